@@ -1,0 +1,77 @@
+"""Frequency response function with its coherence and its uncertainty.
+
+H1 estimator: Bendat & Piersol, Random Data, 4th ed., eq. 6.37 (H = Gyx / Gxx) and table 9.6 (random error).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xy_sysid.stream import FloatArray
+
+ComplexArray = NDArray[np.complex128]
+
+
+def _one() -> FloatArray:
+    return np.ones(1)
+
+
+def _zero() -> FloatArray:
+    return np.zeros(1)
+
+
+@dataclass(frozen=True, slots=True)
+class FrequencyResponse:
+    """Measured response of one axis, output over input.
+
+    frequency:        (m,) Hz, increasing, evenly spaced unless lines were left out
+    response:         (m,) complex, output_unit / input_unit
+    coherence:        (m,) ordinary coherence, 0..1
+    sigma:            (m,) standard deviation of the complex error: E|measured - true|^2 = sigma^2
+    trusted:          (m,) bool: excited and coherent enough to be used for a fit
+    sampling_rate:    Hz
+    averages:         effective number of independent averages
+    resolution:       spacing of the original lines, Hz
+    line_correlation: (k,) correlation of the errors of lines 0..k-1 apart (1 at 0), from the window and its overlap
+    kernel_offset:    (j,) Hz and
+    kernel_weight:    (j,) how the window blurs: the expected estimate at f is sum_j weight_j G(f + offset_j),
+                      where G is the response of the quantity that was transformed (see ``differenced``)
+    differenced:      True if the window was put on the output's difference y[n+1] - y[n] and the estimate divided by
+                      exp(j w T) - 1, so that blurring acts on the response times (exp(j w T) - 1)
+    """
+
+    frequency: FloatArray
+    response: ComplexArray
+    coherence: FloatArray
+    sigma: FloatArray
+    trusted: NDArray[np.bool_]
+    sampling_rate: float
+    averages: float
+    resolution: float
+    input_unit: str = "V"
+    output_unit: str = "m"
+    line_correlation: FloatArray = field(default_factory=_one)
+    kernel_offset: FloatArray = field(default_factory=_zero)
+    kernel_weight: FloatArray = field(default_factory=_one)
+    differenced: bool = False
+
+    def __len__(self) -> int:
+        return int(self.frequency.shape[0])
+
+    def select(self, lines: NDArray[np.bool_] | slice) -> FrequencyResponse:
+        """The same response at some of its lines."""
+        return replace(
+            self,
+            frequency=self.frequency[lines],
+            response=self.response[lines],
+            coherence=self.coherence[lines],
+            sigma=self.sigma[lines],
+            trusted=self.trusted[lines],
+        )
+
+    def band(self, low: float, high: float) -> FrequencyResponse:
+        """The lines from low to high, both included, Hz."""
+        return self.select((self.frequency >= low) & (self.frequency <= high))

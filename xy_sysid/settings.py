@@ -1,0 +1,230 @@
+"""Every knob, once: default, unit, limits and meaning.
+
+ROS parameters, CLI options, YAML files, the page and docs/settings.md are made from these classes. Units are SI.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from xy_sysid.errors import BadInput
+
+Scalar = bool | int | float | str
+Model = TypeVar("Model", bound="Settings")
+
+
+def knob(default: Any, meaning: str, unit: str = "", **limits: Any) -> Any:
+    """One setting: its default, meaning, unit and limits (ge, gt, le, lt)."""
+    return Field(default=default, description=meaning, json_schema_extra={"unit": unit}, **limits)
+
+
+class Settings(BaseModel):
+    """A group of settings that nobody changes in place; an unknown name is an error."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class AxisExcitation(Settings):
+    """What one axis is driven with."""
+
+    kind: Literal["noise", "multisine", "multisine_odd", "multisine_detect", "sweep", "stepped_sine", "prbs", "impulse", "step", "off"] = knob(
+        "noise", "signal; multisine_detect is odd with one random line left out of each group of four, to show distortion"
+    )
+    rms: float = knob(1.0, "root mean square of the signal (impulse and step: its height)", "V", ge=0.0, le=100.0)
+    limit: float = knob(10.0, "no sample leaves this magnitude", "V", gt=0.0, le=1000.0)
+    low: float = knob(0.1, "lowest frequency excited", "Hz", ge=0.0, le=100_000.0)
+    high: float = knob(300.0, "highest frequency excited", "Hz", gt=0.0, le=100_000.0)
+    period: float = knob(4.096, "period of a multisine or PRBS, length of a sweep or step, dwell of a stepped sine", "s", gt=0.0, le=3600.0)
+    steps: int = knob(60, "frequencies of a stepped sine, spread evenly on a log axis", "", ge=1, le=10_000)
+    offset: float = knob(0.0, "constant voltage added", "V", ge=-100.0, le=100.0)
+    seed: int = knob(1, "seed of the random numbers; give every axis its own", "", ge=0, le=2**31 - 1)
+    centring: float = knob(2.0, "pull back to the start, volt per metre away from it; 0 is open loop", "V/m", ge=0.0, le=10_000.0)
+    travel_min: float = knob(-0.14, "soft limit of travel, lower", "m", ge=-1000.0, le=1000.0)
+    travel_max: float = knob(0.14, "soft limit of travel, upper", "m", ge=-1000.0, le=1000.0)
+    brake: float = knob(0.02, "length of the zone before a soft limit in which outward voltage is faded to inward braking", "m", gt=0.0, le=100.0)
+    brake_voltage: float = knob(1.0, "inward voltage at and beyond a soft limit", "V", ge=0.0, le=100.0)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> AxisExcitation:
+        if self.low >= self.high:
+            raise ValueError(f"low is {self.low} Hz; allowed: below high = {self.high} Hz")
+        if self.travel_max - self.travel_min <= 2 * self.brake:
+            raise ValueError(f"travel from {self.travel_min} to {self.travel_max} m; allowed: wider than two brake zones of {self.brake} m")
+        return self
+
+
+class ExcitationSettings(Settings):
+    """Node ``excitation``."""
+
+    rate: float = knob(2000.0, "samples per second", "Hz", ge=10.0, le=100_000.0)
+    block: int = knob(20, "samples in one message", "", ge=1, le=10_000)
+    speed: float = knob(1.0, "times faster than real time, for a simulated machine only; 0 is as fast as it goes", "", ge=0.0, le=1000.0)
+    lockstep: bool = knob(False, "wait for the machine's answer before going on (simulated machines); on a real machine leave it off")
+    ahead: int = knob(3, "blocks sent before the first answer must be there, with lockstep", "", ge=1, le=1000)
+    duration: float = knob(0.0, "stop after so many seconds of signal; 0 is endless", "s", ge=0.0, le=1e9)
+    ramp: float = knob(0.5, "time to fade in, and out at an orderly end", "s", ge=0.0, le=60.0)
+    watchdog: float = knob(0.05, "without a position for so long while active, ramp to zero and go inactive", "s", gt=0.0, le=10.0)
+    abort_ramp: float = knob(0.02, "time to fade out when a guard trips", "s", ge=0.0, le=10.0)
+    axes: dict[str, AxisExcitation] = Field(
+        default_factory=lambda: {"x": AxisExcitation(seed=1), "y": AxisExcitation(seed=2)}, description="one group per axis"
+    )
+
+
+class IdentifierSettings(Settings):
+    """Node ``identifier``, and every offline command that estimates."""
+
+    window: Literal["hann", "hamming", "blackman", "blackmanharris", "flattop", "boxcar"] = knob("hann", "window of the spectra")
+    length: int = knob(4096, "samples in a window", "", ge=16, le=2**22)
+    overlap: float = knob(0.5, "part of a window shared with the next", "", ge=0.0, le=0.95)
+    differenced: bool = knob(True, "put the window on the position's difference (no leakage of the integrator); off is the paper's plain variant")
+    memory: float = knob(0.0, "forget exponentially with this time constant; 0 remembers everything", "s", ge=0.0, le=1e9)
+    sliding: int = knob(0, "keep only so many of the newest windows; 0 keeps all", "", ge=0, le=100_000)
+    band_low: float = knob(0.5, "lowest frequency used in a fit", "Hz", ge=0.0, le=1e6)
+    band_high: float = knob(300.0, "highest frequency used in a fit", "Hz", gt=0.0, le=1e6)
+    min_coherence: float = knob(0.3, "lines below this coherence are not trusted", "", ge=0.0, le=1.0)
+    numerator_order: int = knob(2, "order of the transfer function's numerator", "", ge=0, le=12)
+    denominator_order: int = knob(4, "order of its denominator, integrators included", "", ge=1, le=12)
+    integrators: int = knob(1, "poles fixed at zero", "", ge=0, le=2)
+    delay: bool = knob(True, "estimate a delay")
+    hold: Literal["zoh", "none"] = knob("zoh", "how the voltage behaves between samples: held (zoh) or band-limited (none)")
+    refit: float = knob(2.0, "seconds of data between two fits", "s", gt=0.0, le=3600.0)
+    reorder: float = knob(0.5, "how late a block may come before its samples count as lost", "s", gt=0.0, le=60.0)
+    frozen: float = knob(0.25, "an encoder that repeats one value for so long while the voltage moves is called frozen", "s", gt=0.0, le=60.0)
+    alarm_windows: int = knob(5, "windows of the short memory that watches for a moved resonance", "", ge=3, le=1000)
+    alarm_sigma: float = knob(4.0, "a resonance has moved when it is so many standard errors away", "", ge=1.0, le=100.0)
+    source: Literal["blocks", "joint_state"] = knob("blocks", "type of the position topic")
+    effort_as_voltage: bool = knob(False, "with joint_state: take the input from `effort` instead of the voltage topic")
+    state_file: str = knob("", "file that keeps the spectra over a restart; empty is none")
+    save_every: float = knob(10.0, "seconds between two savings of the state", "s", gt=0.0, le=3600.0)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> IdentifierSettings:
+        if self.band_low >= self.band_high:
+            raise ValueError(f"band_low is {self.band_low} Hz; allowed: below band_high = {self.band_high} Hz")
+        if self.numerator_order > self.denominator_order:
+            raise ValueError(f"numerator_order is {self.numerator_order}; allowed: up to denominator_order = {self.denominator_order}")
+        if self.integrators > self.denominator_order:
+            raise ValueError(f"integrators is {self.integrators}; allowed: up to denominator_order = {self.denominator_order}")
+        return self
+
+
+class BallscrewSettings(Settings):
+    """Node ``ballscrew``: the simulated machine."""
+
+    machine: str = knob("paper.yaml", "machine file: a path, or a name in config/machines")
+    seed: int = knob(0, "seed of noise and hidden effects; 0 is what the machine file says", "", ge=0, le=2**31 - 1)
+    clean: bool = knob(False, "without encoder noise and quantization")
+
+
+class RecorderSettings(Settings):
+    """Node ``recorder``."""
+
+    output: str = knob("", "folder of the new bag; empty is xy_<date>")
+    storage: Literal["sqlite3", "mcap"] = knob("sqlite3", "file format of the bag")
+    topics: list[str] = Field(
+        default_factory=lambda: ["voltage", "position", "joint_states", "frf/.*", "transfer_function/.*", "metrics", "diagnosis", "comparison/.*"],
+        description="topics to record, as regular expressions relative to the namespace",
+    )
+    seconds: float = knob(0.0, "stop after so long; 0 is until told", "s", ge=0.0, le=1e9)
+
+
+@dataclass(frozen=True, slots=True)
+class Knob:
+    """One setting, flattened: ``x.rms`` for the rms of axis x."""
+
+    name: str
+    value: Any
+    default: Any
+    unit: str
+    meaning: str
+    low: float | None
+    high: float | None
+    choices: tuple[str, ...]
+
+
+def _limit(metadata: list[Any], *names: str) -> float | None:
+    for item in metadata:
+        for name in names:
+            found = getattr(item, name, None)
+            if found is not None:
+                return float(found)
+    return None
+
+
+def knobs(settings: Settings, prefix: str = "") -> Iterator[Knob]:
+    """Every setting of a group, axes as ``<axis>.<name>``."""
+    for name, info in type(settings).model_fields.items():
+        value = getattr(settings, name)
+        if isinstance(value, dict):
+            for axis, group in value.items():
+                yield from knobs(group, f"{prefix}{axis}.")
+            continue
+        extra = info.json_schema_extra if isinstance(info.json_schema_extra, dict) else {}
+        choices = tuple(getattr(info.annotation, "__args__", ())) if "Literal" in str(info.annotation) else ()
+        yield Knob(
+            prefix + name,
+            value,
+            info.get_default(call_default_factory=True),
+            str(extra.get("unit", "")),
+            info.description or "",
+            _limit(info.metadata, "ge", "gt"),
+            _limit(info.metadata, "le", "lt"),
+            choices,
+        )
+
+
+def _nested(cls: type[Settings], flat: Mapping[str, Any]) -> dict[str, Any]:
+    groups = {name for name, info in cls.model_fields.items() if "dict[" in str(info.annotation)}
+    nested: dict[str, Any] = {}
+    for key, value in flat.items():
+        if "." in key and groups:
+            axis, _, rest = key.partition(".")
+            nested.setdefault(next(iter(groups)), {}).setdefault(axis, {})[rest] = value
+        else:
+            nested[key] = value
+    return nested
+
+
+def build(cls: type[Model], values: Mapping[str, Any], where: str = "settings") -> Model:
+    """Settings from nested or flat (``x.rms``) values.
+
+    Raises BadInput that names the value, what is allowed, and for an unknown key the nearest spelling.
+    """
+    try:
+        return cls.model_validate(_nested(cls, values))
+    except ValidationError as error:
+        raise _explain(cls, error, where) from None
+
+
+def changed(settings: Model, values: Mapping[str, Any]) -> Model:
+    """The same settings with some flat names changed; raises BadInput like ``build``."""
+    flat = {item.name: item.value for item in knobs(settings)}
+    unknown = [name for name in values if name not in flat]
+    if unknown:
+        raise unknown_name(unknown[0], flat, type(settings).__name__)
+    return build(type(settings), {**flat, **values})
+
+
+def unknown_name(name: str, known: Mapping[str, Any] | list[str], where: str) -> BadInput:
+    """The error for a name that nobody knows, with the nearest that somebody does."""
+    near = difflib.get_close_matches(name, list(known), n=1, cutoff=0.4)
+    act = f"Did you mean {near[0]!r}?" if near else "Remove it."
+    return BadInput(f"{where}: name", repr(name), ", ".join(known), act)
+
+
+def _explain(cls: type[Settings], error: ValidationError, where: str) -> BadInput:
+    first = error.errors()[0]
+    name = ".".join(str(part) for part in first["loc"])
+    if first["type"] == "extra_forbidden":
+        owner: type[Settings] = AxisExcitation if len(first["loc"]) > 1 else cls
+        return unknown_name(str(first["loc"][-1]), list(owner.model_fields), where)
+    context = first.get("ctx", {})
+    allowed = ", ".join(f"{key} {value}" for key, value in context.items() if key != "error") or first["msg"]
+    if "error" in context:
+        return BadInput(f"{where}", name or "not consistent", str(context["error"]), "Change one of them.")
+    return BadInput(f"{where}: {name}", repr(first["input"]), allowed, "Change it and try again.")

@@ -1,0 +1,64 @@
+"""A block of consecutive samples, as it travels in one std_msgs/Float64MultiArray.
+
+Rows are samples; columns are ``seq,time`` and then one per axis. Nothing here knows ROS: a message is its column names
+and its numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xy_sysid.errors import BadInput
+
+FloatArray = NDArray[np.float64]
+SEQ, TIME = "seq", "time"
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Consecutive samples of one quantity.
+
+    axes:   names of the axes, one per column of ``values``
+    seq:    (n,) sample counter since the source started, whole numbers
+    time:   (n,) sample instants, s
+    values: (n, axes), V or m
+    """
+
+    axes: tuple[str, ...]
+    seq: FloatArray
+    time: FloatArray
+    values: FloatArray
+
+    def __len__(self) -> int:
+        return int(self.seq.shape[0])
+
+
+def columns(axes: Sequence[str]) -> str:
+    """The label of ``layout.dim[1]`` for these axes."""
+    return ",".join((SEQ, TIME, *axes))
+
+
+def pack(block: Block) -> FloatArray:
+    """(n * (2 + axes),) row-major numbers of the message."""
+    return np.column_stack((block.seq, block.time, block.values)).ravel()
+
+
+def unpack(label: str, rows: int, width: int, data: FloatArray) -> Block:
+    """The block that a message holds.
+
+    label: ``layout.dim[1].label``; rows, width: the sizes of dim[0] and dim[1]; data: the message's numbers.
+    Raises BadInput if the columns are not ``seq,time,<axis>...`` or the sizes do not fit the data.
+    """
+    names = [name.strip() for name in label.split(",")]
+    if len(names) < 3 or names[0] != SEQ or names[1] != TIME or len(set(names)) != len(names):
+        raise BadInput("column label", repr(label), "'seq,time,' and one name per axis", "Name the columns in layout.dim[1].label.")
+    if width != len(names) or rows < 0 or rows * width != data.size:
+        raise BadInput(
+            "block size", f"{rows} x {width} with {data.size} numbers", f"rows x {len(names)} columns", "Set layout.dim sizes to rows and columns."
+        )
+    table = np.asarray(data, dtype=np.float64).reshape(rows, width)
+    return Block(tuple(names[2:]), table[:, 0], table[:, 1], table[:, 2:])
