@@ -1,0 +1,104 @@
+"""From spectra to the frequency response: the H1 estimator, its coherence, its sigma and which lines to trust.
+
+H1 = Gyx / Gxx; sigma^2 = (Gyy - |Gyx|^2 / Gxx) / Gxx / (averages - 1) is the variance of the complex error.
+(Bendat & Piersol, Random Data, 4th ed., eq. 6.37 and 9.90; Pintelon & Schoukens, System Identification, 2nd ed., sec. 2.5)
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xy_sysid.frf import ComplexArray, FrequencyResponse
+from xy_sysid.spectra import Spectra
+from xy_sysid.stream import FloatArray
+from xy_sysid.windows import WindowShape, blur_kernel
+
+NOISE_SMOOTHING = 2  # lines to each side over which the noise power is averaged: it steadies sigma when windows are few
+EXCITED = 1e-3  # a line is excited when its input power is above this share of the strong lines' power
+
+
+def main_lobe(shape: WindowShape) -> int:
+    """Half width of the taper's main lobe in lines; nearer to zero frequency the removed mean spoils an estimate."""
+    return {"boxcar": 1, "hann": 2, "hamming": 2, "blackman": 3, "blackmanharris": 4, "flattop": 5}.get(shape.name, 4)
+
+
+def divisor(frequency: FloatArray, sampling_rate: float) -> ComplexArray:
+    """(m,) response of the forward difference y[n + 1] - y[n], exp(j w T) - 1."""
+    return np.asarray(np.expm1(2j * np.pi * frequency / sampling_rate), dtype=np.complex128)
+
+
+def frequency_response(
+    spectra: Spectra,
+    shape: WindowShape,
+    sampling_rate: float,
+    *,
+    differenced: bool,
+    periodic: bool = False,
+    band: tuple[float, float] = (0.0, np.inf),
+    min_coherence: float = 0.3,
+    units: tuple[str, str] = ("V", "m"),
+) -> FrequencyResponse:
+    """The response of one axis at the lines inside ``band`` (Hz), zero frequency left out.
+
+    periodic: the window is a whole number of periods of the input, so that nothing leaks and only the excited lines
+    carry information. With fewer than two effective averages sigma is infinite and no line is trusted.
+    """
+    frequency = np.arange(spectra.gxx.shape[0]) * sampling_rate / shape.length
+    inside = (frequency > 0) & (frequency >= band[0]) & (frequency <= min(band[1], 0.5 * sampling_rate))
+    gxx, gyy, gyx = spectra.gxx, spectra.gyy, spectra.gyx
+    power = np.maximum(gxx, np.finfo(float).tiny)
+    response = gyx / power
+    unexplained = np.maximum(gyy - np.abs(gyx) ** 2 / power, 0.0)
+    coherence = np.clip(1.0 - unexplained / np.maximum(gyy, np.finfo(float).tiny), 0.0, 1.0)
+    excited = _excited(gxx, inside, 0 if periodic else main_lobe(shape))
+    if not periodic:
+        unexplained = _smoothed(unexplained)
+        excited &= np.arange(gxx.shape[0]) >= main_lobe(shape)
+    averages = spectra.averages
+    with np.errstate(divide="ignore", over="ignore"):
+        sigma = np.sqrt(unexplained / power / (averages - 1.0)) if averages >= 2.0 else np.full(gxx.shape, np.inf)
+    if differenced:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            response, sigma = response / divisor(frequency, sampling_rate), sigma / np.abs(divisor(frequency, sampling_rate))
+    trusted = excited & (coherence >= min_coherence) & np.isfinite(sigma) & (averages >= 2.0)
+    kernel = np.ones(1) if periodic else blur_kernel(shape)
+    half = (kernel.shape[0] - 1) // 2
+    apart = np.ones(1) if periodic else spectra.quadratic / max(spectra.quadratic[0], np.finfo(float).tiny)
+    return FrequencyResponse(
+        frequency=frequency[inside],
+        response=response[inside],
+        coherence=coherence[inside],
+        sigma=sigma[inside],
+        trusted=trusted[inside],
+        sampling_rate=sampling_rate,
+        averages=averages,
+        resolution=sampling_rate / shape.length,
+        input_unit=units[0],
+        output_unit=units[1],
+        line_correlation=np.trim_zeros(np.where(apart < 1e-6, 0.0, apart), "b"),
+        kernel_offset=np.arange(-half, half + 1) * 0.5 * sampling_rate / shape.length,
+        kernel_weight=kernel,
+        differenced=differenced,
+    )
+
+
+def _excited(gxx: FloatArray, inside: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
+    """Lines whose input power, and that of all their neighbours within the window's main lobe, is not negligible."""
+    strong = float(np.quantile(gxx[inside], 0.9)) if bool(inside.any()) else 0.0
+    if reach == 0 and strong < float(gxx[inside].max(initial=0.0)) * EXCITED:
+        strong = float(gxx[inside].max(initial=0.0))
+    above = gxx > EXCITED * strong
+    if strong <= 0.0:
+        return np.zeros_like(above)
+    result = above.copy()
+    for shift in range(1, reach + 1):
+        result[shift:] &= above[:-shift]
+        result[:-shift] &= above[shift:]
+    return result
+
+
+def _smoothed(power: FloatArray) -> FloatArray:
+    width = 2 * NOISE_SMOOTHING + 1
+    padded = np.pad(power, NOISE_SMOOTHING, mode="edge")
+    return np.asarray(np.convolve(padded, np.full(width, 1.0 / width), mode="valid"), dtype=np.float64)
