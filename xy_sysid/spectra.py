@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,9 @@ from scipy import fft
 from xy_sysid.frf import ComplexArray
 from xy_sysid.stream import FloatArray
 from xy_sysid.windows import LINES_APART, Window, WindowShape, error_correlation
+
+
+State = dict[str, NDArray[Any]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +128,7 @@ class RunningSpectra:
         self._recent.append((new.index, 1.0))
         return Spectra(keep * old.gxx + new.gxx, keep * old.gyy + new.gyy, keep * old.gyx + new.gyx, keep * old.weight + 1.0, quadratic)
 
-    def state(self) -> dict[str, NDArray[np.float64] | NDArray[np.complex128]]:
+    def state(self) -> State:
         """Everything needed to go on later, as arrays."""
         kept = list(self._kept)
         empty = np.zeros((0, self.lines))
@@ -141,7 +145,7 @@ class RunningSpectra:
             "kept_gyx": np.stack([w.gyx for w in kept]) if kept else empty.astype(np.complex128),
         }
 
-    def restore(self, state: dict[str, NDArray[np.float64] | NDArray[np.complex128]]) -> None:
+    def restore(self, state: State) -> None:
         """Go on from a state of the same shape."""
         self._sum = Spectra(
             np.real(state["gxx"]), np.real(state["gyy"]), np.asarray(state["gyx"], dtype=np.complex128),

@@ -71,7 +71,7 @@ def error_correlation(shape: WindowShape) -> FloatArray:
         shift = m * shape.hop
         product = taper[: shape.length - shift] * taper[shift:]
         rows[m] = np.abs(product @ turn[: shape.length - shift]) ** 2
-    return rows / rows[0, 0]
+    return np.asarray(rows / rows[0, 0], dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True)

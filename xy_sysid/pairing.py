@@ -1,0 +1,296 @@
+"""Pair voltage and position by sample counter, whatever order they come in, and say what was wrong with the streams.
+
+Both streams are laid into rings that are indexed by the counter; where both rings are filled the samples go on, in
+order. What is missing for longer than the reorder time is given up as a gap.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xy_sysid.errors import BadInput
+from xy_sysid.recording import rate_from_time
+from xy_sysid.stream import Block, FloatArray
+from xy_sysid.windows import Samples
+
+Kind = Literal["voltage", "position"]
+KINDS: tuple[Kind, Kind] = ("voltage", "position")
+
+RATE_SAMPLES = 200  # samples of one stream from which its rate is read
+RATE_TOLERANCE = 1e-3  # two streams, or one before and after a restart, have the same rate within this
+TIME_TOLERANCE = 1.5  # samples by which a time stamp may leave its place before that counts as a jump
+REORDER_UNKNOWN = 1000  # samples a block may be late as long as the rate is not known
+RESTART_BLOCKS = 2  # consecutive blocks from the past that together mean the source has started again
+
+REASONS = {
+    "lost": "samples never came",
+    "not_finite": "a value was NaN or infinite",
+    "time_jump": "time jumped against the sample counter",
+    "restart": "a source started again",
+    "overrun": "one stream was silent while the other went on",
+    "duplicated": "samples came twice (the first is kept)",
+    "late": "samples came after they had been given up",
+    "wrong_columns": "a message did not hold the expected columns",
+    "bad_counter": "the sample counter was not whole and increasing",
+    "unequal_rates": "voltage and position have different sampling rates",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """Samples that will not come: from counter ``seq``, so many, and why (a key of REASONS)."""
+
+    seq: int
+    samples: int
+    reason: str
+
+
+class _Ring:
+    """One stream, by counter modulo capacity."""
+
+    def __init__(self, capacity: int, axes: int) -> None:
+        self.capacity = capacity
+        self.tag: NDArray[np.int64] = np.full(capacity, -1, dtype=np.int64)
+        self.value: FloatArray = np.zeros((capacity, axes))
+        self.newest = -1
+        self.offset: float | None = None
+        self.rate: float | None = None
+        self.behind = 0
+        self.behind_next = -1
+        self._seqs: list[FloatArray] = []
+        self._times: list[FloatArray] = []
+
+    def put(self, seq: NDArray[np.int64], values: FloatArray) -> int:
+        """Store what is new; the number of samples that were there already."""
+        place = seq % self.capacity
+        fresh = self.tag[place] != seq
+        if bool(fresh.all()):
+            self.tag[place], self.value[place] = seq, values
+        else:
+            self.tag[place[fresh]], self.value[place[fresh]] = seq[fresh], values[fresh]
+        if seq.size:
+            self.newest = max(self.newest, int(seq[-1]))
+        return int(seq.size - np.count_nonzero(fresh))
+
+    def filled(self, first: int, last: int) -> NDArray[np.bool_]:
+        """(last - first,) whether each counter is there."""
+        seq = np.arange(first, last)
+        return np.asarray(self.tag[seq % self.capacity] == seq, dtype=np.bool_)
+
+    def take(self, first: int, last: int) -> FloatArray:
+        return self.value[np.arange(first, last) % self.capacity]
+
+    def clear(self) -> None:
+        self.tag.fill(-1)
+        self.newest, self.offset, self.behind = -1, None, 0
+
+    def learn_rate(self, block: Block) -> None:
+        """Read the rate from the first samples."""
+        if self.rate is None:
+            self._seqs.append(block.seq.copy())
+            self._times.append(block.time.copy())
+            if sum(map(len, self._seqs)) >= RATE_SAMPLES:
+                seq, time = np.concatenate(self._seqs), np.concatenate(self._times)
+                order = np.argsort(seq, kind="stable")
+                keep = order[np.concatenate(([True], np.diff(seq[order]) > 0))]
+                self._seqs, self._times = [], []
+                try:
+                    self.rate = rate_from_time(time[keep], seq[keep].astype(np.int64))
+                except BadInput:
+                    self.rate = None
+
+
+class Pairer:
+    """feed(kind, block) -> paired samples and gaps, in order of the counter."""
+
+    def __init__(self, axes: tuple[str, ...], reorder: float, capacity: int = 1 << 15) -> None:
+        """reorder: seconds by which a block may be late; capacity: samples that one stream may be ahead of the other."""
+        self.axes = axes
+        self.counts: Counter[str] = Counter()
+        self.said: dict[str, str] = {}
+        self._reorder_time = reorder
+        self._rings = {kind: _Ring(capacity, len(axes)) for kind in KINDS}
+        self._next: int | None = None
+        self._cuts: dict[int, str] = {}
+        self._bad: dict[int, str] = {}
+
+    @property
+    def rate(self) -> float | None:
+        """Sampling rate in Hz, once enough was heard of the position stream."""
+        return self._rings["position"].rate
+
+    @property
+    def _reorder(self) -> int:
+        """Samples by which a block may be late."""
+        most = self._rings["voltage"].capacity // 4
+        return REORDER_UNKNOWN if self.rate is None else min(max(round(self._reorder_time * self.rate), 1), most)
+
+    @property
+    def waiting(self) -> dict[Kind, int]:
+        """Newest counter heard of each stream, -1 before the first."""
+        return {kind: ring.newest for kind, ring in self._rings.items()}
+
+    def feed(self, kind: Kind, block: Block) -> list[Samples | Gap]:
+        """Take one block of one stream; blocks may have any length."""
+        found: list[Samples | Gap] = []
+        step = self._rings[kind].capacity // 4
+        for start in range(0, max(len(block), 1), step):
+            part = slice(start, start + step)
+            found += self._feed(kind, Block(block.axes, block.seq[part], block.time[part], block.values[part]))
+        return found
+
+    def _feed(self, kind: Kind, block: Block) -> list[Samples | Gap]:
+        columns = self._columns(kind, block)
+        if columns is None or len(block) == 0:
+            return []
+        if not bool(np.all(np.isfinite(block.seq))) or bool(np.any(block.seq != np.floor(block.seq))) or bool(np.any(np.diff(block.seq) <= 0)):
+            self._fault("bad_counter", f"{kind}: the sample counter must be whole and increase")
+            return []
+        seq = block.seq.astype(np.int64)
+        found: list[Samples | Gap] = []
+        ring = self._rings[kind]
+        if self._restarted(ring, seq):
+            self._fault("restart", f"{kind}: the counter went back from {ring.newest} to {int(seq[0])}")
+            for other in self._rings.values():
+                other.clear()
+            found.append(Gap(int(seq[0]), 0, "restart"))
+            self._next, self._cuts, self._bad = None, {}, {}
+        elif int(seq[-1]) < ring.newest - self._reorder:
+            self._fault("late", f"{kind}: samples {int(seq[0])}..{int(seq[-1])} came {ring.newest - int(seq[-1])} samples late", len(seq))
+            return found
+        ring.learn_rate(block)
+        usable = self._check_values(kind, seq, block.values[:, columns]) & self._check_time(kind, ring, seq, block.time)
+        if self._next is not None:
+            past = seq < self._next
+            if bool(np.any(past & usable)):
+                self.counts["duplicated"] += int(np.count_nonzero(past & usable))
+            usable &= ~past
+        found += self._make_room(int(seq[-1]))
+        self.counts["duplicated"] += ring.put(seq[usable], block.values[usable][:, columns])
+        ring.newest = max(ring.newest, int(seq[-1]))
+        if self._rates_differ():
+            return found
+        return found + self._emit()
+
+    def _columns(self, kind: Kind, block: Block) -> list[int] | None:
+        missing = [name for name in self.axes if name not in block.axes]
+        if missing or block.values.shape != (len(block), len(block.axes)):
+            self._fault("wrong_columns", f"{kind}: columns {', '.join(block.axes)}; expected {', '.join(self.axes)}")
+            return None
+        return [block.axes.index(name) for name in self.axes]
+
+    def _fault(self, reason: str, text: str, number: int = 1) -> None:
+        self.counts[reason] += number
+        self.said[reason] = text
+
+    def _restarted(self, ring: _Ring, seq: NDArray[np.int64]) -> bool:
+        """A jump far back that goes on consistently is a restart; a single old block is only late."""
+        if ring.newest < 0 or int(seq[0]) > ring.newest - self._reorder:
+            ring.behind = 0
+            return False
+        ring.behind = ring.behind + 1 if int(seq[0]) == ring.behind_next else 1
+        ring.behind_next = int(seq[-1]) + 1
+        return ring.behind >= RESTART_BLOCKS
+
+    def _check_values(self, kind: Kind, seq: NDArray[np.int64], values: FloatArray) -> NDArray[np.bool_]:
+        good = np.asarray(np.isfinite(values).all(axis=1), dtype=np.bool_)
+        if not bool(good.all()):
+            bad = seq[~good]
+            self._fault("not_finite", f"{kind}: {len(bad)} samples from counter {int(bad[0])} on are not finite", len(bad))
+            self._bad.update(dict.fromkeys(bad.tolist(), "not_finite"))
+        return good
+
+    def _check_time(self, kind: Kind, ring: _Ring, seq: NDArray[np.int64], time: FloatArray) -> NDArray[np.bool_]:
+        """Time must follow the counter; where it leaves it for good, a run is cut, where it is nonsense, samples are refused."""
+        good = np.asarray(np.isfinite(time), dtype=np.bool_)
+        if ring.rate is not None and bool(good.any()):
+            offset = time - seq / ring.rate
+            before = offset[good][0] if ring.offset is None else ring.offset
+            moved = np.abs(np.diff(np.concatenate(([before], np.where(good, offset, before))))) > TIME_TOLERANCE / ring.rate
+            places = np.flatnonzero(moved)
+            if places.size:
+                self._fault("time_jump", f"{kind}: time jumps at counter {int(seq[places[0]])}", int(places.size))
+            if places.size > 1 and places.size > len(seq) // 4:
+                good = np.zeros_like(good)
+            for place in places[:8]:
+                self._cuts[int(seq[place])] = "time_jump"
+            ring.offset = float(offset[good][-1]) if bool(good.any()) else float(before)
+        if not bool(good.all()):
+            self._bad.update(dict.fromkeys(seq[~good].tolist(), "time_jump"))
+        return good
+
+    def _rates_differ(self) -> bool:
+        rates = [ring.rate for ring in self._rings.values()]
+        if rates[0] is None or rates[1] is None or abs(rates[0] / rates[1] - 1.0) <= RATE_TOLERANCE:
+            return False
+        self._fault("unequal_rates", f"voltage comes at {rates[0]:.6g} Hz, position at {rates[1]:.6g} Hz; they must be equal")
+        return True
+
+    def _make_room(self, newest: int) -> list[Samples | Gap]:
+        """Give up what would be overwritten when one stream runs far ahead of the other."""
+        capacity = self._rings["voltage"].capacity
+        if self._next is None or newest - self._next < capacity:
+            return []
+        gap = Gap(self._next, newest - capacity // 2 - self._next, "overrun")
+        self._fault("overrun", f"one stream is {newest - self._next} samples ahead of the other", gap.samples)
+        self._next = newest - capacity // 2
+        return [gap]
+
+    def _emit(self) -> list[Samples | Gap]:
+        voltage, position = self._rings["voltage"], self._rings["position"]
+        end = min(voltage.newest, position.newest) + 1
+        if voltage.newest < 0 or position.newest < 0:
+            return []
+        if self._next is None:
+            self._next = max(self._first(voltage), self._first(position))
+        found: list[Samples | Gap] = []
+        while self._next < end:
+            both = voltage.filled(self._next, end) & position.filled(self._next, end)
+            hole = int(np.argmin(both)) if not bool(both.all()) else len(both)
+            if hole:
+                found += self._run(self._next, self._next + hole)
+                self._next += hole
+                continue
+            rest = np.flatnonzero(both)
+            if end - self._next <= self._reorder and not self._all_known_bad(int(rest[0]) if rest.size else 0):
+                break
+            skip = int(rest[0]) if rest.size else end - self._next
+            reason = self._bad.get(self._next, "lost")
+            if reason == "lost":
+                self._fault("lost", f"{skip} samples from counter {self._next} on never came", skip)
+            found.append(Gap(self._next, skip, reason))
+            self._next += skip
+        self._bad = {seq: reason for seq, reason in self._bad.items() if seq >= self._next} if self._bad else self._bad
+        return found
+
+    def _all_known_bad(self, length: int) -> bool:
+        """Whether the hole ahead is known never to be filled, so that there is nothing to wait for."""
+        start = self._next or 0
+        return length > 0 and all(start + i in self._bad for i in range(length))
+
+    @staticmethod
+    def _first(ring: _Ring) -> int:
+        return int(ring.tag[ring.tag >= 0].min()) if bool(np.any(ring.tag >= 0)) else ring.newest + 1
+
+    def _run(self, first: int, last: int) -> list[Samples | Gap]:
+        found: list[Samples | Gap] = []
+        cuts = sorted(seq for seq in self._cuts if seq < last)
+        for cut in cuts:
+            reason = self._cuts.pop(cut)
+            if cut < first:
+                cut = first
+            if cut > first:
+                found.append(self._samples(first, cut))
+            found.append(Gap(cut, 0, reason))
+            first = cut
+        if last > first:
+            found.append(self._samples(first, last))
+        return found
+
+    def _samples(self, first: int, last: int) -> Samples:
+        return Samples(first, self._rings["voltage"].take(first, last), self._rings["position"].take(first, last))
