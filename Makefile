@@ -1,0 +1,53 @@
+# Everything runs from .venv, which is made once and again when constraints.txt or setup.py change.
+# Another Python: make install PYTHON=/path/to/python3.12
+
+PYTHON ?=
+ARGS ?=
+VENV := .venv
+BIN := $(VENV)/bin
+INSTALLED := $(VENV)/.installed
+PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet install --no-compile -c constraints.txt
+FITS := import ensurepip, sys, venv; sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 13))
+
+.DEFAULT_GOAL := help
+.PHONY: help install demo test lint types unit bench clean
+
+help: ## this text
+	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 18
+
+install: $(INSTALLED) ## make .venv with the ROS 2 wheels and the test tools
+
+$(INSTALLED): constraints.txt setup.py
+	@found=; for python in $(PYTHON) $(if $(PYTHON),,python3.12 python3.11 python3); do \
+	  if "$$python" -c '$(FITS)' >/dev/null 2>&1; then found=$$python; break; fi; done; \
+	if [ -z "$$found" ]; then \
+	  echo "make: no Python 3.11 or 3.12 with venv and ensurepip found$(if $(PYTHON), as PYTHON=$(PYTHON))." \
+	    "Install one (on Debian and Ubuntu: python3 python3-venv), or say where it is: make install PYTHON=PATH" >&2; exit 1; fi; \
+	echo "making $(VENV) with $$("$$found" --version); this takes about a minute"; \
+	"$$found" -m venv --clear $(VENV)
+	@$(PIP) setuptools
+	@$(PIP) --no-build-isolation --editable '.[ros,test]'
+	@touch $@
+
+demo: $(INSTALLED) ## watch a simulated XY table being identified live (ARGS="--help" for more)
+	@$(BIN)/xy-sysid demo $(ARGS)
+
+test: lint types unit ## style, types and every test
+
+lint: $(INSTALLED) ## style
+	@$(BIN)/ruff check .
+	@$(BIN)/ruff format --check .
+
+types: $(INSTALLED) ## types
+	@$(BIN)/mypy
+
+unit: $(INSTALLED) ## every test (ARGS="-k words" for some)
+	@$(BIN)/python -m pytest $(ARGS)
+
+bench: $(INSTALLED) ## measure against other software, and write the table (ARGS names one)
+	@$(PIP) --no-build-isolation --editable '.[bench]'
+	@$(BIN)/python -m bench $(ARGS)
+
+clean: ## remove what the other targets made
+	rm -rf $(VENV) build install log .mypy_cache .ruff_cache .pytest_cache .hypothesis *.egg-info
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

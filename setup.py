@@ -1,0 +1,62 @@
+"""How the package is installed: by pip, by colcon, or both from one tree."""
+
+from glob import glob
+
+from setuptools import find_packages, setup
+
+NAME = "xy_sysid"
+ROS_WHEELS = "sys_platform == 'linux' and platform_machine == 'x86_64'"
+
+setup(
+    name=NAME,
+    version="0.1.0",
+    description="Live identification of an XY table over ROS 2, and the same from a recording",
+    author="xy_sysid contributors",
+    maintainer="xy_sysid maintainers",
+    maintainer_email="maintainers@users.noreply.example.com",
+    license="Apache-2.0",
+    python_requires=">=3.11,<3.13",
+    packages=find_packages(include=["xy_sysid", "xy_sysid.*", "xy_sim", "xy_sim.*"]),
+    package_data={"xy_sysid": ["py.typed", "**/*.html", "**/*.js", "**/*.css", "**/*.yaml"], "xy_sim": ["py.typed", "**/*.yaml"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
+        (f"share/{NAME}", ["package.xml"]),
+        (f"share/{NAME}/config", sorted(glob("config/*.yaml") + glob("config/*.xml") + glob("config/*.md"))),
+        (f"share/{NAME}/config/machines", sorted(glob("config/machines/*.yaml"))),
+        (f"share/{NAME}/launch", sorted(glob("launch/*.py"))),
+    ],
+    zip_safe=False,
+    install_requires=["numpy", "scipy", "numba", "rosbags", "pydantic>=2", "typer", "rich", "plotly", "joblib", "pyyaml"],
+    extras_require={
+        "ros": [
+            f"ros-jazzy-rclpy[fastrtps]==7.1.6; {ROS_WHEELS}",
+            f"ros-jazzy-common-interfaces==5.3.6; {ROS_WHEELS}",
+        ],
+        "control": ["control"],
+        "bench": ["scikit-rf", "pyFRF", "threadpoolctl"],
+        "test": [
+            "pytest",
+            "hypothesis",
+            "ruff",
+            "mypy",
+            "scipy-stubs",
+            "types-PyYAML",
+            "types-setuptools",
+            "pre-commit",
+            "threadpoolctl",
+            "control",
+            "colcon-core",
+            "colcon-ros",
+            "colcon-bash",
+        ],
+    },
+    entry_points={
+        "console_scripts": [
+            "xy-sysid = xy_sysid.cli:main",
+            "excitation = xy_sysid.nodes.excitation:main",
+            "identifier = xy_sysid.nodes.identifier:main",
+            "recorder = xy_sysid.nodes.recorder:main",
+            "ballscrew = xy_sim.node:main",
+        ],
+    },
+)
