@@ -171,7 +171,9 @@ class Pairer:
                 self.counts["duplicated"] += int(np.count_nonzero(past & usable))
             usable &= ~past
         found += self._make_room(int(seq[-1]))
-        self.counts["duplicated"] += ring.put(seq[usable], block.values[usable][:, columns])
+        doubled = ring.put(seq[usable], block.values[usable][:, columns])
+        if doubled:
+            self.counts["duplicated"] += doubled
         ring.newest = max(ring.newest, int(seq[-1]))
         if self._rates_differ():
             return found

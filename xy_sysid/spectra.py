@@ -18,7 +18,6 @@ from xy_sysid.frf import ComplexArray
 from xy_sysid.stream import FloatArray
 from xy_sysid.windows import LINES_APART, Window, WindowShape, error_correlation
 
-
 State = dict[str, NDArray[Any]]
 
 
