@@ -1,0 +1,19 @@
+"""Functions that are compiled into whatever compiled code calls them.
+
+They keep no cache of their own, so the one cache that counts, the kernel's, can be keyed on the text of them all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import ParamSpec, TypeVar, cast
+
+from numba.extending import register_jitable
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def inlined(function: Callable[P, R]) -> Callable[P, R]:
+    """The same function, callable from Python and from compiled code."""
+    return cast("Callable[P, R]", register_jitable(function))

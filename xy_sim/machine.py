@@ -1,0 +1,138 @@
+"""The simulated machine: volts in, encoder metres out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from xy_sim import kernel, truth
+from xy_sim.layout import STATES, numbers
+from xy_sim.machine_file import Axis, Spec, parts_from, read
+from xy_sim.parts import PARTS
+from xy_sysid.errors import BadInput
+from xy_sysid.stream import FloatArray
+
+
+class _Moving:
+    """One axis while it runs: parameters, state, voltages on their way, and its own noise."""
+
+    def __init__(self, axis: Axis, rate: float, seed: int, number: int) -> None:
+        self.parameters = numbers(axis.drive, axis.parts)
+        delay = axis.parts.get("time_delay", {}).get("delay", 0.0)
+        self.states = np.zeros((kernel.ROWS, len(STATES)))
+        self.past = np.zeros(int(delay * rate) + 3)
+        self.counters = np.zeros(3, dtype=np.int64)
+        self.random = np.random.default_rng([seed, number])
+
+
+class Machine:
+    """A table of one or more axes that goes on from where it was; its truth can be asked for.
+
+    Any split of the same voltages into blocks gives the same positions, bit for bit.
+    """
+
+    def __init__(self, spec: Spec, seed: int | None = None, clean: bool = False) -> None:
+        """spec: what it is made of; seed: of the encoder noise (the spec's by default); clean: exact positions."""
+        self.spec = spec
+        self.seed = spec.seed if seed is None else seed
+        self.clean = clean
+        self.reset()
+
+    @classmethod
+    def from_file(cls, path_or_name: str | Path, seed: int | None = None, clean: bool = False) -> Machine:
+        """A machine from a YAML file or a name in config/machines; a file with ``hidden`` draws its effects from the seed.
+
+        Raises BadInput for what cannot be read, with the nearest spelling of an unknown name.
+        """
+        spec = read(path_or_name)
+        if spec.hidden is not None:
+            from xy_sim.hidden import drawn  # noqa: PLC0415
+
+            spec = drawn(spec, seed)
+        return cls(spec, seed, clean)
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Names of the axes, in the order of the columns."""
+        return tuple(axis.name for axis in self.spec.axes)
+
+    @property
+    def rate(self) -> float:
+        """Samples per second, Hz."""
+        return self.spec.rate
+
+    @property
+    def samples(self) -> int:
+        """Samples done since the start."""
+        return int(self._moving[0].counters[0])
+
+    def reset(self) -> None:
+        """Back to rest at the origin, with the noise from its start."""
+        self._moving = [_Moving(axis, self.spec.rate, self.seed, number) for number, axis in enumerate(self.spec.axes)]
+
+    def step(self, voltage: FloatArray) -> FloatArray:
+        """(n, axes) encoder positions, m: row k is read at the instant at which row k of ``voltage`` (n, axes), V, begins to be held."""
+        given = np.asarray(voltage, dtype=np.float64)
+        if given.ndim != 2 or given.shape[1] != len(self._moving) or not np.all(np.isfinite(given)):
+            raise BadInput("voltage", f"of shape {given.shape}", f"finite numbers, (n, {len(self._moving)})", "Give one column per axis.")
+        out = np.empty_like(given, order="C")
+        for column, (axis, moving) in enumerate(zip(self.spec.axes, self._moving, strict=True)):
+            seen = np.empty(given.shape[0])
+            kernel.run(
+                moving.parameters,
+                moving.states,
+                moving.past,
+                moving.counters,
+                np.ascontiguousarray(given[:, column]),
+                seen,
+                self.spec.rate,
+                self.spec.inner_rate,
+            )
+            out[:, column] = seen if self.clean else self._encoder(axis, moving, seen)
+        return out
+
+    @staticmethod
+    def _encoder(axis: Axis, moving: _Moving, seen: FloatArray) -> FloatArray:
+        count = axis.drive.count
+        noise = axis.drive.encoder_noise * moving.random.standard_normal(seen.shape[0])
+        counted: FloatArray = np.round((seen + noise) / count) * count
+        return counted
+
+    def truth(self, axis: str, time: float = 0.0) -> dict[str, Any]:
+        """The linear truth of an axis at small signal, at ``time`` (s) for what drifts; see ``xy_sim.truth.linear``."""
+        return truth.linear(self.spec.axes[self._place(axis)], time)
+
+    def state(self, axis: str) -> dict[str, float]:
+        """Every state of an axis now, by name, SI."""
+        return dict(zip(STATES, self._moving[self._place(axis)].states[0].tolist(), strict=True))
+
+    def energy(self, axis: str) -> float:
+        """Energy stored in an axis now, J: motion, springs, contacts, bristles, potentials."""
+        moving = self._moving[self._place(axis)]
+        return truth.energy(moving.parameters, moving.states[0], self.samples / self.rate)
+
+    def with_parts(self, parts: Mapping[str, Any], axes: Sequence[str] | None = None) -> Machine:
+        """A new machine at rest, with parts added or replaced on some axes (all by default).
+
+        parts: name -> size, or name -> {parameter: value}, or name -> {} for the default size, or name -> False to take it away.
+        """
+        for axis in axes or ():
+            self._place(axis)
+        away = {name for name, value in parts.items() if value is False and name in PARTS}
+        added = parts_from({name: value for name, value in parts.items() if name not in away}, "effect")
+
+        def changed(axis: Axis) -> Axis:
+            if axes is not None and axis.name not in axes:
+                return axis
+            return replace(axis, parts={name: value for name, value in (dict(axis.parts) | added).items() if name not in away})
+
+        return Machine(replace(self.spec, axes=tuple(changed(axis) for axis in self.spec.axes)), self.seed, self.clean)
+
+    def _place(self, axis: str) -> int:
+        if axis not in self.axes:
+            raise BadInput("axis", repr(axis), ", ".join(self.axes), "Give one of these.")
+        return self.axes.index(axis)

@@ -1,0 +1,155 @@
+"""Machine files: YAML in, checked settings out."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from xy_sim.drive import Drive
+from xy_sim.parts import PARTS
+from xy_sysid.errors import BadInput
+from xy_sysid.settings import build, unknown_name
+
+Parts = Mapping[str, Mapping[str, float]]
+_TOP = ("description", "base", "rate", "inner_rate", "seed", "axes", "hidden")
+_HIDDEN = ("seed", "effects", "scale")
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """One axis: its drive, and its parts with every parameter (part -> parameter -> value, SI)."""
+
+    name: str
+    drive: Drive
+    parts: Parts
+
+
+@dataclass(frozen=True, slots=True)
+class Spec:
+    """A whole machine, before it moves.
+
+    rate: samples per second, Hz; inner_rate: fewest inner steps per second, Hz; seed: of the encoder noise;
+    hidden: what ``xy_sim.hidden`` shall draw (keys seed, effects, scale), or empty.
+    """
+
+    axes: tuple[Axis, ...]
+    rate: float = 2000.0
+    inner_rate: float = 40_000.0
+    seed: int = 0
+    description: str = ""
+    hidden: Mapping[str, Any] | None = None
+
+
+def _folders() -> list[Path]:
+    prefixes = [entry for entry in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if entry]
+    shares = [Path(prefix) / "share" / "xy_sysid" / "config" / "machines" for prefix in (*prefixes, sys.prefix)]
+    package = Path(__file__).resolve().parent
+    return [package.parent / "config" / "machines", package / "machines", *shares]
+
+
+def machine_path(name: str | Path) -> Path:
+    """The file of a machine: a path, or a name (with or without .yaml) in config/machines of the source or the installation.
+
+    Raises BadInput if there is none.
+    """
+    given = Path(name)
+    if given.is_file():
+        return given
+    for folder in _folders():
+        for candidate in (folder / given, folder / f"{given}.yaml"):
+            if candidate.is_file():
+                return candidate
+    names = sorted({file.name for folder in _folders() for file in folder.glob("*.yaml")})
+    raise BadInput("machine", repr(str(name)), "a file, or one of " + (", ".join(names) or "none installed"), "Give one of these or a path.")
+
+
+def _mapping(value: object, where: str) -> dict[str, Any]:
+    if value is None:
+        return {}
+    if not isinstance(value, dict):
+        raise BadInput(where, repr(value), "names with values (key: value)", "Indent the keys below it.")
+    for key in value:
+        if isinstance(key, bool):
+            raise BadInput(
+                f"{where}: name", str(key), 'text, such as "x" or "y"', 'YAML reads a bare y, yes or on as true: write the name in quotes, "y".'
+            )
+    return {str(key): item for key, item in value.items()}
+
+
+def _number(value: object, where: str, low: float, high: float) -> float:
+    try:
+        number = float(str(value))
+    except ValueError:
+        number = float("nan")
+    if isinstance(value, bool) or not low <= number <= high:
+        raise BadInput(where, repr(value), f"{low:g} to {high:g}", "Change it and try again.")
+    return number
+
+
+def parts_from(given: object, where: str) -> dict[str, dict[str, float]]:
+    """Checked parts with all their parameters, from part -> size, or part -> parameter -> value, or part -> nothing."""
+    table = _mapping(given, f"{where}: parts")
+    for name in table:
+        if name not in PARTS:
+            raise unknown_name(name, list(PARTS), f"{where}: part")
+    return {name: PARTS[name].values(value, where) for name, value in table.items()}
+
+
+def _numeric(values: dict[str, Any]) -> dict[str, Any]:
+    """YAML 1.1 takes 1e-6 for text; here it is a number."""
+
+    def number(value: Any) -> Any:
+        try:
+            return float(value) if isinstance(value, str) else value
+        except ValueError:
+            return value
+
+    return {name: number(value) for name, value in values.items()}
+
+
+def _axis(name: str, given: object, where: str) -> Axis:
+    values = _mapping(given, f"{where}: axis {name}")
+    parts = parts_from(values.pop("parts", None), f"{where}: axis {name}")
+    known = [*Drive.model_fields, "parts"]
+    for key in values:
+        if key not in known:
+            raise unknown_name(key, known, f"{where}: axis {name}")
+    if "base_loosening" in parts and "base_resonance" not in parts:
+        raise BadInput(f"{where}: axis {name}", "base_loosening", "only with base_resonance", "Add base_resonance.")
+    return Axis(name, build(Drive, _numeric(values), f"{where}: axis {name}"), parts)
+
+
+def read(name: str | Path) -> Spec:
+    """The machine that a file describes; raises BadInput, which names the value, what is allowed and the nearest spelling."""
+    path = machine_path(name)
+    try:
+        table = _mapping(yaml.safe_load(path.read_text(encoding="utf-8")), path.name)
+    except (yaml.YAMLError, UnicodeDecodeError, OSError) as error:
+        raise BadInput("machine file", str(path), "YAML text", f"It says: {str(error).splitlines()[0]}.") from None
+    for key in table:
+        if key not in _TOP:
+            raise unknown_name(key, list(_TOP), path.name)
+    hidden = _mapping(table["hidden"], f"{path.name}: hidden") if "hidden" in table else None
+    for key in hidden or {}:
+        if key not in _HIDDEN:
+            raise unknown_name(key, list(_HIDDEN), f"{path.name}: hidden")
+    if "base" in table:
+        if "axes" in table:
+            raise BadInput(path.name, "base and axes", "one of them", "Remove one.")
+        below = read(path.parent / str(table["base"]) if (path.parent / str(table["base"])).is_file() else str(table["base"]))
+        axes, defaults = below.axes, below
+    else:
+        given = _mapping(table.get("axes"), f"{path.name}: axes")
+        if not given:
+            raise BadInput(f"{path.name}: axes", "empty", "one group per axis", 'Add axes: {"x": {}}.')
+        axes, defaults = tuple(_axis(axis, values, path.name) for axis, values in given.items()), Spec(())
+    rate = _number(table.get("rate", defaults.rate), f"{path.name}: rate", 10.0, 1e5)
+    inner = _number(table.get("inner_rate", defaults.inner_rate), f"{path.name}: inner_rate", rate, 1e7)
+    seed = int(_number(table.get("seed", defaults.seed), f"{path.name}: seed", 0, 2**31 - 1))
+    return Spec(axes, rate, inner, seed, str(table.get("description", defaults.description)), hidden)

@@ -1,0 +1,24 @@
+"""The amplifier has a largest voltage."""
+
+from __future__ import annotations
+
+from xy_sim.inlined import inlined
+from xy_sim.parts.contract import Parameter, Part
+
+PART = Part(
+    name="saturation",
+    kind="input",
+    group="effect",
+    law="v = clip(u, -limit, limit)",
+    meaning="supply or current limit of the drive",
+    source="Khalil, Nonlinear Systems, sec. 1.2",
+    parameters=(
+        Parameter("limit", "V", 1.5, 1.0, 2.2, "largest voltage that comes out", 1e-9, 1e6),
+    ),
+)
+
+
+@inlined
+def output(limit: float, u: float) -> float:
+    """Clipped voltage, V; limit 0 is none."""
+    return min(max(u, -limit), limit) if limit > 0.0 else u
