@@ -1,0 +1,161 @@
+"""From a point in the space of models to a Fit: coefficients, poles, zeros, and how sure each of them is.
+
+Covariance: errors of neighbouring lines are correlated (window, overlap), so the sandwich
+(J'J)^-1 J' S J (J'J)^-1 with S the covariance of the weighted errors (Pintelon & Schoukens, System Identification, 2nd ed.,
+9.11). Everything else follows by the delta method.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from xy_sysid.fitting.damped import weighted_jacobian
+from xy_sysid.fitting.intervals import coefficient_estimates, gain_estimate, root_estimates
+from xy_sysid.fitting.problem import Point, Problem, cost
+from xy_sysid.fitting.result import Fit
+from xy_sysid.frf import ComplexArray
+from xy_sysid.stream import FloatArray
+from xy_sysid.transfer_function import TransferFunction
+
+CONSISTENT = 3.0  # standard deviations
+
+
+def finish(task: Problem, at: Point, method: str, iterations: int, converged: bool, reason: str, start: str) -> Fit:
+    """Work out everything that a Fit says."""
+    structure, plan, frf = task.structure, task.plan, task.frf
+    predicted, jacobian = weighted_jacobian(task, at)
+    value = cost(task, predicted)
+    inner, expected, deviation = _covariance(task, jacobian)
+    to_numerator, to_denominator = _to_coefficients(task, at)
+    numerator = (at.b @ to_numerator)[::-1]
+    denominator = np.concatenate(((at.a @ to_denominator)[::-1], np.zeros(structure.integrators)))
+    if structure.domain == "z":
+        denominator = denominator[: structure.free_order + 1]
+        for _ in range(structure.integrators):
+            denominator = np.convolve(denominator, [1.0, -1.0])
+    tf = TransferFunction(numerator, denominator, at.delay, None if structure.domain == "s" else plan.period, frf.input_unit, frf.output_unit)
+    map_all = _parameter_map(task, to_numerator, to_denominator)
+    names = _names(task)
+    covariance = map_all @ inner @ map_all.T
+    stacked = np.concatenate((jacobian.real, jacobian.imag)) @ np.linalg.inv(map_all)
+    poles = at.denominator.roots(at.a)
+    zeros = at.numerator.roots(at.b)
+    rest = np.full(structure.integrators, 0.0 if structure.domain == "s" else 1.0)
+    relative = float(np.sqrt(np.mean(np.abs((frf.response - predicted) / frf.response) ** 2)))
+    values = np.concatenate((tf.numerator, (at.a @ to_denominator)[:-1][::-1], [at.delay] if structure.free_delay else []))
+    coefficients = coefficient_estimates(names, values, covariance)
+    gain = gain_estimate(task, at, inner)
+    warnings: list[str] = []
+    if not np.isfinite(expected):
+        consistent = None
+    else:
+        consistent = bool(value <= expected + CONSISTENT * deviation)
+        if not consistent and converged:
+            warnings.append(f"The cost {value:.4g} is above the {expected:.4g} that noise explains: the model misses something that the data show.")
+    unstable = poles[(poles.real > 0) if structure.domain == "s" else (np.abs(poles) > 1)]
+    if unstable.size:
+        listed = ", ".join(f"{p:.4g}" for p in unstable * (plan.scale if structure.domain == "s" else 1.0))
+        warnings.append(f"Unstable: poles at {listed}{' rad/s' if structure.domain == 's' else ''}.")
+    if structure.free_delay and at.delay >= structure.delay_max * (1 - 1e-9):
+        warnings.append(f"The delay is at its largest allowed value, {structure.delay_max:g} s; allow a larger one.")
+    return Fit(
+        tf=tf,
+        structure=structure,
+        method=method,
+        frequency=frf.frequency,
+        measured=frf.response,
+        response=predicted,
+        weight=task.weight,
+        cost=value,
+        expected_cost=expected,
+        cost_deviation=deviation,
+        consistent=consistent,
+        relative_error=relative,
+        parameters=names,
+        covariance=covariance,
+        jacobian=stacked,
+        poles=np.concatenate((_ordered(poles) * plan.scale, rest)),
+        zeros=_ordered(zeros) * plan.scale,
+        intervals=(
+            *coefficients,
+            gain,
+            *root_estimates(task, poles, at.denominator, at.a, inner, at.b.size, "pole"),
+            *root_estimates(task, zeros, at.numerator, at.b, inner, 0, "zero"),
+        ),
+        iterations=iterations,
+        converged=converged and np.isfinite(value),
+        reason=reason,
+        warnings=tuple(warnings),
+        start=start,
+    )
+
+
+def _ordered(roots: ComplexArray) -> ComplexArray:
+    return roots[np.lexsort((roots.imag, np.round(np.abs(roots), 12)))]
+
+
+def _to_coefficients(task: Problem, at: Point) -> tuple[FloatArray, FloatArray]:
+    """(m + 1, m + 1) and (n + 1, n + 1): row k is what parameter k adds to the coefficients of rising powers of s."""
+    up, down = at.numerator.powers(), at.denominator.powers()
+    lead = down[-1, -1] * at.a[-1]
+    scale, order, free = task.plan.scale, float(task.structure.denominator_order), float(task.structure.free_order)
+    return up / lead * scale ** (order - np.arange(up.shape[1])), down / lead * scale ** (free - np.arange(down.shape[1]))
+
+
+def _parameter_map(task: Problem, to_numerator: FloatArray, to_denominator: FloatArray) -> FloatArray:
+    """(p, p): from changes of (b, a, delay) to changes of the reported parameters (falling powers)."""
+    m, n = task.structure.numerator_order + 1, task.structure.free_order
+    out = np.zeros((m + n + int(task.structure.free_delay),) * 2)
+    out[:m, :m] = to_numerator.T[::-1]
+    out[m : m + n, m : m + n] = to_denominator[:n, :n].T[::-1]
+    if task.structure.free_delay:
+        out[-1, -1] = 1.0
+    return out
+
+
+def _names(task: Problem) -> tuple[str, ...]:
+    """numerator_k and denominator_k are the coefficients of s^k (z^k, in the z domain of the part without integrators)."""
+    structure = task.structure
+    shift = structure.integrators if structure.domain == "s" else 0
+    top = [f"numerator_{k}" for k in range(structure.numerator_order, -1, -1)]
+    bottom = [f"denominator_{k + shift}" for k in range(structure.free_order - 1, -1, -1)]
+    return tuple(top + bottom + (["delay"] if structure.free_delay else []))
+
+
+def _covariance(task: Problem, jacobian: ComplexArray) -> tuple[FloatArray, float, float]:
+    """((p, p) covariance of b, a, delay, expected cost, its standard deviation); NaN without sigma."""
+    size = jacobian.shape[1]
+    if task.sigma is None:
+        return np.full((size, size), np.nan), float("nan"), float("nan")
+    scale = np.sqrt(np.sum(np.abs(jacobian) ** 2, axis=0))
+    scale[~(scale > 0)] = 1.0
+    unit = jacobian / scale
+    stacked = np.concatenate((unit.real, unit.imag))
+    _, values, right = np.linalg.svd(stacked, full_matrices=False)
+    keep = values > 1e-13 * values[0]
+    bread = (right[keep].T / values[keep] ** 2) @ right[keep]
+    error = task.weight * task.sigma
+    meat = 0.5 * np.real(unit.conj().T @ _correlated(task, unit * error[:, None], error))
+    expected = 0.5 * (float(np.sum(error**2)) - float(np.trace(bread @ meat)))
+    squares = task.frf.line_correlation[1:] ** 2
+    spread = float(np.sum(error**4)) * (1.0 + 2.0 * float(np.sum(squares)))
+    freedom = 2.0 * (task.frf.averages - 1.0)
+    if task.structure.weighting == "sigma" and freedom > 4.5:  # sigma is itself estimated: |error|^2 / sigma^2 is F(2, freedom)
+        expected *= freedom / (freedom - 2.0)
+        spread *= freedom**3 / ((freedom - 2.0) ** 2 * (freedom - 4.0))
+    return (bread @ meat @ bread) / np.outer(scale, scale), expected, 0.5 * float(np.sqrt(spread))
+
+
+def _correlated(task: Problem, scaled: ComplexArray, error: FloatArray) -> ComplexArray:
+    """Covariance of the weighted errors times a matrix whose rows are already multiplied by the errors' size."""
+    frf = task.frf
+    place = np.rint(frf.frequency / frf.resolution).astype(np.int64) if frf.resolution > 0 else np.arange(len(frf))
+    place = place - place[0]
+    full = np.zeros((int(place[-1]) + 1, scaled.shape[1]), dtype=np.complex128)
+    full[place] = scaled
+    total = full * frf.line_correlation[0]
+    for k, value in enumerate(frf.line_correlation[1:], start=1):
+        if k < full.shape[0] and value != 0.0:
+            total[k:] += value * full[:-k]
+            total[:-k] += value * full[k:]
+    return np.asarray(total[place] * error[:, None])

@@ -1,0 +1,36 @@
+"""The estimate to trust by default: maximum likelihood from a warm start, checked against a cold one when in doubt."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from xy_sysid.fitting.damped import minimise
+from xy_sysid.fitting.nlls import cold, finished
+from xy_sysid.fitting.problem import from_transfer_function, problem
+from xy_sysid.fitting.result import Fit
+from xy_sysid.fitting.structure import FitOptions, Structure
+from xy_sysid.frf import FrequencyResponse
+from xy_sysid.transfer_function import TransferFunction
+
+DEFAULTS = FitOptions()
+DOUBT = 3.0  # a warm start is doubted when its cost is more than this many deviations above what noise explains
+
+
+def identify(frf: FrequencyResponse, structure: Structure, start: TransferFunction | None = None, options: FitOptions = DEFAULTS) -> Fit:
+    """Fit a structure to the trusted lines of a response.
+
+    start: the last model, if there is one: a few milliseconds; a cold start is tried as well when it leads nowhere good.
+    Raises BadInput for too few trusted lines. A fit that fails is a result with ``converged`` False and a reason.
+    """
+    task = problem(frf, structure)
+    warm = None
+    point = from_transfer_function(task, start) if start is not None else None
+    if point is not None:
+        warm = finished(task, minimise(task, point, options), "ml" if structure.weighting == "sigma" else "nlls", "the last model")
+        if warm.converged and warm.consistent:
+            return warm
+    minimum = cold(task, replace(options, refine_delay=False))
+    if warm is not None and warm.cost <= minimum.cost * (1 + 1e-9):
+        return warm
+    name = "ml" if structure.weighting == "sigma" else "nlls"
+    return finished(task, minimum, name, "iterative weighted least squares at the best delays of a scan")

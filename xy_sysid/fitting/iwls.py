@@ -1,0 +1,21 @@
+"""Iterative weighted linear least squares (Sanathanan & Koerner, 1963): each step weighted by the last denominator."""
+
+from __future__ import annotations
+
+from xy_sysid.fitting.finish import finish
+from xy_sysid.fitting.linear import searched
+from xy_sysid.fitting.problem import problem
+from xy_sysid.fitting.result import Fit
+from xy_sysid.fitting.structure import FitOptions, Structure
+from xy_sysid.frf import FrequencyResponse
+from xy_sysid.transfer_function import TransferFunction
+
+DEFAULTS = FitOptions()
+
+
+def fit(frf: FrequencyResponse, structure: Structure, start: TransferFunction | None = None, options: FitOptions = DEFAULTS) -> Fit:
+    """Fit by re-weighted linear steps at the best delay; ``start`` is not needed and not used. Raises BadInput for too few lines."""
+    del start
+    task = problem(frf, structure)
+    point, _, steps = searched(task, options.reweightings, options)
+    return finish(task, point, "iwls", steps, True, "The best of the re-weighted linear steps.", "scan over delays")

@@ -1,0 +1,116 @@
+"""Linear least squares for N and D, plain and re-weighted by the last denominator.
+
+Levy, "Complex-curve fitting", IRE Trans. 1959; Sanathanan & Koerner, IEEE Trans. Automatic Control 8, 1963. Hold, window
+and delay enter by correcting the data with the last model: what it predicts through them, less what it is without them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from xy_sysid.fitting.basis import basis
+from xy_sysid.fitting.problem import Point, Problem, cost, rational, response
+from xy_sysid.fitting.structure import FitOptions
+from xy_sysid.frf import ComplexArray
+
+SCAN_STEPS = 4  # re-weightings at each delay of the scan: enough to rank delays
+
+
+def linear_step(task: Problem, delay: float, last: Point | None, correct: bool) -> Point:
+    """One linear fit at a delay, weighted by the last denominator; the first one (last=None) is Levy's."""
+    line, structure = task.plan.line, task.structure
+    factor = task.plan.line_factor * np.exp(-1j * task.plan.line_omega * delay)
+    data = task.frf.response
+    weight: ComplexArray = task.weight.astype(np.complex128)
+    if last is not None:
+        up, down = rational(task, last)
+        weight = weight / (down / np.max(np.abs(down)))
+        if correct:
+            data = data - (response(task, last) - factor * up / down)
+    n_weight, d_weight = weight * factor, weight * data
+    numerator = basis(line, np.abs(n_weight), structure.numerator_order)
+    denominator = basis(line, np.abs(d_weight), structure.free_order)
+    left = numerator.values(line) * n_weight[:, None]
+    right = denominator.values(line) * d_weight[:, None]
+    table = np.concatenate((left, -right[:, :-1], right[:, -1:]), axis=1)
+    upper = np.linalg.qr(np.concatenate((table.real, table.imag)), mode="r")
+    size = upper.shape[1] - 1
+    solution = np.linalg.lstsq(upper[:size, :size], upper[:size, size], rcond=1e-14)[0]
+    split = structure.numerator_order + 1
+    return Point(numerator, denominator, solution[:split], np.append(solution[split:], 1.0), delay)
+
+
+def reweighted(task: Problem, delay: float, steps: int, start: Point | None = None) -> tuple[Point, float, int]:
+    """(best point, its cost, steps done): linear steps until the cost settles."""
+    point = linear_step(task, delay, start, start is not None)
+    best, lowest = point, cost(task, response(task, point))
+    previous = lowest
+    for number in range(1, steps):
+        if not np.isfinite(previous):
+            return best, lowest, number
+        point = linear_step(task, delay, point, True)
+        value = cost(task, response(task, point))
+        if value < lowest:
+            best, lowest = point, value
+        if abs(previous - value) <= 1e-6 * value:
+            return best, lowest, number + 1
+        previous = value
+    return best, lowest, steps
+
+
+def scan(task: Problem, steps: int, options: FitOptions) -> list[tuple[float, float, Point]]:
+    """(cost, delay, point) at the best delays, best first: local minima of the cost over a grid of delays."""
+    structure = task.structure
+    if structure.delay != "free":
+        point, value, _ = reweighted(task, structure.delay, steps)
+        return [(value, structure.delay, point)]
+    if structure.domain == "z":
+        delays = np.arange(int(structure.delay_max * task.frf.sampling_rate + 1e-9) + 1) / task.frf.sampling_rate
+    else:
+        step = options.delay_step / float(task.frf.frequency[-1])
+        delays = np.linspace(0.0, structure.delay_max, max(int(np.ceil(structure.delay_max / step)), 1) + 1)
+    found: list[tuple[float, float, Point]] = []
+    for delay in delays:
+        point, lowest = None, np.inf
+        for _ in range(min(steps, SCAN_STEPS)):
+            point = linear_step(task, float(delay), point, False)
+            lowest = min(lowest, _simple_cost(task, point))
+        assert point is not None
+        found.append((lowest if np.isfinite(lowest) else np.inf, float(delay), point))
+    costs = [item[0] for item in found]
+    padded = [np.inf, *costs, np.inf]
+    minima = [i for i in range(len(found)) if padded[i + 1] <= padded[i] and padded[i + 1] <= padded[i + 2]]
+    return [found[i] for i in sorted(minima, key=lambda i: costs[i])]
+
+
+def _simple_cost(task: Problem, at: Point) -> float:
+    up, down = rational(task, at)
+    return cost(task, task.plan.line_factor * np.exp(-1j * task.plan.line_omega * at.delay) * up / down)
+
+
+def searched(task: Problem, steps: int, options: FitOptions) -> tuple[Point, float, int]:
+    """The linear estimator's answer: best delay of the scan, then a golden-section search around it."""
+    candidates = scan(task, steps, options)
+    _, delay, start = candidates[0]
+    if steps == 1:
+        start_point: Point | None = None
+    else:
+        start_point = start
+    best, lowest, count = reweighted(task, delay, steps, start_point)
+    if not (task.structure.free_delay and options.refine_delay):
+        return best, lowest, count
+    width = options.delay_step / float(task.frf.frequency[-1])
+    low, high = max(delay - width, 0.0), min(delay + width, task.structure.delay_max)
+    ratio = 0.5 * (np.sqrt(5.0) - 1.0)
+    for _ in range(48):
+        if high - low < 1e-12:
+            break
+        for trial in (high - ratio * (high - low), low + ratio * (high - low)):
+            point, value, more = reweighted(task, trial, steps, best if steps > 1 else None)
+            count += more
+            if value < lowest:
+                best, lowest = point, value
+        # keep the part around the best delay
+        span = ratio * (high - low)
+        low, high = max(best.delay - 0.5 * span, 0.0), min(best.delay + 0.5 * span, task.structure.delay_max)
+    return best, lowest, count

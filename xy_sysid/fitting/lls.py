@@ -1,0 +1,21 @@
+"""Linear least squares (Levy, 1959): one linear fit, biased towards high frequencies and by noise, but it needs no start."""
+
+from __future__ import annotations
+
+from xy_sysid.fitting.finish import finish
+from xy_sysid.fitting.linear import searched
+from xy_sysid.fitting.problem import problem
+from xy_sysid.fitting.result import Fit
+from xy_sysid.fitting.structure import FitOptions, Structure
+from xy_sysid.frf import FrequencyResponse
+from xy_sysid.transfer_function import TransferFunction
+
+DEFAULTS = FitOptions()
+
+
+def fit(frf: FrequencyResponse, structure: Structure, start: TransferFunction | None = None, options: FitOptions = DEFAULTS) -> Fit:
+    """Fit by one linear step at the best delay; ``start`` is not needed and not used. Raises BadInput for too few lines."""
+    del start
+    task = problem(frf, structure)
+    point, _, steps = searched(task, 1, options)
+    return finish(task, point, "lls", steps, True, "Linear: solved at once for each delay tried.", "none needed")

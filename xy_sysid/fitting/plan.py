@@ -1,0 +1,151 @@
+"""From a transfer function to what the spectra are expected to show: hold, delay, sampling, window.
+
+Everything that depends only on the lines, the window and the structure is worked out once, here, and kept.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xy_sysid.errors import BadInput
+from xy_sysid.fitting.alias import ALIASES, TAIL_POINTS, interpolation, nodes_for
+from xy_sysid.fitting.structure import Structure
+from xy_sysid.frf import ComplexArray, FrequencyResponse
+from xy_sysid.stream import FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """Where the model is evaluated, and how that becomes the prediction on the lines.
+
+    scale:       rad/s that the variable s is divided by (1 in the z domain)
+    period:      sampling time, s
+    line:        (m,) the model's variable (scaled s, or z) on the lines
+    line_omega:  (m,) rad/s
+    line_factor: (m,) complex: prediction without aliases, window and delay = line_factor * N / D
+    grid:        (g,) the model's variable where it is evaluated; the kernel asks for it
+    omega:       (g,) rad/s
+    main:        (g,) factor of N / D exp(-j w delay) at the grid
+    fold:        (g,) factor of the sum of aliases at the grid
+    index:       (m, j) rows of the grid that a line needs; conjugate: (m, j) True where the kernel reaches below 0 Hz
+    kernel:      (m, j) complex weights, the division by the difference's response included
+    alias:       (nodes * 2 ALIASES,) scaled s of the aliases, grouped by node
+    alias_factor: (same,) 1 / (s sigma^integrators)
+    alias_number: (2 ALIASES,) k
+    spread:      (g, nodes) interpolates from nodes to grid
+    tail:        (nodes, points) interpolates the tail from TAIL_POINTS to nodes
+    """
+
+    scale: float
+    period: float
+    line: ComplexArray
+    line_omega: FloatArray
+    line_factor: ComplexArray
+    grid: ComplexArray
+    omega: FloatArray
+    main: ComplexArray
+    fold: ComplexArray
+    index: NDArray[np.int64]
+    conjugate: NDArray[np.bool_]
+    kernel: ComplexArray
+    alias: ComplexArray
+    alias_factor: ComplexArray
+    alias_number: FloatArray
+    spread: FloatArray
+    tail: FloatArray
+
+
+def plan_for(frf: FrequencyResponse, structure: Structure) -> Plan:
+    """The plan for the lines of a response; kept from the last few calls with the same lines."""
+    return _plan(
+        frf.frequency.tobytes(),
+        frf.kernel_offset.tobytes(),
+        frf.kernel_weight.tobytes(),
+        frf.sampling_rate,
+        frf.resolution,
+        frf.differenced,
+        structure.integrators,
+        structure.hold if structure.domain == "s" else "none",
+        structure.domain,
+    )
+
+
+@lru_cache(maxsize=32)
+def _plan(
+    frequency_bytes: bytes,
+    offset_bytes: bytes,
+    weight_bytes: bytes,
+    rate: float,
+    resolution: float,
+    differenced: bool,
+    integrators: int,
+    hold: str,
+    domain: str,
+) -> Plan:
+    frequency, offset, weight = (np.frombuffer(b, dtype=np.float64) for b in (frequency_bytes, offset_bytes, weight_bytes))
+    if not bool(np.all(frequency > 0)):
+        raise BadInput("lowest frequency", f"{np.min(frequency):g} Hz", "> 0 Hz", "Leave out the line at 0 Hz.")
+    period, held = 1.0 / rate, hold == "zoh"
+    scale = float(np.median(2 * np.pi * frequency)) if domain == "s" else 1.0
+    wanted = frequency[:, None] + offset[None, :]
+    step = max(resolution, 1e-6 * float(np.max(frequency))) * 1e-5
+    _, first, inverse = np.unique(np.rint(np.abs(wanted) / step).astype(np.int64), return_index=True, return_inverse=True)
+    grid_frequency = np.abs(wanted).ravel()[first]
+    omega, line_omega = 2 * np.pi * grid_frequency, 2 * np.pi * frequency
+    main, fold = _factors(omega, period, scale, integrators, differenced, held, domain)
+    post = 1.0 / np.expm1(1j * line_omega * period) if differenced else np.ones(frequency.size, dtype=np.complex128)
+    line_main, _ = _factors(line_omega, period, scale, integrators, False, held, domain)
+    nodes = nodes_for(float(np.max(grid_frequency)) * period)
+    k = np.concatenate((np.arange(-ALIASES, 0), np.arange(1, ALIASES + 1))).astype(np.float64)
+    if not held:
+        nodes, k = nodes[:0], k[:0]
+    s = 2j * np.pi * rate * (nodes[:, None] + k[None, :]).ravel()
+    return Plan(
+        scale=scale,
+        period=period,
+        line=_variable(line_omega, period, scale, domain),
+        line_omega=line_omega,
+        line_factor=line_main,
+        grid=_variable(omega, period, scale, domain),
+        omega=omega,
+        main=main,
+        fold=fold,
+        index=np.ascontiguousarray(inverse.reshape(wanted.shape)).astype(np.int64),
+        conjugate=wanted < 0,
+        kernel=weight[None, :] * post[:, None],
+        alias=s / scale,
+        alias_factor=1.0 / (s * (s / scale) ** integrators),
+        alias_number=k,
+        spread=interpolation(nodes, grid_frequency * period) if held else np.zeros((omega.size, 0)),
+        tail=interpolation(TAIL_POINTS, nodes) if held else np.zeros((0, TAIL_POINTS.size)),
+    )
+
+
+def _variable(omega: FloatArray, period: float, scale: float, domain: str) -> ComplexArray:
+    if domain == "z":
+        return np.exp(1j * omega * period)
+    return np.asarray(1j * omega / scale)
+
+
+def _factors(
+    omega: FloatArray, period: float, scale: float, integrators: int, differenced: bool, held: bool, domain: str
+) -> tuple[ComplexArray, ComplexArray]:
+    """(main, fold) at each frequency; at 0 Hz the limit, or 0 where it is infinite (the data have no DC there)."""
+    zero = omega == 0
+    s = 1j * np.where(zero, 1.0, omega)
+    difference = np.expm1(s * period) if differenced else np.ones_like(s)
+    if domain == "z":
+        main = difference / np.expm1(s * period) ** integrators
+        limit = 1.0 if int(differenced) == integrators else 0.0
+        return np.where(zero, limit, main), np.zeros_like(s)
+    hold = -np.expm1(-s * period) / period
+    main = difference / (s / scale) ** integrators * (hold / s if held else 1.0)
+    if int(differenced) == integrators:
+        limit = (period * scale) ** integrators
+    else:
+        limit = 0.0
+    return np.where(zero, limit, main), np.where(zero, 0.0, difference * hold)
