@@ -1,11 +1,17 @@
 """How the package is installed: by pip, by colcon, or both from one tree."""
 
-from glob import glob
+from pathlib import Path
 
 from setuptools import find_packages, setup
 
 NAME = "xy_sysid"
 ROS_WHEELS = "sys_platform == 'linux' and platform_machine == 'x86_64'"
+
+def files(*patterns: str) -> list[str]:
+    """Paths relative to this file, the way setuptools wants them."""
+    here = Path(__file__).parent
+    return sorted(str(path.relative_to(here)) for pattern in patterns for path in here.glob(pattern))
+
 
 setup(
     name=NAME,
@@ -21,9 +27,9 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
-        (f"share/{NAME}/config", sorted(glob("config/*.yaml") + glob("config/*.xml") + glob("config/*.md"))),
-        (f"share/{NAME}/config/machines", sorted(glob("config/machines/*.yaml"))),
-        (f"share/{NAME}/launch", sorted(glob("launch/*.py"))),
+        (f"share/{NAME}/config", files("config/*.yaml", "config/*.xml", "config/*.md")),
+        (f"share/{NAME}/config/machines", files("config/machines/*.yaml")),
+        (f"share/{NAME}/launch", files("launch/*.py")),
     ],
     zip_safe=False,
     install_requires=["numpy", "scipy", "numba", "rosbags", "pydantic>=2", "typer", "rich", "plotly", "joblib", "pyyaml"],
