@@ -1,0 +1,42 @@
+"""Excitation signals: a pure stream of voltage samples for one axis.
+
+``signal(settings, rate).next(n)`` gives the following samples; any chunking gives the same stream, bit for bit.
+"""
+
+from __future__ import annotations
+
+from xy_sysid.errors import BadInput
+from xy_sysid.excitation.contract import Maker, Signal, crest
+from xy_sysid.excitation.multisine import Multisine, MultisineLines, multisine
+from xy_sysid.excitation.noise import noise
+from xy_sysid.excitation.prbs import prbs
+from xy_sysid.excitation.pulse import impulse, off, step
+from xy_sysid.excitation.stepped import schedule, stepped_sine
+from xy_sysid.excitation.sweep import sweep
+from xy_sysid.settings import AxisExcitation
+
+MAKERS: dict[str, Maker] = {
+    "noise": noise,
+    "multisine": multisine,
+    "multisine_odd": multisine,
+    "multisine_detect": multisine,
+    "sweep": sweep,
+    "stepped_sine": stepped_sine,
+    "prbs": prbs,
+    "impulse": impulse,
+    "step": step,
+    "off": off,
+}
+
+
+def signal(settings: AxisExcitation, rate: float) -> Signal:
+    """The stream that these settings describe, at ``rate`` samples per second.
+
+    Raises BadInput if the band or the period does not fit the rate.
+    """
+    if not 0 < rate < float("inf"):
+        raise BadInput("rate", f"{rate} Hz", "a positive number", "Give the sampling rate.")
+    return MAKERS[settings.kind](settings, rate)
+
+
+__all__ = ["MAKERS", "Multisine", "MultisineLines", "Signal", "crest", "multisine", "schedule", "signal", "stepped_sine"]

@@ -1,0 +1,74 @@
+"""Band-limited Gaussian white noise: seeded white noise through two elliptic filters with a state.
+
+Measured: flat to 0.04 dB from ``low`` to ``high``; 40 dB down at 0.92 low and 1.08 high, 60 dB down from 0.90 low and 1.10
+high on, at every rate from 1 to 100 kHz. The power between the band and the stop bands counts in the rms. A few hundred
+bytes of state, whatever the length.
+
+Source: elliptic design and cascaded second-order sections, A. V. Oppenheim, R. W. Schafer, "Discrete-Time Signal
+Processing", ch. 7; the random numbers are Philox, J. Salmon et al., "Parallel random numbers: as easy as 1, 2, 3", SC11.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import ellip, sosfilt, sosfreqz
+
+from xy_sysid.errors import BadInput
+from xy_sysid.excitation.contract import below_nyquist
+from xy_sysid.settings import AxisExcitation
+from xy_sysid.stream import FloatArray
+
+ORDER, RIPPLE_DB, STOP_DB = 10, 0.02, 60.0
+LOWEST = 1e-6  # of the rate: at a tenth of it rounding quadruples the ripple (measured)
+
+
+def sections(low: float, high: float, rate: float) -> FloatArray:
+    """(sections, 6) second-order sections of the band-pass with unit gain in the band; low = 0 keeps DC."""
+    lowpass = np.asarray(ellip(ORDER, RIPPLE_DB, STOP_DB, high, "lowpass", output="sos", fs=rate), dtype=np.float64)
+    if low == 0:
+        return lowpass
+    return np.vstack((lowpass, np.asarray(ellip(ORDER, RIPPLE_DB, STOP_DB, low, "highpass", output="sos", fs=rate), dtype=np.float64)))
+
+
+def power_gain(sos: FloatArray, low: float, high: float, rate: float) -> float:
+    """Variance of the filtered noise for white noise of variance 1: the mean of |H|^2 up to the Nyquist frequency."""
+    top = min(1.5 * high, rate / 2)  # beyond it is less than 1e-6 of the power
+    near_low = low * np.geomspace(0.5, 100, 20_001)
+    frequency = np.union1d(np.linspace(0, top, 40_001), near_low[near_low < top])
+    gain = np.abs(np.asarray(sosfreqz(sos, frequency, fs=rate)[1])) ** 2
+    return float(np.trapezoid(gain, frequency) / (rate / 2))
+
+
+@dataclass(slots=True)
+class Noise:
+    """Filtered Gaussian noise.
+
+    scale: factor on the filter's output; sos: (sections, 6) filter; state: (sections, 2); white: source of N(0, 1)
+    """
+
+    scale: float
+    sos: FloatArray
+    state: FloatArray
+    white: np.random.Generator
+
+    def next(self, n: int) -> FloatArray:
+        """(n,) the following samples, V."""
+        if n == 0:
+            return np.empty(0)
+        filtered, self.state = sosfilt(self.sos, self.white.standard_normal(n), zi=self.state)
+        return np.asarray(filtered, dtype=np.float64) * self.scale
+
+
+def noise(settings: AxisExcitation, rate: float) -> Noise:
+    """Noise of the set rms from low to high; raises BadInput if the band does not fit the rate."""
+    below_nyquist(settings, rate)
+    least = LOWEST * rate
+    if 0 < settings.low < least:
+        raise BadInput("low", f"{settings.low:g} Hz", f"0, or at least {least:g} Hz at this rate", "Raise low, or set it to 0.")
+    if settings.high < least:
+        raise BadInput("high", f"{settings.high:g} Hz", f"at least {least:g} Hz at this rate", "Raise high or lower the rate.")
+    sos = sections(settings.low, settings.high, rate)
+    scale = settings.rms / np.sqrt(power_gain(sos, settings.low, settings.high, rate))
+    return Noise(float(scale), sos, np.zeros((sos.shape[0], 2)), np.random.Generator(np.random.Philox(settings.seed)))
