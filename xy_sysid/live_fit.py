@@ -1,0 +1,172 @@
+"""Fits that follow one another: warm starts, the watch on a resonance, and what is to be published.
+
+``LiveFitter.fit(request)`` depends only on the requests so far, in their order, so that a replay repeats it bit for bit.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from xy_sysid.errors import BadInput
+from xy_sysid.fitting import identify
+from xy_sysid.fitting.result import Fit
+from xy_sysid.fitting.structure import Structure
+from xy_sysid.frf import FrequencyResponse
+from xy_sysid.identifier import AxisRequest, FitRequest
+from xy_sysid.messages import ERROR, OK, WARN, ArrayMessage, StatusMessage, comparison_message, frf_message, transfer_function_message
+from xy_sysid.settings import IdentifierSettings
+from xy_sysid.tracking import Resonance, Track, alarm_sentence, follow
+
+LIGHT_DAMPING = 0.4  # a pole pair with more damping is no resonance to be watched
+GOOD_ERROR = 0.05  # relative error above which the sentence of an axis says that the model does not fit yet
+
+
+def structure_from(settings: IdentifierSettings) -> Structure:
+    """The model family that the settings ask for."""
+    return Structure(
+        numerator_order=settings.numerator_order,
+        denominator_order=settings.denominator_order,
+        integrators=settings.integrators,
+        delay="free" if settings.delay else 0.0,
+        hold=settings.hold,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class AxisUpdate:
+    """One axis after a fit; ``fit`` is None and ``problem`` says why when it could not be tried."""
+
+    frf: FrequencyResponse
+    fit: Fit | None
+    track: Track
+    windows: int
+    dropped: dict[str, int]
+    problem: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Update:
+    """All axes after one request."""
+
+    request: FitRequest
+    axes: dict[str, AxisUpdate]
+
+    def arrays(self) -> list[ArrayMessage]:
+        """The array topics, in a fixed order."""
+        found: list[ArrayMessage] = []
+        for axis, update in self.axes.items():
+            found.append(frf_message(axis, update.frf))
+            if update.fit is not None and update.fit.converged:
+                found.append(transfer_function_message(axis, update.fit.tf))
+                found.append(comparison_message(axis, update.fit))
+        return found
+
+    def statuses(self) -> list[StatusMessage]:
+        """``metrics``: one status per axis."""
+        return [_status(axis, update, self.request) for axis, update in self.axes.items()]
+
+
+class LiveFitter:
+    """Keeps the last model of each axis as the next start, and its resonance's history."""
+
+    def __init__(self, settings: IdentifierSettings) -> None:
+        self._settings = settings
+        self._structure = structure_from(settings)
+        self._last: dict[str, Fit] = {}
+        self._tracks: dict[str, Track] = {}
+
+    def fit(self, request: FitRequest) -> Update:
+        """Fit every axis of the request."""
+        return Update(request, {axis: self._axis(axis, asked) for axis, asked in request.axes.items()})
+
+    def reset(self) -> None:
+        """Forget models and references."""
+        self._last.clear()
+        self._tracks.clear()
+
+    def references(self) -> dict[str, Resonance]:
+        """The resonance that each axis is watched against."""
+        return {axis: track.reference for axis, track in self._tracks.items() if track.reference}
+
+    def restore(self, references: dict[str, Resonance]) -> None:
+        """Watch against these, as before a restart."""
+        self._tracks = {axis: Track(reference=reference) for axis, reference in references.items()}
+
+    def _axis(self, axis: str, asked: AxisRequest) -> AxisUpdate:
+        track = self._tracks.get(axis, Track())
+        start = self._last.get(axis)
+        try:
+            fit = identify(asked.frf, self._structure, start.tf if start else None)
+        except BadInput as problem:
+            return AxisUpdate(asked.frf, None, track, asked.windows, asked.dropped, str(problem))
+        if fit.converged:
+            self._last[axis] = fit
+        overall = watched(fit)
+        track = follow(track, overall, self._recent(asked, fit, track), asked.windows, self._settings.alarm_sigma)
+        self._tracks[axis] = track
+        return AxisUpdate(asked.frf, fit, track, asked.windows, asked.dropped)
+
+    def _recent(self, asked: AxisRequest, fit: Fit, track: Track) -> Resonance | None:
+        if asked.recent is None or not fit.converged:
+            return None
+        try:
+            short = identify(asked.recent, self._structure, fit.tf)
+        except BadInput:
+            return None
+        return watched(short, near=track.reference.frequency if track.reference else None) if short.converged else None
+
+
+def watched(fit: Fit, near: float | None = None) -> Resonance | None:
+    """The resonance to watch: of those in the band with little damping the least damped one, or the one nearest to ``near`` Hz."""
+    found: list[tuple[float, Resonance]] = []
+    low, high = float(fit.frequency[0]), float(fit.frequency[-1])
+    for item in fit.intervals:
+        if item.name.startswith("resonance_") and item.name.endswith(".frequency"):
+            damping = fit.interval(item.name.replace(".frequency", ".damping")).value
+            if low <= item.value <= high and 0.0 < damping < LIGHT_DAMPING and math.isfinite(item.sigma):
+                distance = damping if near is None else abs(item.value - near)
+                found.append((distance, Resonance(item.value, item.sigma)))
+    return min(found, key=lambda pair: pair[0])[1] if found else None
+
+
+def _status(axis: str, update: AxisUpdate, request: FitRequest) -> StatusMessage:
+    fit, track = update.fit, update.track
+    values: dict[str, str] = {
+        "fit": str(request.number),
+        "windows": str(update.windows),
+        "averages": f"{update.frf.averages:.6g}",
+        "seconds of data (s)": f"{request.seconds:.6g}",
+        "sampling rate (Hz)": f"{request.sampling_rate:.9g}",
+        "dropped windows": str(sum(update.dropped.values())),
+    }
+    values |= {f"dropped windows: {reason}": str(number) for reason, number in sorted(update.dropped.items())}
+    values |= {f"stream: {reason}": str(number) for reason, number in sorted(request.faults.items())}
+    if fit is None:
+        return StatusMessage(f"axis {axis}", WARN, f"axis {axis}: no fit yet: {update.problem}", tuple(values.items()))
+    values["relative error (1)"] = f"{fit.relative_error:.6g}"
+    for item in fit.intervals:
+        if item.name in ("delay", "gain") or "resonance" in item.name:
+            label = f"{item.name} ({item.unit or '1'})"
+            values[label] = f"{item.value:.9g}"
+            values[f"{item.name} 95 % low"], values[f"{item.name} 95 % high"] = f"{item.low:.9g}", f"{item.high:.9g}"
+    values["cost"], values["expected cost"] = f"{fit.cost:.6g}", f"{fit.expected_cost:.6g}"
+    if track.reference and track.now:
+        values["resonance watched (Hz)"], values["resonance reference (Hz)"] = f"{track.now.frequency:.6g}", f"{track.reference.frequency:.6g}"
+        values["resonance shift (Hz)"] = f"{track.shift:.6g}"
+    level, sentence = _verdict(axis, update, request)
+    return StatusMessage(f"axis {axis}", level, sentence, tuple(values.items()))
+
+
+def _verdict(axis: str, update: AxisUpdate, request: FitRequest) -> tuple[int, str]:
+    fit = update.fit
+    if update.track.alarm:
+        return ERROR, alarm_sentence(axis, update.track)
+    if fit is None or not fit.converged:
+        return WARN, f"axis {axis}: the fit did not converge: {fit.reason if fit else update.problem}"
+    if fit.relative_error > GOOD_ERROR:
+        return WARN, f"axis {axis}: relative error {100 * fit.relative_error:.2g} %; the model does not fit (yet)"
+    if any(request.faults.values()) or any(update.dropped.values()):
+        reasons = ", ".join(sorted({*request.faults, *update.dropped}))
+        return WARN, f"axis {axis}: relative error {100 * fit.relative_error:.2g} %; some data could not be used ({reasons})"
+    return OK, f"axis {axis}: relative error {100 * fit.relative_error:.2g} %"
