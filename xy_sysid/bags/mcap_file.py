@@ -1,0 +1,194 @@
+"""An MCAP file: which topics it has, and its messages in the order in which they were logged.
+
+Read from the front, chunk after chunk, without the index at the end: so a file that was cut short gives what it has.
+Source: mcap.dev/spec (records Header 1, Footer 2, Schema 3, Channel 4, Message 5, Chunk 6, Statistics 11, DataEnd 15).
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+from collections.abc import Callable, Generator, Iterator, Sequence
+from pathlib import Path
+from zlib import crc32
+
+import numpy as np
+
+from xy_sysid.bags.cdr import Bytes
+from xy_sysid.bags.compression import Damaged, decompressor
+from xy_sysid.bags.stride import Batch, Indices
+from xy_sysid.compiled import compiled
+from xy_sysid.errors import BadRecording
+
+MAGIC = b"\x89MCAP0\r\n"
+FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, DATA_END = 2, 3, 4, 5, 6, 15
+WINDOW = 1 << 20  # bytes read at once where messages are not in chunks
+LARGEST = 1 << 31  # bytes; a record that claims to be longer is damage
+
+
+@compiled
+def messages(data: Bytes, at: int, rows: Indices) -> tuple[int, int]:
+    """Walk over records from ``at`` while they are messages.
+
+    rows: out, one per message: channel, log time, start, length. Returns how many, and where the walk stopped:
+    at another record, at an incomplete one, or because ``rows`` is full.
+    """
+    found, size = 0, data.shape[0]
+    while at + 9 <= size and data[at] == 5 and found < rows.shape[0]:
+        length = np.int64(0)
+        for index in range(8):
+            length |= np.int64(data[at + 1 + index]) << (8 * index)
+        if length < 22 or length > size - at - 9:
+            break
+        time = np.int64(0)
+        for index in range(8):
+            time |= np.int64(data[at + 15 + index]) << (8 * index)
+        rows[found, 0] = np.int64(data[at + 9]) | np.int64(data[at + 10]) << 8
+        rows[found, 1] = time
+        rows[found, 2] = at + 31
+        rows[found, 3] = length - 22
+        found += 1
+        at += 9 + int(length)
+    return found, at
+
+
+def _text(data: bytes, at: int) -> tuple[str, int]:
+    (length,) = struct.unpack_from("<I", data, at)
+    if at + 4 + length > len(data):
+        raise struct.error("text is longer than its record")
+    return data[at + 4 : at + 4 + length].decode("utf-8", "replace"), at + 4 + length
+
+
+class McapFile:
+    """One .mcap file, opened for reading; raises BadRecording if it is not one."""
+
+    def __init__(self, path: Path, notes: list[str]) -> None:
+        self.path, self.notes = path, notes
+        self.schemas: dict[int, str] = {}
+        self.channels: dict[int, tuple[str, str]] = {}
+        self.handle = os.open(path, os.O_RDONLY)
+        self.size = os.fstat(self.handle).st_size
+        self.damage = ""
+        try:
+            if os.pread(self.handle, 8, 0) != MAGIC:
+                raise BadRecording(path, "not an MCAP file (its first bytes are wrong)", "Give a bag that ros2 or xy-sysid recorded.")
+            if not self._summary():
+                for _ in self._chunks([]):  # no index at the end: learn the topics by walking through
+                    pass
+                if not self.damage and os.pread(self.handle, 8, max(0, self.size - 8)) != MAGIC:
+                    self.damage = "cut short"
+        except BadRecording:
+            self.close()
+            raise
+
+    @property
+    def topics(self) -> list[tuple[str, str]]:
+        """(name, type) of each topic."""
+        return list(dict.fromkeys(self.channels.values()))
+
+    def close(self) -> None:
+        os.close(self.handle)
+
+    def _summary(self) -> bool:
+        """Learn the topics from the index at the end; False if there is none."""
+        tail = os.pread(self.handle, 37, max(0, self.size - 37))
+        if len(tail) < 37 or tail[-8:] != MAGIC or tail[0] != FOOTER:
+            return False
+        (start,) = struct.unpack_from("<Q", tail, 9)
+        if not 0 < start < self.size - 37 or self.size - start > LARGEST:
+            return False
+        data, at = os.pread(self.handle, self.size - 37 - start, start), 0
+        while at + 9 <= len(data):
+            (length,) = struct.unpack_from("<Q", data, at + 1)
+            self._learn(data[at], data[at + 9 : at + 9 + length])
+            at += 9 + length
+        return bool(self.channels)
+
+    def _learn(self, kind: int, record: bytes) -> None:
+        try:
+            if kind == SCHEMA:
+                self.schemas[struct.unpack_from("<H", record)[0]] = _text(record, 2)[0]
+            elif kind == CHANNEL:
+                number, schema = struct.unpack_from("<HH", record)
+                self.channels[number] = (_text(record, 4)[0], self.schemas.get(schema, ""))
+        except struct.error:
+            self.damage = "a record is damaged"
+
+    def batches(self, wanted: Sequence[str], unpack: Callable[[bytes], bytes] | None) -> Iterator[tuple[Batch, float]]:
+        """Messages of these topics in log order, with the part of the file that has been read."""
+        yield from self._chunks(wanted)
+        if self.damage:
+            self.notes.append(f"{self.path.name}: {self.damage}; what could be read is read")
+
+    def _chunks(self, wanted: Sequence[str]) -> Iterator[tuple[Batch, float]]:
+        at = len(MAGIC)
+        while at + 9 <= self.size:
+            head = os.pread(self.handle, 9, at)
+            kind, length = head[0], int(struct.unpack_from("<Q", head, 1)[0])
+            if kind in (FOOTER, DATA_END):
+                return
+            if kind == 0 or length > LARGEST:
+                self.damage = f"damaged at byte {at}"
+                return
+            if kind == MESSAGE:
+                data = np.frombuffer(os.pread(self.handle, max(WINDOW, length + 9), at), np.uint8)
+                used = yield from self._walk(data, 0, wanted, at)
+                if used == 0:
+                    self.damage = "cut short"
+                    return
+                at += used
+                continue
+            if kind == CHUNK:
+                yield from self._chunk(os.pread(self.handle, length, at + 9), length, wanted, at)
+            elif kind in (SCHEMA, CHANNEL):
+                self._learn(kind, os.pread(self.handle, length, at + 9))
+            at += 9 + length
+        if at < self.size or (at > self.size):
+            self.damage = self.damage or "cut short"
+
+    def _chunk(self, record: bytes, length: int, wanted: Sequence[str], place: int) -> Iterator[tuple[Batch, float]]:
+        try:
+            _, _, full, checksum = struct.unpack_from("<QQQI", record)
+            method, at = _text(record, 28)
+            raw = memoryview(record)[at + 8 :]
+            if full > LARGEST:
+                raise Damaged("its size is not possible")
+            data = raw if not method else decompressor(method, self.path)(bytes(raw))
+        except (struct.error, Damaged) as error:
+            self.damage = "cut short" if len(record) < length else f"a chunk is damaged ({error})"
+            return
+        if len(record) == length and (len(data) != full or (checksum and crc32(data) != checksum)):
+            self.damage = "the checksum of a chunk does not match; the chunk is left out"
+            return
+        array, at = np.frombuffer(data, np.uint8), 0
+        while at < len(array):
+            used = yield from self._walk(array, at, wanted, place)
+            at += used
+            if at + 9 > len(array):
+                break
+            kind, size = data[at], int(struct.unpack_from("<Q", data, at + 1)[0])
+            if size > len(array) - at - 9:
+                self.damage = "cut short"
+                break
+            if kind in (SCHEMA, CHANNEL):
+                self._learn(kind, bytes(data[at + 9 : at + 9 + size]))
+            if used == 0 or kind != MESSAGE:
+                at += 9 + size
+
+    def _walk(self, data: Bytes, at: int, wanted: Sequence[str], place: int) -> Generator[tuple[Batch, float], None, int]:
+        """Yield the messages from ``at`` on; the value of the generator is how many bytes they take."""
+        rows = np.empty((4096, 4), np.int64)
+        start = at
+        lookup = np.full(max([*self.channels, 0]) + 2, -1, np.int64)
+        for number, (name, _) in self.channels.items():
+            if name in wanted:
+                lookup[number] = wanted.index(name)
+        while True:
+            found, at = messages(data, at, rows)
+            if found and wanted:
+                topic = lookup[np.minimum(rows[:found, 0], len(lookup) - 1)]
+                kept = rows[:found][topic >= 0]
+                if len(kept):
+                    yield Batch(topic[topic >= 0], kept[:, 1], kept[:, 2], kept[:, 3], data), min(1.0, place / self.size)
+            if found < len(rows):
+                return at - start

@@ -1,0 +1,146 @@
+"""A rosbag2 sqlite3 file: which topics it has, and its messages in the order in which they were logged."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sqlite3
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from xy_sysid.bags import pages
+from xy_sysid.bags.stride import Batch, Indices
+from xy_sysid.errors import BadRecording
+
+COLUMNS = ["id", "topic_id", "timestamp", "data"]
+ROWS = 1024  # rows fetched at once on the slow way
+
+
+def _unsaved(path: Path) -> list[Path]:
+    """Files beside the database in which sqlite keeps changes that are not in it yet."""
+    found = []
+    for ending in ("-journal", "-wal"):
+        beside = path.with_name(path.name + ending)
+        with contextlib.suppress(OSError):
+            if beside.stat().st_size > 0:
+                found.append(beside)
+    return found
+
+
+def _connect(path: Path, mode: str) -> sqlite3.Connection:
+    """Open; a file that was cut short is opened too (``writable_schema`` lifts sqlite's check of its length)."""
+    connection = sqlite3.connect(f"file:{_quoted(path)}?{mode}", uri=True)
+    connection.execute("PRAGMA writable_schema=ON")
+    connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
+    return connection
+
+
+def _quoted(path: Path) -> str:
+    return str(path.resolve()).replace("%", "%25").replace("?", "%3f").replace("#", "%23")
+
+
+class SqliteFile:
+    """One .db3 file, opened for reading; raises BadRecording if it is not one."""
+
+    def __init__(self, path: Path, notes: list[str]) -> None:
+        self.path, self.notes = path, notes
+        self._closed = contextlib.ExitStack()
+        self.database = self._open()
+        self._closed.callback(self.database.close)
+        try:
+            tables = {name for (name,) in self.database.execute("SELECT name FROM sqlite_master WHERE type='table'")}
+            if not {"topics", "messages"} <= tables:
+                raise BadRecording(path, "an sqlite3 file without the tables of a rosbag2", "Give a bag that ros2 or xy-sysid recorded.")
+            self.ids = [(int(i), str(name), str(kind)) for i, name, kind in self.database.execute("SELECT id, name, type FROM topics ORDER BY id")]
+        except (sqlite3.DatabaseError, TypeError, ValueError) as error:
+            self.close()
+            raise BadRecording(path, f"the list of topics is damaged ({error})", "Take another copy of the bag.") from None
+        except BadRecording:
+            self.close()
+            raise
+
+    def _open(self) -> sqlite3.Connection:
+        # A journal left by a process that was killed is rolled back first, which needs to write; else read as it is.
+        ways = ["mode=rw", "mode=ro", "immutable=1"] if _unsaved(self.path) else ["mode=ro", "immutable=1"]
+        problem = ""
+        for way in ways:
+            try:
+                return _connect(self.path, way)
+            except sqlite3.DatabaseError as error:
+                problem = str(error)
+        raise BadRecording(self.path, f"not readable as an sqlite3 bag ({problem})", "Take another copy of the bag.")
+
+    @property
+    def topics(self) -> list[tuple[str, str]]:
+        """(name, type) of each topic."""
+        return [(name, kind) for _, name, kind in self.ids]
+
+    def close(self) -> None:
+        self._closed.close()
+
+    def batches(self, wanted: Sequence[str], unpack: Callable[[bytes], bytes] | None) -> Iterator[tuple[Batch, float]]:
+        """Messages of these topics in log order, with the part of the file that has been read."""
+        lookup = {identity: wanted.index(name) for identity, name, _ in self.ids if name in wanted}
+        info = [str(row[1]) for row in self.database.execute("PRAGMA table_info(messages)")]
+        root = self.database.execute("SELECT rootpage FROM sqlite_master WHERE name='messages' AND type='table'").fetchone()
+        plain = info == COLUMNS and root is not None and not _unsaved(self.path) and unpack is None
+        yield from self._walk(int(root[0]), lookup) if plain else self._rows(lookup, unpack)
+
+    def _walk(self, root: int, lookup: dict[int, int]) -> Iterator[tuple[Batch, float]]:
+        handle = os.open(self.path, os.O_RDONLY)
+        try:
+            file = pages.open_pages(handle)
+            numbers, damaged = pages.leaves(file, root)
+            table = np.full(max([*lookup, 0]) + 2, -1, np.int64)
+            for identity, index in lookup.items():
+                table[identity] = index
+            for cells in pages.scan(file, numbers):
+                damaged += cells.damaged
+                rows = cells.rows
+                topic = table[np.clip(rows[:, 1], 0, len(table) - 1)]
+                if topic.size and topic.min() < 0:
+                    rows, topic = rows[topic >= 0], topic[topic >= 0]
+                if not topic.size:
+                    continue
+                if rows[:, 3].min() < 0:
+                    yield self._by_id(rows[:, 0], lookup), cells.position
+                    continue
+                yield Batch(topic, rows[:, 2], rows[:, 3], rows[:, 4], cells.buffer), cells.position
+        finally:
+            os.close(handle)
+        if damaged:
+            self.notes.append(f"{self.path.name}: {damaged} of {len(numbers)} pages are damaged or missing; what they held is left out")
+
+    def _by_id(self, ids: Indices, lookup: dict[int, int]) -> Batch:
+        """Messages whose chained pages lie far apart: sqlite fetches them."""
+        found = []
+        for identity in ids.tolist():
+            try:
+                found += self.database.execute("SELECT topic_id, timestamp, data FROM messages WHERE id=?", (identity,)).fetchall()
+            except sqlite3.DatabaseError:
+                note = f"{self.path.name}: some messages are damaged or missing; they are left out"
+                if note not in self.notes:
+                    self.notes.append(note)
+        return _batch(found, lookup, None)
+
+    def _rows(self, lookup: dict[int, int], unpack: Callable[[bytes], bytes] | None) -> Iterator[tuple[Batch, float]]:
+        wanted = ",".join(str(identity) for identity in lookup)
+        read = 0
+        try:
+            (total,) = self.database.execute("SELECT max(rowid) FROM messages").fetchone()
+            cursor = self.database.execute(f"SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN ({wanted}) ORDER BY rowid")
+            while rows := cursor.fetchmany(ROWS):
+                read += len(rows)
+                yield _batch(rows, lookup, unpack), min(1.0, read / max(1, total or 1))
+        except sqlite3.DatabaseError as error:
+            self.notes.append(f"{self.path.name}: damaged ({error}); the {read} messages before that are read")
+
+
+def _batch(rows: Sequence[tuple[int, int, bytes]], lookup: dict[int, int], unpack: Callable[[bytes], bytes] | None) -> Batch:
+    rows = [row for row in rows if isinstance(row[2], bytes)]
+    data = [row[2] if unpack is None else unpack(row[2]) for row in rows]
+    length = np.array([len(item) for item in data], np.int64)
+    topic = np.array([lookup[row[0]] for row in rows], np.int64)
+    return Batch(topic, np.array([row[1] for row in rows], np.int64), np.cumsum(length) - length, length, np.frombuffer(b"".join(data), np.uint8))

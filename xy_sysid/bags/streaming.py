@@ -1,0 +1,261 @@
+"""A bag of any length as blocks of voltage and position, in log order and in flat memory."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from xy_sysid.bags.cdr import ARRAY_TYPE, JOINT_TYPE, Layout, array_layout, joint_layout
+from xy_sysid.bags.reading import Bag
+from xy_sysid.bags.stride import Batch, Indices, Reader, Stretch, doubles, stamps
+from xy_sysid.errors import BadInput
+from xy_sysid.stream import Block, FloatArray, unpack
+
+Kind = Literal["voltage", "position", "reference"]
+VOLTAGE, POSITION, REFERENCE = "/xy/voltage", "/xy/position", "/xy/reference"
+PIECE = 500  # samples; a consumer that waits 1000 samples for a late partner never sees the two topics drift apart
+CLOCK_SAMPLES = 2000  # stamps from which the period of a joint state stream is learnt
+OTHERS = "Name others with --voltage-topic, --position-topic or --joint-topic."
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """Where input and output come from.
+
+    topics: (name, kind) of the block topics; joints: the JointState topic or None; effort: input is its effort;
+    said:   whether effort was asked for, rather than found as the only input there is
+    """
+
+    topics: tuple[tuple[str, Kind], ...]
+    joints: str | None
+    effort: bool
+    said: bool
+
+
+def choose(bag: Bag, voltage_topic: str, position_topic: str, joint_topic: str | None, effort_as_voltage: bool) -> Source:
+    """Decide which topics to read; raises BadRecording that names the topics there are."""
+    blocks = [name for name in (voltage_topic, position_topic) if bag.kind(name) == ARRAY_TYPE]
+    joints = joint_topic
+    if joints is None and bag.kind(position_topic) == JOINT_TYPE:
+        joints = position_topic
+    elif joints is None and (position_topic not in blocks or effort_as_voltage):
+        found = bag.of_kind(JOINT_TYPE)
+        if len(found) > 1:
+            raise bag.bad(f"has several JointState topics: {', '.join(found)}", "Choose one with --joint-topic.")
+        joints = found[0] if found else None
+    if joints is not None:
+        if bag.kind(joints) != JOINT_TYPE:
+            raise bag.bad(f"has no JointState topic {joints}; it has {bag.listing()}", OTHERS)
+        effort = effort_as_voltage or voltage_topic not in blocks
+        return Source(() if effort else ((voltage_topic, "voltage"),), joints, effort, effort_as_voltage)
+    if len(blocks) < 2:
+        missing = " and ".join(dict.fromkeys(name for name in (voltage_topic, position_topic) if name not in blocks))
+        raise bag.bad(f"no block topic {missing}; it has {bag.listing()}", OTHERS)
+    extra: tuple[tuple[str, Kind], ...] = ((REFERENCE, "reference"),) if bag.kind(REFERENCE) == ARRAY_TYPE else ()
+    return Source(((voltage_topic, "voltage"), (position_topic, "position"), *extra), None, False, False)
+
+
+class _Clock:
+    """Sample numbers for stamps: rounded steps of one period from the last stamp, or from the last voltage sample."""
+
+    def __init__(self, period: float) -> None:
+        self.period = period
+        self.seq, self.time = 0.0, np.nan
+
+    def anchor(self, seq: float, time: float) -> None:
+        self.seq, self.time = seq, time
+
+    def number(self, time: FloatArray, follow: bool) -> FloatArray:
+        """(n,) numbers; ``follow``: remember the last stamp as the anchor of the next call."""
+        if not np.isfinite(self.time):
+            self.time = float(time[0])
+        if follow:
+            steps = np.rint(np.diff(time, prepend=self.time) / self.period)
+            seq = self.seq + np.cumsum(steps)
+            self.anchor(float(seq[-1]), float(time[-1]))
+            return seq
+        return self.seq + np.rint((time - self.time) / self.period)
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """Decoded messages of one kind: ``message`` is the place in the batch of each, ``rows`` its number of samples."""
+
+    kind: Kind
+    message: Indices
+    rows: int
+    block: Block
+
+
+class _Decoder:
+    """Turns batches of raw messages into blocks, and counts what could not be read."""
+
+    def __init__(self, bag: Bag, source: Source) -> None:
+        self.bag, self.source = bag, source
+        self.names = [name for name, _ in source.topics] + ([source.joints] if source.joints else [])
+        self.readers = [Reader(array_layout) for _ in source.topics] + [Reader(joint_layout)]
+        self.unreadable: dict[str, int] = {}
+        self.example: dict[str, str] = {}
+        self.joints: tuple[str, ...] = ()
+        self.from_log: bool | None = None
+        self.clock: _Clock | None = None
+
+    def parts(self, batch: Batch) -> list[_Part]:
+        parts: list[_Part] = []
+        for index, name in enumerate(self.names):
+            message = np.flatnonzero(batch.topic == index)
+            if not message.size:
+                continue
+            mine = Batch(batch.topic[message], batch.log_time[message], batch.start[message], batch.length[message], batch.buffer)
+            for stretch in self.readers[index].stretches(mine):
+                places = message[stretch.first : stretch.last]
+                if stretch.layout is None:
+                    self.skip(name, len(places), "not a message of its type")
+                elif index < len(self.source.topics):
+                    parts += self.blocks(name, self.source.topics[index][1], mine, stretch, stretch.layout, places)
+                else:
+                    parts += self.joint_states(name, mine, stretch, stretch.layout, places)
+        return parts
+
+    def skip(self, name: str, count: int, why: str) -> None:
+        self.unreadable[name] = self.unreadable.get(name, 0) + count
+        self.example.setdefault(name, why)
+
+    def blocks(self, name: str, kind: Kind, batch: Batch, stretch: Stretch, layout: Layout, places: Indices) -> list[_Part]:
+        table = doubles(batch, stretch, 0)
+        try:
+            if len(layout.names) != 2:
+                raise BadInput("dimensions", len(layout.names), "2", "Name the columns in layout.dim[1].label.")
+            unpack(layout.names[1], layout.shape[0], layout.shape[1], table[0])
+        except BadInput as error:
+            self.skip(name, len(places), str(error))
+            return []
+        block = unpack(layout.names[1], len(table) * layout.shape[0], layout.shape[1], table.ravel())
+        if not len(block):
+            return []
+        if self.clock is not None and kind == "voltage":
+            self.clock.anchor(float(block.seq[-1]), float(block.time[-1]))
+        return [_Part(kind, places, layout.shape[0], block)]
+
+    def joint_states(self, name: str, batch: Batch, stretch: Stretch, layout: Layout, places: Indices) -> list[_Part]:
+        self.joints = self.joints or layout.names
+        position, effort = layout.parts[0][1], layout.parts[2][1]
+        width = len(layout.names)
+        if position != width or width == 0 or set(layout.names) != set(self.joints) or (self.source.effort and effort != width):
+            self.skip(name, len(places), f"{width} names with {position} positions and {effort} efforts, joints {', '.join(layout.names)}")
+            return []
+        stamp = stamps(batch, stretch)
+        if self.from_log is None:
+            self.from_log = not bool(np.any(stamp))
+        time = (batch.log_time[stretch.first : stretch.last] if self.from_log else stamp).astype(np.float64) * 1e-9
+        order = [layout.names.index(joint) for joint in self.joints]
+        seq = np.zeros(len(time)) if self.clock is None else self.clock.number(time, self.source.effort)
+        parts = [_Part("position", places, 1, Block(self.joints, seq, time, doubles(batch, stretch, 0)[:, order]))]
+        if self.source.effort:
+            parts.insert(0, _Part("voltage", places, 1, Block(self.joints, seq, time, doubles(batch, stretch, 2)[:, order])))
+        return parts
+
+    def finish(self) -> None:
+        for name, count in self.unreadable.items():
+            self.bag.notes.append(f"{count} messages on {name} are left out: {self.example[name]}")
+        if self.from_log:
+            self.bag.notes.append("the stamps of the joint states are zero; the time of recording is used")
+
+
+def _cut(parts: list[_Part], most: int) -> Iterator[tuple[Kind, Block]]:
+    """Blocks of about ``most`` samples, those of all kinds side by side, in log order."""
+    if not parts:
+        return
+    last = 1 + max(int(part.message[-1]) for part in parts)
+    level = np.zeros(last, np.int64)
+    for kind in {part.kind for part in parts}:
+        filled = np.zeros(last, np.int64)
+        for part in parts:
+            if part.kind == kind:
+                filled[part.message] = part.rows
+        np.maximum(level, np.cumsum(filled) - filled, out=level)
+    group = level // most
+    pieces: list[tuple[int, int, Kind, Block]] = []
+    for part in parts:
+        number = group[part.message]
+        edges = [0, *(np.flatnonzero(np.diff(number)) + 1).tolist(), len(number)]
+        for a, b in itertools.pairwise(edges):
+            rows = slice(a * part.rows, b * part.rows)
+            block = Block(part.block.axes, part.block.seq[rows], part.block.time[rows], part.block.values[rows])
+            pieces.append((int(number[a]), int(part.message[a]), part.kind, block))
+    pieces.sort(key=lambda piece: piece[:2])
+    for _, _, kind, block in pieces:
+        yield kind, block
+
+
+def _period(bag: Bag, source: Source) -> float:
+    """Sample period of the stream that gives the sample numbers to the joint states, s."""
+    decoder = _Decoder(bag, source)
+    times: list[FloatArray] = []
+    seqs: list[FloatArray] = []
+    for batch, _ in bag.batches(decoder.names):
+        for part in decoder.parts(batch):
+            if part.kind == "voltage":
+                times.append(part.block.time)
+                seqs.append(part.block.seq)
+        if sum(map(len, times)) >= CLOCK_SAMPLES:
+            break
+    if not times or sum(map(len, times)) < 2:
+        input_name = "effort" if source.effort else source.topics[0][0]
+        why = "; ".join(decoder.example.values())
+        act = OTHERS if source.effort else "Record for longer."
+        raise bag.bad(f"fewer than 2 samples of {input_name} that can be read{f' ({why})' if why else ''}; it has {bag.listing()}", act)
+    time, seq = np.concatenate(times), np.concatenate(seqs)
+    steps = np.diff(time)
+    if not source.effort:
+        steps = steps[np.diff(seq) == 1]
+    steps = steps[steps > 0]
+    if not steps.size:
+        raise bag.bad("the time stamps do not increase", "Record with stamped messages.")
+    return float(np.median(steps))
+
+
+def pieces(bag: Bag, source: Source, most: int, progress: Callable[[float], None] | None) -> Iterator[tuple[Kind, Block]]:
+    """The blocks of an open bag; notes on what was left out are added to ``bag.notes`` at the end."""
+    decoder = _Decoder(bag, source)
+    if source.joints is not None:
+        before = len(bag.notes)
+        decoder.clock = _Clock(_period(bag, source))
+        del bag.notes[before:]
+    for batch, part in bag.batches(decoder.names):
+        yield from _cut(decoder.parts(batch), most)
+        if progress is not None:
+            progress(part)
+    decoder.finish()
+
+
+def stream_blocks(
+    path: Path | str,
+    *,
+    voltage_topic: str = VOLTAGE,
+    position_topic: str = POSITION,
+    joint_topic: str | None = None,
+    effort_as_voltage: bool = False,
+    chunk_samples: int = PIECE,
+    notes: list[str] | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Iterator[tuple[Kind, Block]]:
+    """("voltage" | "position" | "reference", Block) in log order, in flat memory.
+
+    chunk_samples: about how many samples of one kind come in one block, so also how far the kinds are apart
+    notes:         gets a sentence for everything that was odd or left out; complete when the iteration has ended
+    progress:      called with the part that has been read, 0..1
+    Raises BadRecording if nothing can be read.
+    """
+    with Bag(path) as bag:
+        try:
+            source = choose(bag, voltage_topic, position_topic, joint_topic, effort_as_voltage)
+            yield from pieces(bag, source, chunk_samples, progress)
+        finally:
+            if notes is not None:
+                notes.extend(bag.notes)
