@@ -56,14 +56,16 @@ _DROP, _DROP_START, _DROP_RATE = slot("base_loosening.drop"), slot("base_looseni
 @inlined
 def dry_level(p: FloatArray, v: float, direction: float) -> float:
     """Size of all dry friction at speed ``v``, sliding in ``direction`` (+1 or -1), V."""
-    level = coulomb_friction.level(p[_COULOMB]) + asymmetric_friction.level(p[_ASYM], p[_ASYM_COULOMB], direction)
-    return level + stribeck_friction.level(p[_STRIBECK], p[_STRIBECK_COULOMB], p[_STRIBECK_V], v) + p[_PRE]
+    level: float = coulomb_friction.level(p[_COULOMB]) + asymmetric_friction.level(p[_ASYM], p[_ASYM_COULOMB], direction)
+    level += stribeck_friction.level(p[_STRIBECK], p[_STRIBECK_COULOMB], p[_STRIBECK_V], v) + p[_PRE]
+    return level
 
 
 @inlined
 def slide_length(p: FloatArray, v: float) -> float:
     """Bristle deflection that speed ``v`` can hold, m."""
-    return p[_PRE_LENGTH] * dry_level(p, v, 1.0 if v >= 0.0 else -1.0) / p[_PRE]
+    length: float = p[_PRE_LENGTH] * dry_level(p, v, 1.0 if v >= 0.0 else -1.0) / p[_PRE]
+    return length
 
 
 @inlined

@@ -6,7 +6,7 @@ They keep no cache of their own, so the one cache that counts, the kernel's, can
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import ParamSpec, TypeVar, cast
+from typing import ParamSpec, TypeVar
 
 from numba.extending import register_jitable
 
@@ -16,4 +16,5 @@ R = TypeVar("R")
 
 def inlined(function: Callable[P, R]) -> Callable[P, R]:
     """The same function, callable from Python and from compiled code."""
-    return cast("Callable[P, R]", register_jitable(function))
+    compilable: Callable[P, R] = register_jitable(function)
+    return compilable

@@ -94,7 +94,7 @@ def _piece(p: FloatArray, y: FloatArray, n: int, t: float, span: float, volts: f
     """Moves row NOW on by ``span`` (s) in equal steps no longer than 1 / ``inner``; returns the friction mode."""
     if mode == 0:
         mode = _broken_loose(p, y, _NOW, t, volts)
-    steps = max(int(math.ceil(span * inner - 1e-9)), 1)
+    steps = max(math.ceil(span * inner - 1e-9), 1)
     for i in range(steps):
         mode = _advance(p, y, n, t + span * i / steps, span / steps, volts, mode)
     return mode

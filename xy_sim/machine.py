@@ -11,7 +11,7 @@ import numpy as np
 
 from xy_sim import kernel, truth
 from xy_sim.layout import STATES, numbers
-from xy_sim.machine_file import Axis, Spec, parts_from, read
+from xy_sim.machine_file import Axis, Spec, fitting, parts_from, read
 from xy_sim.parts import PARTS
 from xy_sysid.errors import BadInput
 from xy_sysid.stream import FloatArray
@@ -50,7 +50,7 @@ class Machine:
         """
         spec = read(path_or_name)
         if spec.hidden is not None:
-            from xy_sim.hidden import drawn  # noqa: PLC0415
+            from xy_sim.hidden import drawn
 
             spec = drawn(spec, seed)
         return cls(spec, seed, clean)
@@ -128,7 +128,7 @@ class Machine:
         def changed(axis: Axis) -> Axis:
             if axes is not None and axis.name not in axes:
                 return axis
-            return replace(axis, parts={name: value for name, value in (dict(axis.parts) | added).items() if name not in away})
+            return fitting(replace(axis, parts={name: value for name, value in (dict(axis.parts) | added).items() if name not in away}))
 
         return Machine(replace(self.spec, axes=tuple(changed(axis) for axis in self.spec.axes)), self.seed, self.clean)
 

@@ -101,6 +101,13 @@ def parts_from(given: object, where: str) -> dict[str, dict[str, float]]:
     return {name: PARTS[name].values(value, where) for name, value in table.items()}
 
 
+def fitting(axis: Axis) -> Axis:
+    """The same axis; raises BadInput if one of its parts needs another that is not there."""
+    if "base_loosening" in axis.parts and "base_resonance" not in axis.parts:
+        raise BadInput(f"axis {axis.name}: part", "base_loosening", "only on a base that can swing", "Add base_resonance.")
+    return axis
+
+
 def _numeric(values: dict[str, Any]) -> dict[str, Any]:
     """YAML 1.1 takes 1e-6 for text; here it is a number."""
 
@@ -115,41 +122,52 @@ def _numeric(values: dict[str, Any]) -> dict[str, Any]:
 
 def _axis(name: str, given: object, where: str) -> Axis:
     values = _mapping(given, f"{where}: axis {name}")
-    parts = parts_from(values.pop("parts", None), f"{where}: axis {name}")
+    parts = parts_from({part: value for part, value in values.pop("parts").items() if value is not False}, f"{where}: axis {name}")
     known = [*Drive.model_fields, "parts"]
     for key in values:
         if key not in known:
             raise unknown_name(key, known, f"{where}: axis {name}")
-    if "base_loosening" in parts and "base_resonance" not in parts:
-        raise BadInput(f"{where}: axis {name}", "base_loosening", "only with base_resonance", "Add base_resonance.")
-    return Axis(name, build(Drive, _numeric(values), f"{where}: axis {name}"), parts)
+    return fitting(Axis(name, build(Drive, _numeric(values), f"{where}: axis {name}"), parts))
+
+
+def _table(name: str | Path, beside: Path | None = None, depth: int = 0) -> tuple[str, dict[str, Any]]:
+    """File name and top-level keys, with those of ``base`` below them; axes and parts are merged by name."""
+    near = None if beside is None else beside / str(name)
+    path = near if near is not None and near.is_file() else machine_path(name)
+    if depth > 8:
+        raise BadInput(f"{path.name}: base", repr(str(name)), "a chain of at most 8 files", "A file must not be its own base.")
+    try:
+        own = _mapping(yaml.safe_load(path.read_text(encoding="utf-8")), path.name)
+    except (yaml.YAMLError, UnicodeDecodeError, OSError) as error:
+        raise BadInput("machine file", str(path), "YAML text", f"It says: {str(error).splitlines()[0]}.") from None
+    for key in own:
+        if key not in _TOP:
+            raise unknown_name(key, list(_TOP), path.name)
+    axes = {axis: _mapping(values, f"{path.name}: axis {axis}") for axis, values in _mapping(own.get("axes"), f"{path.name}: axes").items()}
+    for axis, values in axes.items():
+        values["parts"] = _mapping(values.get("parts"), f"{path.name}: axis {axis}: parts")
+    if "base" not in own:
+        return path.name, {**own, "axes": axes}
+    _, below = _table(own.pop("base"), path.parent, depth + 1)
+    merged = dict(below["axes"])
+    for axis, values in axes.items():
+        under = merged.get(axis, {"parts": {}})
+        merged[axis] = {**under, **values, "parts": {**under["parts"], **values["parts"]}}
+    return path.name, {**below, **own, "axes": merged}
 
 
 def read(name: str | Path) -> Spec:
     """The machine that a file describes; raises BadInput, which names the value, what is allowed and the nearest spelling."""
-    path = machine_path(name)
-    try:
-        table = _mapping(yaml.safe_load(path.read_text(encoding="utf-8")), path.name)
-    except (yaml.YAMLError, UnicodeDecodeError, OSError) as error:
-        raise BadInput("machine file", str(path), "YAML text", f"It says: {str(error).splitlines()[0]}.") from None
-    for key in table:
-        if key not in _TOP:
-            raise unknown_name(key, list(_TOP), path.name)
-    hidden = _mapping(table["hidden"], f"{path.name}: hidden") if "hidden" in table else None
+    file, table = _table(name)
+    hidden = _mapping(table["hidden"], f"{file}: hidden") if "hidden" in table else None
     for key in hidden or {}:
         if key not in _HIDDEN:
-            raise unknown_name(key, list(_HIDDEN), f"{path.name}: hidden")
-    if "base" in table:
-        if "axes" in table:
-            raise BadInput(path.name, "base and axes", "one of them", "Remove one.")
-        below = read(path.parent / str(table["base"]) if (path.parent / str(table["base"])).is_file() else str(table["base"]))
-        axes, defaults = below.axes, below
-    else:
-        given = _mapping(table.get("axes"), f"{path.name}: axes")
-        if not given:
-            raise BadInput(f"{path.name}: axes", "empty", "one group per axis", 'Add axes: {"x": {}}.')
-        axes, defaults = tuple(_axis(axis, values, path.name) for axis, values in given.items()), Spec(())
-    rate = _number(table.get("rate", defaults.rate), f"{path.name}: rate", 10.0, 1e5)
-    inner = _number(table.get("inner_rate", defaults.inner_rate), f"{path.name}: inner_rate", rate, 1e7)
-    seed = int(_number(table.get("seed", defaults.seed), f"{path.name}: seed", 0, 2**31 - 1))
-    return Spec(axes, rate, inner, seed, str(table.get("description", defaults.description)), hidden)
+            raise unknown_name(key, list(_HIDDEN), f"{file}: hidden")
+    if not table["axes"]:
+        raise BadInput(f"{file}: axes", "empty", "one group per axis", 'Add axes: {"x": {}}.')
+    axes = tuple(_axis(axis, values, file) for axis, values in table["axes"].items())
+    default = Spec(axes)
+    rate = _number(table.get("rate", default.rate), f"{file}: rate", 10.0, 1e5)
+    inner = _number(table.get("inner_rate", max(default.inner_rate, rate)), f"{file}: inner_rate", rate, 1e7)
+    seed = int(_number(table.get("seed", default.seed), f"{file}: seed", 0, 2**31 - 1))
+    return Spec(axes, rate, inner, seed, str(table.get("description", "")), hidden)

@@ -10,6 +10,7 @@ import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from xy_sim.layout import BASE, BASE_SPEED, BRISTLE, MOTOR, MOTOR_SPEED, RATTLE, RATTLE_SPEED, TABLE, TABLE_SPEED, coupling, slot
 from xy_sim.machine_file import Axis
@@ -105,7 +106,7 @@ def _transfer(axis: Axis, time: float) -> tuple[_Poly, _Poly]:
     return numerator / denominator[0], denominator / denominator[0]
 
 
-def _pairs(roots: FloatArray) -> list[float]:
+def _pairs(roots: NDArray[np.complex128]) -> list[float]:
     """Natural frequencies of the complex pairs, rising, Hz."""
     return sorted(float(abs(root)) / (2.0 * math.pi) for root in roots if root.imag > 1e-6 * abs(root))
 
@@ -117,9 +118,10 @@ def linear(axis: Axis, time: float = 0.0) -> dict[str, Any]:
     taken at ``time``. velocity_gain is None if a spring holds the axis. pole is the real pole next to the drive's.
     """
     numerator, denominator = _transfer(axis, time)
-    zeros, poles = np.roots(numerator), np.roots(denominator)
+    zeros, poles = np.roots(numerator).astype(np.complex128), np.roots(denominator).astype(np.complex128)
     integrates = denominator[-1] == 0.0
-    real = sorted((-float(root.real) for root in poles if abs(root.imag) <= 1e-9 * abs(root) and abs(root) > 1e-9), key=lambda w: abs(w - axis.drive.pole))
+    real = [-float(root.real) for root in poles if abs(root.imag) <= 1e-9 * abs(root) and abs(root) > 1e-9]
+    real.sort(key=lambda pole: abs(pole - axis.drive.pole))
     antiresonances, resonances = _pairs(zeros), _pairs(poles)
     return {
         "axis": axis.name,

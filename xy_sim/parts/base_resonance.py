@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import math
-
 from xy_sim.inlined import inlined
 from xy_sim.parts.contract import Parameter, Part
 

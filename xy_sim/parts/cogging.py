@@ -16,7 +16,7 @@ PART = Part(
     source="Hanselman, Brushless Permanent Magnet Motor Design, 2003, ch. 5",
     parameters=(
         Parameter("amplitude", "V", 0.15, 0.05, 0.4, "drive voltage that overcomes it", 0.0, 100.0),
-        Parameter("per_revolution", "", 4.0, 2.0, 8.0, "periods in one turn of the screw", 0.01, 1000.0),
+        Parameter("per_revolution", "", 4.0, 2.0, 8.0, "periods in one turn of the screw", 0.01, 1000.0, whole=True),
         Parameter("phase", "rad", 0.0, -3.0, 3.0, "phase at the origin", -10.0, 10.0),
     ),
 )

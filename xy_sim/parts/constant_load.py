@@ -12,9 +12,7 @@ PART = Part(
     law="f = -load",
     meaning="a tilted axis, a hanging cable, a current offset of the amplifier",
     source="Newton; Gautier & Venture, EMPS benchmark 2013, 'offset'",
-    parameters=(
-        Parameter("load", "V", 0.15, 0.05, 0.4, "drive voltage that holds it", -100.0, 100.0, True),
-    ),
+    parameters=(Parameter("load", "V", 0.15, 0.05, 0.4, "drive voltage that holds it", -100.0, 100.0, True),),
 )
 
 

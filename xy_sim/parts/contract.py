@@ -15,7 +15,10 @@ Group = Literal["base", "effect", "outside", "event"]
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One number of a part: ``low..high`` is drawn from, ``minimum..maximum`` is allowed."""
+    """One number of a part: ``low..high`` is drawn from, ``minimum..maximum`` is allowed.
+
+    signed: drawn with either sign; whole: drawn as a whole number.
+    """
 
     name: str
     unit: str
@@ -26,6 +29,7 @@ class Parameter:
     minimum: float = 0.0
     maximum: float = float("inf")
     signed: bool = False
+    whole: bool = False
 
     def checked(self, value: object, where: str) -> float:
         """The value as a number; raises BadInput outside the allowed range."""

@@ -12,9 +12,7 @@ PART = Part(
     law="v = u - clip(u, -width, width)",
     meaning="amplifier cross-over, valve overlap, a threshold in the drive",
     source="Tao & Kokotovic, Adaptive Control of Systems with Actuator Nonlinearities, Wiley 1996, ch. 2",
-    parameters=(
-        Parameter("width", "V", 0.15, 0.05, 0.4, "half of the zone", 0.0, 100.0),
-    ),
+    parameters=(Parameter("width", "V", 0.15, 0.05, 0.4, "half of the zone", 0.0, 100.0),),
 )
 
 

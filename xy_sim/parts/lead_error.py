@@ -16,7 +16,7 @@ PART = Part(
     source="ISO 3408-3: 2006, travel deviation within one revolution",
     parameters=(
         Parameter("amplitude", "m", 8e-6, 4e-6, 20e-6, "largest error", 0.0, 1e-2),
-        Parameter("per_revolution", "", 1.0, 1.0, 2.0, "periods in one turn of the screw", 0.01, 1000.0),
+        Parameter("per_revolution", "", 1.0, 1.0, 2.0, "periods in one turn of the screw", 0.01, 1000.0, whole=True),
         Parameter("phase", "rad", 0.0, -3.0, 3.0, "phase at the origin", -10.0, 10.0),
     ),
 )

@@ -12,9 +12,7 @@ PART = Part(
     law="v = clip(u, -limit, limit)",
     meaning="supply or current limit of the drive",
     source="Khalil, Nonlinear Systems, sec. 1.2",
-    parameters=(
-        Parameter("limit", "V", 1.5, 1.0, 2.2, "largest voltage that comes out", 1e-9, 1e6),
-    ),
+    parameters=(Parameter("limit", "V", 1.5, 1.0, 2.2, "largest voltage that comes out", 1e-9, 1e6),),
 )
 
 

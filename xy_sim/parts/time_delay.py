@@ -12,9 +12,7 @@ PART = Part(
     law="v(t) = u(t - delay)",
     meaning="the whole chain from command to current acts a fixed time late; fractions of a sample count",
     source="measured on the paper's table: 1.29 ms (x), 1.38 ms (y)",
-    parameters=(
-        Parameter("delay", "s", 1.29e-3, 0.5e-3, 3e-3, "time from a voltage sample to its effect", 0.0, 1.0),
-    ),
+    parameters=(Parameter("delay", "s", 1.29e-3, 0.5e-3, 3e-3, "time from a voltage sample to its effect", 0.0, 1.0),),
 )
 
 

@@ -12,9 +12,7 @@ PART = Part(
     law="f = coefficient v",
     meaning="drag beyond the drive's own (which velocity_gain and pole describe)",
     source="Olsson et al., Friction models and friction compensation, Eur. J. Control 4 (1998), eq. 2",
-    parameters=(
-        Parameter("coefficient", "V/(m/s)", 2.0, 0.5, 4.0, "drive voltage that the drag eats, per speed"),
-    ),
+    parameters=(Parameter("coefficient", "V/(m/s)", 2.0, 0.5, 4.0, "drive voltage that the drag eats, per speed"),),
 )
 
 
