@@ -1,0 +1,144 @@
+"""What the package says about itself, in every file that says it."""
+
+from __future__ import annotations
+
+import ast
+import re
+import runpy
+import sys
+import types
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+from typing import Any
+from unittest import mock
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture(scope="module")
+def setup_arguments() -> dict[str, Any]:
+    """What setup.py hands to setuptools."""
+    with mock.patch("setuptools.setup") as setup, pytest.MonkeyPatch.context() as patch:
+        patch.chdir(ROOT)
+        runpy.run_path(str(ROOT / "setup.py"))
+    return dict(setup.call_args.kwargs)
+
+
+@pytest.fixture(scope="module")
+def manifest() -> ElementTree.Element:
+    return ElementTree.parse(ROOT / "package.xml").getroot()
+
+
+def text(manifest: ElementTree.Element, tag: str) -> str:
+    return (manifest.findtext(tag) or "").strip()
+
+
+def test_package_xml_and_setup_py_say_the_same(setup_arguments: dict[str, Any], manifest: ElementTree.Element) -> None:
+    """Name, version, licence and maintainer are one; the mail address is valid, or colcon would not see a ROS package."""
+    assert text(manifest, "name") == setup_arguments["name"] == "xy_sysid"
+    assert text(manifest, "version") == setup_arguments["version"]
+    assert text(manifest, "license") == setup_arguments["license"] == "Apache-2.0"
+    (maintainer,) = manifest.findall("maintainer")
+    assert maintainer.get("email") == setup_arguments["maintainer_email"]
+    assert re.fullmatch(r"[-\w.%+]+@[-\w%]+(\.[-\w%]+)+", maintainer.get("email") or "")
+    assert manifest.get("format") == "3"
+    assert manifest.findtext("export/build_type") == "ament_python"
+
+
+def test_every_dependency_has_a_rosdep_key_or_a_word_about_it(setup_arguments: dict[str, Any], manifest: ElementTree.Element) -> None:
+    """What pip installs is in package.xml too, under its rosdep key; what has none is named in a comment."""
+    keys = {node.text for node in manifest.findall("exec_depend")}
+    remarks = (ROOT / "package.xml").read_text(encoding="utf-8")
+    for requirement in setup_arguments["install_requires"]:
+        name = (
+            re.split(r"[<>=;\[ ]", requirement)[0].lower().removeprefix("py") if requirement == "pyyaml" else re.split(r"[<>=;\[ ]", requirement)[0]
+        )
+        assert {f"python3-{name}", f"python3-{name}-pip"} & keys or f"{name} has no rosdep key" in remarks, requirement
+
+
+def test_the_versions_of_everything_are_pinned(setup_arguments: dict[str, Any]) -> None:
+    """constraints.txt has exact versions only, no options or hosts, and every requirement of every extra is in it."""
+    lines = [line for line in (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines() if line and not line.startswith("#")]
+    pinned = {}
+    for line in lines:
+        assert re.fullmatch(r"[a-z0-9-]+==[\w.!+]+", line), line
+        pinned[line.split("==")[0]] = line.split("==")[1]
+    assert len(pinned) == len(lines)
+    wanted = [*setup_arguments["install_requires"], *(item for extra in setup_arguments["extras_require"].values() for item in extra)]
+    for requirement in wanted:
+        name = re.split(r"[<>=;\[ ]", requirement)[0].lower().replace("_", "-")
+        assert name in pinned, requirement
+        exact = re.search(r"==([\d.]+)", requirement)
+        assert exact is None or pinned[name] == exact.group(1)
+
+
+def test_entry_points_lead_to_a_main_function(setup_arguments: dict[str, Any]) -> None:
+    """Every executable names a module of this tree that defines, or imports, main."""
+    scripts = dict(item.split(" = ") for item in setup_arguments["entry_points"]["console_scripts"])
+    assert {"xy-sysid", "excitation", "identifier", "recorder", "ballscrew"} == set(scripts)
+    for name, target in scripts.items():
+        module, _, function = target.partition(":")
+        path = ROOT / module.replace(".", "/")
+        source = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+        assert source.is_file(), f"{name}: {source} is not there"
+        tree = ast.parse(source.read_text(encoding="utf-8"))
+        defined = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+        defined |= {alias.asname or alias.name for node in tree.body if isinstance(node, ast.ImportFrom) for alias in node.names}
+        assert function in defined, f"{name}: {source} has no {function}"
+
+
+def test_share_holds_the_marker_the_manifest_the_configuration_and_the_launch_files(setup_arguments: dict[str, Any]) -> None:
+    """What ros2 launch, ros2 run and the nodes look for in an installation."""
+    data = {target: set(files) for target, files in setup_arguments["data_files"]}
+    assert data["share/ament_index/resource_index/packages"] == {"resource/xy_sysid"}
+    assert data["share/xy_sysid"] == {"package.xml"}
+    assert {"config/default.yaml", "config/demo.yaml", "config/real.yaml", "config/fastdds.xml"} <= data["share/xy_sysid/config"]
+    assert data["share/xy_sysid/config/machines"] == {f"config/machines/{path.name}" for path in (ROOT / "config" / "machines").glob("*.yaml")}
+    assert data["share/xy_sysid/launch"] == {"launch/xy.launch.py"}
+    for file in set().union(*data.values()):
+        assert (ROOT / file).is_file(), file
+
+
+def test_hooks_and_the_check_script_use_what_make_installs() -> None:
+    """pre-commit fetches nothing: every hook is local; .ci/run is strict and calls make test."""
+    hooks = yaml.safe_load((ROOT / ".pre-commit-config.yaml").read_text(encoding="utf-8"))
+    assert {repo["repo"] for repo in hooks["repos"]} == {"local"}
+    assert {hook["language"] for repo in hooks["repos"] for hook in repo["hooks"]} == {"system"}
+    script = ROOT / ".ci" / "run"
+    assert script.stat().st_mode & 0o111
+    assert "set -euo pipefail" in script.read_text(encoding="utf-8")
+    assert "make test" in script.read_text(encoding="utf-8")
+
+
+def test_the_launch_file_starts_the_executables_and_moves_nothing_unasked(setup_arguments: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    """With stand-ins for launch: each node is an executable of the package, and activation depends on an argument that is off."""
+    made: list[tuple[str, dict[str, Any]]] = []
+
+    class StandIn(types.ModuleType):
+        def __getattr__(self, name: str) -> Any:
+            if name.startswith("__"):
+                raise AttributeError(name)
+
+            def make(*arguments: Any, **keywords: Any) -> Any:
+                made.append((name, {"arguments": arguments, **keywords}))
+                return made[-1]
+
+            vars(make).update(TRANSITION_ACTIVATE=3, TRANSITION_CONFIGURE=1)
+            return make
+
+    tree = ast.parse((ROOT / "launch" / "xy.launch.py").read_text(encoding="utf-8"))
+    for name in {str(node.module) for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}:
+        for end in [*(index for index, letter in enumerate(name) if letter == "."), len(name)]:
+            monkeypatch.setitem(sys.modules, name[:end], StandIn(name[:end]))
+    runpy.run_path(str(ROOT / "launch" / "xy.launch.py"))["generate_launch_description"]()
+    scripts = {item.split(" = ")[0] for item in setup_arguments["entry_points"]["console_scripts"]}
+    nodes = [keywords for kind, keywords in made if kind in ("Node", "LifecycleNode")]
+    assert {node["executable"] for node in nodes} == scripts - {"xy-sysid"}
+    assert all(node["package"] == "xy_sysid" for node in nodes)
+    declared = {keywords["arguments"][0]: keywords["default_value"] for kind, keywords in made if kind == "DeclareLaunchArgument"}
+    assert declared["activate"] == declared["simulate"] == declared["record"] == "false"
+    (drive,) = [keywords for kind, keywords in made if kind == "RegisterEventHandler"]
+    assert drive["condition"][1]["arguments"][0][1]["arguments"] == ("activate",)
