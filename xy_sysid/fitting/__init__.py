@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from xy_sysid.fitting import iwls, lls, ml, nlls
+from xy_sysid.fitting import iwls, lls, ml, nlls, nllsfdi
 from xy_sysid.fitting.identify import identify
 from xy_sysid.fitting.result import Estimate, Fit
 from xy_sysid.fitting.structure import FitOptions, Structure
@@ -14,6 +14,7 @@ ESTIMATORS: dict[str, Callable[..., Fit]] = {
     "iwls": iwls.fit,
     "nlls": nlls.fit,
     "ml": ml.fit,
+    "nllsfdi": nllsfdi.fit,
 }
 
 __all__ = ["ESTIMATORS", "Estimate", "Fit", "FitOptions", "Structure", "identify"]

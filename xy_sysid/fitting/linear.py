@@ -12,6 +12,7 @@ from xy_sysid.fitting.basis import basis
 from xy_sysid.fitting.problem import Point, Problem, cost, rational, response
 from xy_sysid.fitting.structure import FitOptions
 from xy_sysid.frf import ComplexArray
+from xy_sysid.stream import FloatArray
 
 SCAN_STEPS = 4  # re-weightings at each delay of the scan: enough to rank delays
 
@@ -33,9 +34,9 @@ def linear_step(task: Problem, delay: float, last: Point | None, correct: bool) 
     left = numerator.values(line) * n_weight[:, None]
     right = denominator.values(line) * d_weight[:, None]
     table = np.concatenate((left, -right[:, :-1], right[:, -1:]), axis=1)
-    upper = np.linalg.qr(np.concatenate((table.real, table.imag)), mode="r")
+    upper: FloatArray = np.asarray(np.linalg.qr(np.concatenate((table.real, table.imag)), mode="r"))
     size = upper.shape[1] - 1
-    solution = np.linalg.lstsq(upper[:size, :size], upper[:size, size], rcond=1e-14)[0]
+    solution: FloatArray = np.asarray(np.linalg.lstsq(upper[:size, :size], upper[:size, size], rcond=1e-14)[0], dtype=np.float64)
     split = structure.numerator_order + 1
     return Point(numerator, denominator, solution[:split], np.append(solution[split:], 1.0), delay)
 
@@ -71,11 +72,11 @@ def scan(task: Problem, steps: int, options: FitOptions) -> list[tuple[float, fl
         delays = np.linspace(0.0, structure.delay_max, max(int(np.ceil(structure.delay_max / step)), 1) + 1)
     found: list[tuple[float, float, Point]] = []
     for delay in delays:
-        point, lowest = None, np.inf
-        for _ in range(min(steps, SCAN_STEPS)):
+        point = linear_step(task, float(delay), None, False)
+        lowest = _simple_cost(task, point)
+        for _ in range(min(steps, SCAN_STEPS) - 1):
             point = linear_step(task, float(delay), point, False)
             lowest = min(lowest, _simple_cost(task, point))
-        assert point is not None
         found.append((lowest if np.isfinite(lowest) else np.inf, float(delay), point))
     costs = [item[0] for item in found]
     padded = [np.inf, *costs, np.inf]
@@ -92,11 +93,7 @@ def searched(task: Problem, steps: int, options: FitOptions) -> tuple[Point, flo
     """The linear estimator's answer: best delay of the scan, then a golden-section search around it."""
     candidates = scan(task, steps, options)
     _, delay, start = candidates[0]
-    if steps == 1:
-        start_point: Point | None = None
-    else:
-        start_point = start
-    best, lowest, count = reweighted(task, delay, steps, start_point)
+    best, lowest, count = reweighted(task, delay, steps, start if steps > 1 else None)
     if not (task.structure.free_delay and options.refine_delay):
         return best, lowest, count
     width = options.delay_step / float(task.frf.frequency[-1])

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xy_sysid.errors import BadInput
-from xy_sysid.fitting.alias import ALIASES, TAIL_POINTS, interpolation, nodes_for
 from xy_sysid.fitting.structure import Structure
 from xy_sysid.frf import ComplexArray, FrequencyResponse
+from xy_sysid.hold import ALIASES, TAIL_POINTS, interpolation, nodes_for
 from xy_sysid.stream import FloatArray
 
 
@@ -103,7 +103,8 @@ def _plan(
     k = np.concatenate((np.arange(-ALIASES, 0), np.arange(1, ALIASES + 1))).astype(np.float64)
     if not held:
         nodes, k = nodes[:0], k[:0]
-    s = 2j * np.pi * rate * (nodes[:, None] + k[None, :]).ravel()
+    s = np.asarray(2j * np.pi * rate * (nodes[:, None] + k[None, :]).ravel(), dtype=np.complex128)
+    alias_factor = np.asarray(1.0 / (s * (s / scale) ** integrators), dtype=np.complex128)
     return Plan(
         scale=scale,
         period=period,
@@ -117,8 +118,8 @@ def _plan(
         index=np.ascontiguousarray(inverse.reshape(wanted.shape)).astype(np.int64),
         conjugate=wanted < 0,
         kernel=weight[None, :] * post[:, None],
-        alias=s / scale,
-        alias_factor=1.0 / (s * (s / scale) ** integrators),
+        alias=np.asarray(s / scale, dtype=np.complex128),
+        alias_factor=alias_factor,
         alias_number=k,
         spread=interpolation(nodes, grid_frequency * period) if held else np.zeros((omega.size, 0)),
         tail=interpolation(TAIL_POINTS, nodes) if held else np.zeros((0, TAIL_POINTS.size)),
@@ -127,8 +128,8 @@ def _plan(
 
 def _variable(omega: FloatArray, period: float, scale: float, domain: str) -> ComplexArray:
     if domain == "z":
-        return np.exp(1j * omega * period)
-    return np.asarray(1j * omega / scale)
+        return np.asarray(np.exp(1j * omega * period), dtype=np.complex128)
+    return np.asarray(1j * omega / scale, dtype=np.complex128)
 
 
 def _factors(
@@ -144,8 +145,5 @@ def _factors(
         return np.where(zero, limit, main), np.zeros_like(s)
     hold = -np.expm1(-s * period) / period
     main = difference / (s / scale) ** integrators * (hold / s if held else 1.0)
-    if int(differenced) == integrators:
-        limit = (period * scale) ** integrators
-    else:
-        limit = 0.0
+    limit = (period * scale) ** integrators if int(differenced) == integrators else 0.0
     return np.where(zero, limit, main), np.where(zero, 0.0, difference * hold)

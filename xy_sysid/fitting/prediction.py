@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xy_sysid.compiled import compiled
-from xy_sysid.fitting.alias import ALIASES, SERIES, TAIL_POINTS, tail_sums
 from xy_sysid.fitting.basis import Basis
 from xy_sysid.fitting.plan import Plan
 from xy_sysid.frf import ComplexArray
+from xy_sysid.hold import ALIASES, SERIES, TAIL_POINTS, tail_sums
 from xy_sysid.stream import FloatArray
 
 TAIL_REACH = 0.5  # the series in 1 / s is used while every pole is within this part of the last alias

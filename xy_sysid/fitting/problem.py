@@ -137,7 +137,8 @@ def from_transfer_function(task: Problem, tf: TransferFunction) -> Point | None:
     line, power = task.plan.line, task.plan.scale
     up = numerator * power ** (np.arange(numerator.size)[::-1] - float(structure.denominator_order))
     down = denominator * power ** (np.arange(denominator.size)[::-1] - float(structure.free_order))
-    n_values, d_values = np.polyval(up, line), np.polyval(down, line)
+    n_values: ComplexArray = np.asarray(np.polyval(up, line), dtype=np.complex128)
+    d_values: ComplexArray = np.asarray(np.polyval(down, line), dtype=np.complex128)
     if not (bool(np.all(np.isfinite(n_values / d_values))) and bool(np.any(n_values != 0))):
         return None
     delay = tf.delay if structure.delay == "free" else float(structure.delay)

@@ -83,6 +83,6 @@ def nodes_for(highest: float, digits: float = 11.0) -> FloatArray:
     top = min(max(highest, 1e-3), 0.5)
     nearest = max(2.0 / top - 3.0, 1.02)
     rate = nearest + math.sqrt(nearest**2 - 1.0)
-    number = min(int(math.ceil(digits * math.log(10.0) / math.log(rate))) + 2, 40)
+    number = min(math.ceil(digits * math.log(10.0) / math.log(rate)) + 2, 40)
     angle = (2.0 * np.arange(number) + 1.0) / (2.0 * number) * np.pi
     return np.asarray(0.5 * max(highest, 1e-3) * (1.0 - np.cos(angle)))
