@@ -132,9 +132,9 @@ def leaf_cells(buffer: Bytes, first: int, filled: int, numbers: Indices, size: i
             local = payload
             if payload > usable - 35:
                 least = (usable - 12) * 32 // 255 - 23
-                local = least + (payload - least) % (usable - 4)
+                local = np.int64(least + (payload - least) % (usable - 4))
                 if local > usable - 35:
-                    local = least
+                    local = np.int64(least)
             if payload < 5 or at + local + (4 if local < payload else 0) > end:
                 broken = True
                 continue
@@ -160,7 +160,7 @@ def leaf_cells(buffer: Bytes, first: int, filled: int, numbers: Indices, size: i
             if local < payload:
                 here = record + local - body
                 if spill + length > buffer.shape[0]:
-                    return -1, damaged, spill + length
+                    return -1, damaged, spill + int(length)
                 buffer[spill : spill + here] = buffer[body : body + here]
                 done, link = here, np.int64(record + local)
                 reachable = True
@@ -177,7 +177,7 @@ def leaf_cells(buffer: Bytes, first: int, filled: int, numbers: Indices, size: i
                     done += part
                 rows[found, 3] = spill if reachable else -1
                 if reachable:
-                    spill += length
+                    spill += int(length)
             found += 1
         if broken:
             damaged += 1
