@@ -27,6 +27,7 @@ $(INSTALLED): constraints.txt setup.py
 	"$$found" -m venv --clear $(VENV)
 	@$(PIP) setuptools
 	@$(PIP) --no-build-isolation --editable '.[ros,test]'
+	-@$(BIN)/python -m compileall -q -j 0 -x '/(plotly|matplotlib|fontTools|pip|docutils)/' $(VENV)/lib
 	@touch $@
 
 demo: $(INSTALLED) ## watch a simulated XY table being identified live (ARGS="--help" for more)
@@ -44,9 +45,12 @@ types: $(INSTALLED) ## types
 unit: $(INSTALLED) ## every test (ARGS="-k words" for some)
 	@$(BIN)/python -m pytest $(ARGS)
 
-bench: $(INSTALLED) ## measure against other software, and write the table (ARGS names one)
-	@$(PIP) --no-build-isolation --editable '.[bench]'
+bench: $(VENV)/.bench ## measure against other software, and write the table (ARGS names one)
 	@$(BIN)/python -m bench $(ARGS)
+
+$(VENV)/.bench: $(INSTALLED)
+	@$(PIP) --no-build-isolation --editable '.[bench]'
+	@touch $@
 
 clean: ## remove what the other targets made
 	rm -rf $(VENV) build install log .mypy_cache .ruff_cache .pytest_cache .hypothesis *.egg-info
