@@ -1,0 +1,6 @@
+"""python -m xy_sysid"""
+
+from xy_sysid.cli import main
+
+if __name__ == "__main__":
+    main()

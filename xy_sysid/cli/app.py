@@ -1,0 +1,27 @@
+"""The commands by name. Each is one file; it imports what it needs when it runs, so that --help is quick."""
+
+from __future__ import annotations
+
+import typer
+
+from xy_sysid.cli.demo import demo
+from xy_sysid.cli.fit import fit
+from xy_sysid.cli.frf import frf
+from xy_sysid.cli.record import record
+from xy_sysid.cli.replay import replay
+from xy_sysid.cli.run import run
+from xy_sysid.cli.simulate import simulate
+from xy_sysid.cli.study import study
+from xy_sysid.cli.validate import validate
+
+app = typer.Typer(
+    name="xy-sysid",
+    help="Identify the axes of a machine: frequency response, transfer function with delay, and how far both can be trusted.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+for command in (demo, run, record, replay, simulate, frf, fit, validate, study):
+    app.command(name=command.__name__)(command)

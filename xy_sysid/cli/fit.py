@@ -1,0 +1,152 @@
+"""xy-sysid fit: the parametric model, with its uncertainty and its verdicts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from xy_sysid.cli import options as o
+from xy_sysid.cli.output import aside, emit, people, quantity, table
+from xy_sysid.cli.provenance import provenance
+from xy_sysid.cli.reading import chosen, read
+
+if TYPE_CHECKING:
+    from xy_sysid.fitting import Fit, Structure
+    from xy_sysid.offline import AxisEstimate
+    from xy_sysid.recording import Recording
+
+
+def fit(
+    rec: o.Rec,
+    axis: o.Axes = None,
+    set_: o.Set = None,
+    params: o.Params = None,
+    topic: o.Topics = None,
+    effort: o.Effort = False,
+    period: o.Period = "auto",
+    span: o.Span = "",
+    method: Annotated[str, typer.Option(help="best (maximum likelihood), lls, iwls, nlls, ml, or nllsfdi (the paper's own path)")] = "best",
+    weighting: Annotated[str, typer.Option(help="of a line's error: sigma, relative (1/|FRF|, the paper's) or uniform")] = "sigma",
+    domain: Annotated[str, typer.Option(help="s (continuous) or z (discrete)")] = "s",
+    held_out: Annotated[float, typer.Option(help="last part of the recording that no fit sees, for the check in time")] = 0.2,
+    model: Annotated[Path | None, typer.Option("--model", metavar="FILE", help="write the model as YAML")] = None,
+    mat: Annotated[Path | None, typer.Option("--mat", metavar="FILE", help="write the model for MATLAB's tf()")] = None,
+    json: o.Json = False,
+) -> None:
+    """Transfer function with delay of each axis, 95 % intervals, and whether it can be trusted."""
+    from xy_sysid import exports
+    from xy_sysid.offline import estimate, split
+    from xy_sysid.validation import validate
+
+    settings = o.settings_from(params, set_)
+    recording = read(rec, axis, topic, effort, span, json)
+    training, unseen = split(recording, held_out)
+    structure = _structure(settings, weighting, domain)
+    estimator = _estimator(method)
+    answers: dict[str, Any] = {}
+    fits: dict[str, Fit] = {}
+    for name in chosen(recording, axis):
+        found = estimate(training, name, settings, o.period_from(period))
+        result = estimator(found.frf, structure)
+        verdicts = validate(result, found.frf, _unseen(unseen, name))
+        fits[name] = result
+        answers[name] = answer(found, result, verdicts)
+        if not json:
+            _show(found, result, verdicts)
+    origin = provenance(rec, recording)
+    if model is not None:
+        exports.write_model(model, fits, origin)
+    if mat is not None:
+        exports.write_mat(mat, fits)
+    if json:
+        emit({"recording": origin, "axes": answers})
+
+
+def _structure(settings: Any, weighting: str, domain: str) -> Structure:
+    from dataclasses import replace
+    from typing import get_args
+
+    from xy_sysid.errors import BadInput
+    from xy_sysid.fitting.structure import Weighting
+    from xy_sysid.live_fit import structure_from
+
+    if weighting not in get_args(Weighting):
+        raise BadInput("--weighting", repr(weighting), ", ".join(get_args(Weighting)), "Choose one of these.")
+    if domain not in ("s", "z"):
+        raise BadInput("--domain", repr(domain), "s, z", "Choose one of these.")
+    return replace(structure_from(settings), weighting=weighting, domain=domain)
+
+
+def _estimator(method: str) -> Any:
+    from xy_sysid.errors import BadInput
+    from xy_sysid.fitting import ESTIMATORS, identify
+
+    known = {"best": identify, **ESTIMATORS}
+    if method not in known:
+        raise BadInput("--method", repr(method), ", ".join(known), "Choose one of these.")
+    return known[method]
+
+
+def _unseen(recording: Recording, axis: str) -> Any:
+    """(input, output, sampling rate) of the longest gap-free run that no fit saw, or None."""
+    runs = recording.runs()
+    if not runs:
+        return None
+    run = max(runs, key=lambda part: part.stop - part.start)
+    u, y = recording.axis(axis)
+    return u[run], y[run], recording.sampling_rate
+
+
+def answer(found: AxisEstimate, result: Fit, verdicts: Any) -> dict[str, Any]:
+    """One axis of the JSON document."""
+    tf = result.tf
+    return {
+        "method": result.method,
+        "converged": result.converged,
+        "reason": result.reason,
+        "iterations": result.iterations,
+        "transfer_function": {
+            "numerator": tf.numerator,
+            "denominator": tf.denominator,
+            "delay": tf.delay,
+            "sampling_time": tf.sampling_time,
+            "input_unit": tf.input_unit,
+            "output_unit": tf.output_unit,
+        },
+        "poles": result.poles,
+        "zeros": result.zeros,
+        "estimates": {item.name: {"value": item.value, "ci95": [item.low, item.high], "unit": item.unit} for item in result.intervals},
+        "relative_error": result.relative_error,
+        "paper": {"error_cost": result.error_cost, "confidence": result.confidence},
+        "cost": result.cost,
+        "expected_cost": result.expected_cost,
+        "consistent": result.consistent,
+        "lines": len(result.frequency),
+        "band": [result.frequency[0], result.frequency[-1]],
+        "windows": found.windows,
+        "period": found.period,
+        "validation": verdicts,
+        "warnings": [*found.notes, *result.warnings],
+    }
+
+
+def _show(found: AxisEstimate, result: Fit, verdicts: Any) -> None:
+    f = result.frequency
+    people.print(
+        f"[bold]axis {found.axis}[/bold]: {result.method}, {len(f)} lines from {f[0]:.3g} to {f[-1]:.4g} Hz, {found.windows} windows; "
+        f"relative error {100 * result.relative_error:.2g} % (paper: error cost {result.error_cost:.2f}, confidence {result.confidence:.2f})"
+    )
+    if not result.converged:
+        people.print(f"[bold]The fit did not converge:[/bold] {result.reason}")
+    rows = [
+        (item.name, quantity(item.value, item.unit, 6), f"{quantity(item.low, item.unit, 6)} .. {quantity(item.high, item.unit, 6)}")
+        for item in result.intervals
+    ]
+    table("", ("parameter", "value", "95 % interval"), rows)
+    for check in verdicts.verdicts:
+        people.print(f"  {'ok  ' if check.ok else 'WARN'} {check.sentence}")
+    for note in (*found.notes, *result.warnings):
+        aside.print(f"axis {found.axis}: {note}")
+    people.print()

@@ -1,0 +1,79 @@
+"""xy-sysid frf: the non-parametric model."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from xy_sysid.cli import options as o
+from xy_sysid.cli.output import aside, emit, people, table
+from xy_sysid.cli.reading import chosen, read
+
+
+def frf(
+    rec: o.Rec,
+    axis: o.Axes = None,
+    set_: o.Set = None,
+    params: o.Params = None,
+    topic: o.Topics = None,
+    effort: o.Effort = False,
+    period: o.Period = "auto",
+    span: o.Span = "",
+    csv: Annotated[str, typer.Option("--csv", metavar="FILE", help="write frequency, real, imag, coherence and sigma of every line")] = "",
+    json: o.Json = False,
+) -> None:
+    """Frequency response, coherence and uncertainty of each axis."""
+    import numpy as np
+
+    from xy_sysid.offline import estimate
+
+    settings = o.settings_from(params, set_)
+    recording = read(rec, axis, topic, effort, span, json)
+    found = [estimate(recording, name, settings, o.period_from(period)) for name in chosen(recording, axis)]
+    if csv:
+        _write_csv(csv, found)
+    if json:
+        emit(
+            {
+                "recording": {"source": str(rec), "sampling_rate": recording.sampling_rate, "samples": len(recording), "notes": recording.notes},
+                "axes": {item.axis: {"windows": item.windows, "period": item.period, "notes": item.notes, "frf": item.frf} for item in found},
+            }
+        )
+        return
+    for item in found:
+        f = item.frf
+        for note in item.notes:
+            aside.print(f"axis {item.axis}: {note}")
+        people.print(
+            f"axis {item.axis}: {int(f.trusted.sum())} of {len(f)} lines trusted, {f.resolution:.4g} Hz apart, "
+            f"{item.windows} windows ({f.averages:.1f} independent), {recording.sampling_rate:.6g} Hz"
+        )
+        lines = np.unique(np.clip(np.searchsorted(f.frequency, np.geomspace(max(f.frequency[0], 1e-9), f.frequency[-1], 16)), 0, len(f) - 1))
+        rows = [
+            (
+                f"{f.frequency[k]:.4g}",
+                f"{20 * np.log10(max(abs(f.response[k]), 1e-300)):.2f}",
+                f"{np.degrees(np.angle(f.response[k])):.1f}",
+                f"{f.coherence[k]:.4f}",
+                f"{100 * f.sigma[k] / max(abs(f.response[k]), 1e-300):.2g}",
+                "yes" if f.trusted[k] else "no",
+            )
+            for k in lines
+        ]
+        unit = f"{f.output_unit}/{f.input_unit}"
+        table(f"axis {item.axis}, {unit}", ("Hz", f"dB ({unit})", "phase deg", "coherence", "sigma %", "trusted"), rows)
+
+
+def _write_csv(path: str, found: list) -> None:  # type: ignore[type-arg]
+    import numpy as np
+
+    rows = []
+    for item in found:
+        f = item.frf
+        rows += [
+            f"{item.axis},{a!r},{b.real!r},{b.imag!r},{c!r},{s!r},{int(t)}"
+            for a, b, c, s, t in zip(*(np.asarray(v).tolist() for v in (f.frequency, f.response, f.coherence, f.sigma, f.trusted)), strict=True)
+        ]
+    with open(path, "w", encoding="utf-8") as file:
+        file.write("axis,frequency_hz,real,imag,coherence,sigma,trusted\n" + "\n".join(rows) + "\n")

@@ -1,0 +1,72 @@
+"""How a command answers: a table for people, or one JSON document; progress always on stderr."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Iterable, Mapping
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+people = Console(highlight=False, soft_wrap=True)
+aside = Console(stderr=True, highlight=False, soft_wrap=True)
+
+
+def plain(value: Any) -> Any:
+    """The value in JSON's own types: arrays as lists, complex numbers as [real, imag], not finite as null."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return {item.name: plain(getattr(value, item.name)) for item in fields(value)}
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return [plain(item) for item in value.tolist()]
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, complex):
+        return [plain(value.real), plain(value.imag)]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, (str, int, bool)) or value is None:
+        return value
+    if isinstance(value, Iterable):
+        return [plain(item) for item in value]
+    return str(value)
+
+
+def emit(document: Mapping[str, Any]) -> None:
+    """The one JSON document of a command."""
+    sys.stdout.write(json.dumps(plain(document), allow_nan=False) + "\n")
+    sys.stdout.flush()
+
+
+def table(title: str, columns: Iterable[str], rows: Iterable[Iterable[str]]) -> None:
+    """A table on stdout; the first column is text, the others are figures."""
+    made = Table(title=title, title_justify="left", title_style="bold", header_style="bold", box=None, pad_edge=False)
+    for number, name in enumerate(columns):
+        made.add_column(name, justify="left" if number == 0 else "right", overflow="fold")
+    for row in rows:
+        made.add_row(*row)
+    people.print(made)
+
+
+def progress() -> Progress:
+    """A progress bar on stderr that disappears at its end."""
+    return Progress(
+        TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn(), console=aside, transient=True
+    )
+
+
+def quantity(value: float, unit: str, digits: int = 4) -> str:
+    """A figure as people read it: ms for short times, mm for small lengths."""
+    if not math.isfinite(value):
+        return "-"
+    for small, scale, shown in (("s", 1e3, "ms"), ("m", 1e3, "mm"), ("m/s/V", 1e3, "mm/s/V"), ("m/(V s)", 1e3, "mm/(V s)")):
+        if unit == small:
+            return f"{value * scale:.{digits}g} {shown}"
+    return f"{value:.{digits}g} {unit}".rstrip()

@@ -1,0 +1,36 @@
+"""Where an answer comes from: versions, command, and a fingerprint of the data."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+import sys
+from pathlib import Path
+from typing import Any
+
+from xy_sysid.recording import Recording
+
+
+def provenance(path: Path, recording: Recording) -> dict[str, Any]:
+    """Plain values for a model file or report."""
+    from importlib.metadata import PackageNotFoundError, version
+
+    versions = {"python": platform.python_version()}
+    for name in ("xy_sysid", "numpy", "scipy", "numba"):
+        try:
+            versions[name] = version(name)
+        except PackageNotFoundError:
+            versions[name] = "from source"
+    digest = hashlib.sha256()
+    digest.update(recording.voltage.tobytes())
+    digest.update(recording.position.tobytes())
+    return {
+        "source": str(path),
+        "command": " ".join(["xy-sysid", *sys.argv[1:]]),
+        "samples": len(recording),
+        "sampling_rate_hz": float(recording.sampling_rate),
+        "units": {"input": recording.input_unit, "output": recording.output_unit},
+        "data_sha256": digest.hexdigest(),
+        "versions": versions,
+        "notes": list(recording.notes),
+    }

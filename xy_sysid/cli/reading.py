@@ -1,0 +1,40 @@
+"""Read the recording that a command was given, with progress."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from xy_sysid.cli.options import span_from, topics_from
+from xy_sysid.cli.output import aside, progress
+from xy_sysid.errors import BadInput
+from xy_sysid.recording import Recording
+
+
+def read(path: Path, axes: list[str] | None, topics: list[str] | None, effort: bool, span: str, quiet: bool) -> Recording:
+    """The recording; its notes go to stderr unless ``quiet``."""
+    from xy_sysid.imports import load
+
+    start, stop = span_from(span)
+    with progress() as bar:
+        task = bar.add_task(f"reading {path.name}", total=1.0)
+        recording = load(
+            path,
+            axes=tuple(axes) if axes else None,
+            effort_as_voltage=effort,
+            start=start,
+            stop=stop,
+            progress=lambda part: bar.update(task, completed=part),
+            **topics_from(topics),
+        )
+    if not quiet:
+        for note in recording.notes:
+            aside.print(f"note: {note}")
+    return recording
+
+
+def chosen(recording: Recording, axes: list[str] | None) -> tuple[str, ...]:
+    """The axes asked for; raises BadInput for one that is not there."""
+    for name in axes or []:
+        if name not in recording.axes:
+            raise BadInput("--axis", repr(name), ", ".join(recording.axes), "Choose one of these.")
+    return tuple(axes) if axes else recording.axes

@@ -1,0 +1,99 @@
+"""xy-sysid replay: the identifier's logic on a bag, as fast as it goes."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from xy_sysid.cli import options as o
+from xy_sysid.cli.output import aside, emit, people, progress, quantity, table
+
+if TYPE_CHECKING:
+    from xy_sysid.live_fit import Update
+
+
+def replay(
+    bag: Annotated[Path, typer.Argument(metavar="BAG", help="rosbag2 folder or file with voltage and position")],
+    axis: o.Axes = None,
+    set_: o.Set = None,
+    params: o.Params = None,
+    topic: o.Topics = None,
+    effort: o.Effort = False,
+    out: Annotated[Path | None, typer.Option("--out", metavar="BAG", help="write what the node would have published")] = None,
+    json: o.Json = False,
+) -> None:
+    """Replay a bag through the identifier: the same numbers, bit for bit, as the live node."""
+    from contextlib import ExitStack
+
+    from xy_sysid.bags import BagWriter
+    from xy_sysid.errors import BadRecording
+    from xy_sysid.identifier import Identifier
+    from xy_sysid.imports import stream_blocks
+    from xy_sysid.replay import replay as logic
+
+    settings = o.settings_from(params, set_)
+    last: Update | None = None
+    updates, alarms = 0, dict[str, str]()
+    begun = time.perf_counter()
+    with ExitStack() as stack:
+        writer = stack.enter_context(BagWriter(out)) if out is not None else None
+        bar = stack.enter_context(progress())
+        task = bar.add_task(f"replaying {bag.name}", total=None)
+        blocks = stream_blocks(bag, effort_as_voltage=effort, **o.topics_from(topic))
+        kind, first = next(blocks, (None, None))
+        if kind is None or first is None:
+            raise BadRecording(bag, "holds no samples", "Give a bag with voltage and position.")
+        identifier = Identifier(settings, tuple(axis) if axis else first.axes)
+
+        def all_blocks() -> Any:
+            yield kind, first
+            yield from blocks
+
+        for update in logic(all_blocks(), settings, identifier.axes, identifier):
+            last, updates = update, updates + 1
+            bar.update(task, description=f"replaying {bag.name}: {update.request.seconds:.0f} s")
+            for name, part in update.axes.items():
+                if part.track.alarm and name not in alarms:
+                    alarms[name] = f"after {update.request.seconds:.1f} s of data: {_alarm(name, part)}"
+            if writer is not None:
+                stamp = round(update.request.seq / update.request.sampling_rate * 1e9)
+                for message in update.arrays():
+                    writer.write_array(f"/xy/{message.topic}", message.labels, message.sizes, message.data, stamp)
+    seconds = time.perf_counter() - begun
+    if last is None:
+        windows = f"{identifier.samples} paired samples, {settings.length + 1} needed in one piece"
+        raise BadRecording(bag, f"no window was filled ({windows}; {identifier.faults or 'no faults'})", "Give a longer bag or a shorter --set length=.")
+    heard = identifier.samples / last.request.sampling_rate
+    if json:
+        emit(
+            {
+                "updates": updates,
+                "seconds": heard,
+                "speed": heard / seconds,
+                "faults": identifier.faults,
+                "dropped": identifier.dropped,
+                "alarms": alarms,
+                "axes": {s.name.removeprefix("axis "): {"level": s.level, "message": s.message, "values": dict(s.values)} for s in last.statuses()},
+            }
+        )
+        return
+    people.print(f"{bag}: {heard:.1f} s of data in {seconds:.2f} s ({heard / seconds:.0f} times real time), {updates} fits")
+    for reason, sentence in identifier.sentences.items():
+        aside.print(f"{reason}: {sentence}")
+    for sentence in alarms.values():
+        people.print(f"[bold]ALARM[/bold] {sentence}")
+    for name, part in last.axes.items():
+        if part.fit is None:
+            people.print(f"axis {name}: {part.problem}")
+            continue
+        rows = [(i.name, quantity(i.value, i.unit, 6), f"{quantity(i.low, i.unit, 6)} .. {quantity(i.high, i.unit, 6)}") for i in part.fit.intervals]
+        table(f"axis {name}: relative error {100 * part.fit.relative_error:.2g} %", ("parameter", "value", "95 % interval"), rows)
+
+
+def _alarm(name: str, part: Any) -> str:
+    from xy_sysid.tracking import alarm_sentence
+
+    return alarm_sentence(name, part.track)
