@@ -69,10 +69,20 @@ class ExcitationSettings(Settings):
     duration: float = knob(0.0, "stop after so many seconds of signal; 0 is endless", "s", ge=0.0, le=1e9)
     ramp: float = knob(0.5, "time to fade in, and out at an orderly end", "s", ge=0.0, le=60.0)
     watchdog: float = knob(0.05, "without a position for so long while active, ramp to zero and go inactive", "s", gt=0.0, le=10.0)
-    abort_ramp: float = knob(0.02, "time to fade out when a guard trips", "s", ge=0.0, le=10.0)
+    abort_ramp: float = knob(0.02, "time to fade out when a guard trips, and on deactivate", "s", ge=0.0, le=10.0)
+    patience: float = knob(10.0, "how long to wait for the first position, at 0 V, and with lockstep for any answer", "s", gt=0.0, le=3600.0)
+    autostart: bool = knob(False, "configure and activate without being told, once a machine is there")
     axes: dict[str, AxisExcitation] = Field(
         default_factory=lambda: {"x": AxisExcitation(seed=1), "y": AxisExcitation(seed=2)}, description="one group per axis"
     )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> ExcitationSettings:
+        if self.speed == 0 and not self.lockstep:
+            raise ValueError("speed is 0 without lockstep; allowed: above 0, or lockstep with a simulated machine")
+        if not self.axes:
+            raise ValueError("axes is empty; allowed: at least one axis")
+        return self
 
 
 class IdentifierSettings(Settings):
