@@ -1,0 +1,210 @@
+"""Two streams of samples --> one Recording: paired by sample number, sorted, without repeats and without NaN."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xy_sysid.errors import BadInput, BadRecording
+from xy_sysid.recording import Recording, rate_from_time
+from xy_sysid.stream import Block, FloatArray
+
+LATE = 0.5  # s; a sample number that falls back further than that, for good, is a restart of the source
+SAME_RATE = 1e-3  # relative; sampling rates that differ by more do not belong together
+Fail = Callable[[str, str], BadRecording]
+Rows = NDArray[np.int64] | slice
+
+
+@dataclass(frozen=True, slots=True)
+class Stream:
+    """All samples of one kind in log order: seq (n,), time (n,) s, values (n, axes)."""
+
+    axes: tuple[str, ...]
+    seq: FloatArray
+    time: FloatArray
+    values: FloatArray
+
+
+def gather(name: str, blocks: Sequence[Block], axes: tuple[str, ...], notes: list[str], fail: Fail) -> Stream:
+    """One stream from blocks, with the columns in the order of ``axes``; rows that are not finite become gaps."""
+    table = [np.column_stack((block.seq, block.time, block.values[:, [block.axes.index(axis) for axis in axes]])) for block in blocks]
+    rows = np.concatenate(table) if table else np.empty((0, 2 + len(axes)))
+    finite = np.isfinite(rows).all(axis=1)
+    if not finite.all():
+        notes.append(f"{int(np.sum(~finite))} rows of {name} are not numbers; they are left out")
+        rows = rows[finite]
+    if not len(rows):
+        raise fail(f"no samples of {name}", "Record while the source publishes.")
+    whole = np.rint(rows[:, 0])
+    return Stream(axes, whole, rows[:, 1], rows[:, 2:])
+
+
+def sessions(seq: FloatArray, tolerance: float) -> list[int]:
+    """Where the source began to count anew: first index of each session, 0 included.
+
+    A number that falls back by more than ``tolerance`` begins a session, unless the old numbers soon go on (then it was
+    a straggler, and sorting puts it right).
+    """
+    starts = [0]
+    while True:
+        part = seq[starts[-1] :]
+        highest = np.maximum.accumulate(part)
+        fallen = np.flatnonzero(part < highest - tolerance)
+        begin = 0
+        for index in fallen[np.flatnonzero(np.diff(fallen, prepend=-2) > 1)].tolist():
+            back = np.flatnonzero(part[index:] > highest[index] - tolerance)
+            if not back.size or back[0] > tolerance:
+                begin = index
+                break
+        if begin == 0:
+            return starts
+        starts.append(starts[-1] + begin)
+
+
+def _merge(streams: dict[str, Stream], notes: list[str]) -> tuple[dict[str, Stream], float]:
+    """Give each session numbers and times of its own, after those of the session before; also the sampling period."""
+    steps = {name: np.diff(stream.time)[np.diff(stream.seq) == 1] for name, stream in streams.items()}
+    period = float(np.median(np.concatenate(list(steps.values())))) if any(len(s) for s in steps.values()) else 0.0
+    tolerance = LATE / period if period > 0 else 1000.0
+    starts = {name: sessions(stream.seq, tolerance) for name, stream in streams.items()}
+    counts = {name: len(found) for name, found in starts.items()}
+    most = max(counts.values())
+    if most == 1:
+        return streams, period
+    kept = min(counts.values())
+    if kept == most:
+        notes.append(f"the source started anew {most - 1} times; the parts follow each other with a gap")
+    else:
+        said = ", ".join(f"{name} {count - 1} times" for name, count in counts.items())
+        notes.append(f"the sample counters started anew a different number of times ({said}); only the part before the first is paired")
+        kept = 1
+    merged: dict[str, list[Stream]] = {name: [] for name in streams}
+    offset, late = 0.0, 0.0
+    for number in range(kept):
+        highest, latest = -np.inf, -np.inf
+        parts: dict[str, Stream] = {}
+        for name, stream in streams.items():
+            edges = [*starts[name], len(stream.seq)]
+            rows = slice(edges[number], edges[number + 1])
+            parts[name] = Stream(stream.axes, stream.seq[rows], stream.time[rows], stream.values[rows])
+        lowest = min(float(part.seq.min()) for part in parts.values())
+        earliest = min(float(part.time.min()) for part in parts.values())
+        for name, part in parts.items():
+            shift, delay = (offset - lowest, late - earliest) if number else (0.0, 0.0)
+            moved = Stream(part.axes, part.seq + shift, part.time + delay, part.values)
+            highest, latest = max(highest, float(moved.seq.max())), max(latest, float(moved.time.max()))
+            merged[name].append(moved)
+        offset, late = highest + 2, latest + 2 * period
+    return {
+        name: Stream(
+            parts[0].axes,
+            np.concatenate([part.seq for part in parts]),
+            np.concatenate([part.time for part in parts]),
+            np.concatenate([part.values for part in parts]),
+        )
+        for name, parts in merged.items()
+    }, period
+
+
+def _sorted(name: str, stream: Stream, notes: list[str]) -> Stream:
+    """In the order of seq; of samples with the same number the first is kept."""
+    if not bool(np.all(np.diff(stream.seq) > 0)):
+        order = np.argsort(stream.seq, kind="stable")
+        seq = stream.seq[order]
+        first = np.concatenate(([True], np.diff(seq) > 0))
+        if not bool(np.all(np.diff(stream.seq) >= 0)):
+            notes.append(f"{name} came out of order; it is sorted")
+        if not first.all():
+            notes.append(f"{int(np.sum(~first))} samples of {name} are there twice; the first is kept")
+        order = order[first]
+        return Stream(stream.axes, stream.seq[order], stream.time[order], stream.values[order])
+    return stream
+
+
+def pair(streams: dict[str, Stream], source: str, units: tuple[str, str], notes: list[str], fail: Fail) -> Recording:
+    """The recording of the samples that both "voltage" and "position" have; "reference" where it has them too.
+
+    Raises what ``fail`` makes if nothing can be paired or if the streams run at different rates.
+    """
+    streams, period = _merge(streams, notes)
+    streams = {name: _sorted(name, stream, notes) for name, stream in streams.items()}
+    voltage, position = streams["voltage"], streams["position"]
+    for name, stream in (("voltage", voltage), ("position", position)):
+        if len(stream.seq) < 2:
+            raise fail(f"only {len(stream.seq)} sample of {name}", "Record for longer.")
+    rates = {name: _rate(name, stream, fail) for name, stream in (("voltage", voltage), ("position", position))}
+    if abs(rates["voltage"] / rates["position"] - 1) > SAME_RATE:
+        raise fail(f"voltage runs at {rates['voltage']:.6g} Hz and position at {rates['position']:.6g} Hz", "Record both at one rate.")
+    seq, left, right = _common(voltage.seq, position.seq)
+    if len(seq) < 2:
+        spans = f"voltage has {voltage.seq[0]:.0f} to {voltage.seq[-1]:.0f}, position {position.seq[0]:.0f} to {position.seq[-1]:.0f}"
+        raise fail(f"no sample numbers in common ({spans})", "Give both topics the same counter, or stamps of one clock.")
+    alone = {"voltage": len(voltage.seq) - len(seq), "position": len(position.seq) - len(seq)}
+    notes += [f"{count} samples of {name} have no partner; they are left out" for name, count in alone.items() if count]
+    apart = float(np.median(voltage.time[left] - position.time[right]))
+    if period > 0 and abs(apart) > 0.1 * period:
+        notes.append(f"samples of the same number are stamped {1e3 * abs(apart):.4g} ms apart; they are paired by number")
+    reference = _reference(streams.get("reference"), seq, notes)
+    return Recording(
+        sampling_rate=rate_from_time(position.time[right], seq.astype(np.int64)),
+        axes=position.axes,
+        seq=seq.astype(np.int64),
+        time=position.time[right],
+        voltage=voltage.values[left],
+        position=position.values[right],
+        input_unit=units[0],
+        output_unit=units[1],
+        reference=reference,
+        source=source,
+        notes=tuple(notes),
+    )
+
+
+def _common(one: FloatArray, other: FloatArray) -> tuple[FloatArray, Rows, Rows]:
+    """Sample numbers that both have, and where; both are sorted and without repeats."""
+    if np.array_equal(one, other):
+        return one, slice(None), slice(None)
+    place = np.minimum(np.searchsorted(other, one), len(other) - 1)
+    left = np.flatnonzero(other[place] == one)
+    return one[left], left, place[left]
+
+
+def _rate(name: str, stream: Stream, fail: Fail) -> float:
+    seq: NDArray[np.int64] = stream.seq.astype(np.int64)
+    steps = np.diff(stream.time) / np.diff(stream.seq)
+    if not np.median(steps) > 0:
+        raise fail(f"the time of {name} does not increase", "Stamp each sample with its instant in seconds.")
+    return rate_from_time(stream.time, seq)
+
+
+def _reference(stream: Stream | None, seq: FloatArray, notes: list[str]) -> FloatArray | None:
+    if stream is None:
+        return None
+    common, _, there = _common(seq, stream.seq)
+    if len(common) < len(seq):
+        notes.append("the reference does not cover all samples; it is left out")
+        return None
+    return stream.values[there]
+
+
+def cut(recording: Recording, begin: float, start: float, stop: float | None) -> Recording:
+    """The part from ``start`` to before ``stop``, s after the instant ``begin``; raises BadInput if that is too little."""
+    if start <= 0 and stop is None:
+        return recording
+    elapsed = recording.time - begin
+    inside = (elapsed >= start - 1e-9) & (elapsed < (np.inf if stop is None else stop - 1e-9))
+    if np.sum(inside) < 2:
+        asked = f"{start:g} to {'the end' if stop is None else f'{stop:g}'} s"
+        raise BadInput("start and stop", asked, f"within 0 to {elapsed[-1]:.6g} s", "Choose a longer part.")
+    return dataclasses.replace(
+        recording,
+        seq=recording.seq[inside],
+        time=recording.time[inside],
+        voltage=recording.voltage[inside],
+        position=recording.position[inside],
+        reference=None if recording.reference is None else recording.reference[inside],
+    )
