@@ -21,15 +21,16 @@ def names(text: str) -> list[str]:
 # Upstream first: a file imports only from names to its left or above it, or from its own folder.
 CORE = names("""
 errors compiled stream hold settings recording frf transfer_function
-excitation
+excitation travel drive pacing
+simulation reduction
 windows window_check period spectra batch estimate
 fitting validation tracking
 axis_model effects greybox comparison diagnosis refinement
-pairing identifier messages live_fit replay offline
+pairing joints identifier messages live_fit replay offline
 """)
 EDGE = names("""
 shipped parameter_file run_plan starter
-bags imports model_file
+bags imports exports model_file state_file work_queue
 nodes
 report page
 cli __main__
