@@ -13,7 +13,7 @@ from xy_sim.parts import PARTS
 from xy_sysid.errors import BadInput
 from xy_sysid.stream import FloatArray
 
-EVERYTHING = {name: {} for name in PARTS if name not in ("presliding_hysteresis", "base_loosening")}
+EVERYTHING: dict[str, dict[str, float]] = {name: {} for name in PARTS if name not in ("presliding_hysteresis", "base_loosening")}
 
 
 def noise(n: int, rms: float = 1.0, seed: int = 5) -> FloatArray:
@@ -23,7 +23,7 @@ def noise(n: int, rms: float = 1.0, seed: int = 5) -> FloatArray:
 
 @pytest.mark.parametrize("effects", [{}, EVERYTHING, {"presliding_hysteresis": {}}], ids=["paper", "everything", "presliding"])
 @pytest.mark.parametrize("seed", [1, 2])
-def test_any_split_into_blocks_gives_the_same_positions_bit_for_bit(effects: dict[str, object], seed: int) -> None:
+def test_any_split_into_blocks_gives_the_same_positions_bit_for_bit(effects: dict[str, dict[str, float]], seed: int) -> None:
     """Chunking must not matter."""
     machine = Machine.from_file("paper.yaml", seed=3).with_parts(effects)
     u = noise(700)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -33,7 +34,7 @@ def with_part(name: str) -> Machine:
 
 @pytest.mark.parametrize("name", PARTS)
 def test_halving_the_inner_step_changes_nothing(name: str) -> None:
-    """Less than a tenth of an encoder count over 2 s, so that no reading can tell; bristles are worst with 0.02 um.
+    """Less than a tenth of an encoder count over 2 s, so that no reading can tell; bristles are worst with 0.02 to 0.03 um.
 
     Even backlash: its contacts are damped and located in time, so errors of rounding do not grow here.
     """
@@ -84,13 +85,13 @@ def linear_machine(kind: str) -> Machine:
     return machine if kind == "paper" else machine.with_parts({kind: {}})
 
 
-def exact_positions(truth: dict[str, object], u: FloatArray, rate: float) -> FloatArray:
+def exact_positions(truth: dict[str, Any], u: FloatArray, rate: float) -> FloatArray:
     """Response of a transfer function with delay to held voltages, by matrix exponentials cut at the delayed instants."""
     a, b, c, _ = tf2ss(truth["numerator"], truth["denominator"])
     scale = np.diag(300.0 ** np.arange(a.shape[0]))  # balances the companion form
     a, b, c = scale @ a @ np.linalg.inv(scale), scale @ b, c @ np.linalg.inv(scale)
     n = a.shape[0]
-    delay = float(str(truth["delay"])) * rate
+    delay = truth["delay"] * rate
     whole, rest = int(delay), delay % 1.0 / rate
 
     def held(span: float) -> tuple[FloatArray, FloatArray]:
@@ -120,7 +121,7 @@ def test_linear_machines_move_as_their_transfer_function_says(kind: str) -> None
 def test_a_sine_through_the_paper_machine_meets_the_truth(frequency: float) -> None:
     """Steady response at a frequency is the transfer function's times the hold's, to 0.1 %, in magnitude and phase."""
     machine = Machine.from_file("paper.yaml", clean=True)
-    n = int(2000 * 4)
+    n = 2000 * 4
     instants = np.arange(n) / 2000.0
     y = machine.step(np.repeat(np.sin(2 * np.pi * frequency * instants)[:, None], 2, axis=1))[n // 2 :, 0]
     late = instants[n // 2 :]
@@ -130,8 +131,8 @@ def test_a_sine_through_the_paper_machine_meets_the_truth(frequency: float) -> N
     assert abs(complex(sine, cosine) / expected - 1.0) < 1e-3
 
 
-def shifted(truth: dict[str, object], frequency: float) -> complex:
+def shifted(truth: dict[str, Any], frequency: float) -> complex:
     """Transfer function times the hold's at ``frequency``, Hz; sampling adds its images."""
     s = 2j * np.pi * frequency
     plant = np.polyval(np.array(truth["numerator"]), s) / np.polyval(np.array(truth["denominator"]), s)
-    return complex(plant * np.exp(-s * float(str(truth["delay"]))) * (1 - np.exp(-s / 2000.0)) / (s / 2000.0))
+    return complex(plant * np.exp(-s * truth["delay"]) * (1 - np.exp(-s / 2000.0)) / (s / 2000.0))
