@@ -83,7 +83,9 @@ def _transfer_function(path: Path, axis: str, part: Any) -> TransferFunction:
     except (KeyError, TypeError, ValueError) as problem:
         raise BadRecording(path, f"axis {axis}: {type(problem).__name__} {problem}", "Write the model again with xy-sysid fit --model.") from None
     if not (np.all(np.isfinite(numerator)) and np.all(np.isfinite(denominator)) and denominator.size and denominator[0] != 0 and delay >= 0):
-        raise BadInput(f"{path}: axis {axis}", "a transfer function with bad numbers", "finite coefficients, leading one not 0, delay >= 0", "Correct it.")
+        raise BadInput(
+            f"{path}: axis {axis}", "a transfer function with bad numbers", "finite coefficients, leading one not 0, delay >= 0", "Correct it."
+        )
     return TransferFunction(numerator / denominator[0], denominator / denominator[0], delay, None if step is None else float(step), *units)
 
 

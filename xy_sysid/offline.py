@@ -41,7 +41,9 @@ def estimate(recording: Recording, axis: str, settings: IdentifierSettings, peri
     """
     u, y = recording.axis(axis)
     if float(np.ptp(u)) == 0.0:
-        raise BadInput(f"input of axis {axis}", f"constant at {float(u[0]) if u.size else 0.0:g} {recording.input_unit}", "a moving one", "Excite this axis.")
+        raise BadInput(
+            f"input of axis {axis}", f"constant at {float(u[0]) if u.size else 0.0:g} {recording.input_unit}", "a moving one", "Excite this axis."
+        )
     if float(np.ptp(y)) == 0.0:
         raise BadInput(f"output of axis {axis}", "constant", "a moving one", "Check the encoder, and that the axis is enabled.")
     runs = recording.runs()
@@ -67,9 +69,7 @@ def estimate(recording: Recording, axis: str, settings: IdentifierSettings, peri
     return AxisEstimate(axis, frf, period or None, int(spectra.weight), tuple(notes + _closed_loop(recording, axis)))
 
 
-def _periodic(
-    settings: IdentifierSettings, runs: list[slice], period: int, notes: list[str], rate: float
-) -> tuple[IdentifierSettings, list[slice]]:
+def _periodic(settings: IdentifierSettings, runs: list[slice], period: int, notes: list[str], rate: float) -> tuple[IdentifierSettings, list[slice]]:
     first = runs[0]
     if (first.stop - first.start) // period > TRANSIENT + 1:
         runs = [slice(first.start + TRANSIENT * period, first.stop), *runs[1:]]

@@ -11,7 +11,9 @@ from xy_sysid.settings import IdentifierSettings
 from xy_sysid.stream import Block
 
 
-def replay(blocks: Iterable[tuple[Kind, Block]], settings: IdentifierSettings, axes: tuple[str, ...], identifier: Identifier | None = None) -> Iterator[Update]:
+def replay(
+    blocks: Iterable[tuple[Kind, Block]], settings: IdentifierSettings, axes: tuple[str, ...], identifier: Identifier | None = None
+) -> Iterator[Update]:
     """Updates in order, lazily; pass an ``identifier`` of your own to read its counters afterwards."""
     identifier = identifier or Identifier(settings, axes)
     fitter = LiveFitter(settings)

@@ -34,7 +34,7 @@ def run(arguments: Sequence[str]) -> int:
         text = problem.format_message() if hasattr(problem, "format_message") else str(problem)
         return _refuse(f"{text.rstrip('.')}. See xy-sysid {' '.join(arguments[:1])} --help.".replace("  ", " "))
     except BrokenPipeError:
-        sys.stdout = open(os.devnull, "w")
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # the reader went away: nothing more to say to it
         return 0
 
 

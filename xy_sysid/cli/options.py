@@ -12,10 +12,13 @@ from xy_sysid.settings import IdentifierSettings, changed
 
 Rec = Annotated[Path, typer.Argument(metavar="REC", help="recording: a rosbag2 folder or file (.db3, .mcap), .csv, .mat or .npz")]
 Axes = Annotated[list[str] | None, typer.Option("--axis", "-a", help="only this axis (may be repeated)")]
-Set = Annotated[list[str] | None, typer.Option("--set", "-s", metavar="NAME=VALUE", help="change a setting, for example length=2048 (see docs/settings.md)")]
+Set = Annotated[
+    list[str] | None, typer.Option("--set", "-s", metavar="NAME=VALUE", help="change a setting, for example length=2048 (see docs/settings.md)")
+]
 Params = Annotated[Path | None, typer.Option("--params", metavar="FILE", help="ROS parameter file; the identifier's part is used")]
 Topics = Annotated[
-    list[str] | None, typer.Option("--topic", metavar="WHAT=NAME", help="topic names in a bag: voltage=..., position=... or joints=... (may be repeated)")
+    list[str] | None,
+    typer.Option("--topic", metavar="WHAT=NAME", help="topic names in a bag: voltage=..., position=... or joints=... (may be repeated)"),
 ]
 Effort = Annotated[bool, typer.Option("--effort", help="take the input from the effort of a JointState")]
 Period = Annotated[str, typer.Option(help="samples of the input's period: auto, none or a number")]

@@ -57,9 +57,7 @@ def table(title: str, columns: Iterable[str], rows: Iterable[Iterable[str]]) -> 
 
 def progress() -> Progress:
     """A progress bar on stderr that disappears at its end."""
-    return Progress(
-        TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn(), console=aside, transient=True
-    )
+    return Progress(TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn(), console=aside, transient=True)
 
 
 def quantity(value: float, unit: str, digits: int = 4) -> str:

@@ -65,7 +65,9 @@ def replay(
     seconds = time.perf_counter() - begun
     if last is None:
         windows = f"{identifier.samples} paired samples, {settings.length + 1} needed in one piece"
-        raise BadRecording(bag, f"no window was filled ({windows}; {identifier.faults or 'no faults'})", "Give a longer bag or a shorter --set length=.")
+        raise BadRecording(
+            bag, f"no window was filled ({windows}; {identifier.faults or 'no faults'})", "Give a longer bag or a shorter --set length=."
+        )
     heard = identifier.samples / last.request.sampling_rate
     if json:
         emit(

@@ -21,13 +21,16 @@ def simulate(
     out: Annotated[Path, typer.Argument(metavar="OUT", help="new bag (a folder; .mcap for that format), or a .csv, .mat or .npz file")],
     machine: Annotated[str, typer.Option(help="machine file or a name in config/machines")] = "paper.yaml",
     effect: Annotated[
-        list[str] | None, typer.Option("--effect", metavar="NAME[=SIZE]", help="add an effect, [axis:]name[=size][,parameter=value] (may be repeated)")
+        list[str] | None,
+        typer.Option("--effect", metavar="NAME[=SIZE]", help="add an effect, [axis:]name[=size][,parameter=value] (may be repeated)"),
     ] = None,
     hidden: Annotated[int | None, typer.Option(metavar="SEED", help="draw effects and sizes from this seed, and do not tell")] = None,
     duration: Annotated[float, typer.Option(help="seconds of data", min=0.01, max=1e6)] = 60.0,
     clean: Annotated[bool, typer.Option("--clean", help="without encoder noise and quantization")] = False,
     seed: Annotated[int, typer.Option(help="of encoder noise; the excitation's seeds are added to it", min=0, max=2**31 - 100)] = 0,
-    excite: Annotated[list[str] | None, typer.Option("--excite", "-e", metavar="NAME=VALUE", help="excitation setting for every axis, for example kind=multisine")] = None,
+    excite: Annotated[
+        list[str] | None, typer.Option("--excite", "-e", metavar="NAME=VALUE", help="excitation setting for every axis, for example kind=multisine")
+    ] = None,
     truth: Annotated[Path | None, typer.Option(metavar="FILE", help="write what was really simulated as JSON")] = None,
     json: o.Json = False,
 ) -> None:
