@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from xy_sim.dynamics import rates
+from xy_sim.layout import BASE, BASE_SPEED, MOTOR_SPEED, STATES, numbers
 from xy_sim.machine import Machine
 from xy_sim.parts import PARTS
 from xy_sysid.stream import FloatArray
@@ -200,6 +202,18 @@ def test_the_base_gives_way_against_the_push() -> None:
     table = machine.spec.axes[0].drive.table_mass * (state["motor_speed"] + state["base_speed"])
     assert table == pytest.approx(-base * state["base_speed"], rel=1e-3)
     assert table > 0.0
+
+
+def test_friction_must_hold_a_resting_table_against_its_inertia_on_a_swinging_base() -> None:
+    """With the screw stuck, table and base are one mass on the spring; friction carries the table's share."""
+    axis = rigid(base_resonance={"frequency": 46.2, "mass": 120.0, "damping": 0.0}, coulomb_friction=1.0).spec.axes[0]
+    states = np.zeros((2, len(STATES)))
+    states[0, BASE] = 1e-4
+    needed = rates(numbers(axis.drive, axis.parts), states, 0, 0.0, 0.0, 0, 1)
+    acceleration = -((2 * math.pi * 46.2) ** 2) * 1e-4
+    assert states[1, BASE_SPEED] == pytest.approx(acceleration, rel=1e-12)
+    assert needed == pytest.approx(-axis.drive.table_mass * acceleration, rel=1e-12)
+    assert states[1, MOTOR_SPEED] == 0.0
 
 
 def test_a_hardening_spring_balances_the_voltage_at_the_cube_root() -> None:
