@@ -54,6 +54,7 @@ class Drive:
         self.axes = tuple(settings.axes)
         self.state: State = "idle"
         self.reason = ""
+        self.blind = False  # stopped because positions did not come
         self.seq = seq
         self._travel = TravelGuard(settings)
         self._signals = [signal(axis.model_copy(update={"rms": 1.0}), settings.rate) for axis in settings.axes.values()]
@@ -62,7 +63,7 @@ class Drive:
         self._begun = 0  # samples since the first usable position
         self._fade_from, self._fade_at, self._fade_length = 1.0, 0, 0
         self._start: FloatArray | None = None
-        self._silence = 0.0
+        self._silence, self._unusable = 0.0, 0
         self._ticked: float | None = None
         self._squares, self._counted = np.zeros(len(self.axes)), 0
         self._clipped, self._braked = np.zeros(len(self.axes)), np.zeros(len(self.axes))
@@ -114,18 +115,23 @@ class Drive:
 
     def see(self, block: Block) -> bool:
         """Take note of positions, (n, axes) in m; False if the newest is not usable (not finite, absurd, other axes)."""
+        if not self._usable(block):
+            self._unusable += 1
+            return False
+        values, seq = block.values[:, [block.axes.index(axis) for axis in self.axes]], float(block.seq[-1])
+        self._travel.saw(Seen(seq, values[-1].copy(), self._speed(values, block.seq)))
+        self._silence, self._unusable = 0.0, 0
+        if self._start is None:
+            self._start = values[-1].copy()
+        return True
+
+    def _usable(self, block: Block) -> bool:
         if len(block) == 0 or any(axis not in block.axes for axis in self.axes):
             return False
-        values = block.values[:, [block.axes.index(axis) for axis in self.axes]]
-        newest, seq = values[-1], float(block.seq[-1])
+        newest = block.values[-1, [block.axes.index(axis) for axis in self.axes]]
         low, high = self._travel.low, self._travel.high
-        if not (np.isfinite(newest).all() and np.isfinite(seq)) or (np.abs(newest - (low + high) / 2) > ABSURD * (high - low)).any():
-            return False
-        self._travel.saw(Seen(seq, newest.copy(), self._speed(values, block.seq)))
-        self._silence = 0.0
-        if self._start is None:
-            self._start = newest.copy()
-        return True
+        near = np.abs(newest - (low + high) / 2) <= ABSURD * (high - low)  # False for NaN
+        return bool(near.all()) and bool(np.isfinite(block.seq[-1]))
 
     def _speed(self, values: FloatArray, seq: FloatArray) -> FloatArray:
         """(axes,) m/s over the block, or since the last position if it has one row; 0 if neither tells."""
@@ -148,10 +154,13 @@ class Drive:
             self._silence += min(now - self._ticked, allowed / 4)
         self._ticked = now
         if self.state == "active" and self._silence > allowed:
+            self.blind = True
+            unusable = f" ({self._unusable} came that were not usable)" if self._unusable else ""
             if waiting:
-                self.stop(f"no answer from the machine for {allowed:g} s; is it running, and does it publish position?", self.settings.abort_ramp)
+                reason = f"no answer from the machine for {allowed:g} s{unusable}; is it running, and does it publish position?"
             else:
-                self.stop(f"no position from the machine for {allowed * 1000:g} ms", self.settings.abort_ramp)
+                reason = f"no position from the machine for {allowed * 1000:g} ms{unusable}"
+            self.stop(reason, self.settings.abort_ramp)
 
     def skip(self, n: int) -> None:
         """Let n samples of time pass without a voltage, after a stall of the caller."""
@@ -174,9 +183,14 @@ class Drive:
             self._travel.sent(self.seq, values)
         self._squares += np.sum(values * values, axis=0)
         self._counted += n
+        block = self.zeros(n)
+        return Block(block.axes, block.seq, block.time, values)
+
+    def zeros(self, n: int) -> Block:
+        """The following n samples at 0 V, whatever state this is in."""
         seq = np.arange(self.seq, self.seq + n, dtype=np.float64)
         self.seq += n
-        return Block(self.axes, seq, seq / self.settings.rate, values)
+        return Block(self.axes, seq, seq / self.settings.rate, np.zeros((n, len(self.axes))))
 
     def _voltage(self, n: int) -> FloatArray:
         seen, start = self._travel.seen, self._start

@@ -56,8 +56,8 @@ class Clock:
 class Answers:
     """Positions that came back, handed out up to a sample: in lockstep nobody may see a later one, however it was sent."""
 
-    _blocks: deque[Block] = field(default_factory=deque)
     _given: float = -1.0
+    _blocks: deque[Block] = field(default_factory=deque)
 
     def add(self, block: Block) -> None:
         """Positions as they arrive; a counter that is not finite or was handed out before is not an answer."""

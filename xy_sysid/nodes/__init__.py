@@ -1,0 +1,11 @@
+"""ROS 2 nodes: thin adapters around the core.
+
+One thread for linear algebra: the same bits on every run, and no core taken from the data path. Set before numpy is loaded.
+"""
+
+from __future__ import annotations
+
+import os
+
+for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")

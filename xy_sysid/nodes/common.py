@@ -1,0 +1,154 @@
+"""What the nodes share: parameters made from the settings, and blocks to messages and back."""
+
+from __future__ import annotations
+
+import array
+import functools
+from collections.abc import Callable, Collection
+from typing import Any, Generic, TypeVar, cast
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout
+
+from xy_sysid.errors import BadInput
+from xy_sysid.nodes.run import run_node
+from xy_sysid.settings import Knob, Settings, build, changed, knobs, unknown_name
+from xy_sysid.stream import Block, columns, pack, unpack
+
+__all__ = [
+    "DATA_QOS",
+    "LATCHED_QOS",
+    "NAMESPACE",
+    "Ending",
+    "Parameters",
+    "declare",
+    "from_message",
+    "run_node",
+    "settings_from_parameters",
+    "status",
+    "to_message",
+]
+
+NAMESPACE = "/xy"
+Model = TypeVar("Model", bound=Settings)
+
+# Ten seconds of 20-row blocks at 2 kHz: reader queues overflow silently, so they are longer than any stall.
+DATA_QOS = QoSProfile(depth=1000, history=HistoryPolicy.KEEP_LAST, reliability=ReliabilityPolicy.RELIABLE)
+LATCHED_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+OF_ROS = ("use_sim_time", "start_type_description_service", "qos_overrides.")  # parameters that rclpy has by itself
+
+
+class Ending:
+    """The end of a node that has nothing to do before it ends."""
+
+    exit_code: int | None = None
+
+    def ask_to_stop(self, reason: str) -> None:
+        """Nothing to begin."""
+
+    def has_stopped(self) -> bool:
+        """At once."""
+        return True
+
+    def last_words(self) -> None:
+        """None."""
+
+
+class Parameters(Generic[Model]):
+    """The settings as the node's parameters have them now; ``accept`` may refuse a change by raising BadInput."""
+
+    def __init__(self, settings: Model, accept: Callable[[Model], None] | None) -> None:
+        self.settings = settings
+        self._accept = accept
+
+    def on_change(self, parameters: list[Parameter]) -> SetParametersResult:
+        """rclpy asks before it sets parameters."""
+        known = {item.name for item in knobs(self.settings)}
+        values = {parameter.name: parameter.value for parameter in parameters if parameter.name in known}
+        try:
+            settings = changed(self.settings, values)
+            if self._accept is not None:
+                self._accept(settings)
+        except BadInput as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        self.settings = settings
+        return SetParametersResult(successful=True)
+
+
+def overrides(node: Node) -> dict[str, Any]:
+    """Parameters given on the command line or in a file, of a node made with automatically_declare_parameters_from_overrides."""
+    given = cast("dict[str, Parameter]", node.get_parameters_by_prefix(""))
+    return {name: parameter.value for name, parameter in given.items() if not name.startswith(OF_ROS)}
+
+
+def settings_from_parameters(node: Node, cls: type[Model]) -> Model:
+    """The settings as the node's declared parameters have them now; raises BadInput if they do not fit together."""
+    known = {item.name for item in knobs(cls())}
+    return build(cls, {name: value for name, value in overrides(node).items() if name in known}, f"node {node.get_name()}")
+
+
+def declare(node: Node, defaults: Model, accept: Callable[[Model], None] | None = None, also: Collection[str] = ()) -> Parameters[Model]:
+    """Declare every knob with its type, meaning, unit and limits; take what was given; keep up with changes.
+
+    The node must be made with automatically_declare_parameters_from_overrides. also: names that the node declares itself.
+    Raises BadInput for an unknown name (with the nearest spelling) and for a value that is not allowed.
+    """
+    given = {name: value for name, value in overrides(node).items() if name not in also}
+    known = {item.name: item.value for item in knobs(defaults)}
+    for name in given:
+        if name not in known:
+            raise unknown_name(name, [*known, *also], f"node {node.get_name()}: parameter")
+    settings = build(type(defaults), {**known, **given}, f"node {node.get_name()}")
+    for item in knobs(settings):
+        if item.name in given:
+            node.undeclare_parameter(item.name)
+        node.declare_parameter(item.name, item.value, describe(item), ignore_override=True)
+    parameters = Parameters(settings, accept)
+    node.add_on_set_parameters_callback(parameters.on_change)
+    return parameters
+
+
+def describe(item: Knob) -> ParameterDescriptor:
+    """Meaning, unit and limits in ROS' words."""
+    unit = f" [{item.unit}]" if item.unit else ""
+    descriptor = ParameterDescriptor(
+        description=item.meaning + unit, additional_constraints=f"one of {', '.join(item.choices)}" if item.choices else ""
+    )
+    if item.low is not None and item.high is not None:
+        if isinstance(item.value, float):
+            descriptor.floating_point_range = [FloatingPointRange(from_value=item.low, to_value=item.high)]
+        else:
+            descriptor.integer_range = [IntegerRange(from_value=int(item.low), to_value=int(item.high))]
+    return descriptor
+
+
+@functools.lru_cache(maxsize=64)
+def _layout(axes: tuple[str, ...], rows: int) -> MultiArrayLayout:
+    width = 2 + len(axes)
+    sample = MultiArrayDimension(label="sample", size=rows, stride=rows * width)
+    return MultiArrayLayout(dim=[sample, MultiArrayDimension(label=columns(axes), size=width, stride=width)])
+
+
+def to_message(block: Block) -> Float64MultiArray:
+    """The block as it travels; an array.array is taken over whole, where a list would be checked number by number."""
+    return Float64MultiArray(layout=_layout(block.axes, len(block)), data=array.array("d", pack(block).tobytes()))
+
+
+def from_message(message: Float64MultiArray) -> Block:
+    """The block in a message; raises BadInput if its layout is not two dimensions with the columns named."""
+    dim = message.layout.dim
+    if len(dim) != 2:
+        raise BadInput("layout.dim", f"{len(dim)} dimensions", "2: rows and named columns", "Set layout.dim.")
+    return unpack(dim[1].label, dim[0].size, dim[1].size, np.frombuffer(message.data, dtype=np.float64))
+
+
+def status(name: str, level: int, message: str, values: dict[str, str]) -> DiagnosticStatus:
+    """One line of diagnostics: level 0 OK, 1 WARN, 2 ERROR, 3 STALE."""
+    pairs = [KeyValue(key=key, value=value) for key, value in values.items()]
+    return DiagnosticStatus(name=name, hardware_id=name, level=bytes([level]), message=message, values=pairs)

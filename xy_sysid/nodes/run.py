@@ -1,0 +1,96 @@
+"""The main loop of every node: Ctrl-C and SIGTERM are wishes, the node ends in order, exactly once.
+
+Imports nothing heavy, so that the signals are in hand before anything that takes time.
+"""
+
+from __future__ import annotations
+
+import signal
+import sys
+import time
+from collections.abc import Callable, Sequence
+from types import FrameType
+from typing import Any, Protocol, cast
+
+from xy_sysid.errors import MissingExtra, XySysidError
+
+LONGEST_STOP = 3.0  # s an orderly end may take; then the last words are said without waiting
+
+
+class Runnable(Protocol):
+    """What a node class adds to rclpy's Node; ``Ending`` in common.py has it all at its simplest."""
+
+    exit_code: int | None  # set it to end the process
+
+    def ask_to_stop(self, reason: str) -> None:
+        """Begin to end; the node goes on spinning until ``has_stopped``."""
+        ...
+
+    def has_stopped(self) -> bool:
+        """Nothing is left to do but the last words."""
+        ...
+
+    def last_words(self) -> None:
+        """Called once, whatever happened, while publishers still work."""
+        ...
+
+    def destroy_node(self) -> None:
+        """rclpy's."""
+        ...
+
+
+def run_node(factory: Callable[[], Runnable], args: Sequence[str] | None = None) -> int:
+    """Make the node and spin it until a signal, its own ``exit_code`` or an error; the exit code of the process.
+
+    factory: makes the node, after rclpy is initialised; args: as for rclpy.init, the process' own by default.
+    2 with one line on stderr if rclpy is missing or an argument or parameter is wrong.
+    """
+    asked: list[int] = []
+
+    def note(number: int, _frame: FrameType | None) -> None:
+        asked.append(number)
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, note)
+    try:
+        import rclpy
+        from rclpy.exceptions import ParameterException
+        from rclpy.impl.implementation_singleton import rclpy_implementation
+        from rclpy.signals import SignalHandlerOptions
+        from rclpy.utilities import try_shutdown
+    except ModuleNotFoundError as error:
+        if error.name != "rclpy":
+            raise
+        return _refuse(MissingExtra("ROS 2 (rclpy)", "ros"))
+    try:
+        rclpy.init(args=None if args is None else list(args), signal_handler_options=SignalHandlerOptions.NO)
+        node = factory()
+    except (XySysidError, ParameterException, rclpy_implementation.RCLError) as error:
+        try_shutdown()
+        return _refuse(error)
+    try:
+        _spin(node, asked)
+    finally:
+        node.last_words()
+        node.destroy_node()
+        try_shutdown()
+    return node.exit_code or 0
+
+
+def _spin(node: Runnable, asked: list[int]) -> None:
+    from rclpy.experimental.events_executor import EventsExecutor
+
+    executor = EventsExecutor()
+    executor.add_node(cast("Any", node))
+    while not asked and node.exit_code is None:
+        executor.spin_once(timeout_sec=0.1)
+    node.ask_to_stop(signal.Signals(asked[0]).name if asked else "finished")
+    until = time.monotonic() + LONGEST_STOP
+    while not node.has_stopped() and time.monotonic() < until:
+        executor.spin_once(timeout_sec=0.02)
+
+
+def _refuse(error: Exception) -> int:
+    """One line on stderr; what rcl adds about its own source files is left out."""
+    sys.stderr.write(" ".join(str(error).split(", at /")[0].split()) + "\n")
+    return 2
