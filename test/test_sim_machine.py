@@ -98,6 +98,15 @@ def test_the_truth_is_json() -> None:
     assert json.loads(json.dumps(truth)) == truth
 
 
+def test_a_machine_too_fast_for_its_inner_step_is_refused() -> None:
+    """Rather than numbers without meaning: the least inner rate is named, and with it the machine is steady."""
+    machine = Machine.from_file("rigid.yaml", clean=True)
+    with pytest.raises(BadInput, match=r"inner_rate is 40000; allowed: at least 6\.67e\+04 Hz"):
+        machine.with_parts({"amplifier_lag": 1e-5})
+    finer = Machine(replace(machine.spec, inner_rate=1e5), clean=True).with_parts({"amplifier_lag": 1e-5})
+    assert np.abs(finer.step(noise(400)) - machine.step(noise(400))).max() < 1e-5
+
+
 @pytest.mark.parametrize("voltage", [np.zeros(3), np.zeros((3, 3)), np.full((2, 2), np.nan)], ids=["flat", "wide", "nan"])
 def test_voltages_of_the_wrong_shape_are_refused(voltage: FloatArray) -> None:
     """One line, and the machine has not moved."""

@@ -65,7 +65,7 @@ def _advance(p: FloatArray, y: FloatArray, n: int, t: float, span: float, volts:
     remaining, dt = span, span
     before = regime(p, y, _NOW)
     while remaining > 1e-9 * span:
-        dt = longest_step(p, y[_NOW, MOTOR_SPEED], min(dt, remaining))
+        dt = max(longest_step(p, y[_NOW, MOTOR_SPEED], min(dt, remaining)), min(_EVENT * span, remaining))
         _step(p, y, n, t, dt, volts, mode)
         found, after = regime(p, y, _NEXT), mode
         if mode == 1 or mode == -1:

@@ -16,6 +16,8 @@ from xy_sim.parts import PARTS
 from xy_sysid.errors import BadInput
 from xy_sysid.stream import FloatArray
 
+_RESOLVED = 1.5  # rad in one inner step: the method of order 4 is stable to 2.6, and exact far below
+
 
 class _Moving:
     """One axis while it runs: parameters, state, voltages on their way, and its own noise."""
@@ -40,6 +42,10 @@ class Machine:
         self.spec = spec
         self.seed = spec.seed if seed is None else seed
         self.clean = clean
+        for axis in spec.axes:
+            least = truth.fastest(axis) / _RESOLVED
+            if spec.inner_rate < least:
+                raise BadInput(f"axis {axis.name}: inner_rate", f"{spec.inner_rate:g}", f"at least {least:.3g} Hz", "Raise it, or soften the parts.")
         self.reset()
 
     @classmethod

@@ -111,6 +111,11 @@ def _pairs(roots: NDArray[np.complex128]) -> list[float]:
     return sorted(float(abs(root)) / (2.0 * math.pi) for root in roots if root.imag > 1e-6 * abs(root))
 
 
+def fastest(axis: Axis) -> float:
+    """Largest magnitude of the poles, rad/s: what the inner step must resolve."""
+    return float(np.abs(np.roots(_transfer(axis, 0.0)[1])).max())
+
+
 def linear(axis: Axis, time: float = 0.0) -> dict[str, Any]:
     """The truth that an identification should find, JSON-ready, SI.
 

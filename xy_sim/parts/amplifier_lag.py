@@ -12,7 +12,7 @@ PART = Part(
     law="lag v' + v = u",
     meaning="motor inductance, filter of the command input",
     source="Krishnan, Electric Motor Drives, 2001, sec. 2.3",
-    parameters=(Parameter("lag", "s", 1e-3, 0.4e-3, 2e-3, "time constant", 1e-6, 10.0),),
+    parameters=(Parameter("lag", "s", 1e-3, 0.4e-3, 2e-3, "time constant", 1e-5, 10.0),),
 )
 
 

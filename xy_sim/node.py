@@ -1,0 +1,23 @@
+"""Executable ``ballscrew``: the simulated XY table as a node. Voltage blocks in, encoder positions out."""
+
+from __future__ import annotations
+
+import sys
+
+from xy_sysid.nodes.run import Runnable, run_node
+
+
+def make() -> Runnable:
+    """The node; its imports wait until the signals are in hand and rclpy is known to be there."""
+    from xy_sim.ballscrew_node import BallscrewNode
+
+    return BallscrewNode()
+
+
+def main() -> int:
+    """Run the node; the exit code."""
+    return run_node(make)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
