@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from xy_sim import kernel, truth
+from xy_sim.drawing import drawn
 from xy_sim.layout import STATES, numbers
 from xy_sim.machine_file import Axis, Spec, fitting, parts_from, read
 from xy_sim.parts import PARTS
@@ -56,8 +57,6 @@ class Machine:
         """
         spec = read(path_or_name)
         if spec.hidden is not None:
-            from xy_sim.hidden import drawn
-
             spec = drawn(spec, seed)
         return cls(spec, seed, clean)
 

@@ -35,7 +35,7 @@ class Spec:
     """A whole machine, before it moves.
 
     rate: samples per second, Hz; inner_rate: fewest inner steps per second, Hz; seed: of the encoder noise;
-    hidden: what ``xy_sim.hidden`` shall draw (keys seed, effects, scale), or empty.
+    hidden: what ``xy_sim.drawing`` shall draw (keys seed, effects, scale), or empty.
     """
 
     axes: tuple[Axis, ...]

@@ -1,0 +1,72 @@
+"""Parts and their sizes, drawn from a seed onto the axes of a machine."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from xy_sim.machine_file import Axis, Spec
+from xy_sim.parts import PARTS
+from xy_sim.parts.contract import Parameter, Part
+from xy_sysid.errors import BadInput
+
+Effects = int | str | tuple[int, int]
+_STREAM = 20_260  # keeps these random numbers apart from the encoder's, which come from the same seed
+
+
+def drawn(spec: Spec, seed: int | None) -> Spec:
+    """What the file's ``hidden`` group asks for; its own seed unless one is given."""
+    group = dict(spec.hidden or {})
+    chosen = int(group.get("seed", 1)) if seed is None else seed
+    return with_drawn(spec, chosen, group.get("effects", "1..2"), float(group.get("scale", 1.0)))
+
+
+def with_drawn(spec: Spec, seed: int, effects: Effects, scale: float) -> Spec:
+    """The spec with drawn parts on every axis, each axis from random numbers of its own."""
+    fewest, most, group = _asked(effects)
+    axes = []
+    for number, axis in enumerate(spec.axes):
+        random = np.random.default_rng([seed, _STREAM, number])
+        parts = _choose(axis, group, int(random.integers(fewest, most + 1)), random)
+        axes.append(replace(axis, parts=dict(axis.parts) | {part.name: sizes(part, random, scale) for part in parts}))
+    return replace(spec, axes=tuple(axes))
+
+
+def sizes(part: Part, random: np.random.Generator, scale: float = 1.0) -> dict[str, float]:
+    """Every parameter of a part, drawn from its range; only the size (the first) is scaled."""
+    return {item.name: _size(item, random, scale if place == 0 else 1.0) for place, item in enumerate(part.parameters)}
+
+
+def _size(parameter: Parameter, random: np.random.Generator, scale: float) -> float:
+    low, high = parameter.low, parameter.high
+    fraction, sign = random.random(), -1.0 if random.random() < 0.5 and parameter.signed else 1.0
+    value = math.exp(math.log(low) + fraction * math.log(high / low)) if low > 0.0 else low + fraction * (high - low)
+    value = float(round(value)) if parameter.whole else value * scale
+    return min(max(sign * value, parameter.minimum), parameter.maximum)
+
+
+def _asked(effects: Effects) -> tuple[int, int, str]:
+    """Fewest, most and the group to draw from."""
+    if effects == "none":
+        return 0, 0, "effect"
+    if effects == "outside":
+        return 1, 1, "outside"
+    texts = [str(item) for item in effects] if isinstance(effects, (tuple, list)) else str(effects).split("..")
+    if not all(text.strip().isdigit() for text in texts) or len(texts) > 2 or int(texts[0]) > int(texts[-1]) or int(texts[-1]) > 6:
+        raise BadInput("effects", repr(effects), "0 to 6, a range such as 1..3, none, or outside", "Give one of these.")
+    return int(texts[0]), int(texts[-1]), "effect"
+
+
+def _choose(axis: Axis, group: str, count: int, random: np.random.Generator) -> list[Part]:
+    """So many parts that the axis does not have, none that stands for another of its family."""
+    chosen: list[Part] = []
+    taken = {PARTS[name].family for name in axis.parts}
+    for name in random.permutation(sorted(PARTS)):
+        part = PARTS[str(name)]
+        free = part.name not in axis.parts and (not part.family or part.family not in taken)
+        if len(chosen) < count and part.group == group and free:
+            chosen.append(part)
+            taken.add(part.family)
+    return chosen
