@@ -61,25 +61,36 @@ def choose(bag: Bag, voltage_topic: str, position_topic: str, joint_topic: str |
 
 
 class _Clock:
-    """Sample numbers for stamps: rounded steps of one period from the last stamp, or from the last voltage sample."""
+    """Sample numbers for stamps: periods since the last stamp, or since the voltage sample before each."""
 
     def __init__(self, period: float) -> None:
         self.period = period
-        self.seq, self.time = 0.0, np.nan
+        self.seq, self.time = np.empty(0), np.empty(0)
 
-    def anchor(self, seq: float, time: float) -> None:
-        self.seq, self.time = seq, time
+    def forget(self) -> None:
+        """Keep the newest anchor only."""
+        self.seq, self.time = self.seq[-1:], self.time[-1:]
 
-    def number(self, time: FloatArray, follow: bool) -> FloatArray:
-        """(n,) numbers; ``follow``: remember the last stamp as the anchor of the next call."""
-        if not np.isfinite(self.time):
-            self.time = float(time[0])
-        if follow:
-            steps = np.rint(np.diff(time, prepend=self.time) / self.period)
-            seq = self.seq + np.cumsum(steps)
-            self.anchor(float(seq[-1]), float(time[-1]))
-            return seq
-        return self.seq + np.rint((time - self.time) / self.period)
+    def anchor(self, block: Block) -> None:
+        """Samples whose number and instant are known."""
+        finite = np.isfinite(block.time) & np.isfinite(block.seq)
+        seq, time = np.append(self.seq, block.seq[finite]), np.append(self.time, block.time[finite])
+        order = np.argsort(time, kind="stable")
+        self.seq, self.time = seq[order], time[order]
+
+    def near(self, time: FloatArray) -> FloatArray:
+        """(n,) numbers of stamps by the anchors; not a number before there is one."""
+        if not self.time.size:
+            return np.full(len(time), np.nan)
+        place = np.maximum(np.searchsorted(self.time, time, side="right") - 1, 0)
+        return np.asarray(self.seq[place] + np.rint((time - self.time[place]) / self.period))
+
+    def follow(self, time: FloatArray) -> FloatArray:
+        """(n,) numbers of stamps by their own steps, from 0."""
+        before, number = (self.time[-1], self.seq[-1]) if self.time.size else (time[0], 0.0)
+        seq = number + np.cumsum(np.rint(np.diff(time, prepend=before) / self.period))
+        self.seq, self.time = seq[-1:], time[-1:]
+        return np.asarray(seq)
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,6 +118,8 @@ class _Decoder:
 
     def parts(self, batch: Batch) -> list[_Part]:
         parts: list[_Part] = []
+        if self.clock is not None:
+            self.clock.forget()
         for index, name in enumerate(self.names):
             message = np.flatnonzero(batch.topic == index)
             if not message.size:
@@ -139,7 +152,7 @@ class _Decoder:
         if not len(block):
             return []
         if self.clock is not None and kind == "voltage":
-            self.clock.anchor(float(block.seq[-1]), float(block.time[-1]))
+            self.clock.anchor(block)
         return [_Part(kind, places, layout.shape[0], block)]
 
     def joint_states(self, name: str, batch: Batch, stretch: Stretch, layout: Layout, places: Indices) -> list[_Part]:
@@ -154,7 +167,7 @@ class _Decoder:
             self.from_log = not bool(np.any(stamp))
         time = (batch.log_time[stretch.first : stretch.last] if self.from_log else stamp).astype(np.float64) * 1e-9
         order = [layout.names.index(joint) for joint in self.joints]
-        seq = np.zeros(len(time)) if self.clock is None else self.clock.number(time, self.source.effort)
+        seq = np.zeros(len(time)) if self.clock is None else self.clock.follow(time) if self.source.effort else self.clock.near(time)
         parts = [_Part("position", places, 1, Block(self.joints, seq, time, doubles(batch, stretch, 0)[:, order]))]
         if self.source.effort:
             parts.insert(0, _Part("voltage", places, 1, Block(self.joints, seq, time, doubles(batch, stretch, 2)[:, order])))
@@ -211,13 +224,13 @@ def _period(bag: Bag, source: Source) -> float:
         act = OTHERS if source.effort else "Record for longer."
         raise bag.bad(f"fewer than 2 samples of {input_name} that can be read{f' ({why})' if why else ''}; it has {bag.listing()}", act)
     time, seq = np.concatenate(times), np.concatenate(seqs)
-    steps = np.diff(time)
-    if not source.effort:
-        steps = steps[np.diff(seq) == 1]
-    steps = steps[steps > 0]
-    if not steps.size:
+    lag = 1 if source.effort else max(1, len(time) // 2)  # far apart, where the numbers are known, for many digits
+    steps, counts = time[lag:] - time[:-lag], np.ones(1) if source.effort else seq[lag:] - seq[:-lag]
+    steps, counts = np.broadcast_arrays(steps, counts)
+    usable = (steps > 0) & (counts > 0)
+    if not usable.any():
         raise bag.bad("the time stamps do not increase", "Record with stamped messages.")
-    return float(np.median(steps))
+    return float(np.median(steps[usable] / counts[usable]))
 
 
 def pieces(bag: Bag, source: Source, most: int, progress: Callable[[float], None] | None) -> Iterator[tuple[Kind, Block]]:

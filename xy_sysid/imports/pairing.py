@@ -15,6 +15,7 @@ from xy_sysid.stream import Block, FloatArray
 
 LATE = 0.5  # s; a sample number that falls back further than that, for good, is a restart of the source
 SAME_RATE = 1e-3  # relative; sampling rates that differ by more do not belong together
+LARGEST = 2.0**53  # a counter beyond it is not exact in a double, so it is no counter
 Fail = Callable[[str, str], BadRecording]
 Rows = NDArray[np.int64] | slice
 
@@ -33,7 +34,7 @@ def gather(name: str, blocks: Sequence[Block], axes: tuple[str, ...], notes: lis
     """One stream from blocks, with the columns in the order of ``axes``; rows that are not finite become gaps."""
     table = [np.column_stack((block.seq, block.time, block.values[:, [block.axes.index(axis) for axis in axes]])) for block in blocks]
     rows = np.concatenate(table) if table else np.empty((0, 2 + len(axes)))
-    finite = np.isfinite(rows).all(axis=1)
+    finite = np.isfinite(rows).all(axis=1) & (np.abs(rows[:, 0]) < LARGEST)
     if not finite.all():
         notes.append(f"{int(np.sum(~finite))} rows of {name} are not numbers; they are left out")
         rows = rows[finite]
@@ -57,7 +58,8 @@ def sessions(seq: FloatArray, tolerance: float) -> list[int]:
         begin = 0
         for index in fallen[np.flatnonzero(np.diff(fallen, prepend=-2) > 1)].tolist():
             back = np.flatnonzero(part[index:] > highest[index] - tolerance)
-            if not back.size or back[0] > tolerance:
+            ends_soon = len(part) - index <= tolerance < part[index]  # a late block at the end, and not a new beginning
+            if back[0] > tolerance if back.size else not ends_soon:
                 begin = index
                 break
         if begin == 0:
