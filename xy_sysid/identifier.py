@@ -82,6 +82,10 @@ class Identifier:
         self._slot = -1
         self._number = 0
 
+    def change(self, settings: IdentifierSettings) -> None:
+        """Use other settings from now on that leave the spectra what they are (band, refit, coherence, frozen)."""
+        self.settings = settings
+
     @property
     def sampling_rate(self) -> float | None:
         """Hz, None until it is known from the time stamps."""

@@ -8,6 +8,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from xy_sysid.errors import BadInput
 from xy_sysid.fitting import identify
 from xy_sysid.fitting.result import Fit
@@ -16,6 +18,7 @@ from xy_sysid.frf import FrequencyResponse
 from xy_sysid.identifier import AxisRequest, FitRequest
 from xy_sysid.messages import ERROR, OK, WARN, ArrayMessage, StatusMessage, comparison_message, frf_message, transfer_function_message
 from xy_sysid.settings import IdentifierSettings
+from xy_sysid.spectra import State
 from xy_sysid.tracking import Resonance, Track, alarm_sentence, follow
 
 LIGHT_DAMPING = 0.4  # a pole pair with more damping is no resonance to be watched
@@ -92,6 +95,15 @@ class LiveFitter:
     def restore(self, references: dict[str, Resonance]) -> None:
         """Watch against these, as before a restart."""
         self._tracks = {axis: Track(reference=reference) for axis, reference in references.items()}
+
+    def state(self) -> State:
+        """The references as named arrays, to be kept over a restart."""
+        return {f"reference/{axis}": np.array([found.frequency, found.error]) for axis, found in self.references().items()}
+
+    def recall(self, state: State) -> None:
+        """Watch against what ``state`` gave."""
+        prefix = "reference/"
+        self.restore({name.removeprefix(prefix): Resonance(*map(float, value)) for name, value in state.items() if name.startswith(prefix)})
 
     def _axis(self, axis: str, asked: AxisRequest) -> AxisUpdate:
         track = self._tracks.get(axis, Track())

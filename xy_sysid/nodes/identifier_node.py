@@ -1,0 +1,240 @@
+"""Voltage and position in; frequency response, transfer function, comparison and metrics out.
+
+Thin: the logic is ``identifier.Identifier`` on the data path and ``live_fit.LiveFitter`` in a thread of its own, so that
+data handling never waits for a fit.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.node import Node
+from rclpy.qos import HistoryPolicy, QoSProfile
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+from std_srvs.srv import Trigger
+
+from xy_sysid.errors import BadInput, XySysidError
+from xy_sysid.identifier import Identifier
+from xy_sysid.joints import JointCounter
+from xy_sysid.live_fit import LiveFitter, Update
+from xy_sysid.messages import OK, STALE, WARN, StatusMessage
+from xy_sysid.nodes.common import DATA_QOS, LATCHED_QOS, NAMESPACE, Ending, declare, from_message, overrides
+from xy_sysid.nodes.convert import array_to_ros, statuses_to_ros
+from xy_sysid.pairing import KINDS, Kind
+from xy_sysid.settings import IdentifierSettings
+from xy_sysid.state_file import load_state, save_state, set_aside
+from xy_sysid.stream import Block
+from xy_sysid.work_queue import FitWorker
+
+PUBLISH_PERIOD = 0.05  # s between two looks for finished fits
+HEARTBEAT = 1.0  # s between two statuses of the streams
+JOINT_QOS = QoSProfile(depth=20_000, history=HistoryPolicy.KEEP_LAST)  # ten seconds of single samples at 2 kHz
+AXES = "axes"
+# Changing one of these starts the spectra anew; the topics' names and types are fixed when the node starts.
+SHAPES_SPECTRA = ("window", "length", "overlap", "differenced", "memory", "sliding", "alarm_windows", "reorder")
+FIXED = ("source", "effort_as_voltage", "state_file", "save_every")
+
+
+class IdentifierNode(Node, Ending):
+    """The adapter: topics, services, parameters and the state file around the pure logic."""
+
+    def __init__(self) -> None:
+        super().__init__("identifier", namespace=NAMESPACE, automatically_declare_parameters_from_overrides=True)
+        axes = overrides(self).get(AXES, ["x", "y"])
+        if not isinstance(axes, list) or not axes or not all(isinstance(axis, str) and axis for axis in axes):
+            raise BadInput(f"node identifier: parameter {AXES}", axes, 'a list of names like ["x", "y"]', "Change it and try again.")
+        if not self.has_parameter(AXES):
+            self.declare_parameter(AXES, axes)
+        self._ready = False
+        self._parameters = declare(self, IdentifierSettings(), self._accept, also=[AXES])
+        settings = self._parameters.settings
+        self._axes = tuple(axes)
+        self._identifier = Identifier(settings, self._axes)
+        self._worker = FitWorker(LiveFitter(settings))
+        self._joints = JointCounter(self._axes, with_voltage=not settings.effort_as_voltage)
+        self._refused: dict[str, str] = {}
+        self._heard = dict.fromkeys(KINDS, 0)
+        self._before = dict(self._heard)
+        self._state_path = Path(settings.state_file).expanduser() if settings.state_file else None
+        self._metrics = self.create_publisher(DiagnosticArray, "metrics", 10)
+        self._arrays: dict[str, Any] = {}
+        for axis in self._axes:
+            self._publisher(f"frf/{axis}")
+            self._publisher(f"transfer_function/{axis}")
+            self._publisher(f"comparison/{axis}")
+        self._resume()
+        if settings.source == "joint_state":
+            self.create_subscription(JointState, "joint_states", self._on_joints, JOINT_QOS)
+        else:
+            self.create_subscription(Float64MultiArray, "position", lambda message: self._on_block("position", message), DATA_QOS)
+        if settings.source == "blocks" or not settings.effort_as_voltage:
+            self.create_subscription(Float64MultiArray, "voltage", lambda message: self._on_block("voltage", message), DATA_QOS)
+        for name, act in (("reset", self._reset), ("save", self._save), ("load", self._load)):
+            self.create_service(Trigger, f"~/{name}", lambda request, response, act=act: _answer(response, act))
+        self.create_timer(PUBLISH_PERIOD, self._publish_done)
+        self.create_timer(HEARTBEAT, self._beat)
+        if self._state_path is not None:
+            self.create_timer(settings.save_every, self._save_quietly)
+        self._ready = True
+
+    # data
+
+    def _on_block(self, kind: Kind, message: Float64MultiArray) -> None:
+        try:
+            block = from_message(message)
+        except BadInput as problem:
+            self._refuse(f"{kind}: {problem}")
+            return
+        self._feed(kind, block)
+        if kind == "voltage":
+            self._joints.see_voltage(block)
+
+    def _on_joints(self, message: JointState) -> None:
+        missing = [axis for axis in self._axes if axis not in message.name]
+        places = [] if missing else [message.name.index(axis) for axis in self._axes]
+        effort = self._parameters.settings.effort_as_voltage
+        if missing or len(message.position) != len(message.name) or (effort and len(message.effort) != len(message.name)):
+            what = f"joints {', '.join(message.name)}" if missing else "a position" + (" and an effort" if effort else "") + " for some joints only"
+            self._refuse(f"joint_states: {what}; expected {', '.join(self._axes)}. Set the parameter axes to joint names.")
+            return
+        time = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
+        row = [message.position[k] for k in places] + ([message.effort[k] for k in places] if effort else [])
+        block = self._joints.add(time, np.array(row, dtype=np.float64))
+        if block is None:
+            return
+        number = len(self._axes)
+        self._feed("position", Block(self._axes, block.seq, block.time, block.values[:, :number]))
+        if effort:
+            self._feed("voltage", Block(self._axes, block.seq, block.time, block.values[:, number:]))
+
+    def _feed(self, kind: Kind, block: Block) -> None:
+        self._heard[kind] += len(block)
+        for request in self._identifier.feed(kind, block):
+            self._worker.ask(request)
+
+    def _refuse(self, text: str) -> None:
+        if self._refused.get("message") != text:
+            self.get_logger().warning(text)
+        self._refused = {"message": text, "number": str(int(self._refused.get("number", "0")) + 1)}
+
+    # results
+
+    def _publisher(self, topic: str) -> Any:
+        if topic not in self._arrays:
+            latched = topic.startswith("transfer_function/")
+            self._arrays[topic] = self.create_publisher(Float64MultiArray, topic, LATCHED_QOS if latched else 10)
+        return self._arrays[topic]
+
+    def _publish_done(self) -> None:
+        for update in self._worker.done():
+            self._publish(update)
+
+    def _publish(self, update: Update) -> None:
+        for message in update.arrays():
+            self._publisher(message.topic).publish(array_to_ros(message))
+        self._metrics.publish(statuses_to_ros(update.statuses(), self.get_clock().now().to_msg(), "identifier"))
+
+    def _beat(self) -> None:
+        """What is heard of the streams, once a second, whether or not there is anything to fit."""
+        silent = [kind for kind in KINDS if self._heard[kind] == self._before[kind]]
+        self._before = dict(self._heard)
+        sentences = self._identifier.sentences
+        level, text = OK, "voltage and position are heard"
+        if silent:
+            level, text = STALE, f"no {' and no '.join(silent)} heard for a second"
+        elif self._refused:
+            level, text = WARN, self._refused["message"]
+        elif sentences:
+            level, text = WARN, "; ".join(sentences.values())
+        if self._worker.skipped:
+            level, text = max(level, WARN), f"{text}; {self._worker.skipped} fits were skipped, the machine is too slow for this rate"
+        values = {
+            "samples paired": str(self._identifier.samples),
+            "sampling rate (Hz)": f"{self._identifier.sampling_rate or 0.0:.9g}",
+            "messages refused": self._refused.get("number", "0"),
+            "skipped fits": str(self._worker.skipped),
+        }
+        values |= {f"newest {kind}": str(seq) for kind, seq in self._identifier.waiting.items()}
+        values |= {f"windows {axis}": str(number) for axis, number in self._identifier.windows.items()}
+        values |= {f"stream: {reason}": str(number) for reason, number in self._identifier.faults.items()}
+        status = StatusMessage("streams", level, text, tuple(values.items()))
+        self._metrics.publish(statuses_to_ros([status], self.get_clock().now().to_msg(), "identifier"))
+
+    # parameters and services
+
+    def _accept(self, settings: IdentifierSettings) -> None:
+        if not self._ready:
+            return
+        before = self._parameters.settings
+        for name in FIXED:
+            if getattr(before, name) != getattr(settings, name):
+                raise BadInput(name, "not to be changed while the node runs", str(getattr(before, name)), "Start the node again with it.")
+        if any(getattr(before, name) != getattr(settings, name) for name in SHAPES_SPECTRA):
+            self._identifier = Identifier(settings, self._axes)
+            self._worker.change(LiveFitter(settings))
+            self.get_logger().info("the spectra start anew with the new settings")
+        else:
+            self._identifier.change(settings)
+            references = self._worker.fitter.references()
+            fitter = LiveFitter(settings)
+            fitter.restore(references)
+            self._worker.change(fitter)
+
+    def _reset(self) -> str:
+        self._identifier.reset()
+        self._worker.change(LiveFitter(self._parameters.settings))
+        return "everything heard is forgotten"
+
+    def _save(self) -> str:
+        path = self._path()
+        save_state(path, self._identifier.state() | self._worker.fitter.state())
+        return f"saved {sum(self._identifier.windows.values())} windows to {path}"
+
+    def _load(self) -> str:
+        path = self._path()
+        state = load_state(path)
+        self._identifier.restore(state)
+        fitter = LiveFitter(self._parameters.settings)
+        fitter.recall(state)
+        self._worker.change(fitter)
+        return f"loaded {sum(self._identifier.windows.values())} windows from {path}"
+
+    def _path(self) -> Path:
+        if self._state_path is None:
+            raise BadInput("parameter state_file", "empty", "the name of a file", "Start the node with it.")
+        return self._state_path
+
+    def _resume(self) -> None:
+        """Go on with the saved spectra, if there are any that fit."""
+        if self._state_path is None or not self._state_path.exists():
+            return
+        try:
+            self.get_logger().info(self._load())
+        except XySysidError as problem:
+            kept = set_aside(self._state_path)
+            self.get_logger().error(f"{problem} The file is kept as {kept}; the spectra start anew.")
+
+    def _save_quietly(self) -> None:
+        try:
+            self._save()
+        except OSError as problem:
+            self.get_logger().error(f"the state could not be saved: {problem}", throttle_duration_sec=60.0)
+
+    def last_words(self) -> None:
+        """Publish what is still to come, and save."""
+        for update in self._worker.close():
+            self._publish(update)
+        if self._state_path is not None:
+            self._save_quietly()
+
+
+def _answer(response: Any, act: Any) -> Any:
+    try:
+        response.message, response.success = act(), True
+    except (XySysidError, OSError) as problem:
+        response.message, response.success = str(problem), False
+    return response
