@@ -233,6 +233,7 @@ def test_wild_stamps_are_numbered_as_they_came(tmp_path: Path) -> None:
     joint_bag(tmp_path / "bag", [int(10**18 + i * 500_000 + random.integers(0, 490_000)) for i in range(3000)])
     recording = load(tmp_path / "bag")
     assert len(recording.runs()) == 1 and len(recording) == 3000 and any("jitter" in note for note in recording.notes)
+    assert recording.sampling_rate == pytest.approx(2000.0, rel=1e-4)
 
 
 def test_without_stamps_the_time_of_recording_counts(tmp_path: Path) -> None:

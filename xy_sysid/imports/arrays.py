@@ -27,7 +27,8 @@ DAMAGED = (OSError, ValueError, EOFError, KeyError, TypeError, IndexError, NotIm
 def read_npz(path: Path) -> Arrays:
     """The arrays of an .npz file; raises BadRecording."""
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with path.open("rb") as raw:
+            file = np.load(raw, allow_pickle=False)
             if not isinstance(file, np.lib.npyio.NpzFile):
                 raise BadRecording(path, "one bare array, not an .npz", "Save named arrays with numpy.savez.")
             return {name: file[name] for name in file.files}

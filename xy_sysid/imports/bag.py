@@ -11,12 +11,11 @@ import numpy as np
 from xy_sysid.bags.reading import Bag
 from xy_sysid.bags.streaming import Kind, choose, pieces
 from xy_sysid.errors import BadInput
-from xy_sysid.imports.pairing import LATE, Stream, cut, gather, pair
+from xy_sysid.imports.pairing import LATE, Stream, cut, gather, is_jitter, pair, steady
 from xy_sysid.recording import Recording
 from xy_sysid.stream import Block
 
 WHOLE = 1 << 40  # samples; blocks as long as they come
-FEW = 0.01  # part of the samples; more stamps than that off their grid, and the samples are numbered in order
 MARGIN = 1.0  # s kept around the part that was asked for, for samples that came late
 COPIES = 4  # times the size of the samples that pairing needs while it works
 SHARE = 0.6  # of the machine's memory that a recording may take
@@ -123,13 +122,8 @@ def _axes(
 def _in_order(streams: dict[str, Stream], notes: list[str]) -> dict[str, Stream]:
     """Joint states whose stamps jitter too much to count by, but of which none is lost, are numbered as they came."""
     time = streams["position"].time
-    steps = np.diff(time)
-    if len(steps) < 2 or not np.median(steps) > 0:
+    if len(time) < 2 or len(streams["voltage"].seq) != len(time) or not is_jitter(np.diff(streams["position"].seq)):
         return streams
-    off = float(np.mean(np.diff(streams["position"].seq) != 1))
-    complete = abs(float(np.mean(steps)) / float(np.median(steps)) - 1) < FEW
-    if off <= FEW or not complete or len(streams["voltage"].seq) != len(time):
-        return streams
-    notes.append(f"the stamps jitter ({100 * off:.0f} % of the steps are not one sample); samples are numbered as they came")
-    count = np.arange(len(time), dtype=np.float64)
-    return {name: Stream(stream.axes, count, stream.time, stream.values) for name, stream in streams.items()}
+    notes.append("the stamps jitter by more than half a sample; samples are numbered as they came, with even times")
+    count, even = np.arange(len(time), dtype=np.float64), steady(time)
+    return {name: Stream(stream.axes, count, even, stream.values) for name, stream in streams.items()}

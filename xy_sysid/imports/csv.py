@@ -61,10 +61,12 @@ def _header(path: Path, cells: list[str]) -> tuple[list[str], list[str]]:
 
 
 def _numbers(path: Path, rows: list[tuple[int, str]], separator: str, names: list[str]) -> FloatArray:
+    if not rows:
+        return np.empty((0, len(names)))
     comma = separator != ","
     try:
         text = (line.replace(",", ".") if comma else line for _, line in rows)
-        table = np.loadtxt(text, delimiter=separator, ndmin=2, usecols=range(len(names)), comments=None)
+        table = np.loadtxt(text, delimiter=separator, ndmin=2, comments=None)
         if table.shape == (len(rows), len(names)):
             return table
     except (ValueError, IndexError):

@@ -15,6 +15,7 @@ from xy_sysid.stream import Block, FloatArray
 
 LATE = 0.5  # s; a sample number that falls back further than that, for good, is a restart of the source
 SAME_RATE = 1e-3  # relative; sampling rates that differ by more do not belong together
+FEW = 0.01  # part of the samples; more steps than that off their grid in both directions are jitter, not gaps
 LARGEST = 2.0**53  # a counter beyond it is not exact in a double, so it is no counter
 Fail = Callable[[str, str], BadRecording]
 Rows = NDArray[np.int64] | slice
@@ -28,6 +29,18 @@ class Stream:
     seq: FloatArray
     time: FloatArray
     values: FloatArray
+
+
+def is_jitter(steps: FloatArray) -> bool:
+    """Whether time steps, in whole periods, are off one because instants jitter: then too short and too long ones balance."""
+    short, extra = float(np.sum(np.maximum(1 - steps, 0))), float(np.sum(np.maximum(steps - 1, 0)))
+    return short + extra > FEW * len(steps) and short < 2 * extra < 4 * short
+
+
+def steady(time: FloatArray) -> FloatArray:
+    """Evenly spaced instants through jittering ones."""
+    count = np.arange(len(time)) - (len(time) - 1) / 2
+    return np.asarray(time.mean() + count * (count @ (time - time.mean())) / (count @ count))
 
 
 def gather(name: str, blocks: Sequence[Block], axes: tuple[str, ...], notes: list[str], fail: Fail) -> Stream:

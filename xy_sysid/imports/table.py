@@ -9,12 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from xy_sysid.errors import BadInput, BadRecording
-from xy_sysid.imports.pairing import cut
+from xy_sysid.imports.pairing import cut, is_jitter, steady
 from xy_sysid.imports.units import to_si
 from xy_sysid.recording import Recording, rate_from_time
 from xy_sysid.stream import FloatArray
 
-FEW = 0.01  # part of the samples; more time steps than that off their grid are jitter, not gaps
 USUAL = ("x", "y", "z")
 
 
@@ -41,25 +40,25 @@ def axis_names(count: int) -> tuple[str, ...]:
     return tuple(USUAL[i] if i < len(USUAL) else f"axis{i + 1}" for i in range(count))
 
 
-def _numbers(path: Path, time: FloatArray, notes: list[str]) -> tuple[FloatArray, float]:
-    """Sample numbers from instants, which must increase."""
+def _numbers(path: Path, time: FloatArray, notes: list[str]) -> tuple[FloatArray, FloatArray, float]:
+    """Sample numbers from instants, which must increase; the instants, and the rate."""
     try:
         rate = rate_from_time(time)
     except BadInput as error:
         raise BadRecording(path, f"{error.what} is {error.value}", error.act) from None
     steps = np.diff(time) * rate
-    if steps.size and float(steps.min()) < -0.5:
+    if steps.size and float(steps.min()) < -1.0:
         row = int(np.argmin(steps)) + 1
         raise BadRecording(path, f"time falls back from {time[row - 1]:.9g} to {time[row]:.9g} s at sample {row + 1}", "Sort the samples by time.")
     seq = np.concatenate(([0.0], np.cumsum(np.rint(steps))))
     drift = np.rint((time - time[0]) * rate)
     if float(np.max(np.abs(seq - drift))) <= 1:
         seq = drift
-    off = float(np.mean(np.diff(seq) != 1)) if steps.size else 0.0
-    if off > FEW and abs(float(np.mean(steps)) - 1) < FEW:
-        notes.append(f"the time column jitters ({100 * off:.0f} % of the steps are not one sample); samples are numbered as they stand")
-        seq = np.arange(len(time), dtype=np.float64)
-    return seq, rate
+    if is_jitter(np.diff(seq)):
+        notes.append("the time column jitters by more than half a sample; samples are numbered as they stand, with even times")
+        even = steady(time)
+        return np.arange(len(time), dtype=np.float64), even, rate_from_time(even)
+    return seq, time, rate
 
 
 def recording(path: Path, table: Table, wanted: Sequence[str] | None, start: float, stop: float | None, notes: list[str]) -> Recording:
@@ -85,7 +84,7 @@ def recording(path: Path, table: Table, wanted: Sequence[str] | None, start: flo
         reference = None if reference is None else reference[finite]
     if len(time) < 2:
         raise BadRecording(path, f"{len(time)} samples", "A recording needs 2 or more; record for longer.")
-    seq, rate = _numbers(path, time, notes) if table.seq is None else (table.seq[finite], 0.0)
+    seq, time, rate = _numbers(path, time, notes) if table.seq is None else (table.seq[finite], time, 0.0)
     fresh = np.concatenate(([True], seq[1:] > np.maximum.accumulate(seq)[:-1]))
     if not fresh.all():
         if table.seq is not None and bool(np.any(np.diff(seq) < 0)):
