@@ -192,9 +192,9 @@ def scan(file: PageFile, numbers: NDArray[np.int64]) -> Iterator[Cells]:
     before = int(numbers[0]) - 1 if total else 0
     while at < total:
         low = before + 1 if 0 <= numbers[at] - before <= SPAN else int(numbers[at])
-        end = at + 1
-        while end < total and end - at < SPAN and low <= numbers[end] < low + SPAN:
-            end += 1
+        near = numbers[at : at + SPAN]
+        outside = np.flatnonzero((near < low) | (near >= low + SPAN))
+        end = max(at + 1, at + (int(outside[0]) if outside.size else len(near)))
         following = int(numbers[end]) if end < total else file.pages + 1
         top = int(numbers[at:end].max())
         high = following if top < following <= top + WIDEST else top + 1

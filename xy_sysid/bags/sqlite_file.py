@@ -99,7 +99,7 @@ class SqliteFile:
             for cells in pages.scan(file, numbers):
                 damaged += cells.damaged
                 rows = cells.rows
-                topic = table[np.clip(rows[:, 1], 0, len(table) - 1)]
+                topic = table[np.minimum(np.maximum(rows[:, 1], -1), len(table) - 1)]  # -1 and unknown topics: the last entry
                 if topic.size and topic.min() < 0:
                     rows, topic = rows[topic >= 0], topic[topic >= 0]
                 if not topic.size:
