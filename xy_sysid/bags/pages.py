@@ -20,6 +20,8 @@ from xy_sysid.compiled import compiled
 INTERIOR, LEAF = 5, 13
 SPAN = 256  # pages read at once: stays in the cache of the processor
 WIDTHS = np.array([0, 1, 2, 3, 4, 6, 8, 0, 0, 0])  # bytes of an integer column, by serial type
+GROUP = 4096  # leaf pages listed at once
+DEEPEST = 20  # levels; a B-tree of pages that is deeper is damaged
 WIDEST = 16_384  # pages; one leaf with longer chains of overflow than this is read by SQL
 
 
@@ -51,27 +53,45 @@ def open_pages(handle: int) -> PageFile:
     return PageFile(handle, size, size - header[20], os.fstat(handle).st_size // size)
 
 
-def leaves(file: PageFile, root: int) -> tuple[NDArray[np.int64], int]:
-    """Numbers of the leaf pages in row order, and how many pages of the index above them are damaged or missing."""
-    level, damaged = np.array([root], np.int64), 0
-    while True:
-        below: list[NDArray[np.int64]] = []
-        for number in level.tolist():
-            page = os.pread(file.handle, file.size, (number - 1) * file.size) if number <= file.pages else b""
-            if len(page) == file.size and page[0] == LEAF:
-                return level, damaged
-            count = int.from_bytes(page[3:5], "big") if len(page) == file.size else 0
-            if len(page) < file.size or page[0] != INTERIOR or 12 + 2 * count > file.size:
-                damaged += 1
-                continue
-            raw = np.frombuffer(page, np.uint8)
-            pointers = np.frombuffer(page, ">u2", count, 12).astype(np.int64)
-            pointers = pointers[pointers + 4 <= file.size]
-            children = raw[pointers[:, None] + np.arange(4)].astype(np.int64) @ np.array([1 << 24, 1 << 16, 1 << 8, 1])
-            below.append(np.append(children, int.from_bytes(page[8:12], "big")))
-        if not below:
-            return np.empty(0, np.int64), damaged
-        level = np.concatenate(below)
+def _children(file: PageFile, number: int) -> NDArray[np.int64] | None:
+    """Pages below an interior page, in row order; None for a leaf. A page that is neither has none."""
+    page = os.pread(file.handle, file.size, (number - 1) * file.size)
+    if len(page) < file.size:
+        return np.empty(0, np.int64)
+    if page[0] == LEAF:
+        return None
+    count = int.from_bytes(page[3:5], "big")
+    if page[0] != INTERIOR or 12 + 2 * count > file.size:
+        return np.empty(0, np.int64)
+    pointers = np.frombuffer(page, ">u2", count, 12).astype(np.int64)
+    pointers = pointers[pointers + 4 <= file.size]
+    left = np.frombuffer(page, np.uint8)[pointers[:, None] + np.arange(4)].astype(np.int64) @ np.array([1 << 24, 1 << 16, 1 << 8, 1])
+    return np.append(left, int.from_bytes(page[8:12], "big"))
+
+
+def leaves(file: PageFile, root: int) -> Iterator[NDArray[np.int64]]:
+    """Numbers of the leaf pages in row order, many at a time; a number outside the file stands for a lost page."""
+    waiting, ready, seen, depth = [(root, 0)], [np.empty(0, np.int64)], 0, DEEPEST
+    while waiting and seen <= file.pages:
+        number, level = waiting.pop()
+        below = _children(file, number) if 1 <= number <= file.pages and level < depth else np.empty(0, np.int64)
+        seen += 1
+        if below is None:
+            depth = level  # all leaves of a B-tree lie equally deep
+            below = np.array([number])
+        elif below.size and level + 1 < depth:
+            inside = below[(below >= 1) & (below <= file.pages)]
+            if depth == DEEPEST and inside.size and _children(file, int(inside[0])) is None:
+                depth = level + 1
+        if below.size and level + 1 < depth:
+            waiting += [(child, level + 1) for child in below[::-1].tolist()]
+            continue
+        ready.append(below if below.size else np.zeros(1, np.int64))
+        if sum(map(len, ready)) >= GROUP:
+            yield np.concatenate(ready)
+            ready = []
+    if ready:
+        yield np.concatenate(ready)
 
 
 @compiled
@@ -184,31 +204,35 @@ def leaf_cells(buffer: Bytes, first: int, filled: int, numbers: Indices, size: i
     return found, damaged, spill
 
 
-def scan(file: PageFile, numbers: NDArray[np.int64]) -> Iterator[Cells]:
-    """The messages of these leaf pages, span by span; the buffer is reused."""
+def scan(file: PageFile, root: int) -> Iterator[Cells]:
+    """All messages, span by span of pages; the buffer is reused."""
     buffer = np.empty(0, np.uint8)
     rows = np.empty((SPAN * 16, 5), np.int64)
-    at, total = 0, len(numbers)
-    before = int(numbers[0]) - 1 if total else 0
-    while at < total:
-        low = before + 1 if 0 <= numbers[at] - before <= SPAN else int(numbers[at])
-        near = numbers[at : at + SPAN]
-        outside = np.flatnonzero((near < low) | (near >= low + SPAN))
-        end = max(at + 1, at + (int(outside[0]) if outside.size else len(near)))
-        following = int(numbers[end]) if end < total else file.pages + 1
-        top = int(numbers[at:end].max())
-        high = following if top < following <= top + WIDEST else top + 1
-        span = (high - low) * file.size
-        if buffer.size < 2 * span:
-            buffer = np.empty(2 * max(span, SPAN * file.size), np.uint8)
-        filled = max(0, os.preadv(file.handle, [buffer[:span].data], (low - 1) * file.size))
-        while True:
-            found, damaged, spill = leaf_cells(buffer, low, filled, numbers[at:end], file.size, file.usable, filled, rows)
-            if found >= 0:
-                break
-            if spill > buffer.size:
-                buffer = np.concatenate((buffer, np.empty(spill, np.uint8)))
-            else:
-                rows = np.empty((2 * len(rows), 5), np.int64)
-        yield Cells(rows[:found], buffer, damaged, end / total)
-        before, at = top, end
+    before = -SPAN - 1
+    for group in leaves(file, root):
+        numbers = group[(group >= 1) & (group <= file.pages)]
+        if len(numbers) < len(group):
+            yield Cells(rows[:0], buffer, len(group) - len(numbers), 0.0)
+        at, total = 0, len(numbers)
+        while at < total:
+            low = before + 1 if 0 <= numbers[at] - before <= SPAN else int(numbers[at])
+            near = numbers[at : at + SPAN]
+            outside = np.flatnonzero((near < low) | (near >= low + SPAN))
+            end = max(at + 1, at + (int(outside[0]) if outside.size else len(near)))
+            top = int(numbers[at:end].max())
+            following = int(numbers[end]) if end < total else min(top + SPAN, file.pages + 1)
+            high = following if top < following <= top + WIDEST else top + 1
+            span = (high - low) * file.size
+            if buffer.size < 2 * span:
+                buffer = np.empty(2 * max(span, SPAN * file.size), np.uint8)
+            filled = os.preadv(file.handle, [buffer[:span].data], (low - 1) * file.size)
+            while True:
+                found, damaged, spill = leaf_cells(buffer, low, filled, numbers[at:end], file.size, file.usable, filled, rows)
+                if found >= 0:
+                    break
+                if spill > buffer.size:
+                    buffer = np.concatenate((buffer, np.empty(spill, np.uint8)))
+                else:
+                    rows = np.empty((2 * len(rows), 5), np.int64)
+            yield Cells(rows[:found], buffer, damaged, min(1.0, top / file.pages))
+            before, at = top, end

@@ -92,11 +92,11 @@ class SqliteFile:
         handle = os.open(self.path, os.O_RDONLY)
         try:
             file = pages.open_pages(handle)
-            numbers, damaged = pages.leaves(file, root)
+            damaged = 0
             table = np.full(max([*lookup, 0]) + 2, -1, np.int64)
             for identity, index in lookup.items():
                 table[identity] = index
-            for cells in pages.scan(file, numbers):
+            for cells in pages.scan(file, root):
                 damaged += cells.damaged
                 rows = cells.rows
                 topic = table[np.minimum(np.maximum(rows[:, 1], -1), len(table) - 1)]  # -1 and unknown topics: the last entry
@@ -111,7 +111,7 @@ class SqliteFile:
         finally:
             os.close(handle)
         if damaged:
-            self.notes.append(f"{self.path.name}: {damaged} of {len(numbers)} pages are damaged or missing; what they held is left out")
+            self.notes.append(f"{self.path.name}: {damaged} of its {file.pages} pages are damaged or missing; what they held is left out")
 
     def _by_id(self, ids: Indices, lookup: dict[int, int]) -> Batch:
         """Messages whose chained pages lie far apart: sqlite fetches them."""
