@@ -93,8 +93,9 @@ class Bag:
 
     def _open(self, path: Path) -> SqliteFile | McapFile:
         try:
-            if path.stat().st_size == 0:
-                raise BadRecording(path, "the file is empty (0 bytes)", ANOTHER_COPY)
+            with path.open("rb") as content:
+                if not content.read(1):
+                    raise BadRecording(path, "the file is empty (0 bytes)", ANOTHER_COPY)
             file = STORAGES[path.suffix](path, self.notes)
         except OSError as error:
             raise BadRecording(path, f"cannot be opened ({error.strerror})", "Check the path and the permissions.") from None
