@@ -3,21 +3,136 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from xy_sysid.cli import options as o
-from xy_sysid.cli.output import emit, people
+from xy_sysid.cli.output import aside, emit, people, progress
+from xy_sysid.cli.provenance import provenance
+from xy_sysid.cli.reading import chosen, read
+
+if TYPE_CHECKING:
+    from xy_sysid.recording import Recording
+    from xy_sysid.report.study import AxisStudy
 
 
 def study(
     rec: o.Rec,
     out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="the page to write")] = Path("study.html"),
+    loose: Annotated[
+        Path | None, typer.Option("--loose", metavar="REC2", help="the same machine afterwards (bolts loosened): how far did the resonance move?")
+    ] = None,
+    loose_span: Annotated[str, typer.Option("--loose-span", metavar="FROM:TO", help="only this part of REC2, in seconds from its start")] = "",
+    axis: o.Axes = None,
+    set_: o.Set = None,
+    params: o.Params = None,
+    topic: o.Topics = None,
+    effort: o.Effort = False,
+    period: o.Period = "auto",
+    span: o.Span = "",
     json: o.Json = False,
 ) -> None:
     """The paper's study (figures 2-7, tables 1-2) of any recording, as one HTML page that opens offline."""
+    from xy_sysid.report.captions import summary
+    from xy_sysid.report.page import study_page
+    from xy_sysid.report.study import study_axis
+
+    settings = o.settings_from(params, set_)
+    samples = o.period_from(period)
+    _writable(out, loose, loose_span)
+    recording = read(rec, axis, topic, effort, span, json)
+    names = chosen(recording, axis)
+    second = read(loose, axis, topic, effort, loose_span, json) if loose is not None else None
+    if second is not None:
+        _same_machine(recording, second, names)
+    studies: dict[str, AxisStudy] = {}
+    with progress() as bar:
+        task = bar.add_task("studying", total=len(names))
+        for name in names:
+            studies[name] = study_axis(recording, name, settings, samples, second)
+            bar.advance(task)
+    _any(studies)
+    origins: dict[str, dict[str, Any]] = {"Recording": provenance(rec, recording)}
+    if loose is not None and second is not None:
+        origins["Second recording (after)"] = provenance(loose, second)
+    units = (recording.input_unit, recording.output_unit)
+    page = study_page(rec.name, studies, units, settings.min_coherence, origins, recording.notes)
+    _write(out, page)
     if json:
-        emit({"recording": str(rec), "page": str(out)})
-    else:
-        people.print(f"no page written to {out} yet")
+        emit({"page": str(out), "bytes": len(page.encode()), "recordings": origins, "axes": {name: answer(one) for name, one in studies.items()}})
+        return
+    for one in studies.values():
+        people.print(summary(one))
+    for one in studies.values():
+        for note in one.estimate.notes if one.estimate else ():
+            aside.print(f"axis {one.axis}: {note}")
+    people.print(f"wrote {out}, {len(page.encode()) / 1e6:.1f} MB")
+
+
+def answer(one: AxisStudy) -> dict[str, Any]:
+    """One axis of the JSON document."""
+    from xy_sysid.report.remarks import axis_remarks
+
+    fits: dict[str, dict[str, Any]] = {
+        name: {
+            "converged": fit.converged,
+            "stable": fit.tf.is_stable,
+            "numerator": fit.tf.numerator,
+            "denominator": fit.tf.denominator,
+            "delay": fit.tf.delay if name == "ML" else None,
+            "relative_error": fit.relative_error,
+            "paper": {"error_cost": fit.error_cost, "confidence": fit.confidence},
+            "poles": fit.poles,
+            "zeros": fit.zeros,
+        }
+        for name, fit in one.fits.items()
+    }
+    if "ML" in one.fits:
+        ml = one.fits["ML"]
+        fits["ML"]["estimates"] = {item.name: {"value": item.value, "ci95": [item.low, item.high], "unit": item.unit} for item in ml.intervals}
+    change: dict[str, Any] | None = None
+    if one.change is not None:
+        moved = {shift.name: {"value": shift.value, "ci95": [shift.low, shift.high], "unit": "Hz"} for shift in one.change.shifts}
+        change = {"before": one.change.before_name, "after": one.change.after_name, "shift": moved, "problem": one.change.problem}
+    return {"problem": one.problem, "fits": fits, "change": change, "remarks": axis_remarks(one)}
+
+
+def _writable(out: Path, loose: Path | None, loose_span: str) -> None:
+    from xy_sysid.errors import BadInput
+
+    if not out.absolute().parent.is_dir():
+        raise BadInput("--out: folder", str(out.absolute().parent), "a folder that is there", "Make it first.")
+    if out.is_dir():
+        raise BadInput("--out", str(out), "a file", "Give the page a name, for example study.html.")
+    if loose_span and loose is None:
+        raise BadInput("--loose-span", repr(loose_span), "only together with --loose", "Give the second recording too.")
+
+
+def _same_machine(first: Recording, second: Recording, names: tuple[str, ...]) -> None:
+    from xy_sysid.errors import BadInput
+
+    missing = [name for name in names if name not in second.axes]
+    if missing:
+        raise BadInput("axes of --loose", ", ".join(second.axes), f"at least {', '.join(names)}", "Give a recording of the same machine.")
+    if (first.input_unit, first.output_unit) != (second.input_unit, second.output_unit):
+        given, wanted = f"{second.input_unit}, {second.output_unit}", f"{first.input_unit}, {first.output_unit}"
+        raise BadInput("units of --loose", given, wanted, "Give a recording of the same machine.")
+
+
+def _any(studies: dict[str, AxisStudy]) -> None:
+    """A page without one response would show nothing: say why instead."""
+    from xy_sysid.errors import BadInput
+
+    if all(one.frf is None for one in studies.values()):
+        first = next(iter(studies.values()))
+        raise BadInput("recording", "without a response on any axis", "one that moves and is excited", first.problem)
+
+
+def _write(out: Path, page: str) -> None:
+    from xy_sysid.errors import BadInput
+
+    try:
+        out.write_text(page, encoding="utf-8")
+    except OSError as problem:
+        raise BadInput("--out", f"{out} ({problem.strerror})", "a file that can be written", "Choose another place.") from None

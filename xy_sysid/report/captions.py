@@ -1,0 +1,128 @@
+"""What each figure says in words: captions for everybody, and the alternative text for who cannot see it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from xy_sysid.fitting import Fit
+from xy_sysid.frf import FrequencyResponse
+from xy_sysid.report.signals import Excitation, Motion
+from xy_sysid.report.study import AxisStudy, BeforeAfter
+from xy_sysid.report.words import estimate_text, number, quantity
+
+INTRODUCTION = (
+    "Figures 2 to 7 and tables 1 and 2 of the frequency-domain study of a ball-screw XY table, redrawn for this recording: what it was "
+    "driven with, what it did, its frequency response, the fits of a transfer function, and how far each of them can be trusted."
+)
+FITS = (
+    "Top and middle: magnitude and phase. Bottom: relative error of each fit at each line; a fit is as good as it can be where it lies on "
+    "the grey noise of the measurement, and misses something where it lies far above."
+)
+NO_FIT = "No axis of this recording could be fitted; the remarks say why."
+COEFFICIENTS = (
+    "LLS and NLLS are the paper's path (nllsfdi: all poles free, delay absorbed, errors weighted by 1/|FRF|); ML has delay, hold and window "
+    "in its model and weighs by the measured scatter. Its last coefficient is fixed at 0 by the integrator of the axis."
+)
+
+
+def summary(one: AxisStudy) -> str:
+    """One line on top of the page."""
+    if not one.fits:
+        return f"Axis {one.axis}: {one.problem}"
+    ml = one.fits["ML"]
+    text = f"Axis {one.axis}: relative error {number(ml.error_cost, 2)} %"
+    if not ml.converged:
+        return f"{text}, but the fit did not converge: {ml.reason}"
+    if ml.structure.free_delay:
+        text += f", delay {estimate_text(ml.interval('delay'))}"
+    if one.pair is not None:
+        if one.pair.antiresonance is not None:
+            text += f", antiresonance {estimate_text(one.pair.antiresonance)}"
+        text += f", resonance {estimate_text(one.pair.resonance)}"
+    return f"{text}."
+
+
+def excitation(inputs: Mapping[str, Excitation], unit: str) -> str:
+    """Caption of figure 2."""
+    each = "; ".join(
+        f"axis {axis}: {quantity(one.rms, unit, 3)} rms, peak {quantity(one.peak, unit, 3)}, "
+        f"excited from {number(one.density.low, 3)} to {number(one.density.high, 3)} Hz (−10 dB, dotted)"
+        for axis, one in inputs.items()
+    )
+    return f"Top: an excerpt, each value held to the next sample. Middle: distribution of all samples. Bottom: power spectral density. {each}."
+
+
+def position(outputs: Mapping[str, Motion], unit: str) -> str:
+    """Caption of figure 3."""
+    each = "; ".join(
+        f"axis {axis}: from {quantity(one.low, unit, 3)} to {quantity(one.high, unit, 3)}, "
+        f"drift {quantity(one.drift * 60, f'{unit}', 3)} a minute (dashed)"
+        for axis, one in outputs.items()
+    )
+    return f"The measured position; each point of the line is the smallest or largest sample of its instant, so that no peak is lost. {each}."
+
+
+def response(responses: Mapping[str, FrequencyResponse]) -> str:
+    """Caption of figure 4."""
+    each = []
+    for axis, frf in responses.items():
+        used = frf.trusted
+        if not bool(np.any(used)):
+            each.append(f"axis {axis}: no line can be trusted, all are drawn, without a band")
+            continue
+        typical = float(np.median(frf.sigma[used] / np.abs(frf.response[used])))
+        each.append(
+            f"axis {axis}: {int(np.sum(used))} lines, {number(frf.averages, 3)} averages, typical standard deviation {number(100 * typical, 2)} %"
+        )
+    return (
+        "Magnitude and phase of the measured response (H1) with the 95 % band of each line; where no band shows it is thinner than the "
+        f"line. {'; '.join(each)}."
+    )
+
+
+def coherence(responses: Mapping[str, FrequencyResponse], least: float) -> str:
+    """Caption of figure 5."""
+    each = []
+    for axis, frf in responses.items():
+        used = frf.coherence[frf.trusted]
+        lowest = f"median {number(float(np.median(used)), 4)}, lowest used {number(float(np.min(used)), 3)}" if used.size else "no line used"
+        each.append(f"axis {axis}: {lowest}")
+    return (
+        "1 means that the input explains all of the output. Crosses are lines that no fit uses: not excited, or below the dotted "
+        f"limit of {number(least, 2)}. {'; '.join(each)}."
+    )
+
+
+def fit(axis: str, fits: Mapping[str, Fit]) -> str:
+    """What figure 6 shows of one axis."""
+    each = ", ".join(f"{name} {number(one.error_cost, 3)} %" for name, one in fits.items())
+    return f"Axis {axis}: fits over the measured response; relative error {each}."
+
+
+def change(axis: str, one: BeforeAfter) -> str:
+    """What figure 7 shows of one axis."""
+    each = ", ".join(f"{s.name} {number(s.value, 3)} Hz [{number(s.low, 3)}, {number(s.high, 3)}]" for s in one.shifts)
+    return f"Axis {axis}: the pair in {one.before_name} and {one.after_name}; shift: {each or 'unknown'}."
+
+
+def pair_title(studies: Mapping[str, AxisStudy]) -> str:
+    """Heading of figure 7."""
+    found = [one.pair.resonance.value for one in studies.values() if one.pair is not None]
+    return f"the {number(float(np.mean(found)), 2)} Hz pair" if found else "antiresonance and resonance"
+
+
+def pair(studies: Mapping[str, AxisStudy]) -> str:
+    """Caption of figure 7."""
+    changes = [one.change for one in studies.values() if one.change is not None and (one.change.before or one.change.after)]
+    if not changes:
+        return "No lightly damped resonance was found in the band of this recording."
+    names = f"{changes[0].before_name} and {changes[0].after_name}"
+    second = " of this recording, as no second one was given" if changes[0].before_name == "first half" else ", two recordings"
+    return (
+        "Zoom on antiresonance and resonance (the response is multiplied by jω where the axis integrates: it is that of the speed). "
+        f"Dots with 95 % bars are measured, lines fitted, vertical lines and bands the two frequencies with their intervals; {names}{second}. "
+        "Loose bolts of the base make both move left. Bottom: the shift with its 95 % interval; no shift is proven where the bar crosses 0. "
+        + " ".join(change(axis, one.change) for axis, one in studies.items() if one.change is not None)
+    )

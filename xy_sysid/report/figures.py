@@ -1,0 +1,267 @@
+"""Figures 2 to 7 of the paper's study: numbers in, a Plotly figure out. One function a figure; no files, no fits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from xy_sysid.fitting import Fit
+from xy_sysid.frf import ComplexArray, FrequencyResponse
+from xy_sysid.report.signals import Excitation, Motion
+from xy_sysid.report.study import BeforeAfter, Pair
+from xy_sysid.report.theme import AFTER, BEFORE, METHODS, ROW, axis_colour, fade, template
+from xy_sysid.report.words import people_unit
+from xy_sysid.stream import FloatArray
+
+QUANTILE = 1.959963984540054  # 97.5 % of the normal distribution
+FIT_NAMES = {"LLS": "LLS, delay absorbed", "NLLS": "NLLS, delay absorbed", "ML": "ML, delay and hold in the model"}
+DASHES = {"LLS": "dot", "NLLS": "dash", "ML": "solid"}
+
+
+def excitation_figure(inputs: Mapping[str, Excitation], unit: str) -> go.Figure:
+    """Figure 2: excerpt in time, distribution beside the normal one of the same rms, power spectral density with band edges."""
+    figure = _rows(3, shared=False, gap=0.13)
+    for number, (axis, one) in enumerate(inputs.items()):
+        colour = axis_colour(number)
+        line = {"color": colour, "width": 1.2}
+        figure.add_scatter(x=one.time, y=one.value, mode="lines", line={**line, "shape": "hv"}, name=f"axis {axis}", legendgroup=axis, row=1, col=1)
+        figure.add_scatter(
+            x=one.centre, y=one.share, mode="lines", line={**line, "shape": "hvh"}, name=f"axis {axis}", legendgroup=axis, showlegend=False,
+            row=2, col=1,
+        )  # fmt: skip
+        figure.add_scatter(
+            x=one.density.frequency, y=_positive(one.density.density), mode="lines", line=line, name=f"axis {axis}", legendgroup=axis,
+            showlegend=False, row=3, col=1,
+        )  # fmt: skip
+        for edge in (one.density.low, one.density.high):
+            if np.isfinite(edge):
+                figure.add_vline(x=edge, line={"color": colour, "width": 1, "dash": "dot"}, row=3, col=1)
+    widest = max((one.rms for one in inputs.values()), default=0.0)
+    if widest > 0:
+        level = np.linspace(-4 * widest, 4 * widest, 161)
+        bell = np.exp(-0.5 * (level / widest) ** 2) / (widest * np.sqrt(2 * np.pi))
+        figure.add_scatter(
+            x=level, y=bell, mode="lines", line={"color": METHODS["measured"], "width": 1.2, "dash": "dash"}, name="normal, same rms", row=2, col=1
+        )
+    figure.update_xaxes(title_text="time (s)", row=1, col=1)
+    figure.update_yaxes(title_text=f"input ({unit})", row=1, col=1)
+    figure.update_xaxes(title_text=f"input ({unit})", row=2, col=1)
+    figure.update_yaxes(title_text=f"density (1/{unit})", rangemode="tozero", row=2, col=1)
+    figure.update_xaxes(title_text="frequency (Hz)", type="log", dtick=1, row=3, col=1)
+    highest = max((float(np.max(one.density.density)) for one in inputs.values()), default=1.0)
+    figure.update_yaxes(title_text=f"PSD ({unit}²/Hz)", type="log", exponentformat="power", dtick=2, row=3, col=1)
+    figure.update_yaxes(range=[np.log10(highest) - 8, np.log10(highest) + 0.5], row=3, col=1)
+    return figure
+
+
+def position_figure(outputs: Mapping[str, Motion], unit: str) -> go.Figure:
+    """Figure 3: the measured output of each axis over time, and the straight line of its drift."""
+    scale, shown = people_unit(unit)
+    figure = _rows(len(outputs), shared=True, gap=0.06)
+    for number, (axis, one) in enumerate(outputs.items()):
+        row = number + 1
+        figure.add_scatter(
+            x=one.time, y=one.value * scale, mode="lines", line={"color": axis_colour(number), "width": 1}, name=f"axis {axis}", row=row, col=1
+        )
+        ends = np.array([0.0, float(one.time[-1])])
+        figure.add_scatter(
+            x=ends, y=(one.offset + one.drift * ends) * scale, mode="lines", line={"color": METHODS["measured"], "width": 1.5, "dash": "dash"},
+            name="drift", legendgroup="drift", showlegend=number == 0, row=row, col=1,
+        )  # fmt: skip
+        figure.update_yaxes(title_text=f"{axis} ({shown})", row=row, col=1)
+    figure.update_xaxes(title_text="time (s)", row=len(outputs), col=1)
+    return figure
+
+
+def response_figure(responses: Mapping[str, FrequencyResponse]) -> go.Figure:
+    """Figure 4: magnitude and phase of every axis over log frequency, with the 95 % band of each line."""
+    figure = _rows(2, shared=True, gap=0.06, heights=[0.55, 0.45])
+    for number, (axis, frf) in enumerate(responses.items()):
+        lines = frf.select(frf.trusted) if bool(np.any(frf.trusted)) else frf
+        colour = axis_colour(number)
+        part = QUANTILE * np.where(np.isfinite(lines.sigma), lines.sigma, 0.0) / np.sqrt(2) / np.abs(lines.response)
+        phase = phase_of(lines.response)
+        with np.errstate(invalid="ignore"):
+            turn = np.degrees(np.arcsin(np.minimum(part, 1.0)))
+        level = decibel(lines.response, frf.output_unit)
+        down = 20 * np.log10(np.maximum(1 - part, 1e-3))
+        for row, middle, low, high in ((1, level, level + down, level + 20 * np.log10(1 + part)), (2, phase, phase - turn, phase + turn)):
+            _band(figure, row, lines.frequency, low, high, colour, axis, f"95 % band, {axis}" if row == 1 else "")
+            figure.add_scatter(
+                x=lines.frequency, y=middle, mode="lines", line={"color": colour, "width": 1.6}, name=f"axis {axis}", legendgroup=axis,
+                showlegend=row == 1, row=row, col=1,
+            )  # fmt: skip
+    first = next(iter(responses.values()))
+    figure.update_yaxes(title_text=f"magnitude (dB re {_ratio(first)})", row=1, col=1)
+    figure.update_yaxes(title_text="phase (°)", dtick=90, row=2, col=1)
+    _frequency_axis(figure, 2)
+    return figure
+
+
+def coherence_figure(responses: Mapping[str, FrequencyResponse], least: float) -> go.Figure:
+    """Figure 5: coherence of every line; lines that no fit uses are small crosses. least: the limit for use."""
+    figure = _rows(1, shared=True, gap=0.0)
+    figure.update_layout(height=320)
+    for number, (axis, frf) in enumerate(responses.items()):
+        colour = axis_colour(number)
+        inside = frf.coherence.copy()
+        inside[~frf.trusted] = np.nan
+        sparse = float(np.mean(frf.trusted)) < 0.5
+        figure.add_scatter(
+            x=frf.frequency, y=inside, mode="markers" if sparse else "lines", line={"color": colour, "width": 1.6},
+            marker={"color": colour, "size": 5}, name=f"axis {axis}", legendgroup=axis, row=1, col=1,
+        )  # fmt: skip
+        outside = ~frf.trusted
+        if bool(np.any(outside)):
+            figure.add_scatter(
+                x=frf.frequency[outside], y=frf.coherence[outside], mode="markers",
+                marker={"color": fade(colour, 0.45), "size": 4, "symbol": "x-thin", "line": {"width": 1, "color": fade(colour, 0.45)}},
+                name=f"not used, {axis}", legendgroup=axis, row=1, col=1,
+            )  # fmt: skip
+    figure.add_hline(y=least, line={"color": METHODS["measured"], "width": 1, "dash": "dot"}, row=1, col=1)
+    figure.update_yaxes(title_text="coherence", range=[-0.02, 1.03], row=1, col=1)
+    _frequency_axis(figure, 1)
+    return figure
+
+
+def fit_figure(frf: FrequencyResponse, fits: Mapping[str, Fit]) -> go.Figure:
+    """Figure 6, of one axis: the fits over the measurement in magnitude and phase, and below the relative error per line."""
+    figure = _rows(3, shared=True, gap=0.05, heights=[0.38, 0.28, 0.34])
+    one = next(iter(fits.values()))
+    reference = phase_of(one.measured)
+    dots = {"color": fade(METHODS["measured"], 0.75), "size": 4}
+    for row, values in ((1, decibel(one.measured, frf.output_unit)), (2, reference)):
+        figure.add_scatter(
+            x=one.frequency, y=values, mode="markers", marker=dots, name="measured", legendgroup="measured", showlegend=row == 1, row=row, col=1
+        )
+    lines = frf.select(np.isin(frf.frequency, one.frequency))
+    noise = 100 * lines.sigma / np.abs(lines.response)
+    figure.add_scatter(
+        x=lines.frequency, y=_positive(noise), mode="lines", line={"color": fade(METHODS["measured"], 0.9), "width": 1},
+        name="noise of the measurement", row=3, col=1,
+    )  # fmt: skip
+    for name, fit in fits.items():
+        line = {"color": METHODS[name], "width": 1.8, "dash": DASHES[name]}
+        phase = reference + np.degrees(np.angle(fit.response / fit.measured))
+        error = 100 * np.abs((fit.measured - fit.response) / fit.measured)
+        for row, values in ((1, decibel(fit.response, frf.output_unit)), (2, phase), (3, _positive(error))):
+            figure.add_scatter(
+                x=fit.frequency, y=values, mode="lines", line={**line, "width": 1.2} if row == 3 else line, name=FIT_NAMES[name],
+                legendgroup=name, showlegend=row == 1, row=row, col=1,
+            )  # fmt: skip
+    figure.update_yaxes(title_text=f"dB re {_ratio(frf)}", row=1, col=1)
+    figure.update_yaxes(title_text="phase (°)", dtick=90, row=2, col=1)
+    figure.update_yaxes(title_text="error (%)", type="log", dtick=1, exponentformat="power", row=3, col=1)
+    figure.update_layout(height=680)
+    _frequency_axis(figure, 3)
+    return figure
+
+
+def pair_figure(change: BeforeAfter) -> go.Figure:
+    """Figure 7, of one axis: the pair before and after, measured and fitted, with intervals; below the shift in Hz."""
+    shifts = change.shifts
+    heights = [0.47, 0.28, 0.25] if shifts else [0.6, 0.4]
+    figure = _rows(len(heights), shared=False, gap=0.11, heights=heights)
+    sides = [(change.before_name, change.before, BEFORE, "solid"), (change.after_name, change.after, AFTER, "dash")]
+    known = [(name, pair, colour, dash) for name, pair, colour, dash in sides if pair is not None]
+    low, high = _zoom([pair for _, pair, _, _ in known])
+    turned: float | None = None
+    for name, pair, colour, dash in known:
+        fit = pair.fit
+        chosen = (fit.frequency >= low) & (fit.frequency <= high)
+        frequency, measured, model = fit.frequency[chosen], fit.measured[chosen], fit.response[chosen]
+        factor = 2j * np.pi * frequency if fit.structure.integrators else np.ones_like(measured)
+        sigma = 1.0 / fit.weight[chosen] if fit.structure.weighting == "sigma" else np.zeros(frequency.size)
+        part = QUANTILE * sigma / np.sqrt(2) / np.abs(measured)
+        phase = phase_of(measured * factor)
+        if turned is not None and phase.size:
+            phase = phase + 360 * np.round((turned - np.mean(phase)) / 360)
+        turned = float(np.mean(phase)) if phase.size else turned
+        curves = (
+            (1, decibel(measured * factor, fit.tf.output_unit), 20 * np.log10(1 + part), decibel(model * factor, fit.tf.output_unit)),
+            (2, phase, np.degrees(part), phase + np.degrees(np.angle(model / measured))),
+        )
+        for row, points, half, curve in curves:
+            figure.add_scatter(
+                x=frequency, y=points, mode="markers", marker={"color": fade(colour, 0.8), "size": 4},
+                error_y={"type": "data", "array": half, "thickness": 1, "width": 0, "color": fade(colour, 0.6)},
+                name=f"{name}, measured", legendgroup=name, showlegend=row == 1, row=row, col=1,
+            )  # fmt: skip
+            figure.add_scatter(
+                x=frequency, y=curve, mode="lines", line={"color": colour, "width": 1.6, "dash": dash}, name=f"{name}, fit",
+                legendgroup=name, showlegend=row == 1, row=row, col=1,
+            )  # fmt: skip
+        for item in (pair.antiresonance, pair.resonance):
+            if item is not None:
+                for row in (1, 2):
+                    figure.add_vrect(x0=item.low, x1=item.high, line_width=0, fillcolor=fade(colour, 0.35), row=row, col=1)
+                    figure.add_vline(x=item.value, line={"color": colour, "width": 1, "dash": dash}, row=row, col=1)
+    if shifts:
+        figure.add_scatter(
+            x=[one.value for one in shifts], y=[one.name for one in shifts], mode="markers", marker={"color": METHODS["ML"], "size": 9},
+            error_x={"type": "data", "array": [one.high - one.value for one in shifts], "thickness": 2, "width": 6},
+            name="shift, 95 % interval", showlegend=False, row=3, col=1,
+        )  # fmt: skip
+        figure.add_vline(x=0, line={"color": METHODS["measured"], "width": 1}, row=3, col=1)
+        figure.update_xaxes(title_text=f"shift, {change.after_name} − {change.before_name} (Hz)", row=3, col=1)
+        figure.update_yaxes(range=[-0.6, len(shifts) - 0.4], row=3, col=1)
+    speed = bool(known) and known[0][1].fit.structure.integrators > 0
+    ratio = f"{people_unit(known[0][1].fit.tf.output_unit)[1]}{'/s' if speed else ''}/{known[0][1].fit.tf.input_unit}" if known else ""
+    figure.update_yaxes(title_text=f"dB re {ratio}", row=1, col=1)
+    figure.update_yaxes(title_text="phase (°)", row=2, col=1)
+    figure.update_xaxes(title_text="", range=[low, high], matches="x", row=1, col=1)
+    figure.update_xaxes(title_text="frequency (Hz)", range=[low, high], matches="x", row=2, col=1)
+    figure.update_layout(height=640 if shifts else 480)
+    return figure
+
+
+def decibel(response: ComplexArray, output_unit: str) -> FloatArray:
+    """20 log10 of the magnitude in people's unit of the output (mm for m)."""
+    scale, _ = people_unit(output_unit)
+    return np.asarray(20 * np.log10(np.maximum(np.abs(response) * scale, np.finfo(float).tiny)), dtype=np.float64)
+
+
+def phase_of(response: ComplexArray) -> FloatArray:
+    """Unwrapped phase in degrees."""
+    return np.asarray(np.degrees(np.unwrap(np.angle(response))), dtype=np.float64)
+
+
+def _rows(number: int, *, shared: bool, gap: float, heights: list[float] | None = None) -> go.Figure:
+    figure = make_subplots(rows=number, cols=1, shared_xaxes=shared, vertical_spacing=gap, row_heights=heights)
+    figure.update_layout(template=template("light"), height=ROW * number + 90, margin={"l": 10, "r": 12, "t": 36, "b": 10}, hovermode="closest")
+    figure.update_xaxes(hoverformat=".5g")
+    figure.update_yaxes(hoverformat=".4g")
+    return figure
+
+
+def _band(figure: go.Figure, row: int, x: FloatArray, low: FloatArray, high: FloatArray, colour: str, axis: str, name: str) -> None:
+    figure.add_scatter(
+        x=np.concatenate((x, x[::-1])), y=np.concatenate((high, low[::-1])), mode="lines", line={"width": 0}, fill="toself",
+        fillcolor=fade(colour, 0.25), hoverinfo="skip", name=name, legendgroup=axis, showlegend=bool(name), row=row, col=1,
+    )  # fmt: skip
+
+
+def _frequency_axis(figure: go.Figure, row: int) -> None:
+    figure.update_xaxes(type="log", dtick=1, minor={"dtick": "D2", "ticklen": 3})
+    figure.update_xaxes(title_text="frequency (Hz)", row=row, col=1)
+
+
+def _zoom(pairs: list[Pair]) -> tuple[float, float]:
+    """Hz around all antiresonances and resonances: room to each side, at least a third of the frequency."""
+    found = [item.value for pair in pairs for item in (pair.antiresonance, pair.resonance) if item is not None]
+    if not found:
+        return 0.0, 1.0
+    room = max(0.35 * min(found), 1.5 * (max(found) - min(found)))
+    return max(min(found) - room, 0.3 * min(found)), max(found) + room
+
+
+def _positive(values: FloatArray) -> FloatArray:
+    """For a log axis: NaN where not above 0."""
+    return np.where(np.isfinite(values) & (values > 0), values, np.nan)
+
+
+def _ratio(frf: FrequencyResponse) -> str:
+    return f"1 {people_unit(frf.output_unit)[1]}/{frf.input_unit}"

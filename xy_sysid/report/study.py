@@ -1,0 +1,163 @@
+"""The paper's study in numbers: for each axis the response, three fits, and the pair of antiresonance and resonance.
+
+Frozen results only; figures, tables and the page are made from them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from xy_sysid.errors import BadInput
+from xy_sysid.fitting import Estimate, Fit, Structure, identify, lls, nllsfdi
+from xy_sysid.frf import FrequencyResponse
+from xy_sysid.live_fit import LIGHT_DAMPING, structure_from, watched
+from xy_sysid.offline import AxisEstimate, estimate, split
+from xy_sysid.recording import Recording
+from xy_sysid.report.signals import Excitation, Motion, excitation, motion
+from xy_sysid.settings import IdentifierSettings
+
+NEAR = 2.0  # an antiresonance belongs to a resonance when their frequencies differ by less than this factor
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """Resonance, and the antiresonance that belongs to it where there is one, with intervals; in the fit named."""
+
+    resonance: Estimate
+    antiresonance: Estimate | None
+    fit: Fit
+
+
+@dataclass(frozen=True, slots=True)
+class Shift:
+    """After minus before: value and 95 % interval, Hz."""
+
+    name: str
+    value: float
+    low: float
+    high: float
+
+    @property
+    def certain(self) -> bool:
+        """True if the interval leaves out 0."""
+        return self.low > 0.0 or self.high < 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class BeforeAfter:
+    """The pair in two stretches of data; None where no lightly damped resonance was found, ``problem`` says why."""
+
+    before_name: str
+    after_name: str
+    before: Pair | None
+    after: Pair | None
+    problem: str = ""
+
+    @property
+    def shifts(self) -> tuple[Shift, ...]:
+        """Of the antiresonance (if both have one) and of the resonance; empty if one stretch has no pair."""
+        if self.before is None or self.after is None:
+            return ()
+        made = []
+        for name in ("antiresonance", "resonance"):
+            was, now = getattr(self.before, name), getattr(self.after, name)
+            if was is not None and now is not None:
+                half = 1.959963984540054 * math.hypot(was.sigma, now.sigma)
+                value = now.value - was.value
+                made.append(Shift(name, value, value - half, value + half))
+        return tuple(made)
+
+
+@dataclass(frozen=True, slots=True)
+class AxisStudy:
+    """Everything about one axis; ``fits`` holds LLS, NLLS (the paper's path) and ML, empty if ``problem`` says why not."""
+
+    axis: str
+    excitation: Excitation
+    motion: Motion
+    estimate: AxisEstimate | None
+    fits: dict[str, Fit]
+    pair: Pair | None
+    change: BeforeAfter | None
+    problem: str = ""
+
+    @property
+    def frf(self) -> FrequencyResponse | None:
+        """The measured response, None if there is none."""
+        return self.estimate.frf if self.estimate else None
+
+
+def study_axis(
+    recording: Recording, axis: str, settings: IdentifierSettings, period: int | None = 0, loose: Recording | None = None, refit: bool = True
+) -> AxisStudy:
+    """The study of one axis; what cannot be done is said in ``problem``.
+
+    period: as in ``offline.estimate``; loose: a second recording of the same machine, to be compared with the first;
+    without one the two halves of the first are compared (``refit`` False leaves that out).
+    """
+    drive, moved = excitation(recording, axis), motion(recording, axis)
+    try:
+        found = estimate(recording, axis, settings, period)
+    except BadInput as problem:
+        return AxisStudy(axis, drive, moved, None, {}, None, None, str(problem))
+    structure = structure_from(settings)
+    try:
+        fits = three_fits(found.frf, structure)
+    except BadInput as problem:
+        return AxisStudy(axis, drive, moved, found, {}, None, None, str(problem))
+    pair = pair_of(fits["ML"])
+    change = before_after(recording, axis, settings, period, loose, fits["ML"]) if refit else None
+    return AxisStudy(axis, drive, moved, found, fits, pair, change)
+
+
+def three_fits(frf: FrequencyResponse, structure: Structure) -> dict[str, Fit]:
+    """LLS and NLLS as nllsfdi makes them (delay absorbed, weight 1/|FRF|), and ML with delay and hold in the model."""
+    literal = replace(structure, integrators=0, delay=0.0, hold="none", weighting="relative", domain="s")
+    bare = replace(frf, kernel_offset=np.zeros(1), kernel_weight=np.ones(1), differenced=False)
+    return {"LLS": lls.fit(bare, literal), "NLLS": nllsfdi.fit(frf, literal), "ML": identify(frf, structure)}
+
+
+def before_after(
+    recording: Recording, axis: str, settings: IdentifierSettings, period: int | None, loose: Recording | None, whole: Fit
+) -> BeforeAfter:
+    """The pair before and after, each fitted from the model of the whole."""
+    if loose is None:
+        names = ("first half", "second half")
+        first, second = split(recording, 0.5)
+    else:
+        names = ("before", "after")
+        first, second = recording, loose
+    pairs: list[Pair | None] = []
+    problems: list[str] = []
+    for name, data in zip(names, (first, second), strict=True):
+        try:
+            frf = estimate(data, axis, settings, period).frf
+            fit = identify(frf, structure_from(settings), whole.tf)
+        except BadInput as problem:
+            pairs.append(None)
+            problems.append(f"{name}: {problem}")
+            continue
+        near = pairs[0].resonance.value if pairs and pairs[0] else None
+        pairs.append(pair_of(fit, near))
+        if pairs[-1] is None:
+            problems.append(f"{name}: no lightly damped resonance in the band.")
+    return BeforeAfter(names[0], names[1], pairs[0], pairs[1], " ".join(problems))
+
+
+def pair_of(fit: Fit, near: float | None = None) -> Pair | None:
+    """The watched resonance of a fit (the one nearest to ``near`` Hz if given) with its antiresonance; None without one."""
+    resonance = watched(fit, near) if fit.converged else None
+    if resonance is None:
+        return None
+    named = next(e for e in fit.intervals if e.name.startswith("resonance_") and e.name.endswith(".frequency") and e.value == resonance.frequency)
+    zeros = []
+    for item in fit.intervals:
+        if item.name.startswith("antiresonance_") and item.name.endswith(".frequency"):
+            damping = abs(fit.interval(item.name.replace(".frequency", ".damping")).value)
+            ratio = max(item.value, named.value) / max(min(item.value, named.value), 1e-12)
+            if damping < LIGHT_DAMPING and ratio < NEAR:
+                zeros.append((ratio, item))
+    return Pair(named, min(zeros, key=lambda each: each[0])[1] if zeros else None, fit)

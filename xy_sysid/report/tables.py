@@ -1,0 +1,118 @@
+"""Tables 1 and 2 of the paper's study as rows of text: what goes into HTML, and nothing about HTML."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from xy_sysid.fitting import Estimate, Fit
+from xy_sysid.report.study import AxisStudy
+from xy_sysid.report.words import digits_for, estimate_text, number, people_unit, root
+from xy_sysid.stream import FloatArray
+
+METHODS = ("LLS", "NLLS", "ML")
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """caption, column heads, and rows; the first cell of a row is its head."""
+
+    caption: str
+    heads: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+def coefficient_table(axis: str, fits: Mapping[str, Fit]) -> Table:
+    """Table 1, of one axis: coefficients of falling powers of s with the denominator's first one 1."""
+    ml = fits["ML"]
+    scale, shown = people_unit(ml.tf.output_unit)
+    rows: list[tuple[str, ...]] = []
+    for part, letter, factor in (("numerator", "b", scale), ("denominator", "a", 1.0)):
+        size = max(getattr(fit.tf, part).size for fit in fits.values())
+        for power in range(size - 1, -1, -1):
+            cells = [number(_coefficient(getattr(fits[name].tf, part), power) * factor, 6) for name in METHODS]
+            item = _named(ml, f"{part}_{power}")
+            if item is not None:
+                cells[2] = number(item.value * factor, max(digits_for(item), 6))
+                cells.append(f"[{number(item.low * factor, digits_for(item))}, {number(item.high * factor, digits_for(item))}]")
+            else:
+                cells.append("fixed")
+            rows.append((f"{letter}{_subscript(power)}  (s{_power(power)})", *cells))
+    delay = _named(ml, "delay")
+    interval = f"[{number(delay.low * 1e3, digits_for(delay))}, {number(delay.high * 1e3, digits_for(delay))}]" if delay else "fixed"
+    rows.append(("delay (ms)", "absorbed", "absorbed", number(ml.tf.delay * 1e3, digits_for(delay) if delay else 5), interval))
+    caption = f"Axis {axis}: H(s) = Σ bₖ sᵏ / Σ aₖ sᵏ · e^(−s·delay), in {shown}/{ml.tf.input_unit} and rad/s"
+    return Table(caption, ("coefficient", "LLS", "NLLS", "ML", "ML, 95 % interval"), tuple(rows))
+
+
+def result_table(one: AxisStudy) -> Table:
+    """Table 2, of one axis: errors, what the paper calls confidence, and the physical numbers with their intervals."""
+    fits = one.fits
+    ml = fits["ML"]
+    same = [fits[name] for name in METHODS]
+    rows: list[tuple[str, ...]] = [
+        ("error cost = relative error (%)", *(number(fit.error_cost, 4) for fit in same)),
+        ("“confidence” of the paper = 100 − error (%)", *(number(fit.confidence, 5) for fit in same)),
+        ("cost / cost that noise explains", "–", "–", number(ml.cost / ml.expected_cost, 4) if ml.expected_cost > 0 else "–"),
+        ("converged", *("yes" if fit.converged else f"no ({fit.iterations} iterations)" for fit in same)),
+        ("stable", *("yes" if fit.tf.is_stable else "no" for fit in same)),
+        ("poles (rad/s)", *(roots_text(fit.poles) for fit in same)),
+        ("zeros (rad/s)", *(roots_text(fit.zeros) for fit in same)),
+        ("delay", "absorbed", "absorbed", _interval(_named(ml, "delay"), "fixed")),
+        (("static gain", "velocity gain", "acceleration gain")[ml.structure.integrators], "–", "–", _interval(_named(ml, "gain"))),
+        ("pole", "–", "–", _interval(_slowest(ml))),
+        ("antiresonance", "–", "–", _interval(one.pair.antiresonance if one.pair else None)),
+        ("resonance", "–", "–", _interval(one.pair.resonance if one.pair else None)),
+    ]
+    return Table(f"Axis {one.axis}: values with their 95 % intervals", ("", *METHODS), tuple(rows))
+
+
+def change_table(studies: Mapping[str, AxisStudy]) -> Table | None:
+    """The pair before and after, of every axis that has it; None if no axis has."""
+    rows: list[tuple[str, ...]] = []
+    heads = ("", "before", "after", "shift")
+    for axis, one in studies.items():
+        change = one.change
+        if change is None or change.before is None or change.after is None:
+            continue
+        heads = ("", change.before_name, change.after_name, "shift")
+        for shift in change.shifts:
+            was, now = getattr(change.before, shift.name), getattr(change.after, shift.name)
+            item = Estimate(shift.name, shift.value, 0.0, shift.low, shift.high, "Hz")
+            rows.append((f"{shift.name}, axis {axis}", estimate_text(was), estimate_text(now), estimate_text(item)))
+    return Table("Antiresonance and resonance: value [95 % interval]", heads, tuple(rows)) if rows else None
+
+
+def roots_text(roots: FloatArray | object) -> str:
+    """Roots, conjugates once."""
+    values = np.asarray(roots, dtype=np.complex128)
+    return "; ".join(root(complex(value)) for value in values if value.imag >= 0) or "none"
+
+
+def _named(fit: Fit, name: str) -> Estimate | None:
+    return next((item for item in fit.intervals if item.name == name), None)
+
+
+def _slowest(fit: Fit) -> Estimate | None:
+    """The real pole nearest to zero that is no integrator."""
+    real = [item for item in fit.intervals if item.name.startswith("pole_") and "." not in item.name]
+    return min(real, key=lambda item: abs(item.value)) if real else None
+
+
+def _interval(item: Estimate | None, without: str = "none found") -> str:
+    return estimate_text(item) if item is not None else without
+
+
+def _coefficient(values: FloatArray, power: int) -> float:
+    place = values.size - 1 - power
+    return float(values[place]) if place >= 0 else 0.0
+
+
+def _power(power: int) -> str:
+    return str(power).translate(str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹"))
+
+
+def _subscript(power: int) -> str:
+    return str(power).translate(str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉"))
