@@ -59,7 +59,7 @@ class Drive:
         self._travel = TravelGuard(settings)
         self._signals = [signal(axis.model_copy(update={"rms": 1.0}), settings.rate) for axis in settings.axes.values()]
         self._use(settings)
-        self._gain, self._offset = self._wanted("rms"), self._wanted("offset")
+        self._gain, self._offset = self._rms, self._steady
         self._begun = 0  # samples since the first usable position
         self._fade_from, self._fade_at, self._fade_length = 1.0, 0, 0
         self._start: FloatArray | None = None
@@ -70,6 +70,7 @@ class Drive:
 
     def _use(self, settings: ExcitationSettings) -> None:
         self.settings = settings
+        self._rms, self._steady = self._wanted("rms"), self._wanted("offset")
         self._limit, self._centring = self._wanted("limit"), self._wanted("centring")
         self._travel.use(settings)
 
@@ -195,10 +196,9 @@ class Drive:
     def _voltage(self, n: int) -> FloatArray:
         seen, start = self._travel.seen, self._start
         assert seen is not None and start is not None
-        gain = np.linspace(self._gain, self._wanted("rms"), n + 1)[1:]
-        offset = np.linspace(self._offset, self._wanted("offset"), n + 1)[1:]
-        self._gain, self._offset = self._wanted("rms"), self._wanted("offset")
-        driven = np.column_stack([stream.next(n) for stream in self._signals]) * gain + offset
+        driven = np.column_stack([stream.next(n) for stream in self._signals]) * _line(self._gain, self._rms, n)
+        driven += _line(self._offset, self._steady, n)
+        self._gain, self._offset = self._rms, self._steady
         driven += self._centring * (start - seen.position)
         ramp = round(self.settings.ramp * self.settings.rate)
         if self._begun < ramp:
@@ -219,3 +219,8 @@ class Drive:
         rms = np.sqrt(self._squares / max(1, self._counted))
         self._squares, self._counted = np.zeros(len(self.axes)), 0
         return Report(self.state, self.reason, rms, self._clipped.copy(), self._braked.copy())
+
+
+def _line(before: FloatArray, after: FloatArray, n: int) -> FloatArray:
+    """(n, axes) along a straight line that ends at ``after``, or (axes,) if nothing changes."""
+    return after if np.array_equal(before, after) else np.linspace(before, after, n + 1)[1:]

@@ -82,12 +82,18 @@ class TravelGuard:
         if self.seen is None:
             return driven
         place = self.seen.position
-        ahead = np.clip((seq - self.seen.seq + np.arange(len(driven))) / self.rate + REACTION, 0.0, FURTHEST)[:, None]
+        ahead = (seq - self.seen.seq + np.arange(len(driven))) / self.rate + REACTION
+        ahead = np.minimum(np.maximum(ahead, 0.0), FURTHEST)[:, None]
         recent = [seen.speed for seen in self._speeds if self.seen.seq - seen.seq <= float(ahead[-1, 0]) * self.rate]
         ratio = np.sqrt(self._speed_power / np.maximum(self._voltage_power, 1e-12))
         outward = np.vstack((recent, ratio * np.array([sent.mean for sent in self._sent] + [driven.mean(axis=0)])))
         up, down = np.maximum(outward.max(axis=0), 0.0), np.minimum(outward.min(axis=0), 0.0)
-        upper = np.clip((place + up * ahead - self.high + self.zone) / self.zone, 0.0, 1.0)
-        lower = np.clip((self.low + self.zone - place - down * ahead) / self.zone, 0.0, 1.0)
-        driven = np.minimum(driven, (1 - upper) * np.maximum(driven, 0.0) - upper * self.push) if upper.any() else driven
-        return np.maximum(driven, (1 - lower) * np.minimum(driven, 0.0) + lower * self.push) if lower.any() else driven
+        upper = (place + up * ahead - self.high + self.zone) / self.zone
+        lower = (self.low + self.zone - place - down * ahead) / self.zone
+        if upper.max() > 0:
+            part = np.clip(upper, 0.0, 1.0)
+            driven = np.minimum(driven, (1 - part) * np.maximum(driven, 0.0) - part * self.push)
+        if lower.max() > 0:
+            part = np.clip(lower, 0.0, 1.0)
+            driven = np.maximum(driven, (1 - part) * np.minimum(driven, 0.0) + part * self.push)
+        return driven

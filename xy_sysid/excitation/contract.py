@@ -54,6 +54,9 @@ class Parts:
 
     def next(self, n: int) -> FloatArray:
         """(n,) the following samples, V."""
+        if n <= self._left.size:
+            piece, self._left = self._left[:n], self._left[n:]
+            return piece
         pieces = []
         while n > self._left.size:
             pieces.append(self._left)
