@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy import signal
@@ -51,7 +53,7 @@ def test_the_plain_variant_agrees_with_scipy_on_the_same_windows(name: str) -> N
     u, y = noise(60_000)
     shape = WindowShape.of(name, 4096, 0.5)
     spectra = run(u, y, shape, differenced=False).get()
-    options = {"fs": FS, "window": name, "nperseg": 4096, "noverlap": 2048}
+    options: Any = {"fs": FS, "window": name, "nperseg": 4096, "noverlap": 2048}
     _, gyx = signal.csd(u, y, **options)
     _, gxx = signal.welch(u, **options)
     _, coherence = signal.coherence(u, y, **options)
@@ -204,7 +206,8 @@ def test_a_state_goes_on_where_it_stopped() -> None:
     """Saved and restored spectra continue bit for bit."""
     u, y = noise(40_000, 10)
     shape = WindowShape.of("hann", 1024, 0.5)
-    for memory in ({"forget": 0.97}, {"sliding": 5.0}):
+    kinds: list[dict[str, Any]] = [{"forget": 0.97}, {"sliding": 5.0}]
+    for memory in kinds:
         whole = run(u, y, shape, differenced=False, **memory)
         part = run(u[:20_480], y[:20_480], shape, differenced=False, **memory)
         again = RunningSpectra(shape, forget=memory.get("forget", 1.0), sliding=int(memory.get("sliding", 0)))
@@ -218,7 +221,7 @@ def test_a_state_goes_on_where_it_stopped() -> None:
 
 def test_an_impossible_overlap_is_refused() -> None:
     """The error names the value and what is allowed."""
-    with pytest.raises(BadInput, match="overlap is 0.999"):
+    with pytest.raises(BadInput, match=r"overlap is 0\.999"):
         WindowShape.of("hann", 16, 0.999)
 
 

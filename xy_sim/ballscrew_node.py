@@ -27,8 +27,8 @@ class BallscrewNode(Node, Ending):
 
     def __init__(self) -> None:
         super().__init__("ballscrew", namespace=NAMESPACE, automatically_declare_parameters_from_overrides=True)
-        self._parameters = declare(self, BallscrewSettings(), self._accept)
-        settings = self._parameters.settings
+        self._own = declare(self, BallscrewSettings(), self._accept)
+        settings = self._own.settings
         self._machine = Machine.from_file(settings.machine, settings.seed or None, settings.clean)
         self._machine.step(np.zeros((1, len(self._machine.axes))))  # compile before anybody waits
         self._machine.reset()
@@ -43,7 +43,7 @@ class BallscrewNode(Node, Ending):
         self.get_logger().info(f"simulating {self._machine.spec.description or settings.machine}: axes {', '.join(self._machine.axes)}")
 
     def _accept(self, settings: BallscrewSettings) -> None:
-        if getattr(self, "_machine", None) is not None and settings != self._parameters.settings:
+        if getattr(self, "_machine", None) is not None and settings != self._own.settings:
             raise BadInput("machine", "not to be changed while it runs", "as it is", "Start the node again.")
 
     def _on_voltage(self, message: Float64MultiArray) -> None:

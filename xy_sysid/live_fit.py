@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from xy_sysid.errors import BadInput
+from xy_sysid.estimate import frequency_response
 from xy_sysid.fitting import identify
 from xy_sysid.fitting.result import Fit
 from xy_sysid.fitting.structure import Structure
@@ -18,8 +19,9 @@ from xy_sysid.frf import FrequencyResponse
 from xy_sysid.identifier import AxisRequest, FitRequest
 from xy_sysid.messages import ERROR, OK, WARN, ArrayMessage, StatusMessage, comparison_message, frf_message, transfer_function_message
 from xy_sysid.settings import IdentifierSettings
-from xy_sysid.spectra import State
+from xy_sysid.spectra import RunningSpectra, State, Transformer
 from xy_sysid.tracking import Resonance, Track, alarm_sentence, follow
+from xy_sysid.windows import Window, WindowShape
 
 LIGHT_DAMPING = 0.4  # a pole pair with more damping is no resonance to be watched
 GOOD_ERROR = 0.05  # relative error above which the sentence of an axis says that the model does not fit yet
@@ -182,3 +184,22 @@ def _verdict(axis: str, update: AxisUpdate, request: FitRequest) -> tuple[int, s
         reasons = ", ".join(sorted({*request.faults, *update.dropped}))
         return WARN, f"axis {axis}: relative error {100 * fit.relative_error:.2g} %; some data could not be used ({reasons})"
     return OK, f"axis {axis}: relative error {100 * fit.relative_error:.2g} %"
+
+
+def warm_up(settings: IdentifierSettings) -> None:
+    """Fit a made-up response once, so that everything is compiled before data come in."""
+    rate, lines = 2000.0, 200
+    shape = WindowShape.of(settings.window, settings.length, settings.overlap)
+    random = np.random.default_rng(0)
+    running = RunningSpectra(shape)
+    u = random.standard_normal((shape.length, 1))
+    y = np.concatenate((np.zeros((3, 1)), np.cumsum(u, axis=0)))[: shape.length + int(settings.differenced)]
+    transform = Transformer(shape, settings.differenced)
+    for index in range(4):
+        running.update(transform(Window(index, np.roll(u, index * 7, axis=0), y + 0.01 * random.standard_normal(y.shape)))[0])
+    frf = frequency_response(running.get(), shape, rate, differenced=settings.differenced, band=(1.0, lines * rate / shape.length))
+    structure = structure_from(settings)
+    try:
+        identify(frf, structure, identify(frf, structure).tf)
+    except BadInput:
+        return

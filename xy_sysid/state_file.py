@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,8 @@ def save_state(path: Path, state: State) -> None:
     """Write beside the old file, then put it in its place."""
     fresh = path.with_name(f".{path.name}.{os.getpid()}")
     with fresh.open("wb") as file:
-        np.savez(file, **state)
+        arrays: dict[str, Any] = dict(state)
+        np.savez(file, **arrays)
         file.flush()
         os.fsync(file.fileno())
     fresh.replace(path)

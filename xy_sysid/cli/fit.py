@@ -72,11 +72,11 @@ def _structure(settings: Any, weighting: str, domain: str) -> Structure:
     from xy_sysid.fitting.structure import Weighting
     from xy_sysid.live_fit import structure_from
 
-    if weighting not in get_args(Weighting):
-        raise BadInput("--weighting", repr(weighting), ", ".join(get_args(Weighting)), "Choose one of these.")
-    if domain not in ("s", "z"):
-        raise BadInput("--domain", repr(domain), "s, z", "Choose one of these.")
-    return replace(structure_from(settings), weighting=weighting, domain=domain)
+    values: dict[str, Any] = {"weighting": weighting, "domain": domain}
+    for name, allowed in (("weighting", get_args(Weighting)), ("domain", ("s", "z"))):
+        if values[name] not in allowed:
+            raise BadInput(f"--{name}", repr(values[name]), ", ".join(allowed), "Choose one of these.")
+    return replace(structure_from(settings), **values)
 
 
 def _estimator(method: str) -> Any:

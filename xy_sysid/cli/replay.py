@@ -29,9 +29,10 @@ def replay(
     from contextlib import ExitStack
 
     from xy_sysid.bags import BagWriter
+    from xy_sysid.bags.streaming import stream_blocks
     from xy_sysid.errors import BadRecording
     from xy_sysid.identifier import Identifier
-    from xy_sysid.imports import stream_blocks
+    from xy_sysid.pairing import KINDS
     from xy_sysid.replay import replay as logic
 
     settings = o.settings_from(params, set_)
@@ -42,7 +43,8 @@ def replay(
         writer = stack.enter_context(BagWriter(out)) if out is not None else None
         bar = stack.enter_context(progress())
         task = bar.add_task(f"replaying {bag.name}", total=None)
-        blocks = stream_blocks(bag, effort_as_voltage=effort, **o.topics_from(topic))
+        names: dict[str, Any] = dict(o.topics_from(topic))
+        blocks = (item for item in stream_blocks(bag, effort_as_voltage=effort, **names) if item[0] in KINDS)
         kind, first = next(blocks, (None, None))
         if kind is None or first is None:
             raise BadRecording(bag, "holds no samples", "Give a bag with voltage and position.")

@@ -6,6 +6,8 @@ data handling never waits for a fit.
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +22,7 @@ from std_srvs.srv import Trigger
 from xy_sysid.errors import BadInput, XySysidError
 from xy_sysid.identifier import Identifier
 from xy_sysid.joints import JointCounter
-from xy_sysid.live_fit import LiveFitter, Update
+from xy_sysid.live_fit import LiveFitter, Update, warm_up
 from xy_sysid.messages import OK, STALE, WARN, StatusMessage
 from xy_sysid.nodes.common import DATA_QOS, LATCHED_QOS, NAMESPACE, Ending, declare, from_message, overrides
 from xy_sysid.nodes.convert import array_to_ros, statuses_to_ros
@@ -50,8 +52,8 @@ class IdentifierNode(Node, Ending):
         if not self.has_parameter(AXES):
             self.declare_parameter(AXES, axes)
         self._ready = False
-        self._parameters = declare(self, IdentifierSettings(), self._accept, also=[AXES])
-        settings = self._parameters.settings
+        self._own = declare(self, IdentifierSettings(), self._accept, also=[AXES])
+        settings = self._own.settings
         self._axes = tuple(axes)
         self._identifier = Identifier(settings, self._axes)
         self._worker = FitWorker(LiveFitter(settings))
@@ -67,14 +69,15 @@ class IdentifierNode(Node, Ending):
             self._publisher(f"transfer_function/{axis}")
             self._publisher(f"comparison/{axis}")
         self._resume()
+        warm_up(settings)  # before anything is subscribed to: compiling holds up the data path
         if settings.source == "joint_state":
             self.create_subscription(JointState, "joint_states", self._on_joints, JOINT_QOS)
         else:
-            self.create_subscription(Float64MultiArray, "position", lambda message: self._on_block("position", message), DATA_QOS)
+            self.create_subscription(Float64MultiArray, "position", self._on_position, DATA_QOS)
         if settings.source == "blocks" or not settings.effort_as_voltage:
-            self.create_subscription(Float64MultiArray, "voltage", lambda message: self._on_block("voltage", message), DATA_QOS)
+            self.create_subscription(Float64MultiArray, "voltage", self._on_voltage, DATA_QOS)
         for name, act in (("reset", self._reset), ("save", self._save), ("load", self._load)):
-            self.create_service(Trigger, f"~/{name}", lambda request, response, act=act: _answer(response, act))
+            self.create_service(Trigger, f"~/{name}", functools.partial(_answer, act))
         self.create_timer(PUBLISH_PERIOD, self._publish_done)
         self.create_timer(HEARTBEAT, self._beat)
         if self._state_path is not None:
@@ -82,6 +85,12 @@ class IdentifierNode(Node, Ending):
         self._ready = True
 
     # data
+
+    def _on_voltage(self, message: Float64MultiArray) -> None:
+        self._on_block("voltage", message)
+
+    def _on_position(self, message: Float64MultiArray) -> None:
+        self._on_block("position", message)
 
     def _on_block(self, kind: Kind, message: Float64MultiArray) -> None:
         try:
@@ -96,7 +105,7 @@ class IdentifierNode(Node, Ending):
     def _on_joints(self, message: JointState) -> None:
         missing = [axis for axis in self._axes if axis not in message.name]
         places = [] if missing else [message.name.index(axis) for axis in self._axes]
-        effort = self._parameters.settings.effort_as_voltage
+        effort = self._own.settings.effort_as_voltage
         if missing or len(message.position) != len(message.name) or (effort and len(message.effort) != len(message.name)):
             what = f"joints {', '.join(message.name)}" if missing else "a position" + (" and an effort" if effort else "") + " for some joints only"
             self._refuse(f"joint_states: {what}; expected {', '.join(self._axes)}. Set the parameter axes to joint names.")
@@ -169,7 +178,7 @@ class IdentifierNode(Node, Ending):
     def _accept(self, settings: IdentifierSettings) -> None:
         if not self._ready:
             return
-        before = self._parameters.settings
+        before = self._own.settings
         for name in FIXED:
             if getattr(before, name) != getattr(settings, name):
                 raise BadInput(name, "not to be changed while the node runs", str(getattr(before, name)), "Start the node again with it.")
@@ -186,7 +195,7 @@ class IdentifierNode(Node, Ending):
 
     def _reset(self) -> str:
         self._identifier.reset()
-        self._worker.change(LiveFitter(self._parameters.settings))
+        self._worker.change(LiveFitter(self._own.settings))
         return "everything heard is forgotten"
 
     def _save(self) -> str:
@@ -198,7 +207,7 @@ class IdentifierNode(Node, Ending):
         path = self._path()
         state = load_state(path)
         self._identifier.restore(state)
-        fitter = LiveFitter(self._parameters.settings)
+        fitter = LiveFitter(self._own.settings)
         fitter.recall(state)
         self._worker.change(fitter)
         return f"loaded {sum(self._identifier.windows.values())} windows from {path}"
@@ -232,7 +241,7 @@ class IdentifierNode(Node, Ending):
             self._save_quietly()
 
 
-def _answer(response: Any, act: Any) -> Any:
+def _answer(act: Callable[[], str], _request: Any, response: Any) -> Any:
     try:
         response.message, response.success = act(), True
     except (XySysidError, OSError) as problem:

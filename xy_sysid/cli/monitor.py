@@ -1,0 +1,97 @@
+"""Listens to the identifier's topics and drives the excitation's lifecycle: what the demo shows comes over DDS."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.signals import SignalHandlerOptions
+from std_msgs.msg import Float64MultiArray
+
+from xy_sysid.messages import ArrayMessage
+from xy_sysid.nodes.common import LATCHED_QOS, NAMESPACE
+from xy_sysid.nodes.convert import array_from_ros
+
+QUIET = 1.0  # s without a new result after which the last one has been heard
+
+
+class Monitor:
+    """One node that hears results and statuses; call ``spin`` often."""
+
+    def __init__(self, axes: tuple[str, ...]) -> None:
+        self.arrays: dict[str, ArrayMessage] = {}
+        self.statuses: dict[str, tuple[int, str, dict[str, str]]] = {}
+        self.changed = time.monotonic()
+        self._context = Context()
+        rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
+        self._node = rclpy.create_node("demo", namespace=NAMESPACE, context=self._context)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+        for axis in axes:
+            for topic in (f"frf/{axis}", f"transfer_function/{axis}", f"comparison/{axis}"):
+                self._listen(topic)
+        self._node.create_subscription(DiagnosticArray, "metrics", self._on_statuses, 100)
+        self._client = self._node.create_client(ChangeState, "excitation/change_state")
+        self._wanted = [Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE]
+        self._call: Any = None
+
+    def _listen(self, topic: str) -> None:
+        quality: Any = LATCHED_QOS if topic.startswith("transfer") else 10
+
+        def heard(message: Float64MultiArray) -> None:
+            self.arrays[topic] = array_from_ros(topic, message)
+            self.changed = time.monotonic()
+
+        self._node.create_subscription(Float64MultiArray, topic, heard, quality)
+
+    def _on_statuses(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            level = status.level[0] if isinstance(status.level, bytes) else int(status.level)
+            self.statuses[status.name] = (level, status.message, {pair.key: pair.value for pair in status.values})
+            if status.name.startswith("axis "):
+                self.changed = time.monotonic()
+
+    def others(self, seconds: float = 1.5) -> list[str]:
+        """Who else reads or writes the machine's topics in this domain."""
+        until = time.monotonic() + seconds
+        while time.monotonic() < until:
+            self._executor.spin_once(timeout_sec=0.1)
+        found = []
+        for topic in (f"{NAMESPACE}/voltage", f"{NAMESPACE}/position"):
+            infos = self._node.get_publishers_info_by_topic(topic) + self._node.get_subscriptions_info_by_topic(topic)
+            found += [f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in infos]
+        return sorted(set(found))
+
+    def spin(self, seconds: float) -> None:
+        """Hear what there is."""
+        until = time.monotonic() + seconds
+        while (left := until - time.monotonic()) > 0:
+            self._executor.spin_once(timeout_sec=left)
+
+    def start_when_ready(self) -> None:
+        """Configure and activate the excitation once the machine and the identifier are there."""
+        if not self._wanted or "streams" not in self.statuses or "ballscrew" not in self.statuses or not self._client.service_is_ready():
+            return
+        if self._call is not None and not self._call.done():
+            return
+        if self._call is not None and self._call.result() is not None and self._call.result().success:
+            self._wanted.pop(0)
+            self._call = None
+        if self._wanted:
+            self._call = self._client.call_async(ChangeState.Request(transition=Transition(id=self._wanted[0])))
+
+    def over(self) -> bool:
+        """The excitation has ended and the last results have been heard."""
+        state = self.statuses.get("excitation", (0, "", {}))[2].get("state", "")
+        return state == "stopped" and time.monotonic() - self.changed > QUIET
+
+    def close(self) -> None:
+        """Leave."""
+        self._node.destroy_node()
+        self._context.try_shutdown()
