@@ -36,12 +36,12 @@ def new_domain() -> int:
 class NodeProcess:
     """A node in a process of its own; what it writes goes to a file and can be read at any time."""
 
-    def __init__(self, module: str, arguments: Sequence[str], domain: int, log: Path) -> None:
+    def __init__(self, program: Sequence[str], arguments: Sequence[str], domain: int, log: Path) -> None:
         environment = {**os.environ, "ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
         environment["PYTHONPATH"] = os.pathsep.join(filter(None, (str(ROOT), environment.get("PYTHONPATH"))))
         self._log = log
         with log.open("wb") as out:
-            command = [sys.executable, "-m", module, *arguments]
+            command = [sys.executable, *program, *arguments]
             self.process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.STDOUT, env=environment)
 
     def output(self) -> str:
@@ -82,13 +82,14 @@ class World:
         self.processes: list[NodeProcess] = []
 
     def start(self, module: str, parameters: dict[str, Any] | None = None, *, arguments: Sequence[str] = ()) -> NodeProcess:
-        """Start a node process with these parameters (values as YAML writes them)."""
+        """Start a node process with these parameters (values as YAML writes them); module: its name, or a program text of lines."""
         pairs = [
             word
             for name, value in (parameters or {}).items()
             for word in ("-p", f"{name}:={str(value).lower() if value in (True, False) else value}")
         ]
-        process = NodeProcess(module, ["--ros-args", *pairs, *arguments], self.domain, self.folder / f"node{len(self.processes)}.log")
+        program = ("-c", module) if "\n" in module else ("-m", module)
+        process = NodeProcess(program, ["--ros-args", *pairs, *arguments], self.domain, self.folder / f"node{len(self.processes)}.log")
         self.processes.append(process)
         return process
 
