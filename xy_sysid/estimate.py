@@ -15,6 +15,7 @@ from xy_sysid.stream import FloatArray
 from xy_sysid.windows import WindowShape, blur_kernel
 
 NOISE_SMOOTHING = 2  # lines to each side over which the noise power is averaged: it steadies sigma when windows are few
+PERIODIC_COHERENCE = 0.9  # a line of a periodic input repeats itself; one that does not is feedback or noise between the excited ones
 EXCITED = 1e-3  # a line is excited when its input power is above this share of the strong lines' power
 
 
@@ -61,7 +62,7 @@ def frequency_response(
     if differenced:
         with np.errstate(divide="ignore", invalid="ignore"):
             response, sigma = response / divisor(frequency, sampling_rate), sigma / np.abs(divisor(frequency, sampling_rate))
-    trusted = excited & (coherence >= min_coherence) & np.isfinite(sigma) & (averages >= 2.0)
+    trusted = excited & (coherence >= (max(min_coherence, PERIODIC_COHERENCE) if periodic else min_coherence)) & np.isfinite(sigma) & (averages >= 2.0)
     kernel = np.ones(1) if periodic else blur_kernel(shape)
     half = (kernel.shape[0] - 1) // 2
     apart = np.ones(1) if periodic else spectra.quadratic / max(spectra.quadratic[0], np.finfo(float).tiny)
