@@ -1,0 +1,82 @@
+"""A given transfer function against a measured response and signal that it was not fitted to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from xy_sysid.errors import BadInput
+from xy_sysid.estimate import divisor
+from xy_sysid.frf import ComplexArray, FrequencyResponse
+from xy_sysid.simulation import SimulationError, simulation_error
+from xy_sysid.stream import FloatArray
+from xy_sysid.transfer_function import TransferFunction, held_response
+
+AT_THE_FLOOR = 1.3  # rms residual in sigma up to which a model that was fitted elsewhere is as good as noise allows
+
+
+@dataclass(frozen=True, slots=True)
+class ModelCheck:
+    """How a model does on data that it has not seen.
+
+    frequency, measured, predicted: (m,) trusted lines, Hz; the data; the model through hold and window
+    relative_error: rms of |measured - predicted| / |measured|; noise_floor: the same of the measurement's own sigma
+    rms_sigma, worst_sigma: of the residual in sigma; worst_hz: where
+    simulation: in the time domain, None if the data are too short
+    """
+
+    frequency: FloatArray
+    measured: ComplexArray
+    predicted: ComplexArray
+    relative_error: float
+    noise_floor: float
+    rms_sigma: float
+    worst_sigma: float
+    worst_hz: float
+    simulation: SimulationError | None
+    sentence: str
+
+
+def through_window(tf: TransferFunction, frf: FrequencyResponse, hold: Literal["zoh", "none"] = "zoh") -> ComplexArray:
+    """(m,) what a measurement like ``frf`` is expected to give of this model: held, sampled, blurred by the window."""
+    total = np.zeros(len(frf), dtype=np.complex128)
+    for offset, weight in zip(frf.kernel_offset, frf.kernel_weight, strict=True):
+        at = frf.frequency + offset
+        safe = np.where(np.abs(at) < 1e-9 * frf.sampling_rate, 1e-9 * frf.sampling_rate, at)
+        value = held_response(tf, safe, frf.sampling_rate) if hold == "zoh" else tf.response(safe)
+        total += weight * value * (divisor(safe, frf.sampling_rate) if frf.differenced else 1.0)
+    return np.asarray(total / (divisor(frf.frequency, frf.sampling_rate) if frf.differenced else 1.0), dtype=np.complex128)
+
+
+def check(tf: TransferFunction, frf: FrequencyResponse, u: FloatArray, y: FloatArray, hold: Literal["zoh", "none"] = "zoh") -> ModelCheck:
+    """Compare at the trusted lines, and simulate the samples. Raises BadInput for other units or no trusted line."""
+    if (tf.input_unit, tf.output_unit) != (frf.input_unit, frf.output_unit):
+        given, wanted = f"{tf.output_unit}/{tf.input_unit}", f"{frf.output_unit}/{frf.input_unit}"
+        raise BadInput("unit of the model", given, wanted, "Use a model and a recording of the same units.")
+    lines = frf.select(frf.trusted)
+    if len(lines) == 0:
+        raise BadInput("number of trusted lines", 0, "1 or more", "Record longer, excite more, or widen the band.")
+    predicted = through_window(tf, lines, hold)
+    error = np.abs(lines.response - predicted)
+    size = np.abs(lines.response)
+    relative = float(np.sqrt(np.mean((error / size) ** 2)))
+    floor = float(np.sqrt(np.mean((lines.sigma / size) ** 2)))
+    sigmas = error / lines.sigma
+    worst = int(np.argmax(sigmas))
+    rms = float(np.sqrt(np.mean(sigmas**2)))
+    try:
+        simulated = simulation_error(tf, frf.sampling_rate, u, y)
+    except BadInput:
+        simulated = None
+    if rms <= AT_THE_FLOOR:
+        sentence = f"the model holds: its residual is {rms:.2f} sigma, at the noise floor."
+    else:
+        sentence = (
+            f"the model is off by {100 * relative:.2g} % where noise allows {100 * floor:.2g} %; "
+            f"most at {lines.frequency[worst]:.4g} Hz ({sigmas[worst]:.3g} sigma)."
+        )
+    return ModelCheck(
+        lines.frequency, lines.response, predicted, relative, floor, rms, float(sigmas[worst]), float(lines.frequency[worst]), simulated, sentence
+    )
