@@ -10,14 +10,15 @@ from xy_sysid.fitting import Fit
 from xy_sysid.frf import FrequencyResponse
 from xy_sysid.report.signals import Excitation, Motion
 from xy_sysid.report.study import AxisStudy, BeforeAfter
-from xy_sysid.report.words import estimate_text, number, quantity
+from xy_sysid.report.words import estimate_text, interval_text, number, quantity
 
 INTRODUCTION = (
     "Figures 2 to 7 and tables 1 and 2 of the frequency-domain study of a ball-screw XY table, redrawn for this recording: what it was "
     "driven with, what it did, its frequency response, the fits of a transfer function, and how far each of them can be trusted."
 )
 FITS = (
-    "Top and middle: magnitude and phase. Bottom: relative error of each fit at each line; a fit is as good as it can be where it lies on "
+    "LLS and NLLS have the delay absorbed in their polynomials (the paper's path), ML has delay and hold in its model. Top and middle: "
+    "magnitude and phase. Bottom: relative error of each fit at each line; a fit is as good as it can be where it lies on "
     "the grey noise of the measurement, and misses something where it lies far above."
 )
 NO_FIT = "No axis of this recording could be fitted; the remarks say why."
@@ -41,13 +42,13 @@ def summary(one: AxisStudy) -> str:
         if one.pair.antiresonance is not None:
             text += f", antiresonance {estimate_text(one.pair.antiresonance)}"
         text += f", resonance {estimate_text(one.pair.resonance)}"
-    return f"{text}."
+    return f"{text}." if ml.consistent is not False else f"{text}. The model misses something that the data show; the intervals do not cover that."
 
 
 def excitation(inputs: Mapping[str, Excitation], unit: str) -> str:
     """Caption of figure 2."""
-    each = "; ".join(
-        f"axis {axis}: {quantity(one.rms, unit, 3)} rms, peak {quantity(one.peak, unit, 3)}, "
+    each = ". ".join(
+        f"Axis {axis}: {quantity(one.rms, unit, 3)} rms, peak {quantity(one.peak, unit, 3)}, "
         f"excited from {number(one.density.low, 3)} to {number(one.density.high, 3)} Hz (−10 dB, dotted)"
         for axis, one in inputs.items()
     )
@@ -56,8 +57,8 @@ def excitation(inputs: Mapping[str, Excitation], unit: str) -> str:
 
 def position(outputs: Mapping[str, Motion], unit: str) -> str:
     """Caption of figure 3."""
-    each = "; ".join(
-        f"axis {axis}: from {quantity(one.low, unit, 3)} to {quantity(one.high, unit, 3)}, "
+    each = ". ".join(
+        f"Axis {axis}: from {quantity(one.low, unit, 3)} to {quantity(one.high, unit, 3)}, "
         f"drift {quantity(one.drift * 60, f'{unit}', 3)} a minute (dashed)"
         for axis, one in outputs.items()
     )
@@ -70,15 +71,15 @@ def response(responses: Mapping[str, FrequencyResponse]) -> str:
     for axis, frf in responses.items():
         used = frf.trusted
         if not bool(np.any(used)):
-            each.append(f"axis {axis}: no line can be trusted, all are drawn, without a band")
+            each.append(f"Axis {axis}: no line can be trusted, all are drawn, without a band")
             continue
         typical = float(np.median(frf.sigma[used] / np.abs(frf.response[used])))
         each.append(
-            f"axis {axis}: {int(np.sum(used))} lines, {number(frf.averages, 3)} averages, typical standard deviation {number(100 * typical, 2)} %"
+            f"Axis {axis}: {int(np.sum(used))} lines, {number(frf.averages, 3)} averages, typical standard deviation {number(100 * typical, 2)} %"
         )
     return (
         "Magnitude and phase of the measured response (H1) with the 95 % band of each line; where no band shows it is thinner than the "
-        f"line. {'; '.join(each)}."
+        f"line. {'. '.join(each)}."
     )
 
 
@@ -88,10 +89,10 @@ def coherence(responses: Mapping[str, FrequencyResponse], least: float) -> str:
     for axis, frf in responses.items():
         used = frf.coherence[frf.trusted]
         lowest = f"median {number(float(np.median(used)), 4)}, lowest used {number(float(np.min(used)), 3)}" if used.size else "no line used"
-        each.append(f"axis {axis}: {lowest}")
+        each.append(f"Axis {axis}: {lowest}")
     return (
-        "1 means that the input explains all of the output. Crosses are lines that no fit uses: not excited, or below the dotted "
-        f"limit of {number(least, 2)}. {'; '.join(each)}."
+        "1 means that the input explains all of the output. Crosses are lines that no fit uses: not excited, or below the limit of "
+        f"{number(least, 2)} (dotted). {'. '.join(each)}."
     )
 
 
@@ -103,7 +104,7 @@ def fit(axis: str, fits: Mapping[str, Fit]) -> str:
 
 def change(axis: str, one: BeforeAfter) -> str:
     """What figure 7 shows of one axis."""
-    each = ", ".join(f"{s.name} {number(s.value, 3)} Hz [{number(s.low, 3)}, {number(s.high, 3)}]" for s in one.shifts)
+    each = ", ".join(f"{s.name} {interval_text(s.value, s.low, s.high, 'Hz')}" for s in one.shifts)
     return f"Axis {axis}: the pair in {one.before_name} and {one.after_name}; shift: {each or 'unknown'}."
 
 
@@ -123,6 +124,5 @@ def pair(studies: Mapping[str, AxisStudy]) -> str:
     return (
         "Zoom on antiresonance and resonance (the response is multiplied by jω where the axis integrates: it is that of the speed). "
         f"Dots with 95 % bars are measured, lines fitted, vertical lines and bands the two frequencies with their intervals; {names}{second}. "
-        "Loose bolts of the base make both move left. Bottom: the shift with its 95 % interval; no shift is proven where the bar crosses 0. "
-        + " ".join(change(axis, one.change) for axis, one in studies.items() if one.change is not None)
+        "Loose bolts of the base make both move left. Bottom: the shift with its 95 % interval; no shift is proven where the bar crosses 0."
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 
 import numpy as np
@@ -12,12 +13,12 @@ from xy_sysid.fitting import Fit
 from xy_sysid.frf import ComplexArray, FrequencyResponse
 from xy_sysid.report.signals import Excitation, Motion
 from xy_sysid.report.study import BeforeAfter, Pair
-from xy_sysid.report.theme import AFTER, BEFORE, METHODS, ROW, axis_colour, fade, template
+from xy_sysid.report.theme import AFTER, BEFORE, DRIFT, METHODS, ROW, axis_colour, fade, template
 from xy_sysid.report.words import people_unit
 from xy_sysid.stream import FloatArray
 
 QUANTILE = 1.959963984540054  # 97.5 % of the normal distribution
-FIT_NAMES = {"LLS": "LLS, delay absorbed", "NLLS": "NLLS, delay absorbed", "ML": "ML, delay and hold in the model"}
+GAP = 2.5  # times the usual spacing of lines, above which a curve is interrupted
 DASHES = {"LLS": "dot", "NLLS": "dash", "ML": "solid"}
 
 
@@ -50,7 +51,7 @@ def excitation_figure(inputs: Mapping[str, Excitation], unit: str) -> go.Figure:
     figure.update_yaxes(title_text=f"input ({unit})", row=1, col=1)
     figure.update_xaxes(title_text=f"input ({unit})", row=2, col=1)
     figure.update_yaxes(title_text=f"density (1/{unit})", rangemode="tozero", row=2, col=1)
-    figure.update_xaxes(title_text="frequency (Hz)", type="log", dtick=1, row=3, col=1)
+    figure.update_xaxes(title_text="frequency (Hz)", type="log", dtick=1, tickformat="~g", row=3, col=1)
     highest = max((float(np.max(one.density.density)) for one in inputs.values()), default=1.0)
     figure.update_yaxes(title_text=f"PSD ({unit}²/Hz)", type="log", exponentformat="power", dtick=2, row=3, col=1)
     figure.update_yaxes(range=[np.log10(highest) - 8, np.log10(highest) + 0.5], row=3, col=1)
@@ -68,7 +69,7 @@ def position_figure(outputs: Mapping[str, Motion], unit: str) -> go.Figure:
         )
         ends = np.array([0.0, float(one.time[-1])])
         figure.add_scatter(
-            x=ends, y=(one.offset + one.drift * ends) * scale, mode="lines", line={"color": METHODS["measured"], "width": 1.5, "dash": "dash"},
+            x=ends, y=(one.offset + one.drift * ends) * scale, mode="lines", line={"color": DRIFT, "width": 2, "dash": "dash"},
             name="drift", legendgroup="drift", showlegend=number == 0, row=row, col=1,
         )  # fmt: skip
         figure.update_yaxes(title_text=f"{axis} ({shown})", row=row, col=1)
@@ -79,25 +80,29 @@ def position_figure(outputs: Mapping[str, Motion], unit: str) -> go.Figure:
 def response_figure(responses: Mapping[str, FrequencyResponse]) -> go.Figure:
     """Figure 4: magnitude and phase of every axis over log frequency, with the 95 % band of each line."""
     figure = _rows(2, shared=True, gap=0.06, heights=[0.55, 0.45])
+    phases: list[FloatArray] = []
     for number, (axis, frf) in enumerate(responses.items()):
         lines = frf.select(frf.trusted) if bool(np.any(frf.trusted)) else frf
         colour = axis_colour(number)
         part = QUANTILE * np.where(np.isfinite(lines.sigma), lines.sigma, 0.0) / np.sqrt(2) / np.abs(lines.response)
         phase = phase_of(lines.response)
+        phases.append(phase)
         with np.errstate(invalid="ignore"):
             turn = np.degrees(np.arcsin(np.minimum(part, 1.0)))
         level = decibel(lines.response, frf.output_unit)
         down = 20 * np.log10(np.maximum(1 - part, 1e-3))
         for row, middle, low, high in ((1, level, level + down, level + 20 * np.log10(1 + part)), (2, phase, phase - turn, phase + turn)):
-            _band(figure, row, lines.frequency, low, high, colour, axis, f"95 % band, {axis}" if row == 1 else "")
+            pieces = unbroken(lines.frequency)
+            _band(figure, row, pieces, lines.frequency, low, high, colour, axis, f"95 % band, {axis}" if row == 1 else "")
             figure.add_scatter(
-                x=lines.frequency, y=middle, mode="lines", line={"color": colour, "width": 1.6}, name=f"axis {axis}", legendgroup=axis,
+                x=_broken(pieces, lines.frequency), y=_broken(pieces, middle), mode="lines" if len(pieces) == 1 else "lines+markers",
+                line={"color": colour, "width": 1.6}, marker={"color": colour, "size": 3}, name=f"axis {axis}", legendgroup=axis,
                 showlegend=row == 1, row=row, col=1,
             )  # fmt: skip
     first = next(iter(responses.values()))
     figure.update_yaxes(title_text=f"magnitude (dB re {_ratio(first)})", row=1, col=1)
-    figure.update_yaxes(title_text="phase (°)", dtick=90, row=2, col=1)
-    _frequency_axis(figure, 2)
+    figure.update_yaxes(title_text="phase (°)", dtick=_turns(phases), row=2, col=1)
+    _frequency_axis(figure, 2, [frf.frequency for frf in responses.values()])
     return figure
 
 
@@ -118,12 +123,15 @@ def coherence_figure(responses: Mapping[str, FrequencyResponse], least: float) -
         if bool(np.any(outside)):
             figure.add_scatter(
                 x=frf.frequency[outside], y=frf.coherence[outside], mode="markers",
-                marker={"color": fade(colour, 0.45), "size": 4, "symbol": "x-thin", "line": {"width": 1, "color": fade(colour, 0.45)}},
+                marker={"color": fade(colour, 0.7), "size": 4, "symbol": "x-thin", "line": {"width": 1, "color": fade(colour, 0.7)}},
                 name=f"not used, {axis}", legendgroup=axis, row=1, col=1,
             )  # fmt: skip
-    figure.add_hline(y=least, line={"color": METHODS["measured"], "width": 1, "dash": "dot"}, row=1, col=1)
-    figure.update_yaxes(title_text="coherence", range=[-0.02, 1.03], row=1, col=1)
-    _frequency_axis(figure, 1)
+    bottom = coherence_bottom(responses)
+    if least > bottom:
+        figure.add_hline(y=least, line={"color": METHODS["measured"], "width": 1, "dash": "dot"}, row=1, col=1)
+    room = 0.03 * (1 - bottom)
+    figure.update_yaxes(title_text="coherence", range=[bottom - room, 1 + room], row=1, col=1)
+    _frequency_axis(figure, 1, [frf.frequency for frf in responses.values()])
     return figure
 
 
@@ -132,6 +140,7 @@ def fit_figure(frf: FrequencyResponse, fits: Mapping[str, Fit]) -> go.Figure:
     figure = _rows(3, shared=True, gap=0.05, heights=[0.38, 0.28, 0.34])
     one = next(iter(fits.values()))
     reference = phase_of(one.measured)
+    phases = [reference]
     dots = {"color": fade(METHODS["measured"], 0.75), "size": 4}
     for row, values in ((1, decibel(one.measured, frf.output_unit)), (2, reference)):
         figure.add_scatter(
@@ -141,22 +150,24 @@ def fit_figure(frf: FrequencyResponse, fits: Mapping[str, Fit]) -> go.Figure:
     noise = 100 * lines.sigma / np.abs(lines.response)
     figure.add_scatter(
         x=lines.frequency, y=_positive(noise), mode="lines", line={"color": fade(METHODS["measured"], 0.9), "width": 1},
-        name="noise of the measurement", row=3, col=1,
+        name="noise", row=3, col=1,
     )  # fmt: skip
     for name, fit in fits.items():
         line = {"color": METHODS[name], "width": 1.8, "dash": DASHES[name]}
-        phase = reference + np.degrees(np.angle(fit.response / fit.measured))
+        phase = phase_of(fit.response)
+        phase = phase + 360 * np.round(np.median(reference - phase) / 360)
+        phases.append(phase)
         error = 100 * np.abs((fit.measured - fit.response) / fit.measured)
         for row, values in ((1, decibel(fit.response, frf.output_unit)), (2, phase), (3, _positive(error))):
             figure.add_scatter(
-                x=fit.frequency, y=values, mode="lines", line={**line, "width": 1.2} if row == 3 else line, name=FIT_NAMES[name],
+                x=fit.frequency, y=values, mode="lines", line={**line, "width": 1.2} if row == 3 else line, name=name,
                 legendgroup=name, showlegend=row == 1, row=row, col=1,
             )  # fmt: skip
     figure.update_yaxes(title_text=f"dB re {_ratio(frf)}", row=1, col=1)
-    figure.update_yaxes(title_text="phase (°)", dtick=90, row=2, col=1)
+    figure.update_yaxes(title_text="phase (°)", dtick=_turns(phases), row=2, col=1)
     figure.update_yaxes(title_text="error (%)", type="log", dtick=1, exponentformat="power", row=3, col=1)
     figure.update_layout(height=680)
-    _frequency_axis(figure, 3)
+    _frequency_axis(figure, 3, [one.frequency])
     return figure
 
 
@@ -218,6 +229,12 @@ def pair_figure(change: BeforeAfter) -> go.Figure:
     return figure
 
 
+def coherence_bottom(responses: Mapping[str, FrequencyResponse]) -> float:
+    """Where the axis of figure 5 begins: 0, or a round figure below every line when all are coherent."""
+    lowest = min((float(np.min(frf.coherence)) for frf in responses.values()), default=0.0)
+    return float(np.floor(lowest * 10 - 0.5) / 10) if lowest > 0.5 else 0.0
+
+
 def decibel(response: ComplexArray, output_unit: str) -> FloatArray:
     """20 log10 of the magnitude in people's unit of the output (mm for m)."""
     scale, _ = people_unit(output_unit)
@@ -237,15 +254,33 @@ def _rows(number: int, *, shared: bool, gap: float, heights: list[float] | None 
     return figure
 
 
-def _band(figure: go.Figure, row: int, x: FloatArray, low: FloatArray, high: FloatArray, colour: str, axis: str, name: str) -> None:
+def unbroken(frequency: FloatArray) -> list[slice]:
+    """Stretches of lines between gaps much wider than the usual spacing."""
+    steps = np.diff(frequency)
+    cuts = np.flatnonzero(steps > GAP * np.median(steps)) + 1 if steps.size else np.array([], dtype=np.int64)
+    return [slice(a, b) for a, b in itertools.pairwise([0, *cuts.tolist(), frequency.size])]
+
+
+def _broken(pieces: list[slice], values: FloatArray) -> FloatArray:
+    """The values with a NaN between pieces, so that no line is drawn over a gap."""
+    return np.concatenate([np.append(values[piece], np.nan) for piece in pieces])[:-1]
+
+
+def _band(
+    figure: go.Figure, row: int, pieces: list[slice], x: FloatArray, low: FloatArray, high: FloatArray, colour: str, axis: str, name: str
+) -> None:
+    across = np.concatenate([np.concatenate((x[piece], x[piece][::-1], [np.nan])) for piece in pieces])
+    up = np.concatenate([np.concatenate((high[piece], low[piece][::-1], [np.nan])) for piece in pieces])
     figure.add_scatter(
-        x=np.concatenate((x, x[::-1])), y=np.concatenate((high, low[::-1])), mode="lines", line={"width": 0}, fill="toself",
+        x=across, y=up, mode="lines", line={"width": 0}, fill="toself",
         fillcolor=fade(colour, 0.25), hoverinfo="skip", name=name, legendgroup=axis, showlegend=bool(name), row=row, col=1,
     )  # fmt: skip
 
 
-def _frequency_axis(figure: go.Figure, row: int) -> None:
-    figure.update_xaxes(type="log", dtick=1, minor={"dtick": "D2", "ticklen": 3})
+def _frequency_axis(figure: go.Figure, row: int, frequency: list[FloatArray]) -> None:
+    low, high = (float(np.log10(limit)) for limit in (min(f[0] for f in frequency), max(f[-1] for f in frequency)))
+    room = 0.02 * (high - low)
+    figure.update_xaxes(type="log", range=[low - room, high + room], dtick=1, tickformat="~g", minor={"dtick": "D2", "ticklen": 3})
     figure.update_xaxes(title_text="frequency (Hz)", row=row, col=1)
 
 
@@ -256,6 +291,12 @@ def _zoom(pairs: list[Pair]) -> tuple[float, float]:
         return 0.0, 1.0
     room = max(0.35 * min(found), 1.5 * (max(found) - min(found)))
     return max(min(found) - room, 0.3 * min(found)), max(found) + room
+
+
+def _turns(phases: list[FloatArray]) -> float:
+    """Step between ticks of a phase axis: 90 degrees, or more where that would crowd it."""
+    span = max(float(np.max(p)) for p in phases) - min(float(np.min(p)) for p in phases)
+    return next((step for step in (45.0, 90.0, 180.0, 360.0, 720.0) if span <= 5.5 * step), 3600.0)
 
 
 def _positive(values: FloatArray) -> FloatArray:

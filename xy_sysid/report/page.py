@@ -21,11 +21,12 @@ from xy_sysid.report.theme import template
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """One Plotly figure of the page: its element's id, the figure, and what it shows in words."""
+    """One Plotly figure of the page: its element's id, the figure, what it shows in words, and its title."""
 
     name: str
     figure: go.Figure
     alt: str
+    title: str = ""
 
 
 def study_page(
@@ -65,12 +66,12 @@ def study_page(
     made: list[Drawing] = []
     for axis, one in fitted.items():
         frf = responses[axis]
-        made.append(Drawing(f"plot-6-{len(made)}", figures.fit_figure(frf, one.fits), captions.fit(axis, one.fits)))
+        made.append(Drawing(f"plot-6-{len(made)}", figures.fit_figure(frf, one.fits), captions.fit(axis, one.fits), f"Axis {axis}"))
     section(6, "fits over the measurement", made, captions.FITS if made else captions.NO_FIT)
     made = []
     for axis, one in fitted.items():
         if one.change is not None and (one.change.before or one.change.after):
-            made.append(Drawing(f"plot-7-{len(made)}", figures.pair_figure(one.change), captions.change(axis, one.change)))
+            made.append(Drawing(f"plot-7-{len(made)}", figures.pair_figure(one.change), captions.change(axis, one.change), f"Axis {axis}"))
     changed = change_table(studies)
     section(7, captions.pair_title(studies), made, captions.pair(studies), _table(changed) if changed else "")
     coefficients = "".join(_table(coefficient_table(axis, one.fits)) for axis, one in fitted.items())
@@ -123,8 +124,9 @@ def _section(name: str, title: str, drawings: list[Drawing], caption: str, extra
 
 
 def _plot(drawing: Drawing) -> str:
-    height = int(drawing.figure.layout.height)
-    return f'<div class="plot" id="{drawing.name}" role="img" aria-label="{escape(drawing.alt)}" style="height:{height}px"></div>'
+    height, title = int(drawing.figure.layout.height), f"<h3>{escape(drawing.title)}</h3>" if drawing.title else ""
+    alt = escape(drawing.alt)
+    return f'<div>{title}<div class="plot" id="{drawing.name}" role="img" aria-label="{alt}" style="height:{height}px"></div></div>'
 
 
 def _block(name: str, title: str, words: str, content: str) -> str:
@@ -138,7 +140,7 @@ def _table(table: Table) -> str:
     )
     caption = escape(table.caption)
     return (
-        f'<div class="scroll" role="region" tabindex="0" aria-label="{caption}"><table><caption>{caption}</caption>'
+        f'<div class="scroll" role="region" tabindex="0" aria-label="{caption}"><table><caption><span>{caption}</span></caption>'
         f"<thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table></div>"
     )
 

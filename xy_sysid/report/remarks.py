@@ -6,9 +6,9 @@ import numpy as np
 
 from xy_sysid.fitting import Fit
 from xy_sysid.frf import ComplexArray
-from xy_sysid.report.study import AxisStudy
+from xy_sysid.report.study import AxisStudy, BeforeAfter
 from xy_sysid.report.tables import roots_text
-from xy_sysid.report.words import estimate_text, number
+from xy_sysid.report.words import estimate_text, interval_text, number
 
 MUCH_BETTER = 3.0  # times smaller error at which the delay in the model is called the reason
 NOT_A_CONFIDENCE = (
@@ -87,9 +87,21 @@ def _change(one: AxisStudy) -> list[str]:
             )
     for shift in change.shifts:
         direction = "left (down)" if shift.value < 0 else "right (up)"
-        size = f"{number(abs(shift.value), 3)} Hz [{number(shift.low, 3)}, {number(shift.high, 3)}]"
-        if shift.certain:
-            made.append(f"Axis {one.axis}: the {shift.name} moved {direction} by {size} from {change.before_name} to {change.after_name}.")
+        if not shift.certain:
+            continue
+        size = interval_text(shift.value, shift.low, shift.high, "Hz")
+        text = f"Axis {one.axis}: the {shift.name} moved {direction} from {change.before_name} to {change.after_name}: {size}."
+        if _misses(change):
+            text += (
+                " The model misses more than noise in these data, and the interval knows of noise only: "
+                "a shift that is small against the spacing of the lines need not be one of the machine."
+            )
+        made.append(text)
     if change.shifts and not any(shift.certain for shift in change.shifts):
         made.append(f"Axis {one.axis}: no shift of the pair that its interval would not explain.")
     return made
+
+
+def _misses(change: BeforeAfter) -> bool:
+    """True if either fit leaves more than noise explains."""
+    return any(pair is not None and pair.fit.consistent is False for pair in (change.before, change.after))

@@ -103,13 +103,15 @@ def excitation(recording: Recording, axis: str) -> Excitation:
     middle = (run.start + run.stop) // 2
     excerpt = slice(max(run.start, middle - EXCERPT // 2), min(run.stop, middle + EXCERPT // 2))
     counts, edges = np.histogram(u, bins=61, density=True)
+    width = float(edges[1] - edges[0])
+    centres = np.concatenate(([edges[0] - 0.5 * width], 0.5 * (edges[1:] + edges[:-1]), [edges[-1] + 0.5 * width]))
     return Excitation(
         time=recording.time[excerpt] - recording.time[0],
         value=u[excerpt],
         rms=float(np.std(u)),
         peak=float(np.max(np.abs(u))),
-        centre=0.5 * (edges[1:] + edges[:-1]),
-        share=np.asarray(counts, dtype=np.float64),
+        centre=centres,
+        share=np.concatenate(([0.0], counts, [0.0])),
         density=density(u[run], recording.sampling_rate),
     )
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from xy_sysid.fitting import Estimate, Fit
 from xy_sysid.report.study import AxisStudy
-from xy_sysid.report.words import digits_for, estimate_text, number, people_unit, root
+from xy_sysid.report.words import estimate_text, interval_parts, interval_text, number, people_unit, root
 from xy_sysid.stream import FloatArray
 
 METHODS = ("LLS", "NLLS", "ML")
@@ -35,14 +35,13 @@ def coefficient_table(axis: str, fits: Mapping[str, Fit]) -> Table:
             cells = [number(_coefficient(getattr(fits[name].tf, part), power) * factor, 6) for name in METHODS]
             item = _named(ml, f"{part}_{power}")
             if item is not None:
-                cells[2] = number(item.value * factor, max(digits_for(item), 6))
-                cells.append(f"[{number(item.low * factor, digits_for(item))}, {number(item.high * factor, digits_for(item))}]")
+                cells[2:] = _with_interval(item, factor)
             else:
                 cells.append("fixed")
             rows.append((f"{letter}{_subscript(power)}  (s{_power(power)})", *cells))
     delay = _named(ml, "delay")
-    interval = f"[{number(delay.low * 1e3, digits_for(delay))}, {number(delay.high * 1e3, digits_for(delay))}]" if delay else "fixed"
-    rows.append(("delay (ms)", "absorbed", "absorbed", number(ml.tf.delay * 1e3, digits_for(delay) if delay else 5), interval))
+    last = _with_interval(delay, 1e3) if delay else [number(ml.tf.delay * 1e3, 5), "fixed"]
+    rows.append(("delay (ms)", "absorbed", "absorbed", *last))
     caption = f"Axis {axis}: H(s) = Σ bₖ sᵏ / Σ aₖ sᵏ · e^(−s·delay), in {shown}/{ml.tf.input_unit} and rad/s"
     return Table(caption, ("coefficient", "LLS", "NLLS", "ML", "ML, 95 % interval"), tuple(rows))
 
@@ -80,15 +79,21 @@ def change_table(studies: Mapping[str, AxisStudy]) -> Table | None:
         heads = ("", change.before_name, change.after_name, "shift")
         for shift in change.shifts:
             was, now = getattr(change.before, shift.name), getattr(change.after, shift.name)
-            item = Estimate(shift.name, shift.value, 0.0, shift.low, shift.high, "Hz")
-            rows.append((f"{shift.name}, axis {axis}", estimate_text(was), estimate_text(now), estimate_text(item)))
+            moved = interval_text(shift.value, shift.low, shift.high, "Hz")
+            rows.append((f"{shift.name}, axis {axis}", _together(estimate_text(was)), _together(estimate_text(now)), _together(moved)))
     return Table("Antiresonance and resonance: value [95 % interval]", heads, tuple(rows)) if rows else None
 
 
 def roots_text(roots: FloatArray | object) -> str:
     """Roots, conjugates once."""
     values = np.asarray(roots, dtype=np.complex128)
-    return "; ".join(root(complex(value)) for value in values if value.imag >= 0) or "none"
+    return "; ".join(_together(root(complex(value))) for value in values if value.imag >= 0) or "none"
+
+
+def _with_interval(item: Estimate, factor: float) -> list[str]:
+    """[value, interval], both with the same decimals."""
+    value, low, high, power = interval_parts(item.value * factor, item.low * factor, item.high * factor)
+    return [f"{value}{power}", f"[{low}, {high}]{power}"]
 
 
 def _named(fit: Fit, name: str) -> Estimate | None:
@@ -102,7 +107,12 @@ def _slowest(fit: Fit) -> Estimate | None:
 
 
 def _interval(item: Estimate | None, without: str = "none found") -> str:
-    return estimate_text(item) if item is not None else without
+    return _together(estimate_text(item)) if item is not None else without
+
+
+def _together(text: str) -> str:
+    """A text that is not broken into lines."""
+    return text.replace(" ", "\u00a0")
 
 
 def _coefficient(values: FloatArray, power: int) -> float:

@@ -6,6 +6,7 @@ from typing import Any
 
 AXES = ("#2f7fd0", "#d9691e", "#1a9a6c", "#9a62d0", "#c9478a", "#8a8420")
 METHODS = {"measured": "#7f8993", "LLS": "#d9691e", "NLLS": "#9a62d0", "ML": "#2f7fd0"}
+DRIFT = "#9a62d0"
 BEFORE, AFTER = "#2f7fd0", "#d9691e"
 FONT = "system-ui, -apple-system, 'Segoe UI', 'Liberation Sans', Arial, sans-serif"
 ROW = 230  # height of a row of a figure, px

@@ -8,6 +8,8 @@ from xy_sysid.fitting import Estimate
 
 SMALL = {"s": "ms", "m": "mm", "m/s": "mm/s", "m/s/V": "mm/s/V", "m/V": "mm/V", "m/(V s)": "mm/(V s)"}  # 1000 of the second make one of the first
 
+LARGE, TINY = 1e6, 1e-4  # numbers are written with a power of ten from LARGE on and below TINY
+
 
 def people_unit(unit: str) -> tuple[float, str]:
     """(factor, name): 1000 and mm for m; 1 and the unit itself where people read SI."""
@@ -22,7 +24,7 @@ def number(value: float, digits: int = 4) -> str:
         return "–"
     text = f"{value:.{digits}g}"
     if "e" in text:
-        if 1.0 <= abs(value) < 1e7:
+        if 1.0 <= abs(value) < LARGE:
             return f"{float(text):.0f}".replace("-", "−")
         mantissa, _, exponent = text.partition("e")
         text = f"{mantissa}·10{_superscript(int(exponent))}"
@@ -39,20 +41,28 @@ def quantity(value: float, unit: str, digits: int = 4) -> str:
     return f"{number(value * scale, digits)} {shown}".rstrip()
 
 
-def digits_for(item: Estimate) -> int:
-    """So many that the interval's half width shows two digits, 3 to 8."""
-    half = item.high - item.value
-    if not (math.isfinite(half) and half > 0 and item.value != 0):
-        return 5
-    return int(min(max(math.floor(math.log10(abs(item.value))) - math.floor(math.log10(half)) + 2, 3), 8))
+def interval_parts(value: float, low: float, high: float) -> tuple[str, str, str, str]:
+    """(value, low, high, power of ten) with as many decimals as show two digits of the half width, zeros kept."""
+    half = 0.5 * (high - low)
+    if not (math.isfinite(half) and half > 0.0):
+        return number(value, 5), number(low, 5), number(high, 5), ""
+    size = max(abs(low), abs(high))
+    exponent = math.floor(math.log10(size)) if size >= LARGE or size < TINY else 0
+    decimals = min(max(1 - math.floor(math.log10(half)) + exponent, 0), 9)
+    value_text, low_text, high_text = (f"{each / 10.0**exponent:.{decimals}f}".replace("-", "−") for each in (value, low, high))
+    return value_text, low_text, high_text, f"·10{_superscript(exponent)}" if exponent else ""
+
+
+def interval_text(value: float, low: float, high: float, unit: str) -> str:
+    """value [low, high] unit, in people's units."""
+    scale, shown = people_unit(unit)
+    middle, first, last, power = interval_parts(value * scale, low * scale, high * scale)
+    return f"{middle} [{first}, {last}]{power} {shown}".rstrip()
 
 
 def estimate_text(item: Estimate) -> str:
     """value [low, high] unit."""
-    scale, shown = people_unit(item.unit)
-    digits = digits_for(item)
-    value, low, high = (number(each * scale, digits) for each in (item.value, item.low, item.high))
-    return f"{value} [{low}, {high}] {shown}".rstrip()
+    return interval_text(item.value, item.low, item.high, item.unit)
 
 
 def root(value: complex, digits: int = 4) -> str:
