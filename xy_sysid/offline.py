@@ -10,13 +10,13 @@ from xy_sysid.batch import batch_spectra
 from xy_sysid.errors import BadInput
 from xy_sysid.estimate import frequency_response
 from xy_sysid.frf import FrequencyResponse
+from xy_sysid.friction_hint import friction_hint, friction_note
 from xy_sysid.period import find_period
 from xy_sysid.recording import Recording
 from xy_sysid.settings import IdentifierSettings
 from xy_sysid.windows import WindowShape
 
 TRANSIENT = 1  # periods left out at the start of a periodic recording
-STANDSTILL = 0.02  # part of the samples in which an encoder may repeat one value for long, above that it is said
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +66,10 @@ def estimate(recording: Recording, axis: str, settings: IdentifierSettings, peri
         min_coherence=settings.min_coherence,
         units=(recording.input_unit, recording.output_unit),
     )
-    return AxisEstimate(axis, frf, period or None, int(spectra.weight), tuple(notes + _closed_loop(recording, axis)))
+    longest = max(runs, key=lambda run: run.stop - run.start)
+    friction = friction_note(friction_hint(u[longest], y[longest], recording.sampling_rate), recording.input_unit)
+    notes += [*_closed_loop(recording, axis), *([friction] if friction else [])]
+    return AxisEstimate(axis, frf, period or None, int(spectra.weight), tuple(notes))
 
 
 def _periodic(settings: IdentifierSettings, runs: list[slice], period: int, notes: list[str], rate: float) -> tuple[IdentifierSettings, list[slice]]:

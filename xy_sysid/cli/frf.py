@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from xy_sysid.cli import options as o
 from xy_sysid.cli.output import aside, emit, people, table
 from xy_sysid.cli.reading import chosen, read
+
+if TYPE_CHECKING:
+    from xy_sysid.offline import AxisEstimate
 
 
 def frf(
@@ -65,7 +68,7 @@ def frf(
         table(f"axis {item.axis}, {unit}", ("Hz", f"dB ({unit})", "phase deg", "coherence", "sigma %", "trusted"), rows)
 
 
-def _write_csv(path: str, found: list) -> None:  # type: ignore[type-arg]
+def _write_csv(path: str, found: list[AxisEstimate]) -> None:
     import numpy as np
 
     rows = []

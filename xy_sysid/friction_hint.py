@@ -1,0 +1,69 @@
+"""Does the input carry a part that follows the direction of motion? Then friction distorts the frequency response.
+
+The inverse dynamic model, input = a * acceleration + b * speed + c * direction + d, by least squares on samples that went
+through one low-pass (Janot, Gautier, Brunot 2019, for EMPS). A hint for people; naming the effect is the diagnosis' work.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import signal
+
+from xy_sysid.stream import FloatArray
+
+PART_OF_RATE = 0.02  # cut-off of the low-pass over the sampling rate: far below any lag that the model leaves out
+SLOWEST = 0.02  # of the rms speed: below, the direction counts as zero
+SURE = 8.0  # standard errors from which the hint is given; linear simulated axes stay below 3, EMPS has 188
+ENOUGH = 200  # samples after decimation needed for a hint
+
+
+@dataclass(frozen=True, slots=True)
+class FrictionHint:
+    """level: input opposed to motion, input unit; error: its standard error; share: of the input's variance it explains alone."""
+
+    level: float
+    error: float
+    share: float
+
+
+def friction_hint(u: FloatArray, y: FloatArray, sampling_rate: float) -> FrictionHint | None:
+    """The part of the input (n,) that follows the direction of the output's (n,) motion; None if there is too little motion."""
+    step = max(int(0.25 / PART_OF_RATE), 1)
+    if u.shape[0] < ENOUGH * step or float(np.ptp(y)) == 0.0:
+        return None
+    taps = signal.firwin(8 * step + 1, PART_OF_RATE * sampling_rate, fs=sampling_rate)
+    low_u, low_y = (signal.oaconvolve(values - values[0], taps, mode="valid") for values in (u, y))
+    speed = np.gradient(low_y) * sampling_rate
+    columns = [np.gradient(speed)[::step] * sampling_rate, speed[::step]]
+    pace = speed[::step]
+    direction = np.where(np.abs(pace) > SLOWEST * float(np.sqrt(np.mean(pace**2))), np.sign(pace), 0.0)
+    target = low_u[::step] - float(np.mean(low_u))
+    table = np.column_stack([*columns, np.ones_like(pace), direction])
+    scale = np.linalg.norm(table, axis=0)
+    if not bool(np.all(scale > 0)):
+        return None
+    without = _left_over(table[:, :3] / scale[:3], target)
+    solution, *_ = np.linalg.lstsq(table / scale, target, rcond=None)
+    rest = target - table / scale @ solution
+    inverse = np.linalg.pinv((table / scale).T @ (table / scale))
+    deviation = float(np.sqrt(rest @ rest / max(len(target) - 4, 1) * inverse[3, 3]))
+    share = (without - float(rest @ rest)) / float(target @ target)
+    return FrictionHint(float(solution[3] / scale[3]), deviation / float(scale[3]), share)
+
+
+def friction_note(hint: FrictionHint | None, unit: str) -> str:
+    """The sentence for people, empty when there is nothing to say."""
+    if hint is None or hint.level < SURE * hint.error:
+        return ""
+    return (
+        f"Friction: {abs(hint.level):.3g} +- {1.96 * hint.error:.1g} {unit} of the input follow the direction of motion. It distorts the "
+        "frequency response, most at low frequency and small amplitude, and the response changes with the amplitude."
+    )
+
+
+def _left_over(table: FloatArray, target: FloatArray) -> float:
+    solution, *_ = np.linalg.lstsq(table, target, rcond=None)
+    rest = target - table @ solution
+    return float(rest @ rest)
