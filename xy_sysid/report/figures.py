@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
+from html import escape
 
 import numpy as np
 import plotly.graph_objects as go
@@ -28,13 +29,15 @@ def excitation_figure(inputs: Mapping[str, Excitation], unit: str) -> go.Figure:
     for number, (axis, one) in enumerate(inputs.items()):
         colour = axis_colour(number)
         line = {"color": colour, "width": 1.2}
-        figure.add_scatter(x=one.time, y=one.value, mode="lines", line={**line, "shape": "hv"}, name=f"axis {axis}", legendgroup=axis, row=1, col=1)
         figure.add_scatter(
-            x=one.centre, y=one.share, mode="lines", line={**line, "shape": "hvh"}, name=f"axis {axis}", legendgroup=axis, showlegend=False,
+            x=one.time, y=one.value, mode="lines", line={**line, "shape": "hv"}, name=f"axis {plain(axis)}", legendgroup=axis, row=1, col=1
+        )
+        figure.add_scatter(
+            x=one.centre, y=one.share, mode="lines", line={**line, "shape": "hvh"}, name=f"axis {plain(axis)}", legendgroup=axis, showlegend=False,
             row=2, col=1,
         )  # fmt: skip
         figure.add_scatter(
-            x=one.density.frequency, y=_positive(one.density.density), mode="lines", line=line, name=f"axis {axis}", legendgroup=axis,
+            x=one.density.frequency, y=_positive(one.density.density), mode="lines", line=line, name=f"axis {plain(axis)}", legendgroup=axis,
             showlegend=False, row=3, col=1,
         )  # fmt: skip
         for edge in (one.density.low, one.density.high):
@@ -48,12 +51,12 @@ def excitation_figure(inputs: Mapping[str, Excitation], unit: str) -> go.Figure:
             x=level, y=bell, mode="lines", line={"color": METHODS["measured"], "width": 1.2, "dash": "dash"}, name="normal, same rms", row=2, col=1
         )
     figure.update_xaxes(title_text="time (s)", row=1, col=1)
-    figure.update_yaxes(title_text=f"input ({unit})", row=1, col=1)
-    figure.update_xaxes(title_text=f"input ({unit})", row=2, col=1)
-    figure.update_yaxes(title_text=f"density (1/{unit})", rangemode="tozero", row=2, col=1)
+    figure.update_yaxes(title_text=f"input ({plain(unit)})", row=1, col=1)
+    figure.update_xaxes(title_text=f"input ({plain(unit)})", row=2, col=1)
+    figure.update_yaxes(title_text=f"density (1/{plain(unit)})", rangemode="tozero", row=2, col=1)
     figure.update_xaxes(title_text="frequency (Hz)", type="log", dtick=1, tickformat="~g", row=3, col=1)
     highest = max((float(np.max(one.density.density)) for one in inputs.values()), default=1.0)
-    figure.update_yaxes(title_text=f"PSD ({unit}²/Hz)", type="log", exponentformat="power", dtick=2, row=3, col=1)
+    figure.update_yaxes(title_text=f"PSD ({plain(unit)}²/Hz)", type="log", exponentformat="power", dtick=2, row=3, col=1)
     figure.update_yaxes(range=[np.log10(highest) - 8, np.log10(highest) + 0.5], row=3, col=1)
     return figure
 
@@ -65,14 +68,14 @@ def position_figure(outputs: Mapping[str, Motion], unit: str) -> go.Figure:
     for number, (axis, one) in enumerate(outputs.items()):
         row = number + 1
         figure.add_scatter(
-            x=one.time, y=one.value * scale, mode="lines", line={"color": axis_colour(number), "width": 1}, name=f"axis {axis}", row=row, col=1
+            x=one.time, y=one.value * scale, mode="lines", line={"color": axis_colour(number), "width": 1}, name=f"axis {plain(axis)}", row=row, col=1
         )
         ends = np.array([0.0, float(one.time[-1])])
         figure.add_scatter(
             x=ends, y=(one.offset + one.drift * ends) * scale, mode="lines", line={"color": DRIFT, "width": 2, "dash": "dash"},
             name="drift", legendgroup="drift", showlegend=number == 0, row=row, col=1,
         )  # fmt: skip
-        figure.update_yaxes(title_text=f"{axis} ({shown})", row=row, col=1)
+        figure.update_yaxes(title_text=f"{plain(axis)} ({plain(shown)})", row=row, col=1)
     figure.update_xaxes(title_text="time (s)", row=len(outputs), col=1)
     return figure
 
@@ -81,28 +84,30 @@ def response_figure(responses: Mapping[str, FrequencyResponse]) -> go.Figure:
     """Figure 4: magnitude and phase of every axis over log frequency, with the 95 % band of each line."""
     figure = _rows(2, shared=True, gap=0.06, heights=[0.55, 0.45])
     phases: list[FloatArray] = []
+    spans: list[FloatArray] = []
     for number, (axis, frf) in enumerate(responses.items()):
         lines = frf.select(frf.trusted) if bool(np.any(frf.trusted)) else frf
         colour = axis_colour(number)
         part = QUANTILE * np.where(np.isfinite(lines.sigma), lines.sigma, 0.0) / np.sqrt(2) / np.abs(lines.response)
         phase = phase_of(lines.response)
         phases.append(phase)
+        spans.append(lines.frequency)
         with np.errstate(invalid="ignore"):
             turn = np.degrees(np.arcsin(np.minimum(part, 1.0)))
         level = decibel(lines.response, frf.output_unit)
         down = 20 * np.log10(np.maximum(1 - part, 1e-3))
         for row, middle, low, high in ((1, level, level + down, level + 20 * np.log10(1 + part)), (2, phase, phase - turn, phase + turn)):
             pieces = unbroken(lines.frequency)
-            _band(figure, row, pieces, lines.frequency, low, high, colour, axis, f"95 % band, {axis}" if row == 1 else "")
+            _band(figure, row, pieces, lines.frequency, low, high, colour, axis, f"95 % band, {plain(axis)}" if row == 1 else "")
             figure.add_scatter(
                 x=_broken(pieces, lines.frequency), y=_broken(pieces, middle), mode="lines" if len(pieces) == 1 else "lines+markers",
-                line={"color": colour, "width": 1.6}, marker={"color": colour, "size": 3}, name=f"axis {axis}", legendgroup=axis,
+                line={"color": colour, "width": 1.6}, marker={"color": colour, "size": 3}, name=f"axis {plain(axis)}", legendgroup=axis,
                 showlegend=row == 1, row=row, col=1,
             )  # fmt: skip
     first = next(iter(responses.values()))
     figure.update_yaxes(title_text=f"magnitude (dB re {_ratio(first)})", row=1, col=1)
     figure.update_yaxes(title_text="phase (°)", dtick=_turns(phases), row=2, col=1)
-    _frequency_axis(figure, 2, [frf.frequency for frf in responses.values()])
+    _frequency_axis(figure, 2, spans)
     return figure
 
 
@@ -117,14 +122,14 @@ def coherence_figure(responses: Mapping[str, FrequencyResponse], least: float) -
         sparse = float(np.mean(frf.trusted)) < 0.5
         figure.add_scatter(
             x=frf.frequency, y=inside, mode="markers" if sparse else "lines", line={"color": colour, "width": 1.6},
-            marker={"color": colour, "size": 5}, name=f"axis {axis}", legendgroup=axis, row=1, col=1,
+            marker={"color": colour, "size": 5}, name=f"axis {plain(axis)}", legendgroup=axis, row=1, col=1,
         )  # fmt: skip
         outside = ~frf.trusted
         if bool(np.any(outside)):
             figure.add_scatter(
                 x=frf.frequency[outside], y=frf.coherence[outside], mode="markers",
                 marker={"color": fade(colour, 0.7), "size": 4, "symbol": "x-thin", "line": {"width": 1, "color": fade(colour, 0.7)}},
-                name=f"not used, {axis}", legendgroup=axis, row=1, col=1,
+                name=f"not used, {plain(axis)}", legendgroup=axis, row=1, col=1,
             )  # fmt: skip
     bottom = coherence_bottom(responses)
     if least > bottom:
@@ -221,7 +226,7 @@ def pair_figure(change: BeforeAfter) -> go.Figure:
         figure.update_yaxes(range=[-0.6, len(shifts) - 0.4], row=3, col=1)
     speed = bool(known) and known[0][1].fit.structure.integrators > 0
     ratio = f"{people_unit(known[0][1].fit.tf.output_unit)[1]}{'/s' if speed else ''}/{known[0][1].fit.tf.input_unit}" if known else ""
-    figure.update_yaxes(title_text=f"dB re {ratio}", row=1, col=1)
+    figure.update_yaxes(title_text=f"dB re {plain(ratio)}", row=1, col=1)
     figure.update_yaxes(title_text="phase (°)", row=2, col=1)
     figure.update_xaxes(title_text="", range=[low, high], matches="x", row=1, col=1)
     figure.update_xaxes(title_text="frequency (Hz)", range=[low, high], matches="x", row=2, col=1)
@@ -233,6 +238,11 @@ def coherence_bottom(responses: Mapping[str, FrequencyResponse]) -> float:
     """Where the axis of figure 5 begins: 0, or a round figure below every line when all are coherent."""
     lowest = min((float(np.min(frf.coherence)) for frf in responses.values()), default=0.0)
     return float(np.floor(lowest * 10 - 0.5) / 10) if lowest > 0.5 else 0.0
+
+
+def plain(text: str) -> str:
+    """Text from a file for a place where Plotly would take HTML for markup."""
+    return escape(text, quote=False)
 
 
 def decibel(response: ComplexArray, output_unit: str) -> FloatArray:
@@ -305,4 +315,4 @@ def _positive(values: FloatArray) -> FloatArray:
 
 
 def _ratio(frf: FrequencyResponse) -> str:
-    return f"1 {people_unit(frf.output_unit)[1]}/{frf.input_unit}"
+    return plain(f"1 {people_unit(frf.output_unit)[1]}/{frf.input_unit}")
