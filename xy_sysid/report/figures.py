@@ -98,7 +98,8 @@ def response_figure(responses: Mapping[str, FrequencyResponse]) -> go.Figure:
         down = 20 * np.log10(np.maximum(1 - part, 1e-3))
         for row, middle, low, high in ((1, level, level + down, level + 20 * np.log10(1 + part)), (2, phase, phase - turn, phase + turn)):
             pieces = unbroken(lines.frequency)
-            _band(figure, row, pieces, lines.frequency, low, high, colour, axis, f"95 % band, {plain(axis)}" if row == 1 else "")
+            if bool(np.any(frf.trusted)):
+                _band(figure, row, pieces, lines.frequency, low, high, colour, axis, f"95 % band, {plain(axis)}" if row == 1 else "")
             figure.add_scatter(
                 x=_broken(pieces, lines.frequency), y=_broken(pieces, middle), mode="lines" if len(pieces) == 1 else "lines+markers",
                 line={"color": colour, "width": 1.6}, marker={"color": colour, "size": 3}, name=f"axis {plain(axis)}", legendgroup=axis,
