@@ -56,6 +56,9 @@ class ExcitationNode(LifecycleNode):
         self.create_timer(0.5, self._report)
         self._waiting_since = time.monotonic()
         self._autostart: Timer | None = self.create_timer(0.1, self._start_by_itself) if self._knobs.settings.autostart else None
+        self.get_logger().info(
+            "unconfigured: nothing moves before configure and activate" + (", which come by themselves" if self._autostart else "")
+        )
 
     # lifecycle
 
