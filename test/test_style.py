@@ -29,7 +29,7 @@ axis_model effects greybox comparison diagnosis refinement
 pairing joints identifier messages live_fit replay offline
 """)
 EDGE = names("""
-shipped parameter_file run_plan starter
+shipped parameter_file settings_doc run_plan starter
 bags imports exports state_file work_queue
 nodes
 report page
