@@ -24,6 +24,8 @@ from xy_sysid.tracking import Resonance, Track, alarm_sentence, follow
 from xy_sysid.windows import Window, WindowShape
 
 LIGHT_DAMPING = 0.4  # a pole pair with more damping is no resonance to be watched
+FIRST_FITS = 3  # fits in which a warm start that noise does not explain is checked against a cold one,
+LATER_DOUBT = 15  # and every so many later: an axis with friction is never explained by noise, and a cold start is slow
 GOOD_ERROR = 0.05  # relative error above which the sentence of an axis says that the model does not fit yet
 
 
@@ -83,7 +85,7 @@ class LiveFitter:
 
     def fit(self, request: FitRequest) -> Update:
         """Fit every axis of the request."""
-        return Update(request, {axis: self._axis(axis, asked) for axis, asked in request.axes.items()})
+        return Update(request, {axis: self._axis(axis, asked, request.number) for axis, asked in request.axes.items()})
 
     def reset(self) -> None:
         """Forget models and references."""
@@ -107,11 +109,11 @@ class LiveFitter:
         prefix = "reference/"
         self.restore({name.removeprefix(prefix): Resonance(*map(float, value)) for name, value in state.items() if name.startswith(prefix)})
 
-    def _axis(self, axis: str, asked: AxisRequest) -> AxisUpdate:
+    def _axis(self, axis: str, asked: AxisRequest, number: int) -> AxisUpdate:
         track = self._tracks.get(axis, Track())
         start = self._last.get(axis)
         try:
-            fit = identify(asked.frf, self._structure, start.tf if start else None)
+            fit = identify(asked.frf, self._structure, start.tf if start else None, doubt=number <= FIRST_FITS or number % LATER_DOUBT == 0)
         except BadInput as problem:
             return AxisUpdate(asked.frf, None, track, asked.windows, asked.dropped, str(problem))
         if fit.converged:
@@ -125,7 +127,7 @@ class LiveFitter:
         if asked.recent is None or not fit.converged:
             return None
         try:
-            short = identify(asked.recent, self._structure, fit.tf)
+            short = identify(asked.recent, self._structure, fit.tf, doubt=False)
         except BadInput:
             return None
         return watched(short, near=track.reference.frequency if track.reference else None) if short.converged else None

@@ -13,13 +13,15 @@ from xy_sysid.frf import FrequencyResponse
 from xy_sysid.transfer_function import TransferFunction
 
 DEFAULTS = FitOptions()
-DOUBT = 3.0  # a warm start is doubted when its cost is more than this many deviations above what noise explains
 
 
-def identify(frf: FrequencyResponse, structure: Structure, start: TransferFunction | None = None, options: FitOptions = DEFAULTS) -> Fit:
+def identify(
+    frf: FrequencyResponse, structure: Structure, start: TransferFunction | None = None, options: FitOptions = DEFAULTS, doubt: bool = True
+) -> Fit:
     """Fit a structure to the trusted lines of a response.
 
-    start: the last model, if there is one: a few milliseconds; a cold start is tried as well when it leads nowhere good.
+    start: the last model, if there is one: a few milliseconds; a cold start is tried as well when it does not converge.
+    doubt: also when it converges to more than noise explains, which on a real axis is usual, and a cold start is slow
     Raises BadInput for too few trusted lines. A fit that fails is a result with ``converged`` False and a reason.
     """
     task = problem(frf, structure)
@@ -27,7 +29,7 @@ def identify(frf: FrequencyResponse, structure: Structure, start: TransferFuncti
     point = from_transfer_function(task, start) if start is not None else None
     if point is not None:
         warm = finished(task, minimise(task, point, options), "ml" if structure.weighting == "sigma" else "nlls", "the last model")
-        if warm.converged and warm.consistent:
+        if warm.converged and (warm.consistent or not doubt):
             return warm
     minimum = cold(task, replace(options, refine_delay=False))
     if warm is not None and warm.cost <= minimum.cost * (1 + 1e-9):

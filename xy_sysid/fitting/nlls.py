@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from xy_sysid.fitting.damped import Minimum, minimise
 from xy_sysid.fitting.finish import finish
-from xy_sysid.fitting.linear import reweighted, scan
-from xy_sysid.fitting.problem import Point, Problem, from_transfer_function, problem
+from xy_sysid.fitting.linear import linear_step, reweighted, scan
+from xy_sysid.fitting.problem import Point, Problem, from_transfer_function, in_bases, problem, rational
 from xy_sysid.fitting.result import Fit
 from xy_sysid.fitting.structure import FitOptions, Structure
 from xy_sysid.frf import FrequencyResponse
 from xy_sysid.transfer_function import TransferFunction
 
 DEFAULTS = FitOptions()
-STARTS = 2  # delays of the scan that are followed to their minimum
+MOST_STARTS = 4  # delays of the scan that are followed to their minimum when nothing is as good as noise allows
 
 
 def fit(frf: FrequencyResponse, structure: Structure, start: TransferFunction | None = None, options: FitOptions = DEFAULTS) -> Fit:
@@ -35,17 +37,39 @@ def solve(task: Problem, start: TransferFunction | None, options: FitOptions, na
 
 
 def cold(task: Problem, options: FitOptions) -> Minimum:
-    """The best minimum from linear starts at a few delays."""
+    """The best minimum from several starts, the likeliest first; the search ends when noise explains the cost.
+
+    First the best delay of a scan; then a delay from a rigid axis of the lowest order, from which the full order grows
+    under relative weights: weights of 1 / sigma can hold linear steps in a wrong valley when a pole and zero lie close.
+    """
     best: Minimum | None = None
-    for _, delay, start in scan(task, options.reweightings, options)[:STARTS]:
-        point, value, _ = reweighted(task, delay, options.reweightings, start)
-        found = minimise(task, point, options) if np.isfinite(value) else Minimum(point, value, 0, False, "No finite start.")
-        if best is None or found.cost < best.cost:
+    scanned = scan(task, options.reweightings, options)
+    for start in (scanned[0], None, *scanned[1:MOST_STARTS]):
+        found = _grown(task, options) if start is None else _followed(task, start[1], start[2], options)
+        if best is None or (found.cost < best.cost and (found.converged or not best.converged)):
             best = found
         if best.cost <= 1.5 * float(len(task.frf)) and task.structure.weighting == "sigma":
             break  # as good as the noise allows
     assert best is not None
     return best
+
+
+def _followed(task: Problem, delay: float, start: Point, options: FitOptions) -> Minimum:
+    point, value, _ = reweighted(task, delay, options.reweightings, start)
+    return minimise(task, point, options) if np.isfinite(value) else Minimum(point, value, 0, False, "No finite start.")
+
+
+def _grown(task: Problem, options: FitOptions) -> Minimum:
+    """The minimum from the delay of a rigid axis."""
+    relative = replace(task.structure, weighting="relative")
+    rigid = problem(task.frf, replace(relative, numerator_order=0, denominator_order=min(relative.integrators + 1, relative.denominator_order)))
+    _, first, start = scan(rigid, options.reweightings, options)[0]
+    delay = _followed(rigid, first, start, options).point.delay
+    full = problem(task.frf, relative)
+    better = _followed(full, delay, linear_step(full, delay, None, False), options).point
+    up, down = rational(task, better)
+    factor = task.weight * np.abs(task.plan.line_factor / down)
+    return minimise(task, in_bases(task, up, down, better.delay, factor), options)
 
 
 def finished(task: Problem, found: Minimum, name: str, start: str) -> Fit:
