@@ -17,6 +17,7 @@ from xy_sysid.stream import FloatArray
 
 LARGEST_DAMPING = 1e12
 ROUNDING = 1e-26  # a cost below this part of the data's own is zero in double precision
+NEAR_ROUNDING = 1e-20  # below this part, a step that fails is blamed on rounding
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +54,8 @@ def minimise(task: Problem, start: Point, options: FitOptions) -> Minimum:
             if predicted <= options.relative_change * value or value <= floor:
                 return Minimum(point, value, iteration, True, "No step lowers the cost: a minimum.")
             damping = damping * 10.0 if damped else max(damping * 10.0, 1e-6)
+            if damping > LARGEST_DAMPING and value <= floor / ROUNDING * NEAR_ROUNDING:
+                return Minimum(point, value, iteration, True, "The model reproduces the data to rounding.")
             if damping > LARGEST_DAMPING:
                 return Minimum(point, value, iteration, False, "No step lowers the cost, though its slope is not zero.")
         change = (value - trial_value) / value
