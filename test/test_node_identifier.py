@@ -44,7 +44,13 @@ def ready(world: World, statuses: list[Any], *names: str) -> None:
     assert world.until(lambda: all(newest(statuses, name) for name in names), 40.0), f"not all of {names} came up"
 
 
-def drive(world: World, statuses: list[Any]) -> None:
+def drive(world: World, statuses: list[Any], listeners: int = 2) -> None:
+    """Activate once everybody hears everybody, and wait for the end of the signal."""
+
+    def all_there() -> bool:
+        return all(int(newest(statuses, name).get("listeners", "0")) >= listeners for name in ("excitation", "ballscrew"))
+
+    assert world.until(all_there, 20.0)
     assert world.transition("excitation", "configure")
     assert world.transition("excitation", "activate")
     assert world.until(lambda: newest(statuses, "excitation").get("state") == "stopped", 60.0)
@@ -77,7 +83,7 @@ def test_live_recorded_and_replayed_are_the_same_bit_for_bit(world: World, tmp_p
     world.start(EXCITATION, FAST)
     ready(world, statuses, "streams", "ballscrew", "excitation")
     assert world.until(lambda: all(f"recording /xy/{topic}" in recorder.output() for topic in ("voltage", "position", "frf/x", "comparison/y")), 20.0)
-    drive(world, statuses)
+    drive(world, statuses, listeners=3)
     assert world.until(lambda: int(newest(statuses, "axis x").get("fit", "0")) >= 14, 30.0)
     world.spin(1.5)
     recorder.send(signal.SIGINT)

@@ -86,7 +86,8 @@ class BallscrewNode(Node, Ending):
         silent = time.monotonic() - self._heard > IDLE
         message = "no voltage: motors off" if silent else "moving"
         level = 1 if self._faults and not silent else 0
-        values = {"samples": str(self._machine.samples), **{f"voltage {what}": str(number) for what, number in self._faults.items()}}
+        listeners = str(self._position.get_subscription_count())
+        values = {"samples": str(self._machine.samples), "listeners": listeners, **{f"voltage {what}": str(number) for what, number in self._faults.items()}}
         stamped = DiagnosticArray(status=[status("ballscrew", level, self._said if self._faults else message, values)])
         stamped.header.stamp = self.get_clock().now().to_msg()
         self._metrics.publish(stamped)

@@ -41,6 +41,8 @@ def demo(
         emit({"machine": machine, "seconds": seconds, "wall_seconds": wall, "axes": answer, "exit_code": code})
     elif code == 0:
         people.print(_panel(monitor, table.axes, seconds))
+        for axis in table.axes:
+            people.print(function_text(monitor, axis), markup=False)
         for line in _summary(answer):
             people.print(line)
         people.print(f"{seconds:g} s of data in {wall:.0f} s. Next: xy-sysid simulate rec && xy-sysid fit rec")
@@ -191,6 +193,29 @@ def result(monitor: Monitor, axis: str, truth: dict[str, Any]) -> dict[str, Any]
     found["windows"] = int(values.get("windows", "0"))
     found["dropped_windows"] = int(values.get("dropped windows", "0"))
     return found
+
+
+def function_text(monitor: Monitor, axis: str) -> str:
+    """The transfer function that was published, in a line of mathematics."""
+    from xy_sysid.messages import read_transfer_function
+
+    message = monitor.arrays.get(f"transfer_function/{axis}")
+    if message is None:
+        return f"axis {axis}: no transfer function was published"
+    tf = read_transfer_function(message)
+    return f"H_{axis}(s) = ({polynomial(tf.numerator)}) / ({polynomial(tf.denominator)}) exp(-{tf.delay:.4g} s)  [m/V]"
+
+
+def polynomial(coefficients: Any) -> str:
+    """Falling powers of s, as people write them."""
+    terms = []
+    for power, value in zip(range(len(coefficients) - 1, -1, -1), coefficients, strict=True):
+        if value == 0:
+            continue
+        unit = value == 1 and power > 0
+        variable = "" if power == 0 else "s" if power == 1 else f"s^{power}"
+        terms.append(f"{'' if unit else f'{value:.5g}'}{'' if unit or not variable else ' '}{variable}")
+    return " + ".join(terms).replace("+ -", "- ") or "0"
 
 
 def _summary(answer: dict[str, Any]) -> list[str]:

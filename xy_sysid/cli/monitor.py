@@ -18,6 +18,7 @@ from xy_sysid.messages import ArrayMessage
 from xy_sysid.nodes.common import LATCHED_QOS, NAMESPACE
 from xy_sysid.nodes.convert import array_from_ros
 
+LISTENERS = 2  # voltage is heard by the machine and the identifier, position by the excitation and the identifier
 QUIET = 1.0  # s without a new result after which the last one has been heard
 
 
@@ -75,9 +76,12 @@ class Monitor:
             self._executor.spin_once(timeout_sec=left)
 
     def start_when_ready(self) -> None:
-        """Configure and activate the excitation once the machine and the identifier are there."""
-        if not self._wanted or "streams" not in self.statuses or "ballscrew" not in self.statuses or not self._client.service_is_ready():
+        """Configure and activate the excitation once everybody hears everybody: discovery can take seconds."""
+        if not self._wanted or "streams" not in self.statuses or not self._client.service_is_ready():
             return
+        for name in ("excitation", "ballscrew"):
+            if int(self.statuses.get(name, (0, "", {}))[2].get("listeners", "0")) < LISTENERS:
+                return
         if self._call is not None and not self._call.done():
             return
         if self._call is not None and self._call.result() is not None and self._call.result().success:

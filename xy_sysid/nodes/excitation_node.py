@@ -232,6 +232,7 @@ class ExcitationNode(LifecycleNode):
                 values[f"{axis}.rms"] = f"{report.rms[number]:.4g}"
                 values[f"{axis}.clipped"] = f"{report.clipped[number]:.0f}"
                 values[f"{axis}.braked"] = f"{report.braked[number]:.0f}"
+        values["listeners"] = str(self._voltage.get_subscription_count())
         stamped = DiagnosticArray(status=[status("excitation", level, message, values)])
         stamped.header.stamp = self.get_clock().now().to_msg()
         self._metrics.publish(stamped)
