@@ -33,7 +33,13 @@ class Basis:
 
     def powers(self) -> FloatArray:
         """(order + 1, order + 1): row k holds the coefficients of p_k, rising powers of x."""
-        return _powers(self.first, self.recurrence)
+        order = self.recurrence.shape[1]
+        table = np.zeros((order + 1, order + 1))
+        table[0, 0] = self.first
+        for k in range(order):
+            row = np.roll(table[k], 1) - self.recurrence[: k + 1, k] @ table[: k + 1]
+            table[k + 1] = row / self.recurrence[k + 1, k]
+        return table
 
     def roots(self, coefficients: FloatArray) -> ComplexArray:
         """Roots of sum_k coefficients[k] p_k, eigenvalues of the comrade matrix."""
@@ -92,16 +98,3 @@ def _values(x: NDArray[np.complex128], first: float, recurrence: NDArray[np.floa
                 value -= recurrence[j, k] * out[i, j]
             out[i, k + 1] = value / recurrence[k + 1, k]
     return out
-
-
-@compiled
-def _powers(first: float, recurrence: NDArray[np.float64]) -> NDArray[np.float64]:
-    order = recurrence.shape[1]
-    table = np.zeros((order + 1, order + 1))
-    table[0, 0] = first
-    for k in range(order):
-        table[k + 1, 1:] = table[k, :-1]
-        for j in range(k + 1):
-            table[k + 1] -= recurrence[j, k] * table[j]
-        table[k + 1] /= recurrence[k + 1, k]
-    return table

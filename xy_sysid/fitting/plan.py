@@ -17,8 +17,6 @@ from xy_sysid.frf import ComplexArray, FrequencyResponse
 from xy_sysid.hold import ALIASES, TAIL_POINTS, interpolation, nodes_for
 from xy_sysid.stream import FloatArray
 
-NO_WEIGHT = 1e-15  # weights of the window below this share of the largest are rounding
-
 
 @dataclass(frozen=True, slots=True)
 class Plan:
@@ -33,9 +31,8 @@ class Plan:
     omega:       (g,) rad/s
     main:        (g,) factor of N / D exp(-j w delay) at the grid
     fold:        (g,) factor of the sum of aliases at the grid
-    index:       (m, j) rows of the grid that a line needs (the window reaches below 0 Hz near it)
-    kernel:      (j,) weights of the window
-    after:       (m,) factor of the blurred response: the division by the difference's response
+    index:       (m, j) rows of the grid that a line needs; conjugate: (m, j) True where the kernel reaches below 0 Hz
+    kernel:      (m, j) complex weights, the division by the difference's response included
     alias:       (nodes * 2 ALIASES,) scaled s of the aliases, grouped by node
     alias_factor: (same,) 1 / (s sigma^integrators)
     alias_number: (2 ALIASES,) k
@@ -53,8 +50,8 @@ class Plan:
     main: ComplexArray
     fold: ComplexArray
     index: NDArray[np.int64]
-    kernel: FloatArray
-    after: ComplexArray
+    conjugate: NDArray[np.bool_]
+    kernel: ComplexArray
     alias: ComplexArray
     alias_factor: ComplexArray
     alias_number: FloatArray
@@ -90,20 +87,17 @@ def _plan(
     domain: str,
 ) -> Plan:
     frequency, offset, weight = (np.frombuffer(b, dtype=np.float64) for b in (frequency_bytes, offset_bytes, weight_bytes))
-    seen = np.abs(weight) > NO_WEIGHT * np.max(np.abs(weight))
-    offset, weight = offset[seen], weight[seen]
     if not bool(np.all(frequency > 0)):
         raise BadInput("lowest frequency", f"{np.min(frequency):g} Hz", "> 0 Hz", "Leave out the line at 0 Hz.")
     period, held = 1.0 / rate, hold == "zoh"
     scale = float(np.median(2 * np.pi * frequency)) if domain == "s" else 1.0
     wanted = frequency[:, None] + offset[None, :]
     step = max(resolution, 1e-6 * float(np.max(frequency))) * 1e-5
-    _, first, inverse = np.unique(np.rint(wanted / step).astype(np.int64), return_index=True, return_inverse=True)
-    grid_frequency = wanted.ravel()[first]
-    grid_frequency[np.abs(grid_frequency) < step] = 0.0
+    _, first, inverse = np.unique(np.rint(np.abs(wanted) / step).astype(np.int64), return_index=True, return_inverse=True)
+    grid_frequency = np.abs(wanted).ravel()[first]
     omega, line_omega = 2 * np.pi * grid_frequency, 2 * np.pi * frequency
     main, fold = _factors(omega, period, scale, integrators, differenced, held, domain)
-    after = 1.0 / np.expm1(1j * line_omega * period) if differenced else np.ones(frequency.size, dtype=np.complex128)
+    post = 1.0 / np.expm1(1j * line_omega * period) if differenced else np.ones(frequency.size, dtype=np.complex128)
     line_main, _ = _factors(line_omega, period, scale, integrators, False, held, domain)
     nodes = nodes_for(float(np.max(grid_frequency)) * period)
     k = np.concatenate((np.arange(-ALIASES, 0), np.arange(1, ALIASES + 1))).astype(np.float64)
@@ -122,8 +116,8 @@ def _plan(
         main=main,
         fold=fold,
         index=np.ascontiguousarray(inverse.reshape(wanted.shape)).astype(np.int64),
-        kernel=np.ascontiguousarray(weight),
-        after=after,
+        conjugate=wanted < 0,
+        kernel=weight[None, :] * post[:, None],
         alias=np.asarray(s / scale, dtype=np.complex128),
         alias_factor=alias_factor,
         alias_number=k,

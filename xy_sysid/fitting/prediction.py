@@ -25,7 +25,7 @@ TAIL_REACH = 0.5  # the series in 1 / s is used while every pole is within this 
 class Model:
     """A plan with a basis: what is needed to evaluate parameters on it.
 
-    numerator, denominator: the bases; *_grid, *_alias: their values; *_top: (order + 1, SERIES) their highest powers
+    numerator, denominator: the bases; *_grid, *_line, *_alias: their values; *_top: (order + 1, SERIES) their highest powers
     """
 
     plan: Plan
@@ -65,24 +65,12 @@ def _top(part: Basis) -> FloatArray:
     return out
 
 
-def predict(model: Model, b: FloatArray, a: FloatArray, delay: float) -> ComplexArray:
-    """(lines,) predicted response."""
-    return np.asarray(_lines(model, b, a, delay, False)[:, 0])
-
-
-def table(model: Model, b: FloatArray, a: FloatArray, delay: float, weight: FloatArray, measured: ComplexArray) -> FloatArray:
-    """(p + 2, 2 lines), real parts before imaginary ones: rows of weighted derivatives to b, a[:-1] and the delay; weighted error.
-
-    The error, in the last row, is measured - predicted.
-    """
-    return _table(_lines(model, b, a, delay, True), weight, measured)
-
-
-def _lines(model: Model, b: FloatArray, a: FloatArray, delay: float, jacobian: bool) -> ComplexArray:
+def predict(model: Model, b: FloatArray, a: FloatArray, delay: float, jacobian: bool) -> ComplexArray:
+    """(lines, 1) predicted response, or (lines, 1 + (m + 1) + n + 1) with the derivatives to b, a[:-1] and the delay."""
     plan = model.plan
     return _predict(
         b, a, delay, jacobian, model.integrators, plan.scale, plan.period, plan.omega, plan.main, plan.fold,
-        plan.index, plan.kernel, plan.after, plan.alias, plan.alias_factor, plan.alias_number, plan.spread, plan.tail,
+        plan.index, plan.conjugate, plan.kernel, plan.alias, plan.alias_factor, plan.alias_number, plan.spread, plan.tail,
         model.numerator_grid, model.denominator_grid, model.numerator_alias, model.denominator_alias,
         model.numerator_top, model.denominator_top,
     )  # fmt: skip
@@ -91,28 +79,26 @@ def _lines(model: Model, b: FloatArray, a: FloatArray, delay: float, jacobian: b
 @compiled
 def _row(
     out: NDArray[np.complex128], n_values: NDArray[np.complex128], d_values: NDArray[np.complex128], b: NDArray[np.float64],
-    a: NDArray[np.float64], factor: complex, omega: float, jacobian: bool,
+    a: NDArray[np.float64], factor: complex, s: complex, jacobian: bool,
 ) -> None:  # fmt: skip
-    """Add factor * (N / D and its derivatives; to the delay with s = j omega) to a row."""
+    """Add factor * (N / D and its derivatives; to the delay with this s) to a row."""
     top, bottom = 0.0 + 0.0j, 0.0 + 0.0j
     for i in range(b.shape[0]):
         top += b[i] * n_values[i]
     for i in range(a.shape[0]):
         bottom += a[i] * d_values[i]
-    size = bottom.real * bottom.real + bottom.imag * bottom.imag
-    if not size > 1e-300:
-        bottom, size = 1e-150 + 0.0j, 1e-300
-    turned = complex(bottom.real / size, -bottom.imag / size)
-    inverse = factor * turned
+    if bottom == 0.0:
+        bottom = 1e-300 + 0.0j
+    inverse = factor / bottom
     value = top * inverse
     out[0] += value
     if jacobian:
         for i in range(b.shape[0]):
             out[1 + i] += n_values[i] * inverse
-        ratio = -value * turned
+        ratio = -value / bottom
         for i in range(a.shape[0] - 1):
             out[1 + b.shape[0] + i] += d_values[i] * ratio
-        out[b.shape[0] + a.shape[0]] += complex(omega * value.imag, -omega * value.real)
+        out[b.shape[0] + a.shape[0]] -= s * value
 
 
 @compiled
@@ -150,20 +136,19 @@ def _tail(
     weight = np.zeros(size)
     for j in range(size):
         weight[j] = (scale * period) ** (lowest + j) / scale
-    series = np.zeros((out.shape[1], size))  # of each column, in falling powers of s
-    series[0] = ratio
-    if jacobian:
-        for j in range(size):
-            for r in range(j + 1):
-                for i in range(b.shape[0]):
-                    series[1 + i, j] += n_top[i, r] * inverse[j - r]
-                for i in range(a.shape[0] - 1):
-                    series[1 + b.shape[0] + i, j] += d_top[i, r] * square[j - r]
     for p in range(out.shape[0]):
         for j in range(size):
-            for c in range(out.shape[1]):
-                out[p, c] += series[c, j] * weight[j] * sums[p, j + 1]
-            if jacobian:
+            out[p, 0] += ratio[j] * weight[j] * sums[p, j + 1]
+        if jacobian:
+            for i in range(b.shape[0]):
+                for j in range(size):
+                    for r in range(j + 1):
+                        out[p, 1 + i] += n_top[i, r] * inverse[j - r] * weight[j] * sums[p, j + 1]
+            for i in range(a.shape[0] - 1):
+                for j in range(size):
+                    for r in range(j + 1):
+                        out[p, 1 + b.shape[0] + i] += d_top[i, r] * square[j - r] * weight[j] * sums[p, j + 1]
+            for j in range(size):
                 out[p, b.shape[0] + a.shape[0]] -= ratio[j] * weight[j] * sums[p, j] / period
 
 
@@ -171,7 +156,7 @@ def _tail(
 def _predict(
     b: NDArray[np.float64], a: NDArray[np.float64], delay: float, jacobian: bool, integrators: int, scale: float, period: float,
     omega: NDArray[np.float64], main: NDArray[np.complex128], fold: NDArray[np.complex128],
-    index: NDArray[np.int64], kernel: NDArray[np.float64], after: NDArray[np.complex128],
+    index: NDArray[np.int64], conjugate: NDArray[np.bool_], kernel: NDArray[np.complex128],
     alias: NDArray[np.complex128], alias_factor: NDArray[np.complex128], alias_number: NDArray[np.float64],
     spread: NDArray[np.float64], tail: NDArray[np.float64],
     n_grid: NDArray[np.complex128], d_grid: NDArray[np.complex128], n_alias: NDArray[np.complex128], d_alias: NDArray[np.complex128],
@@ -179,9 +164,6 @@ def _predict(
 ) -> NDArray[np.complex128]:  # fmt: skip
     width = 1 + b.shape[0] + a.shape[0] if jacobian else 1
     size, nodes, numbers = omega.shape[0], spread.shape[1], alias_number.shape[0]
-    turn = np.empty(size, dtype=np.complex128)
-    for g in range(size):
-        turn[g] = complex(np.cos(omega[g] * delay), -np.sin(omega[g] * delay))
     rows = np.zeros((size, width), dtype=np.complex128)
     if nodes > 0:
         at_nodes = np.zeros((nodes, width), dtype=np.complex128)
@@ -189,7 +171,7 @@ def _predict(
         for n in range(nodes):
             for k in range(numbers):
                 i = n * numbers + k
-                _row(at_nodes[n], n_alias[i], d_alias[i], b, a, phase[k] * alias_factor[i], alias[i].imag * scale, jacobian)
+                _row(at_nodes[n], n_alias[i], d_alias[i], b, a, phase[k] * alias_factor[i], alias[i] * scale, jacobian)
         lowest = a.shape[0] - b.shape[0] + integrators + 1
         sums = tail_sums(TAIL_POINTS, delay / period, ALIASES, lowest - 1, SERIES + 1)
         beyond = np.zeros((TAIL_POINTS.shape[0], width), dtype=np.complex128)
@@ -198,34 +180,21 @@ def _predict(
         at_nodes += (np.dot(tail, beyond.view(np.float64))).view(np.complex128)
         rows = (np.dot(spread, at_nodes.view(np.float64))).view(np.complex128)
         for g in range(size):
-            factor = fold[g] * turn[g]
             for c in range(width):
-                rows[g, c] *= factor
+                rows[g, c] *= fold[g]
     for g in range(size):
-        _row(rows[g], n_grid[g], d_grid[g], b, a, main[g] * turn[g], omega[g], jacobian)
-    flat = rows.view(np.float64)
-    blurred = np.zeros((index.shape[0], 2 * width))
+        _row(rows[g], n_grid[g], d_grid[g], b, a, main[g], 1j * omega[g], jacobian)
+        turn = np.exp(-1j * omega[g] * delay)
+        for c in range(width):
+            rows[g, c] *= turn
+    out = np.zeros((index.shape[0], width), dtype=np.complex128)
     for i in range(index.shape[0]):
         for j in range(index.shape[1]):
-            row, weight = flat[index[i, j]], kernel[j]
-            for c in range(2 * width):
-                blurred[i, c] += weight * row[c]
-    out = blurred.view(np.complex128)
-    for i in range(index.shape[0]):
-        for c in range(width):
-            out[i, c] *= after[i]
-    return out
-
-
-@compiled
-def _table(lines: NDArray[np.complex128], weight: NDArray[np.float64], measured: NDArray[np.complex128]) -> NDArray[np.float64]:
-    size, last = lines.shape[0], lines.shape[1] - 1
-    out = np.empty((last + 1, 2 * size))
-    for i in range(size):
-        for c in range(last):
-            out[c, i] = lines[i, 1 + c].real * weight[i]
-            out[c, size + i] = lines[i, 1 + c].imag * weight[i]
-        error = measured[i] - lines[i, 0]
-        out[last, i] = error.real * weight[i]
-        out[last, size + i] = error.imag * weight[i]
+            row = rows[index[i, j]]
+            if conjugate[i, j]:
+                for c in range(width):
+                    out[i, c] += kernel[i, j] * row[c].conjugate()
+            else:
+                for c in range(width):
+                    out[i, c] += kernel[i, j] * row[c]
     return out
