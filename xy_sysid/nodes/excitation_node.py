@@ -23,6 +23,7 @@ from xy_sysid.settings import AxisExcitation, ExcitationSettings, knobs
 from xy_sysid.stream import Block
 
 ARRIVES = Duration(seconds=1.0)  # how long the last zero may take to be acknowledged
+SETTLED = 0.5  # s without a new listener before starting by itself: whoever was started together hears the first sample
 SAME_NODE = 2.0  # s to look for one node that reads voltage and writes position, before any two will do
 AXES = "axes"
 
@@ -55,6 +56,7 @@ class ExcitationNode(LifecycleNode):
         self._pace: Timer | None = None
         self.create_timer(0.5, self._report)
         self._waiting_since = time.monotonic()
+        self._readers, self._settled_at = 0, 0.0  # of the voltage, and when their number will have settled
         self._autostart: Timer | None = self.create_timer(0.1, self._start_by_itself) if self._knobs.settings.autostart else None
         self.get_logger().info(
             "unconfigured: nothing moves before configure and activate" + (", which come by themselves" if self._autostart else "")
@@ -246,6 +248,10 @@ class ExcitationNode(LifecycleNode):
         readers = {(info.node_namespace, info.node_name) for info in self.get_subscriptions_info_by_topic(self._voltage.topic_name)}
         writers = {(info.node_namespace, info.node_name) for info in self.get_publishers_info_by_topic(self._position.topic_name)}
         if not readers & writers and time.monotonic() - self._waiting_since < SAME_NODE:
+            return
+        if len(readers) != self._readers:
+            self._readers, self._settled_at = len(readers), time.monotonic() + SETTLED
+        if time.monotonic() < self._settled_at:
             return
         assert self._autostart is not None
         self.destroy_timer(self._autostart)
