@@ -6,6 +6,8 @@ H1 = Gyx / Gxx; sigma^2 = (Gyy - |Gyx|^2 / Gxx) / Gxx / (averages - 1) is the va
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,12 +18,21 @@ from xy_sysid.windows import WindowShape, blur_kernel
 
 NOISE_SMOOTHING = 2  # lines to each side over which the noise power is averaged: it steadies sigma when windows are few
 PERIODIC_COHERENCE = 0.9  # a line of a periodic input repeats itself; one that does not is feedback or noise between the excited ones
+MARGIN = 8  # lines beside the band that its own lines need (smoothing, main lobe)
+STRONG = 0.9  # quantile of the input power in the band that is called strong
 EXCITED = 1e-3  # a line is excited when its input power is above this share of the strong lines' power
 
 
 def main_lobe(shape: WindowShape) -> int:
     """Half width of the taper's main lobe in lines; nearer to zero frequency the removed mean spoils an estimate."""
     return {"boxcar": 1, "hann": 2, "hamming": 2, "blackman": 3, "blackmanharris": 4, "flattop": 5}.get(shape.name, 4)
+
+
+@lru_cache(maxsize=8)
+def _kernel(shape: WindowShape) -> FloatArray:
+    kernel = blur_kernel(shape)
+    kernel.setflags(write=False)
+    return kernel
 
 
 def divisor(frequency: FloatArray, sampling_rate: float) -> ComplexArray:
@@ -45,9 +56,14 @@ def frequency_response(
     periodic: the window is a whole number of periods of the input, so that nothing leaks and only the excited lines
     carry information. With fewer than two effective averages sigma is infinite and no line is trusted.
     """
-    frequency = np.arange(spectra.gxx.shape[0]) * sampling_rate / shape.length
-    inside = (frequency > 0) & (frequency >= band[0]) & (frequency <= min(band[1], 0.5 * sampling_rate))
-    gxx, gyy, gyx = spectra.gxx, spectra.gyy, spectra.gyx
+    length = spectra.gxx.shape[0]
+    every = np.arange(length) * sampling_rate / shape.length
+    chosen = np.flatnonzero((every > 0) & (every >= band[0]) & (every <= min(band[1], 0.5 * sampling_rate)))
+    first, last = (int(chosen[0]), int(chosen[-1]) + 1) if chosen.size else (0, 0)
+    near = slice(max(first - MARGIN, 0), min(last + MARGIN, length))
+    inside = slice(first - near.start, last - near.start)
+    frequency = every[near]
+    gxx, gyy, gyx = spectra.gxx[near], spectra.gyy[near], spectra.gyx[near]
     power = np.maximum(gxx, np.finfo(float).tiny)
     response = gyx / power
     unexplained = np.maximum(gyy - np.abs(gyx) ** 2 / power, 0.0)
@@ -55,15 +71,17 @@ def frequency_response(
     excited = _excited(gxx, inside, 0 if periodic else main_lobe(shape))
     if not periodic:
         unexplained = _smoothed(unexplained)
-        excited &= np.arange(gxx.shape[0]) >= main_lobe(shape)
+        excited &= np.arange(near.start, near.stop) >= main_lobe(shape)
     averages = spectra.averages
     with np.errstate(divide="ignore", over="ignore"):
         sigma = np.sqrt(unexplained / power / (averages - 1.0)) if averages >= 2.0 else np.full(gxx.shape, np.inf)
     if differenced:
         with np.errstate(divide="ignore", invalid="ignore"):
-            response, sigma = response / divisor(frequency, sampling_rate), sigma / np.abs(divisor(frequency, sampling_rate))
-    trusted = excited & (coherence >= (max(min_coherence, PERIODIC_COHERENCE) if periodic else min_coherence)) & np.isfinite(sigma) & (averages >= 2.0)
-    kernel = np.ones(1) if periodic else blur_kernel(shape)
+            step = divisor(frequency, sampling_rate)
+            response, sigma = response / step, sigma / np.abs(step)
+    least = max(min_coherence, PERIODIC_COHERENCE) if periodic else min_coherence
+    trusted = excited & (coherence >= least) & np.isfinite(sigma) & (averages >= 2.0)
+    kernel = np.ones(1) if periodic else _kernel(shape)
     half = (kernel.shape[0] - 1) // 2
     apart = np.ones(1) if periodic else spectra.quadratic / max(spectra.quadratic[0], np.finfo(float).tiny)
     return FrequencyResponse(
@@ -84,11 +102,13 @@ def frequency_response(
     )
 
 
-def _excited(gxx: FloatArray, inside: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
+def _excited(gxx: FloatArray, inside: slice, reach: int) -> NDArray[np.bool_]:
     """Lines whose input power, and that of all their neighbours within the window's main lobe, is not negligible."""
-    strong = float(np.quantile(gxx[inside], 0.9)) if bool(inside.any()) else 0.0
-    if reach == 0 and strong < float(gxx[inside].max(initial=0.0)) * EXCITED:
-        strong = float(gxx[inside].max(initial=0.0))
+    own = gxx[inside]
+    place = int(STRONG * (own.size - 1))
+    strong = float(np.partition(own, place)[place]) if own.size else 0.0
+    if reach == 0 and strong < float(own.max(initial=0.0)) * EXCITED:
+        strong = float(own.max(initial=0.0))
     above = gxx > EXCITED * strong
     if strong <= 0.0:
         return np.zeros_like(above)

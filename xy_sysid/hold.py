@@ -36,6 +36,7 @@ def tail_sums(points: NDArray[np.float64], delay: float, aliases: int, lowest: i
     out = np.zeros((points.shape[0], count), dtype=np.complex128)
     highest = lowest + count - 1
     constants = np.zeros(highest + 1, dtype=np.complex128)
+    phase = np.exp(-2j * np.pi * delay * np.arange(-aliases, aliases + 1))
     for n in range(points.shape[0]):
         x = points[n]
         turn = np.exp(-2j * np.pi * x)
@@ -58,10 +59,15 @@ def tail_sums(points: NDArray[np.float64], delay: float, aliases: int, lowest: i
                     factor *= -part / i
                 full += constants[q - i] * factor
             full *= shift  # takes the factor exp(-j 2 pi x delay) out of every term; whole samples turn by exp(-j 2 pi x whole)
-            near = 0.0 + 0.0j
-            for k in range(-aliases, aliases + 1):
-                near += np.exp(-2j * np.pi * k * delay) / (2j * np.pi * (x + k)) ** q
-            out[n, c] = full - near
+            out[n, c] = full
+        for m in range(2 * aliases + 1):
+            inverse = complex(0.0, -1.0 / (2.0 * np.pi * (x + m - aliases)))
+            term = phase[m]
+            for _ in range(lowest):
+                term *= inverse
+            for c in range(count):
+                out[n, c] -= term
+                term *= inverse
     return out
 
 

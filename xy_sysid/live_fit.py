@@ -13,19 +13,22 @@ import numpy as np
 from xy_sysid.errors import BadInput
 from xy_sysid.estimate import frequency_response
 from xy_sysid.fitting import identify
-from xy_sysid.fitting.result import Fit
-from xy_sysid.fitting.structure import Structure
+from xy_sysid.fitting.modes import pole_estimates
+from xy_sysid.fitting.result import Estimate, Fit
+from xy_sysid.fitting.structure import FitOptions, Structure
 from xy_sysid.frf import FrequencyResponse
 from xy_sysid.identifier import AxisRequest, FitRequest
 from xy_sysid.messages import ERROR, OK, WARN, ArrayMessage, StatusMessage, comparison_message, frf_message, transfer_function_message
 from xy_sysid.settings import IdentifierSettings
 from xy_sysid.spectra import RunningSpectra, State, Transformer
+from xy_sysid.stream import FloatArray
 from xy_sysid.tracking import Resonance, Track, alarm_sentence, follow
 from xy_sysid.windows import Window, WindowShape
 
 LIGHT_DAMPING = 0.4  # a pole pair with more damping is no resonance to be watched
 FIRST_FITS = 3  # fits in which a warm start that noise does not explain is checked against a cold one,
 LATER_DOUBT = 15  # and every so many later: an axis with friction is never explained by noise, and a cold start is slow
+OPTIONS = FitOptions(relative_change=1e-6)  # of the cost: a hundredth of a standard error is left at the most
 GOOD_ERROR = 0.05  # relative error above which the sentence of an axis says that the model does not fit yet
 
 
@@ -113,7 +116,8 @@ class LiveFitter:
         track = self._tracks.get(axis, Track())
         start = self._last.get(axis)
         try:
-            fit = identify(asked.frf, self._structure, start.tf if start else None, doubt=number <= FIRST_FITS or number % LATER_DOUBT == 0)
+            doubt = number <= FIRST_FITS or number % LATER_DOUBT == 0
+            fit = identify(asked.frf, self._structure, start.tf if start else None, OPTIONS, doubt)
         except BadInput as problem:
             return AxisUpdate(asked.frf, None, track, asked.windows, asked.dropped, str(problem))
         if fit.converged:
@@ -127,19 +131,24 @@ class LiveFitter:
         if asked.recent is None or not fit.converged:
             return None
         try:
-            short = identify(asked.recent, self._structure, fit.tf, doubt=False)
+            poles = pole_estimates(asked.recent, self._structure, fit.tf, OPTIONS)
         except BadInput:
             return None
-        return watched(short, near=track.reference.frequency if track.reference else None) if short.converged else None
+        return _light(poles, fit.frequency, track.reference.frequency if track.reference else None)
 
 
 def watched(fit: Fit, near: float | None = None) -> Resonance | None:
     """The resonance to watch: of those in the band with little damping the least damped one, or the one nearest to ``near`` Hz."""
+    return _light(fit.intervals, fit.frequency, near)
+
+
+def _light(intervals: tuple[Estimate, ...], band: FloatArray, near: float | None) -> Resonance | None:
     found: list[tuple[float, Resonance]] = []
-    low, high = float(fit.frequency[0]), float(fit.frequency[-1])
-    for item in fit.intervals:
+    low, high = float(band[0]), float(band[-1])
+    values = {item.name: item.value for item in intervals}
+    for item in intervals:
         if item.name.startswith("resonance_") and item.name.endswith(".frequency"):
-            damping = fit.interval(item.name.replace(".frequency", ".damping")).value
+            damping = values[item.name.replace(".frequency", ".damping")]
             if low <= item.value <= high and 0.0 < damping < LIGHT_DAMPING and math.isfinite(item.sigma):
                 distance = damping if near is None else abs(item.value - near)
                 found.append((distance, Resonance(item.value, item.sigma)))

@@ -31,15 +31,13 @@ class Basis:
         """(len(x), order + 1) values of every polynomial at x."""
         return _values(x, self.first, self.recurrence)
 
+    def parts(self, x: ComplexArray) -> FloatArray:
+        """(2, order + 1, len(x)) the same values, real and imaginary parts apart."""
+        return _parts(x, self.first, self.recurrence)
+
     def powers(self) -> FloatArray:
         """(order + 1, order + 1): row k holds the coefficients of p_k, rising powers of x."""
-        order = self.recurrence.shape[1]
-        table = np.zeros((order + 1, order + 1))
-        table[0, 0] = self.first
-        for k in range(order):
-            row = np.roll(table[k], 1) - self.recurrence[: k + 1, k] @ table[: k + 1]
-            table[k + 1] = row / self.recurrence[k + 1, k]
-        return table
+        return _powers(self.first, self.recurrence)
 
     def roots(self, coefficients: FloatArray) -> ComplexArray:
         """Roots of sum_k coefficients[k] p_k, eigenvalues of the comrade matrix."""
@@ -97,4 +95,37 @@ def _values(x: NDArray[np.complex128], first: float, recurrence: NDArray[np.floa
             for j in range(k + 1):
                 value -= recurrence[j, k] * out[i, j]
             out[i, k + 1] = value / recurrence[k + 1, k]
+    return out
+
+
+@compiled
+def _powers(first: float, recurrence: NDArray[np.float64]) -> NDArray[np.float64]:
+    order = recurrence.shape[1]
+    table = np.zeros((order + 1, order + 1))
+    table[0, 0] = first
+    for k in range(order):
+        table[k + 1, 1:] = table[k, :-1]
+        for j in range(k + 1):
+            table[k + 1] -= recurrence[j, k] * table[j]
+        table[k + 1] /= recurrence[k + 1, k]
+    return table
+
+
+@compiled
+def _parts(x: NDArray[np.complex128], first: float, recurrence: NDArray[np.float64]) -> NDArray[np.float64]:
+    order, size = recurrence.shape[1], x.shape[0]
+    out = np.empty((2, order + 1, size))
+    out[0, 0], out[1, 0] = first, 0.0
+    for k in range(order):
+        for i in range(size):
+            real, imag = out[0, k, i], out[1, k, i]
+            out[0, k + 1, i], out[1, k + 1, i] = x[i].real * real - x[i].imag * imag, x[i].real * imag + x[i].imag * real
+        for j in range(k + 1):
+            if recurrence[j, k] != 0.0:
+                for part in range(2):
+                    for i in range(size):
+                        out[part, k + 1, i] -= recurrence[j, k] * out[part, j, i]
+        for part in range(2):
+            for i in range(size):
+                out[part, k + 1, i] /= recurrence[k + 1, k]
     return out

@@ -1,6 +1,7 @@
 """Gauss-Newton and Levenberg-Marquardt on the weighted errors, by orthogonal factors, never by normal equations.
 
-Damping as in nllsfdi: lambda from 0.01, halved on success, times 10 on failure; columns scaled (More, 1978).
+Damping as in nllsfdi: lambda from 0.01, halved on success, times 10 on failure; columns scaled, and the damped step found by
+rotations of the triangular factor (More, "The Levenberg-Marquardt algorithm", 1978).
 """
 
 from __future__ import annotations
@@ -8,109 +9,139 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import lapack
 
-from xy_sysid.fitting.prediction import Model, predict
-from xy_sysid.fitting.problem import Point, Problem, model, moved, rebased
+from xy_sysid.compiled import compiled
+from xy_sysid.fitting.prediction import Model, table
+from xy_sysid.fitting.problem import Point, Problem, model, moved
 from xy_sysid.fitting.structure import FitOptions
-from xy_sysid.frf import ComplexArray
 from xy_sysid.stream import FloatArray
 
 LARGEST_DAMPING = 1e12
 ROUNDING = 1e-26  # a cost below this part of the data's own is zero in double precision
 NEAR_ROUNDING = 1e-20  # below this part, a step that fails is blamed on rounding
+RANK = 1e-13  # a direction whose factor is below this part of the largest is left where it is
 
 
 @dataclass(frozen=True, slots=True)
 class Minimum:
-    """Where a minimisation ended, and why."""
+    """Where a minimisation ended, and why; table: what ``weighted`` gives there."""
 
     point: Point
     cost: float
     iterations: int
     converged: bool
     reason: str
+    table: FloatArray
+
+
+def weighted(task: Problem, at: Point) -> FloatArray:
+    """(p + 1, 2 m), real parts before imaginary ones: rows of weighted derivatives to b, a[:-1] and, if free, the delay; the error."""
+    return _table(task, model(task, at), at)
 
 
 def minimise(task: Problem, start: Point, options: FitOptions) -> Minimum:
-    """The nearest minimum of half the sum of squared weighted errors."""
-    point = rebased(task, start)
-    here = model(task, point)
-    table = _table(task, here, point)
-    value = _half_square(table)
-    floor = ROUNDING * 0.5 * float(np.sum((task.weight * np.abs(task.frf.response)) ** 2))
+    """The nearest minimum of half the sum of squared weighted errors. The start must be in its own bases (``rebased``)."""
+    here = model(task, start)
+    rows, point = _table(task, here, start), start
+    value = _half_square(rows)
+    size = 0.5 * float(np.sum((task.weight * np.abs(task.frf.response)) ** 2))
     damped = options.method == "levenberg_marquardt"
     damping = options.damping if damped else 0.0
     if not np.isfinite(value):
-        return Minimum(point, float("inf"), 0, False, "The start gives no finite prediction.")
-    for iteration in range(1, options.max_iterations + 1):
-        upper, scale = _factor(task, table, point)
+        return Minimum(point, float("inf"), 0, False, "The start gives no finite prediction.", rows)
+    for iteration in range(options.max_iterations + 1):
+        if value <= ROUNDING * size:
+            return Minimum(point, value, iteration, True, "The model reproduces the data to rounding.", rows)
+        upper, scale = _factor(task, rows, point)
+        _, predicted = _step(upper, 0.0)
+        if predicted <= options.relative_change * value:
+            return Minimum(point, value, iteration, True, "No step lowers the cost: a minimum.", rows)
+        if iteration == options.max_iterations:
+            break
         while True:
-            trial = _moved(task, point, _step(upper, scale, damping))
-            trial_table = _table(task, here, trial)
-            trial_value = _half_square(trial_table)
+            trial = _moved(task, point, _step(upper, damping)[0] / scale)
+            trial_rows = _table(task, here, trial)
+            trial_value = _half_square(trial_rows)
             if trial_value < value:
                 break
-            predicted = 0.5 * float(np.sum(upper[:-1, -1] ** 2))
-            if predicted <= options.relative_change * value or value <= floor:
-                return Minimum(point, value, iteration, True, "No step lowers the cost: a minimum.")
             damping = damping * 10.0 if damped else max(damping * 10.0, 1e-6)
-            if damping > LARGEST_DAMPING and value <= floor / ROUNDING * NEAR_ROUNDING:
-                return Minimum(point, value, iteration, True, "The model reproduces the data to rounding.")
             if damping > LARGEST_DAMPING:
-                return Minimum(point, value, iteration, False, "No step lowers the cost, though its slope is not zero.")
+                rounding = value <= NEAR_ROUNDING * size
+                reason = "The model reproduces the data to rounding." if rounding else "No step lowers the cost, though its slope is not zero."
+                return Minimum(point, value, iteration + 1, rounding, reason, rows)
         change = (value - trial_value) / value
-        point, table, value = trial, trial_table, trial_value
+        point, rows, value = trial, trial_rows, trial_value
         damping = damping * 0.5 if damped else 0.0
-        if value <= floor:
-            return Minimum(point, value, iteration, True, "The model reproduces the data to rounding.")
         if change <= options.relative_change:
-            return Minimum(point, value, iteration, True, "The cost changes no more.")
-    return Minimum(point, value, options.max_iterations, False, f"No convergence in {options.max_iterations} iterations.")
-
-
-def weighted_jacobian(task: Problem, at: Point) -> tuple[ComplexArray, ComplexArray]:
-    """(prediction, (m, p) weighted derivatives to b, a[:-1] and, if it is free, the delay)."""
-    out = predict(model(task, at), at.b, at.a, at.delay, True)
-    last = out.shape[1] if task.structure.free_delay else out.shape[1] - 1
-    return out[:, 0], out[:, 1:last] * task.weight[:, None]
+            return Minimum(point, value, iteration + 1, True, "The cost changes no more.", rows)
+    return Minimum(point, value, options.max_iterations, False, f"No convergence in {options.max_iterations} iterations.", rows)
 
 
 def _table(task: Problem, here: Model, at: Point) -> FloatArray:
-    """(2 m, p + 1): weighted derivatives and, last, weighted data minus prediction; real parts over imaginary ones."""
-    out = predict(here, at.b, at.a, at.delay, True)
-    table = np.empty((2 * out.shape[0], out.shape[1] - int(not task.structure.free_delay)))
-    out[:, 0] = task.frf.response - out[:, 0]
-    out *= task.weight[:, None]
-    half, columns = out.shape[0], table.shape[1]
-    table[:half, :-1], table[half:, :-1] = out[:, 1:columns].real, out[:, 1:columns].imag
-    table[:half, -1], table[half:, -1] = out[:, 0].real, out[:, 0].imag
-    return table
+    rows = table(here, at.b, at.a, at.delay, task.weight, task.frf.response)
+    return rows if task.structure.free_delay else np.delete(rows, -2, axis=0)
 
 
-def _half_square(table: FloatArray) -> float:
-    value = 0.5 * float(table[:, -1] @ table[:, -1])
+def _half_square(rows: FloatArray) -> float:
+    value = 0.5 * float(rows[-1] @ rows[-1])
     return value if np.isfinite(value) else float("inf")
 
 
-def _factor(task: Problem, table: FloatArray, at: Point) -> tuple[FloatArray, FloatArray]:
+def triangle(rows: FloatArray) -> FloatArray:
+    """(p + 1, p + 1) upper triangular factor R of the table."""
+    factors = lapack.dgeqrf(rows.T)[0]
+    return np.asarray(np.triu(factors[: rows.shape[0]]))
+
+
+def _factor(task: Problem, rows: FloatArray, at: Point) -> tuple[FloatArray, FloatArray]:
     """(R of the scaled table, scales); a delay at its limit that wants to go further is held."""
-    scale = np.sqrt(np.sum(table[:, :-1] ** 2, axis=0))
+    upper = triangle(rows)
+    scale = np.sqrt(np.sum(upper[:, :-1] ** 2, axis=0))
     scale[~(scale > 0)] = 1.0
-    scaled = table / np.append(scale, 1.0)
-    if task.structure.free_delay:
-        pull = float(scaled[:, -2] @ scaled[:, -1])
+    upper[:, :-1] /= scale
+    if task.structure.free_delay and (at.delay <= 0.0 or at.delay >= task.structure.delay_max):
+        pull = float(upper[:, -2] @ upper[:, -1])
         if (at.delay <= 0.0 and pull < 0) or (at.delay >= task.structure.delay_max and pull > 0):
-            scaled[:, -2] = 0.0
-    return np.asarray(np.linalg.qr(scaled, mode="r")), scale
+            upper[:, -2] = 0.0
+    return upper, scale
 
 
-def _step(upper: FloatArray, scale: FloatArray, damping: float) -> FloatArray:
-    size = scale.size
-    left, right = upper[:size, :size], upper[:size, size]
-    if damping > 0:
-        left = np.concatenate((left, np.sqrt(damping) * np.eye(size)))
-        right = np.concatenate((right, np.zeros(size)))
-    return np.asarray(np.linalg.lstsq(left, right, rcond=1e-13)[0] / scale)
+@compiled
+def _step(upper: NDArray[np.float64], damping: float) -> tuple[NDArray[np.float64], float]:
+    """(step, by how much it lowers the linearised cost): min |R x - q|^2 + damping |x|^2 with (R, q) the table's factor."""
+    size = upper.shape[0] - 1
+    r, q = upper[:size, :size].copy(), upper[:size, size].copy()
+    if damping > 0.0:
+        for i in range(size):
+            row = np.zeros(size)
+            row[i], rest = np.sqrt(damping), 0.0
+            for k in range(i, size):
+                if row[k] == 0.0:
+                    continue
+                length = np.sqrt(r[k, k] * r[k, k] + row[k] * row[k])
+                cosine, sine = r[k, k] / length, row[k] / length
+                for j in range(k, size):
+                    r[k, j], row[j] = cosine * r[k, j] + sine * row[j], cosine * row[j] - sine * r[k, j]
+                q[k], rest = cosine * q[k] + sine * rest, cosine * rest - sine * q[k]
+    largest = 0.0
+    for i in range(size):
+        largest = max(largest, abs(r[i, i]))
+    x = np.zeros(size)
+    for i in range(size - 1, -1, -1):
+        if abs(r[i, i]) > RANK * largest:
+            total = q[i]
+            for j in range(i + 1, size):
+                total -= r[i, j] * x[j]
+            x[i] = total / r[i, i]
+    gain = 0.0
+    for i in range(size):
+        left = upper[i, size]
+        for j in range(i, size):
+            left -= upper[i, j] * x[j]
+        gain += 0.5 * (upper[i, size] ** 2 - left * left)
+    return x, gain
 
 
 def _moved(task: Problem, at: Point, step: FloatArray) -> Point:

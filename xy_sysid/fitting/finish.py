@@ -1,17 +1,13 @@
-"""From a point in the space of models to a Fit: coefficients, poles, zeros, and how sure each of them is.
-
-Covariance: errors of neighbouring lines are correlated (window, overlap), so the sandwich
-(J'J)^-1 J' S J (J'J)^-1 with S the covariance of the weighted errors (Pintelon & Schoukens, System Identification, 2nd ed.,
-9.11). Everything else follows by the delta method.
-"""
+"""From a point in the space of models to a Fit: coefficients, poles, zeros, and how sure each of them is."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from xy_sysid.fitting.damped import weighted_jacobian
+from xy_sysid.fitting.covariance import covariance
+from xy_sysid.fitting.damped import weighted
 from xy_sysid.fitting.intervals import coefficient_estimates, gain_estimate, root_estimates
-from xy_sysid.fitting.problem import Point, Problem, cost
+from xy_sysid.fitting.problem import Point, Problem
 from xy_sysid.fitting.result import Fit
 from xy_sysid.frf import ComplexArray
 from xy_sysid.stream import FloatArray
@@ -20,12 +16,14 @@ from xy_sysid.transfer_function import TransferFunction
 CONSISTENT = 3.0  # standard deviations
 
 
-def finish(task: Problem, at: Point, method: str, iterations: int, converged: bool, reason: str, start: str) -> Fit:
-    """Work out everything that a Fit says."""
+def finish(task: Problem, at: Point, method: str, iterations: int, converged: bool, reason: str, start: str, table: FloatArray | None = None) -> Fit:
+    """Work out everything that a Fit says; table: ``damped.weighted`` at the point, if it is there already."""
     structure, plan, frf = task.structure, task.plan, task.frf
-    predicted, jacobian = weighted_jacobian(task, at)
-    value = cost(task, predicted)
-    inner, expected, deviation = _covariance(task, jacobian)
+    table = weighted(task, at) if table is None else table
+    error = table[-1].reshape(2, -1) / task.weight
+    predicted = frf.response - (error[0] + 1j * error[1])
+    value = 0.5 * float(table[-1] @ table[-1])
+    inner, expected, deviation = covariance(task, table)
     to_numerator, to_denominator = _to_coefficients(task, at)
     numerator = (at.b @ to_numerator)[::-1]
     denominator = np.concatenate(((at.a @ to_denominator)[::-1], np.zeros(structure.integrators)))
@@ -36,14 +34,14 @@ def finish(task: Problem, at: Point, method: str, iterations: int, converged: bo
     tf = TransferFunction(numerator, denominator, at.delay, None if structure.domain == "s" else plan.period, frf.input_unit, frf.output_unit)
     map_all = _parameter_map(task, to_numerator, to_denominator)
     names = _names(task)
-    covariance = map_all @ inner @ map_all.T
-    stacked = np.concatenate((jacobian.real, jacobian.imag)) @ np.linalg.inv(map_all)
+    reported = map_all @ inner @ map_all.T
+    jacobian: FloatArray = np.asarray(table[:-1].T @ np.linalg.inv(map_all), dtype=np.float64)
     poles = at.denominator.roots(at.a)
     zeros = at.numerator.roots(at.b)
     rest = np.full(structure.integrators, 0.0 if structure.domain == "s" else 1.0)
     relative = float(np.sqrt(np.mean(np.abs((frf.response - predicted) / frf.response) ** 2)))
     values = np.concatenate((tf.numerator, (at.a @ to_denominator)[:-1][::-1], [at.delay] if structure.free_delay else []))
-    coefficients = coefficient_estimates(names, values, covariance)
+    coefficients = coefficient_estimates(names, values, reported)
     gain = gain_estimate(task, at, inner)
     warnings: list[str] = []
     if not np.isfinite(expected):
@@ -72,8 +70,8 @@ def finish(task: Problem, at: Point, method: str, iterations: int, converged: bo
         consistent=consistent,
         relative_error=relative,
         parameters=names,
-        covariance=covariance,
-        jacobian=stacked,
+        covariance=reported,
+        jacobian=jacobian,
         poles=np.concatenate((_ordered(poles) * plan.scale, rest)),
         zeros=_ordered(zeros) * plan.scale,
         intervals=(
@@ -120,42 +118,3 @@ def _names(task: Problem) -> tuple[str, ...]:
     top = [f"numerator_{k}" for k in range(structure.numerator_order, -1, -1)]
     bottom = [f"denominator_{k + shift}" for k in range(structure.free_order - 1, -1, -1)]
     return tuple(top + bottom + (["delay"] if structure.free_delay else []))
-
-
-def _covariance(task: Problem, jacobian: ComplexArray) -> tuple[FloatArray, float, float]:
-    """((p, p) covariance of b, a, delay, expected cost, its standard deviation); NaN without sigma."""
-    size = jacobian.shape[1]
-    if task.sigma is None:
-        return np.full((size, size), np.nan), float("nan"), float("nan")
-    scale = np.sqrt(np.sum(np.abs(jacobian) ** 2, axis=0))
-    scale[~(scale > 0)] = 1.0
-    unit = jacobian / scale
-    stacked = np.concatenate((unit.real, unit.imag))
-    _, values, right = np.linalg.svd(stacked, full_matrices=False)
-    keep = values > 1e-13 * values[0]
-    bread = (right[keep].T / values[keep] ** 2) @ right[keep]
-    error = task.weight * task.sigma
-    meat = 0.5 * np.real(unit.conj().T @ _correlated(task, unit * error[:, None], error))
-    expected = 0.5 * (float(np.sum(error**2)) - float(np.trace(bread @ meat)))
-    squares = task.frf.line_correlation[1:] ** 2
-    spread = float(np.sum(error**4)) * (1.0 + 2.0 * float(np.sum(squares)))
-    freedom = 2.0 * (task.frf.averages - 1.0)
-    if task.structure.weighting == "sigma" and freedom > 4.5:  # sigma is itself estimated: |error|^2 / sigma^2 is F(2, freedom)
-        expected *= freedom / (freedom - 2.0)
-        spread *= freedom**3 / ((freedom - 2.0) ** 2 * (freedom - 4.0))
-    return (bread @ meat @ bread) / np.outer(scale, scale), expected, 0.5 * float(np.sqrt(spread))
-
-
-def _correlated(task: Problem, scaled: ComplexArray, error: FloatArray) -> ComplexArray:
-    """Covariance of the weighted errors times a matrix whose rows are already multiplied by the errors' size."""
-    frf = task.frf
-    place = np.rint(frf.frequency / frf.resolution).astype(np.int64) if frf.resolution > 0 else np.arange(len(frf))
-    place = place - place[0]
-    full = np.zeros((int(place[-1]) + 1, scaled.shape[1]), dtype=np.complex128)
-    full[place] = scaled
-    total = full * frf.line_correlation[0]
-    for k, value in enumerate(frf.line_correlation[1:], start=1):
-        if k < full.shape[0] and value != 0.0:
-            total[k:] += value * full[:-k]
-            total[:-k] += value * full[k:]
-    return np.asarray(total[place] * error[:, None])

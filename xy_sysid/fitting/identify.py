@@ -13,6 +13,12 @@ from xy_sysid.frf import FrequencyResponse
 from xy_sysid.transfer_function import TransferFunction
 
 DEFAULTS = FitOptions()
+WARM_DAMPING = 1e-6  # part of the usual damping that a warm start begins with: it is near, so that Gauss-Newton steps are right
+
+
+def warm(options: FitOptions) -> FitOptions:
+    """The same for a start that is close to the minimum."""
+    return replace(options, damping=options.damping * WARM_DAMPING)
 
 
 def identify(
@@ -25,14 +31,14 @@ def identify(
     Raises BadInput for too few trusted lines. A fit that fails is a result with ``converged`` False and a reason.
     """
     task = problem(frf, structure)
-    warm = None
+    last = None
     point = from_transfer_function(task, start) if start is not None else None
     if point is not None:
-        warm = finished(task, minimise(task, point, options), "ml" if structure.weighting == "sigma" else "nlls", "the last model")
-        if warm.converged and (warm.consistent or not doubt):
-            return warm
+        last = finished(task, minimise(task, point, warm(options)), "ml" if structure.weighting == "sigma" else "nlls", "the last model")
+        if last.converged and (last.consistent or not doubt):
+            return last
     minimum = cold(task, replace(options, refine_delay=False))
-    if warm is not None and warm.cost <= minimum.cost * (1 + 1e-9):
-        return warm
+    if last is not None and last.cost <= minimum.cost * (1 + 1e-9):
+        return last
     name = "ml" if structure.weighting == "sigma" else "nlls"
     return finished(task, minimum, name, "iterative weighted least squares at the best delays of a scan")

@@ -9,7 +9,7 @@ import numpy as np
 from xy_sysid.fitting.damped import Minimum, minimise
 from xy_sysid.fitting.finish import finish
 from xy_sysid.fitting.linear import linear_step, reweighted, scan
-from xy_sysid.fitting.problem import Point, Problem, from_transfer_function, in_bases, problem, rational
+from xy_sysid.fitting.problem import Point, Problem, from_transfer_function, in_bases, problem, rational, rebased
 from xy_sysid.fitting.result import Fit
 from xy_sysid.fitting.structure import FitOptions, Structure
 from xy_sysid.frf import FrequencyResponse
@@ -55,8 +55,8 @@ def cold(task: Problem, options: FitOptions) -> Minimum:
 
 
 def _followed(task: Problem, delay: float, start: Point, options: FitOptions) -> Minimum:
-    point, value, _ = reweighted(task, delay, options.reweightings, start)
-    return minimise(task, point, options) if np.isfinite(value) else Minimum(point, value, 0, False, "No finite start.")
+    point, _, _ = reweighted(task, delay, options.reweightings, start)
+    return minimise(task, rebased(task, point), options)
 
 
 def _grown(task: Problem, options: FitOptions) -> Minimum:
@@ -74,5 +74,4 @@ def _grown(task: Problem, options: FitOptions) -> Minimum:
 
 def finished(task: Problem, found: Minimum, name: str, start: str) -> Fit:
     """A minimum as a result."""
-    point: Point = found.point
-    return finish(task, point, name, found.iterations, found.converged, found.reason, start)
+    return finish(task, found.point, name, found.iterations, found.converged, found.reason, start, found.table)

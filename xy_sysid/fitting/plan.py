@@ -17,6 +17,8 @@ from xy_sysid.frf import ComplexArray, FrequencyResponse
 from xy_sysid.hold import ALIASES, TAIL_POINTS, interpolation, nodes_for
 from xy_sysid.stream import FloatArray
 
+NO_WEIGHT = 1e-15  # weights of the window below this share of the largest are rounding
+
 
 @dataclass(frozen=True, slots=True)
 class Plan:
@@ -31,13 +33,14 @@ class Plan:
     omega:       (g,) rad/s
     main:        (g,) factor of N / D exp(-j w delay) at the grid
     fold:        (g,) factor of the sum of aliases at the grid
-    index:       (m, j) rows of the grid that a line needs; conjugate: (m, j) True where the kernel reaches below 0 Hz
-    kernel:      (m, j) complex weights, the division by the difference's response included
-    alias:       (nodes * 2 ALIASES,) scaled s of the aliases, grouped by node
+    index:       (j, m) rows of the grid that a line needs (the window reaches below 0 Hz near it)
+    kernel:      (j,) weights of the window
+    after:       (m,) factor of the blurred response: the division by the difference's response
+    alias:       (nodes * 2 ALIASES,) scaled s of the aliases, grouped by node; alias_omega: rad/s
     alias_factor: (same,) 1 / (s sigma^integrators)
     alias_number: (2 ALIASES,) k
-    spread:      (g, nodes) interpolates from nodes to grid
-    tail:        (nodes, points) interpolates the tail from TAIL_POINTS to nodes
+    spread:      (nodes, g) interpolates from nodes to grid
+    tail:        (points, nodes) interpolates the tail from TAIL_POINTS to nodes
     """
 
     scale: float
@@ -50,9 +53,10 @@ class Plan:
     main: ComplexArray
     fold: ComplexArray
     index: NDArray[np.int64]
-    conjugate: NDArray[np.bool_]
-    kernel: ComplexArray
+    kernel: FloatArray
+    after: ComplexArray
     alias: ComplexArray
+    alias_omega: FloatArray
     alias_factor: ComplexArray
     alias_number: FloatArray
     spread: FloatArray
@@ -87,17 +91,20 @@ def _plan(
     domain: str,
 ) -> Plan:
     frequency, offset, weight = (np.frombuffer(b, dtype=np.float64) for b in (frequency_bytes, offset_bytes, weight_bytes))
+    seen = np.abs(weight) > NO_WEIGHT * np.max(np.abs(weight))
+    offset, weight = offset[seen], weight[seen]
     if not bool(np.all(frequency > 0)):
         raise BadInput("lowest frequency", f"{np.min(frequency):g} Hz", "> 0 Hz", "Leave out the line at 0 Hz.")
     period, held = 1.0 / rate, hold == "zoh"
     scale = float(np.median(2 * np.pi * frequency)) if domain == "s" else 1.0
     wanted = frequency[:, None] + offset[None, :]
     step = max(resolution, 1e-6 * float(np.max(frequency))) * 1e-5
-    _, first, inverse = np.unique(np.rint(np.abs(wanted) / step).astype(np.int64), return_index=True, return_inverse=True)
-    grid_frequency = np.abs(wanted).ravel()[first]
+    _, first, inverse = np.unique(np.rint(wanted / step).astype(np.int64), return_index=True, return_inverse=True)
+    grid_frequency = wanted.ravel()[first]
+    grid_frequency[np.abs(grid_frequency) < step] = 0.0
     omega, line_omega = 2 * np.pi * grid_frequency, 2 * np.pi * frequency
     main, fold = _factors(omega, period, scale, integrators, differenced, held, domain)
-    post = 1.0 / np.expm1(1j * line_omega * period) if differenced else np.ones(frequency.size, dtype=np.complex128)
+    after = 1.0 / np.expm1(1j * line_omega * period) if differenced else np.ones(frequency.size, dtype=np.complex128)
     line_main, _ = _factors(line_omega, period, scale, integrators, False, held, domain)
     nodes = nodes_for(float(np.max(grid_frequency)) * period)
     k = np.concatenate((np.arange(-ALIASES, 0), np.arange(1, ALIASES + 1))).astype(np.float64)
@@ -115,14 +122,15 @@ def _plan(
         omega=omega,
         main=main,
         fold=fold,
-        index=np.ascontiguousarray(inverse.reshape(wanted.shape)).astype(np.int64),
-        conjugate=wanted < 0,
-        kernel=weight[None, :] * post[:, None],
+        index=np.ascontiguousarray(inverse.reshape(wanted.shape).T).astype(np.int64),
+        kernel=np.ascontiguousarray(weight),
+        after=after,
         alias=np.asarray(s / scale, dtype=np.complex128),
+        alias_omega=np.ascontiguousarray(s.imag),
         alias_factor=alias_factor,
         alias_number=k,
-        spread=interpolation(nodes, grid_frequency * period) if held else np.zeros((omega.size, 0)),
-        tail=interpolation(TAIL_POINTS, nodes) if held else np.zeros((0, TAIL_POINTS.size)),
+        spread=np.ascontiguousarray(interpolation(nodes, grid_frequency * period).T) if held else np.zeros((0, omega.size)),
+        tail=np.ascontiguousarray(interpolation(TAIL_POINTS, nodes).T) if held else np.zeros((TAIL_POINTS.size, 0)),
     )
 
 

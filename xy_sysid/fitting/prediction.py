@@ -25,17 +25,18 @@ TAIL_REACH = 0.5  # the series in 1 / s is used while every pole is within this 
 class Model:
     """A plan with a basis: what is needed to evaluate parameters on it.
 
-    numerator, denominator: the bases; *_grid, *_line, *_alias: their values; *_top: (order + 1, SERIES) their highest powers
+    numerator, denominator: the bases; *_top: (order + 1, SERIES) their highest powers
+    *_grid, *_alias: (2, order + 1, points) real and imaginary parts of their values
     """
 
     plan: Plan
     integrators: int
     numerator: Basis
     denominator: Basis
-    numerator_grid: ComplexArray
-    denominator_grid: ComplexArray
-    numerator_alias: ComplexArray
-    denominator_alias: ComplexArray
+    numerator_grid: FloatArray
+    denominator_grid: FloatArray
+    numerator_alias: FloatArray
+    denominator_alias: FloatArray
     numerator_top: FloatArray
     denominator_top: FloatArray
 
@@ -47,10 +48,10 @@ def model_for(plan: Plan, integrators: int, numerator: Basis, denominator: Basis
         integrators,
         numerator,
         denominator,
-        numerator.values(plan.grid),
-        denominator.values(plan.grid),
-        numerator.values(plan.alias),
-        denominator.values(plan.alias),
+        numerator.parts(plan.grid),
+        denominator.parts(plan.grid),
+        numerator.parts(plan.alias),
+        denominator.parts(plan.alias),
         _top(numerator),
         _top(denominator),
     )
@@ -65,48 +66,86 @@ def _top(part: Basis) -> FloatArray:
     return out
 
 
-def predict(model: Model, b: FloatArray, a: FloatArray, delay: float, jacobian: bool) -> ComplexArray:
-    """(lines, 1) predicted response, or (lines, 1 + (m + 1) + n + 1) with the derivatives to b, a[:-1] and the delay."""
+def predict(model: Model, b: FloatArray, a: FloatArray, delay: float) -> ComplexArray:
+    """(lines,) predicted response."""
+    parts = _lines(model, b, a, delay, False)
+    return np.asarray(parts[0, 0] + 1j * parts[0, 1])
+
+
+def table(model: Model, b: FloatArray, a: FloatArray, delay: float, weight: FloatArray, measured: ComplexArray) -> FloatArray:
+    """(p + 1, 2 lines), real parts before imaginary ones: rows of weighted derivatives to b, a[:-1] and the delay; weighted error.
+
+    The error, in the last row, is measured - predicted.
+    """
+    return _table(_lines(model, b, a, delay, True), weight, measured)
+
+
+def _lines(model: Model, b: FloatArray, a: FloatArray, delay: float, jacobian: bool) -> FloatArray:
+    """(1, or 1 + parameters, 2, lines): prediction, then its derivatives to b, a[:-1] and the delay; real and imaginary parts."""
     plan = model.plan
     return _predict(
         b, a, delay, jacobian, model.integrators, plan.scale, plan.period, plan.omega, plan.main, plan.fold,
-        plan.index, plan.conjugate, plan.kernel, plan.alias, plan.alias_factor, plan.alias_number, plan.spread, plan.tail,
+        plan.index, plan.kernel, plan.after, plan.alias_omega, plan.alias_factor, plan.alias_number, plan.spread, plan.tail,
         model.numerator_grid, model.denominator_grid, model.numerator_alias, model.denominator_alias,
         model.numerator_top, model.denominator_top,
     )  # fmt: skip
 
 
 @compiled
-def _row(
-    out: NDArray[np.complex128], n_values: NDArray[np.complex128], d_values: NDArray[np.complex128], b: NDArray[np.float64],
-    a: NDArray[np.float64], factor: complex, s: complex, jacobian: bool,
+def _fractions(
+    out: NDArray[np.float64], n_values: NDArray[np.float64], d_values: NDArray[np.float64], b: NDArray[np.float64],
+    a: NDArray[np.float64], factor: NDArray[np.float64], omega: NDArray[np.float64],
 ) -> None:  # fmt: skip
-    """Add factor * (N / D and its derivatives; to the delay with this s) to a row."""
-    top, bottom = 0.0 + 0.0j, 0.0 + 0.0j
-    for i in range(b.shape[0]):
-        top += b[i] * n_values[i]
-    for i in range(a.shape[0]):
-        bottom += a[i] * d_values[i]
-    if bottom == 0.0:
-        bottom = 1e-300 + 0.0j
-    inverse = factor / bottom
-    value = top * inverse
-    out[0] += value
-    if jacobian:
+    """Add factor * (N / D, its derivatives to b, a[:-1] and, with s = j omega, the delay) at each point.
+
+    out: (width, 2, points), values: (2, order + 1, points), factor: (2, points). Loops over points inside, for vector units.
+    """
+    size = omega.shape[0]
+    top, bottom, work = np.zeros((2, size)), np.zeros((2, size)), np.empty((6, size))
+    for part in range(2):
         for i in range(b.shape[0]):
-            out[1 + i] += n_values[i] * inverse
-        ratio = -value / bottom
-        for i in range(a.shape[0] - 1):
-            out[1 + b.shape[0] + i] += d_values[i] * ratio
-        out[b.shape[0] + a.shape[0]] -= s * value
+            for g in range(size):
+                top[part, g] += b[i] * n_values[part, i, g]
+        for i in range(a.shape[0]):
+            for g in range(size):
+                bottom[part, g] += a[i] * d_values[part, i, g]
+    for g in range(size):
+        square = max(bottom[0, g] * bottom[0, g] + bottom[1, g] * bottom[1, g], 1e-300)
+        up, down = bottom[0, g] / square, -bottom[1, g] / square  # 1 / D
+        real = factor[0, g] * up - factor[1, g] * down
+        imag = factor[0, g] * down + factor[1, g] * up
+        work[0, g], work[1, g] = real, imag
+        value_real = top[0, g] * real - top[1, g] * imag
+        value_imag = top[0, g] * imag + top[1, g] * real
+        work[2, g], work[3, g] = value_real, value_imag
+        work[4, g] = -(value_real * up - value_imag * down)
+        work[5, g] = -(value_real * down + value_imag * up)
+    for g in range(size):
+        out[0, 0, g] += work[2, g]
+        out[0, 1, g] += work[3, g]
+    if out.shape[0] == 1:
+        return
+    last = b.shape[0] + a.shape[0]
+    for i in range(b.shape[0]):
+        for g in range(size):
+            out[1 + i, 0, g] += n_values[0, i, g] * work[0, g] - n_values[1, i, g] * work[1, g]
+            out[1 + i, 1, g] += n_values[0, i, g] * work[1, g] + n_values[1, i, g] * work[0, g]
+    for i in range(a.shape[0] - 1):
+        c = 1 + b.shape[0] + i
+        for g in range(size):
+            out[c, 0, g] += d_values[0, i, g] * work[4, g] - d_values[1, i, g] * work[5, g]
+            out[c, 1, g] += d_values[0, i, g] * work[5, g] + d_values[1, i, g] * work[4, g]
+    for g in range(size):
+        out[last, 0, g] += omega[g] * work[3, g]
+        out[last, 1, g] -= omega[g] * work[2, g]
 
 
 @compiled
 def _tail(
-    out: NDArray[np.complex128], sums: NDArray[np.complex128], n_top: NDArray[np.float64], d_top: NDArray[np.float64],
+    out: NDArray[np.float64], sums: NDArray[np.complex128], n_top: NDArray[np.float64], d_top: NDArray[np.float64],
     b: NDArray[np.float64], a: NDArray[np.float64], scale: float, period: float, lowest: int, reach: float, jacobian: bool,
 ) -> None:  # fmt: skip
-    """Add the aliases beyond the last, from the series of N / D in 1 / s; out: (points, width), sums: (points, SERIES + 1)."""
+    """Add the aliases beyond the last, from the series of N / D in 1 / s; out: (width, 2, points), sums: (points, SERIES + 1)."""
     size = n_top.shape[1]
     up, down = np.zeros(size), np.zeros(size)
     for i in range(b.shape[0]):  # a polynomial of lower order starts lower in the series
@@ -136,65 +175,99 @@ def _tail(
     weight = np.zeros(size)
     for j in range(size):
         weight[j] = (scale * period) ** (lowest + j) / scale
-    for p in range(out.shape[0]):
+    series = np.zeros((out.shape[0], size))  # of each column, in falling powers of s
+    series[0] = ratio
+    if jacobian:
         for j in range(size):
-            out[p, 0] += ratio[j] * weight[j] * sums[p, j + 1]
-        if jacobian:
-            for i in range(b.shape[0]):
-                for j in range(size):
-                    for r in range(j + 1):
-                        out[p, 1 + i] += n_top[i, r] * inverse[j - r] * weight[j] * sums[p, j + 1]
-            for i in range(a.shape[0] - 1):
-                for j in range(size):
-                    for r in range(j + 1):
-                        out[p, 1 + b.shape[0] + i] += d_top[i, r] * square[j - r] * weight[j] * sums[p, j + 1]
-            for j in range(size):
-                out[p, b.shape[0] + a.shape[0]] -= ratio[j] * weight[j] * sums[p, j] / period
+            for r in range(j + 1):
+                for i in range(b.shape[0]):
+                    series[1 + i, j] += n_top[i, r] * inverse[j - r]
+                for i in range(a.shape[0] - 1):
+                    series[1 + b.shape[0] + i, j] += d_top[i, r] * square[j - r]
+    for p in range(out.shape[2]):
+        for j in range(size):
+            for c in range(out.shape[0]):
+                term = series[c, j] * weight[j] * sums[p, j + 1]
+                out[c, 0, p] += term.real
+                out[c, 1, p] += term.imag
+            if jacobian:
+                slope = ratio[j] * weight[j] * sums[p, j] / period
+                out[b.shape[0] + a.shape[0], 0, p] -= slope.real
+                out[b.shape[0] + a.shape[0], 1, p] -= slope.imag
 
 
 @compiled
 def _predict(
     b: NDArray[np.float64], a: NDArray[np.float64], delay: float, jacobian: bool, integrators: int, scale: float, period: float,
     omega: NDArray[np.float64], main: NDArray[np.complex128], fold: NDArray[np.complex128],
-    index: NDArray[np.int64], conjugate: NDArray[np.bool_], kernel: NDArray[np.complex128],
-    alias: NDArray[np.complex128], alias_factor: NDArray[np.complex128], alias_number: NDArray[np.float64],
+    index: NDArray[np.int64], kernel: NDArray[np.float64], after: NDArray[np.complex128],
+    alias_omega: NDArray[np.float64], alias_factor: NDArray[np.complex128], alias_number: NDArray[np.float64],
     spread: NDArray[np.float64], tail: NDArray[np.float64],
-    n_grid: NDArray[np.complex128], d_grid: NDArray[np.complex128], n_alias: NDArray[np.complex128], d_alias: NDArray[np.complex128],
+    n_grid: NDArray[np.float64], d_grid: NDArray[np.float64], n_alias: NDArray[np.float64], d_alias: NDArray[np.float64],
     n_top: NDArray[np.float64], d_top: NDArray[np.float64],
-) -> NDArray[np.complex128]:  # fmt: skip
+) -> NDArray[np.float64]:  # fmt: skip
     width = 1 + b.shape[0] + a.shape[0] if jacobian else 1
-    size, nodes, numbers = omega.shape[0], spread.shape[1], alias_number.shape[0]
-    rows = np.zeros((size, width), dtype=np.complex128)
+    size, nodes, numbers, lines = omega.shape[0], spread.shape[0], alias_number.shape[0], index.shape[1]
+    turn = np.empty(size, dtype=np.complex128)
+    for g in range(size):
+        turn[g] = complex(np.cos(omega[g] * delay), -np.sin(omega[g] * delay))
+    rows = np.zeros((width, 2, size))
+    factor = np.empty((2, size))
     if nodes > 0:
-        at_nodes = np.zeros((nodes, width), dtype=np.complex128)
+        terms, at_nodes = np.zeros((width, 2, alias_omega.shape[0])), np.zeros((2 * width, nodes))
         phase = np.exp(-2j * np.pi * alias_number * (delay / period))
+        alias_parts = np.empty((2, alias_omega.shape[0]))
         for n in range(nodes):
             for k in range(numbers):
-                i = n * numbers + k
-                _row(at_nodes[n], n_alias[i], d_alias[i], b, a, phase[k] * alias_factor[i], alias[i] * scale, jacobian)
+                value = phase[k] * alias_factor[n * numbers + k]
+                alias_parts[0, n * numbers + k], alias_parts[1, n * numbers + k] = value.real, value.imag
+        _fractions(terms, n_alias, d_alias, b, a, alias_parts, alias_omega)
         lowest = a.shape[0] - b.shape[0] + integrators + 1
         sums = tail_sums(TAIL_POINTS, delay / period, ALIASES, lowest - 1, SERIES + 1)
-        beyond = np.zeros((TAIL_POINTS.shape[0], width), dtype=np.complex128)
+        beyond = np.zeros((width, 2, TAIL_POINTS.shape[0]))
         reach = TAIL_REACH * ALIASES * 2.0 * np.pi / (period * scale)
         _tail(beyond, sums, n_top, d_top, b, a, scale, period, lowest, reach, jacobian)
-        at_nodes += (np.dot(tail, beyond.view(np.float64))).view(np.complex128)
-        rows = (np.dot(spread, at_nodes.view(np.float64))).view(np.complex128)
-        for g in range(size):
-            for c in range(width):
-                rows[g, c] *= fold[g]
-    for g in range(size):
-        _row(rows[g], n_grid[g], d_grid[g], b, a, main[g], 1j * omega[g], jacobian)
-        turn = np.exp(-1j * omega[g] * delay)
+        at_nodes += np.dot(beyond.reshape(2 * width, TAIL_POINTS.shape[0]), tail)
         for c in range(width):
-            rows[g, c] *= turn
-    out = np.zeros((index.shape[0], width), dtype=np.complex128)
-    for i in range(index.shape[0]):
-        for j in range(index.shape[1]):
-            row = rows[index[i, j]]
-            if conjugate[i, j]:
-                for c in range(width):
-                    out[i, c] += kernel[i, j] * row[c].conjugate()
-            else:
-                for c in range(width):
-                    out[i, c] += kernel[i, j] * row[c]
+            for part in range(2):
+                for n in range(nodes):
+                    for k in range(numbers):
+                        at_nodes[2 * c + part, n] += terms[c, part, n * numbers + k]
+        rows = np.dot(at_nodes, spread).reshape(width, 2, size)
+        for g in range(size):
+            value = fold[g] * turn[g]
+            factor[0, g], factor[1, g] = value.real, value.imag
+        for c in range(width):
+            for g in range(size):
+                real, imag = rows[c, 0, g], rows[c, 1, g]
+                rows[c, 0, g] = real * factor[0, g] - imag * factor[1, g]
+                rows[c, 1, g] = real * factor[1, g] + imag * factor[0, g]
+    for g in range(size):
+        value = main[g] * turn[g]
+        factor[0, g], factor[1, g] = value.real, value.imag
+    _fractions(rows, n_grid, d_grid, b, a, factor, omega)
+    out = np.zeros((width, 2, lines))
+    for c in range(width):
+        for part in range(2):
+            for j in range(kernel.shape[0]):
+                weight = kernel[j]
+                for i in range(lines):
+                    out[c, part, i] += weight * rows[c, part, index[j, i]]
+        for i in range(lines):
+            real, imag = out[c, 0, i], out[c, 1, i]
+            out[c, 0, i] = real * after[i].real - imag * after[i].imag
+            out[c, 1, i] = real * after[i].imag + imag * after[i].real
+    return out
+
+
+@compiled
+def _table(lines: NDArray[np.float64], weight: NDArray[np.float64], measured: NDArray[np.complex128]) -> NDArray[np.float64]:
+    last, size = lines.shape[0] - 1, lines.shape[2]
+    out = np.empty((last + 1, 2 * size))
+    for c in range(last):
+        for i in range(size):
+            out[c, i], out[c, size + i] = lines[1 + c, 0, i] * weight[i], lines[1 + c, 1, i] * weight[i]
+    for i in range(size):
+        out[last, i] = (measured[i].real - lines[0, 0, i]) * weight[i]
+        out[last, size + i] = (measured[i].imag - lines[0, 1, i]) * weight[i]
     return out

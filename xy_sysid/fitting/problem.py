@@ -76,7 +76,7 @@ def model(task: Problem, at: Point) -> Model:
 
 def response(task: Problem, at: Point) -> ComplexArray:
     """(m,) prediction on the lines."""
-    return predict(model(task, at), at.b, at.a, at.delay, False)[:, 0]
+    return predict(model(task, at), at.b, at.a, at.delay)
 
 
 def cost(task: Problem, predicted: ComplexArray) -> float:
@@ -101,26 +101,27 @@ def rebased(task: Problem, at: Point) -> Point:
 def in_bases(task: Problem, n_values: ComplexArray, d_values: ComplexArray, delay: float, factor: FloatArray) -> Point:
     """The model with these values of N and D on the lines; factor weighs N in a line's error."""
     structure, line = task.structure, task.plan.line
-    numerator = basis(line, factor, structure.numerator_order)
     own = factor * np.abs(n_values / d_values)
-    denominator = basis(line, np.maximum(own, 1e-9 * float(np.max(own))), structure.free_order)
-    b = _project(numerator.values(line), n_values, factor)
-    a = _project(denominator.values(line), d_values, factor)
+    own = np.maximum(own, 1e-9 * float(np.max(own)))
+    numerator, denominator = basis(line, factor, structure.numerator_order), basis(line, own, structure.free_order)
+    b, a = _project(numerator.values(line), n_values, factor), _project(denominator.values(line), d_values, own)
     if a[-1] == 0.0:
         a[-1] = 1e-300
     return Point(numerator, denominator, b / a[-1], a / a[-1], delay)
 
 
 def _project(values: ComplexArray, target: ComplexArray, weight: FloatArray) -> FloatArray:
-    left, right = values * weight[:, None], target * weight
-    solution = np.linalg.lstsq(np.concatenate((left.real, left.imag)), np.concatenate((right.real, right.imag)), rcond=None)[0]
-    return np.asarray(solution, dtype=np.float64)
+    """Coefficients of a polynomial in a basis that is orthonormal under the weight, and once more of what was left by rounding."""
+    rows = np.ascontiguousarray((values * weight[:, None]).T)
+    goal = target * weight
+    first: FloatArray = np.asarray((rows.conj() @ goal).real)
+    return np.asarray(first + (rows.conj() @ (goal - first @ rows)).real)
 
 
 def from_transfer_function(task: Problem, tf: TransferFunction) -> Point | None:
     """The point of a given model, or None if it is not of the structure (other domain, orders or integrators)."""
     structure = task.structure
-    numerator, denominator = np.trim_zeros(tf.numerator, "f"), np.trim_zeros(tf.denominator, "f")
+    numerator, denominator = tf.numerator[np.argmax(tf.numerator != 0) :], tf.denominator[np.argmax(tf.denominator != 0) :]
     if (tf.sampling_time is None) != (structure.domain == "s") or not numerator.size or numerator.size > structure.numerator_order + 1:
         return None
     if denominator.size != structure.denominator_order + 1:

@@ -1,0 +1,30 @@
+"""Where the poles are, and nothing else: the short way for a response that is fitted only to watch a resonance."""
+
+from __future__ import annotations
+
+from xy_sysid.fitting.covariance import covariance
+from xy_sysid.fitting.damped import minimise
+from xy_sysid.fitting.identify import warm
+from xy_sysid.fitting.intervals import root_estimates
+from xy_sysid.fitting.problem import from_transfer_function, problem
+from xy_sysid.fitting.result import Estimate
+from xy_sysid.fitting.structure import FitOptions, Structure
+from xy_sysid.frf import FrequencyResponse
+from xy_sysid.transfer_function import TransferFunction
+
+DEFAULTS = FitOptions()
+
+
+def pole_estimates(frf: FrequencyResponse, structure: Structure, start: TransferFunction, options: FitOptions = DEFAULTS) -> tuple[Estimate, ...]:
+    """Poles and resonances with intervals, as ``identify`` gives them from this start; empty if it leads nowhere.
+
+    Raises BadInput for too few trusted lines.
+    """
+    task = problem(frf, structure)
+    point = from_transfer_function(task, start)
+    found = minimise(task, point, warm(options)) if point is not None else None
+    if found is None or not found.converged:
+        return ()
+    inner, _, _ = covariance(task, found.table)
+    at = found.point
+    return tuple(root_estimates(task, at.denominator.roots(at.a), at.denominator, at.a, inner, at.b.size, "pole"))
