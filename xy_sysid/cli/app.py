@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import typer
 
+from xy_sysid.cli.compare import compare
 from xy_sysid.cli.demo import demo
 from xy_sysid.cli.fit import fit
 from xy_sysid.cli.frf import frf
@@ -17,11 +18,10 @@ from xy_sysid.cli.validate import validate
 app = typer.Typer(
     name="xy-sysid",
     help="Identify the axes of a machine: frequency response, transfer function with delay, and how far both can be trusted.",
-    no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (demo, run, record, replay, simulate, frf, fit, validate, study):
+for command in (demo, run, record, replay, simulate, frf, fit, validate, compare, study):
     app.command(name=command.__name__)(command)
