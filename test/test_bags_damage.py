@@ -157,7 +157,7 @@ def test_a_foreign_bag_says_what_it_has(tmp_path: Path, storage: str) -> None:
     """A bag without such topics: the ones it has are named, and the options that choose others."""
     bag = a_bag(tmp_path / "bag", [("/gantry/drive", both([0])[0][1])], storage=storage)
     text = error_of(bag)
-    assert "/gantry/drive (Float64MultiArray)" in text and "--voltage-topic" in text
+    assert "/gantry/drive (Float64MultiArray)" in text and "--topic voltage=" in text
 
 
 def test_what_is_no_bag_is_one_line(tmp_path: Path) -> None:
@@ -193,7 +193,7 @@ def test_a_bag_that_does_not_fit_in_memory_is_one_line(tmp_path: Path, monkeypat
     bag = a_bag(tmp_path / "bag", both(range(0, 200_000, 200), 200))
     monkeypatch.setattr("xy_sysid.imports.bag.SHARE", 2e-4)
     monkeypatch.setattr("os.sysconf", lambda name: {"SC_PHYS_PAGES": 5_000_000, "SC_PAGE_SIZE": 4096}[name])
-    assert "--start and --stop" in error_of(bag)
+    assert "--span" in error_of(bag)
     part = load(bag, start=90.0, stop=91.5)
     assert part.time[0] == 90.0 and len(part) == 3000
     with pytest.raises(BadInput, match=r"within the recording|within 0 to"):

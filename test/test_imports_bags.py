@@ -283,6 +283,6 @@ def test_several_joint_topics_need_a_choice(tmp_path: Path) -> None:
         for i in range(1, 100):
             for arm in ("left", "right"):
                 writer.write_raw(f"/{arm}/joint_states", JOINT_TYPE, joint_state(i * 500_000, np.ones(2), np.ones(2) * (arm == "left") + 1), i)
-    with pytest.raises(BadRecording, match=r"/left/joint_states, /right/joint_states.*--joint-topic"):
+    with pytest.raises(BadRecording, match=r"/left/joint_states, /right/joint_states.*--topic joints="):
         load(tmp_path / "bag")
     assert load(tmp_path / "bag", joint_topic="/right/joint_states").voltage[0, 0] == 1.0

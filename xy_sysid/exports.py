@@ -13,6 +13,7 @@ from xy_sysid.fitting.result import Fit
 from xy_sysid.transfer_function import TransferFunction
 
 FORMAT = "xy_sysid model 1"
+LONGEST_DELAY = 1e3  # s; no axis answers later
 
 
 def model_document(fits: dict[str, Fit], provenance: dict[str, Any]) -> dict[str, Any]:
@@ -62,31 +63,53 @@ _Quoting.add_representer(str, _string)
 
 def read_model(path: Path) -> dict[str, TransferFunction]:
     """The transfer functions of a model file, by axis; raises BadRecording in one line if it is not one."""
+    document = _document(path)
+    return {str(axis): _transfer_function(path, str(axis), part) for axis, part in document["axes"].items()}
+
+
+def fitted_to(path: Path) -> str:
+    """SHA-256 of the samples that the models of a file were fitted to, empty if it does not say."""
+    origin = _document(path).get("provenance")
+    return str(origin.get("data_sha256", "")) if isinstance(origin, dict) else ""
+
+
+def _document(path: Path) -> dict[str, Any]:
     try:
         document = yaml.safe_load(path.read_text(encoding="utf-8"))
     except OSError as problem:
         raise BadRecording(path, problem.strerror or "cannot be read", "Check the path.") from None
-    except (yaml.YAMLError, UnicodeDecodeError):
+    except (yaml.YAMLError, ValueError):
         raise BadRecording(path, "is not a YAML file", "Give a model written by xy-sysid fit --model.") from None
-    if not isinstance(document, dict) or document.get("format") != FORMAT or not isinstance(document.get("axes"), dict):
+    if not isinstance(document, dict) or document.get("format") != FORMAT or not isinstance(document.get("axes"), dict) or not document["axes"]:
         raise BadRecording(path, f"is not a model file ('{FORMAT}')", "Give a model written by xy-sysid fit --model.")
-    return {str(axis): _transfer_function(path, str(axis), part) for axis, part in document["axes"].items()}
+    return document
 
 
 def _transfer_function(path: Path, axis: str, part: Any) -> TransferFunction:
     try:
         told = part["transfer_function"]
         numerator, denominator = np.array(told["numerator"], dtype=float), np.array(told["denominator"], dtype=float)
-        step = told.get("sampling_time_s")
+        given = told.get("sampling_time_s")
+        step = None if given is None else float(given)
         delay = float(told["delay_s"])
         units = str(told["input_unit"]), str(told["output_unit"])
-    except (KeyError, TypeError, ValueError) as problem:
-        raise BadRecording(path, f"axis {axis}: {type(problem).__name__} {problem}", "Write the model again with xy-sysid fit --model.") from None
-    if not (np.all(np.isfinite(numerator)) and np.all(np.isfinite(denominator)) and denominator.size and denominator[0] != 0 and delay >= 0):
-        raise BadInput(
-            f"{path}: axis {axis}", "a transfer function with bad numbers", "finite coefficients, leading one not 0, delay >= 0", "Correct it."
-        )
-    return TransferFunction(numerator / denominator[0], denominator / denominator[0], delay, None if step is None else float(step), *units)
+        variable = str(told.get("variable", "s" if step is None else "z"))
+    except (AttributeError, KeyError, TypeError, ValueError, OverflowError):
+        needed = "numerator and denominator as lists of numbers, delay_s, input_unit and output_unit"
+        raise BadRecording(path, f"axis {axis} has no transfer_function with {needed}", "Write the model again with xy-sysid fit --model.") from None
+    for problem, allowed in (
+        (numerator.ndim != 1 or denominator.ndim != 1, "numerator and denominator as plain lists of coefficients"),
+        (not (np.isfinite(numerator).all() and np.isfinite(denominator).all()), "finite coefficients"),
+        (not numerator.any(), "a numerator that is not 0"),
+        (not denominator.size or denominator.flat[0] == 0, "a denominator that does not begin with 0"),
+        (numerator.size > denominator.size, "at most as many numerator coefficients as denominator coefficients"),
+        (not 0 <= delay <= LONGEST_DELAY, f"a delay from 0 to {LONGEST_DELAY:g} s"),
+        (variable != ("s" if step is None else "z"), "variable s without a sampling time, or z with one"),
+        (step is not None and not 0 < step < np.inf, "a sampling time above 0 s"),
+    ):
+        if problem:
+            raise BadInput(f"{path}: axis {axis}", "a transfer function with bad numbers", allowed, "Correct it.")
+    return TransferFunction(numerator / denominator[0], denominator / denominator[0], delay, step, *units)
 
 
 def write_mat(path: Path, fits: dict[str, Fit]) -> None:

@@ -23,6 +23,10 @@ def _zero() -> FloatArray:
     return np.zeros(1)
 
 
+def _none() -> FloatArray:
+    return np.zeros((0, 1))
+
+
 @dataclass(frozen=True, slots=True)
 class FrequencyResponse:
     """Measured response of one axis, output over input.
@@ -35,10 +39,15 @@ class FrequencyResponse:
     sampling_rate:    Hz
     averages:         effective number of independent averages
     resolution:       spacing of the original lines, Hz
-    line_correlation: (k,) correlation of the errors of lines 0..k-1 apart (1 at 0), from the window and its overlap
+    line_correlation: (k,) correlation of the errors that noise makes on lines 0..k-1 apart (1 at 0), from window and overlap
     kernel_offset:    (j,) Hz and
     kernel_weight:    (j,) how the window blurs: the expected estimate at f is sum_j weight_j G(f + offset_j),
                       where G is the response of the quantity that was transformed (see ``differenced``)
+    leakage:          (k, j) what the window makes of a response that bends: its random errors on lines i and i + d have the
+                      covariance sum_o leakage[d, o] D_i(o) conj(D_(i + d)(o')), with D_i(o) the response G at
+                      kernel_offset[o] from line i less its blurred value, and o' the same frequency seen from line i + d;
+                      (0, 1) where nothing leaks
+    smoothing:        lines over which the noise power was averaged for sigma
     differenced:      True if the window was put on the output's difference y[n+1] - y[n] and the estimate divided by
                       exp(j w T) - 1, so that blurring acts on the response times (exp(j w T) - 1)
     """
@@ -56,6 +65,8 @@ class FrequencyResponse:
     line_correlation: FloatArray = field(default_factory=_one)
     kernel_offset: FloatArray = field(default_factory=_zero)
     kernel_weight: FloatArray = field(default_factory=_one)
+    leakage: FloatArray = field(default_factory=_none)
+    smoothing: int = 1
     differenced: bool = False
 
     def __len__(self) -> int:

@@ -42,7 +42,7 @@ def friction_hint(u: FloatArray, y: FloatArray, sampling_rate: float) -> Frictio
     target = low_u[::step] - float(np.mean(low_u))
     table = np.column_stack([*columns, np.ones_like(pace), direction])
     scale = np.linalg.norm(table, axis=0)
-    if not bool(np.all(scale > 0)):
+    if not bool(np.all(scale > 0)) or float(target @ target) == 0.0:
         return None
     without = _left_over(table[:, :3] / scale[:3], target)
     solution, *_ = np.linalg.lstsq(table / scale, target, rcond=None)

@@ -55,10 +55,16 @@ def check(tf: TransferFunction, frf: FrequencyResponse, u: FloatArray, y: FloatA
     if (tf.input_unit, tf.output_unit) != (frf.input_unit, frf.output_unit):
         given, wanted = f"{tf.output_unit}/{tf.input_unit}", f"{frf.output_unit}/{frf.input_unit}"
         raise BadInput("unit of the model", given, wanted, "Use a model and a recording of the same units.")
+    if tf.sampling_time is not None and abs(tf.sampling_time * frf.sampling_rate - 1.0) > 1e-6:
+        wanted = f"{1 / frf.sampling_rate:g} s, the recording's"
+        raise BadInput("sampling time of the model", f"{tf.sampling_time:g} s", wanted, "Use data of the same rate.")
     lines = frf.select(frf.trusted)
     if len(lines) == 0:
         raise BadInput("number of trusted lines", 0, "1 or more", "Record longer, excite more, or widen the band.")
-    predicted = through_window(tf, lines, hold)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        predicted = through_window(tf, lines, hold)
+    if not bool(np.all(np.isfinite(predicted))):
+        raise BadInput("response of the model", "not finite", "finite in the band of the recording", "Check the coefficients of the model.")
     error = np.abs(lines.response - predicted)
     size = np.abs(lines.response)
     relative = float(np.sqrt(np.mean((error / size) ** 2)))
@@ -67,7 +73,8 @@ def check(tf: TransferFunction, frf: FrequencyResponse, u: FloatArray, y: FloatA
     worst = int(np.argmax(sigmas))
     rms = float(np.sqrt(np.mean(sigmas**2)))
     try:
-        simulated = simulation_error(tf, frf.sampling_rate, u, y)
+        with np.errstate(over="ignore", invalid="ignore"):  # an unstable model runs away, and the figure says so
+            simulated = simulation_error(tf, frf.sampling_rate, u, y)
     except BadInput:
         simulated = None
     if rms <= AT_THE_FLOOR:

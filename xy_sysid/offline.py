@@ -11,12 +11,16 @@ from xy_sysid.errors import BadInput
 from xy_sysid.estimate import frequency_response
 from xy_sysid.frf import FrequencyResponse
 from xy_sysid.friction_hint import friction_hint, friction_note
-from xy_sysid.period import find_period
+from xy_sysid.period import find_period, period_note
 from xy_sysid.recording import Recording
 from xy_sysid.settings import IdentifierSettings
+from xy_sysid.stream import FloatArray
+from xy_sysid.window_check import sound
 from xy_sysid.windows import WindowShape
 
+HARDLY = 2.0  # times the lines that chance makes coherent, below which the output hardly follows the input
 TRANSIENT = 1  # periods left out at the start of a periodic recording
+SMALLEST, LARGEST = 1e-100, 1e100  # of what is measured: squares of more or less leave the range of numbers
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,24 +41,27 @@ def estimate(recording: Recording, axis: str, settings: IdentifierSettings, peri
     """H1 of one axis.
 
     period: samples of a period (the window becomes one period, without a taper), 0 to look for one, None for none
+    Windows in which the encoder stands still or leaps are left out, as online, and a note says so.
     Raises BadInput if the axis is not there, was not excited, or the data are too short for one window.
     """
     u, y = recording.axis(axis)
-    if float(np.ptp(u)) == 0.0:
-        raise BadInput(
-            f"input of axis {axis}", f"constant at {float(u[0]) if u.size else 0.0:g} {recording.input_unit}", "a moving one", "Excite this axis."
-        )
-    if float(np.ptp(y)) == 0.0:
-        raise BadInput(f"output of axis {axis}", "constant", "a moving one", "Check the encoder, and that the axis is enabled.")
+    _moving(axis, u, y, (recording.input_unit, recording.output_unit))
     runs = recording.runs()
-    if period == 0:
-        longest = max(runs, key=lambda run: run.stop - run.start)
-        period = find_period(u[longest])
+    longest = max(runs, key=_samples)
     notes: list[str] = []
+    if period == 0:
+        period = find_period(u[longest])
+    elif period:
+        notes += period_note(u[longest], period)
     if period:
         settings, runs = _periodic(settings, runs, period, notes, recording.sampling_rate)
+    _possible(settings, recording.sampling_rate, _samples(longest))
     shape = WindowShape.of(settings.window, settings.length, settings.overlap)
-    pieces = [(0 if period else int(recording.seq[run][0]), u[run], y[run]) for run in runs]
+    grid = 0 if period or not _fits(recording, runs, shape, settings.differenced) else 1
+    pieces = [(grid * int(recording.seq[run][0]), u[run], y[run]) for run in runs]
+    frozen = max(round(settings.frozen * recording.sampling_rate), 2)
+    pieces, left_out = sound(pieces, shape, settings.differenced, frozen)
+    notes += left_out
     spectra = batch_spectra(pieces, shape, settings.differenced)
     frf = frequency_response(
         spectra,
@@ -66,10 +73,60 @@ def estimate(recording: Recording, axis: str, settings: IdentifierSettings, peri
         min_coherence=settings.min_coherence,
         units=(recording.input_unit, recording.output_unit),
     )
-    longest = max(runs, key=lambda run: run.stop - run.start)
+    notes += _coherence(frf, settings, bool(period))
+    longest = max(runs, key=_samples)
     friction = friction_note(friction_hint(u[longest], y[longest], recording.sampling_rate), recording.input_unit)
     notes += [*_closed_loop(recording, axis), *([friction] if friction else [])]
     return AxisEstimate(axis, frf, period or None, int(spectra.weight), tuple(notes))
+
+
+def _samples(run: slice) -> int:
+    return int(run.stop - run.start)
+
+
+def _moving(axis: str, u: FloatArray, y: FloatArray, units: tuple[str, str]) -> None:
+    """Raises BadInput for an input or output that does not move, or that moves by more than numbers can be squared."""
+    acts = "Excite this axis.", "Check the encoder, and that the axis is enabled."
+    for name, values, unit, act in zip(("input", "output"), (u, y), units, acts, strict=True):
+        if values.size == 0 or float(np.ptp(values)) == 0.0:
+            raise BadInput(f"{name} of axis {axis}", f"constant at {float(values[0]) if values.size else 0.0:g} {unit}", "a moving one", act)
+        size = float(np.max(np.abs(values)))
+        if not (float(np.ptp(values)) >= SMALLEST and size <= LARGEST):
+            allowed = f"{SMALLEST:g} to {LARGEST:g} {unit}"
+            raise BadInput(f"{name} of axis {axis}", f"up to {size:.3g} {unit} in size", allowed, "Check its unit and how it was written.")
+
+
+def _possible(settings: IdentifierSettings, rate: float, samples: int) -> None:
+    """Raises BadInput, before any work is done, for windows longer than the data and for a band that they cannot show."""
+    needed = settings.length + int(settings.differenced)
+    if samples < needed:
+        act = f"Record for longer, or shorten the window with --set length={max(samples // 4, 16)}."
+        raise BadInput("longest gap-free run", f"{samples} samples", f"{needed} or more", act)
+    lowest, highest = rate / settings.length, 0.5 * rate
+    if max(settings.band_low, lowest) > min(settings.band_high, highest):
+        shown = f"some of {lowest:.4g} to {highest:.4g} Hz, which {rate:.6g} Hz and windows of {settings.length} samples show"
+        raise BadInput(
+            "band", f"{settings.band_low:g} to {settings.band_high:g} Hz", shown, "Change it with --set band_low= and band_high=, or the length."
+        )
+
+
+def _fits(recording: Recording, runs: list[slice], shape: WindowShape, differenced: bool) -> bool:
+    """Whether a window of the grid (see ``windows``) lies in any run; a short recording may lie between two."""
+    return any(-int(recording.seq[run.start]) % shape.hop + shape.length + int(differenced) <= _samples(run) for run in runs)
+
+
+def _coherence(frf: FrequencyResponse, settings: IdentifierSettings, periodic: bool) -> list[str]:
+    """Too little to judge, or hardly more trusted lines than noise alone would give."""
+    if frf.averages < 2.0:
+        return [f"Only {frf.averages:.1f} independent windows: no uncertainty, so no line is trusted. Record longer, or shorten the window."]
+    chance = 0.0 if periodic else (1.0 - settings.min_coherence) ** (frf.averages - 1.0)
+    trusted = int(frf.trusted.sum())
+    if periodic or trusted > HARDLY * chance * len(frf):
+        return []
+    return [
+        f"Only {trusted} of {len(frf)} lines in the band are coherent with the input, and chance alone gives {chance * len(frf):.0f}: "
+        "the output hardly follows the input. Excite more, narrow the band, or check the wiring."
+    ]
 
 
 def _periodic(settings: IdentifierSettings, runs: list[slice], period: int, notes: list[str], rate: float) -> tuple[IdentifierSettings, list[slice]]:
@@ -103,6 +160,13 @@ def _closed_loop(recording: Recording, axis: str) -> list[str]:
         f"Closed loop: the input follows the tracking error (correlation {likeness:.2f}). H1 is biased where noise and friction are "
         "large against the excitation; trust lines of high coherence only, or measure with open loop."
     ]
+
+
+def judged(frf: FrequencyResponse) -> None:
+    """Raises BadInput for a response without an uncertainty of its own, to which nothing can be fitted or compared."""
+    if frf.averages < 2.0:
+        act = "Record longer, or shorten the window with --set length=."
+        raise BadInput("number of independent windows", f"{frf.averages:.1f}", "2 or more, so that there is an uncertainty", act)
 
 
 def split(recording: Recording, held_out: float) -> tuple[Recording, Recording]:

@@ -15,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from xy_sysid.errors import BadInput
 
 Scalar = bool | int | float | str
+SIGNS = {"ge": ">= ", "gt": "> ", "le": "<= ", "lt": "< ", "expected": ""}  # how a limit that was broken is told
 Model = TypeVar("Model", bound="Settings")
 
 
@@ -234,7 +235,7 @@ def _explain(cls: type[Settings], error: ValidationError, where: str) -> BadInpu
         owner: type[Settings] = AxisExcitation if len(first["loc"]) > 1 else cls
         return unknown_name(str(first["loc"][-1]), list(owner.model_fields), where)
     context = first.get("ctx", {})
-    allowed = ", ".join(f"{key} {value}" for key, value in context.items() if key != "error") or first["msg"]
+    allowed = ", ".join(f"{SIGNS[key]}{value}" for key, value in context.items() if key in SIGNS) or first["msg"].removeprefix("Input should be ")
     if "error" in context:
         return BadInput(f"{where}", name or "not consistent", str(context["error"]), "Change one of them.")
     return BadInput(f"{where}: {name}", repr(first["input"]), allowed, "Change it and try again.")

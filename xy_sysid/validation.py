@@ -56,6 +56,8 @@ def validate(fit: Fit, frf: FrequencyResponse, unseen: HeldOut | None = None, or
     tried = try_orders(frf, fit) if orders and fit.structure.domain == "s" and fit.structure.weighting == "sigma" else ()
     simulated = _simulated(fit, unseen)
     checks = [_cost(fit), _residual(fit, frf), _identifiable(fit), _stable(fit), _inside(fit), _cancelled(fit), _feasible(fit)]
+    if fit.structure.free_delay:
+        checks.append(_delay(fit))
     if tried:
         checks.append(_order(fit, tried))
     if simulated is not None:
@@ -68,7 +70,9 @@ def _cost(fit: Fit) -> Verdict:
     if fit.consistent is None:
         return Verdict("cost", True, "The cost cannot be judged: the response has no uncertainty of its own.", figures)
     if fit.consistent:
-        return Verdict("cost", True, f"The cost {fit.cost:.4g} is what noise explains ({fit.expected_cost:.4g} +- {fit.cost_deviation:.2g}).", figures)
+        return Verdict(
+            "cost", True, f"The cost {fit.cost:.4g} is what noise explains ({fit.expected_cost:.4g} +- {fit.cost_deviation:.2g}).", figures
+        )
     times = fit.cost / fit.expected_cost
     return Verdict(
         "cost",
@@ -92,7 +96,9 @@ def _residual(fit: Fit, frf: FrequencyResponse) -> Verdict:
     place = f"the worst is {ratio[worst]:.2g} sigma at {fit.frequency[worst]:.4g} Hz"
     figures = {"outside": outside, "allowed": allowed, "worst_sigma": float(ratio[worst]), "worst_hz": float(fit.frequency[worst])}
     ok = outside <= allowed
-    text = f"{100 * outside:.1f} % of the lines lie outside their 95 % region ({'at most' if ok else 'more than the'} {100 * allowed:.1f} %); {place}."
+    text = (
+        f"{100 * outside:.1f} % of the lines lie outside their 95 % region ({'at most' if ok else 'more than the'} {100 * allowed:.1f} %); {place}."
+    )
     return Verdict("residual", ok, text, figures)
 
 
@@ -112,7 +118,7 @@ def _identifiable(fit: Fit) -> Verdict:
     return Verdict(
         "identifiable",
         False,
-        f"The combination of {', '.join(named)} is hardly determined (singular value {smallest:.1e} of the largest): lower the orders or widen the band.",
+        f"The combination of {', '.join(named)} is hardly determined ({smallest:.1e} of the best determined): lower the orders or widen the band.",
         figures,
     )
 
@@ -124,7 +130,9 @@ def _stable(fit: Fit) -> Verdict:
         return Verdict("stable", True, f"Stable, {fit.tf.phase_type} phase.", figures)
     where = ", ".join(f"{pole.real:.4g}{pole.imag:+.4g}j" for pole in beyond)
     unit = "rad/s" if fit.tf.sampling_time is None else "(z)"
-    return Verdict("stable", False, f"Unstable pole at {where} {unit}: a machine at rest does not run away, so this is an artefact of the fit.", figures)
+    return Verdict(
+        "stable", False, f"Unstable pole at {where} {unit}: a machine at rest does not run away, so this is an artefact of the fit.", figures
+    )
 
 
 def _inside(fit: Fit) -> Verdict:
@@ -134,7 +142,9 @@ def _inside(fit: Fit) -> Verdict:
     if not far or fit.tf.sampling_time is not None:
         return Verdict("inside_band", True, "Poles and zeros lie in or near the band.", figures)
     where = ", ".join(f"{mode.frequency:.4g} Hz" for mode in far)
-    return Verdict("inside_band", False, f"Poles or zeros at {where}, far above the band's end of {top:.4g} Hz: they only stand for delay or gain.", figures)
+    return Verdict(
+        "inside_band", False, f"Poles or zeros at {where}, far above the band's end of {top:.4g} Hz: they only stand for delay or gain.", figures
+    )
 
 
 def _cancelled(fit: Fit) -> Verdict:
@@ -160,8 +170,22 @@ def _feasible(fit: Fit) -> Verdict:
     return Verdict("feasible", True, f"Physical: damping is not negative and the gain is finite.{sign}", figures)
 
 
+def _delay(fit: Fit) -> Verdict:
+    """A free delay that ends at a bound is not an estimate."""
+    largest = fit.structure.delay_max
+    figures = {"delay": fit.tf.delay, "largest": largest}
+    if fit.tf.delay >= largest * (1 - 1e-9):
+        return Verdict("delay", False, f"The delay ends at the largest one looked for, {1e3 * largest:g} ms: it may be larger still.", figures)
+    if fit.tf.delay <= 0.0:
+        text = "The delay ends at 0, the least there is: the phase leads what the model allows. Is the input really held (--set hold=none)?"
+        return Verdict("delay", False, text, figures)
+    return Verdict("delay", True, "The delay lies inside its bounds.", figures)
+
+
 def _order(fit: Fit, tried: tuple[OrderTrial, ...]) -> Verdict:
-    now = next(item for item in tried if (item.numerator_order, item.denominator_order) == (fit.structure.numerator_order, fit.structure.denominator_order))
+    now = next(
+        item for item in tried if (item.numerator_order, item.denominator_order) == (fit.structure.numerator_order, fit.structure.denominator_order)
+    )
     best = tried[0]
     gain = now.length - best.length
     figures = {"numerator_order": float(best.numerator_order), "denominator_order": float(best.denominator_order), "gain": gain}
@@ -177,12 +201,20 @@ def _simulated(fit: Fit, unseen: HeldOut | None) -> SimulationError | None:
         return None
     u, y, rate = unseen
     try:
-        return simulation_error(fit.tf, rate, u, y)
+        with np.errstate(over="ignore", invalid="ignore"):  # an unstable model runs away, and the figure says so
+            return simulation_error(fit.tf, rate, u, y)
     except BadInput:
         return None
 
 
 def _simulation(error: SimulationError) -> Verdict:
     figures = {"rms": error.rms, "nrmse": error.nrmse, "seconds": error.seconds}
-    text = f"Simulated on {error.seconds:.3g} s not used for the fit: {error.nrmse:.1f} % of the {error.compared} explained, rms error {error.rms:.3g} {error.unit}."
-    return Verdict("simulation", error.nrmse >= GOOD_SIMULATION, text, figures)
+    return Verdict("simulation", error.nrmse >= GOOD_SIMULATION, f"Data not used for the fit, {simulation_sentence(error)}", figures)
+
+
+def simulation_sentence(error: SimulationError) -> str:
+    """How much of a measured signal a simulation explains; lengths in mm."""
+    scale, unit = (1e3, f"m{error.unit}") if error.unit in ("m", "m/s") else (1.0, error.unit)
+    if not np.isfinite(error.nrmse):
+        return f"simulated over {error.seconds:.3g} s: the model runs away."
+    return f"simulated over {error.seconds:.3g} s: {error.nrmse:.1f} % of the {error.compared} explained, rms error {error.rms * scale:.3g} {unit}."

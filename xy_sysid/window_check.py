@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from xy_sysid.errors import BadInput
 from xy_sysid.stream import FloatArray
+from xy_sysid.windows import WindowShape
+
+Piece = tuple[int, FloatArray, FloatArray]
+"""Counter of the first sample, input (n,), output (n,) of a gap-free stretch."""
 
 CREST_FACTOR = 10.0  # a step of the encoder counts as a leap when it stands out so many times more than the voltage does
 CREST_USUAL = 4.0  # crest factor that any noise reaches in a few thousand samples
@@ -15,11 +20,13 @@ REASONS = {
 }
 
 
-def longest_repeat(values: FloatArray) -> int:
-    """Length of the longest run of equal consecutive values of a (n,) array."""
-    changes = np.flatnonzero(np.diff(values) != 0)
-    edges = np.concatenate(([-1], changes, [values.shape[0] - 1]))
-    return int(np.max(np.diff(edges)))
+def stands_still(voltage: FloatArray, position: FloatArray, frozen: int) -> bool:
+    """Whether the position (n,) keeps one value for ``frozen`` samples after the voltage (n,) has moved."""
+    edges = np.concatenate(([0], np.flatnonzero(np.diff(position) != 0) + 1, [position.shape[0]]))
+    for begin, end in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
+        if end - begin >= frozen and float(np.ptp(voltage[begin : end - frozen + 2])) > 0.0:
+            return True
+    return False
 
 
 def window_fault(voltage: FloatArray, position: FloatArray, frozen: int) -> str | None:
@@ -28,7 +35,7 @@ def window_fault(voltage: FloatArray, position: FloatArray, frozen: int) -> str 
     frozen: samples of standstill that are too many. A leap is a step whose ratio to the rms step is ten times what the
     voltage's own crest factor suggests (an impulse has a large one, so its answer is not a leap).
     """
-    if float(np.ptp(voltage)) > 0.0 and longest_repeat(position) >= frozen:
+    if stands_still(voltage, position, frozen):
         return "frozen"
     step = np.diff(position)
     rms = float(np.sqrt(np.mean(step**2)))
@@ -38,3 +45,34 @@ def window_fault(voltage: FloatArray, position: FloatArray, frozen: int) -> str 
     drive_rms = float(np.sqrt(np.mean(drive**2)))
     usual = max(CREST_USUAL, float(np.max(np.abs(drive))) / drive_rms) if drive_rms > 0 else CREST_USUAL
     return "leap" if float(np.max(np.abs(step))) > CREST_FACTOR * usual * rms else None
+
+
+def sound(pieces: list[Piece], shape: WindowShape, differenced: bool, frozen: int) -> tuple[list[Piece], list[str]]:
+    """The pieces cut so that no window of the grid has a fault, and a sentence about the windows left out.
+
+    differenced: a window needs one sample more. Raises BadInput if every window has a fault.
+    """
+    kept: list[Piece] = []
+    faults: dict[str, int] = {}
+    total = 0
+    for seq, u, y in pieces:
+        stretches: list[tuple[int, int]] = []  # first sample and last sample + 1 of windows without a fault
+        follows = False
+        for start in range(-seq % shape.hop, u.shape[0] - shape.length - int(differenced) + 1, shape.hop):
+            stop = start + shape.length + int(differenced)
+            fault = window_fault(u[start:stop], y[start:stop], frozen)
+            total += 1
+            if fault is not None:
+                faults[fault] = faults.get(fault, 0) + 1
+            elif follows:
+                stretches[-1] = (stretches[-1][0], stop)
+            else:
+                stretches.append((start, stop))
+            follows = fault is None
+        kept += [(seq + start, u[start:stop], y[start:stop]) for start, stop in stretches]
+    if not faults:
+        return pieces, []
+    why = "; ".join(f"in {count} {REASONS[name]}" for name, count in faults.items())
+    if not kept:
+        raise BadInput("number of sound windows", f"0 of {total} ({why})", "1 or more", "Check the encoder; --set frozen= allows longer standstill.")
+    return kept, [f"{sum(faults.values())} of {total} windows are left out: {why}."]

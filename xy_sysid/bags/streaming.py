@@ -20,7 +20,7 @@ Kind = Literal["voltage", "position", "reference"]
 VOLTAGE, POSITION, REFERENCE = "/xy/voltage", "/xy/position", "/xy/reference"
 PIECE = 500  # samples; a consumer that waits 1000 samples for a late partner never sees the two topics drift apart
 CLOCK_SAMPLES = 2000  # stamps from which the period of a joint state stream is learnt
-OTHERS = "Name others with --voltage-topic, --position-topic or --joint-topic."
+OTHERS = "Name others with --topic voltage=NAME, position=NAME or joints=NAME."
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,7 @@ def choose(bag: Bag, voltage_topic: str, position_topic: str, joint_topic: str |
     elif joints is None and (position_topic not in blocks or effort_as_voltage):
         found = bag.of_kind(JOINT_TYPE)
         if len(found) > 1:
-            raise bag.bad(f"has several JointState topics: {', '.join(found)}", "Choose one with --joint-topic.")
+            raise bag.bad(f"has several JointState topics: {', '.join(found)}", "Choose one with --topic joints=NAME.")
         joints = found[0] if found else None
     if joints is not None:
         if bag.kind(joints) != JOINT_TYPE:

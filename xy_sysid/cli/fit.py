@@ -37,18 +37,22 @@ def fit(
 ) -> None:
     """Transfer function with delay of each axis, 95 % intervals, and whether it can be trusted."""
     from xy_sysid import exports
-    from xy_sysid.offline import estimate, split
+    from xy_sysid.offline import estimate, judged, split
     from xy_sysid.validation import validate
 
     settings = o.settings_from(params, set_)
-    recording = read(rec, axis, topic, effort, span, json)
-    training, unseen = split(recording, held_out)
+    for option, file in (("--model", model), ("--mat", mat)):
+        o.output_file(option, file)
+    samples = o.period_from(period)
     structure = _structure(settings, weighting, domain)
     estimator = _estimator(method)
+    recording = read(rec, axis, topic, effort, span, json)
+    training, unseen = split(recording, held_out)
     answers: dict[str, Any] = {}
     fits: dict[str, Fit] = {}
     for name in chosen(recording, axis):
-        found = estimate(training, name, settings, o.period_from(period))
+        found = estimate(training, name, settings, samples)
+        judged(found.frf)
         result = estimator(found.frf, structure)
         verdicts = validate(result, found.frf, _unseen(unseen, name))
         fits[name] = result
@@ -135,11 +139,12 @@ def answer(found: AxisEstimate, result: Fit, verdicts: Any) -> dict[str, Any]:
 def _show(found: AxisEstimate, result: Fit, verdicts: Any) -> None:
     f = result.frequency
     people.print(
-        f"[bold]axis {found.axis}[/bold]: {result.method}, {len(f)} lines from {f[0]:.3g} to {f[-1]:.4g} Hz, {found.windows} windows; "
-        f"relative error {100 * result.relative_error:.2g} % (paper: error cost {result.error_cost:.2f}, confidence {result.confidence:.2f})"
+        f"axis {found.axis}: {result.method}, {len(f)} lines from {f[0]:.3g} to {f[-1]:.4g} Hz, {found.windows} windows; "
+        f"relative error {100 * result.relative_error:.2g} % (paper: error cost {result.error_cost:.2f}, confidence {result.confidence:.2f})",
+        style="bold",
     )
     if not result.converged:
-        people.print(f"[bold]The fit did not converge:[/bold] {result.reason}")
+        people.print(f"The fit did not converge: {result.reason}", style="bold")
     rows = [
         (item.name, quantity(item.value, item.unit, 6), f"{quantity(item.low, item.unit, 6)} .. {quantity(item.high, item.unit, 6)}")
         for item in result.intervals
@@ -147,6 +152,6 @@ def _show(found: AxisEstimate, result: Fit, verdicts: Any) -> None:
     table("", ("parameter", "value", "95 % interval"), rows)
     for check in verdicts.verdicts:
         people.print(f"  {'ok  ' if check.ok else 'WARN'} {check.sentence}")
-    for note in (*found.notes, *result.warnings):
+    for note in found.notes:  # the warnings of the fit are among the verdicts
         aside.print(f"axis {found.axis}: {note}")
     people.print()

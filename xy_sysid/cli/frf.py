@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import cmath
+import math
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -11,6 +14,7 @@ from xy_sysid.cli.output import aside, emit, people, table
 from xy_sysid.cli.reading import chosen, read
 
 if TYPE_CHECKING:
+    from xy_sysid.frf import FrequencyResponse
     from xy_sysid.offline import AxisEstimate
 
 
@@ -23,7 +27,7 @@ def frf(
     effort: o.Effort = False,
     period: o.Period = "auto",
     span: o.Span = "",
-    csv: Annotated[str, typer.Option("--csv", metavar="FILE", help="write frequency, real, imag, coherence and sigma of every line")] = "",
+    csv: Annotated[Path | None, typer.Option("--csv", metavar="FILE", help="write frequency, real, imag, coherence and sigma of every line")] = None,
     json: o.Json = False,
 ) -> None:
     """Frequency response, coherence and uncertainty of each axis."""
@@ -32,9 +36,10 @@ def frf(
     from xy_sysid.offline import estimate
 
     settings = o.settings_from(params, set_)
+    o.output_file("--csv", csv)
     recording = read(rec, axis, topic, effort, span, json)
     found = [estimate(recording, name, settings, o.period_from(period)) for name in chosen(recording, axis)]
-    if csv:
+    if csv is not None:
         _write_csv(csv, found)
     if json:
         emit(
@@ -53,22 +58,19 @@ def frf(
             f"{item.windows} windows ({f.averages:.1f} independent), {recording.sampling_rate:.6g} Hz"
         )
         lines = np.unique(np.clip(np.searchsorted(f.frequency, np.geomspace(max(f.frequency[0], 1e-9), f.frequency[-1], 16)), 0, len(f) - 1))
-        rows = [
-            (
-                f"{f.frequency[k]:.4g}",
-                f"{20 * np.log10(max(abs(f.response[k]), 1e-300)):.2f}",
-                f"{np.degrees(np.angle(f.response[k])):.1f}",
-                f"{f.coherence[k]:.4f}",
-                f"{100 * f.sigma[k] / max(abs(f.response[k]), 1e-300):.2g}",
-                "yes" if f.trusted[k] else "no",
-            )
-            for k in lines
-        ]
+        rows = [_row(f, int(k)) for k in lines]
         unit = f"{f.output_unit}/{f.input_unit}"
         table(f"axis {item.axis}, {unit}", ("Hz", f"dB ({unit})", "phase deg", "coherence", "sigma %", "trusted"), rows)
 
 
-def _write_csv(path: str, found: list[AxisEstimate]) -> None:
+def _row(f: FrequencyResponse, k: int) -> tuple[str, ...]:
+    size, sigma = abs(complex(f.response[k])), float(f.sigma[k])
+    level, phase = (f"{20 * math.log10(size):.2f}", f"{math.degrees(cmath.phase(complex(f.response[k]))):.1f}") if size > 0 else ("-", "-")
+    spread = f"{100 * sigma / size:.2g}" if size > 0 and math.isfinite(sigma) else "-"
+    return f"{f.frequency[k]:.4g}", level, phase, f"{f.coherence[k]:.4f}", spread, "yes" if f.trusted[k] else "no"
+
+
+def _write_csv(path: Path, found: list[AxisEstimate]) -> None:
     import numpy as np
 
     rows = []
@@ -78,5 +80,4 @@ def _write_csv(path: str, found: list[AxisEstimate]) -> None:
             f"{item.axis},{a!r},{b.real!r},{b.imag!r},{c!r},{s!r},{int(t)}"
             for a, b, c, s, t in zip(*(np.asarray(v).tolist() for v in (f.frequency, f.response, f.coherence, f.sigma, f.trusted)), strict=True)
         ]
-    with open(path, "w", encoding="utf-8") as file:
-        file.write("axis,frequency_hz,real,imag,coherence,sigma,trusted\n" + "\n".join(rows) + "\n")
+    path.write_text("axis,frequency_hz,real,imag,coherence,sigma,trusted\n" + "\n".join(rows) + "\n", encoding="utf-8")

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from xy_sysid.errors import BadInput, BadRecording
-from xy_sysid.settings import IdentifierSettings, changed
+from xy_sysid.settings import IdentifierSettings, Settings, changed, unknown_name
 
 Rec = Annotated[Path, typer.Argument(metavar="REC", help="recording: a rosbag2 folder or file (.db3, .mcap), .csv, .mat or .npz")]
 Axes = Annotated[list[str] | None, typer.Option("--axis", "-a", help="only this axis (may be repeated)")]
@@ -28,20 +29,41 @@ Json = Annotated[bool, typer.Option("--json", help="one JSON document on stdout"
 
 def settings_from(params: Path | None, pairs: list[str] | None) -> IdentifierSettings:
     """The identifier's settings from a parameter file and NAME=VALUE pairs."""
-    import yaml
-
     settings = IdentifierSettings()
     if params is not None:
         from xy_sysid.parameter_file import parameters
 
         settings = changed(settings, parameters(read_text(params), str(params)).get("identifier", {}))
+    return changed(settings, values_from(pairs, "--set", "length=2048", IdentifierSettings))
+
+
+def values_from(pairs: list[str] | None, option: str, example: str, cls: type[Settings]) -> dict[str, Any]:
+    """Values by name from NAME=VALUE pairs, as text: the settings turn each into the type that they declare."""
     values: dict[str, Any] = {}
     for pair in pairs or []:
-        name, equals, text = pair.partition("=")
+        name, equals, text = (part.strip() for part in pair.partition("="))
         if not equals:
-            raise BadInput("--set", repr(pair), "NAME=VALUE", "Write for example --set length=2048.")
-        values[name.strip()] = yaml.safe_load(text)
-    return changed(settings, values) if values else settings
+            raise BadInput(option, repr(pair), "NAME=VALUE", f"Write for example {option} {example}.")
+        if name not in cls.model_fields:
+            raise unknown_name(name, list(cls.model_fields), option)
+        values[name] = text
+    return values
+
+
+def output_file(option: str, path: Path | None) -> None:
+    """Raises BadInput, before any work is done, when a file cannot be written."""
+    if path is None:
+        return
+    folder = path.absolute().parent
+    try:
+        if path.is_dir():
+            raise BadInput(option, str(path), "a file, and this is a folder", "Give the file a name.")
+        if not folder.is_dir():
+            raise BadInput(option, str(path), "a file in a folder that is there", f"Make {folder} first.")
+    except OSError as problem:
+        raise BadInput(option, str(path), "a name that the file system takes", f"{problem.strerror}.") from None
+    if not os.access(path if path.exists() else folder, os.W_OK):
+        raise BadInput(option, str(path), "a file that you may write", "Choose another place.")
 
 
 def read_text(path: Path) -> str:

@@ -14,8 +14,19 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-people = Console(highlight=False, soft_wrap=True)
-aside = Console(stderr=True, highlight=False, soft_wrap=True)
+from xy_sysid.cli import ReaderGone
+
+
+class Terminal(Console):
+    """Leaves it to the command line what happens when the reader of a pipe goes away."""
+
+    def on_broken_pipe(self) -> None:
+        """Called by rich, which would end the process itself."""
+        raise ReaderGone
+
+
+people = Terminal(highlight=False, soft_wrap=True, markup=False, emoji=False)  # a file may be called [bold] or :car:
+aside = Terminal(stderr=True, highlight=False, soft_wrap=True, markup=False, emoji=False)
 
 
 def plain(value: Any) -> Any:
@@ -41,8 +52,11 @@ def plain(value: Any) -> Any:
 
 def emit(document: Mapping[str, Any]) -> None:
     """The one JSON document of a command."""
-    sys.stdout.write(json.dumps(plain(document), allow_nan=False) + "\n")
-    sys.stdout.flush()
+    try:
+        sys.stdout.write(json.dumps(plain(document), allow_nan=False) + "\n")
+        sys.stdout.flush()
+    except BrokenPipeError:
+        raise ReaderGone from None
 
 
 def table(title: str, columns: Iterable[str], rows: Iterable[Iterable[str]]) -> None:
@@ -56,8 +70,9 @@ def table(title: str, columns: Iterable[str], rows: Iterable[Iterable[str]]) -> 
 
 
 def progress() -> Progress:
-    """A progress bar on stderr that disappears at its end."""
-    return Progress(TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn(), console=aside, transient=True)
+    """A progress bar on stderr that disappears at its end; none where nobody watches."""
+    words = TextColumn("{task.description}", markup=False)
+    return Progress(words, BarColumn(), TaskProgressColumn(), TimeRemainingColumn(), console=aside, transient=True, disable=not aside.is_terminal)
 
 
 def quantity(value: float, unit: str, digits: int = 4) -> str:

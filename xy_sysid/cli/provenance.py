@@ -11,6 +11,14 @@ from typing import Any
 from xy_sysid.recording import Recording
 
 
+def fingerprint(recording: Recording) -> str:
+    """SHA-256 of the samples."""
+    digest = hashlib.sha256()
+    digest.update(recording.voltage.tobytes())
+    digest.update(recording.position.tobytes())
+    return digest.hexdigest()
+
+
 def provenance(path: Path, recording: Recording) -> dict[str, Any]:
     """Plain values for a model file or report."""
     from importlib.metadata import PackageNotFoundError, version
@@ -21,16 +29,18 @@ def provenance(path: Path, recording: Recording) -> dict[str, Any]:
             versions[name] = version(name)
         except PackageNotFoundError:
             versions[name] = "from source"
-    digest = hashlib.sha256()
-    digest.update(recording.voltage.tobytes())
-    digest.update(recording.position.tobytes())
     return {
-        "source": str(path),
-        "command": " ".join(["xy-sysid", *sys.argv[1:]]),
+        "source": _printable(str(path)),
+        "command": _printable(" ".join(["xy-sysid", *sys.argv[1:]])),
         "samples": len(recording),
         "sampling_rate_hz": float(recording.sampling_rate),
         "units": {"input": recording.input_unit, "output": recording.output_unit},
-        "data_sha256": digest.hexdigest(),
+        "data_sha256": fingerprint(recording),
         "versions": versions,
         "notes": list(recording.notes),
     }
+
+
+def _printable(text: str) -> str:
+    """A file's name may hold bytes that are no text."""
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")

@@ -9,12 +9,16 @@ from xy_sysid.cli.output import aside, progress
 from xy_sysid.errors import BadInput
 from xy_sysid.recording import Recording
 
+TABLES = (".csv", ".txt", ".tsv", ".npz", ".mat")
+
 
 def read(path: Path, axes: list[str] | None, topics: list[str] | None, effort: bool, span: str, quiet: bool) -> Recording:
     """The recording; its notes go to stderr unless ``quiet``."""
     from xy_sysid.imports import load
 
     start, stop = span_from(span)
+    if (topics or effort) and path.suffix.lower() in TABLES:
+        raise BadInput("--topic or --effort", f"for {path}", "for a bag", "A table has columns: leave it out.")
     with progress() as bar:
         task = bar.add_task(f"reading {path.name}", total=1.0)
         recording = load(

@@ -30,17 +30,19 @@ def replay(
 
     from xy_sysid.bags import BagWriter
     from xy_sysid.bags.streaming import stream_blocks
-    from xy_sysid.errors import BadRecording
+    from xy_sysid.errors import BadInput, BadRecording
     from xy_sysid.identifier import Identifier
     from xy_sysid.pairing import KINDS
     from xy_sysid.replay import replay as logic
 
     settings = o.settings_from(params, set_)
+    if out is not None and out.exists():
+        raise BadRecording(out, "exists already", "Choose another name; nothing is overwritten.")
     last: Update | None = None
     updates, alarms = 0, dict[str, str]()
     begun = time.perf_counter()
     with ExitStack() as stack:
-        writer = stack.enter_context(BagWriter(out)) if out is not None else None
+        writer: BagWriter | None = None
         bar = stack.enter_context(progress())
         task = bar.add_task(f"replaying {bag.name}", total=None)
         names: dict[str, Any] = dict(o.topics_from(topic))
@@ -48,6 +50,9 @@ def replay(
         kind, first = next(blocks, (None, None))
         if kind is None or first is None:
             raise BadRecording(bag, "holds no samples", "Give a bag with voltage and position.")
+        for name in axis or []:
+            if name not in first.axes:
+                raise BadInput("--axis", repr(name), ", ".join(first.axes), "Choose one of these.")
         identifier = Identifier(settings, tuple(axis) if axis else first.axes)
 
         def all_blocks() -> Any:
@@ -60,16 +65,16 @@ def replay(
             for name, part in update.axes.items():
                 if part.track.alarm and name not in alarms:
                     alarms[name] = f"after {update.request.seconds:.1f} s of data: {_alarm(name, part)}"
-            if writer is not None:
+            if out is not None:
+                writer = writer or stack.enter_context(BagWriter(out))
                 stamp = round(update.request.seq / update.request.sampling_rate * 1e9)
                 for message in update.arrays():
                     writer.write_array(f"/xy/{message.topic}", message.labels, message.sizes, message.data, stamp)
     seconds = time.perf_counter() - begun
     if last is None:
         windows = f"{identifier.samples} paired samples, {settings.length + 1} needed in one piece"
-        raise BadRecording(
-            bag, f"no window was filled ({windows}; {identifier.faults or 'no faults'})", "Give a longer bag or a shorter --set length=."
-        )
+        faults = ", ".join(f"{name} {count}" for name, count in identifier.faults.items()) or "no faults"
+        raise BadRecording(bag, f"no window was filled ({windows}; {faults})", "Give a longer bag or a shorter --set length=.")
     heard = identifier.samples / last.request.sampling_rate
     if json:
         emit(
@@ -88,7 +93,7 @@ def replay(
     for reason, sentence in identifier.sentences.items():
         aside.print(f"{reason}: {sentence}")
     for sentence in alarms.values():
-        people.print(f"[bold]ALARM[/bold] {sentence}")
+        people.print(f"ALARM {sentence}", style="bold")
     for name, part in last.axes.items():
         if part.fit is None:
             people.print(f"axis {name}: {part.problem}")

@@ -24,7 +24,9 @@ def simulate(
         list[str] | None,
         typer.Option("--effect", metavar="NAME[=SIZE]", help="add an effect, [axis:]name[=size][,parameter=value] (may be repeated)"),
     ] = None,
-    hidden: Annotated[int | None, typer.Option(metavar="SEED", help="draw effects and sizes from this seed, and do not tell")] = None,
+    hidden: Annotated[
+        int | None, typer.Option(metavar="SEED", help="draw effects and sizes from this seed, and do not tell", min=0, max=2**31 - 1)
+    ] = None,
     duration: Annotated[float, typer.Option(help="seconds of data", min=0.01, max=1e6)] = 60.0,
     clean: Annotated[bool, typer.Option("--clean", help="without encoder noise and quantization")] = False,
     seed: Annotated[int, typer.Option(help="of encoder noise; the excitation's seeds are added to it", min=0, max=2**31 - 100)] = 0,
@@ -37,9 +39,10 @@ def simulate(
     """Simulate the XY table and write a recording."""
     from xy_sysid.imports import save
 
+    _free(out)
+    o.output_file("--truth", truth)
     table = _machine(machine, effect, hidden, seed, clean)
     settings = _excitation(table, excite, seed)
-    _free(out)
     with progress() as bar:
         task = bar.add_task("simulating", total=duration)
         recording = drive(table, settings, duration, lambda seconds: bar.update(task, completed=seconds))
@@ -74,28 +77,21 @@ def _machine(name: str, effects: list[str] | None, hidden: int | None, seed: int
 
 
 def _excitation(table: Machine, pairs: list[str] | None, seed: int) -> ExcitationSettings:
-    import yaml
-
-    from xy_sysid.errors import BadInput
     from xy_sysid.settings import AxisExcitation, ExcitationSettings, build
 
-    values: dict[str, Any] = {}
-    for pair in pairs or []:
-        name, equals, text = pair.partition("=")
-        if not equals:
-            raise BadInput("--excite", repr(pair), "NAME=VALUE", "Write for example --excite rms=0.5.")
-        values[name.strip()] = yaml.safe_load(text)
+    values = o.values_from(pairs, "--excite", "rms=0.5", AxisExcitation)
     axes = {axis: build(AxisExcitation, {"seed": seed + 1 + k, **values}, "--excite") for k, axis in enumerate(table.axes)}
     return build(ExcitationSettings, {"rate": table.rate, "lockstep": True, "speed": 0.0, "axes": axes})
 
 
 def _free(out: Path) -> None:
     from xy_sysid.errors import BadInput
+    from xy_sysid.imports import writer_of
 
+    o.output_file("output", None if out.is_dir() else out)
     if out.exists():
         raise BadInput("output", str(out), "a name that is not there yet", "Choose another name or remove it first.")
-    if not out.absolute().parent.is_dir():
-        raise BadInput("output folder", str(out.absolute().parent), "a folder that is there", "Make it first.")
+    writer_of(out)
 
 
 def drive(table: Machine, settings: ExcitationSettings, duration: float, tell: Any) -> Recording:

@@ -9,6 +9,7 @@ import typer
 
 from xy_sysid.cli import options as o
 from xy_sysid.cli.output import aside, emit, people, table
+from xy_sysid.cli.provenance import fingerprint
 from xy_sysid.cli.reading import chosen, read
 
 
@@ -26,38 +27,47 @@ def validate(
 ) -> None:
     """Check a model on a recording that it has not seen, in frequency and in time."""
     from xy_sysid.errors import BadInput
-    from xy_sysid.exports import read_model
+    from xy_sysid.exports import fitted_to, read_model
     from xy_sysid.model_check import check
-    from xy_sysid.offline import estimate
+    from xy_sysid.offline import estimate, judged
+    from xy_sysid.validation import simulation_sentence
 
     settings = o.settings_from(params, set_)
+    samples = o.period_from(period)
     models = read_model(model)
     recording = read(rec, axis, topic, effort, span, json)
     answers: dict[str, Any] = {}
     for name in chosen(recording, axis):
         if name not in models:
             raise BadInput(f"model of axis {name}", f"not in {model}", ", ".join(models), "Choose axes with --axis.")
-        found = estimate(recording, name, settings, o.period_from(period))
+        found = estimate(recording, name, settings, samples)
+        judged(found.frf)
         run = max(recording.runs(), key=lambda part: part.stop - part.start)
         u, y = recording.axis(name)
         answers[name] = check(models[name], found.frf, u[run], y[run], settings.hold)
         for note in found.notes:
             if not json:
                 aside.print(f"axis {name}: {note}")
+    same = fingerprint(recording) == fitted_to(model)
     if json:
-        emit({"model": str(model), "recording": str(rec), "axes": answers})
+        emit({"model": str(model), "recording": str(rec), "same_data_as_the_fit": same, "axes": answers})
         return
     rows = [
         (
             name,
-            f"{100 * found.relative_error:.3g} %",
-            f"{100 * found.noise_floor:.3g} %",
+            f"{100 * found.relative_error:.3g}",
+            f"{100 * found.noise_floor:.3g}",
             f"{found.rms_sigma:.3g}",
-            f"{found.worst_sigma:.3g} at {found.worst_hz:.4g} Hz",
-            "-" if found.simulation is None else f"{found.simulation.nrmse:.1f} % of the {found.simulation.compared}",
+            f"{found.worst_sigma:.3g}",
+            f"{found.worst_hz:.4g}",
+            "-" if found.simulation is None else f"{found.simulation.nrmse:.1f}",
         )
         for name, found in answers.items()
     ]
-    table(f"{model} on {rec}", ("axis", "relative error", "of noise", "rms sigma", "worst sigma", "explained in time"), rows)
+    table(f"{model} on {rec}", ("axis", "error %", "noise %", "rms sigma", "worst sigma", "at Hz", "in time %"), rows)
+    if same:
+        aside.print("note: the model was fitted to this very recording, so this is no validation")
     for name, found in answers.items():
         people.print(f"axis {name}: {found.sentence}")
+        if found.simulation is not None:
+            people.print(f"axis {name}: {simulation_sentence(found.simulation)}")

@@ -17,7 +17,7 @@ from xy_sysid.stream import Block
 ROWS = 20  # samples in one message of a bag that is written here
 KINDS = "a rosbag2 folder, .db3, .mcap, .csv, .mat, .npz"
 
-__all__ = ["blocks", "load", "save"]
+__all__ = ["blocks", "load", "save", "writer_of"]
 
 
 def load(
@@ -76,14 +76,21 @@ def save(recording: Recording, path: Path | str) -> None:
     Raises BadRecording if the path exists (bags) or cannot be written, BadInput for an ending that is not known.
     """
     path = Path(path)
-    writers = {".csv": csv.write, ".npz": arrays.write_npz, ".mat": arrays.write_mat, ".db3": _write_bag, ".mcap": _write_bag, "": _write_bag}
-    if path.suffix not in writers:
-        raise BadInput("file ending", repr(path.suffix), ", ".join(writers), "Choose one of these; none is a rosbag2 folder.")
+    writer = writer_of(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        writers[path.suffix](path, recording)
+        writer(path, recording)
     except OSError as error:
         raise BadRecording(path, f"cannot be written ({error.strerror or error})", "Choose a folder that you may write to.") from None
+
+
+def writer_of(path: Path) -> Callable[[Path, Recording], None]:
+    """What writes such a file; raises BadInput for an ending that is not known."""
+    writers = {".csv": csv.write, ".npz": arrays.write_npz, ".mat": arrays.write_mat, ".db3": _write_bag, ".mcap": _write_bag, "": _write_bag}
+    if path.suffix not in writers:
+        allowed = f"{', '.join(ending for ending in writers if ending)}, or none for a rosbag2 folder"
+        raise BadInput("file ending", repr(path.suffix), allowed, "Choose one of these.")
+    return writers[path.suffix]
 
 
 def blocks(recording: Recording, rows: int = ROWS) -> list[tuple[Block, Block]]:

@@ -87,7 +87,7 @@ def _collect(bag: Bag, blocks: Iterator[tuple[Kind, Block]], start: float, stop:
         kept.setdefault(kind, []).append(block)
         size += block.values.nbytes + block.seq.nbytes + block.time.nbytes
         if size > room:
-            raise bag.bad(f"more than {size / 1e9:.1f} GB of samples, too long to load at once", "Give a part with --start and --stop, or replay it.")
+            raise bag.bad(f"more than {size / 1e9:.1f} GB of samples, too long to load at once", "Give a part with --span, or replay it.")
     return kept, first
 
 
