@@ -1,0 +1,142 @@
+"""One axis in the time domain: a rigid base (gain, delay, pole) and any of a library's effects.
+
+The velocity is simulated from rest. What depends on position uses the measured one, so that nothing drifts. Scheme:
+each sample is split where the delayed voltage changes; between, the viscous pole is integrated exactly for a constant
+force, and dry friction finds its zero crossings in time (Karnopp 1985's problem without his dead band). Laws that bend
+with speed get two sub-steps in each piece, by the midpoint rule.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from xy_sysid.axis_kernel import Kernel, build
+from xy_sysid.effect_code import BASE, slots
+from xy_sysid.effects import EFFECTS, Effect
+from xy_sysid.errors import BadInput
+from xy_sysid.settings import unknown_name
+from xy_sysid.stream import FloatArray
+
+
+class Library:
+    """A set of effects that simulate in one compiled loop, which is made at its first use."""
+
+    def __init__(self, effects: Iterable[Effect]) -> None:
+        self.effects: dict[str, Effect] = {effect.name: effect for effect in effects}
+        self.acting: tuple[Effect, ...] = tuple(effect for effect in self.effects.values() if effect.category != "base")
+        self.places: Mapping[str, int] = slots(self.acting)
+        self._kernel: Kernel | None = None
+
+    def __getitem__(self, name: str) -> Effect:
+        """The effect of this name; raises BadInput with the nearest spelling."""
+        if name not in self.effects:
+            raise unknown_name(name, list(self.effects), "effect")
+        return self.effects[name]
+
+    @property
+    def kernel(self) -> Kernel:
+        """The compiled loop; see ``effect_code.text``."""
+        if self._kernel is None:
+            self._kernel = build(self.acting)
+        return self._kernel
+
+    def extended(self, effects: Iterable[Effect]) -> Library:
+        """A library with more effects; raises BadInput for a name that is taken."""
+        added = list(effects)
+        for effect in added:
+            if effect.name in self.effects:
+                raise BadInput("effect", effect.name, "a name that is not in the library yet", "Rename it.")
+        return Library([*self.effects.values(), *added])
+
+
+STANDARD = Library(EFFECTS.values())
+
+
+@dataclass(frozen=True, slots=True)
+class AxisModel:
+    """A hypothesis about an axis.
+
+    gain: m/s/V; delay: s; pole: rad/s; effects: (name, parameter values in the effect's order), SI
+    """
+
+    gain: float
+    delay: float
+    pole: float
+    effects: tuple[tuple[str, tuple[float, ...]], ...] = ()
+    library: Library = field(default=STANDARD, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        for name, value, low in (("gain", self.gain, -np.inf), ("delay", self.delay, 0.0), ("pole", self.pole, 1e-9)):
+            if not (np.isfinite(value) and value >= low):
+                raise BadInput(name, value, f"finite, at least {low:g}", "Give another value.")
+        for name, values in self.effects:
+            effect = self.library[name]
+            if effect.category == "base":
+                raise BadInput("effect", name, "one that is not in every model already", "Leave it out.")
+            if len(values) != len(effect.parameters):
+                raise BadInput(
+                    f"effect {name}", f"{len(values)} values", f"{len(effect.parameters)}: {', '.join(effect.names)}", "Give one per name."
+                )
+
+    def __contains__(self, name: str) -> bool:
+        return any(name == own for own, _ in self.effects)
+
+    def with_effect(self, name: str, values: Iterable[float] | None = None) -> AxisModel:
+        """The model with one effect added or changed (None: its typical size)."""
+        chosen = self.library[name].typical if values is None else tuple(float(value) for value in values)
+        return replace(self, effects=(*((own, old) for own, old in self.effects if own != name), (name, chosen)))
+
+    def without(self, name: str) -> AxisModel:
+        """The model without this effect."""
+        return replace(self, effects=tuple(item for item in self.effects if item[0] != name))
+
+    def values(self) -> dict[str, float]:
+        """Every parameter by ``gain``, ``delay``, ``pole``, ``effect.parameter``."""
+        own = {f"{name}.{key}": value for name, row in self.effects for key, value in zip(self.library[name].names, row, strict=True)}
+        return {"gain": self.gain, "delay": self.delay, "pole": self.pole, **own}
+
+
+def simulator(
+    library: Library, active: Iterable[str], sampling_rate: float, voltage: FloatArray, position: FloatArray
+) -> Callable[[FloatArray], FloatArray]:
+    """A function from parameters to the simulated velocity (n - 1,), m/s, for many runs on the same data.
+
+    Its argument is a row: gain, delay, pole, then each active effect's parameters, in the order of ``active``.
+    voltage, position: (n,) V and m; the voltage of sample k is held to k + 1.
+    """
+    if voltage.shape != position.shape or voltage.ndim != 1 or voltage.size < 2:
+        raise BadInput("shape of voltage and position", f"{voltage.shape} and {position.shape}", "one and the same (n,), n >= 2", "Give one axis.")
+    u = np.ascontiguousarray(voltage[:-1], dtype=np.float64)
+    x = np.ascontiguousarray(position, dtype=np.float64)
+    chosen = [library[name] for name in active]
+    row = np.ones(len(library.places))
+    where = np.array([library.places[name] for name in (*BASE, *(f"{effect.name}.{key}" for effect in chosen for key in effect.names))])
+    names = [effect.name for effect in library.acting]
+    sizes = [(names.index(effect.name), library.places[f"{effect.name}.{effect.names[0]}"]) for effect in chosen]
+    kernel = library.kernel
+
+    def run(parameters: FloatArray) -> FloatArray:
+        row[where] = parameters
+        on = np.zeros(len(names), dtype=np.uint8)
+        for place, size in sizes:
+            on[place] = row[size] != 0.0
+        out = np.empty(u.size)
+        kernel(u, x, row, on, float(sampling_rate), out)
+        return out
+
+    return run
+
+
+def simulate(model: AxisModel, sampling_rate: float, voltage: FloatArray, position: FloatArray) -> FloatArray:
+    """(n - 1,) mean velocity of each sample, m/s, from rest; arguments as in ``simulator``."""
+    names = [name for name, _ in model.effects]
+    run = simulator(model.library, names, sampling_rate, voltage, position)
+    return run(np.array([model.gain, model.delay, model.pole, *(value for _, values in model.effects for value in values)]))
+
+
+def sample_velocity(sampling_rate: float, position: FloatArray) -> FloatArray:
+    """(n - 1,) mean velocity of each sample, m/s: what ``simulate`` predicts."""
+    return np.asarray(np.diff(position) * sampling_rate)

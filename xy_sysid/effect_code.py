@@ -1,0 +1,300 @@
+"""The text of one fused simulation loop, written from the laws of a set of effects.
+
+Every effect of the set is in the loop behind a flag, so that any combination runs without compiling again. What does
+not depend on speed is worked out before the loop, or once per piece of a sample.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from string import Template
+
+from xy_sysid.effects.contract import Effect, arguments
+
+BASE = ("gain", "delay", "pole")
+
+
+def slots(effects: Sequence[Effect]) -> dict[str, int]:
+    """Place of each parameter in the row of numbers: ``gain``, ``delay``, ``pole``, then ``effect.parameter``."""
+    names = [*BASE, *(f"{effect.name}.{name}" for effect in effects for name in effect.names)]
+    return {name: place for place, name in enumerate(names)}
+
+
+def called(effect: Effect, function: str) -> str:
+    """Name of a law in the loop."""
+    return f"{effect.name}__{function}"
+
+
+def text(name: str, effects: Sequence[Effect]) -> str:
+    """Source of ``name(u, x, p, on, fs, out)``.
+
+    u: (n,) held voltage, V; x: (n + 1,) measured position, m; p: numbers in the order of ``slots``; on: (effects,) flags;
+    fs: Hz; out: (n,) receives the mean velocity of each sample, m/s.
+    """
+    return TEMPLATE.substitute(
+        name=name,
+        unpack=_unpack(effects),
+        flags=_flags(effects),
+        inputs=_inputs(effects),
+        levels=_levels(effects),
+        states=_states(effects),
+        pulls=_pulls(effects),
+        advance=_advance(effects),
+        drag_start=_drags(effects, "v"),
+        drag_middle=_drags(effects, "middle"),
+        drag_free=_drags(effects, "middle", 6),
+        level_start=_moving_levels(effects, "v"),
+        level_middle=_moving_levels(effects, "middle"),
+        bristle=_bristle(effects),
+        motions=_motions(effects),
+        encoders=_encoders(effects),
+    )
+
+
+def needs_speed(effect: Effect) -> bool:
+    """True if the law's value changes within a sub-step because the speed does."""
+    if effect.category in ("state", "bristle"):
+        return True
+    return effect.category in ("force", "friction") and any("v" in arguments(item) for item in effect.functions.values())
+
+
+def _call(effect: Effect, function: str, words: Mapping[str, str]) -> str:
+    own = {name: f"{effect.name}_{name}" for name in (*effect.names, *effect.states)}
+    bound = {**words, **own}
+    return f"{called(effect, function)}({', '.join(bound[word] for word in arguments(effect.functions[function]))})"
+
+
+def _of(effects: Sequence[Effect], category: str) -> list[Effect]:
+    return sorted((effect for effect in effects if effect.category == category), key=lambda effect: (effect.order, effect.name))
+
+
+def _lines(depth: int, lines: Sequence[str]) -> str:
+    return "\n".join("    " * depth + line for line in lines) or "    " * depth + "pass"
+
+
+def _unpack(effects: Sequence[Effect]) -> str:
+    place = slots(effects)
+    return _lines(1, [f"{effect.name}_{name} = p[{place[f'{effect.name}.{name}']}]" for effect in effects for name in effect.names])
+
+
+def _flags(effects: Sequence[Effect]) -> str:
+    lines = [f"has_{effect.name} = on[{place}] != 0" for place, effect in enumerate(effects)]
+    groups = {
+        "curved": [effect for effect in effects if needs_speed(effect)],
+        "any_state": _of(effects, "state"),
+        "any_pull": [effect for effect in _of(effects, "force") if not needs_speed(effect)],
+        "dry": _of(effects, "friction"),
+        "bristled": _of(effects, "bristle"),
+    }
+    lines += [f"{group} = {' or '.join(f'has_{effect.name}' for effect in members) or 'False'}" for group, members in groups.items()]
+    return _lines(1, lines)
+
+
+def _inputs(effects: Sequence[Effect]) -> str:
+    words = {"u": "held[i]", "t": "i / fs", "x": "x[i]"}
+    lines = []
+    for effect in _of(effects, "input"):
+        lines += [f"if has_{effect.name}:", "    for i in range(n):", f"        held[i] = {_call(effect, 'output', words)}"]
+    return _lines(1, lines)
+
+
+def _levels(effects: Sequence[Effect]) -> str:
+    """Levels at rest, both ways, and the part of them that does not depend on speed."""
+    lines = []
+    for effect in _of(effects, "friction"):
+        lines.append(f"if has_{effect.name}:")
+        for side, direction in (("forth", "1.0"), ("back", "-1.0")):
+            value = _call(effect, "level", {"v": "0.0", "direction": direction})
+            lines.append(f"    rest_{side} += {value}")
+            if not needs_speed(effect):
+                lines.append(f"    fixed_{side} += {value}")
+    return _lines(1, lines)
+
+
+def _states(effects: Sequence[Effect]) -> str:
+    return _lines(1, [f"{effect.name}_{state} = 0.0" for effect in effects for state in effect.states])
+
+
+def _pulls(effects: Sequence[Effect]) -> str:
+    words = {"x": "place", "t": "time", "u": "volts", "gain": "gain", "pole": "pole"}
+    lines = []
+    for effect in _of(effects, "force"):
+        if not needs_speed(effect):
+            lines += [f"if has_{effect.name}:", f"    pull += {_call(effect, 'force', words)}"]
+    return _lines(4, lines)
+
+
+def _advance(effects: Sequence[Effect]) -> str:
+    words = {"u": "drive", "v": "v", "x": "place", "t": "time", "h": "h", "gain": "gain", "pole": "pole"}
+    lines = []
+    for effect in _of(effects, "state"):
+        targets = ", ".join(["drive", *(f"{effect.name}_{state}" for state in effect.states)])
+        lines += [f"if has_{effect.name}:", f"    {targets} = {_call(effect, 'advance', words)}"]
+    return _lines(5, lines)
+
+
+def _drags(effects: Sequence[Effect], speed: str, depth: int = 5) -> str:
+    words = {"u": "drive", "v": speed, "x": "place", "t": "time", "gain": "gain", "pole": "pole"}
+    lines = []
+    for effect in _of(effects, "force"):
+        if needs_speed(effect):
+            lines += [f"if has_{effect.name}:", f"    drag += {_call(effect, 'force', words)}"]
+    return _lines(depth, lines)
+
+
+def _moving_levels(effects: Sequence[Effect], speed: str) -> str:
+    words = {"v": speed, "direction": "direction"}
+    lines = []
+    for effect in _of(effects, "friction"):
+        if needs_speed(effect):
+            lines += [f"if has_{effect.name}:", f"    level += {_call(effect, 'level', words)}"]
+    return _lines(5, lines)
+
+
+def _bristle(effects: Sequence[Effect]) -> str:
+    words = {"v": "v", "h": "0.5 * h", "level": "level"}
+    after = {**words, "v": "end"}
+    bends, forces, relaxes = [], [], []
+    for effect in _of(effects, "bristle"):
+        state = f"{effect.name}_{effect.states[0]}"
+        bends += [f"if has_{effect.name}:", f"    {state} = {_call(effect, 'bend', words)}"]
+        forces += [f"if has_{effect.name}:", f"    push -= {_call(effect, 'force', words)}"]
+        relaxes += [f"if has_{effect.name}:", f"    {state} = {_call(effect, 'bend', after)}"]
+    move = ["reach = gain * push", "end = reach + (v - reach) * decay", "moved += reach * h + (v - reach) * spent"]
+    return _lines(5, [*bends, *forces, *move, *relaxes, "v = end"])
+
+
+def _motions(effects: Sequence[Effect]) -> str:
+    lines = []
+    for effect in _of(effects, "motion"):
+        lines += [
+            f"if has_{effect.name}:",
+            f"    b0, b1, b2, a1, a2 = {_call(effect, 'section', {'fs': 'fs'})}",
+            "    first = second = 0.0",
+            "    for i in range(n):",
+            "        value = b0 * out[i] + first",
+            "        first = b1 * out[i] - a1 * value + second",
+            "        second = b2 * out[i] - a2 * value",
+            "        out[i] = value",
+        ]
+    return _lines(1, lines)
+
+
+def _encoders(effects: Sequence[Effect]) -> str:
+    lines = []
+    for effect in _of(effects, "encoder"):
+        lines += [
+            f"if has_{effect.name}:",
+            f"    before = {_call(effect, 'error', {'x': 'x[0]'})}",
+            "    for i in range(n):",
+            f"        after = {_call(effect, 'error', {'x': 'x[i + 1]'})}",
+            "        out[i] += (after - before) * fs",
+            "        before = after",
+        ]
+    return _lines(1, lines)
+
+
+TEMPLATE = Template("""\
+def $name(u, x, p, on, fs, out):
+    n = out.shape[0]
+    gain, delay, pole = p[0], p[1], p[2]
+$unpack
+$flags
+    held = u.copy()
+$inputs
+    rest_forth = rest_back = fixed_forth = fixed_back = 0.0
+$levels
+$states
+    late = delay * fs
+    whole = int(late)
+    part = late - whole
+    cuts = 2 if curved else 1
+    h_old, h_new = part / fs / cuts, (1.0 - part) / fs / cuts
+    decay_old, decay_new = math.exp(-pole * h_old), math.exp(-pole * h_new)
+    spent_old, spent_new = -math.expm1(-pole * h_old) / pole, -math.expm1(-pole * h_new) / pole
+    v = 0.0
+    for i in range(n):
+        moved = 0.0
+        for piece in range(2):
+            if piece == 0:
+                h, decay, spent, middle_of = h_old, decay_old, spent_old, 0.5 * part
+            else:
+                h, decay, spent, middle_of = h_new, decay_new, spent_new, 0.5 * (1.0 + part)
+            if h <= 0.0:
+                continue
+            k = i - whole - 1 + piece
+            volts = held[k] if k >= 0 else 0.0
+            time = (i + middle_of) / fs
+            place = x[i] + middle_of * (x[i + 1] - x[i])
+            pull = 0.0
+            if any_pull:
+$pulls
+            for cut in range(cuts):
+                drive = volts
+                if any_state:
+$advance
+                net = drive - pull
+                drag = 0.0
+                if curved:
+$drag_start
+                push = net - drag
+                if not dry and not bristled:
+                    if curved:
+                        middle = v + 0.5 * (gain * push - v) * (1.0 - decay)
+                        drag = 0.0
+$drag_free
+                        push = net - drag
+                    reach = gain * push
+                    moved += reach * h + (v - reach) * spent
+                    v = reach + (v - reach) * decay
+                    continue
+                if v == 0.0 and not bristled:
+                    direction = 1.0 if gain * push > 0.0 else -1.0
+                else:
+                    direction = 1.0 if v > 0.0 else -1.0
+                # friction opposes motion, whatever the sign of the gain
+                sign = direction if gain > 0.0 else -direction
+                level = fixed_forth if direction > 0.0 else fixed_back
+                if curved:
+$level_start
+                if bristled:
+$bristle
+                    continue
+                rest = rest_forth if direction > 0.0 else rest_back
+                if v == 0.0:
+                    if abs(push) <= rest:
+                        continue
+                    if curved:
+                        level = rest
+                if curved:
+                    middle = v + 0.5 * (gain * (push - sign * level) - v) * (1.0 - decay)
+                    if middle * direction < 0.0:
+                        middle = 0.0
+                    drag = 0.0
+$drag_middle
+                    push = net - drag
+                    level = fixed_forth if direction > 0.0 else fixed_back
+$level_middle
+                reach = gain * (push - sign * level)
+                end = reach + (v - reach) * decay
+                if end * direction >= 0.0:
+                    moved += reach * h + (v - reach) * spent
+                    v = end
+                    continue
+                # it comes to rest within the sub-step: find when, then see whether it sticks or turns
+                gone = min(math.log1p(-v / reach) / pole, h)
+                moved += reach * gone + v / pole
+                v = 0.0
+                direction = 1.0 if gain * push > 0.0 else -1.0
+                rest = rest_forth if direction > 0.0 else rest_back
+                if abs(push) > rest:
+                    sign = direction if gain > 0.0 else -direction
+                    reach = gain * (push - sign * rest)
+                    left = h - gone
+                    grown = -math.expm1(-pole * left)
+                    moved += reach * (left - grown / pole)
+                    v = reach * grown
+        out[i] = moved * fs
+$motions
+$encoders
+""")

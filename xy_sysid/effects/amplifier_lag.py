@@ -1,0 +1,56 @@
+"""The current needs time to rise."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import scipy.signal
+
+from xy_sysid.effects.contract import Effect, Parameter, law
+from xy_sysid.effects.scene import Guess, Scene, columns
+from xy_sysid.stream import FloatArray
+
+
+@law
+def advance(lag: float, current: float, u: float, h: float) -> tuple[float, float]:
+    """(mean over the sub-step, value at its end) of the lagging voltage, V; exact for the constant ``u``."""
+    left = math.exp(-h / lag)
+    end = u + (current - u) * left
+    return u + (current - u) * lag / h * (1.0 - left), end
+
+
+def guesses(scene: Scene) -> Iterator[Guess]:
+    """What a first-order lag of 0.2 to 5 ms takes from the voltage."""
+    for lag in np.geomspace(0.2e-3, 5e-3, 6):
+        left = math.exp(-1.0 / (float(lag) * scene.sampling_rate))
+        behind = scipy.signal.lfilter([1.0 - left], [1.0, -left], scene.voltage)
+        yield Guess(columns(scene.voltage - behind), _Reader(float(lag)))
+
+
+class _Reader:
+    """The lag from the coefficient of one that was tried."""
+
+    def __init__(self, lag: float) -> None:
+        self.lag = lag
+
+    def __call__(self, c: FloatArray) -> tuple[float, ...]:
+        return (self.lag * min(max(float(c[0]), 0.3), 3.0),)
+
+
+EFFECT = Effect(
+    name="amplifier_lag",
+    law="lag u_eff' + u_eff = u",
+    meaning="motor inductance over resistance, filter of the command input",
+    validity="one time constant; the current loop is not in its limit",
+    source="Krishnan, Electric Motor Drives, Prentice Hall 2001, sec. 2.3",
+    category="state",
+    parameters=(Parameter("lag", "s", 1e-5, 1.0, 1e-3, "time constant"),),
+    shows="one more slope at high frequency, with its phase",
+    look_alikes=("time_delay", "viscous_friction"),
+    experiment="excite to a higher frequency; measure the motor current",
+    functions={"advance": advance},
+    guesses=guesses,
+    states=("current",),
+)

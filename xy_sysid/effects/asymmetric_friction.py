@@ -1,0 +1,46 @@
+"""Dry friction that differs between the two directions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from xy_sysid.effects.contract import Effect, Parameter, law
+from xy_sysid.effects.scene import Guess, Scene, columns
+from xy_sysid.stream import FloatArray
+
+
+@law
+def level(asymmetry: float, coulomb: float, direction: float) -> float:
+    """Size of the friction in one direction, V."""
+    return coulomb * (1.0 + asymmetry * direction)
+
+
+def guesses(scene: Scene) -> Iterator[Guess]:
+    """The direction of motion, and whether it moves at all."""
+    direction = scene.direction()
+
+    def read(c: FloatArray) -> tuple[float, ...]:
+        even, odd = float(c[1]), max(float(c[0]), 1e-3)
+        return (min(max(even / odd, -0.95), 0.95), odd)
+
+    yield Guess(columns(direction, abs(direction)), read)
+
+
+EFFECT = Effect(
+    name="asymmetric_friction",
+    law="F = coulomb (1 + asymmetry sign(v)) sign(v)",
+    meaning="worn or tilted nut, one-sided wiper: forth costs more than back",
+    validity="speeds well above breakaway; each direction has one level",
+    source="Armstrong-Helouvry, Control of Machines with Friction, Kluwer 1991, ch. 3",
+    category="friction",
+    parameters=(
+        Parameter("asymmetry", "", -0.99, 0.99, 0.5, "part by which forth is above and back below the mean", positive=False),
+        Parameter("coulomb", "V", 1e-6, 100.0, 0.2, "mean level"),
+    ),
+    shows="error of another size forth than back, that vanishes at rest",
+    look_alikes=("constant_load", "coulomb_friction"),
+    experiment="rest under small voltages of both signs: a load shifts the two breakaway levels even where nothing moves",
+    functions={"level": level},
+    guesses=guesses,
+    family="dry_friction",
+)

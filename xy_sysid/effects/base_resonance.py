@@ -1,0 +1,42 @@
+"""The base is a mass on a spring, and the table pushes it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from xy_sysid.effects import modes
+from xy_sysid.effects.contract import Effect, Parameter, law
+from xy_sysid.effects.scene import Guess, Scene
+
+
+@law
+def section(split: float, frequency: float, damping: float, pole_damping: float, fs: float) -> tuple[float, float, float, float, float]:
+    """The pole-zero pair."""
+    return modes.pair(frequency, damping, frequency * (1.0 + split), pole_damping, fs)
+
+
+def guesses(scene: Scene) -> Iterable[Guess]:
+    """Pairs from 5 to 90 Hz."""
+    return modes.guesses(scene, 5.0, 90.0)
+
+
+EFFECT = Effect(
+    name="base_resonance",
+    law="v = v_rigid (s^2 + 2 d w s + w^2) / (s^2 + 2 d_p w_p s + w_p^2) (w_p / w)^2; w = 2 pi frequency, w_p = w (1 + split)",
+    meaning="machine frame on its feet or its bolts; the encoder, fixed to it, sees antiresonance before resonance",
+    validity="one mode, small amplitude; dry friction is taken to act on the rigid motion",
+    source="Preumont, Vibration Control of Active Structures, 3rd ed., sec. 2.4 (alternating poles and zeros)",
+    category="motion",
+    parameters=(
+        Parameter("split", "", 1e-4, 10.0, 0.04, "resonance over antiresonance, minus 1"),
+        Parameter("frequency", "Hz", 1.0, 90.0, 46.0, "antiresonance: base and table together, screw locked"),
+        Parameter("damping", "", 1e-4, 1.0, 0.015, "damping ratio of the antiresonance"),
+        Parameter("pole_damping", "", 1e-4, 1.0, 0.02, "damping ratio of the resonance"),
+    ),
+    shows="antiresonance and resonance below 90 Hz (a prior: above, it is called the screw's)",
+    look_alikes=("screw_compliance",),
+    experiment="a scale on the table, an accelerometer on the base, or another payload",
+    functions={"section": section},
+    guesses=guesses,
+    family="resonance",
+)

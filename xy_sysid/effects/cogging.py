@@ -1,0 +1,56 @@
+"""The motor prefers certain angles."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from xy_sysid.effects.contract import Effect, Parameter, law
+from xy_sysid.effects.scene import Guess, Scene, columns
+from xy_sysid.stream import FloatArray
+
+
+@law
+def force(amplitude: float, period: float, phase: float, x: float) -> float:
+    """Force against the drive at ``x``, V."""
+    return amplitude * math.sin(2.0 * math.pi * x / period + phase)
+
+
+def guesses(scene: Scene) -> Iterator[Guess]:
+    """Sine and cosine of the lengths at which the missing force repeats along the travel."""
+    missing = scene.missing_force()
+    for period in scene.periods(missing, np.ones_like(missing)):
+        angle = 2.0 * math.pi * scene.position / period
+        yield Guess(columns(np.sin(angle), np.cos(angle)), _Reader(period))
+
+
+class _Reader:
+    """(amplitude, period, phase) from the coefficients of sine and cosine."""
+
+    def __init__(self, period: float) -> None:
+        self.period = period
+
+    def __call__(self, c: FloatArray) -> tuple[float, ...]:
+        return (max(math.hypot(float(c[0]), float(c[1])), 1e-3), self.period, math.atan2(float(c[1]), float(c[0])))
+
+
+EFFECT = Effect(
+    name="cogging",
+    law="F = amplitude sin(2 pi x / period + phase)",
+    meaning="magnets against slots, and the current sensor's ripple",
+    validity="at least 3 periods within the travel; one harmonic",
+    source="Hanselman, Brushless Permanent Magnet Motor Design, 2nd ed., 2003, ch. 5",
+    category="force",
+    parameters=(
+        Parameter("amplitude", "V", 1e-6, 100.0, 0.15, "drive voltage that overcomes it"),
+        Parameter("period", "m", 1e-5, 10.0, 2.5e-3, "length of one period"),
+        Parameter("phase", "rad", -100.0, 100.0, 0.0, "phase at x = 0", positive=False),
+    ),
+    shows="error repeats along the travel, at all speeds with the same force",
+    look_alikes=("lead_error", "position_dependent_gain"),
+    experiment="a slow traverse: cogging's error in force stays, that of a lead error shrinks with speed",
+    functions={"force": force},
+    guesses=guesses,
+)

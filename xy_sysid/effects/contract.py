@@ -1,0 +1,149 @@
+"""What an effect tells about itself, and the places of the simulation where its law can act.
+
+A law is an ordinary function of numbers. Its arguments are bound by name: parameters and states of the effect, and what
+the simulation knows at that moment (``WORDS``). So a law reads as the equation does, and needs no other glue.
+
+| category | function | returns | where it acts |
+|---|---|---|---|
+| base | (none) | | part of every model: gain, delay, pole |
+| input | output(u, t, x) | V | on each held voltage sample, before the delay |
+| state | advance(states, u, v, x, t, h, gain, pole) | V that is left of u, new states | on the voltage in each sub-step |
+| force | force(u, v, x, t, gain) | V against the drive | in each sub-step; x is the measured position |
+| friction | level(v, direction) | V, never negative | dry friction: sticks, and zero crossings are found in time |
+| bristle | bend(state, v, h, level), force(state, v, level) | new state; V | takes over all dry friction |
+| motion | section(fs) | b0, b1, b2, a1, a2 | linear section that the sampled motion passes |
+| encoder | error(x) | m | added to what the encoder reads |
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal, ParamSpec, TypeVar
+
+from numba.extending import register_jitable
+
+from xy_sysid.effects.scene import Guess, Scene
+from xy_sysid.errors import BadInput
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+Category = Literal["base", "input", "state", "force", "friction", "bristle", "motion", "encoder"]
+Law = Callable[..., Any]
+
+FUNCTIONS: Mapping[str, tuple[str, ...]] = {
+    "base": (),
+    "input": ("output",),
+    "state": ("advance",),
+    "force": ("force",),
+    "friction": ("level",),
+    "bristle": ("bend", "force"),
+    "motion": ("section",),
+    "encoder": ("error",),
+}
+
+WORDS: Mapping[str, str] = {
+    "u": "voltage at this place of the chain, V",
+    "v": "velocity of the axis, m/s",
+    "x": "measured position, m",
+    "t": "time since the start, s",
+    "h": "length of the sub-step, s",
+    "direction": "+1 forth, -1 back",
+    "level": "size of all dry friction at this speed, V",
+    "gain": "speed per volt of the base, m/s/V",
+    "pole": "rate of the base, rad/s",
+    "fs": "sampling rate, Hz",
+}
+
+
+def law(function: Callable[P, R]) -> Callable[P, R]:
+    """The same function, callable from Python, and compiled into the simulation."""
+    compilable: Callable[P, R] = register_jitable(forceinline=True)(function)
+    return compilable
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One number of an effect.
+
+    low, high: what a fit may reach, SI; positive: fitted as a logarithm; typical: a usual size (scale of a step, tests)
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    typical: float
+    meaning: str
+    positive: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """One physical effect.
+
+    law:         one line of mathematics
+    meaning:     what it is on a real machine
+    validity:    where the law holds, and where it does not
+    source:      paper or book, with the equation
+    category:    where it acts (table above)
+    parameters:  the first one is its size: at zero the effect is absent
+    shows:       how it looks in data
+    look_alikes: names of effects that it can be taken for
+    experiment:  what separates it from them
+    functions:   the compiled law, by the names of the table above
+    guesses:     its signatures on a scene, with a way to read start values
+    states:      names of the law's states; all start at zero
+    family:      effects of one family replace one another
+    order:       place among the effects of its category, in the direction of the signal
+    simulable:   False if free simulation cannot judge it (one-step prediction must)
+    """
+
+    name: str
+    law: str
+    meaning: str
+    validity: str
+    source: str
+    category: Category
+    parameters: tuple[Parameter, ...]
+    shows: str
+    look_alikes: tuple[str, ...]
+    experiment: str
+    functions: Mapping[str, Law] = field(default_factory=dict)
+    guesses: Callable[[Scene], Iterable[Guess]] | None = None
+    states: tuple[str, ...] = ()
+    family: str = ""
+    order: int = 0
+    simulable: bool = True
+
+    def __post_init__(self) -> None:
+        """Raises BadInput if the functions do not fit the category or ask for words that nobody knows."""
+        if self.category not in FUNCTIONS:
+            raise BadInput(f"effect {self.name}: category", repr(self.category), ", ".join(FUNCTIONS), "Choose one of these.")
+        expected = FUNCTIONS[self.category]
+        if tuple(sorted(self.functions)) != tuple(sorted(expected)):
+            raise BadInput(f"effect {self.name}: functions", sorted(self.functions), " and ".join(expected) or "none", "Give these.")
+        if not self.name.isidentifier() or not self.parameters:
+            raise BadInput(f"effect {self.name!r}", "incomplete", "a Python name and at least one parameter", "Complete it.")
+        known = {*WORDS, *self.states, *(parameter.name for parameter in self.parameters)}
+        for name in expected:
+            for word in arguments(self.functions[name]):
+                if word not in known:
+                    raise BadInput(f"effect {self.name}: argument of {name}", repr(word), ", ".join(sorted(known)), "Rename it.")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+        return tuple(parameter.name for parameter in self.parameters)
+
+    @property
+    def typical(self) -> tuple[float, ...]:
+        """A usual size of each parameter, SI."""
+        return tuple(parameter.typical for parameter in self.parameters)
+
+
+def arguments(function: Law) -> tuple[str, ...]:
+    """The names of a law's arguments."""
+    return tuple(inspect.signature(function).parameters)

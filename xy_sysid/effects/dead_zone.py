@@ -1,0 +1,50 @@
+"""Small commands do nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from xy_sysid.effects.contract import Effect, Parameter, law
+from xy_sysid.effects.scene import Guess, Scene, columns
+from xy_sysid.stream import FloatArray
+
+
+@law
+def output(width: float, u: float) -> float:
+    """What is left of the voltage ``u``, V."""
+    return u - min(max(u, -width), width)
+
+
+def guesses(scene: Scene) -> Iterator[Guess]:
+    """The part of the voltage within a zone of 3 to 100 per cent of its rms."""
+    u = scene.voltage
+    for width in np.geomspace(0.03, 1.0, 8) * float(np.std(u)):
+        yield Guess(columns(np.clip(u, -width, width)), _Reader(float(width)))
+
+
+class _Reader:
+    """The width from the coefficient of a zone that was tried: to first order both shift the voltage alike."""
+
+    def __init__(self, width: float) -> None:
+        self.width = width
+
+    def __call__(self, c: FloatArray) -> tuple[float, ...]:
+        return (self.width * max(float(c[0]), 0.1),)
+
+
+EFFECT = Effect(
+    name="dead_zone",
+    law="u_eff = u - clip(u, -width, width)",
+    meaning="amplifier cross-over, valve overlap, a threshold in the drive",
+    validity="the same width on both sides; acts on the command, whatever the motion",
+    source="Tao & Kokotovic, Adaptive Control of Systems with Actuator Nonlinearities, Wiley 1996, sec. 2.1",
+    category="input",
+    parameters=(Parameter("width", "V", 1e-6, 100.0, 0.15, "half of the zone"),),
+    shows="error follows the sign of the voltage, not of the motion",
+    look_alikes=("coulomb_friction",),
+    experiment="fast excitation parts the sign of voltage from the sign of velocity; at constant voltage they look the same",
+    functions={"output": output},
+    guesses=guesses,
+)

@@ -1,0 +1,39 @@
+"""A spring to the middle that stiffens."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from xy_sysid.effects.contract import Effect, Parameter, law
+from xy_sysid.effects.scene import Guess, Scene, columns
+
+
+@law
+def force(cubic: float, linear: float, x: float) -> float:
+    """Force against the drive at ``x``, V."""
+    return (linear + cubic * x * x) * x
+
+
+def guesses(scene: Scene) -> Iterator[Guess]:
+    """Position and its cube."""
+    x = scene.position
+    yield Guess(columns(x**3, x), lambda c: (max(float(c[0]), 1.0), float(c[1])))
+
+
+EFFECT = Effect(
+    name="hardening_stiffness",
+    law="F = linear x + cubic x^3",
+    meaning="bellows, cable chain, hose",
+    validity="rest position at x = 0; large travel",
+    source="Worden & Tomlinson, Nonlinearity in Structural Dynamics, 2001, sec. 2.2.1 (Duffing)",
+    category="force",
+    parameters=(
+        Parameter("cubic", "V/m3", 1e-6, 1e12, 3000.0, "drive voltage that holds it, per cube of the distance"),
+        Parameter("linear", "V/m", -1e6, 1e6, 0.0, "the same, per distance", positive=False),
+    ),
+    shows="error grows towards both ends of the travel, with the sign of the position",
+    look_alikes=("constant_load",),
+    experiment="hold still at several places: the voltage needed is the law",
+    functions={"force": force},
+    guesses=guesses,
+)

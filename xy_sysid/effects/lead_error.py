@@ -1,0 +1,58 @@
+"""The scale and the screw disagree, periodically."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from xy_sysid.effects.contract import Effect, Parameter, law
+from xy_sysid.effects.scene import Guess, Scene, columns
+from xy_sysid.stream import FloatArray
+
+
+@law
+def error(amplitude: float, period: float, phase: float, x: float) -> float:
+    """What the encoder shows too much at ``x``, m."""
+    return amplitude * math.sin(2.0 * math.pi * x / period + phase)
+
+
+def guesses(scene: Scene) -> Iterator[Guess]:
+    """Sine and cosine of the lengths at which the error in velocity, over velocity, repeats along the travel."""
+    v = scene.velocity
+    e = scene.smooth(scene.error, 300.0)
+    for period in scene.periods(e * v, v * v):
+        angle = 2.0 * math.pi * scene.position / period
+        rate = 2.0 * math.pi / period * v
+        yield Guess(columns(rate * np.cos(angle), -rate * np.sin(angle)), _Reader(period), at_encoder=True)
+
+
+class _Reader:
+    """(amplitude, period, phase) from the coefficients of sine and cosine."""
+
+    def __init__(self, period: float) -> None:
+        self.period = period
+
+    def __call__(self, c: FloatArray) -> tuple[float, ...]:
+        return (max(math.hypot(float(c[0]), float(c[1])), 1e-8), self.period, math.atan2(float(c[1]), float(c[0])))
+
+
+EFFECT = Effect(
+    name="lead_error",
+    law="y = x + amplitude sin(2 pi x / period + phase)",
+    meaning="wobble of the screw, or an encoder disk off centre",
+    validity="at least 3 periods within the travel; small against the period",
+    source="ISO 3408-3:2006, travel deviation within one revolution",
+    category="encoder",
+    parameters=(
+        Parameter("amplitude", "m", 1e-9, 1e-2, 8e-6, "largest error"),
+        Parameter("period", "m", 1e-5, 10.0, 0.01, "length of one period"),
+        Parameter("phase", "rad", -100.0, 100.0, 0.0, "phase at x = 0", positive=False),
+    ),
+    shows="error repeats along the travel and grows with speed",
+    look_alikes=("cogging", "position_dependent_gain"),
+    experiment="traverse at two speeds: the error in position is the same at both",
+    functions={"error": error},
+    guesses=guesses,
+)

@@ -1,0 +1,52 @@
+"""The amplifier has a largest voltage."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from xy_sysid.effects.contract import Effect, Parameter, law
+from xy_sysid.effects.scene import Guess, Scene, columns
+from xy_sysid.stream import FloatArray
+
+
+@law
+def output(limit: float, u: float) -> float:
+    """Clipped voltage, V."""
+    return min(max(u, -limit), limit) if limit > 0.0 else u
+
+
+def guesses(scene: Scene) -> Iterator[Guess]:
+    """What lies above a limit, for limits from the top 0.1 to the top 60 per cent of the voltages."""
+    u = scene.voltage
+    for limit in np.quantile(np.abs(u), [0.4, 0.6, 0.75, 0.85, 0.92, 0.96, 0.98, 0.99, 0.997, 0.999]):
+        above = u - np.clip(u, -limit, limit)
+        yield Guess(columns(above), _Reader(float(limit)))
+
+
+class _Reader:
+    """The limit that was tried."""
+
+    def __init__(self, limit: float) -> None:
+        self.limit = limit
+
+    def __call__(self, _: FloatArray) -> tuple[float, ...]:
+        return (self.limit,)
+
+
+EFFECT = Effect(
+    name="saturation",
+    law="u_eff = clip(u, -limit, limit)",
+    meaning="supply or current limit of the drive",
+    validity="the same limit on both sides, without memory; limit 0 means none",
+    source="Khalil, Nonlinear Systems, 3rd ed., sec. 1.2.7",
+    category="input",
+    parameters=(Parameter("limit", "V", 1e-3, 1e6, 1.5, "largest voltage that comes out"),),
+    shows="error only where the voltage is large, against its sign",
+    look_alikes=("gain_drift",),
+    experiment="louder excitation: what never reaches the limit cannot show it",
+    functions={"output": output},
+    guesses=guesses,
+    order=10,
+)

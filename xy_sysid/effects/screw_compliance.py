@@ -1,0 +1,42 @@
+"""The screw is a spring between motor and table."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from xy_sysid.effects import modes
+from xy_sysid.effects.contract import Effect, Parameter, law
+from xy_sysid.effects.scene import Guess, Scene
+
+
+@law
+def section(split: float, frequency: float, damping: float, pole_damping: float, fs: float) -> tuple[float, float, float, float, float]:
+    """The pole-zero pair."""
+    return modes.pair(frequency, damping, frequency * (1.0 + split), pole_damping, fs)
+
+
+def guesses(scene: Scene) -> Iterable[Guess]:
+    """Pairs above 90 Hz."""
+    return modes.guesses(scene, 90.0, 600.0)
+
+
+EFFECT = Effect(
+    name="screw_compliance",
+    law="v = v_rigid (s^2 + 2 d w s + w^2) / (s^2 + 2 d_p w_p s + w_p^2) (w_p / w)^2; w = 2 pi frequency, w_p = w (1 + split)",
+    meaning="axial and torsional give of screw, nut and bearing; the encoder sits on the motor",
+    validity="one mode, small amplitude; dry friction is taken to act on the rigid motion",
+    source="Varanasi & Nayfeh, The dynamics of lead-screw drives, J. Dyn. Sys. Meas. Control 126 (2004), sec. 3",
+    category="motion",
+    parameters=(
+        Parameter("split", "", 1e-4, 10.0, 0.4, "resonance over antiresonance, minus 1"),
+        Parameter("frequency", "Hz", 90.0, 2000.0, 110.0, "antiresonance: table on the screw, motor locked"),
+        Parameter("damping", "", 1e-4, 1.0, 0.02, "damping ratio of the antiresonance"),
+        Parameter("pole_damping", "", 1e-4, 1.0, 0.03, "damping ratio of the resonance"),
+    ),
+    shows="antiresonance and resonance above 90 Hz (a prior: below, it is called the base's)",
+    look_alikes=("base_resonance",),
+    experiment="a scale on the table, an accelerometer on the base, or another payload",
+    functions={"section": section},
+    guesses=guesses,
+    family="resonance",
+)

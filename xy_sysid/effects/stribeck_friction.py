@@ -1,0 +1,59 @@
+"""Dry friction that is larger at rest than in motion."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from xy_sysid.effects.contract import Effect, Parameter, law
+from xy_sysid.effects.scene import Guess, Scene, columns
+from xy_sysid.stream import FloatArray
+
+
+@law
+def level(excess: float, coulomb: float, velocity: float, v: float) -> float:
+    """Size of the friction at speed ``v``, V."""
+    ratio = v / velocity
+    return coulomb + excess * math.exp(-ratio * ratio)
+
+
+def guesses(scene: Scene) -> Iterator[Guess]:
+    """The direction of motion, evenly and near rest, for Stribeck speeds from 2 to 100 per cent of the usual one."""
+    direction, v = scene.direction(), scene.smooth(scene.velocity, 300.0)
+    usual = float(np.std(v))
+    for velocity in np.geomspace(0.02, 1.0, 8) * usual:
+        near = direction * np.exp(-((v / velocity) ** 2))
+        yield Guess(columns(near, direction), _Reader(float(velocity)))
+
+
+class _Reader:
+    """(excess, coulomb, velocity) from the coefficients at one Stribeck speed."""
+
+    def __init__(self, velocity: float) -> None:
+        self.velocity = velocity
+
+    def __call__(self, c: FloatArray) -> tuple[float, ...]:
+        return (max(float(c[0]), 0.02), max(float(c[1]), 0.01), self.velocity)
+
+
+EFFECT = Effect(
+    name="stribeck_friction",
+    law="F = (coulomb + excess exp(-(v / velocity)^2)) sign(v); at rest it holds up to coulomb + excess",
+    meaning="boundary lubrication breaks down as the film builds up: stick-slip at crawling speed",
+    validity="steady film; no memory at reversals (presliding) and no frictional lag",
+    source="Armstrong-Helouvry, Dupont & Canudas de Wit, A survey of friction models, Automatica 30 (1994), eq. 6",
+    category="friction",
+    parameters=(
+        Parameter("excess", "V", 1e-6, 100.0, 0.2, "breakaway above the Coulomb level"),
+        Parameter("coulomb", "V", 1e-6, 100.0, 0.15, "level at speed"),
+        Parameter("velocity", "m/s", 1e-5, 1.0, 0.01, "speed at which the excess has fallen to 1/e"),
+    ),
+    shows="as Coulomb friction, with more error below a few mm/s than above",
+    look_alikes=("coulomb_friction", "presliding_hysteresis"),
+    experiment="slow reversals and constant crawling speeds: the force falls while speed rises",
+    functions={"level": level},
+    guesses=guesses,
+    family="dry_friction",
+)

@@ -1,0 +1,18 @@
+"""Grease, seals and back-EMF resist in proportion to speed."""
+
+from __future__ import annotations
+
+from xy_sysid.effects.contract import Effect, Parameter
+
+EFFECT = Effect(
+    name="viscous_friction",
+    law="v' = pole (gain u - v)",
+    meaning="drag in proportion to speed; with the mass it makes the pole of every axis",
+    validity="always in the model; one drag coefficient at every speed and temperature",
+    source="Olsson et al., Friction models and friction compensation, Eur. J. Control 4 (1998), eq. 2",
+    category="base",
+    parameters=(Parameter("pole", "rad/s", 1e-2, 1e5, 250.0, "rate at which speed follows voltage: drag over mass"),),
+    shows="velocity per volt falls with one slope above pole / (2 pi) Hz",
+    look_alikes=("amplifier_lag",),
+    experiment="measure the motor current: the lag lies before it, the pole behind it",
+)
