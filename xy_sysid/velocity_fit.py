@@ -1,0 +1,122 @@
+"""Levenberg-Marquardt on the whitened error in velocity.
+
+Levenberg 1944, Marquardt 1963; whitening by the error's own power, worked out again a few times: iteratively reweighted
+least squares towards the Whittle likelihood. Derivatives are forward differences of the simulation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xy_sysid.spectral_cost import Bands, Floor
+from xy_sysid.stream import FloatArray
+
+STEP = 1e-4  # of a logarithm, or of a parameter's scale: far above rounding, far below what bends
+ENOUGH = 1e-5  # relative fall of the cost below which a round ends
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """How each parameter is moved: low, high: bounds; positive: as a logarithm; unit: size of 1 in the solver else."""
+
+    low: FloatArray
+    high: FloatArray
+    positive: NDArray[np.bool_]
+    unit: FloatArray
+
+    def inner(self, values: FloatArray) -> FloatArray:
+        """The solver's coordinates."""
+        safe = np.where(self.positive, np.clip(values, self.low, self.high), 1.0)
+        return np.where(self.positive, np.log(safe), values / self.unit)
+
+    def outer(self, inner: FloatArray) -> FloatArray:
+        """Parameters, kept within their bounds."""
+        values = np.where(self.positive, np.exp(np.where(self.positive, np.clip(inner, -700.0, 700.0), 0.0)), inner * self.unit)
+        return np.asarray(np.clip(values, self.low, self.high))
+
+
+@dataclass(frozen=True, slots=True)
+class Solution:
+    """values: (k,) parameters; covariance: (k, k) of the solver's coordinates; cost: whitened; runs: simulations done."""
+
+    values: FloatArray
+    covariance: FloatArray
+    cost: float
+    runs: int
+    converged: bool
+
+
+def solve(
+    run: Callable[[FloatArray], FloatArray],
+    velocity: FloatArray,
+    layout: Bands,
+    least: Floor,
+    scale: Scale,
+    start: FloatArray,
+    rounds: int,
+    iterations: int = 8,
+) -> Solution:
+    """The parameters that explain ``velocity`` (n,) best.
+
+    run: parameters -> velocity (n,); rounds: how often the weights are worked out; iterations: most steps of each round.
+    """
+    measured = layout.spectrum(velocity)
+    runs = 0
+
+    def left(inner: FloatArray) -> NDArray[np.complex128]:
+        nonlocal runs
+        runs += 1
+        return np.asarray(measured - layout.spectrum(run(scale.outer(inner))))
+
+    inner = scale.inner(start)
+    error = left(inner)
+    size = inner.size
+    normal, cost, converged = np.eye(size), np.inf, False
+    for _ in range(rounds):
+        power = np.maximum(layout.power(error), least.power)
+        weight = np.sqrt(1.0 / power)[layout.band]
+        cost = _cost(error * weight)
+        damping, converged, fresh = 1e-3, False, True
+        for _ in range(iterations):
+            if fresh:
+                columns = np.empty((size, 2 * error.size))
+                for k in range(size):
+                    step = STEP if scale.outer(inner)[k] < scale.high[k] else -STEP
+                    moved = inner.copy()
+                    moved[k] += step
+                    change = (left(moved) - error) * (weight / step)
+                    columns[k] = np.concatenate((change.real.ravel(), change.imag.ravel()))
+                now = error * weight
+                residual = np.concatenate((now.real.ravel(), now.imag.ravel()))
+                normal, slope = columns @ columns.T, columns @ residual
+            diagonal = np.maximum(np.diag(normal), 1e-12 * float(np.max(np.diag(normal))) + 1e-300)
+            move = -np.linalg.solve(normal + damping * np.diag(diagonal), slope)
+            move *= min(1.0, 2.0 / float(np.max(np.abs(move)) + 1e-300))
+            trial = scale.inner(scale.outer(inner + move))
+            found = left(trial)
+            new = _cost(found * weight)
+            if np.isfinite(new) and new < cost:
+                fall = (cost - new) / cost
+                inner, error, cost, fresh = trial, found, new, True
+                damping = max(damping * 0.2, 1e-9)
+                if fall < ENOUGH:
+                    converged = True
+                    break
+            else:
+                fresh = False
+                damping *= 10.0
+                if damping > 1e6:
+                    converged = True
+                    break
+    diagonal = np.diag(normal) + 1e-300
+    scaled = normal / np.sqrt(np.outer(diagonal, diagonal))
+    covariance = np.linalg.pinv(scaled, rcond=1e-12, hermitian=True) / np.sqrt(np.outer(diagonal, diagonal))
+    return Solution(scale.outer(inner), covariance, cost, runs, converged)
+
+
+def _cost(error: NDArray[np.complex128]) -> float:
+    return float(np.vdot(error, error).real)
