@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 import yaml
@@ -13,6 +14,7 @@ from xy_sysid.fitting.result import Fit
 from xy_sysid.transfer_function import TransferFunction
 
 FORMAT = "xy_sysid model 1"
+Hold = Literal["zoh", "none"]
 LONGEST_DELAY = 1e3  # s; no axis answers later
 
 
@@ -61,16 +63,34 @@ def _string(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
 _Quoting.add_representer(str, _string)
 
 
+@dataclass(frozen=True, slots=True)
+class SavedModel:
+    """A model as a file keeps it; hold: how its input behaves between samples; data: SHA-256 of what it was fitted to, or empty."""
+
+    tf: TransferFunction
+    hold: Hold
+    data: str
+
+
 def read_model(path: Path) -> dict[str, TransferFunction]:
-    """The transfer functions of a model file, by axis; raises BadRecording in one line if it is not one."""
+    """The transfer functions of a model file, by axis; raises BadRecording or BadInput in one line if it is not one."""
+    return {axis: saved.tf for axis, saved in read_saved(path).items()}
+
+
+def read_saved(path: Path) -> dict[str, SavedModel]:
+    """The models of a file with what is known of them, by axis; raises BadRecording or BadInput in one line if it is not one."""
     document = _document(path)
-    return {str(axis): _transfer_function(path, str(axis), part) for axis, part in document["axes"].items()}
-
-
-def fitted_to(path: Path) -> str:
-    """SHA-256 of the samples that the models of a file were fitted to, empty if it does not say."""
-    origin = _document(path).get("provenance")
-    return str(origin.get("data_sha256", "")) if isinstance(origin, dict) else ""
+    origin = document.get("provenance")
+    told = origin.get("data_sha256") if isinstance(origin, dict) else None
+    digests = told if isinstance(told, dict) else {}
+    found: dict[str, SavedModel] = {}
+    for axis, part in document["axes"].items():
+        tf = _transfer_function(path, str(axis), part)
+        hold = part.get("hold", "zoh")
+        if hold not in get_args(Hold):
+            raise BadInput(f"{path}: axis {axis}: hold", repr(hold), ", ".join(get_args(Hold)), "Correct it.")
+        found[str(axis)] = SavedModel(tf, hold, str(digests.get(axis, "")))
+    return found
 
 
 def _document(path: Path) -> dict[str, Any]:

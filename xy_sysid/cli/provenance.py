@@ -11,12 +11,9 @@ from typing import Any
 from xy_sysid.recording import Recording
 
 
-def fingerprint(recording: Recording) -> str:
-    """SHA-256 of the samples."""
-    digest = hashlib.sha256()
-    digest.update(recording.voltage.tobytes())
-    digest.update(recording.position.tobytes())
-    return digest.hexdigest()
+def fingerprint(recording: Recording, axis: str) -> str:
+    """SHA-256 of the samples of an axis."""
+    return hashlib.sha256(b"".join(values.tobytes() for values in recording.axis(axis))).hexdigest()
 
 
 def provenance(path: Path, recording: Recording) -> dict[str, Any]:
@@ -35,7 +32,7 @@ def provenance(path: Path, recording: Recording) -> dict[str, Any]:
         "samples": len(recording),
         "sampling_rate_hz": float(recording.sampling_rate),
         "units": {"input": recording.input_unit, "output": recording.output_unit},
-        "data_sha256": fingerprint(recording),
+        "data_sha256": {axis: fingerprint(recording, axis) for axis in recording.axes},
         "versions": versions,
         "notes": list(recording.notes),
     }

@@ -27,14 +27,14 @@ def validate(
 ) -> None:
     """Check a model on a recording that it has not seen, in frequency and in time."""
     from xy_sysid.errors import BadInput
-    from xy_sysid.exports import fitted_to, read_model
+    from xy_sysid.exports import read_saved
     from xy_sysid.model_check import check
     from xy_sysid.offline import estimate, judged
     from xy_sysid.validation import simulation_sentence
 
     settings = o.settings_from(params, set_)
     samples = o.period_from(period)
-    models = read_model(model)
+    models = read_saved(model)
     recording = read(rec, axis, topic, effort, span, json)
     answers: dict[str, Any] = {}
     for name in chosen(recording, axis):
@@ -44,11 +44,11 @@ def validate(
         judged(found.frf)
         run = max(recording.runs(), key=lambda part: part.stop - part.start)
         u, y = recording.axis(name)
-        answers[name] = check(models[name], found.frf, u[run], y[run], settings.hold)
+        answers[name] = check(models[name].tf, found.frf, u[run], y[run], models[name].hold)
         for note in found.notes:
             if not json:
                 aside.print(f"axis {name}: {note}")
-    same = fingerprint(recording) == fitted_to(model)
+    same = [name for name in answers if models[name].data == fingerprint(recording, name)]
     if json:
         emit({"model": str(model), "recording": str(rec), "same_data_as_the_fit": same, "axes": answers})
         return
@@ -65,8 +65,8 @@ def validate(
         for name, found in answers.items()
     ]
     table(f"{model} on {rec}", ("axis", "error %", "noise %", "rms sigma", "worst sigma", "at Hz", "in time %"), rows)
-    if same:
-        aside.print("note: the model was fitted to this very recording, so this is no validation")
+    for name in same:
+        aside.print(f"axis {name}: the model was fitted to this very recording, so this is no validation")
     for name, found in answers.items():
         people.print(f"axis {name}: {found.sentence}")
         if found.simulation is not None:
