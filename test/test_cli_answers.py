@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -199,15 +200,16 @@ def test_replay_gives_what_the_plain_logic_gives(paper: Path, tmp_path: Path) ->
     settings = IdentifierSettings()
     updates = list(replay(((kind, block) for kind, block in stream_blocks(paper) if kind in KINDS), settings, ("x", "y")))
     wanted = [(f"/xy/{message.topic}", message.data) for update in updates for message in update.arrays()]
-    store = get_typestore(Stores.ROS2_JAZZY)
+    store: Any = get_typestore(Stores.ROS2_JAZZY)
     with Reader(tmp_path / "out") as reader:
         written = [(item.topic, store.deserialize_cdr(raw, item.msgtype)) for item, _, raw in reader.messages()]
     assert [name for name, _ in written] == [name for name, _ in wanted]
     for (_, message), (_, data) in zip(written, wanted, strict=True):
         np.testing.assert_array_equal(message.data, data)
-    answer = cli("replay", paper, "--json").json
+    answer, last = cli("replay", paper, "--json").json, updates[-1].axes["x"].fit
+    assert last is not None
     assert answer["updates"] == len(updates) and answer["faults"] == {} and answer["alarms"] == {}
-    assert float(answer["axes"]["x"]["values"]["delay (s)"]) == pytest.approx(updates[-1].axes["x"].fit.tf.delay, rel=1e-8)
+    assert float(answer["axes"]["x"]["values"]["delay (s)"]) == pytest.approx(last.tf.delay, rel=1e-8)
 
 
 def test_json_is_one_document_and_progress_stays_off_a_pipe(paper: Path, model: Path) -> None:
