@@ -127,16 +127,43 @@ def fit_with(data: AxisData, base: GreyboxFit, names: Iterable[str], starts: Map
     model = base.model
     for name in names:
         values = (starts or {}).get(name)
-        if values is None:
-            values = look(data, base, [model.library[name]])[0].values
-        model = model.with_effect(name, bounded(model.library[name], values))
+        model = _begun(data, base, model, name) if values is None else model.with_effect(name, bounded(model.library[name], values))
     return fit(data, model)
+
+
+def _begun(data: AxisData, base: GreyboxFit, model: AxisModel, name: str) -> AxisModel:
+    """The model with one more effect, its start read from the data: the best of its trace and its joint starts."""
+    effect = model.library[name]
+    candidates = [model.with_effect(name, look(data, base, [effect])[0].values)]
+    if effect.joint is not None:
+        for gain, later, pole, values in effect.joint(_scene(data, base)):
+            whole = replace(model, gain=gain, delay=max(base.model.delay + later, 0.0), pole=min(max(pole, 1e-2), 1e5))
+            candidates.append(whole.with_effect(name, bounded(effect, values)))
+    return min(candidates, key=lambda candidate: _misfit(data, candidate))
+
+
+def _misfit(data: AxisData, model: AxisModel) -> float:
+    """Excess over the first stage's data, without a fit."""
+    run, values, _ = _problem(data, model, data.first)
+    return excess(data.layout, data.velocity[: data.first] - run(values), data.floor)
 
 
 def look(data: AxisData, fitted: GreyboxFit, effects: Iterable[Effect]) -> list[Trace]:
     """What each effect would explain of the error of a fit, best first, with start values."""
     model, n = fitted.model, data.training
-    scene = Scene(
+    run, values, scale = _problem(data, model, n)
+    inner = scale.inner(values)
+    nuisance = []
+    for k in range(values.size):
+        moved = inner.copy()
+        moved[k] += 1e-4
+        nuisance.append(run(scale.outer(moved)) - fitted.simulated[:n])
+    return screen(effects, _scene(data, fitted), np.array(nuisance), data.layout, data.floor, data.first)
+
+
+def _scene(data: AxisData, fitted: GreyboxFit) -> Scene:
+    model, n = fitted.model, data.training
+    return Scene(
         data.sampling_rate,
         model.gain,
         model.pole,
@@ -145,14 +172,6 @@ def look(data: AxisData, fitted: GreyboxFit, effects: Iterable[Effect]) -> list[
         0.5 * (data.position[1 : n + 1] + data.position[:n]),
         fitted.error[:n],
     )
-    run, values, scale = _problem(data, model, n)
-    inner = scale.inner(values)
-    nuisance = []
-    for k in range(values.size):
-        moved = inner.copy()
-        moved[k] += 1e-4
-        nuisance.append(run(scale.outer(moved)) - fitted.simulated[:n])
-    return screen(effects, scene, np.array(nuisance), data.layout, data.floor, data.first)
 
 
 def fit(data: AxisData, start: AxisModel) -> GreyboxFit:

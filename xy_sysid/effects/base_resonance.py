@@ -20,6 +20,11 @@ def guesses(scene: Scene) -> Iterable[Guess]:
     return modes.guesses(scene, 5.0, 90.0)
 
 
+def joint(scene: Scene) -> Iterable[tuple[float, float, float, tuple[float, ...]]]:
+    """Base and pair from the frequency response."""
+    return modes.joint(scene, 5.0, 90.0)
+
+
 EFFECT = Effect(
     name="base_resonance",
     law="v = v_rigid (s^2 + 2 d w s + w^2) / (s^2 + 2 d_p w_p s + w_p^2) (w_p / w)^2; w = 2 pi frequency, w_p = w (1 + split)",
@@ -38,5 +43,6 @@ EFFECT = Effect(
     experiment="a scale on the table, an accelerometer on the base, or another payload",
     functions={"section": section},
     guesses=guesses,
+    joint=joint,
     family="resonance",
 )

@@ -95,6 +95,8 @@ class Effect:
     experiment:  what separates it from them
     functions:   the compiled law, by the names of the table above
     guesses:     its signatures on a scene, with a way to read start values
+    joint:       start values of base and effect together: (gain, delay beyond the scene's, pole, values of the parameters);
+                 for effects so large that the base alone is led astray
     states:      names of the law's states; all start at zero
     family:      effects of one family replace one another
     order:       place among the effects of its category, in the direction of the signal
@@ -113,6 +115,7 @@ class Effect:
     experiment: str
     functions: Mapping[str, Law] = field(default_factory=dict)
     guesses: Callable[[Scene], Iterable[Guess]] | None = None
+    joint: Callable[[Scene], Iterable[tuple[float, float, float, tuple[float, ...]]]] | None = None
     states: tuple[str, ...] = ()
     family: str = ""
     order: int = 0
