@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from xy_sysid.frf import ComplexArray, FrequencyResponse
 from xy_sysid.spectra import Spectra
 from xy_sysid.stream import FloatArray
-from xy_sysid.windows import WindowShape, blur_kernel
+from xy_sysid.windows import WindowShape, blur_kernel, error_correlation
 
 NOISE_SMOOTHING = 2  # lines to each side over which the noise power is averaged: it steadies sigma when windows are few
 PERIODIC_COHERENCE = 0.9  # a line of a periodic input repeats itself; one that does not is feedback or noise between the excited ones
@@ -33,6 +33,11 @@ def _kernel(shape: WindowShape) -> FloatArray:
     kernel = blur_kernel(shape)
     kernel.setflags(write=False)
     return kernel
+
+
+@lru_cache(maxsize=8)
+def _correlation(shape: WindowShape) -> FloatArray:
+    return error_correlation(shape)
 
 
 def divisor(frequency: FloatArray, sampling_rate: float) -> ComplexArray:
@@ -98,8 +103,38 @@ def frequency_response(
         line_correlation=np.trim_zeros(np.where(apart < 1e-6, 0.0, apart), "b"),
         kernel_offset=np.arange(-half, half + 1) * 0.5 * sampling_rate / shape.length,
         kernel_weight=kernel,
+        kernel_amplitude=np.zeros(0) if periodic else _amplitude(shape),
+        pairs=_pairs(spectra, shape),
+        hop=shape.hop / shape.length,
+        smoothing=1 if periodic else 2 * NOISE_SMOOTHING + 1,
         differenced=differenced,
     )
+
+
+@lru_cache(maxsize=8)
+def _amplitude(shape: WindowShape) -> FloatArray:
+    """(j,) transform of the centred window at the kernel's half lines: the root of the kernel, with its sign."""
+    kernel = _kernel(shape)
+    half = (kernel.shape[0] - 1) // 2
+    offset = np.arange(-half, half + 1)
+    transform = np.fft.fft(shape.taper(), 2 * shape.length)[offset] * np.exp(0.5j * np.pi * offset)
+    return np.asarray(np.sqrt(kernel) * np.sign(transform.real))
+
+
+def _pairs(spectra: Spectra, shape: WindowShape) -> FloatArray:
+    """(n,) share of the pairs of windows that lie 0, 1, .. hops apart.
+
+    Worked out from what the noise's correlation sums up to; every distance up to the overlap is taken to be as frequent as
+    any other (true without gaps and with slow forgetting).
+    """
+    correlation = _correlation(shape)
+    if spectra.weight <= 0:
+        return np.ones(1)
+    apart = np.stack((correlation[0], 2.0 * np.sum(correlation[1:], axis=0)), axis=1)
+    single, double = np.linalg.lstsq(apart, spectra.quadratic / spectra.weight**2, rcond=None)[0]
+    shares = np.full(correlation.shape[0], 2.0 * max(float(double), 0.0))
+    shares[0] = max(float(single), 0.0)
+    return shares
 
 
 def _excited(gxx: FloatArray, inside: slice, reach: int) -> NDArray[np.bool_]:

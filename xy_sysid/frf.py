@@ -24,7 +24,7 @@ def _zero() -> FloatArray:
 
 
 def _none() -> FloatArray:
-    return np.zeros((0, 1))
+    return np.zeros(0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,10 +43,9 @@ class FrequencyResponse:
     kernel_offset:    (j,) Hz and
     kernel_weight:    (j,) how the window blurs: the expected estimate at f is sum_j weight_j G(f + offset_j),
                       where G is the response of the quantity that was transformed (see ``differenced``)
-    leakage:          (k, j) what the window makes of a response that bends: its random errors on lines i and i + d have the
-                      covariance sum_o leakage[d, o] D_i(o) conj(D_(i + d)(o')), with D_i(o) the response G at
-                      kernel_offset[o] from line i less its blurred value, and o' the same frequency seen from line i + d;
-                      (0, 1) where nothing leaks
+    kernel_amplitude: (j,) the window's transform at kernel_offset, its square is kernel_weight; empty where nothing leaks
+    pairs:            (n,) share of the pairs of windows that lie 0, 1, .. hops apart, counted both ways: sum of
+                      weight_i weight_j / (sum of weights)^2; hop: from window to window, in lengths of the window
     smoothing:        lines over which the noise power was averaged for sigma
     differenced:      True if the window was put on the output's difference y[n+1] - y[n] and the estimate divided by
                       exp(j w T) - 1, so that blurring acts on the response times (exp(j w T) - 1)
@@ -65,7 +64,9 @@ class FrequencyResponse:
     line_correlation: FloatArray = field(default_factory=_one)
     kernel_offset: FloatArray = field(default_factory=_zero)
     kernel_weight: FloatArray = field(default_factory=_one)
-    leakage: FloatArray = field(default_factory=_none)
+    kernel_amplitude: FloatArray = field(default_factory=_none)
+    pairs: FloatArray = field(default_factory=_one)
+    hop: float = 1.0
     smoothing: int = 1
     differenced: bool = False
 

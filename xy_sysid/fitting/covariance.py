@@ -1,24 +1,34 @@
-"""How sure a fit is: covariance of the parameters, and the cost that noise alone lets expect.
+"""How sure a fit is: covariance of the parameters, and the cost that noise and the window alone let expect.
 
-Errors of neighbouring lines are correlated (window, overlap), so the sandwich (J'J)^-1 J' S J (J'J)^-1 with S the covariance
-of the weighted errors (Pintelon & Schoukens, System Identification, 2nd ed., 9.11).
+Errors of neighbouring lines are correlated, so the sandwich (J'J)^-1 J' S J (J'J)^-1 with S the covariance of the weighted
+errors (Pintelon & Schoukens, System Identification, 2nd ed., 9.11). S has two parts. Noise: independent of the input,
+correlated by window and overlap alone. Leakage: where the response bends within the window's main lobe, what the measured
+scatter shows is mostly this, and most of it cancels between neighbouring lines and overlapping windows; the model tells how
+much there is (``leakage``).
 """
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
+from xy_sysid.compiled import compiled
 from xy_sysid.fitting.damped import triangle
-from xy_sysid.fitting.problem import Problem
+from xy_sysid.fitting.leakage import leakage
+from xy_sysid.fitting.prediction import unblurred
+from xy_sysid.fitting.problem import Point, Problem, model
+from xy_sysid.frf import ComplexArray, FrequencyResponse
 from xy_sysid.stream import FloatArray
 
+BLOCK = 32  # lines whose median noise stands for a line that leakage hides
+DOUBT = 3.0  # noise is seen on its own line when it is so many standard deviations of sigma^2 above the leakage
 RANK = 1e-13  # a direction seen less than this part of the best one is not estimated
 
 
-def covariance(task: Problem, table: FloatArray) -> tuple[FloatArray, float, float]:
+def covariance(task: Problem, at: Point, table: FloatArray) -> tuple[FloatArray, float, float]:
     """((p, p) covariance of b, a, delay, expected cost, its standard deviation); NaN without sigma.
 
-    table: (p + 1, 2 m) as ``damped.weighted`` gives it.
+    table: (p + 1, 2 m) as ``damped.weighted`` gives it at the point.
     """
     size = table.shape[0] - 1
     if task.sigma is None:
@@ -29,36 +39,132 @@ def covariance(task: Problem, table: FloatArray) -> tuple[FloatArray, float, flo
     _, values, right = np.linalg.svd(upper / scale)
     keep = values > RANK * values[0]
     bread = (right[keep].T / values[keep] ** 2) @ right[keep]
-    error = task.weight * task.sigma
-    meat = 0.5 * _meat(task, table[:-1].reshape(size, 2, -1) * (error / scale[:, None])[:, None, :])
-    expected = 0.5 * (float(np.sum(error**2)) - float(np.trace(bread @ meat)))
-    squares = task.frf.line_correlation[1:] ** 2
-    spread = float(np.sum(error**4)) * (1.0 + 2.0 * float(np.sum(squares)))
-    freedom = 2.0 * (task.frf.averages - 1.0)
+    place = _places(task)
+    straight, folded = error_covariance(task, at, task.sigma, place)
+    meat = _meat(np.ascontiguousarray(table[:-1] / scale[:, None]), straight, folded, place)
+    expected = 0.5 * (float(np.sum(straight[0].real)) - 2.0 * float(np.trace(bread @ meat)))
+    squares = np.abs(straight) ** 2 + np.abs(folded) ** 2
+    spread = float(np.sum(squares[0]) + 2.0 * np.sum(squares[1:]))
+    freedom = _freedom(task.frf)
     if task.structure.weighting == "sigma" and freedom > 4.5:  # sigma is itself estimated: |error|^2 / sigma^2 is F(2, freedom)
         expected *= freedom / (freedom - 2.0)
         spread *= freedom**3 / ((freedom - 2.0) ** 2 * (freedom - 4.0))
     return (bread @ meat @ bread) / np.outer(scale, scale), expected, 0.5 * float(np.sqrt(spread))
 
 
-def _meat(task: Problem, rows: FloatArray) -> FloatArray:
-    """(p, p) sum over pairs of lines of their errors' correlation and Re(conj(J_i) J_j); rows: (p, 2, m) J times the errors' size."""
+def _leaky(frf: FrequencyResponse) -> bool:
+    return frf.kernel_amplitude.size == frf.kernel_weight.size > 1
+
+
+def _freedom(frf: FrequencyResponse) -> float:
+    """Degrees of freedom of each line's sigma^2: the windows, and the lines that it was averaged over."""
+    near = frf.line_correlation[1 : frf.smoothing]
+    independent = frf.smoothing / (1.0 + 2.0 * float(np.sum((1.0 - np.arange(1, near.size + 1) / frf.smoothing) * near)))
+    return 2.0 * (frf.averages - 1.0) * independent
+
+
+def _noise(total: FloatArray, leaks: FloatArray, after: FloatArray, freedom: float) -> FloatArray:
+    """(m,) the part of sigma^2 that is noise; leaks: what leakage adds to sigma^2; after: |factor of the response|^2.
+
+    freedom: of the leakage's scatter, which smoothing over lines does not steady.
+    Where leakage is nearly all, the difference is chance, and only its lucky half would be positive: the median of the lines
+    around is taken instead.
+    """
+    rest = total - leaks
+    chance = DOUBT * np.sqrt(2.0 / max(freedom, 2.0)) * leaks
+    size = rest.size // BLOCK
+    if size < 2:
+        return np.maximum(rest, 0.0)
+    blocks = np.median((rest / after)[: size * BLOCK].reshape(size, BLOCK), axis=1)
+    around = np.interp(np.arange(rest.size), (np.arange(size) + 0.5) * BLOCK - 0.5, blocks) * after
+    return np.where(rest > chance, rest, np.clip(around, 0.0, chance))
+
+
+def _places(task: Problem) -> NDArray[np.int64]:
+    """(m,) each line's number on the grid of lines, from 0."""
     frf = task.frf
-    correlation = frf.line_correlation
-    if correlation.size > 1:
-        place = np.rint(frf.frequency / frf.resolution).astype(np.int64)
-        place -= place[0]
-        if int(place[-1]) + 1 > place.size:  # lines left out: zeros in their place
-            full = np.zeros((*rows.shape[:2], int(place[-1]) + 1))
-            full[:, :, place] = rows
-            rows = full
-    total = _product(rows, rows) * correlation[0]
-    for k in range(1, min(correlation.size, rows.shape[2])):
-        if correlation[k] != 0.0:
-            part = _product(rows[:, :, k:], rows[:, :, :-k])
-            total += correlation[k] * (part + part.T)
-    return np.asarray(total)
+    if (frf.line_correlation.size == 1 and not _leaky(frf)) or not frf.resolution > 0:
+        return np.arange(len(frf))
+    place = np.rint(frf.frequency / frf.resolution).astype(np.int64)
+    return np.asarray(place - place[0])
 
 
-def _product(left: FloatArray, right: FloatArray) -> FloatArray:
-    return np.asarray(left[:, 0] @ right[:, 0].T + left[:, 1] @ right[:, 1].T)
+def error_covariance(task: Problem, at: Point, sigma: FloatArray, place: NDArray[np.int64]) -> tuple[ComplexArray, ComplexArray]:
+    """((k, places) E[e_i conj(e_(i + d))], (k, places) E[e_i e_(i + d)]) of the weighted errors of lines d = 0 .. k - 1 apart.
+
+    0 where a line was left out.
+    """
+    frf, plan = task.frf, task.plan
+    weight, noise = np.zeros((2, int(place[-1]) + 1))
+    weight[place] = task.weight
+    noise[place] = sigma**2
+    straight = folded = np.zeros((frf.line_correlation.size, noise.size), dtype=np.complex128)
+    if _leaky(frf):
+        near = unblurred(model(task, at), at.b, at.a, at.delay)
+        bends, single = _bends(near, plan.index, plan.kernel, plan.after, plan.seen, place, frf.kernel_amplitude.size)
+        straight, folded = leakage(frf, bends)
+        single -= straight[0].real  # what leakage adds to the scatter
+        share = np.convolve(np.pad(single, frf.smoothing // 2, mode="edge"), np.full(frf.smoothing, 1.0 / frf.smoothing), mode="valid")
+        noise[place] = _noise(sigma**2, share[place] / max(frf.averages - 1.0, 1.0), np.abs(plan.after) ** 2, 2.0 * (frf.averages - 1.0))
+    return _weighted(frf.line_correlation, np.sqrt(noise), straight, weight), _weighted(np.zeros(1), noise, folded, weight)
+
+
+@compiled
+def _bends(
+    near: NDArray[np.complex128], index: NDArray[np.int64], kernel: NDArray[np.float64], after: NDArray[np.complex128],
+    seen: NDArray[np.int64], place: NDArray[np.int64], offsets: int,
+) -> tuple[NDArray[np.complex128], NDArray[np.float64]]:  # fmt: skip
+    """((offsets, places) response around each line less its blurred value, (places,) the scatter that it makes in one window).
+
+    ``after`` hardly changes within a main lobe, so that it may be multiplied by here.
+    """
+    size = int(place[-1]) + 1
+    bends, single = np.zeros((offsets, size), dtype=np.complex128), np.zeros(size)
+    for i in range(place.shape[0]):
+        mean = 0.0 + 0.0j
+        for j in range(kernel.shape[0]):
+            mean += kernel[j] * near[index[j, i]]
+        for j in range(kernel.shape[0]):
+            bend = (near[index[j, i]] - mean) * after[i]
+            bends[seen[j], place[i]] = bend
+            single[place[i]] += kernel[j] * (bend.real * bend.real + bend.imag * bend.imag)
+    return bends, single
+
+
+@compiled
+def _weighted(
+    correlation: NDArray[np.float64], noise: NDArray[np.float64], leaks: NDArray[np.complex128], weight: NDArray[np.float64]
+) -> NDArray[np.complex128]:
+    out = np.zeros_like(leaks)
+    for d in range(leaks.shape[0]):
+        share = correlation[d] if d < correlation.shape[0] else 0.0
+        for i in range(leaks.shape[1] - d):
+            out[d, i] = weight[i] * weight[i + d] * (share * noise[i] * noise[i + d] + leaks[d, i])
+    return out
+
+
+def _meat(rows: FloatArray, straight: ComplexArray, folded: ComplexArray, place: NDArray[np.int64]) -> FloatArray:
+    """(p, p) covariance of J' e over real and imaginary parts; rows: (p, 2 m) J."""
+    size = straight.shape[1]
+    spaced = rows
+    if rows.shape[1] != 2 * size:  # lines left out: zeros in their place
+        spaced = np.zeros((rows.shape[0], 2 * size))
+        spaced[:, np.concatenate((place, size + place))] = rows
+    part = spaced @ _times(straight, folded, spaced).T
+    return np.asarray(0.5 * (part + part.T))
+
+
+@compiled
+def _times(straight: NDArray[np.complex128], folded: NDArray[np.complex128], rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(p, 2 places) rows of C J, C the covariance of real and imaginary parts: its diagonal and twice its upper diagonals."""
+    size = straight.shape[1]
+    out = np.zeros(rows.shape)
+    for d in range(straight.shape[0]):
+        double = 0.5 if d == 0 else 1.0
+        for p in range(rows.shape[0]):
+            for i in range(size - d):
+                s, f = straight[d, i], folded[d, i]
+                real, imag = rows[p, i + d], rows[p, size + i + d]
+                out[p, i] += double * ((s.real + f.real) * real + (f.imag - s.imag) * imag)
+                out[p, size + i] += double * ((f.imag + s.imag) * real + (s.real - f.real) * imag)
+    return out

@@ -23,7 +23,7 @@ def finish(task: Problem, at: Point, method: str, iterations: int, converged: bo
     error = table[-1].reshape(2, -1) / task.weight
     predicted = frf.response - (error[0] + 1j * error[1])
     value = 0.5 * float(table[-1] @ table[-1])
-    inner, expected, deviation = covariance(task, table)
+    inner, expected, deviation = covariance(task, at, table)
     to_numerator, to_denominator = _to_coefficients(task, at)
     numerator = (at.b @ to_numerator)[::-1]
     denominator = np.concatenate(((at.a @ to_denominator)[::-1], np.zeros(structure.integrators)))

@@ -25,6 +25,6 @@ def pole_estimates(frf: FrequencyResponse, structure: Structure, start: Transfer
     found = minimise(task, point, warm(options)) if point is not None else None
     if found is None or not found.converged:
         return ()
-    inner, _, _ = covariance(task, found.table)
     at = found.point
+    inner, _, _ = covariance(task, at, found.table)
     return tuple(root_estimates(task, at.denominator.roots(at.a), at.denominator, at.a, inner, at.b.size, "pole"))

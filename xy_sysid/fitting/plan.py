@@ -34,7 +34,7 @@ class Plan:
     main:        (g,) factor of N / D exp(-j w delay) at the grid
     fold:        (g,) factor of the sum of aliases at the grid
     index:       (j, m) rows of the grid that a line needs (the window reaches below 0 Hz near it)
-    kernel:      (j,) weights of the window
+    kernel:      (j,) weights of the window; seen: (j,) their places in FrequencyResponse.kernel_weight
     after:       (m,) factor of the blurred response: the division by the difference's response
     alias:       (nodes * 2 ALIASES,) scaled s of the aliases, grouped by node; alias_omega: rad/s
     alias_factor: (same,) 1 / (s sigma^integrators)
@@ -54,6 +54,7 @@ class Plan:
     fold: ComplexArray
     index: NDArray[np.int64]
     kernel: FloatArray
+    seen: NDArray[np.int64]
     after: ComplexArray
     alias: ComplexArray
     alias_omega: FloatArray
@@ -124,6 +125,7 @@ def _plan(
         fold=fold,
         index=np.ascontiguousarray(inverse.reshape(wanted.shape).T).astype(np.int64),
         kernel=np.ascontiguousarray(weight),
+        seen=np.flatnonzero(seen),
         after=after,
         alias=np.asarray(s / scale, dtype=np.complex128),
         alias_omega=np.ascontiguousarray(s.imag),

@@ -6,7 +6,7 @@ Parameters: numerator b (m + 1) and denominator a (n + 1, the last one fixed) in
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,6 +70,14 @@ def predict(model: Model, b: FloatArray, a: FloatArray, delay: float) -> Complex
     """(lines,) predicted response."""
     parts = _lines(model, b, a, delay, False)
     return np.asarray(parts[0, 0] + 1j * parts[0, 1])
+
+
+def unblurred(model: Model, b: FloatArray, a: FloatArray, delay: float) -> ComplexArray:
+    """(grid,) the response of what was transformed, before the window blurs it."""
+    plan = model.plan
+    rows = np.arange(plan.omega.size)[None, :]
+    bare = replace(model, plan=replace(plan, index=rows, kernel=np.ones(1), after=np.ones(plan.omega.size, dtype=np.complex128)))
+    return predict(bare, b, a, delay)
 
 
 def table(model: Model, b: FloatArray, a: FloatArray, delay: float, weight: FloatArray, measured: ComplexArray) -> FloatArray:

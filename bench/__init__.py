@@ -1,0 +1,1 @@
+"""Measurements against other software and against the goals: ``python -m bench [name ...]``."""
