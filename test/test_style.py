@@ -29,7 +29,7 @@ noise_floor effects effect_code axis_kernel axis_model spectral_cost base_start 
 pairing joints identifier messages live_fit replay offline
 """)
 EDGE = names("""
-shipped parameter_file settings_doc run_plan starter
+shipped parameter_file settings_doc effects_doc user_effects run_plan starter
 bags imports exports state_file work_queue
 nodes
 report page

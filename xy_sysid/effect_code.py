@@ -158,7 +158,7 @@ def _bristle(effects: Sequence[Effect]) -> str:
     for effect in _of(effects, "bristle"):
         state = f"{effect.name}_{effect.states[0]}"
         bends += [f"if has_{effect.name}:", f"    {state} = {_call(effect, 'bend', words)}"]
-        forces += [f"if has_{effect.name}:", f"    push -= {_call(effect, 'force', words)}"]
+        forces += [f"if has_{effect.name}:", f"    push -= math.copysign(1.0, gain) * {_call(effect, 'force', words)}"]
         relaxes += [f"if has_{effect.name}:", f"    {state} = {_call(effect, 'bend', after)}"]
     move = ["reach = gain * push", "end = reach + (v - reach) * decay", "moved += reach * h + (v - reach) * spent"]
     return _lines(5, [*bends, *forces, *move, *relaxes, "v = end"])

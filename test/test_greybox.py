@@ -1,0 +1,160 @@
+"""Fits of the base and one effect: to own simulations exactly, and to the other machine's data near the floor."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.signal import butter, sosfilt
+
+from xy_sim.effect_text import with_effects
+from xy_sim.machine import Machine
+from xy_sysid.axis_model import STANDARD, AxisModel, simulate
+from xy_sysid.cli.simulate import drive
+from xy_sysid.errors import BadInput
+from xy_sysid.greybox import AxisData, GreyboxFit, fit_base, fit_with, look, prepare
+from xy_sysid.settings import AxisExcitation, ExcitationSettings, build
+from xy_sysid.spectral_cost import count_size, encoder_noise
+from xy_sysid.stream import FloatArray
+
+RATE = 2000.0
+BASE = AxisModel(0.097, 1.29e-3, 246.0)
+SIMULABLE = [effect.name for effect in STANDARD.acting if effect.simulable]
+SIZES: dict[str, tuple[float, ...]] = {  # where the usual size hardly shows in 30 s, or lies outside the travel
+    "hardening_stiffness": (3e4, 0.0),
+    "position_dependent_gain": (0.1, 4e-3, 0.3),
+    "cogging": (0.15, 2.5e-3, 0.3),
+    "lead_error": (8e-6, 5e-3, 0.3),
+}
+LOOSE = {"hardening_stiffness.linear", "presliding_hysteresis.damping"}  # next to zero, or next to unseen
+
+
+@cache
+def voltage(seconds: float, seed: int = 5) -> FloatArray:
+    """Band noise of 1 V rms up to 300 Hz, and slow waves that make the axis travel."""
+    n = int(seconds * RATE) + 1
+    u = sosfilt(butter(4, 300, fs=RATE, output="sos"), np.random.default_rng(seed).standard_normal(n))
+    return np.asarray(0.9 * u / u.std() + 0.5 * np.cos(2 * np.pi * 0.7 * np.arange(n) / RATE))
+
+
+def own(name: str, seconds: float = 20.0) -> tuple[AxisModel, AxisData]:
+    """A recording by this package's own simulation; what depends on position is told that of the base's motion."""
+    model = BASE.with_effect(name, SIZES.get(name))
+    u = voltage(seconds)
+    place = np.concatenate(([0.0], np.cumsum(simulate(BASE, RATE, u, np.zeros_like(u))) / RATE))
+    x = np.concatenate(([0.0], np.cumsum(simulate(model, RATE, u, place)) / RATE))
+    data = prepare(RATE, u, x + 1e-7 * np.random.default_rng(6).standard_normal(u.size))
+    return model, replace(data, position=place)
+
+
+@pytest.mark.parametrize("name", SIMULABLE)
+def test_an_effect_is_fitted_back_from_its_own_simulation(name: str) -> None:
+    """Every parameter within 2 per cent of the truth, without being told a start; nothing left above the floor."""
+    truth, data = own(name)
+    found = fit_with(data, fit_base(data), [name])
+    assert found.excess < 0.05
+    for key, value in truth.values().items():
+        estimate = found.parameter(key)
+        if key not in LOOSE:
+            assert estimate.value == pytest.approx(value, rel=0.02, abs=0.02 if key.endswith("phase") else 0.0), key
+
+
+@cache
+def machine_data(name: str, seconds: float = 30.0) -> AxisData:
+    """The rigid machine of the other package with one effect of its default size."""
+    machine = with_effects(Machine.from_file("rigid.yaml", 11), [] if name == "none" else [f"x:{name}"])
+    axes = {axis: build(AxisExcitation, {"seed": 12 + k}) for k, axis in enumerate(machine.axes)}
+    settings = build(ExcitationSettings, {"rate": machine.rate, "lockstep": True, "speed": 0.0, "axes": axes})
+    recording = drive(machine, settings, seconds, lambda _: None)
+    return prepare(recording.sampling_rate, *recording.axis("x"))
+
+
+@cache
+def machine_base(name: str) -> GreyboxFit:
+    return fit_base(machine_data(name))
+
+
+def test_nothing_is_left_of_a_clean_machine() -> None:
+    """Base parameters to 0.1 per cent, held-out error at the floor."""
+    found = machine_base("none")
+    assert found.excess < 0.02
+    assert found.held_out_error < 1.03 * found.noise_floor
+    for key, value in {"gain": 0.097, "delay": 1.29e-3, "pole": 246.0}.items():
+        assert found.parameter(key).value == pytest.approx(value, rel=1e-3)
+
+
+@pytest.mark.parametrize("name", [name for name in SIMULABLE if name != "position_dependent_gain"])
+def test_the_right_effect_explains_the_other_machine(name: str) -> None:
+    """Physics code that is not ours: the excess falls below 0.05, the held-out error to 1.05 times the floor."""
+    base = machine_base(name)
+    found = fit_with(machine_data(name), base, [name])
+    assert found.excess < 0.05
+    assert found.held_out_error < 1.05 * found.noise_floor
+    assert found.excess <= base.excess
+
+
+def test_backlash_is_admitted_to_be_beyond_free_simulation() -> None:
+    """It helps, and does not reach the floor: its file says that one-step prediction must judge it."""
+    base = machine_base("backlash")
+    found = fit_with(machine_data("backlash"), base, ["backlash"])
+    assert not STANDARD["backlash"].simulable
+    assert found.excess > 1.0
+
+
+def test_the_wrong_effect_does_not_reach_the_floor() -> None:
+    """Coulomb friction is not a dead zone, and the other way round."""
+    for true, wrong in (("coulomb_friction", "dead_zone"), ("dead_zone", "coulomb_friction"), ("cogging", "coulomb_friction")):
+        assert fit_with(machine_data(true), machine_base(true), [wrong]).excess > 1.0
+
+
+def test_traces_rank_most_effects_first_by_themselves() -> None:
+    """The score test alone names at least 9 of 12 unmistakable effects."""
+    names = [name for name in SIMULABLE if name not in ("position_dependent_gain", "stribeck_friction", "presliding_hysteresis", "screw_compliance")]
+    right = [name for name in names if look(machine_data(name), machine_base(name), STANDARD.acting)[0].effect == name]
+    assert len(right) >= 9, right
+
+
+def test_intervals_hold_the_truth() -> None:
+    """95 % intervals of base and Coulomb friction, 12 draws of noise: at least 8 in 10 hold, and none is absurdly wide."""
+    model = BASE.with_effect("coulomb_friction", (0.2,))
+    u = voltage(12.0)
+    velocity = simulate(model, RATE, u, np.zeros_like(u))
+    clean = np.concatenate(([0.0], np.cumsum(velocity) / RATE))
+    held = total = 0
+    for seed in range(12):
+        data = prepare(RATE, u, clean + 1e-6 * np.random.default_rng(seed).standard_normal(u.size))
+        found = fit_with(data, fit_base(data), ["coulomb_friction"])
+        for key, value in model.values().items():
+            estimate = found.parameter(key)
+            held += estimate.low <= value <= estimate.high
+            total += 1
+            assert estimate.high - estimate.low < 0.05 * abs(value)
+    assert held >= 0.8 * total
+
+
+def test_the_encoder_is_read_from_the_data() -> None:
+    """Its count exactly, its noise within a tenth."""
+    x = np.cumsum(simulate(BASE, RATE, voltage(12.0), np.zeros_like(voltage(12.0)))) / RATE
+    counted = np.round(x / 5e-7) * 5e-7
+    assert count_size(counted) == pytest.approx(5e-7, rel=1e-6)
+    assert count_size(x) == 0.0
+    noisy = x + 2e-6 * np.random.default_rng(0).standard_normal(x.size)
+    assert encoder_noise(RATE, noisy) == pytest.approx(2e-6, rel=0.1)
+
+
+def test_the_same_data_give_the_same_fit_bit_for_bit() -> None:
+    """No hidden randomness."""
+    data = machine_data("none")
+    assert fit_base(data).parameters == fit_base(data).parameters
+
+
+def test_data_that_cannot_be_fitted_are_refused() -> None:
+    """Too short, not finite, not of one length."""
+    with pytest.raises(BadInput, match="number of samples is 100"):
+        prepare(RATE, np.zeros(100), np.zeros(100))
+    with pytest.raises(BadInput, match="not finite"):
+        prepare(RATE, np.zeros(1000), np.full(1000, np.nan))
+    with pytest.raises(BadInput, match="one and the same"):
+        prepare(RATE, np.zeros(1000), np.zeros(900))

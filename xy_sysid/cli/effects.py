@@ -1,0 +1,65 @@
+"""xy-sysid effects: the library of physical effects."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from xy_sysid.cli import options as o
+from xy_sysid.cli.output import emit, people, table
+
+if TYPE_CHECKING:
+    from xy_sysid.effects import Effect
+
+
+def effects(
+    name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="only this effect, in full")] = None,
+    effect_file: Annotated[list[Path] | None, typer.Option("--effect-file", metavar="FILE", help="a Python file with an effect of your own")] = None,
+    json: o.Json = False,
+) -> None:
+    """List the physical effects: law, parameters, how each shows itself, look-alikes and source."""
+    from xy_sysid.user_effects import library
+
+    known = library(effect_file or [])
+    chosen = [known[name]] if name else sorted(known.effects.values(), key=lambda effect: (effect.category != "base", effect.name))
+    if json:
+        emit({"effects": {effect.name: _answer(effect) for effect in chosen}})
+        return
+    if name:
+        _show(chosen[0])
+        return
+    for effect in chosen:
+        _list(effect)
+    people.print("F: force against the drive, in volts of the drive. One effect in full: xy-sysid effects NAME")
+
+
+def _answer(effect: Effect) -> dict[str, Any]:
+    """All that an effect says about itself."""
+    words = ("law", "category", "meaning", "validity", "shows", "look_alikes", "experiment", "source", "family", "simulable")
+    parameters = {
+        item.name: {"unit": item.unit, "low": item.low, "high": item.high, "typical": item.typical, "meaning": item.meaning}
+        for item in effect.parameters
+    }
+    return {word: getattr(effect, word) for word in words} | {"parameters": parameters}
+
+
+def _list(effect: Effect) -> None:
+    sizes = ", ".join(f"{item.name} [{item.unit or '1'}]" for item in effect.parameters)
+    people.print(f"{effect.name}: {effect.law}")
+    for label, text in (("parameters", sizes), ("shows as", effect.shows), ("taken for", ", ".join(effect.look_alikes))):
+        people.print(f"    {label}: {text}")
+
+
+def _show(effect: Effect) -> None:
+    from xy_sysid.effects_doc import bounds
+
+    people.print(f"{effect.name}: {effect.meaning}\n\n    {effect.law}\n")
+    rows = [(item.name, item.unit or "1", bounds(item), f"{item.typical:g}", item.meaning) for item in effect.parameters]
+    table("parameters", ("name", "unit", "allowed", "usual", "meaning"), rows)
+    told = {"valid for": effect.validity, "shows as": effect.shows, "taken for": ", ".join(effect.look_alikes)}
+    told |= {"told apart by": effect.experiment, "source": effect.source}
+    people.print()
+    for label, text in told.items():
+        people.print(f"{label}: {text}")
