@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import yaml
+from bag_making import joint_state
 from cli_tools import RIGID, cli, npz, rigid, with_one
 from scipy.io import loadmat
 
+from xy_sysid.bags import BagWriter
+from xy_sysid.bags.cdr import JOINT_TYPE
 from xy_sysid.bags.streaming import stream_blocks
 from xy_sysid.exports import read_model
 from xy_sysid.imports import load, save
 from xy_sysid.pairing import KINDS
 from xy_sysid.recording import Recording
-from xy_sysid.replay import replay
+from xy_sysid.replay import replay as plain_replay
 from xy_sysid.settings import IdentifierSettings
 
 
@@ -127,9 +131,11 @@ def test_fit_for_people_is_a_table_with_units_and_verdicts(paper: Path) -> None:
     assert said.code == 0 and said.err == ""
     lines = said.out.splitlines()
     assert lines[0].startswith("axis x: ml, 613 lines from 0.977 to 299.8 Hz")
-    assert any(line.split()[:3:2] == ["delay", "ms"] for line in lines) and any(" mm/s/V " in line for line in lines)
+    rows = {line.split()[0]: line.split()[1:] for line in lines if line[:1].isalpha()}
+    assert rows["parameter"] == ["value", "95", "%", "low", "95", "%", "high", "unit"]
+    assert rows["delay"][-1] == "ms" and float(rows["delay"][1]) < 1.29 < float(rows["delay"][2]) and rows["gain"][-1] == "mm/s/V"
     assert sum(line.startswith("  ok   ") for line in lines) == 10 and "WARN" not in said.out
-    assert max(len(line) for line in lines if ".." in line) <= 80
+    assert max(len(line.rstrip()) for line in lines if line.split() and line.split()[0] in rows and line[:4] != "axis") <= 80
 
 
 @pytest.mark.parametrize("method", ["lls", "iwls", "nlls", "ml", "nllsfdi"])
@@ -198,7 +204,7 @@ def test_replay_gives_what_the_plain_logic_gives(paper: Path, tmp_path: Path) ->
     said = cli("replay", paper, "--out", tmp_path / "out")
     assert said.code == 0 and "times real time" in said.out and "axis y: relative error" in said.out
     settings = IdentifierSettings()
-    updates = list(replay(((kind, block) for kind, block in stream_blocks(paper) if kind in KINDS), settings, ("x", "y")))
+    updates = list(plain_replay(((kind, block) for kind, block in stream_blocks(paper) if kind in KINDS), settings, ("x", "y")))
     wanted = [(f"/xy/{message.topic}", message.data) for update in updates for message in update.arrays()]
     store: Any = get_typestore(Stores.ROS2_JAZZY)
     with Reader(tmp_path / "out") as reader:
@@ -287,3 +293,31 @@ def test_a_short_recording_that_starts_between_two_windows_is_used(tmp_path: Pat
     save(late, tmp_path / "bag")
     for length in (7000, 3000):
         assert cli("frf", tmp_path / "bag", "--set", f"length={length}", "--json").json["axes"]["x"]["windows"] >= 1
+
+
+def test_an_axis_without_an_answer_does_not_take_the_others_with_it(paper: Path, model: Path, tmp_path: Path) -> None:
+    """A standing axis: what the others have is told, and why this one has nothing; alone, it is a refusal."""
+    recording = load(paper)
+    position = recording.position.copy()
+    position[:, 0] = 0.0
+    save(replace(recording, position=position), tmp_path / "still.npz")
+    for command, words in (("fit", "no model"), ("frf", "no response")):
+        said = cli(command, tmp_path / "still.npz")
+        assert said.code == 0 and f"axis x: {words}. output of axis x is constant" in said.out and "axis y" in said.out
+        assert "constant" in cli(command, tmp_path / "still.npz", "--json").json["axes"]["x"]["problem"]
+        assert cli(command, tmp_path / "still.npz", "--axis", "x").code == 2
+    checked = cli("validate", tmp_path / "still.npz", model)
+    assert checked.code == 0 and "axis x: not checked" in checked.out and "axis y: the model holds" in checked.out
+
+
+def test_replay_names_the_units_of_its_bag(tmp_path: Path) -> None:
+    """A bag of a current and an angle, and joint states with an effort: no figure claims to be in metres or volts."""
+    t, u, y = rigid(9000).values()
+    save(Recording(1000.0, ("x",), np.arange(9000), t, u[:, None], y[:, None], input_unit="A", output_unit="rad"), tmp_path / "bag")
+    said = cli("replay", tmp_path / "bag", *RIGID, "--set", "length=1024")
+    assert said.code == 0 and "rad/s/A" in said.out and "m/s" not in said.out
+    with BagWriter(tmp_path / "joints") as writer:
+        for k in range(9000):
+            writer.write_raw("/joint_states", JOINT_TYPE, joint_state(10**9 + k * 10**6, y[k : k + 1], u[k : k + 1], ("a",)), 10**9 + k * 10**6)
+    told = cli("replay", tmp_path / "joints", *RIGID, "--set", "length=1024", "--json").json
+    assert told["units"] == {"input": "effort", "output": "position"} and "gain (position/s/effort)" in told["axes"]["a"]["values"]

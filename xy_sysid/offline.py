@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,7 +19,7 @@ from xy_sysid.stream import FloatArray
 from xy_sysid.window_check import sound
 from xy_sysid.windows import WindowShape
 
-HARDLY = 2.0  # times the lines that chance makes coherent, below which the output hardly follows the input
+HARDLY = 4.0  # standard deviations of the number of lines that chance makes coherent (neighbours are alike, hence the 2)
 TRANSIENT = 1  # periods left out at the start of a periodic recording
 SMALLEST, LARGEST = 1e-100, 1e100  # of what is measured: squares of more or less leave the range of numbers
 
@@ -119,12 +120,17 @@ def _coherence(frf: FrequencyResponse, settings: IdentifierSettings, periodic: b
     """Too little to judge, or hardly more trusted lines than noise alone would give."""
     if frf.averages < 2.0:
         return [f"Only {frf.averages:.1f} independent windows: no uncertainty, so no line is trusted. Record longer, or shorten the window."]
-    chance = 0.0 if periodic else (1.0 - settings.min_coherence) ** (frf.averages - 1.0)
+    if periodic:
+        return []
+    none = 1.0 - settings.min_coherence  # chance that a line of no coherence stays below
+    chance = none ** (frf.averages - 1.0) * len(frf)
+    usual = 1.0 - none * 0.1 ** (1.0 / (frf.averages - 1.0))  # nine of ten such lines by chance have no more coherence
     trusted = int(frf.trusted.sum())
-    if periodic or trusted > HARDLY * chance * len(frf):
+    many = trusted > chance + HARDLY * math.sqrt(2.0 * chance)
+    if many or (trusted and float(np.median(frf.coherence[frf.trusted])) > usual):
         return []
     return [
-        f"Only {trusted} of {len(frf)} lines in the band are coherent with the input, and chance alone gives {chance * len(frf):.0f}: "
+        f"Only {trusted} of {len(frf)} lines in the band are coherent with the input, and chance alone gives {chance:.0f}: "
         "the output hardly follows the input. Excite more, narrow the band, or check the wiring."
     ]
 

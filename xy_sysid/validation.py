@@ -67,8 +67,8 @@ def validate(fit: Fit, frf: FrequencyResponse, unseen: HeldOut | None = None, or
 
 def _cost(fit: Fit) -> Verdict:
     figures = {"cost": fit.cost, "expected": fit.expected_cost, "deviation": fit.cost_deviation}
-    if fit.consistent is None:
-        return Verdict("cost", True, "The cost cannot be judged: the response has no uncertainty of its own.", figures)
+    if fit.consistent is None or not fit.expected_cost > 0.0:
+        return Verdict("cost", True, "The cost cannot be judged: there is no uncertainty to compare it with.", figures)
     if fit.consistent:
         return Verdict(
             "cost", True, f"The cost {fit.cost:.4g} is what noise explains ({fit.expected_cost:.4g} +- {fit.cost_deviation:.2g}).", figures

@@ -20,6 +20,7 @@ Kind = Literal["voltage", "position", "reference"]
 VOLTAGE, POSITION, REFERENCE = "/xy/voltage", "/xy/position", "/xy/reference"
 PIECE = 500  # samples; a consumer that waits 1000 samples for a late partner never sees the two topics drift apart
 CLOCK_SAMPLES = 2000  # stamps from which the period of a joint state stream is learnt
+EFFORT_UNITS = ("effort", "position")  # joint states name no unit: N m or N, rad or m
 OTHERS = "Name others with --topic voltage=NAME, position=NAME or joints=NAME."
 
 
@@ -58,6 +59,13 @@ def choose(bag: Bag, voltage_topic: str, position_topic: str, joint_topic: str |
         raise bag.bad(f"no block topic {missing}; it has {bag.listing()}", OTHERS)
     extra: tuple[tuple[str, Kind], ...] = ((REFERENCE, "reference"),) if bag.kind(REFERENCE) == ARRAY_TYPE else ()
     return Source(((voltage_topic, "voltage"), (position_topic, "position"), *extra), None, False, False)
+
+
+def units(bag: Bag, source: Source) -> tuple[str, str]:
+    """Of input and output, as the bag tells them."""
+    if source.effort and not source.said:
+        return EFFORT_UNITS
+    return bag.custom.get("input_unit", "V"), bag.custom.get("output_unit", "m")
 
 
 class _Clock:
@@ -257,17 +265,21 @@ def stream_blocks(
     chunk_samples: int = PIECE,
     notes: list[str] | None = None,
     progress: Callable[[float], None] | None = None,
+    about: Callable[[tuple[str, str]], None] | None = None,
 ) -> Iterator[tuple[Kind, Block]]:
     """("voltage" | "position" | "reference", Block) in log order, in flat memory.
 
     chunk_samples: about how many samples of one kind come in one block, so also how far the kinds are apart
     notes:         gets a sentence for everything that was odd or left out; complete when the iteration has ended
     progress:      called with the part that has been read, 0..1
+    about:         called with the units of input and output before the first block
     Raises BadRecording if nothing can be read.
     """
     with Bag(path) as bag:
         try:
             source = choose(bag, voltage_topic, position_topic, joint_topic, effort_as_voltage)
+            if about is not None:
+                about(units(bag, source))
             yield from pieces(bag, source, chunk_samples, progress)
         finally:
             if notes is not None:

@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from xy_sysid.cli import options as o
-from xy_sysid.cli.output import aside, emit, people, quantity, table
+from xy_sysid.cli.output import aside, emit, estimates, people
 from xy_sysid.cli.provenance import provenance
-from xy_sysid.cli.reading import chosen, read
+from xy_sysid.cli.reading import chosen, each, read
 
 if TYPE_CHECKING:
     from xy_sysid.fitting import Fit, Structure
     from xy_sysid.offline import AxisEstimate
     from xy_sysid.recording import Recording
+    from xy_sysid.validation import Validation
 
 
 def fit(
@@ -48,24 +49,28 @@ def fit(
     estimator = _estimator(method)
     recording = read(rec, axis, topic, effort, span, json)
     training, unseen = split(recording, held_out)
-    answers: dict[str, Any] = {}
-    fits: dict[str, Fit] = {}
-    for name in chosen(recording, axis):
+
+    def work(name: str) -> tuple[AxisEstimate, Fit, Validation]:
         found = estimate(training, name, settings, samples)
         judged(found.frf)
         result = estimator(found.frf, structure)
-        verdicts = validate(result, found.frf, _unseen(unseen, name))
-        fits[name] = result
-        answers[name] = answer(found, result, verdicts)
-        if not json:
-            _show(found, result, verdicts)
+        return found, result, validate(result, found.frf, _unseen(unseen, name))
+
+    done, problems = each(chosen(recording, axis), work)
+    fits = {name: result for name, (_, result, _) in done.items()}
     origin = provenance(rec, recording)
     if model is not None:
         exports.write_model(model, fits, origin)
     if mat is not None:
         exports.write_mat(mat, fits)
     if json:
+        answers = {name: answer(*parts) for name, parts in done.items()} | {name: {"problem": text} for name, text in problems.items()}
         emit({"recording": origin, "axes": answers})
+        return
+    for parts in done.values():
+        _show(*parts)
+    for name, text in problems.items():
+        people.print(f"axis {name}: no model. {text}")
 
 
 def _structure(settings: Any, weighting: str, domain: str) -> Structure:
@@ -103,7 +108,7 @@ def _unseen(recording: Recording, axis: str) -> Any:
     return u[run], y[run], recording.sampling_rate
 
 
-def answer(found: AxisEstimate, result: Fit, verdicts: Any) -> dict[str, Any]:
+def answer(found: AxisEstimate, result: Fit, verdicts: Validation) -> dict[str, Any]:
     """One axis of the JSON document."""
     tf = result.tf
     return {
@@ -136,7 +141,7 @@ def answer(found: AxisEstimate, result: Fit, verdicts: Any) -> dict[str, Any]:
     }
 
 
-def _show(found: AxisEstimate, result: Fit, verdicts: Any) -> None:
+def _show(found: AxisEstimate, result: Fit, verdicts: Validation) -> None:
     f = result.frequency
     people.print(
         f"axis {found.axis}: {result.method}, {len(f)} lines from {f[0]:.3g} to {f[-1]:.4g} Hz, {found.windows} windows; "
@@ -145,11 +150,7 @@ def _show(found: AxisEstimate, result: Fit, verdicts: Any) -> None:
     )
     if not result.converged:
         people.print(f"The fit did not converge: {result.reason}", style="bold")
-    rows = [
-        (item.name, quantity(item.value, item.unit, 6), f"{quantity(item.low, item.unit, 6)} .. {quantity(item.high, item.unit, 6)}")
-        for item in result.intervals
-    ]
-    table("", ("parameter", "value", "95 % interval"), rows)
+    estimates("", result.intervals)
     for check in verdicts.verdicts:
         people.print(f"  {'ok  ' if check.ok else 'WARN'} {check.sentence}")
     for note in found.notes:  # the warnings of the fit are among the verdicts

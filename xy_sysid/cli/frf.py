@@ -11,7 +11,7 @@ import typer
 
 from xy_sysid.cli import options as o
 from xy_sysid.cli.output import aside, emit, people, table
-from xy_sysid.cli.reading import chosen, read
+from xy_sysid.cli.reading import chosen, each, read
 
 if TYPE_CHECKING:
     from xy_sysid.frf import FrequencyResponse
@@ -38,14 +38,17 @@ def frf(
     settings = o.settings_from(params, set_)
     o.output_file("--csv", csv)
     recording = read(rec, axis, topic, effort, span, json)
-    found = [estimate(recording, name, settings, o.period_from(period)) for name in chosen(recording, axis)]
+    samples = o.period_from(period)
+    done, problems = each(chosen(recording, axis), lambda name: estimate(recording, name, settings, samples))
+    found = list(done.values())
     if csv is not None:
         _write_csv(csv, found)
     if json:
         emit(
             {
                 "recording": {"source": str(rec), "sampling_rate": recording.sampling_rate, "samples": len(recording), "notes": recording.notes},
-                "axes": {item.axis: {"windows": item.windows, "period": item.period, "notes": item.notes, "frf": item.frf} for item in found},
+                "axes": {item.axis: {"windows": item.windows, "period": item.period, "notes": item.notes, "frf": item.frf} for item in found}
+                | {name: {"problem": text} for name, text in problems.items()},
             }
         )
         return
@@ -61,6 +64,8 @@ def frf(
         rows = [_row(f, int(k)) for k in lines]
         unit = f"{f.output_unit}/{f.input_unit}"
         table(f"axis {item.axis}, {unit}", ("Hz", f"dB ({unit})", "phase deg", "coherence", "sigma %", "trusted"), rows)
+    for name, text in problems.items():
+        people.print(f"axis {name}: no response. {text}")
 
 
 def _row(f: FrequencyResponse, k: int) -> tuple[str, ...]:

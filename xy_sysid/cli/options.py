@@ -21,7 +21,7 @@ Topics = Annotated[
     list[str] | None,
     typer.Option("--topic", metavar="WHAT=NAME", help="topic names in a bag: voltage=..., position=... or joints=... (may be repeated)"),
 ]
-Effort = Annotated[bool, typer.Option("--effort", help="take the input from the effort of a JointState")]
+Effort = Annotated[bool, typer.Option("--effort", help="take the input from the effort of a JointState, which then holds volts")]
 Period = Annotated[str, typer.Option(help="samples of the input's period: auto, none or a number")]
 Span = Annotated[str, typer.Option("--span", metavar="FROM:TO", help="only this part, in seconds from the start, for example 10:70")]
 Json = Annotated[bool, typer.Option("--json", help="one JSON document on stdout")]

@@ -7,7 +7,7 @@ import math
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import fields, is_dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import Console
@@ -15,6 +15,9 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from rich.table import Table
 
 from xy_sysid.cli import ReaderGone
+
+if TYPE_CHECKING:
+    from xy_sysid.fitting.result import Estimate
 
 
 class Terminal(Console):
@@ -60,13 +63,23 @@ def emit(document: Mapping[str, Any]) -> None:
 
 
 def table(title: str, columns: Iterable[str], rows: Iterable[Iterable[str]]) -> None:
-    """A table on stdout; the first column is text, the others are figures."""
+    """A table on stdout; the first column and one called unit are text, the others are figures."""
     made = Table(title=title, title_justify="left", title_style="bold", header_style="bold", box=None, pad_edge=False)
     for number, name in enumerate(columns):
-        made.add_column(name, justify="left" if number == 0 else "right", overflow="fold")
+        made.add_column(name, justify="left" if number == 0 or name == "unit" else "right", overflow="fold")
     for row in rows:
         made.add_row(*row)
     people.print(made)
+
+
+def estimates(title: str, items: Iterable[Estimate]) -> None:
+    """Figures with their 95 % intervals, in the units that people read."""
+    rows = []
+    for item in items:
+        scale, unit = readable(item.unit)
+        figures = (f"{value * scale:.6g}" if math.isfinite(value) else "-" for value in (item.value, item.low, item.high))
+        rows.append((item.name, *figures, unit))
+    table(title, ("parameter", "value", "95 % low", "95 % high", "unit"), rows)
 
 
 def progress() -> Progress:
@@ -79,7 +92,10 @@ def quantity(value: float, unit: str, digits: int = 4) -> str:
     """A figure as people read it: ms for short times, mm for small lengths."""
     if not math.isfinite(value):
         return "-"
-    for small, scale, shown in (("s", 1e3, "ms"), ("m", 1e3, "mm"), ("m/s/V", 1e3, "mm/s/V"), ("m/(V s)", 1e3, "mm/(V s)")):
-        if unit == small:
-            return f"{value * scale:.{digits}g} {shown}"
-    return f"{value:.{digits}g} {unit}".rstrip()
+    scale, shown = readable(unit)
+    return f"{value * scale:.{digits}g} {shown}".rstrip()
+
+
+def readable(unit: str) -> tuple[float, str]:
+    """Factor and unit as people read it: times and lengths are small."""
+    return (1e3, f"m{unit}") if unit in ("s", "m", "m/s", "m/V", "m/s/V", "m/s^2/V") else (1.0, unit)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar
 
 from xy_sysid.cli.options import span_from, topics_from
 from xy_sysid.cli.output import aside, progress
 from xy_sysid.errors import BadInput
 from xy_sysid.recording import Recording
 
+Found = TypeVar("Found")
 TABLES = (".csv", ".txt", ".tsv", ".npz", ".mat")
 
 
@@ -42,3 +45,17 @@ def chosen(recording: Recording, axes: list[str] | None) -> tuple[str, ...]:
         if name not in recording.axes:
             raise BadInput("--axis", repr(name), ", ".join(recording.axes), "Choose one of these.")
     return tuple(axes) if axes else recording.axes
+
+
+def each(names: tuple[str, ...], work: Callable[[str], Found]) -> tuple[dict[str, Found], dict[str, str]]:
+    """What ``work`` finds for each axis, and why there is nothing for the others; raises the first refusal if no axis has an answer."""
+    found: dict[str, Found] = {}
+    refusals: dict[str, BadInput] = {}
+    for name in names:
+        try:
+            found[name] = work(name)
+        except BadInput as refusal:
+            refusals[name] = refusal
+    if not found:
+        raise next(iter(refusals.values()))
+    return found, {name: str(refusal) for name, refusal in refusals.items()}

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from xy_sysid.cli import options as o
-from xy_sysid.cli.output import aside, emit, people, progress, quantity, table
+from xy_sysid.cli.output import aside, emit, estimates, people, progress
 
 if TYPE_CHECKING:
     from xy_sysid.live_fit import Update
@@ -46,14 +46,17 @@ def replay(
         bar = stack.enter_context(progress())
         task = bar.add_task(f"replaying {bag.name}", total=None)
         names: dict[str, Any] = dict(o.topics_from(topic))
-        blocks = (item for item in stream_blocks(bag, effort_as_voltage=effort, **names) if item[0] in KINDS)
+        units: list[tuple[str, str]] = []
+        notes: list[str] = []
+        heard = stream_blocks(bag, effort_as_voltage=effort, notes=notes, about=units.append, **names)
+        blocks = (item for item in heard if item[0] in KINDS)
         kind, first = next(blocks, (None, None))
         if kind is None or first is None:
             raise BadRecording(bag, "holds no samples", "Give a bag with voltage and position.")
         for name in axis or []:
             if name not in first.axes:
                 raise BadInput("--axis", repr(name), ", ".join(first.axes), "Choose one of these.")
-        identifier = Identifier(settings, tuple(axis) if axis else first.axes)
+        identifier = Identifier(settings, tuple(axis) if axis else first.axes, units[0])
 
         def all_blocks() -> Any:
             yield kind, first
@@ -75,13 +78,15 @@ def replay(
         windows = f"{identifier.samples} paired samples, {settings.length + 1} needed in one piece"
         faults = ", ".join(f"{name} {count}" for name, count in identifier.faults.items()) or "no faults"
         raise BadRecording(bag, f"no window was filled ({windows}; {faults})", "Give a longer bag or a shorter --set length=.")
-    heard = identifier.samples / last.request.sampling_rate
+    seconds_heard = identifier.samples / last.request.sampling_rate
     if json:
         emit(
             {
                 "updates": updates,
-                "seconds": heard,
-                "speed": heard / seconds,
+                "seconds": seconds_heard,
+                "units": dict(zip(("input", "output"), units[0], strict=True)),
+                "notes": notes,
+                "speed": seconds_heard / seconds,
                 "faults": identifier.faults,
                 "dropped": identifier.dropped,
                 "alarms": alarms,
@@ -89,7 +94,9 @@ def replay(
             }
         )
         return
-    people.print(f"{bag}: {heard:.1f} s of data in {seconds:.2f} s ({heard / seconds:.0f} times real time), {updates} fits")
+    people.print(f"{bag}: {seconds_heard:.1f} s of data in {seconds:.2f} s ({seconds_heard / seconds:.0f} times real time), {updates} fits")
+    for note in notes:
+        aside.print(f"note: {note}")
     for reason, sentence in identifier.sentences.items():
         aside.print(f"{reason}: {sentence}")
     for sentence in alarms.values():
@@ -98,8 +105,7 @@ def replay(
         if part.fit is None:
             people.print(f"axis {name}: {part.problem}")
             continue
-        rows = [(i.name, quantity(i.value, i.unit, 6), f"{quantity(i.low, i.unit, 6)} .. {quantity(i.high, i.unit, 6)}") for i in part.fit.intervals]
-        table(f"axis {name}: relative error {100 * part.fit.relative_error:.2g} %", ("parameter", "value", "95 % interval"), rows)
+        estimates(f"axis {name}: relative error {100 * part.fit.relative_error:.2g} %", part.fit.intervals)
 
 
 def _alarm(name: str, part: Any) -> str:

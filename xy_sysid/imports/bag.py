@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from xy_sysid.bags.reading import Bag
-from xy_sysid.bags.streaming import Kind, choose, pieces
+from xy_sysid.bags.streaming import Kind, choose, pieces, units
 from xy_sysid.errors import BadInput
 from xy_sysid.imports.pairing import LATE, Stream, cut, gather, is_jitter, pair, steady
 from xy_sysid.recording import Recording
@@ -53,11 +53,9 @@ def load_bag(
                 raise bag.bad(f"the effort on {source.joints} is zero throughout and there is no {voltage_topic}", "Record the voltage too.")
         if source.joints is not None and not source.effort:
             notes.append("joint states are paired with the voltage by their stamps")
-        units = (bag.custom.get("input_unit", "V"), bag.custom.get("output_unit", "m"))
         if source.effort and not source.said:
-            units = ("effort", "m or rad")
             notes.append("joint states name no unit; effort and position are carried as they are")
-        return cut(pair(streams, str(path), units, notes, bag.bad), first["position"], start, stop)
+        return cut(pair(streams, str(path), units(bag, source), notes, bag.bad), first["position"], start, stop)
 
 
 def _collect(bag: Bag, blocks: Iterator[tuple[Kind, Block]], start: float, stop: float | None) -> tuple[dict[Kind, list[Block]], dict[Kind, float]]:
