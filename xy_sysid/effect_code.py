@@ -40,8 +40,8 @@ def text(name: str, effects: Sequence[Effect]) -> str:
         states=_states(effects),
         pulls=_pulls(effects),
         advance=_advance(effects),
-        drag_start=_drags(effects, "v"),
-        drag_middle=_drags(effects, "middle"),
+        drag_start=_drags(effects, "v", 5),
+        drag_middle=_drags(effects, "middle", 5),
         drag_free=_drags(effects, "middle", 6),
         level_start=_moving_levels(effects, "v"),
         level_middle=_moving_levels(effects, "middle"),
@@ -121,7 +121,7 @@ def _pulls(effects: Sequence[Effect]) -> str:
     for effect in _of(effects, "force"):
         if not needs_speed(effect):
             lines += [f"if has_{effect.name}:", f"    pull += {_call(effect, 'force', words)}"]
-    return _lines(4, lines)
+    return _lines(5, lines)
 
 
 def _advance(effects: Sequence[Effect]) -> str:
@@ -130,10 +130,10 @@ def _advance(effects: Sequence[Effect]) -> str:
     for effect in _of(effects, "state"):
         targets = ", ".join(["drive", *(f"{effect.name}_{state}" for state in effect.states)])
         lines += [f"if has_{effect.name}:", f"    {targets} = {_call(effect, 'advance', words)}"]
-    return _lines(5, lines)
+    return _lines(6, lines)
 
 
-def _drags(effects: Sequence[Effect], speed: str, depth: int = 5) -> str:
+def _drags(effects: Sequence[Effect], speed: str, depth: int) -> str:
     words = {"u": "drive", "v": speed, "x": "place", "t": "time", "gain": "gain", "pole": "pole"}
     lines = []
     for effect in _of(effects, "force"):
@@ -152,16 +152,21 @@ def _moving_levels(effects: Sequence[Effect], speed: str) -> str:
 
 
 def _bristle(effects: Sequence[Effect]) -> str:
-    words = {"v": "v", "h": "0.5 * h", "level": "level"}
-    after = {**words, "v": "end"}
-    bends, forces, relaxes = [], [], []
+    """Half a step of bending, the force there for the whole step, the other half: each at the mean speed of its half."""
+
+    def words(speed: str) -> dict[str, str]:
+        return {"v": speed, "h": "0.5 * h", "level": "level"}
+
+    begins, bends, forces, relaxes = [], [], [], []
     for effect in _of(effects, "bristle"):
-        state = f"{effect.name}_{effect.states[0]}"
-        bends += [f"if has_{effect.name}:", f"    {state} = {_call(effect, 'bend', words)}"]
-        forces += [f"if has_{effect.name}:", f"    push -= math.copysign(1.0, gain) * {_call(effect, 'force', words)}"]
-        relaxes += [f"if has_{effect.name}:", f"    {state} = {_call(effect, 'bend', after)}"]
+        state, flag = f"{effect.name}_{effect.states[0]}", f"if has_{effect.name}:"
+        begins += [flag, f"    first -= turn * {_call(effect, 'force', words('v'))}"]
+        bends += [flag, f"    {state} = {_call(effect, 'bend', words('0.5 * (v + middle)'))}"]
+        forces += [flag, f"    push -= turn * {_call(effect, 'force', words('middle'))}"]
+        relaxes += [flag, f"    {state} = {_call(effect, 'bend', words('0.5 * (middle + end)'))}"]
+    predict = ["turn = math.copysign(1.0, gain)", "first = push", *begins, "middle = v + 0.5 * (gain * first - v) * (1.0 - decay)"]
     move = ["reach = gain * push", "end = reach + (v - reach) * decay", "moved += reach * h + (v - reach) * spent"]
-    return _lines(5, [*bends, *forces, *move, *relaxes, "v = end"])
+    return _lines(6, [*predict, *bends, *forces, *move, *relaxes, "v = end"])
 
 
 def _motions(effects: Sequence[Effect]) -> str:
@@ -212,62 +217,113 @@ $states
     h_old, h_new = part / fs / cuts, (1.0 - part) / fs / cuts
     decay_old, decay_new = math.exp(-pole * h_old), math.exp(-pole * h_new)
     spent_old, spent_new = -math.expm1(-pole * h_old) / pole, -math.expm1(-pole * h_new) / pole
+    turn = math.copysign(1.0, gain)  # friction opposes motion, whatever the sign of the gain
     v = 0.0
-    for i in range(n):
-        moved = 0.0
-        for piece in range(2):
-            if piece == 0:
-                h, decay, spent, middle_of = h_old, decay_old, spent_old, 0.5 * part
-            else:
-                h, decay, spent, middle_of = h_new, decay_new, spent_new, 0.5 * (1.0 + part)
-            if h <= 0.0:
-                continue
-            k = i - whole - 1 + piece
-            volts = held[k] if k >= 0 else 0.0
-            time = (i + middle_of) / fs
-            place = x[i] + middle_of * (x[i + 1] - x[i])
-            pull = 0.0
-            if any_pull:
+    if not curved:
+        # v runs in the direction of the voltage here; forth and back are directions of motion
+        size = abs(gain)
+        plus, minus = (fixed_forth, fixed_back) if gain > 0.0 else (fixed_back, fixed_forth)
+        for i in range(n):
+            moved = 0.0
+            for piece in range(2):
+                if piece == 0:
+                    h, decay, spent, middle_of = h_old, decay_old, spent_old, 0.5 * part
+                else:
+                    h, decay, spent, middle_of = h_new, decay_new, spent_new, 0.5 * (1.0 + part)
+                if h <= 0.0:
+                    continue
+                k = i - whole - 1 + piece
+                volts = held[k] if k >= 0 else 0.0
+                push = volts
+                if any_pull:
+                    time = (i + middle_of) / fs
+                    place = x[i] + middle_of * (x[i + 1] - x[i])
+                    pull = 0.0
 $pulls
-            for cut in range(cuts):
-                drive = volts
-                if any_state:
-$advance
-                net = drive - pull
-                drag = 0.0
-                if curved:
-$drag_start
-                push = net - drag
-                if not dry and not bristled:
-                    if curved:
-                        middle = v + 0.5 * (gain * push - v) * (1.0 - decay)
-                        drag = 0.0
-$drag_free
-                        push = net - drag
-                    reach = gain * push
+                    push = volts - pull
+                if not dry:
+                    reach = size * push
                     moved += reach * h + (v - reach) * spent
                     v = reach + (v - reach) * decay
                     continue
-                if v == 0.0 and not bristled:
-                    direction = 1.0 if gain * push > 0.0 else -1.0
-                else:
-                    direction = 1.0 if v > 0.0 else -1.0
-                # friction opposes motion, whatever the sign of the gain
-                sign = direction if gain > 0.0 else -direction
-                level = fixed_forth if direction > 0.0 else fixed_back
-                if curved:
-$level_start
-                if bristled:
-$bristle
-                    continue
-                rest = rest_forth if direction > 0.0 else rest_back
-                if v == 0.0:
-                    if abs(push) <= rest:
+                if v > 0.0 or (v == 0.0 and push > plus):
+                    reach = size * (push - plus)
+                    end = reach + (v - reach) * decay
+                    if end >= 0.0:
+                        moved += reach * h + (v - reach) * spent
+                        v = end
                         continue
-                    if curved:
-                        level = rest
-                if curved:
-                    middle = v + 0.5 * (gain * (push - sign * level) - v) * (1.0 - decay)
+                elif v < 0.0 or push < -minus:
+                    reach = size * (push + minus)
+                    end = reach + (v - reach) * decay
+                    if end <= 0.0:
+                        moved += reach * h + (v - reach) * spent
+                        v = end
+                        continue
+                else:
+                    continue
+                # it comes to rest within the piece: find when, then see whether it sticks or turns
+                gone = min(math.log1p(-v / reach) / pole, h)
+                moved += reach * gone + v / pole
+                v = 0.0
+                if push > plus:
+                    reach = size * (push - plus)
+                elif push < -minus:
+                    reach = size * (push + minus)
+                else:
+                    continue
+                left = h - gone
+                grown = -math.expm1(-pole * left)
+                moved += reach * (left - grown / pole)
+                v = reach * grown
+            out[i] = turn * moved * fs
+    else:
+        for i in range(n):
+            moved = 0.0
+            for piece in range(2):
+                if piece == 0:
+                    h, decay, spent, middle_of = h_old, decay_old, spent_old, 0.5 * part
+                else:
+                    h, decay, spent, middle_of = h_new, decay_new, spent_new, 0.5 * (1.0 + part)
+                if h <= 0.0:
+                    continue
+                k = i - whole - 1 + piece
+                volts = held[k] if k >= 0 else 0.0
+                time = (i + middle_of) / fs
+                place = x[i] + middle_of * (x[i + 1] - x[i])
+                pull = 0.0
+                if any_pull:
+$pulls
+                for cut in range(2):
+                    drive = volts
+                    if any_state:
+$advance
+                    net = drive - pull
+                    drag = 0.0
+$drag_start
+                    push = net - drag
+                    if not dry and not bristled:
+                        middle = v + 0.5 * (gain * push - v) * (1.0 - decay)
+                        drag = 0.0
+$drag_free
+                        reach = gain * (net - drag)
+                        moved += reach * h + (v - reach) * spent
+                        v = reach + (v - reach) * decay
+                        continue
+                    if v != 0.0:
+                        direction = 1.0 if v > 0.0 else -1.0
+                    else:
+                        direction = turn if push > 0.0 else -turn
+                    level = fixed_forth if direction > 0.0 else fixed_back
+$level_start
+                    if bristled:
+$bristle
+                        continue
+                    if v == 0.0:
+                        level = rest_forth if direction > 0.0 else rest_back
+                        if abs(push) <= level:
+                            continue
+                    middle = v + 0.5 * (gain * (push - turn * direction * level) - v) * (1.0 - decay)
                     if middle * direction < 0.0:
                         middle = 0.0
                     drag = 0.0
@@ -275,26 +331,24 @@ $drag_middle
                     push = net - drag
                     level = fixed_forth if direction > 0.0 else fixed_back
 $level_middle
-                reach = gain * (push - sign * level)
-                end = reach + (v - reach) * decay
-                if end * direction >= 0.0:
-                    moved += reach * h + (v - reach) * spent
-                    v = end
-                    continue
-                # it comes to rest within the sub-step: find when, then see whether it sticks or turns
-                gone = min(math.log1p(-v / reach) / pole, h)
-                moved += reach * gone + v / pole
-                v = 0.0
-                direction = 1.0 if gain * push > 0.0 else -1.0
-                rest = rest_forth if direction > 0.0 else rest_back
-                if abs(push) > rest:
-                    sign = direction if gain > 0.0 else -direction
-                    reach = gain * (push - sign * rest)
-                    left = h - gone
-                    grown = -math.expm1(-pole * left)
-                    moved += reach * (left - grown / pole)
-                    v = reach * grown
-        out[i] = moved * fs
+                    reach = gain * (push - turn * direction * level)
+                    end = reach + (v - reach) * decay
+                    if end * direction >= 0.0:
+                        moved += reach * h + (v - reach) * spent
+                        v = end
+                        continue
+                    gone = min(math.log1p(-v / reach) / pole, h) if v != 0.0 else 0.0
+                    moved += reach * gone + v / pole
+                    v = 0.0
+                    direction = turn if push > 0.0 else -turn
+                    rest = rest_forth if direction > 0.0 else rest_back
+                    if abs(push) > rest:
+                        reach = gain * (push - turn * direction * rest)
+                        left = h - gone
+                        grown = -math.expm1(-pole * left)
+                        moved += reach * (left - grown / pole)
+                        v = reach * grown
+            out[i] = moved * fs
 $motions
 $encoders
 """)

@@ -17,7 +17,7 @@ from xy_sysid.effects import Effect, Guess, Scene
 from xy_sysid.spectral_cost import Bands, Floor
 from xy_sysid.stream import FloatArray
 
-MANY = 12  # traces of one effect; more are looked at on the first part of the data only
+MANY = 5  # traces of one effect; more are looked at on the first part of the data only
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,12 +78,13 @@ class _Prepared:
         return np.concatenate((values.real.ravel(), values.imag.ravel()))
 
     def _clean(self, values: FloatArray) -> FloatArray:
-        return np.asarray(values - self.basis @ (self.basis.T @ values))
+        return np.asarray(values - (values @ self.basis) @ self.basis.T)
 
     def share(self, columns: FloatArray) -> tuple[float, FloatArray]:
         """Part of the error's power explained, and the coefficients."""
-        white = np.stack([self._clean(self._white(row)) for row in columns], axis=1)
-        size = np.linalg.norm(white, axis=0) + 1e-300
-        coefficients = np.linalg.lstsq(white / size, self.error, rcond=1e-8)[0]
-        explained = (white / size) @ coefficients
-        return float(explained @ explained) / self.power, np.asarray(coefficients / size)
+        white = np.stack([self._clean(self._white(row)) for row in columns])
+        size = np.linalg.norm(white, axis=1) + 1e-300
+        white /= size[:, None]
+        seen = white @ self.error
+        coefficients = np.linalg.pinv(white @ white.T, rcond=1e-10, hermitian=True) @ seen
+        return float(seen @ coefficients) / self.power, np.asarray(coefficients / size)

@@ -43,13 +43,12 @@ def pair(zero: float, zero_damping: float, pole: float, pole_damping: float, fs:
 def guesses(scene: Scene, low: float, high: float) -> Iterator[Guess]:
     """Traces of pairs with poles between ``low`` and ``high`` (Hz), every 6 per cent."""
     top = min(high, 0.35 * scene.sampling_rate)
+    model = scene.velocity - scene.error
     for frequency in np.geomspace(low, top, max(int(math.log(top / low) / 0.06), 2)):
         w = 2.0 * math.pi * float(frequency)
-        bottom = [1.0, 2.0 * _DAMPING * w, w * w]
-        traces = []
-        for numerator in ([1.0, 0.0, 0.0], [0.0, w, 0.0]):
-            b, a = scipy.signal.bilinear(numerator, bottom, scene.sampling_rate)
-            traces.append(scipy.signal.lfilter(b, a, scene.velocity - scene.error))
+        c = w / math.tan(0.5 * w / scene.sampling_rate)  # s = c (z - 1) / (z + 1), exact at the pair
+        a = np.array([c * c + 2.0 * _DAMPING * w * c + w * w, 2.0 * (w * w - c * c), c * c - 2.0 * _DAMPING * w * c + w * w])
+        traces = [scipy.signal.lfilter(b, a, model) for b in (c * c * np.array([1.0, -2.0, 1.0]), c * w * np.array([1.0, 0.0, -1.0]))]
         yield Guess(columns(*traces), _Reader(float(frequency)), at_encoder=True)
 
 
