@@ -42,7 +42,7 @@ def covariance(task: Problem, at: Point, table: FloatArray) -> tuple[FloatArray,
     place = _places(task)
     straight, folded = error_covariance(task, at, task.sigma, place)
     meat = _meat(np.ascontiguousarray(table[:-1] / scale[:, None]), straight, folded, place)
-    expected = 0.5 * (float(np.sum(straight[0].real)) - 2.0 * float(np.trace(bread @ meat)))
+    expected = 0.5 * (float(np.sum(straight[0].real)) - float(np.trace(bread @ meat)))
     squares = np.abs(straight) ** 2 + np.abs(folded) ** 2
     spread = float(np.sum(squares[0]) + 2.0 * np.sum(squares[1:]))
     freedom = _freedom(task.frf)

@@ -23,6 +23,8 @@ def finish(task: Problem, at: Point, method: str, iterations: int, converged: bo
     error = table[-1].reshape(2, -1) / task.weight
     predicted = frf.response - (error[0] + 1j * error[1])
     value = 0.5 * float(table[-1] @ table[-1])
+    if not np.all(np.isfinite(table)):
+        return _failed(task, at, method, iterations, reason, start)
     inner, expected, deviation = covariance(task, at, table)
     to_numerator, to_denominator = _to_coefficients(task, at)
     numerator = (at.b @ to_numerator)[::-1]
@@ -81,9 +83,43 @@ def finish(task: Problem, at: Point, method: str, iterations: int, converged: bo
             *root_estimates(task, zeros, at.numerator, at.b, inner, 0, "zero"),
         ),
         iterations=iterations,
-        converged=converged and np.isfinite(value),
+        converged=converged,
         reason=reason,
         warnings=tuple(warnings),
+        start=start,
+    )
+
+
+def _failed(task: Problem, at: Point, method: str, iterations: int, reason: str, start: str) -> Fit:
+    """Nothing could be estimated: numbers ran out of range. Everything that is not known is NaN."""
+    structure, frf, nan = task.structure, task.frf, float("nan")
+    lines, names = np.full(len(frf), np.nan), _names(task)
+    bottom = np.zeros(structure.denominator_order + 1)
+    bottom[0] = 1.0
+    period = None if structure.domain == "s" else task.plan.period
+    return Fit(
+        tf=TransferFunction(np.full(structure.numerator_order + 1, np.nan), bottom, at.delay, period, frf.input_unit, frf.output_unit),
+        structure=structure,
+        method=method,
+        frequency=frf.frequency,
+        measured=frf.response,
+        response=lines.astype(np.complex128),
+        weight=task.weight,
+        cost=float("inf"),
+        expected_cost=nan,
+        cost_deviation=nan,
+        consistent=None,
+        relative_error=float("inf"),
+        parameters=names,
+        covariance=np.full((len(names), len(names)), np.nan),
+        jacobian=np.full((2 * len(frf), len(names)), np.nan),
+        poles=np.zeros(0, dtype=np.complex128),
+        zeros=np.zeros(0, dtype=np.complex128),
+        intervals=(),
+        iterations=iterations,
+        converged=False,
+        reason=f"{reason} The numbers ran out of range.",
+        warnings=("The fit failed: its numbers ran out of range. Scale the data or lower the orders.",),
         start=start,
     )
 

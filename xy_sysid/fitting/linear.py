@@ -36,6 +36,8 @@ def linear_step(task: Problem, delay: float, last: Point | None, correct: bool) 
     table = np.concatenate((left, -right[:, :-1], right[:, -1:]), axis=1)
     upper: FloatArray = np.asarray(np.linalg.qr(np.concatenate((table.real, table.imag)), mode="r"))
     size = upper.shape[1] - 1
+    if not np.all(np.isfinite(upper)):
+        upper = np.zeros_like(upper)  # nothing can be solved: a point of cost infinity or worse than any other
     solution: FloatArray = np.asarray(np.linalg.lstsq(upper[:size, :size], upper[:size, size], rcond=1e-14)[0], dtype=np.float64)
     split = structure.numerator_order + 1
     return Point(numerator, denominator, solution[:split], np.append(solution[split:], 1.0), delay)

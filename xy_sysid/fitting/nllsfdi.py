@@ -1,9 +1,10 @@
-"""The paper's own path, as the MATLAB routine nllsfdi takes it: for comparison, not for use.
+"""The paper's own path, as the MATLAB routine nllsfdi (nlsfdi) takes it: for comparison, not for use.
 
 Frequency axis scaled by the median of |j w|; LLS by pseudo-inverse; one LLS re-weighted by 1 / |A|; then Gauss-Newton or
-Levenberg-Marquardt (lambda 0.01, halved on success, times 10 on failure) on powers of s; it stops when the cost changes by
-less than 1e-10 of itself, or after 100 iterations. Cost = half the sum of squared errors weighted by 1 / |FRF|. There is no
-delay, no hold and no window in its model: a delay of the machine is absorbed by the polynomials.
+Levenberg-Marquardt on powers of s: each column's own square damped by lambda = 0.01, halved on success, times 10 on failure. It
+stops when the cost changes by 1e-10 of itself or less, up or down, or after 100 iterations. Cost = half the sum of squared errors
+weighted by 1 / |FRF|. There is no delay, no hold and no window in its model: a delay of the machine is absorbed by the
+polynomials. (T. Beauduin, FdiTools; Pintelon & Schoukens, System Identification, 2nd ed., 9.9)
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ def fit(frf: FrequencyResponse, structure: Structure, start: TransferFunction | 
     if structure.domain != "s":
         raise BadInput("domain", repr(structure.domain), "'s' for the paper's path", "Use another estimator.")
     literal = replace(structure, integrators=0, delay=0.0, hold="none", weighting="relative")
-    bare = replace(frf, kernel_offset=np.zeros(1), kernel_weight=np.ones(1), differenced=False)
+    bare = replace(frf, kernel_offset=np.zeros(1), kernel_weight=np.ones(1), kernel_amplitude=np.zeros(0), differenced=False)
     task = problem(bare, literal)
     data = _Data(task.plan.line, task.frf.response, task.weight, literal.denominator_order, literal.numerator_order)
     first = _linear(data, data.weight)
@@ -65,11 +66,16 @@ def _powers(s: ComplexArray, highest: int) -> ComplexArray:
     return np.asarray(s[:, None] ** np.arange(highest, -1, -1), dtype=np.complex128)
 
 
+def _pinv(table: FloatArray) -> FloatArray:
+    """With MATLAB's tolerance."""
+    return np.asarray(np.linalg.pinv(table, rcond=max(table.shape) * np.finfo(float).eps))
+
+
 def _linear(data: _Data, weight: FloatArray) -> FloatArray:
     """min sum weight^2 |response A - B|^2 by the pseudo-inverse."""
     regressor = np.concatenate((-data.response[:, None] * _powers(data.s, data.n - 1), _powers(data.s, data.m)), axis=1) * weight[:, None]
     right = data.response * data.s**data.n * weight
-    return np.asarray(np.linalg.pinv(np.concatenate((regressor.real, regressor.imag))) @ np.concatenate((right.real, right.imag)))
+    return np.asarray(_pinv(np.concatenate((regressor.real, regressor.imag))) @ np.concatenate((right.real, right.imag)))
 
 
 def _error(data: _Data, theta: FloatArray) -> tuple[FloatArray, FloatArray, float]:
@@ -84,21 +90,22 @@ def _error(data: _Data, theta: FloatArray) -> tuple[FloatArray, FloatArray, floa
 
 def _iterate(data: _Data, theta: FloatArray, options: FitOptions) -> tuple[FloatArray, int, bool]:
     damped = options.method == "levenberg_marquardt"
-    damping = options.damping
+    damping = options.damping if damped else 0.0
     error, slope, cost = _error(data, theta)
     for iteration in range(1, options.max_iterations + 1):
-        left, values, right = np.linalg.svd(slope, full_matrices=False)
-        gain = values / (values**2 + damping * values[0] ** 2) if damped else 1.0 / np.maximum(values, 1e-300)
-        trial = theta - right.T @ (gain * (left.T @ error))
+        squares = np.sum(slope**2, axis=0)
+        below = np.diag(np.sqrt(damping * (squares + np.max(squares) * np.finfo(float).eps)))
+        step = _pinv(np.concatenate((slope, below))) @ np.concatenate((error, np.zeros(theta.size)))
+        trial = theta - step
         trial_error, trial_slope, trial_cost = _error(data, trial)
-        change = abs(cost - trial_cost) / cost if cost > 0 else 0.0
+        if not np.isfinite(trial_cost):
+            return theta, iteration, False
+        change = abs(trial_cost - cost) / cost if cost > 0 else 0.0
         if trial_cost < cost or not damped:
             theta, error, slope, cost = trial, trial_error, trial_slope, trial_cost
             damping *= 0.5
-            if change <= options.relative_change:
-                return theta, iteration, True
         else:
             damping *= 10.0
-            if damping > 1e12:
-                return theta, iteration, True
+        if change <= options.relative_change:
+            return theta, iteration, True
     return theta, options.max_iterations, False

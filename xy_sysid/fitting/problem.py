@@ -15,6 +15,7 @@ from xy_sysid.frf import ComplexArray, FrequencyResponse
 from xy_sysid.stream import FloatArray
 from xy_sysid.transfer_function import TransferFunction
 
+SMALLEST, LARGEST = 1e-100, 1e100  # of |FRF|: squares of more or less leave the range of numbers
 SMALLEST_SIGMA = 1e-13  # of |FRF|: below this the response is exact in double precision
 
 
@@ -52,6 +53,8 @@ def problem(frf: FrequencyResponse, structure: Structure) -> Problem:
             "Record longer, widen the band or lower the orders.",
         )
     magnitude = np.abs(chosen.response)
+    if not (float(np.min(magnitude)) > SMALLEST and float(np.max(magnitude)) < LARGEST):
+        raise BadInput("magnitude of the response", f"{np.min(magnitude):.3g} to {np.max(magnitude):.3g}", "1e-100 to 1e100", "Scale the data.")
     has_sigma = bool(np.all(np.isfinite(chosen.sigma)) and np.all(chosen.sigma >= 0))
     sigma = np.maximum(chosen.sigma, SMALLEST_SIGMA * magnitude) if has_sigma else None
     if structure.weighting == "sigma":
