@@ -12,6 +12,7 @@ from xy_sysid.cli import options as o
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
+    from xy_sim.machine import Machine
     from xy_sysid.cli.monitor import Monitor
 
 DELAY_WITHIN, RESONANCE_WITHIN, ERROR_WITHIN = 20e-6, 0.2, 0.015  # s, Hz, 1: what the demo promises on paper.yaml
@@ -33,9 +34,10 @@ def demo(
         import rclpy  # noqa: F401
     except ModuleNotFoundError:
         raise MissingExtra("ROS 2 (rclpy)", "ros") from None
+    o.ros_domain()
     table = Machine.from_file(machine)
     aside.print("starting the nodes: a simulated table, an excitation and an identifier, over ROS 2 ...")
-    code, monitor, lines, wall = _watch(_specs(table.axes, machine, seconds, speed, seed), table.axes, seconds, plain=json)
+    code, monitor, lines, wall = _watch(_specs(table, machine, seconds, speed, seed), table.axes, seconds, plain=json)
     answer = {axis: result(monitor, axis, table.truth(axis)) for axis in table.axes}
     if json:
         emit({"machine": machine, "seconds": seconds, "wall_seconds": wall, "axes": answer, "exit_code": code})
@@ -52,19 +54,21 @@ def demo(
     raise typer.Exit(code)
 
 
-def _specs(axes: tuple[str, ...], machine: str, seconds: float, speed: float, seed: int) -> list[Any]:
+def _specs(table: Machine, machine: str, seconds: float, speed: float, seed: int) -> list[Any]:
     from json import dumps
     from pathlib import Path
 
     from xy_sysid.run_plan import plan
 
     excite: dict[str, Any] = {"lockstep": True, "speed": float(speed), "duration": float(seconds)}
-    excite |= {axis: {"seed": seed + k} for k, axis in enumerate(axes)}
+    excite |= {axis: {"seed": seed + k} for k, axis in enumerate(table.axes)}
+    rigid = all(table.truth(axis)["resonance_hz"] is None for axis in table.axes)
+    orders = {"numerator_order": 0, "denominator_order": 2} if rigid else {}
     document = {
         "env": {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"},
         "nodes": [
             {"executable": "ballscrew", "parameters": {"machine": machine}},
-            {"executable": "identifier"},
+            {"executable": "identifier", "parameters": orders},
             {"executable": "excitation", "parameters": excite},
         ],
     }

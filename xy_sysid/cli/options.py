@@ -24,6 +24,7 @@ Topics = Annotated[
 Effort = Annotated[bool, typer.Option("--effort", help="take the input from the effort of a JointState, which then holds volts")]
 Period = Annotated[str, typer.Option(help="samples of the input's period: auto, none or a number")]
 Span = Annotated[str, typer.Option("--span", metavar="FROM:TO", help="only this part, in seconds from the start, for example 10:70")]
+LARGEST_DOMAIN = 232
 Json = Annotated[bool, typer.Option("--json", help="one JSON document on stdout")]
 
 
@@ -48,6 +49,13 @@ def values_from(pairs: list[str] | None, option: str, example: str, cls: type[Se
             raise unknown_name(name, list(cls.model_fields), option)
         values[name] = text
     return values
+
+
+def ros_domain() -> None:
+    """Raises BadInput for a ROS_DOMAIN_ID that ROS would refuse with many words."""
+    text = os.environ.get("ROS_DOMAIN_ID", "") or "0"
+    if not (text.isascii() and text.isdigit() and int(text) <= LARGEST_DOMAIN):
+        raise BadInput("ROS_DOMAIN_ID", repr(text), f"0 to {LARGEST_DOMAIN}", "Set it, or leave it unset for 0.")
 
 
 def output_file(option: str, path: Path | None) -> None:

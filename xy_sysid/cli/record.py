@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from json import dumps as json_text
 from pathlib import Path
 from typing import Annotated, Any
@@ -31,6 +32,9 @@ def record(
         import rclpy  # noqa: F401
     except ModuleNotFoundError:
         raise MissingExtra("ROS 2 (rclpy)", "ros") from None
+    o.ros_domain()
+    if not re.fullmatch(r"(/[A-Za-z_][A-Za-z0-9_]*)+|/", namespace):
+        raise BadInput("--namespace", repr(namespace), "names after slashes, like /xy or /cell/xy", "Change it.")
     values: dict[str, Any] = {"output": str(out), "storage": storage, "seconds": float(seconds)}
     if topic:
         values["topics"] = list(topic)

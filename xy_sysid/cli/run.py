@@ -17,6 +17,7 @@ def run(
     from xy_sysid import starter
     from xy_sysid.cli.output import aside, emit
 
+    o.ros_domain()
     code = starter.run(starter.load(params), say=(lambda line: aside.print(line, markup=False)) if json else starter._print)
     if json:
         emit({"run": params, "exit_code": code})
