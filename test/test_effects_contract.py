@@ -82,8 +82,6 @@ def test_an_effect_fades_with_its_size(name: str) -> None:
     rest = EFFECTS[name].typical[1:]
     if name in ("base_resonance", "screw_compliance"):  # the pair closes only if its dampings are equal
         rest = (rest[0], rest[1], rest[1])
-    if name == "asymmetric_friction":
-        rest = (1e-3,)
     if name == "stribeck_friction":
         rest = (1e-3, rest[1])
     if name == "backlash":

@@ -158,3 +158,26 @@ def test_data_that_cannot_be_fitted_are_refused() -> None:
         prepare(RATE, np.zeros(1000), np.full(1000, np.nan))
     with pytest.raises(BadInput, match="one and the same"):
         prepare(RATE, np.zeros(1000), np.zeros(900))
+
+
+def test_friction_is_told_from_drag_where_the_base_alone_is_led_astray() -> None:
+    """A slow machine under slow moves: the base takes friction for drag, and adding friction must leave that valley."""
+    rate, n = 1000.0, 20_001
+    t = np.arange(n) / rate
+    u = np.asarray(1.5 * np.sign(np.sin(2 * np.pi * 0.25 * t)) * (1.0 + 0.3 * np.sin(2 * np.pi * 0.11 * t)) + 0.1 * np.sin(2 * np.pi * 7.0 * t))
+    truth = AxisModel(0.17, 0.4e-3, 2.2).with_effect("coulomb_friction", (0.58,))
+    x = np.concatenate(([0.0], np.cumsum(simulate(truth, rate, u, np.zeros(n))) / rate))
+    data = prepare(rate, u, x + 1e-7 * np.random.default_rng(2).standard_normal(n))
+    base = fit_base(data)
+    assert base.model.pole > 2.5
+    found = fit_with(data, base, ["coulomb_friction"])
+    for key in ("gain", "pole", "coulomb_friction.coulomb"):
+        assert found.parameter(key).value == pytest.approx(truth.values()[key], rel=0.02)
+
+
+def test_a_parameter_that_nothing_shows_has_no_interval() -> None:
+    """A limit that the voltage never reaches: infinite, not an invented number and not an error."""
+    data = machine_data("none")
+    found = fit_with(data, machine_base("none"), ["saturation"], {"saturation": (50.0,)})
+    assert found.parameter("saturation.limit").high == np.inf
+    assert found.parameter("gain").high < 0.0971

@@ -14,6 +14,7 @@ from xy_sysid.axis_model import STANDARD, AxisModel, Library, sample_velocity, s
 from xy_sysid.base_start import base_start
 from xy_sysid.effects import Effect, Parameter, Scene
 from xy_sysid.errors import BadInput
+from xy_sysid.inverse_start import inverse_starts
 from xy_sysid.spectral_cost import Bands, Floor, bands, encoder_noise, excess, floor
 from xy_sysid.stream import FloatArray
 from xy_sysid.traces import Trace, bounded, screen
@@ -132,20 +133,30 @@ def fit_with(data: AxisData, base: GreyboxFit, names: Iterable[str], starts: Map
 
 
 def _begun(data: AxisData, base: GreyboxFit, model: AxisModel, name: str) -> AxisModel:
-    """The model with one more effect, its start read from the data: the best of its trace and its joint starts."""
+    """The model with one more effect, its start read from the data: the best of trace, inverse and joint starts."""
     effect = model.library[name]
     candidates = [model.with_effect(name, look(data, base, [effect])[0].values)]
+    scene = _scene(data, base)
+    for gain, pole, values in inverse_starts(effect, scene, data.first):
+        whole = replace(model, gain=gain, pole=min(max(pole, 1e-2), 1e5))
+        candidates.append(whole.with_effect(name, bounded(effect, values)))
     if effect.joint is not None:
-        for gain, later, pole, values in effect.joint(_scene(data, base)):
+        for gain, later, pole, values in effect.joint(scene):
             whole = replace(model, gain=gain, delay=max(base.model.delay + later, 0.0), pole=min(max(pole, 1e-2), 1e5))
             candidates.append(whole.with_effect(name, bounded(effect, values)))
     return min(candidates, key=lambda candidate: _misfit(data, candidate))
 
 
 def _misfit(data: AxisData, model: AxisModel) -> float:
-    """Excess over the first stage's data, without a fit."""
+    """Excess over the first stage's data, without a fit, plus ln(power of the whole error / floor).
+
+    The second part is for real machines, whose small errors in many high bands would else hide a large one in a few low
+    bands: on EMPS it chooses the valley with the true friction.
+    """
     run, values, _ = _problem(data, model, data.first)
-    return excess(data.layout, data.velocity[: data.first] - run(values), data.floor)
+    error = data.velocity[: data.first] - run(values)
+    whole = _rms(data.layout, data.layout.power(data.layout.spectrum(error))) / _rms(data.layout, data.floor.power)
+    return excess(data.layout, error, data.floor) + 2.0 * float(np.log(max(whole, 1e-6)))
 
 
 def look(data: AxisData, fitted: GreyboxFit, effects: Iterable[Effect]) -> list[Trace]:
@@ -194,7 +205,7 @@ def _result(data: AxisData, start: AxisModel, scale: Scale, found: Solution, run
     held = error[data.training :]
     inner, spread = scale.inner(found.values), Z95 * np.sqrt(np.diag(found.covariance))
     wide = Scale(np.where(scale.positive, scale.low, -np.inf), np.full_like(scale.high, np.inf), scale.positive, scale.unit)
-    low, high = wide.outer(inner - spread), wide.outer(inner + spread)
+    low, high = wide.outer(inner - spread), np.where(np.isinf(spread), np.inf, wide.outer(inner + spread))
     units = ["m/s/V", "s", "rad/s", *(item.unit for name, _ in model.effects for item in model.library[name].parameters)]
     estimates = tuple(
         Estimate(name, value, unit, float(min(a, b)), float(max(a, b)))

@@ -125,6 +125,17 @@ def floor(layout: Bands, velocity: FloatArray, encoder: float, epsilon: float) -
     return Floor(noise + epsilon**2 * envelope, signal > SEEN * noise, encoder, epsilon)
 
 
+def tolerance(layout: Bands, error: ComplexArray, least: Floor) -> FloatArray:
+    """(bands,) m^2/s^2 by which squared errors (a spectrum of them) are divided in a fit.
+
+    What a model leaves above the floor is systematic: taken as one common error of each band (as Kennedy & O'Hagan 2001 do
+    for model discrepancy), it does not average out over the band's lines. So at the floor every line counts, and far above
+    it every band does, wide or narrow.
+    """
+    lines = np.bincount(layout.band, minlength=layout.count)
+    return np.asarray(least.power + lines * np.maximum(layout.power(error) - least.power, 0.0))
+
+
 def excess(layout: Bands, error: FloatArray, least: Floor) -> float:
     """Mean over the excited bands of ln(power of the error / floor), none counted below 0: 0 is nothing left to explain."""
     ratio = layout.power(layout.spectrum(error)) / np.maximum(least.power, 1e-300)

@@ -14,7 +14,7 @@ import scipy.signal
 
 from xy_sysid.base_start import mean_velocity_filter
 from xy_sysid.effects import Effect, Guess, Scene
-from xy_sysid.spectral_cost import Bands, Floor
+from xy_sysid.spectral_cost import Bands, Floor, tolerance
 from xy_sysid.stream import FloatArray
 
 MANY = 5  # traces of one effect; more are looked at on the first part of the data only
@@ -35,7 +35,7 @@ def screen(effects: Iterable[Effect], scene: Scene, nuisance: FloatArray, layout
     nuisance: (k, n) change of the model's velocity per unit of each parameter that it has already;
     short: samples to which effects with many traces are confined.
     """
-    power = np.maximum(layout.power(layout.spectrum(scene.error)), least.power)
+    power = tolerance(layout, layout.spectrum(scene.error), least)
     weight = (least.excited / np.sqrt(power))[layout.band]
     prepared = [_Prepared(scene.error[:n], nuisance[:, :n], layout, weight) for n in (scene.error.size, min(short, scene.error.size))]
     found = []

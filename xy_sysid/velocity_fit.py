@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from xy_sysid.spectral_cost import Bands, Floor
+from xy_sysid.spectral_cost import Bands, Floor, tolerance
 from xy_sysid.stream import FloatArray
 
 STEP = 1e-4  # of a logarithm, or of a parameter's scale: far above rounding, far below what bends
@@ -77,7 +77,7 @@ def solve(
     size = inner.size
     normal, cost, converged = np.eye(size), np.inf, False
     for _ in range(rounds):
-        power = np.maximum(layout.power(error), least.power)
+        power = tolerance(layout, error, least)
         weight = np.sqrt(1.0 / power)[layout.band]
         cost = _cost(error * weight)
         damping, converged, fresh = 1e-3, False, True
@@ -112,10 +112,17 @@ def solve(
                 if damping > 1e6:
                     converged = True
                     break
-    diagonal = np.diag(normal) + 1e-300
-    scaled = normal / np.sqrt(np.outer(diagonal, diagonal))
-    covariance = np.linalg.pinv(scaled, rcond=1e-12, hermitian=True) / np.sqrt(np.outer(diagonal, diagonal))
-    return Solution(scale.outer(inner), covariance, cost, runs, converged)
+    return Solution(scale.outer(inner), _covariance(normal), cost, runs, converged)
+
+
+def _covariance(normal: FloatArray) -> FloatArray:
+    """Inverse of the normal matrix; infinite for a parameter that the data do not see at all."""
+    spread = np.sqrt(np.diag(normal))
+    seen = spread > 0.0
+    covariance = np.diag(np.where(seen, 0.0, np.inf))
+    unit = np.outer(spread[seen], spread[seen])
+    covariance[np.ix_(seen, seen)] = np.linalg.pinv(normal[np.ix_(seen, seen)] / unit, rcond=1e-12, hermitian=True) / unit
+    return covariance
 
 
 def _cost(error: NDArray[np.complex128]) -> float:

@@ -21,7 +21,7 @@ def guesses(scene: Scene) -> Iterator[Guess]:
 
     def read(c: FloatArray) -> tuple[float, ...]:
         even, odd = float(c[1]), max(float(c[0]), 1e-3)
-        return (min(max(even / odd, -0.95), 0.95), odd)
+        return (odd, min(max(even / odd, -0.95), 0.95))
 
     yield Guess(columns(direction, abs(direction)), read)
 
@@ -34,8 +34,8 @@ EFFECT = Effect(
     source="Armstrong-Helouvry, Control of Machines with Friction, Kluwer 1991, ch. 3",
     category="friction",
     parameters=(
-        Parameter("asymmetry", "", -0.99, 0.99, 0.5, "part by which forth is above and back below the mean", positive=False),
         Parameter("coulomb", "V", 1e-6, 100.0, 0.2, "mean level"),
+        Parameter("asymmetry", "", -0.99, 0.99, 0.5, "part by which forth is above and back below the mean", positive=False),
     ),
     shows="error of another size forth than back, that vanishes at rest",
     look_alikes=("constant_load", "coulomb_friction"),

@@ -29,13 +29,13 @@ def guesses(scene: Scene) -> Iterator[Guess]:
 
 
 class _Reader:
-    """(excess, coulomb, velocity) from the coefficients at one Stribeck speed."""
+    """(coulomb, excess, velocity) from the coefficients at one Stribeck speed."""
 
     def __init__(self, velocity: float) -> None:
         self.velocity = velocity
 
     def __call__(self, c: FloatArray) -> tuple[float, ...]:
-        return (max(float(c[0]), 0.02), max(float(c[1]), 0.01), self.velocity)
+        return (max(float(c[1]), 0.01), max(float(c[0]), 0.02), self.velocity)
 
 
 EFFECT = Effect(
@@ -46,8 +46,8 @@ EFFECT = Effect(
     source="Armstrong-Helouvry, Dupont & Canudas de Wit, A survey of friction models, Automatica 30 (1994), eq. 6",
     category="friction",
     parameters=(
-        Parameter("excess", "V", 1e-6, 100.0, 0.2, "breakaway above the Coulomb level"),
         Parameter("coulomb", "V", 1e-6, 100.0, 0.15, "level at speed"),
+        Parameter("excess", "V", 1e-6, 100.0, 0.2, "breakaway above the Coulomb level"),
         Parameter("velocity", "m/s", 1e-5, 1.0, 0.01, "speed at which the excess has fallen to 1/e"),
     ),
     shows="as Coulomb friction, with more error below a few mm/s than above",
