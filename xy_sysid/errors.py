@@ -33,3 +33,7 @@ class MissingExtra(XySysidError):
     def __init__(self, what: str, extra: str) -> None:
         super().__init__(f"{what} is not installed. Install it with: pip install 'xy_sysid[{extra}]'")
         self.extra = extra
+
+
+class ReaderGone(Exception):
+    """Who reads what a command says has gone away; not the user's mistake, and nothing is left to be said."""

@@ -47,11 +47,11 @@ def _axis(fit: Fit) -> dict[str, Any]:
 
 def write_model(path: Path, fits: dict[str, Fit], provenance: dict[str, Any]) -> None:
     """Write the models as YAML; axis names are quoted, as a bare y would mean true."""
-    text = yaml.dump(model_document(fits, provenance), Dumper=_Quoting, sort_keys=False, width=120, allow_unicode=True)
+    text = yaml.dump(model_document(fits, provenance), Dumper=Quoting, sort_keys=False, width=120, allow_unicode=True)
     path.write_text(text, encoding="utf-8")
 
 
-class _Quoting(yaml.SafeDumper):
+class Quoting(yaml.SafeDumper):
     """Writes the names x, y, ... with quotes."""
 
 
@@ -60,7 +60,7 @@ def _string(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
     return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
 
 
-_Quoting.add_representer(str, _string)
+Quoting.add_representer(str, _string)
 
 
 @dataclass(frozen=True, slots=True)

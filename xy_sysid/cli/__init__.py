@@ -15,13 +15,9 @@ INTERRUPTED, WRONG = 130, 2
 LONGEST = 800  # characters of a refusal; somebody may give a whole file as a value
 
 
-class ReaderGone(Exception):
-    """Who reads what a command says has gone away; typer and rich end the process at the error itself."""
-
-
 def run(arguments: Sequence[str]) -> int:
     """Run one command; 0 is an answer, 2 wrong use or bad input, 130 Ctrl-C."""
-    from xy_sysid.errors import XySysidError
+    from xy_sysid.errors import ReaderGone, XySysidError
 
     try:
         return _command(arguments)

@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from xy_sysid.cli import ReaderGone
+from xy_sysid.errors import ReaderGone
 
 if TYPE_CHECKING:
     from xy_sysid.fitting.result import Estimate

@@ -1,0 +1,131 @@
+"""xy-sysid diagnose: which physical effect is missing?"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from xy_sysid.cli import options as o
+from xy_sysid.cli.output import emit, people, progress, table
+from xy_sysid.cli.reading import chosen, each, read
+
+if TYPE_CHECKING:
+    from xy_sysid.diagnosis import Diagnosis
+    from xy_sysid.greybox import GreyboxFit
+    from xy_sysid.recording import Recording
+    from xy_sysid.refinement import Candidate
+
+Own = Annotated[list[Path] | None, typer.Option("--effect-file", metavar="FILE", help="a Python file with an effect of your own (may be repeated)")]
+
+
+def diagnose(
+    rec: o.Rec,
+    axis: o.Axes = None,
+    topic: o.Topics = None,
+    effort: o.Effort = False,
+    span: o.Span = "",
+    effect_file: Own = None,
+    json: o.Json = False,
+) -> None:
+    """Name the physical effect that the rigid model of each axis misses, with evidence, or say that none is known."""
+    from xy_sysid.diagnosis import diagnose as logic
+    from xy_sysid.user_effects import library
+
+    begun = time.perf_counter()
+    known = library(effect_file or [])
+    recording = read(rec, axis, topic, effort, span, json)
+    names = chosen(recording, axis)
+    with progress() as bar:
+        task = bar.add_task("diagnosing", total=len(names))
+
+        def work(name: str) -> Diagnosis:
+            bar.update(task, description=f"diagnosing axis {name}")
+            u, y = samples(recording, name)
+            found = logic(recording.sampling_rate, u, y, known)
+            bar.advance(task)
+            return found
+
+        found, refused = each(names, work)
+    seconds = time.perf_counter() - begun
+    units = recording.input_unit, recording.output_unit
+    if json:
+        answers: dict[str, Any] = {name: answer(item, units) for name, item in found.items()}
+        answers |= {name: {"verdict": "not_enough_data", "effect": None, "confidence": 1.0, "sentence": text} for name, text in refused.items()}
+        emit({"axes": answers, "seconds": seconds})
+        return
+    for name, item in found.items():
+        _show(name, item, units)
+    for name, text in refused.items():
+        people.print(f"axis {name}: {text}", markup=False)
+
+
+def samples(recording: Recording, axis: str) -> Any:
+    """Input and output of the longest gap-free run."""
+    run = max(recording.runs(), key=lambda part: part.stop - part.start)
+    u, y = recording.axis(axis)
+    return u[run], y[run]
+
+
+def answer(item: Diagnosis, units: tuple[str, str]) -> dict[str, Any]:
+    """One axis of the contract's document."""
+    ladder = item.ladder
+    error: dict[str, Any] = {"unit": f"{units[1]}/s", "now": None, "noise_floor": None, "held_out": None}
+    if ladder is not None:
+        first = ladder.steps[0].fit
+        error |= {"now": first.held_out_error, "noise_floor": first.noise_floor, "held_out": ladder.final.held_out_error}
+    places = item.where.places if item.where is not None else ()
+    return {
+        "verdict": item.verdict,
+        "effect": item.effect if item.verdict == "missing_effect" else None,
+        "effects": item.effects,
+        "confidence": item.confidence,
+        "tolerance": item.tolerance,
+        "sentence": item.sentence,
+        "error": error,
+        "where": [{"kind": p.kind, "from": p.low, "to": p.high, "unit": p.unit, "error_over_floor": p.error_over_floor} for p in places],
+        "candidates": [_candidate(c, item) for c in item.candidates if c.fit is not None],
+        "next_experiment": item.next_experiment,
+    }
+
+
+def _candidate(item: Candidate, whole: Diagnosis) -> dict[str, Any]:
+    assert item.fit is not None and whole.ladder is not None
+    before = whole.ladder.steps[0].fit.held_out_error
+    return {
+        "effect": item.effect,
+        "held_out_error": item.fit.held_out_error,
+        "error_ratio": item.fit.held_out_error / before if before > 0 else None,
+        "parameters": parameters(item.fit),
+        "evidence": f"its trace explains {100 * item.share:.3g} % of the error; with it the held-out error is "
+        f"{1e3 * item.fit.held_out_error:.3g} mm/s instead of {1e3 * before:.3g}",
+    }
+
+
+def parameters(fit: GreyboxFit) -> dict[str, Any]:
+    """Every parameter with unit and 95 % interval."""
+    return {item.name: {"value": item.value, "unit": item.unit, "ci95": [item.low, item.high]} for item in fit.parameters}
+
+
+def _show(name: str, item: Diagnosis, units: tuple[str, str]) -> None:
+    people.print(f"axis {name}: {item.sentence} (confidence {item.confidence:.2f})", markup=False)
+    if item.where is not None and item.where.places:
+        people.print(f"  the rigid model fails: {'; '.join(place.sentence for place in item.where.places[:3])}", markup=False)
+    if item.ladder is not None and item.verdict != "nothing_missing":
+        rows = [
+            (c.effect, f"{1e3 * c.fit.held_out_error:.4g}", f"{c.fit.excess:.2f}", f"{100 * c.share:.2g} %")
+            for c in item.candidates
+            if c.fit is not None
+        ]
+        if rows:
+            table("candidates", ("effect", f"held-out error m{units[1]}/s", "excess", "share of error"), rows)
+        parameter_table(item.ladder.final)
+    people.print(f"  Next experiment: {item.next_experiment}\n", markup=False)
+
+
+def parameter_table(fit: GreyboxFit) -> None:
+    """Parameters of a fit, as people read them."""
+    rows = [(p.name, f"{p.value:.5g}", f"{p.low:.5g} .. {p.high:.5g}", p.unit) for p in fit.parameters]
+    table("", ("parameter", "value", "95 % interval", "unit"), rows)

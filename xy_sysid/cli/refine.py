@@ -1,0 +1,141 @@
+"""xy-sysid refine: add effects, refit, watch the error fall."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from xy_sysid.cli import options as o
+from xy_sysid.cli.diagnose import Own, parameter_table, parameters, samples
+from xy_sysid.cli.output import emit, people, progress, table
+from xy_sysid.cli.provenance import provenance
+from xy_sysid.cli.reading import chosen, each, read
+
+if TYPE_CHECKING:
+    from xy_sysid.refinement import Ladder
+
+
+def refine(
+    rec: o.Rec,
+    add: Annotated[list[str] | None, typer.Option("--add", metavar="NAME", help="add this effect (may be repeated, in this order)")] = None,
+    auto: Annotated[bool, typer.Option("--auto", help="go on by itself until the noise floor is reached or nothing helps")] = False,
+    axis: o.Axes = None,
+    topic: o.Topics = None,
+    effort: o.Effort = False,
+    span: o.Span = "",
+    effect_file: Own = None,
+    tolerance: Annotated[
+        float, typer.Option(help="part of the signal that the model may leave; real machines need 0.01 or more", min=1e-6, max=0.5)
+    ] = 1e-3,
+    model: Annotated[Path | None, typer.Option("--model", metavar="FILE", help="write the model with its physical parameters as YAML")] = None,
+    json: o.Json = False,
+) -> None:
+    """Add physical effects to the rigid model, refit everything together, and print the ladder of falling errors."""
+    from xy_sysid.errors import BadInput
+    from xy_sysid.greybox import prepare
+    from xy_sysid.refinement import refine as logic
+    from xy_sysid.user_effects import library
+
+    if not add and not auto:
+        raise BadInput("refine", "without --add and --auto", "--add NAME, or --auto", "Say what to do.")
+    known = library(effect_file or [])
+    for name in add or []:
+        if known[name].category == "base":
+            raise BadInput("--add", name, "an effect that is not in every model already", "See xy-sysid effects.")
+    recording = read(rec, axis, topic, effort, span, json)
+    names = chosen(recording, axis)
+    with progress() as bar:
+        task = bar.add_task("refining", total=len(names))
+
+        def work(name: str) -> Ladder:
+            bar.update(task, description=f"refining axis {name}")
+            u, y = samples(recording, name)
+            data = prepare(recording.sampling_rate, u, y, tolerance)
+            found = logic(data, known, given=tuple(add or ()), most=len(add or ()) + 4 if auto else 0)
+            bar.advance(task)
+            return found
+
+        found, refused = each(names, work)
+    origin = provenance(rec, recording)
+    if model is not None:
+        _write(model, found, origin)
+    unit = f"{recording.output_unit}/s"
+    if json:
+        answers: dict[str, Any] = {name: _answer(ladder, unit) for name, ladder in found.items()}
+        emit({"recording": origin, "axes": answers, "refused": refused})
+        return
+    for name, ladder in found.items():
+        rows = [
+            (
+                step.added or "rigid, with delay",
+                *(f"{1e3 * value:.4g}" for value in (step.fit.training_error, step.fit.held_out_error)),
+                f"{step.fit.excess:.3f}",
+            )
+            for step in ladder.steps
+        ]
+        table(f"axis {name}: m{unit}, floor {1e3 * ladder.final.noise_floor:.4g}", ("added", "training error", "held-out error", "excess"), rows)
+        people.print(f"  {_words(ladder)}", markup=False)
+        parameter_table(ladder.final)
+        people.print()
+    for name, text in refused.items():
+        people.print(f"axis {name}: {text}", markup=False)
+
+
+def verdict(ladder: Ladder) -> str:
+    """The contract's word."""
+    if ladder.explained:
+        return "explained"
+    first, last = ladder.steps[0].fit.excess, ladder.final.excess
+    return "partly" if ladder.effects and last < 0.7 * first else "not_in_library"
+
+
+def _words(ladder: Ladder) -> str:
+    names = ", ".join(ladder.effects) or "nothing"
+    return {
+        "explained": f"Explained by the base and {names}: the held-out error is at the noise floor.",
+        "partly": f"{names} explain a part; the rest is not at the floor.",
+        "not_in_library": "No effect of the library brings the error down.",
+    }[verdict(ladder)]
+
+
+def _answer(ladder: Ladder, unit: str) -> dict[str, Any]:
+    rungs = [
+        {
+            "added": step.added,
+            "train_error": step.fit.training_error,
+            "held_out_error": step.fit.held_out_error,
+            "noise_floor": step.fit.noise_floor,
+            "excess": step.fit.excess,
+        }
+        for step in ladder.steps
+    ]
+    return {"ladder": rungs, "unit": unit, "verdict": verdict(ladder), "effects": ladder.effects, "model": {"parameters": parameters(ladder.final)}}
+
+
+def _write(path: Path, found: dict[str, Ladder], origin: dict[str, Any]) -> None:
+    import yaml
+
+    from xy_sysid.errors import BadRecording
+    from xy_sysid.exports import Quoting
+
+    document = {
+        "format": "xy_sysid axis model 1",
+        "provenance": origin,
+        "axes": {
+            name: {
+                "effects": [own for own, _ in ladder.final.model.effects],
+                "parameters": {
+                    p.name: {"value": float(p.value), "unit": p.unit, "ci95": [float(p.low), float(p.high)]} for p in ladder.final.parameters
+                },
+                "held_out_error": float(ladder.final.held_out_error),
+                "noise_floor": float(ladder.final.noise_floor),
+            }
+            for name, ladder in found.items()
+        },
+    }
+    try:
+        path.write_text(yaml.dump(document, Dumper=Quoting, sort_keys=False, width=120, allow_unicode=True), encoding="utf-8")
+    except OSError as problem:
+        raise BadRecording(path, f"cannot be written ({problem.strerror})", "Choose another place.") from None
