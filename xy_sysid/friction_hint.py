@@ -15,7 +15,7 @@ from xy_sysid.stream import FloatArray
 
 PART_OF_RATE = 0.02  # cut-off of the low-pass over the sampling rate: far below any lag that the model leaves out
 SLOWEST = 0.02  # of the rms speed: below, the direction counts as zero
-SURE = 8.0  # standard errors from which the hint is given; linear simulated axes stay below 3, EMPS has 188
+SURE = 8.0  # standard errors from which the hint is given; linear simulated axes stay below 3, EMPS has 219
 ENOUGH = 200  # samples after decimation needed for a hint
 
 
@@ -34,13 +34,16 @@ def friction_hint(u: FloatArray, y: FloatArray, sampling_rate: float) -> Frictio
     if u.shape[0] < ENOUGH * step or float(np.ptp(y)) == 0.0:
         return None
     taps = signal.firwin(8 * step + 1, PART_OF_RATE * sampling_rate, fs=sampling_rate)
-    low_u, low_y = (signal.oaconvolve(values - values[0], taps, mode="valid") for values in (u, y))
-    speed = np.gradient(low_y) * sampling_rate
-    columns = [np.gradient(speed)[::step] * sampling_rate, speed[::step]]
-    pace = speed[::step]
-    direction = np.where(np.abs(pace) > SLOWEST * float(np.sqrt(np.mean(pace**2))), np.sign(pace), 0.0)
-    target = low_u[::step] - float(np.mean(low_u))
-    table = np.column_stack([*columns, np.ones_like(pace), direction])
+
+    def low(values: FloatArray) -> FloatArray:
+        return np.asarray(signal.oaconvolve(values, taps, mode="valid"), dtype=np.float64)
+
+    speed = np.gradient(low(y - y[0])) * sampling_rate
+    direction = np.where(np.abs(speed) > SLOWEST * float(np.sqrt(np.mean(speed**2))), np.sign(speed), 0.0)
+    pace = low(speed)  # direction jumps: it goes through the filter like the input, which feels it
+    target = low(low(u - u[0]))[::step]
+    target = target - float(np.mean(target))
+    table = np.column_stack([np.gradient(pace)[::step] * sampling_rate, pace[::step], np.ones_like(target), low(direction)[::step]])
     scale = np.linalg.norm(table, axis=0)
     if not bool(np.all(scale > 0)) or float(target @ target) == 0.0:
         return None
@@ -50,7 +53,8 @@ def friction_hint(u: FloatArray, y: FloatArray, sampling_rate: float) -> Frictio
     inverse = np.linalg.pinv((table / scale).T @ (table / scale))
     deviation = float(np.sqrt(rest @ rest / max(len(target) - 4, 1) * inverse[3, 3]))
     share = (without - float(rest @ rest)) / float(target @ target)
-    return FrictionHint(float(solution[3] / scale[3]), deviation / float(scale[3]), share)
+    way = -1.0 if solution[0] < 0 else 1.0  # input and output may be wired against each other
+    return FrictionHint(way * float(solution[3] / scale[3]), deviation / float(scale[3]), share)
 
 
 def friction_note(hint: FrictionHint | None, unit: str) -> str:
