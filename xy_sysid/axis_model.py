@@ -3,7 +3,7 @@
 The velocity is simulated from rest. What depends on position uses the measured one, so that nothing drifts. Scheme:
 each sample is split where the delayed voltage changes; between, the viscous pole is integrated exactly for a constant
 force, and dry friction finds its zero crossings in time (Karnopp 1985's problem without his dead band). Laws that bend
-with speed get two sub-steps in each piece, by the midpoint rule.
+with speed get sub-steps (two in each piece at 2 kHz), by the midpoint rule.
 """
 
 from __future__ import annotations

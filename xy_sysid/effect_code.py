@@ -12,6 +12,7 @@ from string import Template
 from xy_sysid.effects.contract import Effect, arguments
 
 BASE = ("gain", "delay", "pole")
+INNER = 4000.0  # Hz: sub-steps of each of a sample's two pieces; LuGre bristles of 10 um and Stribeck curves of 10 mm/s need it
 
 
 def slots(effects: Sequence[Effect]) -> dict[str, int]:
@@ -33,6 +34,7 @@ def text(name: str, effects: Sequence[Effect]) -> str:
     """
     return TEMPLATE.substitute(
         name=name,
+        inner=f"{INNER:.1f}",
         unpack=_unpack(effects),
         flags=_flags(effects),
         inputs=_inputs(effects),
@@ -213,7 +215,7 @@ $states
     late = delay * fs
     whole = int(late)
     part = late - whole
-    cuts = 2 if curved else 1
+    cuts = math.ceil($inner / fs) if curved else 1
     h_old, h_new = part / fs / cuts, (1.0 - part) / fs / cuts
     decay_old, decay_new = math.exp(-pole * h_old), math.exp(-pole * h_new)
     spent_old, spent_new = -math.expm1(-pole * h_old) / pole, -math.expm1(-pole * h_new) / pole
@@ -294,7 +296,7 @@ $pulls
                 pull = 0.0
                 if any_pull:
 $pulls
-                for cut in range(2):
+                for cut in range(cuts):
                     drive = volts
                     if any_state:
 $advance

@@ -20,7 +20,7 @@ ComplexArray = NDArray[np.complex128]
 TOP = 700.0  # Hz; above, at 2 kHz, differences of an encoder's position are all noise
 TOP_SHARE = 0.35  # of the sampling rate, for slow sampling
 WINDOW = 2.0  # s, nearly: the lowest band is 1/2 Hz wide
-NOISE_BAND = (0.75, 0.95)  # of Nyquist: nobody excites there
+NOISE_BAND = (0.6, 0.94)  # of Nyquist: the quietest twentieth there is the encoder's; friction's harmonics may reach in
 SEEN = 3.0  # a band is excited if the measured velocity has this many times the encoder's noise
 
 
@@ -87,16 +87,15 @@ class Floor:
 
 
 def encoder_noise(sampling_rate: float, position: FloatArray) -> float:
-    """rms of white noise in position, m: from the quiet band below Nyquist, not below what counting alone makes."""
+    """rms of white noise in position, m: from the quietest band below Nyquist, not below what counting alone makes."""
     velocity = np.diff(position) * sampling_rate
     length = min(4096, velocity.size // 2 * 2)
     windows = np.lib.stride_tricks.sliding_window_view(velocity, length)[:: length // 2] * np.hanning(length)
     power = np.mean(np.abs(scipy.fft.rfft(windows, axis=1)) ** 2, axis=0) / np.sum(np.hanning(length) ** 2)
     share = np.arange(power.size) / (length / 2.0)
-    quiet = (share >= NOISE_BAND[0]) & (share <= NOISE_BAND[1])
-    response = (2.0 * np.sin(0.5 * np.pi * share[quiet]) * sampling_rate) ** 2
-    seen = float(np.median(power[quiet] / response))
-    return float(np.sqrt(max(seen, count_size(position) ** 2 / 12.0)))
+    white = power / np.maximum((2.0 * np.sin(0.5 * np.pi * share) * sampling_rate) ** 2, 1e-300)
+    seen = [float(np.median(white[(share >= low) & (share < low + 0.05)])) for low in np.arange(*NOISE_BAND, 0.05)]
+    return float(np.sqrt(max(min(seen), count_size(position) ** 2 / 12.0)))
 
 
 def count_size(position: FloatArray) -> float:
