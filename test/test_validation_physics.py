@@ -39,6 +39,15 @@ def test_negative_coefficients_are_no_physical_axis(good: Fit) -> None:
     assert not stable.ok and "artefact of the fit" in stable.sentence and stable.figures["unstable_poles"] > 0
 
 
+def test_a_cost_far_below_noise_is_told(good: Fit) -> None:
+    """Lines that are not independent make a fit look better than it is; a few lines prove nothing."""
+    assert verdict(good, "cost").ok
+    low = verdict(replace(good, cost=0.1 * good.expected_cost), "cost")
+    assert not low.ok and "not independent" in low.sentence
+    assert verdict(replace(good, cost=0.1, expected_cost=5.0), "cost").ok
+    assert "cannot be judged" in verdict(replace(good, expected_cost=-1.0), "cost").sentence
+
+
 def test_a_gain_of_nothing_or_of_the_other_sign_is_told(good: Fit) -> None:
     """No gain is no axis; a negative gain is wiring, and physical."""
     none = verdict(replace(good, tf=replace(good.tf, numerator=np.array([1.0, 0.0]))), "feasible")

@@ -17,6 +17,8 @@ from xy_sysid.stream import FloatArray
 from xy_sysid.transfer_function import TransferFunction, unstable
 
 TAIL = 0.05  # part of the lines that may lie outside their own 95 % region
+FAR_BELOW = 0.2  # of the expected cost: noise alone gives that once in many thousand fits when more than
+ENOUGH = 10.0  # is expected
 FAR_ABOVE = 3.0  # times the band's end beyond which a pole or zero is not determined by the data
 NEARLY_CANCEL = 0.02  # relative distance of a pole and a zero that cancel for all that the data show
 FLAT = 1e-4  # singular value of the scaled Jacobian, of the largest, below which a combination is not determined
@@ -69,6 +71,9 @@ def _cost(fit: Fit) -> Verdict:
     figures = {"cost": fit.cost, "expected": fit.expected_cost, "deviation": fit.cost_deviation}
     if fit.consistent is None or not fit.expected_cost > 0.0:
         return Verdict("cost", True, "The cost cannot be judged: there is no uncertainty to compare it with.", figures)
+    if fit.expected_cost > ENOUGH and fit.cost < FAR_BELOW * fit.expected_cost:
+        text = f"The cost {fit.cost:.3g} is far below the {fit.expected_cost:.3g} that noise lets expect: the lines are not independent"
+        return Verdict("cost", False, f"{text} (a smooth or short input leaks into them), so the intervals mean little.", figures)
     if fit.consistent:
         return Verdict(
             "cost", True, f"The cost {fit.cost:.4g} is what noise explains ({fit.expected_cost:.4g} +- {fit.cost_deviation:.2g}).", figures

@@ -66,7 +66,7 @@ def table(title: str, columns: Iterable[str], rows: Iterable[Iterable[str]]) -> 
     """A table on stdout; the first column and one called unit are text, the others are figures."""
     made = Table(title=title, title_justify="left", title_style="bold", header_style="bold", box=None, pad_edge=False)
     for number, name in enumerate(columns):
-        made.add_column(name, justify="left" if number == 0 or name == "unit" else "right", overflow="fold")
+        made.add_column(name, justify="left" if number == 0 or name == "unit" else "right", overflow="fold", no_wrap=number == 0)
     for row in rows:
         made.add_row(*row)
     people.print(made)
