@@ -1,15 +1,10 @@
 """How fast bags are read, against deserializing message by message, measured in one run.
 
-    python bench/bags.py [--minutes 5] [--json]
-
 The yardstick is the plain loop that everyone writes with rosbags: read, deserialize, take the numbers.
 """
 
 from __future__ import annotations
 
-import argparse
-import json
-import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -19,12 +14,14 @@ import numpy as np
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_typestore
 
+from bench.tables import Table, at_least
 from xy_sysid.bags import BagWriter, stream_blocks
 from xy_sysid.bags.cdr import JOINT_TYPE
 from xy_sysid.imports import load
 from xy_sysid.stream import Block
 
 RATE, ROWS, REPEATS = 2000, 20, 3
+MINUTES = 5.0
 STORE = get_typestore(Stores.ROS2_JAZZY)
 
 
@@ -76,13 +73,10 @@ def best(work: Callable[[Path], object], path: Path, repeats: int = REPEATS) -> 
     return min(times[1:])
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--minutes", type=float, default=5.0, help="length of the recording")
-    parser.add_argument("--json", action="store_true")
-    options = parser.parse_args()
-    samples = int(options.minutes * 60 * RATE) // ROWS * ROWS
-    rows = []
+def run(report: Callable[[str], None]) -> Table:
+    """Million samples a second, and ratios to the loop that deserializes message by message."""
+    samples = int(MINUTES * 60 * RATE) // ROWS * ROWS
+    found: dict[str, tuple[float, float, float]] = {}
     with tempfile.TemporaryDirectory() as folder:
         for name, write in (
             ("blocks of 20, sqlite3", write_blocks),
@@ -92,21 +86,11 @@ def main() -> None:
         ):
             path = Path(folder) / name.replace(" ", "_").replace(",", "")
             count = write(path, samples)
-            slow, fast, whole = best(loop, path, 1), best(stream, path, 5), best(load, path)
-            rows.append({"bag": name, "samples": count, "loop": count / slow, "stream": count / fast, "load": count / whole, "ratio": slow / fast})
-            print(f"  {name} measured", file=sys.stderr)
-    one_by_one = next(float(str(row["loop"])) for row in rows if row["bag"] == "joint states, sqlite3")
-    if options.json:
-        print(json.dumps({"minutes": options.minutes, "rows": rows}))
-        return
-    print(f"{options.minutes:g} min at {RATE} Hz, 2 axes; million samples a second\n")
-    print(f"{'bag':24}{'loop':>8}{'stream':>9}{'load':>8}{'stream/loop':>13}{'against a loop over joint states':>35}")
-    for row in rows:
-        numbers = [float(str(row[key])) for key in ("loop", "stream", "load", "ratio")]
-        print(
-            f"{row['bag']:24}{numbers[0] / 1e6:8.2f}{numbers[1] / 1e6:9.2f}{numbers[2] / 1e6:8.2f}{numbers[3]:12.1f}x{numbers[1] / one_by_one:34.0f}x"
-        )
-
-
-if __name__ == "__main__":
-    main()
+            found[name] = count / best(loop, path, 1), count / best(stream, path, 5), count / best(load, path)
+            report(f"bags: {name} measured")
+    per_message = found["joint states, sqlite3"][0]
+    rows = tuple((name, *(f"{x / 1e6:.2f}" for x in three), f"{three[1] / three[0]:.1f}x") for name, three in found.items())
+    checks = tuple(at_least(f"{name}: streamed over its own loop", three[1] / three[0], 20.0) for name, three in found.items())
+    checks += (at_least("blocks (sqlite3) over the loop of one message a sample", found["blocks of 20, sqlite3"][1] / per_message, 20.0),)
+    columns = ("bag", "loop, M samples/s", "streamed", "loaded and paired", "streamed over loop")
+    return Table("Reading bags", __doc__.split("\n\n", 1)[-1], columns, rows, checks)

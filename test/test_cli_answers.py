@@ -321,3 +321,15 @@ def test_replay_names_the_units_of_its_bag(tmp_path: Path) -> None:
             writer.write_raw("/joint_states", JOINT_TYPE, joint_state(10**9 + k * 10**6, y[k : k + 1], u[k : k + 1], ("a",)), 10**9 + k * 10**6)
     told = cli("replay", tmp_path / "joints", *RIGID, "--set", "length=1024", "--json").json
     assert told["units"] == {"input": "effort", "output": "position"} and "gain (position/s/effort)" in told["axes"]["a"]["values"]
+
+
+def test_an_output_that_is_the_input_is_answered_without_noise_on_the_terminal(tmp_path: Path) -> None:
+    """A made-up signal without any noise has no scatter; any order, window and method answers or refuses in one line."""
+    path = npz(tmp_path / "same.npz", rows=10_000, y=lambda d: d["u"])
+    for orders in ((0, 1), (3, 6), (8, 9)):
+        for method in ("best", "iwls", "lls", "nllsfdi"):
+            for extra in (("--period", "100"), ("--set", "length=256", "--set", "window=boxcar", "--domain", "z")):
+                settings = ("--set", f"numerator_order={orders[0]}", "--set", f"denominator_order={orders[1]}", "--set", "integrators=0")
+                said = cli("fit", path, *settings, "--method", method, *extra, "--json")
+                assert said.code in (0, 2) and "Warning" not in said.err
+                assert said.json if said.code == 0 else said.err.count("\n") == 1

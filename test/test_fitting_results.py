@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from fitting_data import held, lines, measured, paper_machine
 
-from bench.coverage import machine, trials, truths
+from bench.intervals import machine, trials, truths
 from xy_sysid.errors import BadInput
 from xy_sysid.fitting import ESTIMATORS, Structure, identify
 from xy_sysid.fitting.finish import finish

@@ -25,7 +25,8 @@ excitation travel drive pacing
 simulation reduction
 windows window_check period friction_hint spectra batch estimate
 fitting orders validation model_check tracking
-noise_floor effects effect_code axis_kernel axis_model spectral_cost base_start velocity_fit traces inverse_start greybox comparison refinement diagnosis
+noise_floor effects effect_code axis_kernel axis_model spectral_cost base_start velocity_fit traces inverse_start
+greybox comparison refinement diagnosis
 pairing joints identifier messages live_fit replay offline
 """)
 EDGE = names("""

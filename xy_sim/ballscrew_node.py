@@ -87,7 +87,11 @@ class BallscrewNode(Node, Ending):
         message = "no voltage: motors off" if silent else "moving"
         level = 1 if self._faults and not silent else 0
         listeners = str(self._position.get_subscription_count())
-        values = {"samples": str(self._machine.samples), "listeners": listeners, **{f"voltage {what}": str(number) for what, number in self._faults.items()}}
+        values = {
+            "samples": str(self._machine.samples),
+            "listeners": listeners,
+            **{f"voltage {what}": str(number) for what, number in self._faults.items()},
+        }
         stamped = DiagnosticArray(status=[status("ballscrew", level, self._said if self._faults else message, values)])
         stamped.header.stamp = self.get_clock().now().to_msg()
         self._metrics.publish(stamped)

@@ -12,21 +12,26 @@ from xy_sysid.spectra import Spectra
 from xy_sysid.stream import FloatArray
 from xy_sysid.windows import LINES_APART, WindowShape, error_correlation
 
+SUMS = 16  # partial sums of a mean: less rounding, and they run side by side
 CHUNK = 4  # windows transformed together: their samples and spectra stay in the processor's cache
 
 
 @compiled
 def _taper(signal: FloatArray, first: int, hop: int, taper: FloatArray, out: FloatArray) -> None:
+    length = taper.shape[0]
     for i in range(out.shape[0]):
-        start = first + i * hop
-        total = 0.0
-        for j in range(0, taper.shape[0] - 3, 4):  # four partial sums: less rounding, and they run side by side
-            total += (signal[start + j] + signal[start + j + 1]) + (signal[start + j + 2] + signal[start + j + 3])
-        for j in range(taper.shape[0] - taper.shape[0] % 4, taper.shape[0]):
-            total += signal[start + j]
-        mean = total / taper.shape[0]
-        for j in range(taper.shape[0]):
-            out[i, j] = (signal[start + j] - mean) * taper[j]
+        window, row = signal[first + i * hop : first + i * hop + length], out[i]
+        sums, total = np.zeros(SUMS), 0.0
+        for j in range(0, length - SUMS + 1, SUMS):
+            for k in range(SUMS):
+                sums[k] += window[j + k]
+        for k in range(SUMS):
+            total += sums[k]
+        for j in range(length - length % SUMS, length):
+            total += window[j]
+        mean = total / length
+        for j in range(length):
+            row[j] = (window[j] - mean) * taper[j]
 
 
 @compiled

@@ -21,6 +21,7 @@ from xy_sysid.windows import WindowShape
 
 HARDLY = 4.0  # standard deviations of the number of lines that chance makes coherent (neighbours are alike, hence the 2)
 TRANSIENT = 1  # periods left out at the start of a periodic recording
+ROUNDING = 1e-12  # of the response: no line of a made-up signal without noise is more exact than its numbers
 SMALLEST, LARGEST = 1e-100, 1e100  # of what is measured: squares of more or less leave the range of numbers
 
 
@@ -74,6 +75,7 @@ def estimate(recording: Recording, axis: str, settings: IdentifierSettings, peri
         min_coherence=settings.min_coherence,
         units=(recording.input_unit, recording.output_unit),
     )
+    frf = replace(frf, sigma=np.maximum(frf.sigma, ROUNDING * np.abs(frf.response)))
     notes += _coherence(frf, settings, bool(period))
     longest = max(runs, key=_samples)
     friction = friction_note(friction_hint(u[longest], y[longest], recording.sampling_rate), recording.input_unit)

@@ -37,7 +37,10 @@ def fit(
     json: o.Json = False,
 ) -> None:
     """Transfer function with delay of each axis, 95 % intervals, and whether it can be trusted."""
+    import numpy as np
+
     from xy_sysid import exports
+    from xy_sysid.errors import BadInput
     from xy_sysid.offline import estimate, judged, split
     from xy_sysid.validation import validate
 
@@ -53,8 +56,12 @@ def fit(
     def work(name: str) -> tuple[AxisEstimate, Fit, Validation]:
         found = estimate(training, name, settings, samples)
         judged(found.frf)
-        result = estimator(found.frf, structure)
-        return found, result, validate(result, found.frf, _unseen(unseen, name))
+        try:
+            with np.errstate(all="ignore"):  # what overflows ends in a figure that the verdicts judge
+                result = estimator(found.frf, structure)
+                return found, result, validate(result, found.frf, _unseen(unseen, name))
+        except (np.linalg.LinAlgError, ZeroDivisionError):
+            raise BadInput("fit", "beyond what numbers can hold", "orders that the data determine", "Lower them or widen the band.") from None
 
     done, problems = each(chosen(recording, axis), work)
     fits = {name: result for name, (_, result, _) in done.items()}

@@ -85,7 +85,7 @@ def trials(runs: int, seconds: float, noise: float, report: Callable[[str], None
         for item in fit.intervals:
             found.setdefault(item.name, []).append(item)
         if seed % 50 == 0:
-            report(f"coverage: {seed} of {runs} recordings of {seconds:g} s")
+            report(f"intervals: {seed} of {runs} recordings of {seconds:g} s")
     return found, fits
 
 

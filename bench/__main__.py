@@ -1,0 +1,68 @@
+"""python -m bench [name ...]: run the benchmarks and write docs/benchmarks.md.
+
+h1, fit, replay, bags, live and intervals run without a name; long_bag (a day of data, gigabytes on disk) and axis_model only by name.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+import platform
+import runpy
+import sys
+from datetime import date
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from bench.tables import Table
+
+TABLES = ("h1", "fit", "replay", "bags", "live", "intervals")
+SCRIPTS = ("long_bag", "axis_model")
+PAGE = Path(__file__).parents[1] / "docs" / "benchmarks.md"
+
+
+def facts() -> str:
+    """What this ran on."""
+    versions = []
+    for name in ("numpy", "scipy", "numba", "rosbags", "scikit-rf", "pyFRF"):
+        try:
+            versions.append(f"{name} {version(name)}")
+        except PackageNotFoundError:
+            versions.append(f"{name} not installed")
+    return f"{date.today()}, {os.cpu_count()} cores, {platform.machine()}, Python {platform.python_version()}, {', '.join(versions)}."
+
+
+def text(name: str, table: Table) -> str:
+    """One benchmark as Markdown."""
+    lines = [f"## {table.title}", "", f"`python -m bench {name}`", "", table.text.strip(), ""]
+    lines += [f"| {' | '.join(table.columns)} |", "|" + "---|" * len(table.columns), *(f"| {' | '.join(row)} |" for row in table.rows), ""]
+    lines += ["| figure | measured | goal | met |", "|---|---|---|---|"]
+    lines += [f"| {c.what} | {c.measured} | {c.goal} | {'-' if c.met is None else 'yes' if c.met else 'no'} |" for c in table.checks]
+    return "\n".join(lines) + "\n"
+
+
+def main() -> int:
+    """Run what was asked for; the page is written when everything ran."""
+    asked = sys.argv[1:]
+    unknown = [name for name in asked if name not in (*TABLES, *SCRIPTS)]
+    if unknown:
+        sys.stderr.write(f"bench: {unknown[0]} is not a benchmark; there are {', '.join((*TABLES, *SCRIPTS))}\n")
+        return 2
+    parts = []
+    for name in asked or TABLES:
+        if name in SCRIPTS:
+            sys.argv = [name]
+            runpy.run_module(f"bench.{name}", run_name="__main__")
+            continue
+        table: Table = importlib.import_module(f"bench.{name}").run(lambda line: sys.stderr.write(line + "\n"))
+        parts.append(text(name, table))
+        sys.stdout.write(parts[-1] + "\n")
+        sys.stdout.flush()
+    if not asked:
+        head = f"# Benchmarks\n\nMade by `make bench`; every ratio is from one run, side by side. {facts()}\n"
+        PAGE.write_text("\n".join([head, *parts]), encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
