@@ -7,6 +7,7 @@ from setuptools import find_packages, setup
 NAME = "xy_sysid"
 ROS_WHEELS = "sys_platform == 'linux' and platform_machine == 'x86_64'"
 
+
 def files(*patterns: str) -> list[str]:
     """Paths relative to this file, the way setuptools wants them."""
     here = Path(__file__).parent
