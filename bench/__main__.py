@@ -43,6 +43,8 @@ def text(name: str, table: Table) -> str:
 
 def main() -> int:
     """Run what was asked for; the page is written when everything ran."""
+    for threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):  # before numpy comes in: one core for everybody
+        os.environ.setdefault(threads, "1")
     asked = sys.argv[1:]
     unknown = [name for name in asked if name not in (*TABLES, *SCRIPTS)]
     if unknown:

@@ -39,8 +39,8 @@ def nodes(excitation: dict[str, str]) -> Iterator[tuple[Monitor, dict[str, subpr
         monitor = Monitor(("x", "y"))
         try:
             for name in ("ballscrew", "identifier", "excitation"):
-                pairs = [f"-p{key}:={value}" for key, value in excitation.items()] if name == "excitation" else []
-                words = [word for pair in pairs for word in ("-p", pair[2:])]
+                pairs = excitation.items() if name == "excitation" else ()
+                words = [word for key, text in pairs for word in ("-p", f"{key}:={text}")]
                 command = [sys.executable, "-m", NODES[name], "--ros-args", *words]
                 started[name] = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log, env=environment)
             yield monitor, started
@@ -90,16 +90,16 @@ def real_time() -> dict[str, float]:
 def as_fast_as_it_goes() -> tuple[float, int, int, dict[str, str]]:
     """(times real time, samples sent, samples paired, what the identifier complains of)."""
     with nodes({"speed": "0.0", "lockstep": "true", "duration": str(FAST)}) as (monitor, _):
-        until(monitor, lambda: value(monitor, "streams", "samples") > 0, 60.0, "the first sample")
-        first, begun = value(monitor, "streams", "samples"), time.monotonic()
-        until(monitor, lambda: value(monitor, "streams", "samples") >= 0.9 * FAST * RATE, 300.0, "nine tenths of the data")
-        speed = (value(monitor, "streams", "samples") - first) / RATE / (time.monotonic() - begun)
+        until(monitor, lambda: value(monitor, "streams", "samples paired") > 0, 60.0, "the first sample")
+        first, begun = value(monitor, "streams", "samples paired"), time.monotonic()
+        until(monitor, lambda: value(monitor, "streams", "samples paired") >= 0.9 * FAST * RATE, 300.0, "nine tenths of the data")
+        speed = (value(monitor, "streams", "samples paired") - first) / RATE / (time.monotonic() - begun)
         until(monitor, monitor.over, 120.0, "the end")
         monitor.spin(1.5)
         values = monitor.statuses["streams"][2]
         sent = int(value(monitor, "excitation", "blocks") * 20)
         wrong = {key: text for key, text in values.items() if key.startswith("stream: ") and text != "0"}
-        return speed, sent, int(float(values["samples"])), wrong
+        return speed, sent, int(float(values["samples paired"])), wrong
 
 
 def run(report: Callable[[str], None]) -> Table:
