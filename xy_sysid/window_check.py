@@ -23,8 +23,9 @@ REASONS = {
 def stands_still(voltage: FloatArray, position: FloatArray, frozen: int) -> bool:
     """Whether the position (n,) keeps one value for ``frozen`` samples after the voltage (n,) has moved."""
     edges = np.concatenate(([0], np.flatnonzero(np.diff(position) != 0) + 1, [position.shape[0]]))
-    for begin, end in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
-        if end - begin >= frozen and float(np.ptp(voltage[begin : end - frozen + 2])) > 0.0:
+    for run in np.flatnonzero(np.diff(edges) >= frozen):
+        begin, end = int(edges[run]), int(edges[run + 1])
+        if float(np.ptp(voltage[begin : end - frozen + 2])) > 0.0:
             return True
     return False
 
