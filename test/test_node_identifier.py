@@ -261,7 +261,7 @@ def test_joint_states_are_paired_by_stamp_with_effort_as_input(world: World) -> 
         {**QUICK, "axes": json.dumps(axes), "source": "joint_state", "effort_as_voltage": True, "length": 256, "band_high": 60.0, "refit": 10.0},
     )
     source = Source(world, axes, rate=125.0)
-    publisher = world.node.create_publisher(JointState, "joint_states", 1000)
+    publisher = world.node.create_publisher(JointState, "joint_states", 10_000)  # nothing is lost however slow the reader is
     assert world.until(lambda: publisher.get_subscription_count() > 0, 30.0)
     for n in range(8000):
         message = JointState(name=["elbow", "shoulder"], position=source.y[n, ::-1].tolist(), effort=source.u[n, ::-1].tolist())
@@ -270,7 +270,7 @@ def test_joint_states_are_paired_by_stamp_with_effort_as_input(world: World) -> 
         publisher.publish(message)
         if n % 100 == 0:
             world.spin(0.005)
-    assert world.until(lambda: int(newest(statuses, "axis elbow").get("windows", "0")) >= 50, 20.0), node.output()
+    assert world.until(lambda: int(newest(statuses, "axis elbow").get("windows", "0")) >= 50, 60.0), node.output()
     assert float(newest(statuses, "axis elbow")["sampling rate (Hz)"]) == pytest.approx(125.0)
     assert float(newest(statuses, "axis elbow")["relative error (1)"]) < 0.05
 

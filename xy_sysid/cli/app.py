@@ -13,8 +13,8 @@ from xy_sysid.cli.frf import frf
 from xy_sysid.cli.record import record
 from xy_sysid.cli.refine import refine
 from xy_sysid.cli.replay import replay
-from xy_sysid.cli.run import run
 from xy_sysid.cli.simulate import simulate
+from xy_sysid.cli.start import run
 from xy_sysid.cli.study import study
 from xy_sysid.cli.validate import validate
 
