@@ -51,11 +51,15 @@ def each(names: tuple[str, ...], work: Callable[[str], Found]) -> tuple[dict[str
     """What ``work`` finds for each axis, and why there is nothing for the others; raises the first refusal if no axis has an answer."""
     found: dict[str, Found] = {}
     refusals: dict[str, BadInput] = {}
-    for name in names:
-        try:
-            found[name] = work(name)
-        except BadInput as refusal:
-            refusals[name] = refusal
+    with progress() as bar:
+        task = bar.add_task("", total=len(names))
+        for name in names:
+            bar.update(task, description=f"axis {name}")
+            try:
+                found[name] = work(name)
+            except BadInput as refusal:
+                refusals[name] = refusal
+            bar.advance(task)
     if not found:
         raise next(iter(refusals.values()))
     return found, {name: str(refusal) for name, refusal in refusals.items()}
