@@ -28,6 +28,7 @@ fitting orders validation model_check tracking
 noise_floor effects effect_code axis_kernel axis_model spectral_cost base_start velocity_fit traces inverse_start
 greybox comparison refinement diagnosis
 pairing joints identifier messages live_fit replay offline
+linear_part findings story_pictures story story_document
 """)
 EDGE = names("""
 shipped parameter_file settings_doc effects_doc user_effects run_plan starter

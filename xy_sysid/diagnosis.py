@@ -53,9 +53,9 @@ class Diagnosis:
 
 def diagnose(sampling_rate: float, voltage: FloatArray, position: FloatArray, library: Library = STANDARD) -> Diagnosis:
     """Diagnose one axis from gap-free samples (n,), V and m."""
-    lacking = _lacking(sampling_rate, voltage, position)
-    if lacking:
-        return Diagnosis("not_enough_data", (), 1.0, TOLERANCES[0], f"Not enough data: {lacking}", None, (), None, lacking)
+    missing = lacking(sampling_rate, voltage, position)
+    if missing:
+        return Diagnosis("not_enough_data", (), 1.0, TOLERANCES[0], f"Not enough data: {missing}", None, (), None, missing)
     first: Diagnosis | None = None
     for tolerance, certainty in zip(TOLERANCES, CERTAINTY, strict=True):
         data = prepare(sampling_rate, voltage, position, tolerance)
@@ -70,7 +70,7 @@ def diagnose(sampling_rate: float, voltage: FloatArray, position: FloatArray, li
     return first
 
 
-def _lacking(sampling_rate: float, voltage: FloatArray, position: FloatArray) -> str:
+def lacking(sampling_rate: float, voltage: FloatArray, position: FloatArray) -> str:
     """What is missing in the data, in words; empty if they will do."""
     seconds = voltage.size / sampling_rate
     if seconds < SHORTEST:

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from xy_sysid.diagnosis import Diagnosis
     from xy_sysid.greybox import GreyboxFit
     from xy_sysid.recording import Recording
-    from xy_sysid.refinement import Candidate
 
 Own = Annotated[list[Path] | None, typer.Option("--effect-file", metavar="FILE", help="a Python file with an effect of your own (may be repeated)")]
 
@@ -32,6 +31,7 @@ def diagnose(
 ) -> None:
     """Name the physical effect that the rigid model of each axis misses, with evidence, or say that none is known."""
     from xy_sysid.diagnosis import diagnose as logic
+    from xy_sysid.findings import answer, findings
     from xy_sysid.user_effects import library
 
     begun = time.perf_counter()
@@ -52,7 +52,7 @@ def diagnose(
     seconds = time.perf_counter() - begun
     units = recording.input_unit, recording.output_unit
     if json:
-        answers: dict[str, Any] = {name: answer(item, units) for name, item in found.items()}
+        answers: dict[str, Any] = {name: answer(findings(item, known), units) for name, item in found.items()}
         answers |= {name: {"verdict": "not_enough_data", "effect": None, "confidence": 1.0, "sentence": text} for name, text in refused.items()}
         emit({"axes": answers, "seconds": seconds})
         return
@@ -67,46 +67,6 @@ def samples(recording: Recording, axis: str) -> Any:
     run = max(recording.runs(), key=lambda part: part.stop - part.start)
     u, y = recording.axis(axis)
     return u[run], y[run]
-
-
-def answer(item: Diagnosis, units: tuple[str, str]) -> dict[str, Any]:
-    """One axis of the contract's document."""
-    ladder = item.ladder
-    error: dict[str, Any] = {"unit": f"{units[1]}/s", "now": None, "noise_floor": None, "held_out": None}
-    if ladder is not None:
-        first = ladder.steps[0].fit
-        error |= {"now": first.held_out_error, "noise_floor": first.noise_floor, "held_out": ladder.final.held_out_error}
-    places = item.where.places if item.where is not None else ()
-    return {
-        "verdict": item.verdict,
-        "effect": item.effect if item.verdict == "missing_effect" else None,
-        "effects": item.effects,
-        "confidence": item.confidence,
-        "tolerance": item.tolerance,
-        "sentence": item.sentence,
-        "error": error,
-        "where": [{"kind": p.kind, "from": p.low, "to": p.high, "unit": p.unit, "error_over_floor": p.error_over_floor} for p in places],
-        "candidates": [_candidate(c, item) for c in item.candidates if c.fit is not None],
-        "next_experiment": item.next_experiment,
-    }
-
-
-def _candidate(item: Candidate, whole: Diagnosis) -> dict[str, Any]:
-    assert item.fit is not None and whole.ladder is not None
-    before = whole.ladder.steps[0].fit.held_out_error
-    return {
-        "effect": item.effect,
-        "held_out_error": item.fit.held_out_error,
-        "error_ratio": item.fit.held_out_error / before if before > 0 else None,
-        "parameters": parameters(item.fit),
-        "evidence": f"its trace explains {100 * item.share:.3g} % of the error; with it the held-out error is "
-        f"{1e3 * item.fit.held_out_error:.3g} mm/s instead of {1e3 * before:.3g}",
-    }
-
-
-def parameters(fit: GreyboxFit) -> dict[str, Any]:
-    """Every parameter with unit and 95 % interval."""
-    return {item.name: {"value": item.value, "unit": item.unit, "ci95": [item.low, item.high]} for item in fit.parameters}
 
 
 def _show(name: str, item: Diagnosis, units: tuple[str, str]) -> None:

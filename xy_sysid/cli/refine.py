@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from xy_sysid.cli import options as o
-from xy_sysid.cli.diagnose import Own, parameter_table, parameters, samples
+from xy_sysid.cli.diagnose import Own, parameter_table, samples
 from xy_sysid.cli.output import emit, people, progress, table
 from xy_sysid.cli.provenance import provenance
 from xy_sysid.cli.reading import chosen, each, read
@@ -101,6 +101,8 @@ def _words(ladder: Ladder) -> str:
 
 
 def _answer(ladder: Ladder, unit: str) -> dict[str, Any]:
+    from xy_sysid.findings import parameters
+
     rungs = [
         {
             "added": step.added,
@@ -111,7 +113,13 @@ def _answer(ladder: Ladder, unit: str) -> dict[str, Any]:
         }
         for step in ladder.steps
     ]
-    return {"ladder": rungs, "unit": unit, "verdict": verdict(ladder), "effects": ladder.effects, "model": {"parameters": parameters(ladder.final)}}
+    return {
+        "ladder": rungs,
+        "unit": unit,
+        "verdict": verdict(ladder),
+        "effects": ladder.effects,
+        "model": {"parameters": parameters(ladder.final.parameters)},
+    }
 
 
 def _write(path: Path, found: dict[str, Ladder], origin: dict[str, Any]) -> None:
