@@ -20,7 +20,7 @@ from xy_sysid.imports import save
 from xy_sysid.live_fit import structure_from
 from xy_sysid.offline import estimate, part
 from xy_sysid.recording import Recording
-from xy_sysid.report import figures
+from xy_sysid.report import parts
 from xy_sysid.report.page import study_page
 from xy_sysid.report.study import AxisStudy, study_axis
 from xy_sysid.report.tables import coefficient_table, result_table
@@ -222,8 +222,8 @@ def test_figures_hold_no_raw_signal_and_no_fixed_theme(page: str) -> None:
 def test_a_curve_is_not_drawn_over_lines_that_are_missing() -> None:
     """Gaps in the band interrupt it."""
     frequency = np.concatenate((np.arange(1.0, 5.0), np.arange(20.0, 30.0)))
-    assert figures.unbroken(frequency) == [slice(0, 4), slice(4, 14)]
-    assert figures.unbroken(np.arange(1.0, 40.0, 2.0)) == [slice(0, 20)]
+    assert parts.unbroken(frequency) == [slice(0, 4), slice(4, 14)]
+    assert parts.unbroken(np.arange(1.0, 40.0, 2.0)) == [slice(0, 20)]
 
 
 def test_the_command_writes_the_page_and_speaks_one_json_document(

@@ -2,30 +2,26 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping
-from html import escape
 
 import numpy as np
 import plotly.graph_objects as go
-from plotly.subplots import make_subplots
 
 from xy_sysid.fitting import Fit
-from xy_sysid.frf import ComplexArray, FrequencyResponse
+from xy_sysid.frf import FrequencyResponse
+from xy_sysid.report.parts import QUANTILE, band, broken, decibel, frequency_axis, phase_of, plain, positive, rows, turns, unbroken
 from xy_sysid.report.signals import Excitation, Motion
 from xy_sysid.report.study import BeforeAfter, Pair
-from xy_sysid.report.theme import AFTER, BEFORE, DRIFT, METHODS, ROW, axis_colour, fade, template
+from xy_sysid.report.theme import AFTER, BEFORE, DRIFT, METHODS, axis_colour, fade
 from xy_sysid.report.words import people_unit
 from xy_sysid.stream import FloatArray
 
-QUANTILE = 1.959963984540054  # 97.5 % of the normal distribution
-GAP = 2.5  # times the usual spacing of lines, above which a curve is interrupted
 DASHES = {"LLS": "dot", "NLLS": "dash", "ML": "solid"}
 
 
 def excitation_figure(inputs: Mapping[str, Excitation], unit: str) -> go.Figure:
     """Figure 2: excerpt in time, distribution beside the normal one of the same rms, power spectral density with band edges."""
-    figure = _rows(3, shared=False, gap=0.13)
+    figure = rows(3, shared=False, gap=0.13)
     for number, (axis, one) in enumerate(inputs.items()):
         colour = axis_colour(number)
         line = {"color": colour, "width": 1.2}
@@ -37,7 +33,7 @@ def excitation_figure(inputs: Mapping[str, Excitation], unit: str) -> go.Figure:
             row=2, col=1,
         )  # fmt: skip
         figure.add_scatter(
-            x=one.density.frequency, y=_positive(one.density.density), mode="lines", line=line, name=f"axis {plain(axis)}", legendgroup=axis,
+            x=one.density.frequency, y=positive(one.density.density), mode="lines", line=line, name=f"axis {plain(axis)}", legendgroup=axis,
             showlegend=False, row=3, col=1,
         )  # fmt: skip
         for edge in (one.density.low, one.density.high):
@@ -64,7 +60,7 @@ def excitation_figure(inputs: Mapping[str, Excitation], unit: str) -> go.Figure:
 def position_figure(outputs: Mapping[str, Motion], unit: str) -> go.Figure:
     """Figure 3: the measured output of each axis over time, and the straight line of its drift."""
     scale, shown = people_unit(unit)
-    figure = _rows(len(outputs), shared=True, gap=0.06)
+    figure = rows(len(outputs), shared=True, gap=0.06)
     for number, (axis, one) in enumerate(outputs.items()):
         row = number + 1
         figure.add_scatter(
@@ -82,7 +78,7 @@ def position_figure(outputs: Mapping[str, Motion], unit: str) -> go.Figure:
 
 def response_figure(responses: Mapping[str, FrequencyResponse]) -> go.Figure:
     """Figure 4: magnitude and phase of every axis over log frequency, with the 95 % band of each line."""
-    figure = _rows(2, shared=True, gap=0.06, heights=[0.55, 0.45])
+    figure = rows(2, shared=True, gap=0.06, heights=[0.55, 0.45])
     phases: list[FloatArray] = []
     spans: list[FloatArray] = []
     for number, (axis, frf) in enumerate(responses.items()):
@@ -99,22 +95,22 @@ def response_figure(responses: Mapping[str, FrequencyResponse]) -> go.Figure:
         for row, middle, low, high in ((1, level, level + down, level + 20 * np.log10(1 + part)), (2, phase, phase - turn, phase + turn)):
             pieces = unbroken(lines.frequency)
             if bool(np.any(frf.trusted)):
-                _band(figure, row, pieces, lines.frequency, low, high, colour, axis, f"95 % band, {plain(axis)}" if row == 1 else "")
+                band(figure, row, pieces, lines.frequency, low, high, colour, axis, f"95 % band, {plain(axis)}" if row == 1 else "")
             figure.add_scatter(
-                x=_broken(pieces, lines.frequency), y=_broken(pieces, middle), mode="lines" if len(pieces) == 1 else "lines+markers",
+                x=broken(pieces, lines.frequency), y=broken(pieces, middle), mode="lines" if len(pieces) == 1 else "lines+markers",
                 line={"color": colour, "width": 1.6}, marker={"color": colour, "size": 3}, name=f"axis {plain(axis)}", legendgroup=axis,
                 showlegend=row == 1, row=row, col=1,
             )  # fmt: skip
     first = next(iter(responses.values()))
     figure.update_yaxes(title_text=f"magnitude (dB re {_ratio(first)})", row=1, col=1)
-    figure.update_yaxes(title_text="phase (°)", dtick=_turns(phases), row=2, col=1)
-    _frequency_axis(figure, 2, spans)
+    figure.update_yaxes(title_text="phase (°)", dtick=turns(phases), row=2, col=1)
+    frequency_axis(figure, 2, spans)
     return figure
 
 
 def coherence_figure(responses: Mapping[str, FrequencyResponse], least: float) -> go.Figure:
     """Figure 5: coherence of every line; lines that no fit uses are small crosses. least: the limit for use."""
-    figure = _rows(1, shared=True, gap=0.0)
+    figure = rows(1, shared=True, gap=0.0)
     figure.update_layout(height=320)
     for number, (axis, frf) in enumerate(responses.items()):
         colour = axis_colour(number)
@@ -137,13 +133,13 @@ def coherence_figure(responses: Mapping[str, FrequencyResponse], least: float) -
         figure.add_hline(y=least, line={"color": METHODS["measured"], "width": 1, "dash": "dot"}, row=1, col=1)
     room = 0.03 * (1 - bottom)
     figure.update_yaxes(title_text="coherence", range=[bottom - room, 1 + room], row=1, col=1)
-    _frequency_axis(figure, 1, [frf.frequency for frf in responses.values()])
+    frequency_axis(figure, 1, [frf.frequency for frf in responses.values()])
     return figure
 
 
 def fit_figure(frf: FrequencyResponse, fits: Mapping[str, Fit]) -> go.Figure:
     """Figure 6, of one axis: the fits over the measurement in magnitude and phase, and below the relative error per line."""
-    figure = _rows(3, shared=True, gap=0.05, heights=[0.38, 0.28, 0.34])
+    figure = rows(3, shared=True, gap=0.05, heights=[0.38, 0.28, 0.34])
     one = next(iter(fits.values()))
     reference = phase_of(one.measured)
     phases = [reference]
@@ -155,7 +151,7 @@ def fit_figure(frf: FrequencyResponse, fits: Mapping[str, Fit]) -> go.Figure:
     lines = frf.select(np.isin(frf.frequency, one.frequency))
     noise = 100 * lines.sigma / np.abs(lines.response)
     figure.add_scatter(
-        x=lines.frequency, y=_positive(noise), mode="lines", line={"color": fade(METHODS["measured"], 0.9), "width": 1},
+        x=lines.frequency, y=positive(noise), mode="lines", line={"color": fade(METHODS["measured"], 0.9), "width": 1},
         name="noise", row=3, col=1,
     )  # fmt: skip
     for name, fit in fits.items():
@@ -164,16 +160,16 @@ def fit_figure(frf: FrequencyResponse, fits: Mapping[str, Fit]) -> go.Figure:
         phase = phase + 360 * np.round(np.median(reference - phase) / 360)
         phases.append(phase)
         error = 100 * np.abs((fit.measured - fit.response) / fit.measured)
-        for row, values in ((1, decibel(fit.response, frf.output_unit)), (2, phase), (3, _positive(error))):
+        for row, values in ((1, decibel(fit.response, frf.output_unit)), (2, phase), (3, positive(error))):
             figure.add_scatter(
                 x=fit.frequency, y=values, mode="lines", line={**line, "width": 1.2} if row == 3 else line, name=name,
                 legendgroup=name, showlegend=row == 1, row=row, col=1,
             )  # fmt: skip
     figure.update_yaxes(title_text=f"dB re {_ratio(frf)}", row=1, col=1)
-    figure.update_yaxes(title_text="phase (°)", dtick=_turns(phases), row=2, col=1)
+    figure.update_yaxes(title_text="phase (°)", dtick=turns(phases), row=2, col=1)
     figure.update_yaxes(title_text="error (%)", type="log", dtick=1, exponentformat="power", row=3, col=1)
     figure.update_layout(height=680)
-    _frequency_axis(figure, 3, [one.frequency])
+    frequency_axis(figure, 3, [one.frequency])
     return figure
 
 
@@ -181,7 +177,7 @@ def pair_figure(change: BeforeAfter) -> go.Figure:
     """Figure 7, of one axis: the pair before and after, measured and fitted, with intervals; below the shift in Hz."""
     shifts = change.shifts
     heights = [0.47, 0.28, 0.25] if shifts else [0.6, 0.4]
-    figure = _rows(len(heights), shared=False, gap=0.11, heights=heights)
+    figure = rows(len(heights), shared=False, gap=0.11, heights=heights)
     sides = [(change.before_name, change.before, BEFORE, "solid"), (change.after_name, change.after, AFTER, "dash")]
     known = [(name, pair, colour, dash) for name, pair, colour, dash in sides if pair is not None]
     low, high = _zoom([pair for _, pair, _, _ in known])
@@ -241,60 +237,6 @@ def coherence_bottom(responses: Mapping[str, FrequencyResponse]) -> float:
     return float(np.floor(lowest * 10 - 0.5) / 10) if lowest > 0.5 else 0.0
 
 
-def plain(text: str) -> str:
-    """Text from a file for a place where Plotly would take HTML for markup."""
-    return escape(text, quote=False)
-
-
-def decibel(response: ComplexArray, output_unit: str) -> FloatArray:
-    """20 log10 of the magnitude in people's unit of the output (mm for m)."""
-    scale, _ = people_unit(output_unit)
-    return np.asarray(20 * np.log10(np.maximum(np.abs(response) * scale, np.finfo(float).tiny)), dtype=np.float64)
-
-
-def phase_of(response: ComplexArray) -> FloatArray:
-    """Unwrapped phase in degrees."""
-    return np.asarray(np.degrees(np.unwrap(np.angle(response))), dtype=np.float64)
-
-
-def _rows(number: int, *, shared: bool, gap: float, heights: list[float] | None = None) -> go.Figure:
-    figure = make_subplots(rows=number, cols=1, shared_xaxes=shared, vertical_spacing=gap, row_heights=heights)
-    figure.update_layout(template=template("light"), height=ROW * number + 90, margin={"l": 10, "r": 12, "t": 36, "b": 10}, hovermode="closest")
-    figure.update_xaxes(hoverformat=".5g")
-    figure.update_yaxes(hoverformat=".4g")
-    return figure
-
-
-def unbroken(frequency: FloatArray) -> list[slice]:
-    """Stretches of lines between gaps much wider than the usual spacing."""
-    steps = np.diff(frequency)
-    cuts = np.flatnonzero(steps > GAP * np.median(steps)) + 1 if steps.size else np.array([], dtype=np.int64)
-    return [slice(a, b) for a, b in itertools.pairwise([0, *cuts.tolist(), frequency.size])]
-
-
-def _broken(pieces: list[slice], values: FloatArray) -> FloatArray:
-    """The values with a NaN between pieces, so that no line is drawn over a gap."""
-    return np.concatenate([np.append(values[piece], np.nan) for piece in pieces])[:-1]
-
-
-def _band(
-    figure: go.Figure, row: int, pieces: list[slice], x: FloatArray, low: FloatArray, high: FloatArray, colour: str, axis: str, name: str
-) -> None:
-    across = np.concatenate([np.concatenate((x[piece], x[piece][::-1], [np.nan])) for piece in pieces])
-    up = np.concatenate([np.concatenate((high[piece], low[piece][::-1], [np.nan])) for piece in pieces])
-    figure.add_scatter(
-        x=across, y=up, mode="lines", line={"width": 0}, fill="toself",
-        fillcolor=fade(colour, 0.25), hoverinfo="skip", name=name, legendgroup=axis, showlegend=bool(name), row=row, col=1,
-    )  # fmt: skip
-
-
-def _frequency_axis(figure: go.Figure, row: int, frequency: list[FloatArray]) -> None:
-    low, high = (float(np.log10(limit)) for limit in (min(f[0] for f in frequency), max(f[-1] for f in frequency)))
-    room = 0.02 * (high - low)
-    figure.update_xaxes(type="log", range=[low - room, high + room], dtick=1, tickformat="~g", minor={"dtick": "D2", "ticklen": 3})
-    figure.update_xaxes(title_text="frequency (Hz)", row=row, col=1)
-
-
 def _zoom(pairs: list[Pair]) -> tuple[float, float]:
     """Hz around all antiresonances and resonances: room to each side, at least a third of the frequency."""
     found = [item.value for pair in pairs for item in (pair.antiresonance, pair.resonance) if item is not None]
@@ -302,17 +244,6 @@ def _zoom(pairs: list[Pair]) -> tuple[float, float]:
         return 0.0, 1.0
     room = max(0.35 * min(found), 1.5 * (max(found) - min(found)))
     return max(min(found) - room, 0.3 * min(found)), max(found) + room
-
-
-def _turns(phases: list[FloatArray]) -> float:
-    """Step between ticks of a phase axis: 90 degrees, or more where that would crowd it."""
-    span = max(float(np.max(p)) for p in phases) - min(float(np.min(p)) for p in phases)
-    return next((step for step in (45.0, 90.0, 180.0, 360.0, 720.0) if span <= 5.5 * step), 3600.0)
-
-
-def _positive(values: FloatArray) -> FloatArray:
-    """For a log axis: NaN where not above 0."""
-    return np.where(np.isfinite(values) & (values > 0), values, np.nan)
 
 
 def _ratio(frf: FrequencyResponse) -> str:

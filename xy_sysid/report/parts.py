@@ -1,0 +1,86 @@
+"""Parts that figures are made of: rows, log frequency axes, bands, curves with gaps."""
+
+from __future__ import annotations
+
+import itertools
+from html import escape
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from xy_sysid.frf import ComplexArray
+from xy_sysid.report.theme import ROW, fade, template
+from xy_sysid.report.words import people_unit
+from xy_sysid.stream import FloatArray
+
+QUANTILE = 1.959963984540054  # 97.5 % of the normal distribution
+GAP = 2.5  # times the usual spacing of lines, above which a curve is interrupted
+
+
+def plain(text: str) -> str:
+    """Text from a file for a place where Plotly would take HTML for markup."""
+    return escape(text, quote=False)
+
+
+def decibel(response: ComplexArray, output_unit: str) -> FloatArray:
+    """20 log10 of the magnitude in people's unit of the output (mm for m)."""
+    scale, _ = people_unit(output_unit)
+    return np.asarray(20 * np.log10(np.maximum(np.abs(response) * scale, np.finfo(float).tiny)), dtype=np.float64)
+
+
+def phase_of(response: ComplexArray) -> FloatArray:
+    """Unwrapped phase in degrees."""
+    return np.asarray(np.degrees(np.unwrap(np.angle(response))), dtype=np.float64)
+
+
+def rows(number: int, *, shared: bool, gap: float, heights: list[float] | None = None, mode: str = "light") -> go.Figure:
+    """An empty figure of so many rows; shared: one x axis for all; gap: between rows, part of the height; mode: light or dark."""
+    figure = make_subplots(rows=number, cols=1, shared_xaxes=shared, vertical_spacing=gap, row_heights=heights)
+    figure.update_layout(template=template(mode), height=ROW * number + 90, margin={"l": 10, "r": 12, "t": 36, "b": 10}, hovermode="closest")
+    figure.update_xaxes(hoverformat=".5g")
+    figure.update_yaxes(hoverformat=".4g")
+    return figure
+
+
+def unbroken(frequency: FloatArray) -> list[slice]:
+    """Stretches of lines between gaps much wider than the usual spacing."""
+    steps = np.diff(frequency)
+    cuts = np.flatnonzero(steps > GAP * np.median(steps)) + 1 if steps.size else np.array([], dtype=np.int64)
+    return [slice(a, b) for a, b in itertools.pairwise([0, *cuts.tolist(), frequency.size])]
+
+
+def broken(pieces: list[slice], values: FloatArray) -> FloatArray:
+    """The values with a NaN between pieces, so that no line is drawn over a gap."""
+    return np.concatenate([np.append(values[piece], np.nan) for piece in pieces])[:-1]
+
+
+def band(
+    figure: go.Figure, row: int, pieces: list[slice], x: FloatArray, low: FloatArray, high: FloatArray, colour: str, axis: str, name: str
+) -> None:
+    """The area between two curves, in the pieces of ``x``; without a name it has no legend."""
+    across = np.concatenate([np.concatenate((x[piece], x[piece][::-1], [np.nan])) for piece in pieces])
+    up = np.concatenate([np.concatenate((high[piece], low[piece][::-1], [np.nan])) for piece in pieces])
+    figure.add_scatter(
+        x=across, y=up, mode="lines", line={"width": 0}, fill="toself",
+        fillcolor=fade(colour, 0.25), hoverinfo="skip", name=name, legendgroup=axis, showlegend=bool(name), row=row, col=1,
+    )  # fmt: skip
+
+
+def frequency_axis(figure: go.Figure, row: int, frequency: list[FloatArray]) -> None:
+    """A log axis over all the frequencies, Hz, titled at ``row``."""
+    low, high = (float(np.log10(limit)) for limit in (min(f[0] for f in frequency), max(f[-1] for f in frequency)))
+    room = 0.02 * (high - low)
+    figure.update_xaxes(type="log", range=[low - room, high + room], dtick=1, tickformat="~g", minor={"dtick": "D2", "ticklen": 3})
+    figure.update_xaxes(title_text="frequency (Hz)", row=row, col=1)
+
+
+def turns(phases: list[FloatArray]) -> float:
+    """Step between ticks of a phase axis: 90 degrees, or more where that would crowd it."""
+    span = max(float(np.max(p)) for p in phases) - min(float(np.min(p)) for p in phases)
+    return next((step for step in (45.0, 90.0, 180.0, 360.0, 720.0) if span <= 5.5 * step), 3600.0)
+
+
+def positive(values: FloatArray) -> FloatArray:
+    """For a log axis: NaN where not above 0."""
+    return np.where(np.isfinite(values) & (values > 0), values, np.nan)
