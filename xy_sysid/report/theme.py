@@ -8,6 +8,7 @@ AXES = ("#2f7fd0", "#d9691e", "#1a9a6c", "#9a62d0", "#c9478a", "#8a8420")
 METHODS = {"measured": "#7f8993", "LLS": "#d9691e", "NLLS": "#9a62d0", "ML": "#2f7fd0"}
 DRIFT = "#9a62d0"
 BEFORE, AFTER = "#2f7fd0", "#d9691e"
+MEASURED, MODEL, FLOOR, FAILS, UNTRUSTED = "#2f7fd0", "#d9691e", "#1a9a6c", "#c9478a", "#7f8993"  # of a story, each with a dash or marker too
 FONT = "system-ui, -apple-system, 'Segoe UI', 'Liberation Sans', Arial, sans-serif"
 ROW = 230  # height of a row of a figure, px
 INK = {"light": ("#24292f", "#dfe3e8", "#aab2bb", "#ffffff"), "dark": ("#d7dce1", "#30363d", "#59636e", "#22272e")}

@@ -1,0 +1,136 @@
+"""Pictures of a story over frequency: Bode, coherence; and the poles and zeros of its linear part."""
+
+from __future__ import annotations
+
+import numpy as np
+import plotly.graph_objects as go
+
+from xy_sysid.report.parts import band, broken, frequency_axis, plain, turns
+from xy_sysid.report.story_parts import SMALL, Document, drawing, grey, nothing, pictured, row
+from xy_sysid.report.theme import FAILS, MEASURED, MODEL, fade
+from xy_sysid.report.words import number, people_unit
+from xy_sysid.stream import FloatArray
+
+LEAST = 0.3  # coherence of a trusted line
+
+
+def bode(document: Document, step: int | None = None, mode: str = "light") -> go.Figure:
+    """Magnitude and phase over log frequency: measured with its 95 % band, the model over it, lines not trusted in grey."""
+    shown = pictured(document, step)
+    if shown is None:
+        return nothing(document["sentence"], mode)
+    measured, model = document["measured"]["frequency_response"], shown["pictures"]["frequency_response"]
+    scale, unit = people_unit(document["units"]["output"])
+    lift = 20 * np.log10(scale)
+    frequency, trusted = row(measured["frequency"]), np.array(measured["trusted"], dtype=bool)
+    pieces, seen = _stretches(trusted), _between(trusted)
+    figure = drawing([0.58, 0.42], 420, mode)
+    curves = (
+        (1, "magnitude_db", "magnitude_low_db", "magnitude_high_db", lift),
+        (2, "phase_deg", "phase_low_deg", "phase_high_deg", 0.0),
+    )
+    for at, name, low, high, up in curves:
+        values = row(measured[name]) + up
+        first = at == 1
+        if pieces:
+            band(figure, at, pieces, frequency, row(measured[low]) + up, row(measured[high]) + up, MEASURED, "measured", "")
+            figure.add_scatter(
+                x=broken(pieces, frequency), y=broken(pieces, values), mode="lines", line={"color": MEASURED, "width": 1.8},
+                name="measured, 95 % band", legendgroup="measured", showlegend=first, row=at, col=1,
+            )  # fmt: skip
+        line = {"color": MODEL, "width": 1.8, "dash": "dash"}
+        figure.add_scatter(
+            x=frequency[seen], y=(row(model[name]) + up)[seen], mode="lines", line=line, name="model",
+            legendgroup="model", showlegend=first, row=at, col=1,
+        )  # fmt: skip
+        if not bool(trusted.all()):
+            figure.add_scatter(
+                x=frequency[~trusted], y=values[~trusted], mode="markers", marker=grey(), name="not trusted", legendgroup="not",
+                showlegend=first, row=at, col=1,
+            )  # fmt: skip
+    _range(figure, 1, [(row(measured["magnitude_db"]) + lift)[seen], (row(model["magnitude_db"]) + lift)[seen]])
+    _range(figure, 2, [row(measured["phase_deg"])[seen], row(model["phase_deg"])[seen]])
+    figure.update_yaxes(title_text=f"dB re 1 {plain(unit)}/{plain(document['units']['input'])}", row=1, col=1)
+    figure.update_yaxes(title_text="phase (°)", dtick=turns([row(measured["phase_deg"])[seen]]), row=2, col=1)
+    frequency_axis(figure, 2, [frequency])
+    return figure
+
+
+def coherence(document: Document, step: int | None = None, mode: str = "light") -> go.Figure:
+    """Coherence of every line: 1 where the input explains all of the output; lines that are not trusted in grey."""
+    if document["measured"] is None:
+        return nothing(document["sentence"], mode)
+    measured = document["measured"]["frequency_response"]
+    frequency, values, trusted = row(measured["frequency"]), row(measured["coherence"]), np.array(measured["trusted"], dtype=bool)
+    figure = drawing([1.0], SMALL, mode)
+    pieces = _stretches(trusted)
+    if pieces:
+        figure.add_scatter(
+            x=broken(pieces, frequency),
+            y=broken(pieces, values),
+            mode="lines",
+            line={"color": MEASURED, "width": 1.8},
+            name="coherence",
+            row=1,
+            col=1,
+        )
+    if not bool(trusted.all()):
+        figure.add_scatter(x=frequency[~trusted], y=values[~trusted], mode="markers", marker=grey(), name="not trusted", row=1, col=1)
+    figure.add_hline(y=LEAST, line={"color": FAILS, "width": 1, "dash": "dot"}, row=1, col=1)
+    figure.update_yaxes(title_text="coherence", range=[-0.03, 1.05], row=1, col=1)
+    figure.update_layout(showlegend=not bool(trusted.all()))
+    frequency_axis(figure, 1, [frequency])
+    return figure
+
+
+def poles_zeros(document: Document, step: int | None = None, mode: str = "light") -> go.Figure:
+    """Poles (crosses) and zeros (circles) of the model's linear part; the unstable half is shaded when a root lies in it."""
+    shown = pictured(document, step)
+    if shown is None:
+        return nothing(document["sentence"], mode)
+    figure = drawing([1.0], 260, mode)
+    edge = 1.0
+    for name, symbol, colour in (("poles", "x-thin", MODEL), ("zeros", "circle-open", MEASURED)):
+        roots = [(float(item["real"]), sign * float(item["imag"]), item) for item in shown["pictures"]["linear"][name] for sign in _signs(item)]
+        if not roots:
+            continue
+        edge = max(edge, *(abs(value) for x, y, _ in roots for value in (x, y)))
+        told = [f"{number(item['frequency'] or 0.0, 4)} Hz, damping {number(item['damping'] or 0.0, 3)}" for _, _, item in roots]
+        figure.add_scatter(
+            x=[x for x, _, _ in roots], y=[y for _, y, _ in roots], mode="markers", name=name, text=told,
+            hovertemplate="%{x:.5g} %{y:+.5g}j rad/s<br>%{text}<extra></extra>",
+            marker={"symbol": symbol, "size": 12, "color": colour, "line": {"width": 2.5, "color": colour}}, row=1, col=1,
+        )  # fmt: skip
+    right = max([0.0, *(float(item["real"]) for item in shown["pictures"]["linear"]["poles"])])
+    if right > 0:
+        figure.add_vrect(x0=0, x1=1.3 * right, fillcolor=fade(FAILS, 0.13), line_width=0, annotation_text="unstable", row=1, col=1)
+    figure.add_vline(x=0, line={"color": "#7f8993", "width": 1}, row=1, col=1)
+    figure.add_hline(y=0, line={"color": "#7f8993", "width": 1}, row=1, col=1)
+    left = min([0.0, *(float(item["real"]) for kind in ("poles", "zeros") for item in shown["pictures"]["linear"][kind])])
+    figure.update_xaxes(title_text="real (rad/s)", range=[1.15 * left - 0.05 * edge, max(1.3 * right, 0.12 * edge)], row=1, col=1)
+    figure.update_yaxes(title_text="imaginary (rad/s)", range=[-1.15 * edge, 1.15 * edge], row=1, col=1)
+    return figure
+
+
+def _signs(root: dict[str, float]) -> tuple[int, ...]:
+    """A pair is written once."""
+    return (1, -1) if abs(root["imag"]) > 0 else (1,)
+
+
+def _stretches(trusted: np.ndarray) -> list[slice]:
+    """Runs of neighbouring trusted lines."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], trusted.astype(np.int8), [0]))))
+    return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _between(trusted: np.ndarray) -> slice:
+    """From the first to the last trusted line: beyond them nothing is excited and a simulated response means nothing."""
+    found = np.flatnonzero(trusted)
+    return slice(int(found[0]), int(found[-1]) + 1) if found.size else slice(None)
+
+
+def _range(figure: go.Figure, at: int, curves: list[FloatArray]) -> None:
+    values = np.concatenate([item[np.isfinite(item)] for item in curves])
+    if values.size:
+        room = max(0.06 * float(np.ptp(values)), 1.0)
+        figure.update_yaxes(range=[float(values.min()) - room, float(values.max()) + room], row=at, col=1)

@@ -1,0 +1,90 @@
+"""Pictures of where a model fails: its error over the noise floor by frequency, speed, position and time."""
+
+from __future__ import annotations
+
+import numpy as np
+import plotly.graph_objects as go
+
+from xy_sysid.report.parts import frequency_axis, plain, positive
+from xy_sysid.report.story_parts import Document, drawing, floor_line, held_out_from, nothing, pictured, ratio_axis, row, shade
+from xy_sysid.report.theme import MODEL, UNTRUSTED, fade
+from xy_sysid.report.words import people_unit
+
+
+def residual(document: Document, step: int | None = None, mode: str = "light") -> go.Figure:
+    """Error over the noise floor by frequency, on data that no fit saw; failing bands shaded and named."""
+    shown = pictured(document, step)
+    if shown is None:
+        return nothing(document["sentence"], mode)
+    picture = shown["pictures"]["residual"]["frequency"]
+    frequency, ratio = row(picture["frequency"]), row(picture["error_over_floor"])
+    end = float(picture["up_to"])
+    known, inside = np.isfinite(ratio), frequency <= 1.05 * end
+    figure = drawing([1.0], 280, mode)
+    if bool((known & ~inside).any()):
+        beyond = known & (frequency >= frequency[known & inside][-1]) if bool((known & inside).any()) else known
+        figure.add_scatter(
+            x=frequency[beyond],
+            y=positive(ratio[beyond]),
+            mode="lines",
+            line={"color": fade(UNTRUSTED, 0.8), "width": 1.2},
+            name="noise only",
+            row=1,
+            col=1,
+        )
+    used = known & inside
+    figure.add_scatter(
+        x=frequency[used], y=positive(ratio[used]), mode="lines+markers", line={"color": MODEL, "width": 1.8}, marker={"size": 5},
+        name="error of the model", row=1, col=1,
+    )  # fmt: skip
+    ratio_axis(figure, [ratio])
+    floor_line(figure)
+    places = [item for item in shown["pictures"]["failing"] if item["kind"] == "frequency" and item["to"] > frequency[0]]
+    shade(figure, places, float(frequency[0]), float(frequency[-1]), log=True)
+    frequency_axis(figure, 1, [frequency])
+    return figure
+
+
+def residual_speed(document: Document, step: int | None = None, mode: str = "light") -> go.Figure:
+    """Error against velocity: its size over the noise floor, and its mean; friction jumps at zero, saturation bends the ends."""
+    return _against(document, "speed", step, mode)
+
+
+def residual_position(document: Document, step: int | None = None, mode: str = "light") -> go.Figure:
+    """Error against position: its size over the noise floor, and its mean; cogging, lead errors and springs show here."""
+    return _against(document, "position", step, mode)
+
+
+def residual_time(document: Document, step: int | None = None, mode: str = "light") -> go.Figure:
+    """Error against time: its size over the noise floor, and its mean; what drifts shows here. The part that no fit saw is marked."""
+    return _against(document, "time", step, mode)
+
+
+def _against(document: Document, kind: str, step: int | None, mode: str) -> go.Figure:
+    shown = pictured(document, step)
+    if shown is None:
+        return nothing(document["sentence"], mode)
+    output = document["units"]["output"]
+    scale, unit = {"speed": people_unit(f"{output}/s"), "position": people_unit(output), "time": (1.0, "s")}[kind]
+    faster, speed = people_unit(f"{output}/s")
+    picture = shown["pictures"]["residual"][kind]
+    by, ratio, mean = row(picture[kind]), row(picture["error_over_floor"]), row(picture["mean_error"])
+    figure = drawing([0.55, 0.45], 340, mode)
+    style = {"mode": "lines+markers", "line": {"color": MODEL, "width": 1.8}, "marker": {"size": 4}, "showlegend": False}
+    figure.add_scatter(x=by * scale, y=positive(ratio), name="rms error over the floor", **style, row=1, col=1)
+    figure.add_scatter(x=by * scale, y=mean * faster, name=f"mean error ({speed})", **style, row=2, col=1)
+    ratio_axis(figure, [ratio])
+    floor_line(figure)
+    places = [item for item in shown["pictures"]["failing"] if item["kind"] == kind and item["to"] > item["from"]]
+    if kind == "speed":  # a place is a range of its size; the picture has its sign
+        places += [{**item, "from": -item["to"], "to": -item["from"]} for item in places]
+    if by.size > 1:
+        shade(figure, places, float(by[0]), float(by[-1]), log=False, scale=scale)
+    if kind == "time":
+        start = held_out_from(document)
+        for at in (1, 2):
+            figure.add_vline(x=start, line={"color": UNTRUSTED, "width": 1, "dash": "dash"}, row=at, col=1)
+        figure.add_annotation(text="held out →", x=start, y=0, yref="y domain", xanchor="left", yanchor="bottom", showarrow=False, font={"size": 11})
+    figure.update_yaxes(title_text=f"mean ({plain(speed)})", row=2, col=1)
+    figure.update_xaxes(title_text=f"{'velocity' if kind == 'speed' else kind} ({plain(unit)})", row=2, col=1)
+    return figure

@@ -1,0 +1,123 @@
+"""What the figures of a story share: the document's rows as arrays, people's units, floor lines, shaded places."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+
+from xy_sysid.report.parts import rows
+from xy_sysid.report.theme import FAILS, FLOOR, UNTRUSTED, fade
+from xy_sysid.report.words import number, people_unit
+from xy_sysid.stream import FloatArray
+
+Document = Mapping[str, Any]
+
+MARGIN = {"l": 8, "r": 10, "t": 30, "b": 8}
+SMALL = 220  # px, height of a figure of one row
+
+
+def row(values: Sequence[float | None] | None) -> FloatArray:
+    """A row of the document; null is NaN, a missing row is empty."""
+    return np.array([np.nan if value is None else value for value in values or ()], dtype=np.float64)
+
+
+def pictured(document: Document, step: int | None = None) -> Mapping[str, Any] | None:
+    """The step asked for (the newest if None), or the newest before it that has pictures; None if there is none."""
+    steps = list(document["steps"])
+    if not steps:
+        return None
+    place = len(steps) - 1 if step is None else min(max(step, -len(steps)), len(steps) - 1) % len(steps)
+    found: Mapping[str, Any] | None = next((item for item in reversed(steps[: place + 1]) if item["pictures"] is not None), None)
+    return found
+
+
+def speed_unit(document: Document) -> tuple[float, str]:
+    """Factor and name of people's unit of velocity: 1000 and mm/s for m."""
+    return people_unit(f"{document['units']['output']}/s")
+
+
+def drawing(heights: list[float], height: int, mode: str, gap: float = 0.07, shared: bool = True) -> go.Figure:
+    """An empty figure with narrow margins; heights: of its rows, parts of the whole."""
+    figure = rows(len(heights), shared=shared, gap=gap, heights=heights, mode=mode)
+    figure.update_layout(height=height, margin=MARGIN)
+    figure.update_xaxes(zeroline=False)
+    return figure
+
+
+def nothing(sentence: str, mode: str) -> go.Figure:
+    """A figure that says why there is none."""
+    figure = drawing([1.0], SMALL, mode)
+    figure.update_xaxes(visible=False)
+    figure.update_yaxes(visible=False)
+    figure.add_annotation(text=_wrapped(sentence), showarrow=False, xref="paper", yref="paper", x=0.5, y=0.5)
+    return figure
+
+
+def floor_line(figure: go.Figure, at: int = 1, level: float = 1.0, label: str = "noise floor") -> None:
+    """A horizontal line at the floor of a log axis, named once at its left."""
+    figure.add_hline(y=level, line={"color": FLOOR, "width": 1.5, "dash": "dot"}, row=at, col=1)
+    figure.add_annotation(
+        text=label, x=0, y=np.log10(level), xref="x domain", yref=_axis("y", at), xanchor="left", yanchor="bottom", showarrow=False,
+        font={"color": FLOOR, "size": 11},
+    )  # fmt: skip
+
+
+def shade(figure: go.Figure, places: list[Mapping[str, Any]], low: float, high: float, log: bool, scale: float = 1.0, at: int = 1) -> None:
+    """Failing places as shaded stretches, each named by its size; low, high: ends of the axis in the document's unit."""
+    for level, item in enumerate(places):
+        first, last = max(float(item["from"]), low), min(float(item["to"]), high)
+        if not last >= first:
+            continue
+        figure.add_vrect(x0=first * scale, x1=last * scale, fillcolor=fade(FAILS, 0.13), line={"color": fade(FAILS, 0.5), "width": 1}, row=at, col=1)
+        middle = np.log10(np.sqrt(first * last) * scale) if log else 0.5 * (first + last) * scale
+        left, right = (np.log10([low, high]) if log else np.array([low, high])) + (np.log10(scale) if log else 0.0)
+        where = (middle - left) / max(right - left, 1e-300) if log else (middle / scale - low) / max(high - low, 1e-300)
+        anchor = "left" if where < 0.25 else "right" if where > 0.75 else "center"
+        text = f"fails: {number(float(item['error_over_floor']), 2)} × floor"
+        figure.add_annotation(
+            text=text, x=float(middle), xref=_axis("x", at), y=1, yref=f"{_axis('y', at)} domain",
+            yanchor="top", yshift=-14 * (level % 3), xanchor=anchor, showarrow=False, font={"color": FAILS, "size": 11},
+            hovertext=str(item["sentence"]),
+        )  # fmt: skip
+
+
+def ratio_axis(figure: go.Figure, values: Sequence[FloatArray], title: str = "error / floor", at: int = 1) -> None:
+    """A log axis for errors over the floor that always shows the floor and, above it, room for words."""
+    known = np.concatenate([item[np.isfinite(item) & (item > 0)] for item in values]) if values else np.ones(1)
+    low, high = (float(np.min(known)), float(np.max(known))) if known.size else (1.0, 1.0)
+    bottom, top = np.log10(min(max(low, 0.03), 0.6)), np.log10(max(high, 3.0))
+    figure.update_yaxes(
+        title_text=title, type="log", range=[bottom - 0.05, top + 0.25 * (top - bottom)], dtick="D2" if top - bottom < 1.6 else 1, tickformat="~g",
+        row=at, col=1,
+    )  # fmt: skip
+
+
+def words(name: str) -> str:
+    """coulomb_friction -> coulomb friction."""
+    return name.replace("_", " ")
+
+
+def held_out_from(document: Document) -> float:
+    """s from which no fit has seen the data."""
+    return float(document["measured"]["time"]["held_out_from"])
+
+
+def grey(size: int = 4) -> dict[str, Any]:
+    """Markers of what is not trusted."""
+    return {"color": fade(UNTRUSTED, 0.75), "size": size, "symbol": "x-thin", "line": {"width": 1, "color": fade(UNTRUSTED, 0.75)}}
+
+
+def _axis(letter: str, number: int) -> str:
+    return letter if number == 1 else f"{letter}{number}"
+
+
+def _wrapped(sentence: str, width: int = 46) -> str:
+    lines = [""]
+    for word in sentence.split():
+        if len(lines[-1]) + len(word) > width:
+            lines.append("")
+        lines[-1] += f" {word}" if lines[-1] else word
+    return "<br>".join(lines)
