@@ -26,7 +26,7 @@ $(INSTALLED): constraints.txt setup.py
 	echo "making $(VENV) with $$("$$found" --version); this takes about a minute"; \
 	"$$found" -m venv --clear $(VENV)
 	@$(PIP) setuptools
-	@$(PIP) --no-build-isolation --editable '.[ros,test]'
+	@$(PIP) --no-build-isolation --editable '.[ros,page,test]'
 	-@$(BIN)/python -m compileall -q -j 0 -x '/(plotly|matplotlib|fontTools|pip|docutils)/' $(VENV)/lib
 	@touch $@
 

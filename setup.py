@@ -39,9 +39,12 @@ setup(
             f"ros-jazzy-rclpy[fastrtps]==7.1.6; {ROS_WHEELS}",
             f"ros-jazzy-common-interfaces==5.3.6; {ROS_WHEELS}",
         ],
+        "page": ["nicegui>=3.2,<4"],
         "control": ["control"],
         "bench": ["scikit-rf", "pyFRF", "threadpoolctl"],
         "test": [
+            "nicegui>=3.2,<4",
+            "playwright",
             "pytest",
             "hypothesis",
             "ruff",

@@ -10,6 +10,7 @@ from xy_sysid.cli.diagnose import diagnose
 from xy_sysid.cli.effects import effects
 from xy_sysid.cli.fit import fit
 from xy_sysid.cli.frf import frf
+from xy_sysid.cli.page import page
 from xy_sysid.cli.record import record
 from xy_sysid.cli.refine import refine
 from xy_sysid.cli.replay import replay
@@ -26,5 +27,5 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (demo, run, record, replay, simulate, frf, fit, validate, compare, diagnose, refine, effects, study):
+for command in (demo, page, run, record, replay, simulate, frf, fit, validate, compare, diagnose, refine, effects, study):
     app.command(name=command.__name__)(command)

@@ -1,0 +1,69 @@
+"""xy-sysid page: the live page, or one on recordings."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from xy_sysid.cli import options as o
+
+Recs = Annotated[
+    list[Path] | None, typer.Argument(metavar="[REC]...", help="recordings to open side by side; without one the page is live, over ROS 2")
+]
+
+
+def page(
+    rec: Recs = None,
+    host: Annotated[str, typer.Option(help="address to listen on; anything but this machine needs the token that is printed")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(help="port, or the next one that is free; 0 is any", min=0, max=65535)] = 8080,
+    folder: Annotated[Path, typer.Option(help="folder whose recordings may be opened, and into which bags are recorded")] = Path(),
+    live: Annotated[
+        bool | None, typer.Option("--live/--no-live", help="with recordings: the machine too; default is live without recordings")
+    ] = None,
+    namespace: Annotated[str, typer.Option(help="ROS namespace of the machine")] = "/xy",
+    browse: Annotated[bool, typer.Option("--browse/--no-browse", help="open a browser where there is a display")] = True,
+) -> None:
+    """See measurement and model in a browser, where they part and what is missing; add it and watch the error fall. Ctrl-C ends it."""
+    import re
+
+    from xy_sysid.cli.output import aside, people
+    from xy_sysid.errors import BadInput, BadRecording, MissingExtra
+
+    try:
+        import nicegui  # noqa: F401
+    except ModuleNotFoundError:
+        raise MissingExtra("NiceGUI, which the page needs,", "page") from None
+    for path in rec or []:
+        if not path.exists():
+            raise BadRecording(path, "is not there", "Check the path.")
+    if not folder.is_dir():
+        raise BadInput("--folder", str(folder), "a folder that is there", "Make it first.")
+    if not re.fullmatch(r"(/[A-Za-z_][A-Za-z0-9_]*)+", namespace):
+        raise BadInput("--namespace", repr(namespace), "names after slashes, like /xy or /cell/xy", "Change it.")
+    with_machine = not rec if live is None else live
+    if with_machine:
+        try:
+            import rclpy  # noqa: F401
+        except ModuleNotFoundError:
+            raise MissingExtra("ROS 2 (rclpy), which a live page needs,", "ros") from None
+        o.ros_domain()
+    from xy_sysid.page.server import serve
+    from xy_sysid.page.session import Session
+    from xy_sysid.page.shelf import Shelf
+
+    session = Session(Shelf(folder), with_machine, namespace)
+    try:
+        for path in rec or []:
+            session.open(path)
+        serve(session, host, port, os.environ.get("XY_SYSID_TOKEN", ""), browse and display(), people.print)
+    finally:
+        session.close()
+    aside.print("the page has ended")
+
+
+def display() -> bool:
+    """Whether somebody sits in front of a screen."""
+    return any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))

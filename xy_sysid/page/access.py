@@ -1,0 +1,116 @@
+"""Who may open the page: checks on host, origin and token of every request, before anything else sees it.
+
+Without these, any web page that a user has open could press buttons here (cross-site requests and WebSockets carry no
+same-origin check), or read the answers through a name that is made to point at this machine (DNS rebinding).
+"""
+
+from __future__ import annotations
+
+import hmac
+import ipaddress
+import secrets
+from collections.abc import Mapping
+from dataclasses import dataclass
+from http.cookies import CookieError, SimpleCookie
+from urllib.parse import parse_qs, urlsplit
+
+LOOPBACK = ("localhost", "127.0.0.1", "::1")
+COOKIE = "xy_sysid_token"
+HEADERS = {
+    "x-frame-options": "DENY",  # nobody lays an invisible copy of the buttons over something else
+    "content-security-policy": "default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob:; frame-ancestors 'none'; form-action 'self'",
+    "referrer-policy": "no-referrer",
+    "x-content-type-options": "nosniff",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Access:
+    """The rules. token: empty is none; hosts: names by which the page may be called, empty is any (only with a token)."""
+
+    token: str = ""
+    hosts: tuple[str, ...] = LOOPBACK
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What happens with a request: 200 is let through, else refused with these words; cookie: to be set; to: where to go instead."""
+
+    status: int = 200
+    words: str = ""
+    cookie: str = ""
+    to: str = ""
+
+
+def rules(host: str, token: str = "") -> Access:
+    """The access that belongs to the address that is listened on: a token is needed from wherever is not this machine."""
+    if is_loopback(host):
+        return Access(token, LOOPBACK)
+    return Access(token or secrets.token_urlsafe(24), ())
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only this machine can reach that address."""
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def judge(access: Access, headers: Mapping[str, str], query: str) -> Answer:
+    """Let a request through or not.
+
+    headers: names in lower case; query: as it stands behind the question mark of the address
+    """
+    host = headers.get("host", "")
+    if access.hosts and name_of(host) not in access.hosts:
+        return Answer(403, f"This page does not answer to the name {name_of(host)!r}. Open it as http://127.0.0.1 with its port.")
+    origin = headers.get("origin", "")
+    if origin and not same_origin(origin, host):
+        return Answer(403, f"Requests from {origin} are refused: this page takes orders from itself only.")
+    if headers.get("sec-fetch-site", "none") == "cross-site" and headers.get("sec-fetch-mode") != "navigate":
+        return Answer(403, "Requests from other sites are refused.")
+    if not access.token:
+        return Answer()
+    given = parse_qs(query).get("token", [""])[0]
+    if given:
+        if not _equal(given, access.token):
+            return Answer(401, "That token is not the one of this page.")
+        return Answer(303, "", access.token, "/")
+    if _equal(cookie_of(headers.get("cookie", "")), access.token):
+        return Answer()
+    return Answer(401, "A token is needed: open the address that was printed when the page was started.")
+
+
+def _equal(one: str, other: str) -> bool:
+    return hmac.compare_digest(one.encode(), other.encode())
+
+
+def same_origin(origin: str, host: str) -> bool:
+    """Whether a page from that origin was served under that Host header."""
+    parts = urlsplit(origin)
+    return parts.scheme in ("http", "https") and bool(parts.netloc) and parts.netloc.lower() == host.lower()
+
+
+def name_of(host: str) -> str:
+    """The name in a Host header, without port and brackets, in lower case; empty if it is none."""
+    try:
+        return (urlsplit(f"//{host}").hostname or "").lower()
+    except ValueError:
+        return ""
+
+
+def cookie_of(text: str) -> str:
+    """The token in a Cookie header."""
+    try:
+        found = SimpleCookie(text).get(COOKIE)
+    except CookieError:
+        return ""
+    return found.value if found else ""
+
+
+def set_cookie(token: str) -> str:
+    """The header that keeps the token in the browser, out of reach of scripts and of other sites."""
+    return f"{COOKIE}={token}; Path=/; HttpOnly; SameSite=Strict"

@@ -1,0 +1,158 @@
+"""The machine's card: who is there, configure, activate and STOP, what is heard, excitation settings, and record to a bag."""
+
+from __future__ import annotations
+
+import time
+
+from nicegui import run, ui
+
+from xy_sysid.errors import XySysidError
+from xy_sysid.page.facts import dropped_words, seconds_text
+from xy_sysid.page.session import Session
+from xy_sysid.page.settings_form import SettingsForm
+
+STATES = {
+    "active": "driving",
+    "inactive": "configured; nothing moves before Activate",
+    "unconfigured": "not configured; nothing moves",
+    "finalized": "shut down",
+    "": "not there",
+}
+
+
+class Control:
+    """The machine in one browser."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._nodes_shown: object = None
+        self._forms: dict[str, SettingsForm] = {}
+        with ui.element("section").classes("card").props('aria-label="machine"'):
+            ui.html("<h2>The machine</h2>", sanitize=False)
+            self._nodes = ui.element("div").classes("stack").style("gap:.2rem").props("role=status aria-live=polite data-part=nodes")
+            self._state = ui.label("").props("data-part=lifecycle")
+            with ui.element("div").classes("buttons"):
+                self._configure = ui.button("Configure", on_click=lambda: self._go("configure")).props("outline dense no-caps data-act=configure")
+                self._activate = ui.button("Activate", on_click=self._ask_activate).props("unelevated dense no-caps data-act=activate")
+                self._reset = ui.button("Forget what was heard", on_click=self._forget).props("flat dense no-caps data-act=forget")
+            self._windows = ui.element("div").classes("rows small").props("data-part=windows")
+            with ui.expansion("Excitation").classes("w-full").props("dense data-part=excitation"):
+                self._settings = ui.element("div").classes("stack")
+            with ui.expansion("Record to a bag").classes("w-full").props("dense data-part=record"):
+                self._bag()
+
+    def refresh(self, axes: tuple[str, ...]) -> None:
+        """Show what is now."""
+        session = self._session
+        heard, now = session.heard, time.monotonic()
+        nodes = tuple((node.name, node.level, node.words) for node in heard.nodes(now))
+        if nodes != self._nodes_shown:
+            self._nodes_shown = nodes
+            self._nodes.clear()
+            with self._nodes:
+                if not nodes:
+                    ui.label("No node is heard yet. Start them with xy-sysid run, or see the demo: xy-sysid demo.").classes("warn")
+                for name, level, words in nodes:
+                    with ui.element("div").classes("buttons").style("flex-wrap:nowrap;align-items:baseline"):
+                        ui.element("span").classes(f"dot l{level}").props("aria-hidden=true")
+                        ui.label(name).style("font-weight:600")
+                        ui.label(words).classes("bad" if level > 1 else "warn" if level else "soft")
+        state = heard.lifecycle
+        self._state.set_text(f"Excitation: {STATES.get(state, state)}")
+        self._configure.set_enabled(state == "unconfigured")
+        self._activate.set_enabled(state == "inactive")
+        self._reset.set_enabled("streams" in heard.statuses)
+        self._heard(axes)
+        for axis in axes:
+            if axis not in self._forms and "excitation" in heard.present:
+                with self._settings:
+                    self._forms[axis] = SettingsForm(session, axis)
+        self._recording()
+
+    def _heard(self, axes: tuple[str, ...]) -> None:
+        heard = self._session.heard
+        rows = []
+        for axis in axes:
+            values = heard.values(f"axis {axis}")
+            if "windows" in values:
+                data = float(values.get("seconds of data (s)", "0"))
+                rows.append((f"axis {axis}", f"{values['windows']} windows heard in {seconds_text(data)}, dropped: {dropped_words(values)}"))
+        if rows == getattr(self, "_rows", None):
+            return
+        self._rows = rows
+        self._windows.clear()
+        with self._windows:
+            for name, words in rows:
+                ui.label(name)
+                ui.label(words)
+
+    def _go(self, label: str) -> None:
+        session = self._session
+        if session.link is not None:
+            session.link.transition(
+                label, lambda done, words: session.say(words or (f"{label}: done" if done else f"the excitation refused to {label}"), done)
+            )
+
+    def _ask_activate(self) -> None:
+        """A real machine moves: ask once more. A simulated one may go at once."""
+        if "ballscrew" in self._session.heard.present:
+            self._go("activate")
+            return
+
+        def sure() -> None:
+            dialog.close()
+            self._go("activate")
+
+        with ui.dialog() as dialog, ui.element("div").classes("card"):
+            ui.html("<h2>The machine will move</h2>", sanitize=False)
+            ui.label("Keep the machine's own emergency stop in your hand. STOP in the bar, or Escape, brings the voltage to zero.")
+            with ui.element("div").classes("buttons"):
+                ui.button("Activate", on_click=sure).props("unelevated no-caps data-act=sure")
+                ui.button("Cancel", on_click=dialog.close).props("flat no-caps")
+        dialog.on("hide", dialog.delete)
+        dialog.open()
+
+    def _forget(self) -> None:
+        session = self._session
+        if session.link is not None:
+            session.link.trigger("identifier/reset", lambda done, words: session.say(words or "the identifier did not answer", done))
+
+    # record
+
+    def _bag(self) -> None:
+        self._name = (
+            ui.input("name of the bag", value=f"xy_{time.strftime('%Y-%m-%d_%H-%M-%S')}").props("outlined dense data-part=bag").style("width:100%")
+        )
+        with ui.element("div").classes("buttons"):
+            self._begin = ui.button("Record", on_click=self._record).props("outline dense no-caps data-act=record")
+            self._end = ui.button("Finish", on_click=self._finish).props("outline dense no-caps data-act=finish")
+            self._open = ui.button("Open it", on_click=self._show).props("outline dense no-caps data-act=open-bag")
+        self._told = ui.label("").classes("soft small")
+
+    def _recording(self) -> None:
+        recorder = self._session.recorder
+        self._begin.set_enabled(not recorder.running)
+        self._end.set_enabled(recorder.running)
+        self._open.set_enabled(recorder.last is not None and not recorder.running)
+        self._told.set_text(recorder.words() or f"Bags go to the folder {self._session.shelf.folder.name}.")
+
+    def _record(self) -> None:
+        session = self._session
+        try:
+            session.recorder.start(session.shelf.new(str(self._name.value or "").strip()), session.namespace)
+        except XySysidError as problem:
+            session.say(str(problem))
+
+    async def _finish(self) -> None:
+        session = self._session
+        words = await run.io_bound(session.recorder.stop)
+        session.say(words or "the page ends", bool(words) and str(words).startswith("recorded"))
+        self._name.set_value(f"xy_{time.strftime('%Y-%m-%d_%H-%M-%S')}")
+
+    def _show(self) -> None:
+        session = self._session
+        if session.recorder.last is not None:
+            try:
+                session.open(session.recorder.last)
+            except XySysidError as problem:
+                session.say(str(problem))

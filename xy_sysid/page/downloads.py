@@ -1,0 +1,72 @@
+"""What can be taken away: the model, the story, the report. Content goes to the browser; no path comes from it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import yaml
+from nicegui import run, ui
+
+from xy_sysid.errors import XySysidError
+from xy_sysid.exports import Quoting
+from xy_sysid.page.session import Session
+from xy_sysid.page.wishes import Source
+
+
+def offer(session: Session, source: Source, axis: Callable[[], str]) -> None:
+    """The buttons."""
+
+    def take(kind: str) -> None:
+        documents = {name: source.document(name) for name in source.axes()}
+        found = {name: document for name, document in documents.items() if document}
+        if not found:
+            session.say("There is no story to download yet.")
+        elif kind == "model":
+            ui.download.content(model_text(source.title, found), f"{plain_name(source.title)}.model.yaml")
+        else:
+            ui.download.content(json.dumps(found.get(axis(), {}), allow_nan=False), f"{plain_name(source.title)}.{axis()}.story.json")
+
+    async def report() -> None:
+        path = getattr(source, "path", None)
+        if path is None:
+            session.say("Record a bag and open it: the report is made from a recording.")
+            return
+        waiting = ui.notification("The report is being written ...", spinner=True, timeout=None)
+        try:
+            page = await run.io_bound(session.report, path)
+            if page:
+                ui.download.content(page, f"{plain_name(source.title)}.report.html")
+        except XySysidError as problem:
+            session.say(str(problem))
+        finally:
+            waiting.dismiss()
+
+    with ui.element("div").classes("buttons"):
+        ui.button("Model (YAML)", on_click=lambda: take("model")).props("outline dense no-caps data-take=model")
+        ui.button("Story (JSON)", on_click=lambda: take("story")).props("outline dense no-caps data-take=story")
+        if not source.live:
+            ui.button("Report (HTML)", on_click=report).props("outline dense no-caps data-take=report")
+    ui.label("Figures: the buttons SVG and PNG under each.").classes("soft small")
+
+
+def model_text(source: str, documents: Mapping[str, Mapping[str, Any]]) -> str:
+    """The newest models of all axes, in the format of ``xy-sysid refine --model``."""
+    axes = {
+        axis: {
+            "effects": list(model["effects"]),
+            "parameters": {name: dict(item) for name, item in model["parameters"].items()},
+            "held_out_error": model["held_out_error"],
+            "noise_floor": model["noise_floor"],
+        }
+        for axis, document in documents.items()
+        if (model := document.get("model"))
+    }
+    made = {"format": "xy_sysid axis model 1", "provenance": {"source": source}, "axes": axes}
+    return str(yaml.dump(made, Dumper=Quoting, sort_keys=False, width=120, allow_unicode=True))
+
+
+def plain_name(title: str) -> str:
+    """A file's name out of a title."""
+    return "".join(letter if letter.isalnum() or letter in "-_." else "_" for letter in title)[:60] or "axis"

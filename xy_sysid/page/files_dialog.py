@@ -1,0 +1,34 @@
+"""Choose a recording of the shelf; the browser sends a name, never a path."""
+
+from __future__ import annotations
+
+from nicegui import run, ui
+
+from xy_sysid.errors import XySysidError
+from xy_sysid.page.session import Session
+
+
+async def open_dialog(session: Session) -> None:
+    """Let the user choose, and open it beside the others."""
+    names = await run.io_bound(session.shelf.names)
+    with ui.dialog() as dialog, ui.element("div").classes("card").style("min-width: min(90vw, 420px)"):
+        ui.html("<h2>Open a recording</h2>", sanitize=False)
+        ui.label(f"Bags, CSV, NPZ and MAT files of {session.shelf.folder.name}").classes("soft small")
+        if names:
+            choice = ui.select(names, value=names[0], label="recording", with_input=len(names) > 8).props("outlined dense")
+        else:
+            ui.label("There is none in this folder yet. Record a bag, or start the page in another folder.")
+        with ui.element("div").classes("buttons"):
+            if names:
+                ui.button("Open", on_click=lambda: _open(session, str(choice.value), dialog)).props("unelevated")
+            ui.button("Cancel", on_click=dialog.close).props("flat")
+    dialog.on("hide", dialog.delete)
+    dialog.open()
+
+
+def _open(session: Session, name: str, dialog: ui.dialog) -> None:
+    try:
+        session.open(session.shelf.find(name), name)
+    except XySysidError as problem:
+        session.say(str(problem))
+    dialog.close()

@@ -1,0 +1,57 @@
+"""Puts the rules of ``access`` before the application: HTTP and WebSocket alike."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import Any
+
+from starlette.datastructures import MutableHeaders
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from xy_sysid.page.access import HEADERS, Access, Answer, judge, set_cookie
+
+PAGE = "<!DOCTYPE html><html lang=en><meta charset=utf-8><title>xy_sysid</title><body style='font-family:sans-serif'><h1>xy_sysid</h1><p>{}</p>"
+REFUSED = 4403  # close code of a WebSocket that is not let in
+
+
+class Guard:
+    """ASGI middleware."""
+
+    def __init__(self, app: ASGIApp, access: Access) -> None:
+        self._app, self._access = app, access
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Let it through with some headers of care, or refuse it."""
+        if scope["type"] not in ("http", "websocket"):
+            await self._app(scope, receive, send)
+            return
+        headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]}
+        answer = judge(self._access, headers, scope.get("query_string", b"").decode("latin-1"))
+        if answer.status == 200:
+            await self._app(scope, receive, _careful(send))
+        elif scope["type"] == "websocket":
+            await receive()
+            await send({"type": "websocket.close", "code": REFUSED, "reason": answer.words[:100]})
+        else:
+            await _answer(answer, send)
+
+
+def _careful(send: Send) -> Send:
+    async def sending(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            headers = MutableHeaders(scope=message)
+            for name, value in HEADERS.items():
+                headers[name] = value
+        await send(message)
+
+    return sending
+
+
+async def _answer(answer: Answer, send: Send) -> None:
+    body = PAGE.format(escape(answer.words)).encode()
+    headers: list[Any] = [(b"content-type", b"text/html; charset=utf-8"), (b"cache-control", b"no-store")]
+    headers += [(name.encode(), value.encode()) for name, value in HEADERS.items()]
+    if answer.cookie:
+        headers += [(b"set-cookie", set_cookie(answer.cookie).encode()), (b"location", answer.to.encode("ascii", "ignore"))]
+    await send({"type": "http.response.start", "status": answer.status, "headers": headers})
+    await send({"type": "http.response.body", "body": body})

@@ -1,0 +1,106 @@
+"""The page from top to bottom for one browser: bar with STOP, notices, one panel for the machine and for each recording."""
+
+from __future__ import annotations
+
+from nicegui import ui
+
+from xy_sysid.page.files_dialog import open_dialog
+from xy_sysid.page.panel import Panel
+from xy_sysid.page.session import Session
+from xy_sysid.page.wishes import Source
+
+EVERY = 0.4  # s between two looks for what is new
+SHOWN = 4  # newest messages that stay on the page
+
+
+def build(session: Session) -> None:
+    """Everything; then look for news for as long as the browser is there."""
+    ui.html('<a class="skip" href="#main">to the pictures</a>', sanitize=False)
+    page = Page(session)
+    ui.timer(EVERY, page.refresh)
+
+
+class Page:
+    """One browser's view of the session."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._panels: dict[str, Panel] = {}
+        self._told = -1
+        self._alarms: list[str] = []
+        self._bar()
+        with ui.element("main").classes("pages").props("id=main"):
+            self._alarm = ui.element("div").classes("notices").props("role=alert")
+            self._notices = ui.element("div").classes("notices").props("role=status aria-live=polite")
+            self._empty = ui.element("div").classes("card")
+            with self._empty:
+                ui.label("No recording is open. Open one of the folder in which the page was started.")
+            self._grid = ui.element("div").classes("panels")
+
+    async def refresh(self) -> None:
+        """Draw what has changed."""
+        session = self._session
+        sources = session.sources()
+        for source in sources:
+            if source.key not in self._panels:
+                with self._grid:
+                    self._panels[source.key] = Panel(session, source)
+        for key in set(self._panels) - {source.key for source in sources}:
+            self._panels.pop(key).delete()
+        self._empty.set_visibility(not sources)
+        self._tell(sources)
+        for panel in list(self._panels.values()):
+            await panel.refresh()
+
+    def _bar(self) -> None:
+        session = self._session
+        with ui.header(elevated=False).classes("bar").props("role=banner"):
+            ui.html("<h1>xy_sysid</h1>", sanitize=False)
+            self._state = ui.label("").classes("say grow").props("role=status")
+            ui.button("Open a recording", on_click=lambda: open_dialog(session)).props("flat dense no-caps icon=folder_open")
+            dark = ui.dark_mode(None)
+            theme = ui.toggle({0: "auto", 1: "light", 2: "dark"}, value=0, on_change=lambda event: dark.set_value((None, False, True)[event.value]))
+            theme.props('flat dense no-caps aria-label="light or dark"').classes("hide")
+            if session.live is not None:
+                with ui.button().classes("stop").props('id=stop aria-label="STOP: zero volts, now. Key: Escape"') as stop:
+                    ui.html('STOP<span class="hint">Esc</span>', sanitize=False)
+                stop.on("click", js_handler="() => window.xyStop()")
+
+    def _tell(self, sources: list[Source]) -> None:
+        """The bar's line, alarms, and the newest messages."""
+        session = self._session
+        self._state.set_text(state_words(session, sources))
+        alarms = session.heard.alarms()
+        if alarms != self._alarms:
+            self._alarms = alarms
+            self._alarm.clear()
+            with self._alarm:
+                for words in alarms:
+                    ui.label(f"Alarm: {words}").classes("notice")
+        newest = session.messages[-1].number if session.messages else 0
+        if newest != self._told:
+            self._told = newest
+            self._notices.clear()
+            with self._notices:
+                for message in list(session.messages)[-SHOWN:]:
+                    ui.label(f"{message.clock}  {message.words}").classes("notice good" if message.good else "notice warn")
+
+
+def state_words(session: Session, sources: list[Source]) -> str:
+    """The line in the bar."""
+    parts = []
+    if session.live is not None:
+        if session.stopping:
+            parts.append("stopping ...")
+        else:
+            parts.append(
+                {"active": "driving", "inactive": "ready, not driving", "unconfigured": "not configured"}.get(
+                    session.heard.lifecycle, "no excitation"
+                )
+            )
+    if session.recorder.running:
+        parts.append(session.recorder.words())
+    names = [source.title for source in sources if not source.live]
+    if names:
+        parts.append(", ".join(names))
+    return " · ".join(parts)

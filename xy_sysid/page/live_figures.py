@@ -1,0 +1,158 @@
+"""Pictures of what the identifier publishes: its response with model and residual on one axis, and the resonance over time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import plotly.graph_objects as go
+
+from xy_sysid.messages import ArrayMessage
+from xy_sysid.page.heard import Tracked, columns, thinned
+from xy_sysid.report.parts import QUANTILE, band, broken, decibel, frequency_axis, phase_of, positive, rows, turns, unbroken
+from xy_sysid.report.theme import BEFORE, FAILS, MEASURED, MODEL, UNTRUSTED, fade
+from xy_sysid.stream import FloatArray
+from xy_sysid.transfer_function import TransferFunction, held_response
+
+MOST = 1200  # lines drawn
+LEAST = 0.3  # coherence of a trusted line
+NOTABLE = 4.0  # sigma above which a stretch of lines is shaded
+STRETCH = 3  # neighbouring lines that must be above it
+
+
+def response_figure(frf: ArrayMessage, comparison: ArrayMessage | None, tf: TransferFunction | None, sampling_rate: float) -> go.Figure:
+    """Magnitude and phase with 95 % band, the model over them, coherence, and the residual in standard errors.
+
+    sampling_rate: Hz, for the hold of the voltage that the model is seen through; 0 if it is not known
+    """
+    table = columns(frf)
+    frequency, coherence = table["frequency"], table["coherence"]
+    response = table["real"] + 1j * table["imag"]
+    kept = thinned(frequency, np.abs(response), MOST)
+    kept = kept[frequency[kept] > 0]
+    frequency, coherence, response, sigma = frequency[kept], coherence[kept], response[kept], table["sigma"][kept]
+    trusted = coherence >= LEAST
+    figure = rows(4, shared=True, gap=0.04, heights=[0.36, 0.24, 0.16, 0.24])
+    part = QUANTILE * np.where(np.isfinite(sigma), sigma, 0.0) / np.sqrt(2) / np.maximum(np.abs(response), 1e-300)
+    level, phase = decibel(response, "m"), phase_of(response)
+    turn = np.degrees(np.arcsin(np.minimum(part, 1.0)))
+    curves = (
+        (1, level, level + 20 * np.log10(np.maximum(1 - part, 1e-3)), level + 20 * np.log10(1 + part)),
+        (2, phase, phase - turn, phase + turn),
+    )
+    pieces = _stretches(trusted, frequency)
+    for row, middle, low, high in curves:
+        _untrusted(figure, row, frequency, middle, ~trusted, row == 1)
+        if pieces:
+            band(figure, row, pieces, frequency, low, high, MEASURED, "measured", "95 % band" if row == 1 else "")
+            _curve(figure, row, broken(pieces, frequency), broken(pieces, middle), MEASURED, "solid", "measured", row == 1)
+    if tf is not None:
+        model = held_response(tf, frequency, sampling_rate) if sampling_rate > 0 else tf.response(frequency)
+        shifted = phase_of(model)
+        if bool(trusted.any()):
+            shifted = shifted + 360 * np.round(np.median((phase - shifted)[trusted]) / 360)
+        _curve(figure, 1, frequency, decibel(model, "m"), MODEL, "dash", "model", True)
+        _curve(figure, 2, frequency, shifted, MODEL, "dash", "model", False)
+    _untrusted(figure, 3, frequency, coherence, ~trusted, False)
+    if pieces:
+        _curve(figure, 3, broken(pieces, frequency), broken(pieces, coherence), MEASURED, "solid", "coherence", False)
+    _residual(figure, comparison)
+    figure.update_yaxes(title_text="dB re 1 mm/V", row=1, col=1)
+    figure.update_yaxes(title_text="phase (°)", dtick=turns([phase[trusted] if bool(trusted.any()) else phase]), row=2, col=1)
+    figure.update_yaxes(title_text="coherence", range=[-0.03, 1.05], row=3, col=1)
+    figure.update_yaxes(title_text="residual (σ)", type="log", dtick=1, tickformat="~g", row=4, col=1)
+    for row, values in ((1, level), (2, phase)):
+        seen = values[trusted] if bool(trusted.any()) else values
+        room = max(0.06 * float(np.ptp(seen)), 1.0)
+        figure.update_yaxes(range=[float(seen.min()) - room, float(seen.max()) + room], row=row, col=1)
+    frequency_axis(figure, 4, [frequency])
+    figure.update_layout(height=700)
+    return figure
+
+
+def failing(comparison: ArrayMessage | None) -> list[tuple[float, float, float]]:
+    """Stretches (from, to, largest residual in sigma) of neighbouring lines where the model fails."""
+    table = columns(comparison) if comparison is not None else {}
+    if not table:
+        return []
+    frequency, size = table["frequency"], table["residual_sigma"]
+    if size.size < STRETCH:
+        return []
+    smooth = np.convolve(size, np.full(STRETCH, 1 / STRETCH), mode="same")
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], (smooth > NOTABLE).astype(np.int8), [0]))))
+    found = [(float(frequency[a]), float(frequency[b - 1]), float(size[a:b].max())) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    merged: list[tuple[float, float, float]] = []
+    for low, high, worst in found:
+        if merged and low < 1.15 * merged[-1][1]:
+            merged[-1] = (merged[-1][0], high, max(worst, merged[-1][2]))
+        else:
+            merged.append((low, high, worst))
+    return sorted(merged, key=lambda item: -item[2])
+
+
+def failing_words(comparison: ArrayMessage | None) -> str:
+    """The same in a sentence."""
+    found = failing(comparison)
+    if comparison is None:
+        return "No model yet."
+    if not found:
+        return "No stretch of the band stands out: the model is within what noise explains, line by line."
+    worst = "; ".join(f"{low:.3g} to {high:.3g} Hz, up to {size:.2g} standard errors" for low, high, size in found[:3])
+    return f"The model fails at {worst}."
+
+
+def tracking_figure(history: Sequence[Tracked]) -> go.Figure:
+    """The watched resonance over seconds of data, its reference, and where the alarm was on."""
+    figure = rows(1, shared=True, gap=0.0)
+    time = np.array([item.seconds for item in history])
+    found = np.array([item.frequency for item in history])
+    alarm = np.array([item.alarm for item in history], dtype=bool)
+    figure.add_scatter(x=time, y=[item.reference for item in history], mode="lines", line={"color": UNTRUSTED, "dash": "dash"}, name="reference")
+    figure.add_scatter(x=time, y=found, mode="lines+markers", line={"color": BEFORE, "width": 1.6}, marker={"size": 4}, name="resonance")
+    if bool(alarm.any()):
+        figure.add_scatter(x=time[alarm], y=found[alarm], mode="markers", marker={"color": FAILS, "size": 9, "symbol": "diamond"}, name="alarm")
+    room = max(0.02 * float(np.median(found)), 0.6 * float(np.ptp(found)))
+    figure.update_yaxes(title_text="resonance (Hz)", range=[float(found.min()) - room, float(found.max()) + room])
+    figure.update_xaxes(title_text="seconds of data")
+    figure.update_layout(height=240)
+    return figure
+
+
+def _residual(figure: go.Figure, comparison: ArrayMessage | None) -> None:
+    table = columns(comparison) if comparison is not None else {}
+    if not table:
+        return
+    frequency, size = table["frequency"], table["residual_sigma"]
+    kept = thinned(frequency, size, MOST)
+    _curve(figure, 4, frequency[kept], positive(size[kept]), MODEL, "solid", "residual", False, 1.2)
+    figure.add_hline(y=QUANTILE, line={"color": UNTRUSTED, "width": 1, "dash": "dot"}, row=4, col=1)
+    for low, high, worst in failing(comparison)[:4]:
+        figure.add_vrect(x0=low, x1=high, fillcolor=fade(FAILS, 0.13), line={"color": fade(FAILS, 0.5), "width": 1}, row=4, col=1)
+        figure.add_annotation(
+            text=f"fails: {worst:.2g} σ", x=float(np.log10(np.sqrt(low * high))), xref="x4", y=1, yref="y4 domain", yanchor="top", showarrow=False,
+            font={"color": FAILS, "size": 11},
+        )  # fmt: skip
+    top = float(np.nanmax(np.log10(np.maximum(size, 1e-2))))
+    figure.update_yaxes(range=[-1.0, max(top, 1.0) + 0.35], row=4, col=1)
+
+
+def _curve(figure: go.Figure, row: int, x: FloatArray, y: FloatArray, colour: str, dash: str, name: str, legend: bool, width: float = 1.8) -> None:
+    line = {"color": colour, "width": width, "dash": dash}
+    figure.add_scatter(x=x, y=y, mode="lines", line=line, name=name, legendgroup=name, showlegend=legend, row=row, col=1)
+
+
+def _untrusted(figure: go.Figure, row: int, x: FloatArray, y: FloatArray, which: np.ndarray, legend: bool) -> None:
+    if bool(which.any()):
+        grey = fade(UNTRUSTED, 0.75)
+        marker = {"color": grey, "size": 4, "symbol": "x-thin", "line": {"width": 1, "color": grey}}
+        figure.add_scatter(
+            x=x[which], y=y[which], mode="markers", marker=marker, name="not trusted", legendgroup="not", showlegend=legend, row=row, col=1
+        )
+
+
+def _stretches(trusted: np.ndarray, frequency: FloatArray) -> list[slice]:
+    """Runs of neighbouring trusted lines."""
+    if bool(trusted.all()):
+        return unbroken(frequency) if frequency.size > 2 else [slice(0, frequency.size)]
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], trusted.astype(np.int8), [0]))))
+    return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]

@@ -1,0 +1,15 @@
+// STOP goes by a plain request, so that it works even when the page's own connection is broken.
+window.xyStop = async () => {
+  const gone = document.getElementById("gone");
+  try {
+    const answer = await fetch("/stop", { method: "POST", headers: { "X-Requested-With": "xy_sysid" } });
+    if (!answer.ok) throw new Error(String(answer.status));
+    gone.classList.remove("shown");
+  } catch (error) {
+    gone.textContent = "STOP did not reach the server (" + error.message + "). Use the emergency stop of the machine.";
+    gone.classList.add("shown");
+  }
+};
+document.addEventListener("keydown", (event) => {
+  if (event.key === "Escape" && document.getElementById("stop")) window.xyStop();
+}, true);

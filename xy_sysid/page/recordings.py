@@ -1,0 +1,148 @@
+"""A recording that is open on the page: its worker, the stories so far, and the wishes that wait."""
+
+from __future__ import annotations
+
+import itertools
+import multiprocessing
+import os
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+from xy_sysid.errors import BadInput
+from xy_sysid.page import worker
+from xy_sysid.page.wishes import Act, Job, News, Wish
+
+KEYS = itertools.count(1)
+
+
+class OpenRecording:
+    """A Source whose fits run in a process of their own."""
+
+    live = False
+
+    def __init__(self, path: Path, title: str = "", say: Callable[[str], None] | None = None) -> None:
+        self.key, self.title, self.path = f"rec{next(KEYS)}", title or path.name, path
+        self.about: dict[str, Any] = {}
+        self.reading: float | None = 0.0
+        self.files: list[tuple[str, str, bytes]] = []
+        self._say = say or (lambda text: None)
+        self._documents: dict[str, dict[str, Any]] = {}
+        self._jobs: dict[str, Job] = {}
+        self._stamps: dict[str, int] = {}
+        self._problem = ""
+        self._numbers = itertools.count(1)
+        context = multiprocessing.get_context("spawn")
+        theirs, self._orders = context.Pipe(duplex=False)
+        self._words, mine = context.Pipe(duplex=False)
+        self._process = context.Process(target=worker.main, args=(str(path), theirs, mine), name=f"recording {self.title}", daemon=True)
+        self._process.start()
+        theirs.close()
+        mine.close()
+        threading.Thread(target=self._listen, args=(self._words,), name=self.title, daemon=True).start()
+
+    def axes(self) -> tuple[str, ...]:
+        """As the recording names them; empty until it is read."""
+        return tuple(self.about.get("axes", ()))
+
+    def document(self, axis: str) -> dict[str, Any] | None:
+        """The story as it is now."""
+        return self._documents.get(axis)
+
+    def stamp(self, axis: str) -> int:
+        """Grows with each change."""
+        return self._stamps.get(axis, 0) + self._stamps.get("", 0)
+
+    def job(self, axis: str) -> Job | None:
+        """What is being done for the axis."""
+        return self._jobs.get(axis)
+
+    def problem(self) -> str:
+        """Why it is closed."""
+        return self._problem
+
+    def ask(self, act: Act, axis: str, argument: str = "") -> None:
+        """Order something for an axis, one thing at a time."""
+        if axis not in self.axes():
+            raise BadInput("axis", repr(axis), ", ".join(self.axes()) or "none yet", "Wait until the recording is read.")
+        if axis in self._jobs:
+            raise BadInput(f"axis {axis}", f"busy {self._jobs[axis].wish.words}", "one thing at a time", "Wait, or cancel it.")
+        wish = Wish(next(self._numbers), act, axis, argument)
+        self._jobs[axis] = Job(wish, time.monotonic())
+        self._changed(axis)
+        self._send(wish)
+
+    def cancel(self, axis: str) -> None:
+        """Leave the fit of this axis; if it waits behind another one, that one goes on."""
+        job = self._jobs.get(axis)
+        if job is None or self._process.pid is None or not self._process.is_alive():
+            return
+        first = min(self._jobs.values(), key=lambda item: item.wish.number)
+        if first is job:
+            os.kill(self._process.pid, worker.LEAVE)
+        else:
+            self._say(f"{self.title}: axis {axis} waits for axis {first.wish.axis}; cancel that one first")
+
+    def close(self) -> None:
+        """End the worker."""
+        self._problem = self._problem or "closed"
+        self._orders.close()
+        self._process.join(0.5)
+        if self._process.is_alive():
+            self._process.kill()
+
+    def _send(self, wish: Wish) -> None:
+        try:
+            self._orders.send(wish)
+        except OSError:
+            self._lost("its process has ended")
+
+    def _listen(self, words: Connection) -> None:
+        while True:
+            try:
+                self._hear(words.recv())
+            except (EOFError, OSError):
+                self._lost("its process has ended")
+                return
+
+    def _hear(self, news: News) -> None:
+        if news.kind == "opened":
+            self.about, self.reading = news.content, None
+            self._changed("")
+            for axis in self.axes():
+                self.ask("begin", axis)
+        elif news.kind == "progress":
+            self.reading = news.part
+            self._changed("")
+        elif news.kind == "story":
+            self._documents[news.axis] = news.content
+            self._changed(news.axis)
+        elif news.kind == "file":
+            self.files.append((news.axis, news.words, news.content))
+            self._changed(news.axis)
+        elif news.kind == "closed":
+            self._lost(news.words)
+        else:
+            self._jobs.pop(news.axis, None)
+            if news.kind == "failed":
+                self._say(f"{self.title}, axis {news.axis}: {news.words}")
+            self._changed(news.axis)
+        for axis, job in self._jobs.items():
+            running = job.wish.number == min(item.wish.number for item in self._jobs.values())
+            if running != job.running:
+                self._jobs[axis] = replace(job, running=running, begun=time.monotonic())
+
+    def _lost(self, why: str) -> None:
+        if not self._problem:
+            self._problem = why
+            self._say(f"{self.title} is closed: {why}")
+        self.reading = None
+        self._jobs.clear()
+        self._changed("")
+
+    def _changed(self, axis: str) -> None:
+        self._stamps[axis] = self._stamps.get(axis, 0) + 1

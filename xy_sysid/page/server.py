@@ -1,0 +1,86 @@
+"""The web server: one page, the STOP that works without it, and the rules of who may come in."""
+
+from __future__ import annotations
+
+import socket
+import webbrowser
+from collections.abc import Callable
+from contextlib import closing
+from importlib.resources import files
+
+import uvicorn
+from fastapi import FastAPI
+from fastapi.responses import JSONResponse
+from nicegui import ui
+
+from xy_sysid.errors import BadInput
+from xy_sysid.page.access import Access, rules
+from xy_sysid.page.guard import Guard
+from xy_sysid.page.layout import build
+from xy_sysid.page.session import Session
+
+GRACE = 1  # s that open pages may take when the server ends
+PORTS = 20  # tried after the wished one when that is taken
+
+
+def serve(session: Session, host: str, port: int, token: str, browse: bool, say: Callable[[str], None]) -> None:
+    """Serve until Ctrl-C. say: takes the address once it can be opened. Raises BadInput if the address cannot be had."""
+    access = rules(host, token)
+    app = application(session, access)
+    with closing(listen(host, port)) as place:
+        address = url(host, place.getsockname()[1], access)
+        say(address)
+        if browse:
+            webbrowser.open(address)
+        config = uvicorn.Config(
+            app, log_level="warning", access_log=False, timeout_graceful_shutdown=GRACE, server_header=False, ws_max_size=1 << 22, lifespan="on"
+        )
+        uvicorn.Server(config).run(sockets=[place])
+
+
+def application(session: Session, access: Access) -> FastAPI:
+    """The application with its guard before everything."""
+    app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
+
+    @app.post("/stop")
+    def stop() -> JSONResponse:
+        """Zero volts."""
+        session.stop()
+        return JSONResponse({"asked": session.link is not None})
+
+    @app.get("/alive")
+    def alive() -> JSONResponse:
+        """For whoever starts the server."""
+        return JSONResponse({"page": "xy_sysid"})
+
+    assets = files("xy_sysid.page")
+    style = (assets / "page.css").read_text(encoding="utf-8")
+    script = (assets / "page.js").read_text(encoding="utf-8")
+
+    @ui.page("/", title="xy_sysid", dark=None)
+    async def page() -> None:
+        ui.add_css(style)
+        ui.add_body_html(f"<script>{script}</script><div id=gone role=alert></div>")
+        build(session)
+
+    ui.run_with(app, title="xy_sysid", language="en-US", dark=None, tailwind=False, reconnect_timeout=10.0, show_welcome_message=False)
+    app.add_middleware(Guard, access=access)
+    return app
+
+
+def listen(host: str, port: int) -> socket.socket:
+    """A socket on the wished port, or on one of the next if that is taken; port 0 is any."""
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    problem = ""
+    for number in range(port, port + (PORTS if port else 1)):
+        try:
+            return socket.create_server((host, number), family=family)
+        except OSError as error:
+            problem = error.strerror or str(error)
+    raise BadInput("--host and --port", f"{host}, {port} ({problem})", "an address of this machine and a port that is free", "Give another one.")
+
+
+def url(host: str, port: int, access: Access) -> str:
+    """Where to go, with the token if there is one."""
+    name = socket.gethostname() if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host else host
+    return f"http://{name}:{port}/" + (f"?token={access.token}" if access.token else "")

@@ -1,0 +1,124 @@
+"""What all open pages share: the machine, the recordings, the messages. One for each server."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from xy_sysid.errors import BadInput
+from xy_sysid.page.heard import Heard
+from xy_sysid.page.recorder import Recorder
+from xy_sysid.page.recordings import OpenRecording
+from xy_sysid.page.shelf import Shelf
+from xy_sysid.page.wishes import Source
+
+if TYPE_CHECKING:
+    from xy_sysid.page.link import Link
+    from xy_sysid.page.live import Live
+
+MOST_OPEN = 6  # recordings at a time
+MESSAGES = 50
+DRAWN = 200  # figures kept, so that a second page does not draw them again
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """One line for people, with the time of day."""
+
+    number: int
+    clock: str
+    words: str
+    good: bool
+
+
+class Session:
+    """The server's state. Methods may be called from any thread."""
+
+    def __init__(self, shelf: Shelf, live: bool, namespace: str = "/xy") -> None:
+        self.shelf, self.namespace = shelf, namespace
+        self.heard = Heard()
+        self.recordings: list[OpenRecording] = []
+        self.recorder = Recorder()
+        self.messages: deque[Message] = deque(maxlen=MESSAGES)
+        self.stopping = False
+        self._count = 0
+        self._figures: dict[tuple[object, ...], dict[str, Any]] = {}
+        self.link: Link | None = None
+        self.live: Live | None = None
+        if live:  # ROS 2 is needed for this alone
+            from xy_sysid.page.link import Link
+            from xy_sysid.page.live import Live
+
+            self.link = Link(self.heard, namespace)
+            self.live = Live(self.heard, self.link, self.say)
+
+    def sources(self) -> list[Source]:
+        """The machine first, then the recordings."""
+        return [*([self.live] if self.live else []), *self.recordings]
+
+    def say(self, words: str, good: bool = False) -> None:
+        """A line on every page."""
+        self._count += 1
+        self.messages.append(Message(self._count, time.strftime("%H:%M:%S"), words, good))
+
+    def open(self, path: Path, title: str = "") -> OpenRecording:
+        """Open a recording beside the others."""
+        if len(self.recordings) >= MOST_OPEN:
+            raise BadInput("recordings", f"{MOST_OPEN} already", f"at most {MOST_OPEN}", "Close one first.")
+        made = OpenRecording(path, title, self.say)
+        self.recordings.append(made)
+        return made
+
+    def close_recording(self, key: str) -> None:
+        """Take one off the page."""
+        for one in [one for one in self.recordings if one.key == key]:
+            self.recordings.remove(one)
+            one.close()
+
+    def stop(self) -> None:
+        """Zero volts, now."""
+        if self.link is None:
+            return
+        self.stopping = True
+
+        def told(done: bool, words: str) -> None:
+            self.stopping = False
+            self.say(words, done)
+
+        self.link.stop(told)
+
+    def report(self, path: Path) -> str:
+        """The report of a recording, as ``xy-sysid report`` writes it; raises BadInput with what it says. Takes a while."""
+        with tempfile.TemporaryDirectory() as folder:
+            out = Path(folder) / "report.html"
+            command = [sys.executable, "-m", "xy_sysid", "report", str(path), "-o", str(out)]
+            done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
+            if done.returncode != 0 or not out.is_file():
+                lines = [line for line in done.stderr.splitlines() if line.strip()]
+                raise BadInput("report", "not written", "a recording that can be reported on", lines[-1] if lines else "")
+            return out.read_text(encoding="utf-8")
+
+    def figure(self, key: tuple[object, ...], make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+        """The figure of that key, drawn once for all pages."""
+        found = self._figures.get(key)
+        if found is None:
+            found = self._figures[key] = make()
+            while len(self._figures) > DRAWN:
+                self._figures.pop(next(iter(self._figures)))
+        return found
+
+    def close(self) -> None:
+        """End what was started."""
+        if self.recorder.running:
+            self.recorder.stop()
+        for one in self.recordings:
+            one.close()
+        if self.link is not None:
+            self.link.close()

@@ -1,0 +1,58 @@
+"""The folder whose recordings the page may open and into which it may record. What a browser names is looked up, never joined to a path."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from xy_sysid.errors import BadInput
+
+TABLES = (".csv", ".npz", ".mat", ".mcap", ".db3")
+MOST = 200  # recordings listed
+DEEP = 2  # folders below the shelf that are looked into
+NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
+
+
+class Shelf:
+    """The recordings of one folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder.resolve()
+
+    def names(self) -> list[str]:
+        """What can be opened: bags (folders with a metadata.yaml) and tables, by their path below the folder."""
+        found: list[str] = []
+        self._look(self.folder, DEEP, found)
+        return sorted(found)[:MOST]
+
+    def _look(self, folder: Path, deep: int, found: list[str]) -> None:
+        try:
+            entries = sorted(folder.iterdir())
+        except OSError:
+            return
+        for entry in entries:
+            if entry.name.startswith(".") or entry.is_symlink():
+                continue
+            name = str(entry.relative_to(self.folder))
+            if entry.is_dir():
+                if (entry / "metadata.yaml").is_file():
+                    found.append(name)
+                elif deep > 1 and len(found) < MOST:
+                    self._look(entry, deep - 1, found)
+            elif entry.suffix.lower() in TABLES:
+                found.append(name)
+
+    def find(self, name: str) -> Path:
+        """The recording of that name; raises BadInput for whatever is not in the list, a path that leads elsewhere included."""
+        if name not in self.names():
+            raise BadInput("recording", repr(name[:80]), f"one of the list of {self.folder.name}", "Choose one.")
+        return self.folder / name
+
+    def new(self, name: str) -> Path:
+        """Where a new bag of that name goes; raises BadInput for anything but a plain name that is still free."""
+        if not NAME.fullmatch(name):
+            raise BadInput("name of the bag", repr(name[:80]), "1 to 64 letters, digits, - _ and . (no folders)", "Give another name.")
+        path = self.folder / name
+        if path.exists() or path.is_symlink():
+            raise BadInput("name of the bag", repr(name), "one that is not there yet", "Give another name.")
+        return path

@@ -1,0 +1,160 @@
+"""The story of an axis in one column: verdict, buttons, falling ladder, candidates, what is in the model, look-alikes, next experiment."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from nicegui import ui
+
+from xy_sysid.axis_model import STANDARD
+from xy_sysid.errors import XySysidError
+from xy_sysid.page.downloads import offer
+from xy_sysid.page.facts import seconds_text
+from xy_sysid.page.picture_card import Plot
+from xy_sysid.page.session import Session
+from xy_sysid.page.story_words import candidate_rows, look_alike_lines, model_effects, step_names, verdict_words
+from xy_sysid.page.wishes import Act, Source
+from xy_sysid.report import story_figures as draw
+
+BUTTONS: tuple[tuple[Act, str, str], ...] = (
+    ("diagnose", "Diagnose", "Which effect is missing in the rigid base? Tries them all."),
+    ("next", "Find the next", "Add the effect that helps most now."),
+    ("auto", "Auto", "Add effects until the noise floor is reached or nothing helps, then take out what is not needed."),
+    ("reset", "Start over", "Back to the rigid base with delay."),
+)
+
+
+class StoryCard:
+    """One axis of one source, in one browser."""
+
+    def __init__(self, session: Session, source: Source) -> None:
+        self._session, self._source, self._axis = session, source, ""
+        self._shown: object = None
+        self._buttons: list[ui.button] = []
+        with ui.element("section").classes("card").props('aria-label="story"'):
+            ui.html("<h2>The story</h2>", sanitize=False)
+            self._verdict = ui.label("").classes("sentence").props("role=status aria-live=polite data-part=verdict")
+            self._note = ui.label("").classes("soft")
+            with ui.element("div").classes("buttons"):
+                for act, text, meaning in BUTTONS:
+                    self._button(text, meaning, partial(self._ask, act)).props(f"data-act={act}")
+            with ui.element("div").classes("buttons").props("role=status aria-live=polite") as self._busy:
+                ui.spinner(size="1.2em")
+                self._doing = ui.label("").classes("grow")
+                ui.button("Cancel", on_click=lambda: source.cancel(self._axis)).props("outline dense data-act=cancel")
+            self._ladder = Plot("Each step adds one effect. Held-out error is what counts; dotted is the noise floor that no model can pass.")
+            self._model = ui.element("div").classes("stack").style("gap:.3rem")
+            with ui.element("div").classes("stack").style("gap:.4rem") as self._evidence:
+                ui.html("<h3>What could be missing</h3>", sanitize=False)
+                self._candidates = Plot("What each effect would leave of the error. Shortest is best; hover for its evidence and parameters.")
+                self._ranked = ui.element("div").classes("ranked")
+            with ui.element("div").classes("buttons"):
+                self._choice = (
+                    ui.select(_choices(), label="add any effect", with_input=True)
+                    .props("outlined dense options-dense")
+                    .style("flex:1;min-width:12rem")
+                )
+                self._button("Add", "Fit it together with all that is in the model.", lambda: self._ask("add", str(self._choice.value or ""))).props(
+                    "data-act=add"
+                )
+            self._more = ui.element("div").classes("stack").style("gap:.4rem")
+            with ui.expansion("Before and after").classes("w-full").props("dense") as self._overlay:
+                with ui.element("div").classes("buttons"):
+                    self._first = ui.select({}, label="before", on_change=lambda: self._compare()).props("outlined dense").style("flex:1")
+                    self._last = ui.select({}, label="after", on_change=lambda: self._compare()).props("outlined dense").style("flex:1")
+                self._before_after = Plot("Two models over each other: error over the floor, and the error in time where the rigid base was worst.")
+            self._pair: tuple[int, int] = (0, 0)
+            with ui.expansion("Download").classes("w-full").props("dense"):
+                offer(session, source, lambda: self._axis)
+
+    async def refresh(self, axis: str) -> None:
+        """Write and draw again what has changed."""
+        self._axis = axis
+        job = self._source.job(axis)
+        self._busy.set_visibility(job is not None)
+        if job is not None:
+            waits = "" if job.running or self._source.live else "waiting: "
+            self._doing.set_text(f"{waits}{job.wish.words} ({seconds_text(time.monotonic() - job.begun)})")
+        document = self._source.document(axis)
+        able = job is None and document is not None and not self._source.problem()
+        for button in self._buttons:
+            button.set_enabled(able)
+        stamp = (axis, self._source.stamp(axis))
+        if stamp != self._shown:
+            self._shown = stamp
+            self._write(document)
+        if document is None:
+            return
+        key = (self._source.key, axis, self._source.stamp(axis))
+        await self._ladder.show(self._session, (*key, "ladder"), draw.ladder, document)
+        if document["candidates"]:
+            await self._candidates.show(self._session, (*key, "candidates"), draw.candidates, document)
+        if self._overlay.value and len(document["steps"]) > 1:
+            first, last = self._pair
+            await self._before_after.show(self._session, (*key, "pair", first, last), draw.before_after, document, first, last)
+
+    def _button(self, text: str, meaning: str, act: Callable[[], None]) -> ui.button:
+        button = ui.button(text, on_click=act).props("outline dense no-caps")
+        with button:
+            ui.tooltip(meaning)
+        self._buttons.append(button)
+        return button
+
+    def _ask(self, act: Act, argument: str = "") -> None:
+        try:
+            self._source.ask(act, self._axis, argument)
+        except XySysidError as problem:
+            self._session.say(str(problem))
+
+    def _write(self, document: dict[str, Any] | None) -> None:
+        self._verdict.set_text(verdict_words(document))
+        note = str((document or {}).get("note") or "")
+        self._note.set_text(note)
+        self._note.set_visibility(bool(note))
+        self._evidence.set_visibility(bool(document and document["candidates"]))
+        self._overlay.set_visibility(bool(document and len(document["steps"]) > 1))
+        for part in (self._ranked, self._model, self._more):
+            part.clear()
+        if document is None:
+            return
+        there = model_effects(document)
+        with self._model:
+            ui.label("In the model: rigid base with delay" + ("" if there else ", nothing else"))
+            for name in there:
+                with ui.element("div").classes("buttons"):
+                    ui.label(_words(name)).classes("chip")
+                    self._row_button("Remove", "remove", name)
+        with self._ranked:
+            for row in candidate_rows(document):
+                with ui.element("div").classes("candidate"):
+                    ui.label(f"{_words(row.effect)}: {row.evidence}").classes("small")
+                    if row.effect not in there:
+                        self._row_button("Add", "add", row.effect)
+        with self._more:
+            for line in look_alike_lines(document):
+                ui.label(line).classes("small")
+        steps = step_names(document)
+        self._pair = (min(self._pair[0], len(steps) - 1), len(steps) - 1)
+        self._first.set_options(steps, value=self._pair[0])
+        self._last.set_options(steps, value=self._pair[1])
+
+    def _row_button(self, text: str, act: Act, name: str) -> None:
+        button = ui.button(text, on_click=lambda: self._ask(act, name)).props(
+            f'outline dense no-caps aria-label="{text} {_words(name)}" data-{act}={name}'
+        )
+        button.set_enabled(self._source.job(self._axis) is None)
+
+    def _compare(self) -> None:
+        if self._first.value is not None and self._last.value is not None:
+            self._pair = (int(self._first.value), int(self._last.value))
+
+
+def _choices() -> dict[str, str]:
+    return {effect.name: _words(effect.name) for effect in STANDARD.acting}
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")

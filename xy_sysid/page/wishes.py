@@ -1,0 +1,107 @@
+"""What a page can ask for and how far it is: plain values that go to the worker and back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol
+
+from xy_sysid.report.words import number
+
+Act = Literal["begin", "diagnose", "add", "remove", "next", "auto", "reset", "report", "model"]
+
+DOING = {
+    "begin": "fitting the rigid base",
+    "diagnose": "looking for what is missing",
+    "add": "adding {}",
+    "remove": "taking out {}",
+    "next": "finding the next effect",
+    "auto": "adding effects until the floor is reached",
+    "reset": "going back to the rigid base",
+    "report": "writing the report",
+    "model": "writing the model",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Wish:
+    """One order for one axis; argument: the effect's name for add and remove. number: grows with every wish."""
+
+    number: int
+    act: Act
+    axis: str = ""
+    argument: str = ""
+
+    @property
+    def words(self) -> str:
+        """What is being done."""
+        return DOING[self.act].format(self.argument.replace("_", " "))
+
+
+@dataclass(frozen=True, slots=True)
+class News:
+    """What the worker says. kind: opened (axes in content), progress (part), story (document), file (name and content), done, failed."""
+
+    kind: Literal["opened", "progress", "story", "file", "done", "failed", "closed"]
+    wish: int = 0
+    axis: str = ""
+    words: str = ""
+    part: float | None = None
+    content: Any = None
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """A wish that is being fulfilled or waits; begun: seconds on the page's clock; part: 0..1 or None when nobody knows."""
+
+    wish: Wish
+    begun: float
+    part: float | None = None
+    running: bool = False
+
+
+class Source(Protocol):
+    """Where an axis' story comes from: a recording, or the machine as it runs."""
+
+    key: str
+    title: str
+    live: bool
+
+    def axes(self) -> tuple[str, ...]:
+        """Its axes, in order."""
+        ...
+
+    def document(self, axis: str) -> dict[str, Any] | None:
+        """The story as it is now."""
+        ...
+
+    def stamp(self, axis: str) -> int:
+        """Grows whenever the document or the jobs of the axis change."""
+        ...
+
+    def job(self, axis: str) -> Job | None:
+        """What is being done for the axis."""
+        ...
+
+    def problem(self) -> str:
+        """Why there is nothing (more) to come; empty while all is well."""
+        ...
+
+    def ask(self, act: Act, axis: str, argument: str = "") -> None:
+        """Order something; raises BadInput for what cannot be asked for."""
+        ...
+
+    def cancel(self, axis: str) -> None:
+        """Leave what is being done for the axis."""
+        ...
+
+
+def error_words(document: dict[str, Any] | None) -> str:
+    """How far the newest step is from the floor: 3.2 times the noise floor."""
+    ladder = (document or {}).get("ladder") or []
+    if not ladder:
+        return ""
+    last = ladder[-1]
+    held, floor = last.get("held_out_error"), last.get("noise_floor")
+    if not (isinstance(held, (int, float)) and isinstance(floor, (int, float)) and floor > 0):
+        return ""
+    return f"{number(held / floor, 3)} times the noise floor"
