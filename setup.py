@@ -65,6 +65,7 @@ setup(
             "xy-sysid = xy_sysid.cli:main",
             "excitation = xy_sysid.nodes.excitation:main",
             "identifier = xy_sysid.nodes.identifier:main",
+            "diagnoser = xy_sysid.nodes.diagnoser:main",
             "recorder = xy_sysid.nodes.recorder:main",
             "ballscrew = xy_sim.node:main",
         ],

@@ -28,6 +28,7 @@ def generate_launch_description() -> LaunchDescription:
     common = {"package": "xy_sysid", "namespace": given["namespace"], "output": "screen"}
     excitation = LifecycleNode(executable="excitation", name="excitation", parameters=[given["params_file"]], **common)
     identifier = Node(executable="identifier", name="identifier", parameters=[given["params_file"]], **common)
+    diagnoser = Node(executable="diagnoser", name="diagnoser", parameters=[given["params_file"]], **common)
     ballscrew = Node(
         executable="ballscrew",
         name="ballscrew",
@@ -47,4 +48,4 @@ def generate_launch_description() -> LaunchDescription:
         condition=IfCondition(given["activate"]),
     )
     declared = [DeclareLaunchArgument(name, default_value=value, description=meaning) for name, (value, meaning) in ARGUMENTS.items()]
-    return LaunchDescription([*declared, ballscrew, recorder, identifier, drive, excitation, ask(Transition.TRANSITION_CONFIGURE)])
+    return LaunchDescription([*declared, ballscrew, recorder, identifier, diagnoser, drive, excitation, ask(Transition.TRANSITION_CONFIGURE)])

@@ -178,7 +178,7 @@ class World:
                 return str(answer.current_state.label)
         raise AssertionError(f"{node} does not tell its state")
 
-    def set_parameter(self, node: str, name: str, value: bool | int | float | str) -> tuple[bool, str]:
+    def set_parameter(self, node: str, name: str, value: bool | int | float | str | list[str]) -> tuple[bool, str]:
         """Whether a parameter was changed, and the node's sentence if not."""
         from rcl_interfaces.srv import SetParameters
         from rclpy.parameter import Parameter

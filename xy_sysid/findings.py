@@ -110,6 +110,8 @@ def findings(item: Diagnosis, library: Library) -> Findings:
     before = rungs[0].held_out_error if rungs else 0.0
     fitted = [(candidate, candidate.fit) for candidate in item.candidates if candidate.fit is not None]
     named = item.verdict == "missing_effect"
+    if named:  # a richer relative may fit a hair better than the one that was taken
+        fitted.sort(key=lambda pair: pair[0].effect != item.effect)
     return Findings(
         item.verdict,
         item.effects,

@@ -14,6 +14,7 @@ import yaml
 from xy_sysid.errors import BadInput
 from xy_sysid.settings import (
     BallscrewSettings,
+    DiagnoserSettings,
     ExcitationSettings,
     IdentifierSettings,
     Knob,
@@ -28,6 +29,7 @@ NODES: dict[str, type[Settings]] = {
     "excitation": ExcitationSettings,
     "ballscrew": BallscrewSettings,
     "identifier": IdentifierSettings,
+    "diagnoser": DiagnoserSettings,
     "recorder": RecorderSettings,
 }
 BARE_BOOLEANS = re.compile(r"y|n|yes|no|on|off|true|false", re.IGNORECASE)
@@ -128,8 +130,8 @@ def default_text() -> str:
             if axis != group:
                 lines.append(f'    "{axis}":')
                 group = axis
-            lines += _lines(knob, name, "      " if axis else "    ", name not in explained)
-            explained.add(name)
+            lines += _lines(knob, name, "      " if axis else "    ", knob.meaning not in explained)
+            explained.add(knob.meaning)
     return "\n".join(lines) + "\n"
 
 
@@ -140,7 +142,8 @@ def _lines(knob: Knob, name: str, indent: str, explain: bool) -> list[str]:
     limits = " | ".join(knob.choices) or (f"{knob.low:.10g} to {knob.high:.10g}" if knob.low is not None and knob.high is not None else "")
     facts = "; ".join(part for part in (knob.unit, limits) if part)
     comment = [f"{indent}# {knob.meaning}{f' [{facts}]' if facts else ''}"] if explain else []
-    return [*comment, f"{indent}{name}: {value}"]
+    shown = f'"{name}"' if BARE_BOOLEANS.fullmatch(name) or name == "x" else name
+    return [*comment, f"{indent}{shown}: {value}"]
 
 
 if __name__ == "__main__":

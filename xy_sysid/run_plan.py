@@ -16,6 +16,7 @@ from xy_sysid.settings import unknown_name
 MODULES = {
     "excitation": "xy_sysid.nodes.excitation",
     "identifier": "xy_sysid.nodes.identifier",
+    "diagnoser": "xy_sysid.nodes.diagnoser",
     "recorder": "xy_sysid.nodes.recorder",
     "ballscrew": "xy_sim.node",
 }

@@ -8,12 +8,13 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from xy_sysid.errors import BadInput
 
+Names = Annotated[list[str], BeforeValidator(lambda value: value.split(",") if isinstance(value, str) else value)]
 Scalar = bool | int | float | str
 SIGNS = {"ge": ">= ", "gt": "> ", "le": "<= ", "lt": "< ", "expected": ""}  # how a limit that was broken is told
 Model = TypeVar("Model", bound="Settings")
@@ -124,6 +125,32 @@ class IdentifierSettings(Settings):
         return self
 
 
+class DiagnoserSettings(Settings):
+    """Node ``diagnoser``."""
+
+    memory: float = knob(120.0, "newest gap-free seconds that are kept and looked at", "s", ge=1.0, le=36_000.0)
+    minimum: float = knob(10.0, "gap-free seconds without which nothing is looked at", "s", ge=0.5, le=36_000.0)
+    interval: float = knob(0.0, "diagnose again after so many seconds of data; 0 is on request only", "s", ge=0.0, le=1e9)
+    tolerance: float = knob(0.001, "part of the signal that a model may leave; real machines need 0.01 or more", "", ge=1e-6, le=0.5)
+    reorder: float = knob(0.5, "how late a block may come before its samples count as lost", "s", gt=0.0, le=60.0)
+    source: Literal["blocks", "joint_state"] = knob("blocks", "type of the position topic")
+    effort_as_voltage: bool = knob(False, "with joint_state: take the input from `effort` instead of the voltage topic")
+    effect_files: Names = knob([""], "Python files with effects of your own; they are run")
+    effects: dict[str, Names] = Field(
+        default_factory=lambda: {"x": [""], "y": [""]},
+        description="effects in the model of this axis: setting them adds or removes them and fits again; an empty name is none",
+    )
+
+    def chosen(self, axis: str) -> tuple[str, ...]:
+        """The effects that the model of an axis is to have."""
+        return given(self.effects.get(axis, []))
+
+
+def given(names: list[str]) -> tuple[str, ...]:
+    """The names of a list that are not empty: ROS has no empty lists in its parameter files."""
+    return tuple(name.strip() for name in names if name.strip())
+
+
 class BallscrewSettings(Settings):
     """Node ``ballscrew``: the simulated machine."""
 
@@ -138,7 +165,18 @@ class RecorderSettings(Settings):
     output: str = knob("", "folder of the new bag; empty is xy_<date>")
     storage: Literal["sqlite3", "mcap"] = knob("sqlite3", "file format of the bag")
     topics: list[str] = Field(
-        default_factory=lambda: ["voltage", "position", "joint_states", "frf/.*", "transfer_function/.*", "metrics", "diagnosis", "comparison/.*"],
+        default_factory=lambda: [
+            "voltage",
+            "position",
+            "joint_states",
+            "frf/.*",
+            "transfer_function/.*",
+            "metrics",
+            "diagnosis",
+            "comparison/.*",
+            "error_ladder/.*",
+            "story/.*",
+        ],
         description="topics to record, as regular expressions relative to the namespace",
     )
     seconds: float = knob(0.0, "stop after so long; 0 is until told", "s", ge=0.0, le=1e9)
@@ -168,12 +206,15 @@ def _limit(metadata: list[Any], *names: str) -> float | None:
 
 
 def knobs(settings: Settings, prefix: str = "") -> Iterator[Knob]:
-    """Every setting of a group, axes as ``<axis>.<name>``."""
+    """Every setting of a group, axes as ``<axis>.<name>``, lists by axis as ``<name>.<axis>``."""
     for name, info in type(settings).model_fields.items():
         value = getattr(settings, name)
         if isinstance(value, dict):
             for axis, group in value.items():
-                yield from knobs(group, f"{prefix}{axis}.")
+                if isinstance(group, Settings):
+                    yield from knobs(group, f"{prefix}{axis}.")
+                else:
+                    yield Knob(f"{prefix}{name}.{axis}", group, [""], "", info.description or "", None, None, ())
             continue
         extra = info.json_schema_extra if isinstance(info.json_schema_extra, dict) else {}
         choices = tuple(getattr(info.annotation, "__args__", ())) if "Literal" in str(info.annotation) else ()
@@ -195,7 +236,10 @@ def _nested(cls: type[Settings], flat: Mapping[str, Any]) -> dict[str, Any]:
     for key, value in flat.items():
         if "." in key and groups:
             axis, _, rest = key.partition(".")
-            nested.setdefault(next(iter(groups)), {}).setdefault(axis, {})[rest] = value
+            if axis in groups:
+                nested.setdefault(axis, {})[rest] = value
+            else:
+                nested.setdefault(next(iter(groups)), {}).setdefault(axis, {})[rest] = value
         else:
             nested[key] = value
     return nested

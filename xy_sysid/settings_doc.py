@@ -9,7 +9,7 @@ HEAD = """# Settings
 
 Every knob of every node, made from `xy_sysid/settings.py` by `python -m xy_sysid.settings_doc > docs/settings.md`. They are ROS
 parameters of the node; the identifier's are also `--set NAME=VALUE` of `xy-sysid frf`, `fit`, `replay`, `validate` and `study`, and
-the excitation's axis settings are `--excite NAME=VALUE` of `xy-sysid simulate`. Units are SI. `x.` stands for any axis.
+the excitation's axis settings are `--excite NAME=VALUE` of `xy-sysid simulate`. Units are SI. `x` stands for any axis.
 """
 
 
@@ -18,7 +18,7 @@ def document() -> str:
     parts = [HEAD]
     for node, cls in NODES.items():
         parts.append(f"\n## {node}\n\n| name | default | unit | allowed | meaning |\n|---|---|---|---|---|")
-        parts += [_row(item) for item in knobs(cls()) if not item.name.startswith("y.")]
+        parts += [_row(item) for item in knobs(cls()) if not item.name.startswith("y.") and not item.name.endswith(".y")]
     return "\n".join(parts) + "\n"
 
 

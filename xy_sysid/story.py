@@ -82,11 +82,11 @@ def begin(
 def diagnosed(story: Story, voltage: FloatArray, position: FloatArray, library: Library = STANDARD) -> Story:
     """With the answer to: which effect is missing in the rigid base? The model stays what it is.
 
-    A story that is still at its base takes over the tolerance of the answer.
+    A story that is still at its base takes over the tolerance of the answer if that is looser.
     """
     found = findings(diagnose(story.sampling_rate, voltage, position, library), library)
     told = replace(story, diagnosis=found, note="")
-    if len(story.steps) != 1 or not found.ladder or found.tolerance == story.tolerance:
+    if len(story.steps) != 1 or not found.ladder or found.tolerance <= story.tolerance:
         return told
     data = prepare(story.sampling_rate, voltage, position, found.tolerance)
     return _shown(replace(told, tolerance=found.tolerance, steps=()), data, found.ladder[0], library)
@@ -161,12 +161,17 @@ def auto(story: Story, voltage: FloatArray, position: FloatArray, library: Libra
             story = grown
             break
         story = grown
+    return pruned(story, voltage, position, library)
+
+
+def pruned(story: Story, voltage: FloatArray, position: FloatArray, library: Library = STANDARD) -> Story:
+    """Without the effects that are no longer needed; the same story if all are."""
     if len(story.effects) < 2:
         return story
     data = prepare(story.sampling_rate, voltage, position, story.tolerance)
-    pruned = prune(data, _fit_of(story, data, library))
-    gone = [name for name in story.effects if name not in pruned.model]
-    return _grown(story, data, pruned, None, " and ".join(gone)) if gone else story
+    found = prune(data, _fit_of(story, data, library))
+    gone = [name for name in story.effects if name not in found.model]
+    return _grown(story, data, found, None, " and ".join(gone)) if gone else story
 
 
 def tell(

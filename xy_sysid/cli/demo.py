@@ -69,6 +69,7 @@ def _specs(table: Machine, machine: str, seconds: float, speed: float, seed: int
         "nodes": [
             {"executable": "ballscrew", "parameters": {"machine": machine}},
             {"executable": "identifier", "parameters": orders},
+            {"executable": "diagnoser"},
             {"executable": "excitation", "parameters": excite},
         ],
     }

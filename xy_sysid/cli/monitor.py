@@ -18,7 +18,7 @@ from xy_sysid.messages import ArrayMessage
 from xy_sysid.nodes.common import LATCHED_QOS, NAMESPACE
 from xy_sysid.nodes.convert import array_from_ros
 
-LISTENERS = 2  # voltage is heard by the machine and the identifier, position by the excitation and the identifier
+LISTENERS = 3  # voltage is heard by the machine, position by the excitation, and both by identifier and diagnoser
 QUIET = 1.0  # s without a new result after which the last one has been heard
 
 

@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from xy_sysid.cli import options as o
-from xy_sysid.cli.output import aside, emit, estimates, people, progress
+from xy_sysid.cli.diagnose import Own
+from xy_sysid.cli.output import aside, emit, estimates, people, progress, table
 
 if TYPE_CHECKING:
+    from xy_sysid.findings import Rung
     from xy_sysid.live_fit import Update
 
 
@@ -22,18 +24,26 @@ def replay(
     params: o.Params = None,
     topic: o.Topics = None,
     effort: o.Effort = False,
+    diagnose: Annotated[bool, typer.Option("--diagnose", help="then name what is missing and add it, as the node diagnoser does")] = False,
+    effect_file: Own = None,
     out: Annotated[Path | None, typer.Option("--out", metavar="BAG", help="write what the node would have published")] = None,
     json: o.Json = False,
 ) -> None:
     """Replay a bag through the identifier: the same numbers, bit for bit, as the live node."""
+    import itertools
     from contextlib import ExitStack
 
     from xy_sysid.bags import BagWriter
     from xy_sysid.bags.streaming import stream_blocks
+    from xy_sysid.diagnoser import Diagnoser, all_at_once
     from xy_sysid.errors import BadInput, BadRecording
     from xy_sysid.identifier import Identifier
+    from xy_sysid.live_story import sentence as words
     from xy_sysid.pairing import KINDS
     from xy_sysid.replay import replay as logic
+    from xy_sysid.settings import DiagnoserSettings
+    from xy_sysid.story_document import document
+    from xy_sysid.user_effects import library
 
     settings = o.settings_from(params, set_)
     if out is not None and out.exists():
@@ -58,9 +68,13 @@ def replay(
                 raise BadInput("--axis", repr(name), ", ".join(first.axes), "Choose one of these.")
         identifier = Identifier(settings, tuple(axis) if axis else first.axes, units[0])
 
+        diagnoser = Diagnoser(DiagnoserSettings(reorder=settings.reorder), identifier.axes)
+
         def all_blocks() -> Any:
-            yield kind, first
-            yield from blocks
+            for name, block in itertools.chain([(kind, first)], blocks):
+                if diagnose and name != "reference":
+                    diagnoser.feed(name, block)
+                yield name, block
 
         for update in logic(all_blocks(), settings, identifier.axes, identifier):
             last, updates = update, updates + 1
@@ -74,6 +88,7 @@ def replay(
                 for message in update.arrays():
                     writer.write_array(f"/xy/{message.topic}", message.labels, message.sizes, message.data, stamp)
     seconds = time.perf_counter() - begun
+    stories = all_at_once(diagnoser, library(effect_file or [])) if diagnose else {}
     if last is None:
         windows = f"{identifier.samples} paired samples, {settings.length + 1} needed in one piece"
         faults = ", ".join(f"{name} {count}" for name, count in identifier.faults.items()) or "no faults"
@@ -90,6 +105,7 @@ def replay(
                 "faults": identifier.faults,
                 "dropped": identifier.dropped,
                 "alarms": alarms,
+                **({"stories": {name: document(story) for name, story in stories.items()}} if diagnose else {}),
                 "axes": {s.name.removeprefix("axis "): {"level": s.level, "message": s.message, "values": dict(s.values)} for s in last.statuses()},
             }
         )
@@ -106,6 +122,15 @@ def replay(
             people.print(f"axis {name}: {part.problem}")
             continue
         estimates(f"axis {name}: relative error {100 * part.fit.relative_error:.2g} %", part.fit.intervals)
+    for name, story in stories.items():
+        people.print(words(story), markup=False)
+        rows = [(step.rung.label, *(f"{1e3 * value:.4g}" for value in errors(step.rung))) for step in story.steps]
+        table(f"axis {name}: mm/s", ("step", "training error", "held-out error", "noise floor"), rows)
+
+
+def errors(rung: Rung) -> tuple[float, float, float]:
+    """On the data of the fit, on the rest, and the least possible, m/s."""
+    return rung.train_error, rung.held_out_error, rung.noise_floor
 
 
 def _alarm(name: str, part: Any) -> str:

@@ -118,7 +118,9 @@ def describe(item: Knob) -> ParameterDescriptor:
     """Meaning, unit and limits in ROS' words."""
     unit = f" [{item.unit}]" if item.unit else ""
     descriptor = ParameterDescriptor(
-        description=item.meaning + unit, additional_constraints=f"one of {', '.join(item.choices)}" if item.choices else ""
+        dynamic_typing=isinstance(item.value, list),  # an empty list has no type of its own
+        description=item.meaning + unit,
+        additional_constraints=f"one of {', '.join(item.choices)}" if item.choices else "",
     )
     if item.low is not None and item.high is not None:
         if isinstance(item.value, float):

@@ -7,26 +7,22 @@ data handling never waits for a fit.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
-from rclpy.qos import HistoryPolicy, QoSProfile
-from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
 
 from xy_sysid.errors import BadInput, XySysidError
 from xy_sysid.identifier import Identifier
-from xy_sysid.joints import JointCounter
 from xy_sysid.live_fit import LiveFitter, Update, warm_up
 from xy_sysid.messages import OK, STALE, WARN, StatusMessage
-from xy_sysid.nodes.common import DATA_QOS, LATCHED_QOS, NAMESPACE, Ending, declare, from_message, overrides
+from xy_sysid.nodes.common import LATCHED_QOS, NAMESPACE, Ending, declare
 from xy_sysid.nodes.convert import array_to_ros, statuses_to_ros
-from xy_sysid.pairing import KINDS, Kind
+from xy_sysid.nodes.streams import AXES, Streams, answered, declare_axes
+from xy_sysid.pairing import Kind
 from xy_sysid.settings import IdentifierSettings
 from xy_sysid.state_file import load_state, save_state, set_aside
 from xy_sysid.stream import Block
@@ -34,8 +30,6 @@ from xy_sysid.work_queue import FitWorker
 
 PUBLISH_PERIOD = 0.05  # s between two looks for finished fits
 HEARTBEAT = 1.0  # s between two statuses of the streams
-JOINT_QOS = QoSProfile(depth=20_000, history=HistoryPolicy.KEEP_LAST)  # ten seconds of single samples at 2 kHz
-AXES = "axes"
 # Changing one of these starts the spectra anew; the topics' names and types are fixed when the node starts.
 SHAPES_SPECTRA = ("window", "length", "overlap", "differenced", "memory", "sliding", "alarm_windows", "reorder")
 FIXED = ("source", "effort_as_voltage", "state_file", "save_every")
@@ -46,21 +40,13 @@ class IdentifierNode(Node, Ending):
 
     def __init__(self) -> None:
         super().__init__("identifier", namespace=NAMESPACE, automatically_declare_parameters_from_overrides=True)
-        axes = overrides(self).get(AXES, ["x", "y"])
-        if not isinstance(axes, list) or not axes or not all(isinstance(axis, str) and axis for axis in axes):
-            raise BadInput(f"node identifier: parameter {AXES}", axes, 'a list of names like ["x", "y"]', "Change it and try again.")
-        if not self.has_parameter(AXES):
-            self.declare_parameter(AXES, axes)
+        axes = declare_axes(self)
         self._ready = False
         self._own = declare(self, IdentifierSettings(), self._accept, also=[AXES])
         settings = self._own.settings
-        self._axes = tuple(axes)
+        self._axes = axes
         self._identifier = Identifier(settings, self._axes)
         self._worker = FitWorker(LiveFitter(settings))
-        self._joints = JointCounter(self._axes, with_voltage=not settings.effort_as_voltage)
-        self._refused: dict[str, str] = {}
-        self._heard = dict.fromkeys(KINDS, 0)
-        self._before = dict(self._heard)
         self._state_path = Path(settings.state_file).expanduser() if settings.state_file else None
         self._metrics = self.create_publisher(DiagnosticArray, "metrics", 10)
         self._arrays: dict[str, Any] = {}
@@ -70,14 +56,9 @@ class IdentifierNode(Node, Ending):
             self._publisher(f"comparison/{axis}")
         self._resume()
         warm_up(settings)  # before anything is subscribed to: compiling holds up the data path
-        if settings.source == "joint_state":
-            self.create_subscription(JointState, "joint_states", self._on_joints, JOINT_QOS)
-        else:
-            self.create_subscription(Float64MultiArray, "position", self._on_position, DATA_QOS)
-        if settings.source == "blocks" or not settings.effort_as_voltage:
-            self.create_subscription(Float64MultiArray, "voltage", self._on_voltage, DATA_QOS)
+        self._streams = Streams(self, self._axes, settings.source, settings.effort_as_voltage, self._feed)
         for name, act in (("reset", self._reset), ("save", self._save), ("load", self._load)):
-            self.create_service(Trigger, f"~/{name}", functools.partial(_answer, act))
+            self.create_service(Trigger, f"~/{name}", functools.partial(answered, act))
         self.create_timer(PUBLISH_PERIOD, self._publish_done)
         self.create_timer(HEARTBEAT, self._beat)
         if self._state_path is not None:
@@ -86,49 +67,9 @@ class IdentifierNode(Node, Ending):
 
     # data
 
-    def _on_voltage(self, message: Float64MultiArray) -> None:
-        self._on_block("voltage", message)
-
-    def _on_position(self, message: Float64MultiArray) -> None:
-        self._on_block("position", message)
-
-    def _on_block(self, kind: Kind, message: Float64MultiArray) -> None:
-        try:
-            block = from_message(message)
-        except BadInput as problem:
-            self._refuse(f"{kind}: {problem}")
-            return
-        self._feed(kind, block)
-        if kind == "voltage":
-            self._joints.see_voltage(block)
-
-    def _on_joints(self, message: JointState) -> None:
-        missing = [axis for axis in self._axes if axis not in message.name]
-        places = [] if missing else [message.name.index(axis) for axis in self._axes]
-        effort = self._own.settings.effort_as_voltage
-        if missing or len(message.position) != len(message.name) or (effort and len(message.effort) != len(message.name)):
-            what = f"joints {', '.join(message.name)}" if missing else "a position" + (" and an effort" if effort else "") + " for some joints only"
-            self._refuse(f"joint_states: {what}; expected {', '.join(self._axes)}. Set the parameter axes to joint names.")
-            return
-        time = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
-        row = [message.position[k] for k in places] + ([message.effort[k] for k in places] if effort else [])
-        block = self._joints.add(time, np.array(row, dtype=np.float64))
-        if block is None:
-            return
-        number = len(self._axes)
-        self._feed("position", Block(self._axes, block.seq, block.time, block.values[:, :number]))
-        if effort:
-            self._feed("voltage", Block(self._axes, block.seq, block.time, block.values[:, number:]))
-
     def _feed(self, kind: Kind, block: Block) -> None:
-        self._heard[kind] += len(block)
         for request in self._identifier.feed(kind, block):
             self._worker.ask(request)
-
-    def _refuse(self, text: str) -> None:
-        if self._refused.get("message") != text:
-            self.get_logger().warning(text)
-        self._refused = {"message": text, "number": str(int(self._refused.get("number", "0")) + 1)}
 
     # results
 
@@ -149,14 +90,13 @@ class IdentifierNode(Node, Ending):
 
     def _beat(self) -> None:
         """What is heard of the streams, once a second, whether or not there is anything to fit."""
-        silent = [kind for kind in KINDS if self._heard[kind] == self._before[kind]]
-        self._before = dict(self._heard)
+        silent = self._streams.silent()
         sentences = self._identifier.sentences
         level, text = OK, "voltage and position are heard"
         if silent:
             level, text = STALE, f"no {' and no '.join(silent)} heard for a second"
-        elif self._refused:
-            level, text = WARN, self._refused["message"]
+        elif self._streams.refused:
+            level, text = WARN, self._streams.refused
         elif sentences:
             level, text = WARN, "; ".join(sentences.values())
         if self._worker.skipped:
@@ -164,7 +104,7 @@ class IdentifierNode(Node, Ending):
         values = {
             "samples paired": str(self._identifier.samples),
             "sampling rate (Hz)": f"{self._identifier.sampling_rate or 0.0:.9g}",
-            "messages refused": self._refused.get("number", "0"),
+            "messages refused": str(self._streams.refusals),
             "skipped fits": str(self._worker.skipped),
         }
         values |= {f"newest {kind}": str(seq) for kind, seq in self._identifier.waiting.items()}
@@ -239,11 +179,3 @@ class IdentifierNode(Node, Ending):
             self._publish(update)
         if self._state_path is not None:
             self._save_quietly()
-
-
-def _answer(act: Callable[[], str], _request: Any, response: Any) -> Any:
-    try:
-        response.message, response.success = act(), True
-    except (XySysidError, OSError) as problem:
-        response.message, response.success = str(problem), False
-    return response

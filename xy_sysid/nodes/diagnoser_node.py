@@ -1,0 +1,185 @@
+"""Voltage and position in; on request which effect is missing, and the error falling as effects are added.
+
+Thin: ``diagnoser.Diagnoser`` knows what is to be done when, ``story_worker`` does it in a process of its own.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+from pathlib import Path
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from std_msgs.msg import Float64MultiArray, String
+from std_srvs.srv import Trigger
+
+from xy_sysid.diagnoser import Diagnoser
+from xy_sysid.errors import BadInput
+from xy_sysid.live_story import Act, diagnosis_status, ladder_message
+from xy_sysid.messages import OK, STALE, WARN, StatusMessage
+from xy_sysid.nodes.common import LATCHED_QOS, NAMESPACE, Ending, declare
+from xy_sysid.nodes.convert import array_to_ros, statuses_to_ros
+from xy_sysid.nodes.later import LaterTrigger
+from xy_sysid.nodes.streams import AXES, Streams, answered, declare_axes
+from xy_sysid.settings import DiagnoserSettings, given
+from xy_sysid.story import Story, allowed
+from xy_sysid.story_document import document
+from xy_sysid.story_worker import StoryWorker
+from xy_sysid.user_effects import library
+
+LOOK = 0.1  # s between two looks for news
+HEARTBEAT = 1.0  # s between two statuses in metrics
+ACTS: tuple[Act, ...] = ("diagnose", "add_next", "auto")  # services
+FIXED = ("source", "effort_as_voltage", "effect_files")
+
+
+class DiagnoserNode(Node, Ending):
+    """The adapter: topics, services and parameters around the pure logic and its worker."""
+
+    def __init__(self) -> None:
+        super().__init__("diagnoser", namespace=NAMESPACE, automatically_declare_parameters_from_overrides=True)
+        self._axes = declare_axes(self)
+        self._ready = False
+        defaults = DiagnoserSettings(effects={axis: [""] for axis in self._axes})
+        self._own = declare(self, defaults, self._accept, also=[AXES])
+        settings = self._own.settings
+        files = given(settings.effect_files)
+        self._library = library([Path(file).expanduser() for file in files])
+        self._check(settings)
+        self._diagnoser = Diagnoser(settings, self._axes)
+        self._worker = StoryWorker(files)
+        self._told: tuple[str, ...] = ()
+        self._metrics = self.create_publisher(DiagnosticArray, "metrics", 10)
+        self._diagnosis = self.create_publisher(DiagnosticArray, "diagnosis", LATCHED_QOS)
+        self._ladders = {axis: self.create_publisher(Float64MultiArray, f"error_ladder/{axis}", LATCHED_QOS) for axis in self._axes}
+        self._stories = {axis: self.create_publisher(String, f"story/{axis}", LATCHED_QOS) for axis in self._axes}
+        self._triggers = [LaterTrigger(self, f"~/{act}", functools.partial(self._diagnoser.ask, act)) for act in ACTS]
+        for name, act in (("reset_model", self._reset_model), ("forget", self._forget), ("cancel", self._cancel)):
+            self.create_service(Trigger, f"~/{name}", functools.partial(answered, act))
+        self._streams = Streams(self, self._axes, settings.source, settings.effort_as_voltage, self._diagnoser.feed)
+        self.create_timer(LOOK, self._look)
+        self.create_timer(HEARTBEAT, self._beat)
+        self._ready = True
+        self._tell()
+
+    # work
+
+    def _look(self) -> None:
+        """Give the worker what is to be done, and tell what it has done."""
+        for item in self._worker.news():
+            if item.ended:
+                self._diagnoser.finish(item.problem)
+                if item.problem:
+                    self.get_logger().error(item.problem)
+                self._follow()
+            else:
+                self._diagnoser.progress(item.doing, item.story)
+                if item.story is not None:
+                    self._show(item.story, item.text)
+            self._tell()
+        job = self._diagnoser.start()
+        if job is not None:
+            self._worker.ask(job)
+        answers = self._diagnoser.answers()
+        for answer in answers:
+            for service in self._triggers:
+                service.answer(answer.request, answer.done, answer.text)
+            self.get_logger().info(answer.text)
+        if answers or job is not None:
+            self._tell()
+
+    def _show(self, story: Story, text: str) -> None:
+        self._ladders[story.axis].publish(array_to_ros(ladder_message(story)))
+        self._stories[story.axis].publish(String(data=text))
+
+    def _tell(self) -> None:
+        """``diagnosis``: every axis, and what is done now."""
+        diagnoser = self._diagnoser
+        statuses = [
+            diagnosis_status(diagnoser.stories[axis])
+            if axis in diagnoser.stories
+            else StatusMessage(f"axis {axis}", STALE, f"axis {axis}: not diagnosed yet; call the service diagnose", ())
+            for axis in self._axes
+        ]
+        doing = diagnoser.doing or ("waiting" if diagnoser.busy else "idle")
+        statuses.append(StatusMessage("progress", OK, doing, (("progress", doing),)))
+        self._diagnosis.publish(statuses_to_ros(statuses, self.get_clock().now().to_msg(), "diagnoser"))
+
+    def _beat(self) -> None:
+        """What is heard, once a second."""
+        hearing, silent = self._diagnoser.hearing, self._streams.silent()
+        level, text = OK, f"{hearing.seconds:.1f} s without a gap are kept"
+        if silent:
+            level, text = STALE, f"no {' and no '.join(silent)} heard for a second; {text}"
+        elif self._streams.refused:
+            level, text = WARN, self._streams.refused
+        values = {
+            "seconds kept (s)": f"{hearing.seconds:.6g}",
+            "samples paired": str(hearing.total),
+            "sampling rate (Hz)": f"{hearing.sampling_rate or 0.0:.9g}",
+            "messages refused": str(self._streams.refusals),
+            "progress": self._diagnoser.doing or "idle",
+        }
+        values |= {f"stream: {reason}": str(number) for reason, number in hearing.faults.items()}
+        status = StatusMessage("diagnoser", level, text, tuple(values.items()))
+        self._metrics.publish(statuses_to_ros([status], self.get_clock().now().to_msg(), "diagnoser"))
+
+    # parameters and services
+
+    def _check(self, settings: DiagnoserSettings) -> None:
+        """Raises BadInput for an axis or an effect that nobody knows."""
+        for axis in settings.effects:
+            if axis not in self._axes:
+                raise BadInput("effects of axis", repr(axis), ", ".join(self._axes), "Choose one of these.")
+            for name in settings.chosen(axis):
+                allowed(name, self._library)
+
+    def _accept(self, settings: DiagnoserSettings) -> None:
+        if not self._ready:
+            return
+        before = self._own.settings
+        for name in FIXED:
+            if getattr(before, name) != getattr(settings, name):
+                raise BadInput(name, "not to be changed while the node runs", str(getattr(before, name)), "Start the node again with it.")
+        self._check(settings)
+        self._diagnoser.change(settings)
+        for axis in self._axes:
+            if settings.chosen(axis) not in (before.chosen(axis), self._diagnoser.effects[axis]):
+                self._diagnoser.have(axis, settings.chosen(axis))
+
+    def _follow(self) -> None:
+        """The parameters effects.<axis> say what is in the models."""
+        wrong = {axis: names for axis, names in self._diagnoser.effects.items() if names != self._own.settings.chosen(axis)}
+        if wrong:
+            make: Any = Parameter
+            self.set_parameters([make(f"effects.{axis}", value=list(names) or [""]) for axis, names in wrong.items()])
+
+    def _reset_model(self) -> str:
+        if self._diagnoser.busy:
+            raise BadInput("reset_model", "while work is under way", "an idle diagnoser", "Call cancel first.")
+        self._diagnoser.reset_model()
+        self._follow()
+        for story in self._diagnoser.stories.values():
+            self._show(story, json.dumps(document(story), allow_nan=False, separators=(",", ":")))
+        self._tell()
+        return "the models are rigid again"
+
+    def _forget(self) -> str:
+        self._diagnoser.reset()
+        return "everything heard is forgotten"
+
+    def _cancel(self) -> str:
+        self._worker.cancel()
+        text = self._diagnoser.cancel()
+        self._follow()
+        self._tell()
+        return text
+
+    def last_words(self) -> None:
+        """Nobody is left waiting."""
+        for service in self._triggers:
+            service.give_up("the diagnoser ends")
+        self._worker.close()
