@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-EXECUTABLES = {"xy-sysid", "excitation", "identifier", "recorder", "ballscrew"}
+EXECUTABLES = {"xy-sysid", "excitation", "identifier", "diagnoser", "recorder", "ballscrew"}
 DOMAIN = "87"
 
 pytestmark = [

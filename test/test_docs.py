@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from xy_sysid.cli.app import app
+from xy_sysid.live_story import LADDER_COLUMNS
 from xy_sysid.messages import COMPARISON_COLUMNS, FRF_COLUMNS
 from xy_sysid.pairing import REASONS as STREAM_REASONS
 from xy_sysid.settings_doc import document
@@ -42,6 +43,7 @@ def test_the_topics_page_names_every_column_and_reason() -> None:
     text = (ROOT / "docs" / "topics.md").read_text(encoding="utf-8")
     assert ",".join(FRF_COLUMNS) in text
     assert ",".join(COMPARISON_COLUMNS) in text
+    assert ",".join(LADDER_COLUMNS) in text
     for reason in ("lost", "not_finite", "time_jump", "restart", "overrun"):
         assert reason in STREAM_REASONS
         assert f"`{reason}`" in text

@@ -78,7 +78,7 @@ def test_the_versions_of_everything_are_pinned(setup_arguments: dict[str, Any]) 
 def test_entry_points_lead_to_a_main_function(setup_arguments: dict[str, Any]) -> None:
     """Every executable names a module of this tree that defines, or imports, main."""
     scripts = dict(item.split(" = ") for item in setup_arguments["entry_points"]["console_scripts"])
-    assert {"xy-sysid", "excitation", "identifier", "recorder", "ballscrew"} == set(scripts)
+    assert {"xy-sysid", "excitation", "identifier", "diagnoser", "recorder", "ballscrew"} == set(scripts)
     for name, target in scripts.items():
         module, _, function = target.partition(":")
         path = ROOT / module.replace(".", "/")
