@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from xy_sysid.findings import Rung, answer, parameters, place
+from xy_sysid.own_units import in_units
 from xy_sysid.story import Story, StoryStep
 from xy_sysid.story_pictures import Binned, Measured, Pictures
 from xy_sysid.stream import FloatArray
@@ -53,7 +54,7 @@ def document(story: Story) -> dict[str, Any]:
         "measured": _measured(story.measured) if story.measured else None,
         "steps": [step_document(step, with_pictures=k == 0 or k >= drawn) for k, step in enumerate(story.steps)],
     }
-    return {name: _plain(value) for name, value in made.items()}
+    return {name: _plain(value) for name, value in in_units(made, story.units).items()}
 
 
 def rung_document(item: Rung) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from xy_sysid.cli.page import page
 from xy_sysid.cli.record import record
 from xy_sysid.cli.refine import refine
 from xy_sysid.cli.replay import replay
+from xy_sysid.cli.report import report
 from xy_sysid.cli.simulate import simulate
 from xy_sysid.cli.start import run
 from xy_sysid.cli.study import study
@@ -27,5 +28,5 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (demo, page, run, record, replay, simulate, frf, fit, validate, compare, diagnose, refine, effects, study):
+for command in (demo, page, run, record, replay, simulate, frf, fit, validate, compare, diagnose, refine, effects, study, report):
     app.command(name=command.__name__)(command)

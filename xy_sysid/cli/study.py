@@ -58,7 +58,7 @@ def study(
         origins["Second recording (after)"] = provenance(loose, second)
     units = (recording.input_unit, recording.output_unit)
     page = study_page(rec.name, studies, units, settings.min_coherence, origins, recording.notes)
-    _write(out, page)
+    write_page(out, page)
     if json:
         emit({"page": str(out), "bytes": len(page.encode()), "recordings": origins, "axes": {name: answer(one) for name, one in studies.items()}})
         return
@@ -129,7 +129,8 @@ def _any(studies: dict[str, AxisStudy]) -> None:
         raise BadInput("recording", "without a response on any axis", "one that moves and is excited", first.problem)
 
 
-def _write(out: Path, page: str) -> None:
+def write_page(out: Path, page: str) -> None:
+    """Raises BadInput, in one line, when the file cannot be written."""
     from xy_sysid.errors import BadInput
 
     try:

@@ -53,7 +53,8 @@ def excitation_figure(inputs: Mapping[str, Excitation], unit: str) -> go.Figure:
     figure.update_xaxes(title_text="frequency (Hz)", type="log", dtick=1, tickformat="~g", row=3, col=1)
     highest = max((float(np.max(one.density.density)) for one in inputs.values()), default=1.0)
     figure.update_yaxes(title_text=f"PSD ({plain(unit)}²/Hz)", type="log", exponentformat="power", dtick=2, row=3, col=1)
-    figure.update_yaxes(range=[np.log10(highest) - 8, np.log10(highest) + 0.5], row=3, col=1)
+    if highest > 0:
+        figure.update_yaxes(range=[np.log10(highest) - 8, np.log10(highest) + 0.5], row=3, col=1)
     return figure
 
 

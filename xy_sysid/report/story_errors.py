@@ -10,6 +10,8 @@ from xy_sysid.report.story_parts import Document, drawing, floor_line, held_out_
 from xy_sysid.report.theme import MODEL, UNTRUSTED, fade
 from xy_sysid.report.words import people_unit
 
+LEAST = 0.25  # of the noise floor: a mean error below it is shown as the trifle that it is
+
 
 def residual(document: Document, step: int | None = None, mode: str = "light") -> go.Figure:
     """Error over the noise floor by frequency, on data that no fit saw; failing bands shaded and named."""
@@ -85,6 +87,8 @@ def _against(document: Document, kind: str, step: int | None, mode: str) -> go.F
         for at in (1, 2):
             figure.add_vline(x=start, line={"color": UNTRUSTED, "width": 1, "dash": "dash"}, row=at, col=1)
         figure.add_annotation(text="held out →", x=start, y=0, yref="y domain", xanchor="left", yanchor="bottom", showarrow=False, font={"size": 11})
-    figure.update_yaxes(title_text=f"mean ({plain(speed)})", row=2, col=1)
+    least = LEAST * faster * float(shown["noise_floor"])
+    reach = 1.1 * max(least, faster * float(np.nanmax(np.abs(mean), initial=0.0)))
+    figure.update_yaxes(title_text=f"mean ({plain(speed)})", range=[-reach, reach], tickformat="~g", row=2, col=1)
     figure.update_xaxes(title_text=f"{'velocity' if kind == 'speed' else kind} ({plain(unit)})", row=2, col=1)
     return figure

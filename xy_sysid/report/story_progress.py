@@ -119,10 +119,11 @@ def candidates(document: Document, mode: str = "light", most: int = 8) -> go.Fig
         else fade(UNTRUSTED, 0.7)
         for item in tried
     ]
+    figures = [f"{number(error, 3)} {unit}{_place(item, chosen, runner)}" for item, error in zip(tried, errors, strict=True)]
+    inside = ["inside" if error > 0.5 * max(errors) else "outside" for error in errors]
     figure.add_bar(
-        x=errors, y=[words(item["effect"]) for item in tried], orientation="h", marker={"color": colours},
-        text=[f"{number(error, 3)} {unit}{_place(item, chosen, runner)}" for item, error in zip(tried, errors, strict=True)],
-        textposition="auto", insidetextanchor="end", hovertext=[_evidence(item) for item in tried], hoverinfo="text", showlegend=False,
+        x=errors, y=[words(item["effect"]) for item in tried], orientation="h", marker={"color": colours}, text=figures, textposition=inside,
+        insidetextanchor="end", cliponaxis=False, hovertext=[_evidence(item) for item in tried], hoverinfo="text", showlegend=False,
     )  # fmt: skip
     floor, base = document["ladder"][0]["noise_floor"] * scale, float(document["error"]["now"]) * scale
     for level, told, colour, dash, anchor in ((floor, "floor", FLOOR, "dot", "left"), (base, "none added", UNTRUSTED, "dash", "right")):

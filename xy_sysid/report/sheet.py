@@ -1,0 +1,138 @@
+"""One HTML page that opens offline: headings, figures with words, tables, and where it all comes from.
+
+What goes on it is the business of ``page`` (the paper's study) and ``report_page`` (everything).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from importlib.resources import files
+from typing import Any
+
+import plotly.graph_objects as go
+from plotly.offline import get_plotlyjs
+
+from xy_sysid.report.tables import Table
+from xy_sysid.report.theme import template
+
+SENTENCE = 42  # letters from which a cell is a sentence
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """One Plotly figure of the page: its element's id, the figure, what it shows in words, and its title."""
+
+    name: str
+    figure: go.Figure
+    alt: str
+    title: str = ""
+
+
+def whole(title: str, head: str, parts: Iterable[str], drawings: Iterable[Drawing]) -> str:
+    """The page. title: of the window; head: what stands above all sections, HTML; parts: the sections, HTML."""
+    plots = {drawing.name: json.loads(drawing.figure.to_json()) for drawing in drawings}
+    for plot in plots.values():
+        plot["layout"].pop("template", None)
+    templates = {mode: template(mode) for mode in ("light", "dark")}
+    assets = files("xy_sysid.report")
+    style = (assets / "page.css").read_text(encoding="utf-8")
+    script = (assets / "page.js").read_text(encoding="utf-8")
+    return "\n".join(
+        [
+            "<!DOCTYPE html>",
+            '<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">',
+            '<meta name="color-scheme" content="light dark">',
+            f"<title>{escape(title)}</title><style>{style}</style></head><body><main>",
+            f"<header>{head}</header>",
+            "<noscript><p>The figures need JavaScript; tables and remarks do not.</p></noscript>",
+            *parts,
+            f'</main><script type="application/json" id="plots">{_safe({"plots": plots, "templates": templates})}</script>',
+            f"<script>{get_plotlyjs()}</script>",
+            f"<script>{script}</script></body></html>",
+            "",
+        ]
+    )
+
+
+def paragraph(text: str) -> str:
+    """Plain words as a paragraph."""
+    return f"<p>{escape(text)}</p>"
+
+
+def listing(texts: Iterable[str]) -> str:
+    """Plain words as a list."""
+    return f"<ul>{''.join(f'<li>{escape(text)}</li>' for text in texts)}</ul>"
+
+
+def section(name: str, title: str, drawings: Sequence[Drawing], caption: str, extra: str = "") -> str:
+    """Figures side by side under a heading, with a caption below them and HTML after it."""
+    figure = pictures(drawings, caption, f"{name}-title")
+    return f'<section id="{name}"><h2 id="{name}-title">{escape(title)}</h2>{figure}{extra}</section>'
+
+
+def pictures(drawings: Sequence[Drawing], caption: str, labelled_by: str = "") -> str:
+    """Figures side by side with one caption."""
+    wide = {1: "", 3: " threes"}.get(len(drawings), " pairs")
+    label = f' aria-labelledby="{labelled_by}"' if labelled_by else ""
+    return (
+        f'<figure{label}><div class="plots{wide}">{"".join(_plot(one) for one in drawings)}</div><figcaption>{escape(caption)}</figcaption></figure>'
+    )
+
+
+def block(name: str, title: str, words: str, content: str) -> str:
+    """Words and HTML under a heading."""
+    return f'<section id="{name}"><h2>{escape(title)}</h2><p>{escape(words)}</p>{content}</section>'
+
+
+def table_html(table: Table) -> str:
+    """A table that scrolls by itself where the paper is narrow."""
+    told = [any(len(line[place]) > SENTENCE for line in table.rows) for place in range(len(table.heads))]
+    heads = "".join(
+        f'<th scope="col"{_long(long)}>{escape(text)}</th>' if text else "<td></td>" for text, long in zip(table.heads, told, strict=True)
+    )
+    rows = "".join(
+        f'<tr><th scope="row">{escape(first)}</th>'
+        f"{''.join(f'<td{_long(long)}>{escape(text)}</td>' for text, long in zip(rest, told[1:], strict=True))}</tr>"
+        for first, *rest in table.rows
+    )
+    caption = escape(table.caption)
+    return (
+        f'<div class="scroll" role="region" tabindex="0" aria-label="{caption}"><table><caption><span>{caption}</span></caption>'
+        f"<thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table></div>"
+    )
+
+
+def provenance_html(origins: Mapping[str, Mapping[str, Any]]) -> str:
+    """The last section: what every number was made from, and by what."""
+    made = []
+    for label, origin in origins.items():
+        rows = "".join(f"<dt>{escape(str(key))}</dt><dd>{escape(_flat(value))}</dd>" for key, value in origin.items() if value not in ([], (), ""))
+        made.append(f"<h3>{escape(label)}</h3><dl>{rows}</dl>")
+    return f'<section id="provenance"><h2>Provenance</h2>{"".join(made)}</section>'
+
+
+def _long(sentences: bool) -> str:
+    """Sentences are broken into lines, numbers are not."""
+    return ' class="long"' if sentences else ""
+
+
+def _safe(document: object) -> str:
+    """JSON that cannot end the script element it stands in."""
+    return json.dumps(document, separators=(",", ":")).replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def _plot(drawing: Drawing) -> str:
+    height, title = int(drawing.figure.layout.height), f"<h3>{escape(drawing.title)}</h3>" if drawing.title else ""
+    alt = escape(drawing.alt)
+    return f'<div>{title}<div class="plot" id="{drawing.name}" role="img" aria-label="{alt}" style="height:{height}px"></div></div>'
+
+
+def _flat(value: object) -> str:
+    if isinstance(value, Mapping):
+        return ", ".join(f"{key} {item}" for key, item in value.items())
+    if isinstance(value, (list, tuple)):
+        return " ".join(str(item) for item in value)
+    return str(value)

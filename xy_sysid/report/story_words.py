@@ -1,0 +1,167 @@
+"""A story in words: the verdict that everybody understands, captions of its pictures, its tables."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from xy_sysid.axis_model import Library
+from xy_sysid.report.story_parts import Document, words
+from xy_sysid.report.tables import Table
+from xy_sysid.report.words import interval_text, number, quantity
+
+PARTLY = 0.7  # of the base's excess that may be left for "partly", as in xy-sysid refine
+STANDARD_TOLERANCE = 1e-3
+
+LADDER = (
+    "How the error falls as effects are added and everything is fitted again. Solid: the error on the last third, which no fit has seen; "
+    "dashed: the error on the data of the fit; dotted: the noise floor, below which no model can come. A step at the floor has a tick."
+)
+CANDIDATES = "What each effect leaves of the held-out error when it alone is added to the rigid model. Shorter is better."
+BEFORE_AFTER = (
+    "The rigid model and the last one over each other: error over the noise floor by frequency, and the error in time where the rigid one was worst."
+)
+BASE_FAILS = (
+    "Error of the rigid model by frequency, over the noise floor; on data that no fit has seen. Shaded: where it is more than twice the floor."
+)
+AGAINST = (
+    "The error of the rigid model against velocity, position and time: above its size over the noise floor, below its mean. "
+    "A mean that jumps at zero velocity is dry friction, one that repeats along the travel is cogging or a lead error, one that grows in "
+    "time is drift."
+)
+LEFT = "What the last model leaves, over the noise floor, in the same pictures."
+SIGNALS = (
+    "Measured, and simulated from the voltage alone: half a second around the rigid model's worst moment, and the position over the whole "
+    "recording. The simulated position is integrated freely from the first sample, so small errors of speed add up to a drift."
+)
+ROOTS = "Poles and zeros of the linear part, without the effects that bend."
+
+
+def status(story: Document | None) -> str:
+    """explained, partly explained, not explained, or nothing can be said."""
+    if story is None or not story["ladder"]:
+        return "nothing can be said"
+    first, last = story["ladder"][0], story["ladder"][-1]
+    if last["explained"]:
+        return "explained"
+    return "partly explained" if last["effects"] and last["excess"] < PARTLY * first["excess"] else "not explained"
+
+
+def named(name: str, library: Library) -> str:
+    """An effect with what it is on a machine."""
+    known = library.effects.get(name)
+    return f"{words(name)} ({known.meaning})" if known is not None else words(name)
+
+
+def spoken(text: str, library: Library) -> str:
+    """A sentence with the names of effects as words."""
+    for name in sorted(library.effects, key=len, reverse=True):
+        text = text.replace(name, words(name))
+    return text
+
+
+def verdict(story: Document, library: Library) -> str:
+    """What the story found, for somebody who knows the machine and not the method."""
+    if not story["ladder"]:
+        return str(story["sentence"])
+    last = story["ladder"][-1]
+    parts = ["a rigid axis with delay", *(named(name, library) for name in last["effects"])]
+    model = parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
+    tolerance = float(story["tolerance"])
+    down_to = "" if tolerance <= STANDARD_TOLERANCE else f", down to {number(100 * tolerance, 2)} % of the signal"
+    kind = status(story)
+    if kind == "explained":
+        rest = "is enough: nothing that the data show is missing" if len(parts) == 1 else "explain the motion: what is left is noise"
+        return f"{_capital(model)} {rest}{down_to}."
+    if kind == "partly explained":
+        return f"{_capital(model)} explain a part of the motion; a rest is not in the library of effects."
+    return "Something is missing in the model, and no effect of the library explains it."
+
+
+def size(story: Document, speed: float) -> str:
+    """How large the error is, against the motion, against the rigid model and against noise."""
+    unit = story["error"]["unit"]
+    first, last = story["ladder"][0], story["ladder"][-1]
+    text = (
+        "Simulated from the voltage alone on the last third of the recording, which no fit has seen, the model is off by "
+        f"{quantity(float(last['held_out_error']), unit, 3)} rms"
+    )
+    if math.isfinite(speed) and speed > 0:
+        text += f", {number(100 * float(last['held_out_error']) / speed, 2)} % of the speed itself"
+    text += f"; measurement noise alone makes {quantity(float(last['noise_floor']), unit, 3)}."
+    if last["effects"]:
+        times = float(first["held_out_error"]) / max(float(last["held_out_error"]), 1e-300)
+        text += f" Without {' and '.join(words(name) for name in last['effects'])} it was off by {quantity(float(first['held_out_error']), unit, 3)}"
+        text += f", {number(times, 2)} times as much." if times >= 1 else "."
+    return text
+
+
+def confidence(story: Document) -> str:
+    """How sure the name is; empty where there is none."""
+    if story["verdict"] != "missing_effect":
+        return ""
+    sure = 100 * float(story["confidence"])
+    text = f"Confidence in {words(story['effects'][0])}: {'above 99' if sure > 99 else number(sure, 2)} %."
+    return text + (f" Runner-up: {story['runner_up']['sentence']}" if story["runner_up"] else "")
+
+
+def places_table(story: Document, axis: str) -> Table | None:
+    """Where the rigid model fails, worst first; None if it does not."""
+    if not story["steps"] or not story["steps"][0]["pictures"]["failing"]:
+        return None
+    rows = tuple(
+        (str(item["kind"]), number(float(item["error_over_floor"]), 3), str(item["sentence"])) for item in story["steps"][0]["pictures"]["failing"]
+    )
+    return Table(f"Axis {axis}: where the rigid model fails", ("by", "times the floor", "in words"), rows)
+
+
+def ladder_table(story: Document, axis: str) -> Table:
+    """The ladder in figures."""
+    unit = story["error"]["unit"]
+    rows = tuple(
+        (
+            words(item["label"]),
+            *(quantity(float(item[name]), unit, 4) for name in ("train_error", "held_out_error", "noise_floor")),
+            "yes" if item["explained"] else "no",
+        )
+        for item in story["ladder"]
+    )
+    return Table(f"Axis {axis}: the ladder", ("model", "training error", "held-out error", "noise floor", "at the floor"), rows)
+
+
+def parameter_table(story: Document, axis: str, library: Library) -> Table:
+    """Parameters of the last model with 95 % intervals and what they mean."""
+    rows = tuple((words(name.replace(".", ": ")), _interval(item), _meaning(name, library)) for name, item in story["model"]["parameters"].items())
+    return Table(f"Axis {axis}: parameters of the last model", ("parameter", "value [95 % interval]", "what it is"), rows)
+
+
+def look_alike_table(story: Document, axis: str, library: Library) -> Table | None:
+    """Effects that the named one can be taken for; None without any."""
+    if not story["look_alikes"]:
+        return None
+    rows = tuple(
+        (words(item["effect"]), "yes" if item["told_apart"] else "no", spoken(str(item["sentence"]), library)) for item in story["look_alikes"]
+    )
+    return Table(f"Axis {axis}: what {words(story['effects'][0])} can be taken for", ("effect", "told apart by these data", "why"), rows)
+
+
+def _interval(item: Mapping[str, Any]) -> str:
+    low, high = (float("nan") if end is None else float(end) for end in item["ci95"])
+    text = interval_text(float(item["value"]), low, high, str(item["unit"])) if math.isfinite(low) and math.isfinite(high) else ""
+    return text or f"{quantity(float(item['value']), str(item['unit']), 4)}, not determined"
+
+
+_BASE = {"gain": "steady speed per unit of input", "delay": "from command to motion", "pole": "rate at which speed follows: drag over mass"}
+
+
+def _meaning(name: str, library: Library) -> str:
+    effect, _, own = name.partition(".")
+    if not own:
+        return _BASE.get(effect, "")
+    known = library.effects.get(effect)
+    return next((item.meaning for item in known.parameters if item.name == own), "") if known is not None else ""
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
