@@ -78,8 +78,10 @@ def compare(tf: TransferFunction, u: FloatArray, y: FloatArray, sampling_rate: f
     return compare_velocity(np.diff(simulate(tf, sampling_rate, u)) * sampling_rate, u, y, sampling_rate, f"{tf.output_unit}/s", tf.output_unit)
 
 
-def compare_velocity(model: FloatArray, u: FloatArray, y: FloatArray, sampling_rate: float, unit: str = "m/s", length_unit: str = "m") -> Comparison:
-    """A simulated mean velocity (n - 1,) of any model against the measured output (n,)."""
+def compare_velocity(
+    model: FloatArray, u: FloatArray, y: FloatArray, sampling_rate: float, unit: str = "m/s", length_unit: str = "m", begins: float = 0.0
+) -> Comparison:
+    """A simulated mean velocity (n - 1,) of any model against the measured output (n,). begins: time of the first sample, s."""
     first = int(SKIP * sampling_rate)
     if y.shape[0] < first + 2000 or model.shape[0] != y.shape[0] - 1:
         raise BadInput("number of samples", y.shape[0], f"{first + 2000} or more", "Give a longer recording.")
@@ -99,7 +101,7 @@ def compare_velocity(model: FloatArray, u: FloatArray, y: FloatArray, sampling_r
     noise = float(np.sqrt(np.sum(floor[inside]) * step))
     low_error, low_speed = (_low_pass(values, end, sampling_rate) for values in (error, measured))
     centres = np.sqrt(grid.edges[1:] * grid.edges[:-1])
-    time = (np.arange(error.shape[0]) + first) / sampling_rate
+    time = begins + (np.arange(error.shape[0]) + first) / sampling_rate
     places = _frequency_places(grid.edges, ratio, end)
     total = float(np.sqrt(np.mean(low_error**2)))
     offset = float(np.mean(error))

@@ -164,7 +164,8 @@ def _compared(data: AxisData, fitted: GreyboxFit) -> Comparison:
     """On the samples that no fit saw; on all of them if those are few, and by bands alone if all are few."""
     for first in (data.training, 0):
         try:
-            return compare_velocity(fitted.simulated[first:], data.voltage[first:], data.position[first:], data.sampling_rate)
+            held = fitted.simulated[first:], data.voltage[first:], data.position[first:]
+            return compare_velocity(*held, data.sampling_rate, begins=first / data.sampling_rate)
         except BadInput:
             continue
     edges = data.layout.edges()

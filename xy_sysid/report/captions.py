@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -48,11 +49,15 @@ def summary(one: AxisStudy) -> str:
 def excitation(inputs: Mapping[str, Excitation], unit: str) -> str:
     """Caption of figure 2."""
     each = ". ".join(
-        f"Axis {axis}: {quantity(one.rms, unit, 3)} rms, peak {quantity(one.peak, unit, 3)}, "
-        f"excited from {number(one.density.low, 3)} to {number(one.density.high, 3)} Hz (−10 dB, dotted)"
-        for axis, one in inputs.items()
+        f"Axis {axis}: {quantity(one.rms, unit, 3)} rms, peak {quantity(one.peak, unit, 3)}, {_excited(one)}" for axis, one in inputs.items()
     )
     return f"Top: an excerpt, each value held to the next sample. Middle: distribution of all samples. Bottom: power spectral density. {each}."
+
+
+def _excited(one: Excitation) -> str:
+    if one.rms == 0.0 or not math.isfinite(one.density.low):
+        return "not excited"
+    return f"excited from {number(one.density.low, 3)} to {number(one.density.high, 3)} Hz (−10 dB, dotted)"
 
 
 def position(outputs: Mapping[str, Motion], unit: str) -> str:

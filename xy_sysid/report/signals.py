@@ -122,7 +122,7 @@ def density(signal: FloatArray, sampling_rate: float) -> Density:
     frequency, power = welch(signal, sampling_rate, nperseg=segment)
     frequency, power = _log_bins(np.asarray(frequency)[1:], np.asarray(power)[1:])
     level = float(np.sum(power**2 * np.gradient(frequency)) / max(float(np.sum(power * np.gradient(frequency))), np.finfo(float).tiny))
-    inside = np.flatnonzero(power >= EDGE * level)
+    inside = np.flatnonzero((power >= EDGE * level) & (power > 0.0))
     low, high = (float(frequency[inside[0]]), float(frequency[inside[-1]])) if inside.size else (float("nan"),) * 2
     return Density(frequency, power, low, high)
 

@@ -1,0 +1,159 @@
+"""The report: whole, honest about what it cannot say, safe, and one file."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from cli_tools import cli, npz, refused, rigid
+from test_report_page import parsed, plots
+
+from xy_sysid.own_units import in_units, unit_in
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A recording with Coulomb friction on x and nothing on y, and its report."""
+    made = tmp_path_factory.mktemp("report")
+    said = cli("simulate", made / "rec.npz", "--machine", "rigid.yaml", "--effect", "x:coulomb_friction", "--duration", "20")
+    assert said.code == 0, said
+    return made
+
+
+@pytest.fixture(scope="module")
+def answer(folder: Path) -> dict[str, Any]:
+    """What the command says; it writes the page."""
+    said = cli("report", folder / "rec.npz", "-o", folder / "out.html", "--json")
+    assert said.code == 0, said
+    document: dict[str, Any] = said.json
+    return document
+
+
+@pytest.fixture(scope="module")
+def page(folder: Path, answer: dict[str, Any]) -> str:
+    return (folder / "out.html").read_text(encoding="utf-8")
+
+
+def words_of(page: str) -> str:
+    return " ".join(" ".join(parsed(page).text).split())
+
+
+def test_the_report_is_one_file_that_needs_no_network(page: str, answer: dict[str, Any]) -> None:
+    """No source or link leaves the file, and it is below 8 MB."""
+    for tag, attributes in parsed(page).tags:
+        assert tag not in ("link", "iframe", "base", "img"), tag
+        assert not {"src", "srcset", "action"} & set(attributes)
+        assert (attributes.get("href") or "#").startswith("#"), attributes
+    assert answer["bytes"] == len(page.encode()) < 8_000_000
+
+
+def test_a_manager_reads_the_summary_first(page: str) -> None:
+    """Each axis has a verdict in words, the size of the error against the motion and the noise, and the falling ladder beside it."""
+    text = words_of(page).partition("Provenance")[2]  # behind the links at the top
+    assert text.index("Summary") < text.index("A rigid axis with delay and coulomb friction") < text.index("Remarks")
+    assert "is enough: nothing that the data show is missing" in text
+    assert "which no fit has seen" in text and "% of the speed itself" in text
+    assert "coulomb_friction" not in text.partition("Provenance")[0]
+
+
+def test_every_part_of_the_report_is_there(page: str) -> None:
+    """Summary, experiment, response, fits, one part per axis, provenance, each reachable from the top; words for every picture."""
+    found = parsed(page)
+    ids = {attributes["id"] for _, attributes in found.tags if "id" in attributes}
+    links = {str(attributes["href"])[1:] for tag, attributes in found.tags if tag == "a"}
+    assert {"summary", "experiment", "response", "fits", "axis-0", "axis-1", "provenance"} <= links <= ids
+    labelled = {attributes["id"] for _, attributes in found.tags if attributes.get("role") == "img" and attributes.get("aria-label")}
+    assert labelled == set(plots(page))
+    text = words_of(page)
+    for part in (
+        "LLS NLLS ML",
+        "Checks of the ML fit",
+        "Where the rigid model fails",
+        "What is missing",
+        "parameters of the last model",
+        "the ladder",
+    ):
+        assert part in text
+
+
+def test_the_numbers_are_those_of_the_story(page: str, answer: dict[str, Any]) -> None:
+    """Parameters of the table come with their intervals; the friction is the simulated one."""
+    friction = answer["axes"]["x"]["story"]["model"]["parameters"]["coulomb_friction.coulomb"]
+    assert friction["value"] == pytest.approx(0.2, rel=0.01)
+    low, high = friction["ci95"]
+    assert low < friction["value"] < high
+    assert "coulomb friction: coulomb" in words_of(page)
+    assert answer["axes"]["y"]["story"]["verdict"] == "nothing_missing" and answer["axes"]["y"]["status"] == "explained"
+    assert answer["axes"]["x"]["status"] == "explained" and len(answer["axes"]["x"]["story"]["ladder"]) == 2
+
+
+def test_provenance_tells_data_command_and_versions(page: str, answer: dict[str, Any]) -> None:
+    """The hash of the samples, the command line and the versions are on the page."""
+    text = words_of(page)
+    for value in (answer["recording"]["data_sha256"]["x"], answer["recording"]["versions"]["numpy"], "xy-sysid"):
+        assert value in text
+
+
+def test_default_orders_that_cannot_be_an_axis_give_way_to_rigid_ones(answer: dict[str, Any], page: str) -> None:
+    """A rigid table fitted with a resonance: the report shows an axis that is stable and physical, and says what it did."""
+    checks = answer["axes"]["y"]["checks"]
+    assert checks["stable"]["ok"] and checks["feasible"]["ok"]
+    shown = len(answer["axes"]["y"]["linear"]["fits"]["ML"]["denominator"])
+    assert shown == 5 or "of orders 0/2" in words_of(page)
+
+
+def test_data_of_which_nothing_can_be_said_give_a_report_that_says_so(tmp_path: Path) -> None:
+    """Nothing moves: exit 0, a page with the reason in the summary and no story."""
+    path = npz(tmp_path / "still.npz", u=lambda content: 0 * content["u"], y=lambda content: 0 * content["y"])
+    said = cli("report", path, "-o", tmp_path / "still.html")
+    assert said.code == 0 and "nothing can be said" in said.out
+    text = words_of((tmp_path / "still.html").read_text(encoding="utf-8"))
+    assert "the input does not move" in text.split("Experiment")[1] and "not excited" in text
+
+
+def test_a_recording_of_other_units_keeps_them(tmp_path: Path) -> None:
+    """Ampere and radian: no millimetre and no volt in the answer."""
+    path = npz(tmp_path / "motor.npz", rows=10_000, u_unit="A", y_unit="rad")
+    said = cli("report", path, "-o", tmp_path / "motor.html", "--json")
+    story = said.json["axes"]["x"]["story"]
+    assert story["model"]["parameters"]["gain"]["unit"] == "rad/s/A"
+    text = words_of((tmp_path / "motor.html").read_text(encoding="utf-8"))
+    assert "rad/s" in text and not re.search(r"\bmm\b", text)
+
+
+def test_units_are_renamed_where_they_are_units() -> None:
+    """In unit fields and in sentences; names that hold the letters stay."""
+    assert unit_in("m/s/V", ("A", "rad")) == "rad/s/A" and unit_in("V/m", ("A", "rad")) == "A/rad"
+    made = in_units({"unit": "m", "sentence": "falls to 3 mm/s at 2 V", "effect": "m"}, ("A", "rad"))
+    assert made == {"unit": "rad", "sentence": "falls to 3 mrad/s at 2 A", "effect": "m"}
+    same = {"unit": "m", "sentence": "3 mm"}
+    assert in_units(same, ("V", "m")) == same
+
+
+def test_names_from_a_file_cannot_become_markup(tmp_path: Path) -> None:
+    """An axis called like a tag is shown, not run."""
+    content = rigid(8_000)
+    rows = np.column_stack((content["t"], content["u"], content["y"]))
+    path = tmp_path / "bad.csv"
+    path.write_text("time,<b>_voltage,<b>_position\n" + "\n".join(",".join(f"{value:.12g}" for value in row) for row in rows))
+    said = cli("report", path, "-o", tmp_path / "bad.html")
+    assert said.code == 0, said
+    assert "<b>" not in re.sub(r"<script.*?</script>", "", (tmp_path / "bad.html").read_text(encoding="utf-8"), flags=re.S)
+
+
+def test_wrong_use_is_one_line(tmp_path: Path, folder: Path) -> None:
+    """No recording, no folder, no such axis: exit 2, one line, no file."""
+    assert "cannot be read" in refused("report", tmp_path / "none.npz")
+    assert "folder" in refused("report", folder / "rec.npz", "-o", tmp_path / "no" / "out.html")
+    assert "axis is z" in refused("report", folder / "rec.npz", "-o", tmp_path / "out.html", "--axis", "z")
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_answer_is_plain_json(answer: dict[str, Any]) -> None:
+    """One document, without the pictures' rows."""
+    assert len(json.dumps(answer)) < 100_000
+    assert set(answer["axes"]) == {"x", "y"}
