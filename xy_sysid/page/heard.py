@@ -52,6 +52,7 @@ class Heard:
     resonances: dict[str, deque[Tracked]] = field(default_factory=dict)
     present: dict[str, float] = field(default_factory=dict)
     lifecycle: str = ""
+    progress: tuple[str, float] = ("", 0.0)
     version: dict[str, int] = field(default_factory=dict)
 
     def axes(self) -> tuple[str, ...]:
@@ -86,6 +87,13 @@ class Heard:
         self._changed(f"story {axis}")
         return ""
 
+    def doing(self, words: str, now: float) -> None:
+        """What the diagnoser does now."""
+        words = "" if words == "idle" else words
+        if words != self.progress[0]:
+            self.progress = words, now
+            self._changed("progress")
+
     def graph(self, names: set[str], now: float) -> None:
         """Which nodes are in the namespace now."""
         for name in names:
@@ -105,7 +113,10 @@ class Heard:
             elif name in OFTEN and name in self.when and now - self.when[name] > LOST:
                 found.append(NodeState(name, 3, f"does not answer: silent for {now - self.when[name]:.0f} s", True))
             else:
-                found.append(NodeState(name, status.level if status else 0, status.message if status else "there", False))
+                level = status.level if status else 0
+                if level == 3 and self.lifecycle != "active":
+                    level = 0  # nobody drives: silence of the streams is as it should be
+                found.append(NodeState(name, level, status.message if status else "there", False))
         return found
 
     def values(self, name: str) -> dict[str, str]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 from nicegui import ui
 
 from xy_sysid.page.files_dialog import open_dialog
@@ -10,7 +12,8 @@ from xy_sysid.page.session import Session
 from xy_sysid.page.wishes import Source
 
 EVERY = 0.4  # s between two looks for what is new
-SHOWN = 4  # newest messages that stay on the page
+SHOWN = 4  # messages on the page at a time
+GOOD_STAYS, BAD_STAYS = 8.0, 60.0  # s that a message stays
 
 
 def build(session: Session) -> None:
@@ -26,7 +29,7 @@ class Page:
     def __init__(self, session: Session) -> None:
         self._session = session
         self._panels: dict[str, Panel] = {}
-        self._told = -1
+        self._told: list[int] = []
         self._alarms: list[str] = []
         self._bar()
         with ui.element("main").classes("pages").props("id=main"):
@@ -62,7 +65,7 @@ class Page:
             theme = ui.toggle({0: "auto", 1: "light", 2: "dark"}, value=0, on_change=lambda event: dark.set_value((None, False, True)[event.value]))
             theme.props('flat dense no-caps aria-label="light or dark"').classes("hide")
             if session.live is not None:
-                with ui.button().classes("stop").props('id=stop aria-label="STOP: zero volts, now. Key: Escape"') as stop:
+                with ui.button(color=None).classes("stop").props('id=stop aria-label="STOP: zero volts, now. Key: Escape"') as stop:
                     ui.html('STOP<span class="hint">Esc</span>', sanitize=False)
                 stop.on("click", js_handler="() => window.xyStop()")
 
@@ -77,12 +80,13 @@ class Page:
             with self._alarm:
                 for words in alarms:
                     ui.label(f"Alarm: {words}").classes("notice")
-        newest = session.messages[-1].number if session.messages else 0
-        if newest != self._told:
-            self._told = newest
+        fresh = [message for message in session.messages if time.monotonic() - message.at < (GOOD_STAYS if message.good else BAD_STAYS)]
+        numbers = [message.number for message in fresh[-SHOWN:]]
+        if numbers != self._told:
+            self._told = numbers
             self._notices.clear()
             with self._notices:
-                for message in list(session.messages)[-SHOWN:]:
+                for message in fresh[-SHOWN:]:
                     ui.label(f"{message.clock}  {message.words}").classes("notice good" if message.good else "notice warn")
 
 

@@ -28,8 +28,9 @@ from xy_sysid.page.heard import Heard
 LOOK = 0.5  # s between two looks at the graph and the lifecycle
 PATIENCE = 5.0  # s for an answer of a node
 TABLES = ("frf", "transfer_function", "comparison")
-STOP_AGAIN = 0.5  # s after which STOP is sent again while nobody has confirmed it
+STOP_AGAIN = 1.0  # s after which STOP is sent again while nobody has confirmed it
 STOP_GIVES_UP = 6.0  # s
+AT_REST = ("inactive", "unconfigured", "finalized")
 
 Told = Callable[[bool, str], None]  # whether an order was done, and the node's sentence
 
@@ -50,7 +51,7 @@ class Link:
         self._topics: set[str] = set()
         self._waiting: list[tuple[float, Any, str, Told]] = []
         self._node.create_subscription(DiagnosticArray, "metrics", self._on_statuses, 100)
-        self._node.create_subscription(DiagnosticArray, "diagnosis", self._on_statuses, 20)
+        self._node.create_subscription(DiagnosticArray, "diagnosis", self._on_diagnosis, LATCHED_QOS)
         self._node.create_timer(LOOK, self._look)
         self._thread = threading.Thread(target=self._spin, name="page link", daemon=True)
         self._thread.start()
@@ -74,9 +75,9 @@ class Link:
         begun = time.monotonic()
         self._orders.put(lambda: self._stop(begun, told))
 
-    def trigger(self, service: str, told: Told) -> None:
-        """A service without arguments, such as identifier/reset."""
-        self._orders.put(lambda: self._call(Trigger, service, Trigger.Request(), told, lambda a: (a.success, a.message)))
+    def trigger(self, service: str, told: Told, patience: float = PATIENCE) -> None:
+        """A service without arguments, such as identifier/reset; patience: s that it may take."""
+        self._orders.put(lambda: self._call(Trigger, service, Trigger.Request(), told, lambda a: (a.success, a.message), patience))
 
     def set_parameters(self, node: str, values: dict[str, Any], told: Told) -> None:
         """Change parameters of a node; all or the sentence of the first that was refused."""
@@ -108,25 +109,33 @@ class Link:
             for entry in [entry for entry in self._waiting if entry[0] < now]:
                 self._waiting.remove(entry)
                 entry[1].cancel()
-                entry[3](False, f"{entry[2].partition('/')[0]} did not answer within {PATIENCE:g} s")
+                entry[3](False, f"{entry[2].partition('/')[0]} did not answer in time")
 
     def _client(self, kind: Any, service: str) -> Any:
         if service not in self._clients:
             self._clients[service] = self._node.create_client(kind, service)
         return self._clients[service]
 
-    def _call(self, kind: Any, service: str, request: Any, told: Told, read: Callable[[Any], tuple[bool, str]], since: float | None = None) -> None:
+    def _call(
+        self,
+        kind: Any,
+        service: str,
+        request: Any,
+        told: Told,
+        read: Callable[[Any], tuple[bool, str]],
+        patience: float = PATIENCE,
+        since: float = 0.0,
+    ) -> None:
+        """Call a service, once it is there; told the answer, or that there is none."""
         client, since = self._client(kind, service), since or time.monotonic()
         if not client.service_is_ready():
             if time.monotonic() - since > 2.0:
                 told(False, f"{service.partition('/')[0]} is not there")
             else:
-                timer = threading.Timer(0.1, lambda: self._orders.put(lambda: self._call(kind, service, request, told, read, since)))
-                timer.daemon = True
-                timer.start()
+                _later(0.1, lambda: self._orders.put(lambda: self._call(kind, service, request, told, read, patience, since)))
             return
         future = client.call_async(request)
-        entry = (time.monotonic() + PATIENCE, future, service, told)
+        entry = (time.monotonic() + patience, future, service, told)
         self._waiting.append(entry)
 
         def done(answered: Any) -> None:
@@ -137,28 +146,27 @@ class Link:
         future.add_done_callback(done)
 
     def _stop(self, begun: float, told: Told) -> None:
-        """Send it, look at the state, and again."""
+        """Send it, look at the state, and again until it is seen to be inactive."""
         if time.monotonic() - begun > STOP_GIVES_UP:
             told(False, "STOP was not confirmed by the excitation: use the emergency stop of the machine")
             return
-        client = self._client(ChangeState, "excitation/change_state")
-        states = self._client(GetState, "excitation/get_state")
+        change, states = self._client(ChangeState, "excitation/change_state"), self._client(GetState, "excitation/get_state")
+        answered = threading.Event()
 
-        def look(answered: Any) -> None:
-            label = answered.result().current_state.label
-            self.heard.lifecycle = label
-            if label in ("inactive", "unconfigured", "finalized"):
+        def look(future: Any) -> None:
+            self.heard.lifecycle = label = future.result().current_state.label
+            if label in AT_REST and not answered.is_set():
+                answered.set()
                 told(True, f"stopped: the excitation is {label}, the voltage is zero")
-            # otherwise the next round asks again
 
-        if client.service_is_ready() and states.service_is_ready():
-            client.call_async(ChangeState.Request(transition=Transition(label="deactivate")))
-            states.call_async(GetState.Request()).add_done_callback(look)
-        confirmed = self.heard.lifecycle in ("inactive", "unconfigured", "finalized")
-        if not confirmed:
-            timer = threading.Timer(STOP_AGAIN, lambda: self._orders.put(lambda: self._stop(begun, told)))
-            timer.daemon = True
-            timer.start()
+        def again() -> None:
+            if not answered.is_set():
+                self._orders.put(lambda: self._stop(begun, told))
+
+        if change.service_is_ready() and states.service_is_ready():
+            request = ChangeState.Request(transition=Transition(label="deactivate"))
+            change.call_async(request).add_done_callback(lambda _: states.call_async(GetState.Request()).add_done_callback(look))
+        _later(STOP_AGAIN, again)
 
     def _look(self) -> None:
         """Who is there, which axes they publish, and how the excitation is."""
@@ -189,11 +197,22 @@ class Link:
         if problem:
             self._node.get_logger().warning(problem)
 
+    def _on_diagnosis(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            if status.name == "progress":
+                self.heard.doing(status.message, time.monotonic())
+
     def _on_statuses(self, message: DiagnosticArray) -> None:
         for status in message.status:
             level = status.level[0] if isinstance(status.level, bytes) else int(status.level)
             values = tuple((pair.key, pair.value) for pair in status.values)
             self.heard.status(StatusMessage(status.name, level, status.message, values), time.monotonic())
+
+
+def _later(seconds: float, act: Callable[[], None]) -> None:
+    timer = threading.Timer(seconds, act)
+    timer.daemon = True
+    timer.start()
 
 
 def _all_set(answer: Any) -> tuple[bool, str]:

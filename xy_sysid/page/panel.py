@@ -35,7 +35,7 @@ class Panel:
                 with ui.element("div").classes("stack"):
                     self._numbers = Numbers()
                     self._cards = Cards(session, source)
-                with ui.element("div").classes("stack"):
+                with ui.element("div").classes("stack side"):
                     if source.live:
                         self._control = Control(session)
                     self._story = StoryCard(session, source)

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import plotly.graph_objects as go
-from nicegui import run, ui
+from nicegui import events, run, ui
 
 from xy_sysid.page.session import Session
 from xy_sysid.page.wishes import Source
 from xy_sysid.report import story_figures as draw
 
 Document = Mapping[str, Any]
+EMPTY = {"paper_bgcolor": "rgba(0,0,0,0)", "plot_bgcolor": "rgba(0,0,0,0)"}
 CONFIG = {"displaylogo": False, "responsive": True, "modeBarButtonsToRemove": ["select2d", "lasso2d", "autoScale2d"], "scrollZoom": False}
 
 
@@ -28,23 +31,41 @@ class Picture:
     reading: str
 
 
+def aligned(make: Callable[..., go.Figure]) -> Callable[..., go.Figure]:
+    """The figure with the frequencies of the whole response and with fixed margins, so that those under each other line up."""
+
+    def made(document: Document) -> go.Figure:
+        figure = make(document)
+        frequency = [value for value in document["measured"]["frequency_response"]["frequency"] if value]
+        figure.update_xaxes(range=[math.log10(frequency[0]) - 0.03, math.log10(frequency[-1]) + 0.03], autorange=None)
+        figure.update_yaxes(automargin=False)
+        figure.update_layout(margin={"l": 64, "r": 12})
+        return figure
+
+    return made
+
+
 FREQUENCY, WHERE, TIME, ROOTS = "Measured and modelled over frequency", "Where the model fails", "In time", "Poles and zeros"
 PICTURES = (
     Picture(
-        "bode", FREQUENCY, "", draw.bode, "Where the dashed model leaves the band of the measurement, something is missing. Grey crosses are noise."
+        "bode",
+        FREQUENCY,
+        "",
+        aligned(draw.bode),
+        "Where the dashed model leaves the band of the measurement, something is missing. Grey crosses are noise.",
     ),
     Picture(
         "coherence",
         FREQUENCY,
         "",
-        draw.coherence,
+        aligned(draw.coherence),
         "Near 1: the voltage explains the motion. Low: too little excitation, noise, or something not linear.",
     ),
     Picture(
         "residual",
         FREQUENCY,
         "",
-        draw.residual,
+        aligned(draw.residual),
         "Error on data that no fit saw, in multiples of the noise floor. At 1 nothing is left; shaded bands fail.",
     ),
     Picture("residual_speed", WHERE, "speed", draw.residual_speed, "High at low speed: friction. Rising with speed: drag or saturation."),
@@ -101,7 +122,9 @@ class Cards:
         tabs = [picture for picture in pictures if picture.tab]
         if not tabs:
             for picture in pictures:
-                self._plots[picture.name] = Plot(picture.reading)
+                self._plots[picture.name] = Plot(picture.reading, picture.name)
+            if len(pictures) > 1:
+                Linked([self._plots[picture.name] for picture in pictures])
             return
         with ui.tabs().props("dense no-caps align=left inline-label") as bar:
             for picture in tabs:
@@ -109,17 +132,22 @@ class Cards:
         with ui.tab_panels(bar, value=tabs[0].name, animated=False, keep_alive=True).props("animated=false").style("background: transparent"):
             for picture in tabs:
                 with ui.tab_panel(picture.name).style("padding: 0"):
-                    self._plots[picture.name] = Plot(picture.reading)
+                    self._plots[picture.name] = Plot(picture.reading, picture.name)
 
 
 class Plot:
-    """One figure in one browser."""
+    """One figure in one browser, with how to read it and buttons to keep it."""
 
-    def __init__(self, reading: str) -> None:
+    def __init__(self, reading: str, name: str = "figure") -> None:
         self._shown: object = None
         self._said = ""
-        self._plot = ui.plotly({"data": [], "layout": {"height": 200}, "config": CONFIG}).classes("plot").props("role=img tabindex=0")
-        ui.label(reading).classes("soft small")
+        with ui.element("div").classes("plot") as self.root:
+            self.plot = ui.plotly({"data": [], "layout": {"height": 200, **EMPTY}, "config": CONFIG}).classes("plot").props("role=img tabindex=0")
+            with ui.element("div").classes("under"):
+                ui.label(reading).classes("soft small grow")
+                for kind in ("svg", "png"):
+                    keep = ui.button(kind.upper(), on_click=partial(self._keep, kind, name)).props("flat dense no-caps size=sm")
+                    keep.props(f'aria-label="save {name} as {kind.upper()}"')
 
     async def show(self, session: Session, key: tuple[object, ...], make: Callable[..., go.Figure], *arguments: Any) -> None:
         """Draw it unless it is drawn already; made beside the page's loop, so that nothing waits for it."""
@@ -128,18 +156,43 @@ class Plot:
         self._shown = key
         drawn = await run.io_bound(session.figure, key, lambda: plain(make(*arguments)))
         if drawn is not None:
-            self._plot.update_figure(drawn)
+            self.plot.update_figure(drawn)
 
     def say(self, words: str) -> None:
         """The picture's content in words."""
         if words != self._said:
             self._said = words
-            self._plot.props["aria-label"] = words
+            self.plot.props["aria-label"] = words
+
+    def _keep(self, kind: str, name: str) -> None:
+        self.plot.run_plot_method("downloadImage", {"format": kind, "filename": f"xy_sysid_{name}", "scale": 1 if kind == "svg" else 2})
+
+
+class Linked:
+    """Plots over the same frequencies: who zooms one zooms all."""
+
+    def __init__(self, plots: list[Plot]) -> None:
+        self._plots, self._range = plots, ""
+        for plot in plots:
+            plot.plot.on("plotly_relayout", partial(self._moved, plot))
+
+    def _moved(self, source: Plot, event: events.GenericEventArguments) -> None:
+        """Give the others the range of the one that was moved; they answer with the same range, which changes nothing more."""
+        ends = [event.args.get(f"{axis}.range[{end}]") for axis in ("xaxis2", "xaxis") for end in (0, 1)]
+        found = next((pair for pair in (ends[:2], ends[2:]) if all(isinstance(value, (int, float)) for value in pair)), None)
+        whole = bool(event.args.get("xaxis.autorange") or event.args.get("xaxis2.autorange"))
+        if (found is None and not whole) or str(found) == self._range:
+            return
+        self._range = str(found)
+        for plot in self._plots:
+            if plot is not source:
+                change = {"xaxis.autorange": True} if found is None else {"xaxis.range": found}
+                plot.plot.run_plot_method("relayout", change)
 
 
 def plain(figure: go.Figure) -> dict[str, Any]:
     """As the browser takes it; what the user has zoomed into stays."""
-    figure.update_layout(uirevision="keep")
+    figure.update_layout(uirevision="keep", **EMPTY)
     made: dict[str, Any] = figure.to_plotly_json()
     return {**made, "config": CONFIG}
 
@@ -165,7 +218,7 @@ class LiveCards:
             )
         with ui.element("section").classes("card").props('aria-label="resonance over time"') as self._track_card:
             ui.html("<h2>Resonance over time</h2>", sanitize=False)
-            self._track = Plot("Fitted from the newest windows alone. Two fits in a row away from the reference raise the alarm.")
+            self._track = Plot("Fitted from the newest windows alone. Two fits in a row away from the reference raise the alarm.", "resonance")
 
     async def refresh(self, axis: str) -> None:
         """Draw again what has changed."""

@@ -61,6 +61,14 @@ class OpenRecording:
         """What is being done for the axis."""
         return self._jobs.get(axis)
 
+    def ready(self, axis: str) -> bool:
+        """Whether something can be asked for: the rigid base is fitted and the worker lives."""
+        return axis in self._documents and not self._problem
+
+    def words(self, axis: str) -> str:
+        """While there is no story."""
+        return "" if self._problem else "The rigid base is being fitted ..."
+
     def problem(self) -> str:
         """Why it is closed."""
         return self._problem

@@ -30,10 +30,11 @@ DRAWN = 200  # figures kept, so that a second page does not draw them again
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """One line for people, with the time of day."""
+    """One line for people, with the time of day; at: s on the clock of this process."""
 
     number: int
     clock: str
+    at: float
     words: str
     good: bool
 
@@ -66,7 +67,7 @@ class Session:
     def say(self, words: str, good: bool = False) -> None:
         """A line on every page."""
         self._count += 1
-        self.messages.append(Message(self._count, time.strftime("%H:%M:%S"), words, good))
+        self.messages.append(Message(self._count, time.strftime("%H:%M:%S"), time.monotonic(), words, good))
 
     def open(self, path: Path, title: str = "") -> OpenRecording:
         """Open a recording beside the others."""

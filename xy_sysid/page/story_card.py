@@ -45,11 +45,15 @@ class StoryCard:
                 ui.spinner(size="1.2em")
                 self._doing = ui.label("").classes("grow")
                 ui.button("Cancel", on_click=lambda: source.cancel(self._axis)).props("outline dense data-act=cancel")
-            self._ladder = Plot("Each step adds one effect. Held-out error is what counts; dotted is the noise floor that no model can pass.")
+            self._ladder = Plot(
+                "Each step adds one effect. Held-out error is what counts; dotted is the noise floor that no model can pass.", "ladder"
+            )
             self._model = ui.element("div").classes("stack").style("gap:.3rem")
             with ui.element("div").classes("stack").style("gap:.4rem") as self._evidence:
                 ui.html("<h3>What could be missing</h3>", sanitize=False)
-                self._candidates = Plot("What each effect would leave of the error. Shortest is best; hover for its evidence and parameters.")
+                self._candidates = Plot(
+                    "What each effect would leave of the error. Shortest is best; hover for its evidence and parameters.", "candidates"
+                )
                 self._ranked = ui.element("div").classes("ranked")
             with ui.element("div").classes("buttons"):
                 self._choice = (
@@ -65,7 +69,9 @@ class StoryCard:
                 with ui.element("div").classes("buttons"):
                     self._first = ui.select({}, label="before", on_change=lambda: self._compare()).props("outlined dense").style("flex:1")
                     self._last = ui.select({}, label="after", on_change=lambda: self._compare()).props("outlined dense").style("flex:1")
-                self._before_after = Plot("Two models over each other: error over the floor, and the error in time where the rigid base was worst.")
+                self._before_after = Plot(
+                    "Two models over each other: error over the floor, and the error in time where the rigid base was worst.", "before_after"
+                )
             self._pair: tuple[int, int] = (0, 0)
             with ui.expansion("Download").classes("w-full").props("dense"):
                 offer(session, source, lambda: self._axis)
@@ -77,15 +83,16 @@ class StoryCard:
         self._busy.set_visibility(job is not None)
         if job is not None:
             waits = "" if job.running or self._source.live else "waiting: "
-            self._doing.set_text(f"{waits}{job.wish.words} ({seconds_text(time.monotonic() - job.begun)})")
+            self._doing.set_text(f"{waits}{job.words} ({seconds_text(time.monotonic() - job.begun)})")
         document = self._source.document(axis)
-        able = job is None and document is not None and not self._source.problem()
+        able = job is None and self._source.ready(axis)
         for button in self._buttons:
             button.set_enabled(able)
-        stamp = (axis, self._source.stamp(axis))
+        stamp = (axis, self._source.stamp(axis), document is None and self._source.words(axis))
         if stamp != self._shown:
             self._shown = stamp
             self._write(document)
+        self._ladder.root.set_visibility(bool(document and document["ladder"]))
         if document is None:
             return
         key = (self._source.key, axis, self._source.stamp(axis))
@@ -110,7 +117,7 @@ class StoryCard:
             self._session.say(str(problem))
 
     def _write(self, document: dict[str, Any] | None) -> None:
-        self._verdict.set_text(verdict_words(document))
+        self._verdict.set_text(verdict_words(document) if document else self._source.words(self._axis))
         note = str((document or {}).get("note") or "")
         self._note.set_text(note)
         self._note.set_visibility(bool(note))

@@ -25,10 +25,8 @@ class Row:
     evidence: str
 
 
-def verdict_words(document: Document | None) -> str:
+def verdict_words(document: Document) -> str:
     """The verdict, how sure it is, and where the newest model stands."""
-    if document is None:
-        return "The rigid base is being fitted ..."
     sentence = str(document.get("sentence") or "")
     if document.get("verdict"):
         sure = document.get("confidence")

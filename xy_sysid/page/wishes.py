@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
-from xy_sysid.report.words import number
-
 Act = Literal["begin", "diagnose", "add", "remove", "next", "auto", "reset", "report", "model"]
 
 DOING = {
@@ -57,6 +55,12 @@ class Job:
     begun: float
     part: float | None = None
     running: bool = False
+    said: str = ""
+
+    @property
+    def words(self) -> str:
+        """What is being done."""
+        return self.said or self.wish.words
 
 
 class Source(Protocol):
@@ -82,6 +86,14 @@ class Source(Protocol):
         """What is being done for the axis."""
         ...
 
+    def ready(self, axis: str) -> bool:
+        """Whether something can be asked for."""
+        ...
+
+    def words(self, axis: str) -> str:
+        """What there is to say while there is no story."""
+        ...
+
     def problem(self) -> str:
         """Why there is nothing (more) to come; empty while all is well."""
         ...
@@ -93,15 +105,3 @@ class Source(Protocol):
     def cancel(self, axis: str) -> None:
         """Leave what is being done for the axis."""
         ...
-
-
-def error_words(document: dict[str, Any] | None) -> str:
-    """How far the newest step is from the floor: 3.2 times the noise floor."""
-    ladder = (document or {}).get("ladder") or []
-    if not ladder:
-        return ""
-    last = ladder[-1]
-    held, floor = last.get("held_out_error"), last.get("noise_floor")
-    if not (isinstance(held, (int, float)) and isinstance(floor, (int, float)) and floor > 0):
-        return ""
-    return f"{number(held / floor, 3)} times the noise floor"
