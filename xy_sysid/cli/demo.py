@@ -19,14 +19,16 @@ DELAY_WITHIN, RESONANCE_WITHIN, ERROR_WITHIN = 20e-6, 0.2, 0.015  # s, Hz, 1: wh
 
 
 def demo(
-    machine: Annotated[str, typer.Option(help="machine file or a name in config/machines")] = "paper.yaml",
-    seconds: Annotated[float, typer.Option(help="seconds of data", min=5.0, max=86_400.0)] = 60.0,
+    machine: Annotated[str, typer.Option(help="machine file or a name in config/machines; default paper.yaml, with the page surprise.yaml")] = "",
+    seconds: Annotated[float | None, typer.Option(help="seconds of data; default 60, with the page until Ctrl-C", min=5.0, max=86_400.0)] = None,
     speed: Annotated[float, typer.Option(help="times faster than real time; 0 is as fast as it goes", min=0.0, max=1000.0)] = 4.0,
     seed: Annotated[int, typer.Option(help="of the excitation", min=1, max=2**31 - 100)] = 1,
+    page: Annotated[bool | None, typer.Option("--page/--no-page", help="with the page in a browser; default is yes in a terminal")] = None,
     json: o.Json = False,
 ) -> None:
     """Watch two axes being identified live: all nodes run on this machine, and nothing else is needed."""
     from xy_sim.machine import Machine
+    from xy_sysid.cli.demo_page import watch_page, wished
     from xy_sysid.cli.output import aside, emit, people
     from xy_sysid.errors import MissingExtra
 
@@ -35,7 +37,12 @@ def demo(
     except ModuleNotFoundError:
         raise MissingExtra("ROS 2 (rclpy)", "ros") from None
     o.ros_domain()
+    with_page = wished(page, json)
+    machine = machine or ("surprise.yaml" if with_page else "paper.yaml")
     table = Machine.from_file(machine)
+    if with_page:
+        raise typer.Exit(watch_page(_specs(table, machine, seconds or 0.0, speed, seed), table.axes))
+    seconds = seconds or 60.0
     aside.print("starting the nodes: a simulated table, an excitation and an identifier, over ROS 2 ...")
     code, monitor, lines, wall = _watch(_specs(table, machine, seconds, speed, seed), table.axes, seconds, plain=json)
     answer = {axis: result(monitor, axis, table.truth(axis)) for axis in table.axes}
@@ -83,21 +90,12 @@ def _watch(specs: list[Any], axes: tuple[str, ...], seconds: float, plain: bool)
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     from rich.live import Live
 
-    from xy_sysid.cli.monitor import Monitor
+    from xy_sysid.cli.monitor import Monitor, refuse_others
     from xy_sysid.cli.output import aside
-    from xy_sysid.errors import BadInput
     from xy_sysid.starter import run
 
     monitor = Monitor(axes)
-    others = monitor.others()
-    if others:
-        monitor.close()
-        raise BadInput(
-            "ROS domain",
-            f"{os.environ.get('ROS_DOMAIN_ID', '0')}, where {', '.join(others)} use the machine's topics",
-            "a domain without a machine, so that the demo drives nothing real",
-            "Choose another with ROS_DOMAIN_ID=<1..100>.",
-        )
+    refuse_others(monitor)
     lines: list[str] = []
     begun = time.monotonic()
     live = None if plain or not aside.is_terminal else Live(console=aside, refresh_per_second=5, transient=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from typing import Any
 
@@ -14,6 +15,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Float64MultiArray
 
+from xy_sysid.errors import BadInput
 from xy_sysid.messages import ArrayMessage
 from xy_sysid.nodes.common import LATCHED_QOS, NAMESPACE
 from xy_sysid.nodes.convert import array_from_ros
@@ -99,3 +101,16 @@ class Monitor:
         """Leave."""
         self._node.destroy_node()
         self._context.try_shutdown()
+
+
+def refuse_others(monitor: Monitor) -> None:
+    """Raises BadInput when a machine is there already, which might be a real one; the monitor is closed then."""
+    others = monitor.others()
+    if others:
+        monitor.close()
+        raise BadInput(
+            "ROS domain",
+            f"{os.environ.get('ROS_DOMAIN_ID', '0')}, where {', '.join(others)} use the machine's topics",
+            "a domain without a machine, so that the demo drives nothing real",
+            "Choose another with ROS_DOMAIN_ID=<1..100>.",
+        )

@@ -25,6 +25,7 @@ from xy_sysid.nodes.common import LATCHED_QOS, NAMESPACE
 from xy_sysid.nodes.convert import array_from_ros
 from xy_sysid.page.heard import Heard
 
+WATCHERS = ("page", "demo")  # nodes that only look on
 LOOK = 0.5  # s between two looks at the graph and the lifecycle
 PATIENCE = 5.0  # s for an answer of a node
 TABLES = ("frf", "transfer_function", "comparison")
@@ -171,7 +172,9 @@ class Link:
     def _look(self) -> None:
         """Who is there, which axes they publish, and how the excitation is."""
         space = self._node.get_namespace()
-        names = {name for name, where in self._node.get_node_names_and_namespaces() if where == space and name != "page"}
+        names = {
+            name for name, where in self._node.get_node_names_and_namespaces() if where == space and name not in WATCHERS and not name.startswith("_")
+        }
         self.heard.graph(names, time.monotonic())
         for topic, _ in self._node.get_topic_names_and_types():
             kind, _, axis = topic.removeprefix(f"{space}/").partition("/")

@@ -1,0 +1,64 @@
+"""The demo with its page: the same nodes, the page as one more process, and an address to open."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import sys
+import webbrowser
+from typing import Any
+
+from xy_sysid.errors import MissingExtra
+
+PORT = 8080  # or one of the next that is free
+LAST = 20  # lines of the nodes that are shown when one of them fails
+
+
+def wished(page: bool | None, json: bool) -> bool:
+    """Whether the demo shows a page: as told, else where somebody sits at a terminal and NiceGUI is installed."""
+    from xy_sysid.cli.output import aside, people
+
+    there = importlib.util.find_spec("nicegui") is not None
+    if page is None:
+        return there and not json and people.is_terminal and aside.is_terminal
+    if page and not there:
+        raise MissingExtra("NiceGUI, which the page needs,", "page")
+    return page
+
+
+def watch_page(specs: list[Any], axes: tuple[str, ...]) -> int:
+    """Run the nodes and the page until Ctrl-C or until the page ends; the exit code."""
+    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+    from xy_sysid.cli.monitor import Monitor, refuse_others
+    from xy_sysid.cli.output import aside, people
+    from xy_sysid.cli.page import display
+    from xy_sysid.run_plan import ProcessSpec
+    from xy_sysid.starter import run
+
+    aside.print("starting the nodes and the page: a simulated table with something hidden in each axis, over ROS 2 ...")
+    monitor = Monitor(axes)
+    refuse_others(monitor)
+    command = (sys.executable, "-m", "xy_sysid", "page", "--no-browse", "--port", str(PORT))
+    page = ProcessSpec("page", command, (("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST"),), stop_rank=max(spec.stop_rank for spec in specs))
+    lines: list[str] = []
+
+    def heard(name: str, line: str) -> None:
+        if name == "page" and line.startswith("http"):
+            people.print(f"the page is at {line}")
+            people.print("Watch the curves converge, press Diagnose, then Find the next. Ctrl-C ends everything.")
+            if display():
+                webbrowser.open(line)
+
+    def enough() -> bool:
+        monitor.spin(0.05)
+        monitor.start_when_ready()
+        return False
+
+    try:
+        code = run([*specs, page], say=lines.append, heard=heard, enough=enough)
+    finally:
+        monitor.close()
+    if code not in (0, 130, 143):
+        for line in lines[-LAST:]:
+            aside.print(line, markup=False)
+    return code
