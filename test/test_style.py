@@ -28,12 +28,12 @@ fitting orders validation model_check tracking
 noise_floor effects effect_code axis_kernel axis_model spectral_cost base_start velocity_fit traces inverse_start
 own_units greybox comparison refinement diagnosis
 pairing joints identifier messages live_fit replay offline
-linear_part findings story_pictures story story_document
+linear_part paired distortion findings story_pictures story story_document
 hearing live_story diagnoser
 """)
 EDGE = names("""
 shipped parameter_file settings_doc effects_doc user_effects run_plan starter
-bags imports exports state_file work_queue story_worker
+bags imports exports saved_models state_file work_queue story_worker
 nodes
 report page
 cli __main__

@@ -79,7 +79,7 @@ def read_model(path: Path) -> dict[str, TransferFunction]:
 
 def read_saved(path: Path) -> dict[str, SavedModel]:
     """The models of a file with what is known of them, by axis; raises BadRecording or BadInput in one line if it is not one."""
-    document = _document(path)
+    document = model_file(path)
     origin = document.get("provenance")
     told = origin.get("data_sha256") if isinstance(origin, dict) else None
     digests = told if isinstance(told, dict) else {}
@@ -93,15 +93,17 @@ def read_saved(path: Path) -> dict[str, SavedModel]:
     return found
 
 
-def _document(path: Path) -> dict[str, Any]:
+def model_file(path: Path, formats: tuple[str, ...] = (FORMAT,)) -> dict[str, Any]:
+    """The document of a model file of one of these formats; raises BadRecording in one line if it is not one."""
     try:
         document = yaml.safe_load(path.read_text(encoding="utf-8"))
     except OSError as problem:
         raise BadRecording(path, problem.strerror or "cannot be read", "Check the path.") from None
     except (yaml.YAMLError, ValueError):
         raise BadRecording(path, "is not a YAML file", "Give a model written by xy-sysid fit --model.") from None
-    if not isinstance(document, dict) or document.get("format") != FORMAT or not isinstance(document.get("axes"), dict) or not document["axes"]:
-        raise BadRecording(path, f"is not a model file ('{FORMAT}')", "Give a model written by xy-sysid fit --model.")
+    if not isinstance(document, dict) or document.get("format") not in formats or not isinstance(document.get("axes"), dict) or not document["axes"]:
+        known = " or ".join(f"'{name}'" for name in formats)
+        raise BadRecording(path, f"is not a model file ({known})", "Give a model written by xy-sysid fit --model.")
     return document
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from xy_sysid.errors import BadInput
 from xy_sysid.estimate import divisor
 from xy_sysid.frf import ComplexArray, FrequencyResponse
-from xy_sysid.simulation import SimulationError, simulation_error
+from xy_sysid.simulation import SimulationError, simulation_error, velocity_error
 from xy_sysid.stream import FloatArray
 from xy_sysid.transfer_function import TransferFunction, held_response
 
@@ -65,6 +65,28 @@ def check(tf: TransferFunction, frf: FrequencyResponse, u: FloatArray, y: FloatA
         predicted = through_window(tf, lines, hold)
     if not bool(np.all(np.isfinite(predicted))):
         raise BadInput("response of the model", "not finite", "finite in the band of the recording", "Check the coefficients of the model.")
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):  # an unstable model runs away, and the figure says so
+            simulated = simulation_error(tf, frf.sampling_rate, u, y)
+    except BadInput:
+        simulated = None
+    return _judged(lines, predicted, simulated)
+
+
+def check_motion(velocity: FloatArray, simulated: FrequencyResponse, frf: FrequencyResponse, y: FloatArray) -> ModelCheck:
+    """Any model by its motion: simulated velocity (n - 1,) of the run with output y (n,), and the response of that motion.
+
+    simulated: estimated as ``frf`` was, line by line the same. Raises BadInput without trusted lines.
+    """
+    lines = frf.select(frf.trusted)
+    if len(lines) == 0:
+        raise BadInput("number of trusted lines", 0, "1 or more", "Record longer, excite more, or widen the band.")
+    predicted = np.interp(lines.frequency, simulated.frequency, simulated.response.real)
+    predicted = predicted + 1j * np.interp(lines.frequency, simulated.frequency, simulated.response.imag)
+    return _judged(lines, np.asarray(predicted), velocity_error(velocity, frf.sampling_rate, y, f"{frf.output_unit}/s"))
+
+
+def _judged(lines: FrequencyResponse, predicted: ComplexArray, simulated: SimulationError | None) -> ModelCheck:
     error = np.abs(lines.response - predicted)
     size = np.abs(lines.response)
     relative = float(np.sqrt(np.mean((error / size) ** 2)))
@@ -72,11 +94,6 @@ def check(tf: TransferFunction, frf: FrequencyResponse, u: FloatArray, y: FloatA
     sigmas = error / lines.sigma
     worst = int(np.argmax(sigmas))
     rms = float(np.sqrt(np.mean(sigmas**2)))
-    try:
-        with np.errstate(over="ignore", invalid="ignore"):  # an unstable model runs away, and the figure says so
-            simulated = simulation_error(tf, frf.sampling_rate, u, y)
-    except BadInput:
-        simulated = None
     if rms <= AT_THE_FLOOR:
         sentence = f"the model holds: its residual is {rms:.2f} sigma, at the noise floor."
     else:

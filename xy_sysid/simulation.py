@@ -171,7 +171,18 @@ def simulation_error(tf: TransferFunction, sampling_rate: float, held_input: Flo
     if tf.integrators:
         compared, unit = "velocity", f"{tf.output_unit}/s"
         predicted, target = np.diff(predicted) * sampling_rate, np.diff(measured) * sampling_rate
-    predicted, target = predicted[first:], target[first:]
+    return _error(predicted[first:], target[first:], sampling_rate, unit, compared)
+
+
+def velocity_error(velocity: FloatArray, sampling_rate: float, measured: FloatArray, unit: str, skip: float = 0.5) -> SimulationError:
+    """A simulated velocity (n - 1,) of any model against the output (n,); as ``simulation_error``."""
+    first = int(skip * sampling_rate)
+    if measured.size < first + 16 or velocity.size != measured.size - 1:
+        raise BadInput("number of samples", measured.size, f"{first + 16} or more", "Give a longer recording.")
+    return _error(velocity[first:], np.diff(measured)[first:] * sampling_rate, sampling_rate, unit, "velocity")
+
+
+def _error(predicted: FloatArray, target: FloatArray, sampling_rate: float, unit: str, compared: str) -> SimulationError:
     difference = target - predicted
     difference = difference - np.mean(difference)
     spread = float(np.linalg.norm(target - np.mean(target)))

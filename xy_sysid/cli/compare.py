@@ -8,51 +8,79 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from xy_sysid.cli import options as o
-from xy_sysid.cli.output import emit, people, quantity, table
-from xy_sysid.cli.reading import chosen, read
+from xy_sysid.cli.diagnose import Own
+from xy_sysid.cli.output import aside, emit, people, quantity, table
+from xy_sysid.cli.provenance import fingerprint
+from xy_sysid.cli.reading import chosen, each, read
 
 if TYPE_CHECKING:
     from xy_sysid.comparison import Comparison
+    from xy_sysid.distortion import Distortion
+    from xy_sysid.paired import Paired
+    from xy_sysid.recording import Recording
+    from xy_sysid.saved_models import Saved
 
-HELD_OUT = 1.0 / 3.0  # of the recording, when the model has to be fitted first
+HELD_OUT = 1.0 / 3.0  # of the recording, when a model was fitted to it
+
+
+Other = Annotated[
+    Path | None, typer.Option(metavar="MODEL", help="compare two models in pairs on the same unseen data: the one before, and the one after")
+]
 
 
 def compare(
     rec: o.Rec,
     model: Annotated[
-        Path | None, typer.Argument(metavar="[MODEL]", help="model file; without one, a linear model is fitted to the first two thirds")
+        Path | None,
+        typer.Argument(
+            metavar="[MODEL]", help="file of fit --model or refine --model; without one, a linear model is fitted to the first two thirds"
+        ),
     ] = None,
+    before: Other = None,
+    after: Other = None,
     axis: o.Axes = None,
     set_: o.Set = None,
     params: o.Params = None,
     topic: o.Topics = None,
     effort: o.Effort = False,
     span: o.Span = "",
+    effect_file: Own = None,
     json: o.Json = False,
 ) -> None:
-    """Where the model fails, on data it has not seen: by frequency, speed, direction, position, amplitude and time."""
-    from xy_sysid.comparison import compare as logic
+    """Where a model fails on data it has not seen: by frequency, speed, direction, position, amplitude and time; or which of two is better."""
     from xy_sysid.errors import BadInput
-    from xy_sysid.exports import read_model
-    from xy_sysid.fitting import identify
-    from xy_sysid.live_fit import structure_from
-    from xy_sysid.offline import estimate, split
+    from xy_sysid.saved_models import read_models
+    from xy_sysid.user_effects import library
 
+    if (before is None) != (after is None) or (model is not None and before is not None):
+        raise BadInput("compare", "a mixture of models", "one MODEL, none, or --before MODEL --after MODEL", "Give one of these.")
     settings = o.settings_from(params, set_)
-    models = read_model(model) if model is not None else {}
+    known = library(effect_file or [])
+    files = [path for path in (model, before, after) if path is not None]
+    models = [read_models(path, known) for path in files]
     recording = read(rec, axis, topic, effort, span, json)
-    training, unseen = split(recording, 0.0 if model is not None else HELD_OUT)
-    data = training if model is not None else unseen
+    names = chosen(recording, axis)
+    for path, held in zip(files, models, strict=True):
+        for name in names:
+            if name not in held:
+                raise BadInput(f"model of axis {name}", f"not in {path}", ", ".join(held), "Choose axes with --axis.")
+    if before is not None:
+        pairs, refused = each(names, lambda name: _pair(recording, name, models[0][name], models[1][name]))
+        if json:
+            emit({"before": str(before), "after": str(after), "axes": {name: _paired(item) for name, item in pairs.items()}, "refused": refused})
+            return
+        for name, pair in pairs.items():
+            people.print(f"axis {name}: {pair.sentence}", markup=False)
+        for name, text in refused.items():
+            people.print(f"axis {name}: {text}", markup=False)
+        return
     found: dict[str, Comparison] = {}
-    for name in chosen(recording, axis):
-        if model is not None and name not in models:
-            raise BadInput(f"model of axis {name}", f"not in {model}", ", ".join(models), "Choose axes with --axis.")
-        tf = models[name] if model is not None else identify(estimate(training, name, settings).frf, structure_from(settings)).tf
-        run = max(data.runs(), key=lambda part: part.stop - part.start)
-        u, y = data.axis(name)
-        found[name] = logic(tf, u[run], y[run], data.sampling_rate)
+    splits: dict[str, Distortion | None] = {}
+    for name in names:
+        found[name] = _compared(recording, name, models[0][name] if models else None, settings, quiet=json)
+        splits[name] = _split(recording, name)
     if json:
-        emit({"model": None if model is None else str(model), "axes": {name: _answer(item) for name, item in found.items()}})
+        emit({"model": None if model is None else str(model), "axes": {name: _answer(item, splits[name]) for name, item in found.items()}})
         return
     for name, item in found.items():
         people.print(f"axis {name}: {item.sentence}", markup=False)
@@ -62,12 +90,68 @@ def compare(
             ("up to", f"{item.band_end:.4g} Hz"),
         ]
         people.print("  " + ", ".join(f"{label} {text}" for label, text in figures))
+        split = splits[name]
+        if split is not None:
+            people.print(f"  {split.sentence}")
         if item.places:
             rows = [(place.kind, f"{place.error_over_floor:.3g}", place.sentence) for place in item.places]
             table("", ("where", "over floor", "in words"), rows)
 
 
-def _answer(item: Comparison) -> dict[str, Any]:
+def _compared(recording: Recording, name: str, saved: Saved | None, settings: Any, quiet: bool) -> Comparison:
+    """On the whole recording for a model of another one; else on its last third, with a model fitted to the rest if there is none."""
+    from xy_sysid.comparison import compare_velocity
+    from xy_sysid.fitting import identify
+    from xy_sysid.live_fit import structure_from
+    from xy_sysid.offline import estimate, split
+    from xy_sysid.saved_models import Saved
+
+    seen = saved is not None and saved.data == fingerprint(recording, name)
+    training, unseen = split(recording, HELD_OUT if saved is None else 0.0)
+    if saved is None:
+        saved = Saved(identify(estimate(training, name, settings).frf, structure_from(settings)).tf, None, "zoh", "")
+        data = unseen
+    else:
+        data = recording
+    if seen and not quiet:
+        aside.print(f"axis {name}: the model was fitted to this very recording; only its last third is looked at")
+    u, y = _longest(data, name)
+    velocity = saved.velocity(data.sampling_rate, u, y)
+    first = _held(len(y)) if seen else 0
+    return compare_velocity(velocity[first:], u[first:], y[first:], data.sampling_rate, f"{data.output_unit}/s", data.output_unit)
+
+
+def _pair(recording: Recording, name: str, before: Saved, after: Saved) -> Paired:
+    from xy_sysid.paired import paired
+
+    u, y = _longest(recording, name)
+    first = _held(len(y)) if fingerprint(recording, name) in (before.data, after.data) else 0
+    old, new = (saved.velocity(recording.sampling_rate, u, y)[first:] for saved in (before, after))
+    return paired(old, new, y[first:], recording.sampling_rate)
+
+
+def _longest(recording: Recording, name: str) -> Any:
+    run = max(recording.runs(), key=lambda part: part.stop - part.start)
+    u, y = recording.axis(name)
+    return u[run], y[run]
+
+
+def _held(samples: int) -> int:
+    """The first sample that no fit to this recording has used."""
+    return int((1.0 - HELD_OUT) * samples)
+
+
+def _split(recording: Recording, name: str) -> Distortion | None:
+    """Even and odd distortion of a recording with an odd multisine."""
+    from xy_sysid.distortion import distortion
+    from xy_sysid.period import find_period
+
+    u, y = _longest(recording, name)
+    period = find_period(u)
+    return distortion(recording.sampling_rate, u, y, period) if period else None
+
+
+def _answer(item: Comparison, split: Distortion | None) -> dict[str, Any]:
     return {
         "sentence": item.sentence,
         "error": {"unit": item.unit, "now": item.error, "noise_floor": item.noise_floor, "held_out": item.error},
@@ -77,4 +161,19 @@ def _answer(item: Comparison) -> dict[str, Any]:
         ],
         "frequency": item.frequency,
         "error_over_floor": item.error_over_floor,
+        "distortion": None if split is None else {"sentence": split.sentence, "period": split.period, "even": split.even, "odd": split.odd},
+    }
+
+
+def _paired(item: Paired) -> dict[str, Any]:
+    changes = [{"from": one.low, "to": one.high, "ratio": one.ratio, "better": one.better} for one in item.changes]
+    return {
+        "sentence": item.sentence,
+        "better": item.better,
+        "error": {"unit": "m/s", "before": item.before, "after": item.after, "noise_floor": item.noise_floor},
+        "ratio": {"value": item.ratio, "ci95": [item.low, item.high]},
+        "t": item.t,
+        "p": item.p,
+        "windows": item.windows,
+        "changes": changes,
     }

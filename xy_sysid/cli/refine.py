@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from xy_sysid.refinement import Ladder
 
 
+PARTLY = 0.7  # of the excess, or of the held-out error, that may be left if effects are to count as a part of the truth
+
+
 def refine(
     rec: o.Rec,
     add: Annotated[list[str] | None, typer.Option("--add", metavar="NAME", help="add this effect (may be repeated, in this order)")] = None,
@@ -30,12 +33,14 @@ def refine(
         float, typer.Option(help="part of the signal that the model may leave; real machines need 0.01 or more", min=1e-6, max=0.5)
     ] = 1e-3,
     model: Annotated[Path | None, typer.Option("--model", metavar="FILE", help="write the model with its physical parameters as YAML")] = None,
+    mat: Annotated[Path | None, typer.Option("--mat", metavar="FILE", help="write the linear part and all parameters for MATLAB")] = None,
     json: o.Json = False,
 ) -> None:
     """Add physical effects to the rigid model, refit everything together, and print the ladder of falling errors."""
     from xy_sysid.errors import BadInput
     from xy_sysid.greybox import prepare
     from xy_sysid.refinement import refine as logic
+    from xy_sysid.saved_models import write_axis_mat, write_axis_models
     from xy_sysid.user_effects import library
 
     if not add and not auto:
@@ -60,7 +65,9 @@ def refine(
         found, refused = each(names, work)
     origin = provenance(rec, recording)
     if model is not None:
-        _write(model, found, origin)
+        write_axis_models(model, {name: ladder.final for name, ladder in found.items()}, origin)
+    if mat is not None:
+        write_axis_mat(mat, {name: ladder.final for name, ladder in found.items()})
     unit = f"{recording.output_unit}/s"
     if json:
         answers: dict[str, Any] = {name: _answer(ladder, unit) for name, ladder in found.items()}
@@ -87,8 +94,9 @@ def verdict(ladder: Ladder) -> str:
     """The contract's word."""
     if ladder.explained:
         return "explained"
-    first, last = ladder.steps[0].fit.excess, ladder.final.excess
-    return "partly" if ladder.effects and last < 0.7 * first else "not_in_library"
+    first, last = ladder.steps[0].fit, ladder.final
+    gone = last.excess < PARTLY * first.excess or last.held_out_error < PARTLY * first.held_out_error
+    return "partly" if ladder.effects and gone else "not_in_library"
 
 
 def _words(ladder: Ladder) -> str:
@@ -120,30 +128,3 @@ def _answer(ladder: Ladder, unit: str) -> dict[str, Any]:
         "effects": ladder.effects,
         "model": {"parameters": parameters(ladder.final.parameters)},
     }
-
-
-def _write(path: Path, found: dict[str, Ladder], origin: dict[str, Any]) -> None:
-    import yaml
-
-    from xy_sysid.errors import BadRecording
-    from xy_sysid.exports import Quoting
-
-    document = {
-        "format": "xy_sysid axis model 1",
-        "provenance": origin,
-        "axes": {
-            name: {
-                "effects": [own for own, _ in ladder.final.model.effects],
-                "parameters": {
-                    p.name: {"value": float(p.value), "unit": p.unit, "ci95": [float(p.low), float(p.high)]} for p in ladder.final.parameters
-                },
-                "held_out_error": float(ladder.final.held_out_error),
-                "noise_floor": float(ladder.final.noise_floor),
-            }
-            for name, ladder in found.items()
-        },
-    }
-    try:
-        path.write_text(yaml.dump(document, Dumper=Quoting, sort_keys=False, width=120, allow_unicode=True), encoding="utf-8")
-    except OSError as problem:
-        raise BadRecording(path, f"cannot be written ({problem.strerror})", "Choose another place.") from None

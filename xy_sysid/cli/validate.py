@@ -8,17 +8,20 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from xy_sysid.cli import options as o
+from xy_sysid.cli.diagnose import Own
 from xy_sysid.cli.output import aside, emit, people, table
 from xy_sysid.cli.provenance import fingerprint
 from xy_sysid.cli.reading import chosen, each, read
 
 if TYPE_CHECKING:
     from xy_sysid.model_check import ModelCheck
+    from xy_sysid.recording import Recording
+    from xy_sysid.saved_models import Saved
 
 
 def validate(
     rec: o.Rec,
-    model: Annotated[Path, typer.Argument(metavar="MODEL", help="model file written by fit --model")],
+    model: Annotated[Path, typer.Argument(metavar="MODEL", help="model file written by fit --model or refine --model")],
     axis: o.Axes = None,
     set_: o.Set = None,
     params: o.Params = None,
@@ -26,18 +29,20 @@ def validate(
     effort: o.Effort = False,
     period: o.Period = "auto",
     span: o.Span = "",
+    effect_file: Own = None,
     json: o.Json = False,
 ) -> None:
     """Check a model on a recording that it has not seen, in frequency and in time."""
     from xy_sysid.errors import BadInput
-    from xy_sysid.exports import read_saved
-    from xy_sysid.model_check import check
+    from xy_sysid.model_check import check, check_motion
     from xy_sysid.offline import estimate, judged
+    from xy_sysid.saved_models import read_models
+    from xy_sysid.user_effects import library
     from xy_sysid.validation import simulation_sentence
 
     settings = o.settings_from(params, set_)
     samples = o.period_from(period)
-    models = read_saved(model)
+    models = read_models(model, library(effect_file or []))
     recording = read(rec, axis, topic, effort, span, json)
 
     def work(name: str) -> tuple[ModelCheck, tuple[str, ...]]:
@@ -47,7 +52,12 @@ def validate(
         judged(found.frf)
         run = max(recording.runs(), key=lambda part: part.stop - part.start)
         u, y = recording.axis(name)
-        return check(models[name].tf, found.frf, u[run], y[run], models[name].hold), found.notes
+        saved = models[name]
+        if saved.axis is None:
+            return check(saved.tf, found.frf, u[run], y[run], saved.hold), found.notes
+        moved = estimate(simulated(recording, name, saved), name, settings, samples)
+        velocity = saved.velocity(recording.sampling_rate, u[run], y[run])
+        return check_motion(velocity, moved.frf, found.frf, y[run]), found.notes
 
     done, problems = each(chosen(recording, axis), work)
     answers = {name: found for name, (found, _) in done.items()}
@@ -86,3 +96,19 @@ def validate(
             people.print(f"axis {name}: {simulation_sentence(found.simulation)}")
     for name, text in problems.items():
         people.print(f"axis {name}: not checked. {text}")
+
+
+def simulated(recording: Recording, axis: str, saved: Saved) -> Recording:
+    """The recording as the model says that this axis would have moved in it, run by run."""
+    from dataclasses import replace
+
+    import numpy as np
+
+    u, y = recording.axis(axis)
+    position = recording.position.copy()
+    column = recording.axes.index(axis)
+    for run in recording.runs():
+        if run.stop - run.start > 1:
+            moved = np.cumsum(saved.velocity(recording.sampling_rate, u[run], y[run])) / recording.sampling_rate
+            position[run.start + 1 : run.stop, column] = y[run.start] + moved
+    return replace(recording, position=position)
