@@ -9,7 +9,7 @@ from typing import Literal
 from xy_sysid.axis_model import STANDARD, Library
 from xy_sysid.comparison import Comparison, compare_velocity
 from xy_sysid.errors import BadInput
-from xy_sysid.greybox import AxisData, GreyboxFit, prepare
+from xy_sysid.greybox import AxisData, GreyboxFit, excess_of, loosened, prepare
 from xy_sysid.refinement import AT_FLOOR, Candidate, Ladder, refine
 from xy_sysid.stream import FloatArray
 
@@ -18,6 +18,7 @@ Kind = Literal["missing_effect", "nothing_missing", "not_in_library", "not_enoug
 TOLERANCES = (1e-3, 1e-2, 3e-2)  # of the signal that a model may leave: real machines need the later ones
 CERTAINTY = (1.0, 0.6, 0.4)  # most confidence at each tolerance: a looser floor is reached by wrong models too
 TELLING = 1.0  # excess that the base must have at a looser tolerance, for a name that reaches it to mean anything
+HOPELESS = 1.0  # excess that the strict ladder's end may have at a looser tolerance for a ladder of its own to be worth its time
 CLEAR = 0.3  # excess by which a runner-up must be behind for the confidence to reach 63 % of its most
 EXPLAINS = 0.6  # part of the excess that must be gone for a name with a rest left over
 SHORTEST = 4.0  # s
@@ -56,17 +57,21 @@ def diagnose(sampling_rate: float, voltage: FloatArray, position: FloatArray, li
     missing = lacking(sampling_rate, voltage, position)
     if missing:
         return Diagnosis("not_enough_data", (), 1.0, TOLERANCES[0], f"Not enough data: {missing}", None, (), None, missing)
-    first: Diagnosis | None = None
-    for tolerance, certainty in zip(TOLERANCES, CERTAINTY, strict=True):
-        data = prepare(sampling_rate, voltage, position, tolerance)
-        ladder = refine(data, library)
-        found = _judged(data, ladder, library, tolerance, certainty)
-        if first is None:
-            first = found
-        if ladder.explained:
-            telling = found is first or (found.verdict == "missing_effect" and ladder.steps[0].fit.excess >= TELLING)
-            return replace(found if telling else first, candidates=first.candidates, where=first.where)
-    assert first is not None
+    data = prepare(sampling_rate, voltage, position)
+    ladder = refine(data, library)
+    first = _judged(data, ladder, library, TOLERANCES[0], CERTAINTY[0])
+    if ladder.explained:
+        return first
+    for tolerance, certainty in zip(TOLERANCES[1:], CERTAINTY[1:], strict=True):
+        looser = loosened(data, tolerance)
+        if excess_of(looser, ladder.steps[0].fit) < TELLING or excess_of(looser, ladder.final) > HOPELESS:
+            continue
+        again = refine(looser, library)
+        if again.explained:
+            found = _judged(looser, again, library, tolerance, certainty)
+            if found.verdict == "missing_effect":
+                return replace(found, candidates=first.candidates, where=first.where)
+            break
     return first
 
 

@@ -18,10 +18,12 @@ from xy_sysid.inverse_start import inverse_starts
 from xy_sysid.spectral_cost import Bands, Floor, bands, encoder_noise, excess, floor
 from xy_sysid.stream import FloatArray
 from xy_sysid.traces import Trace, bounded, screen
-from xy_sysid.velocity_fit import Scale, Solution, solve
+from xy_sysid.velocity_fit import Round, Scale, Solution, solve
 
 FIRST = 14.0  # s of the first stage
 TRAINING = 2.0 / 3.0  # of the record; the rest is held out
+BRIEF = (Round(6, 1e-2), Round(6, 3e-3), Round(8, 1e-4))  # weights are worked out before each round
+LONG = (Round(4, 1e-3), Round(6, 1e-5))
 EPSILON = 1e-3  # of the signal that a model may leave (the next rungs of the ladder are 1 % and 3 %)
 Z95 = 1.959964
 
@@ -75,6 +77,16 @@ def prepare(sampling_rate: float, voltage: FloatArray, position: FloatArray, eps
     )
 
 
+def loosened(data: AxisData, epsilon: float) -> AxisData:
+    """The same axis with another tolerance."""
+    encoder, velocity = data.floor.encoder, data.velocity
+    return replace(
+        data,
+        floor=floor(data.layout, velocity[: data.training], encoder, epsilon),
+        held_floor=floor(data.layout, velocity[data.training :], encoder, epsilon),
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class Estimate:
     """One parameter with its 95 % interval."""
@@ -117,19 +129,26 @@ class GreyboxFit:
         raise BadInput("parameter", repr(name), ", ".join(item.name for item in self.parameters), "Choose one of these.")
 
 
+def excess_of(data: AxisData, fitted: GreyboxFit) -> float:
+    """What a fit leaves on the held-out data, against the floor of ``data``."""
+    return excess(data.layout, fitted.error[data.training :], data.held_floor)
+
+
 def fit_base(data: AxisData, library: Library = STANDARD) -> GreyboxFit:
     """Gain, delay and pole without a start value."""
     gain, delay, pole = base_start(data.sampling_rate, data.voltage[: data.first], data.velocity[: data.first])
     return fit(data, AxisModel(gain, delay, pole, library=library))
 
 
-def fit_with(data: AxisData, base: GreyboxFit, names: Iterable[str], starts: Mapping[str, tuple[float, ...]] | None = None) -> GreyboxFit:
+def fit_with(
+    data: AxisData, base: GreyboxFit, names: Iterable[str], starts: Mapping[str, tuple[float, ...]] | None = None, brief: bool = False
+) -> GreyboxFit:
     """The model of ``base`` with more effects, all refitted together; starts: their first values, else read from the data."""
     model = base.model
     for name in names:
         values = (starts or {}).get(name)
         model = _begun(data, base, model, name) if values is None else model.with_effect(name, bounded(model.library[name], values))
-    return fit(data, model)
+    return fit(data, model, brief)
 
 
 def _begun(data: AxisData, base: GreyboxFit, model: AxisModel, name: str) -> AxisModel:
@@ -185,16 +204,20 @@ def _scene(data: AxisData, fitted: GreyboxFit) -> Scene:
     )
 
 
-def fit(data: AxisData, start: AxisModel) -> GreyboxFit:
-    """All parameters of a model, from where it is."""
+def fit(data: AxisData, start: AxisModel, brief: bool = False) -> GreyboxFit:
+    """All parameters of a model, from where it is; brief: on the first stage's data only."""
     run, values, scale = _problem(data, start, data.first)
-    short = solve(run, data.velocity[: data.first], data.layout, data.floor, scale, values, rounds=3)
-    found, runs = short, short.runs
-    if data.training > data.first:
-        run, _, scale = _problem(data, start, data.training)
-        found = solve(run, data.velocity[: data.training], data.layout, data.floor, scale, short.values, rounds=2, iterations=5)
-        runs += found.runs
-    return _result(data, start, scale, found, runs)
+    found = solve(run, data.velocity[: data.first], data.layout, data.floor, scale, values, BRIEF)
+    if not brief:
+        return finish(data, _model(start, found.values), found.runs)
+    return _result(data, start, scale, found, found.runs)
+
+
+def finish(data: AxisData, start: AxisModel, runs: int = 0) -> GreyboxFit:
+    """The second stage alone, on all of the training data, from a model that is nearly there."""
+    run, values, scale = _problem(data, start, data.training)
+    found = solve(run, data.velocity[: data.training], data.layout, data.floor, scale, values, LONG)
+    return _result(data, start, scale, found, runs + found.runs)
 
 
 def _result(data: AxisData, start: AxisModel, scale: Scale, found: Solution, runs: int) -> GreyboxFit:

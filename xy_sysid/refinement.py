@@ -7,18 +7,19 @@ do as well as the best is taken. Afterwards what is no longer needed is taken ou
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from xy_sysid.axis_model import STANDARD, Library
 from xy_sysid.effects import Effect
-from xy_sysid.greybox import AxisData, GreyboxFit, fit, fit_base, fit_with, look
+from xy_sysid.greybox import AxisData, GreyboxFit, finish, fit, fit_base, fit_with, look
 
 # Tuned on development seeds 1-40 of the simulated machine's hidden effects.
 AT_FLOOR = 0.15  # excess below which nothing is left to explain; clean axes stay below 0.02
 SIMPLER = 0.08  # excess that a simpler model may be worse by and still be preferred
 TRIED = 5  # effects that are fitted in full at each step, by their share of the error
+NEAR = 0.3  # excess on the first stage within which candidates run the whole distance
 LEAST_SHARE = 5e-4  # of the error that an effect's trace must explain to be tried
 LEAST_GAIN = 0.1  # excess that an addition must win, and
 PART_GAIN = 0.05  # the part of the excess that it must win
@@ -80,13 +81,33 @@ def refine(data: AxisData, library: Library = STANDARD, most: int = MOST_EFFECTS
 
 
 def candidates(data: AxisData, now: GreyboxFit, library: Library = STANDARD) -> tuple[Candidate, ...]:
-    """The effects that may be added to a fit, the best few fitted in full, least excess first."""
+    """The effects that may be added to a fit, the best few fitted, least excess first.
+
+    A race: simpler effects first, each on the first stage's data only. Once one is at the floor, richer ones cannot be
+    preferred to it and are left out; those that come near the best run the whole distance.
+    """
     families = {library[name].family for name, _ in now.model.effects if library[name].family}
     open_to = [e for e in library.acting if e.simulable and e.name not in now.model and not (e.family and e.family in families)]
     traces = [trace for trace in look(data, now, open_to) if trace.share >= LEAST_SHARE]
-    names = _with_relatives([trace.effect for trace in traces[:TRIED]], open_to)
     shares = {trace.effect: trace.share for trace in traces}
-    found = [Candidate(name, shares.get(name, 0.0), _tried(data, now, name)) for name in names]
+    names = _with_relatives([trace.effect for trace in traces[:TRIED]], open_to)
+    found: list[Candidate] = []
+    enough = np.inf
+    for name in sorted(names, key=lambda name: (len(library[name].parameters), -shares.get(name, 0.0))):
+        if len(library[name].parameters) > enough:
+            found.append(Candidate(name, shares.get(name, 0.0), None))
+            continue
+        fitted = _tried(data, now, name)
+        if fitted is not None and fitted.excess < AT_FLOOR:
+            fitted = finish(data, fitted.model, fitted.runs)
+            if fitted.excess < SIMPLER:
+                enough = len(library[name].parameters)
+        found.append(Candidate(name, shares.get(name, 0.0), fitted))
+    least = min((item.fit.excess for item in found if item.fit), default=np.inf)
+    near = [item for item in found if item.fit and AT_FLOOR <= item.fit.excess <= least + NEAR]
+    for item in near:
+        assert item.fit is not None
+        found[found.index(item)] = replace(item, fit=finish(data, item.fit.model, item.fit.runs))
     rest = [Candidate(trace.effect, trace.share, None) for trace in traces[TRIED:] if trace.effect not in names]
     return tuple(sorted(found, key=lambda item: item.fit.excess if item.fit else np.inf)) + tuple(rest)
 
@@ -100,7 +121,7 @@ def _with_relatives(names: list[str], open_to: list[Effect]) -> list[str]:
 
 def _tried(data: AxisData, now: GreyboxFit, name: str) -> GreyboxFit | None:
     try:
-        found = fit_with(data, now, [name])
+        found = fit_with(data, now, [name], brief=True)
     except np.linalg.LinAlgError:
         return None
     return found if np.isfinite(found.excess) else None

@@ -6,7 +6,7 @@ least squares towards the Whittle likelihood. Derivatives are forward difference
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,14 @@ from xy_sysid.spectral_cost import Bands, Floor, tolerance
 from xy_sysid.stream import FloatArray
 
 STEP = 1e-4  # of a logarithm, or of a parameter's scale: far above rounding, far below what bends
-ENOUGH = 1e-5  # relative fall of the cost below which a round ends
+
+
+@dataclass(frozen=True, slots=True)
+class Round:
+    """Steps with one set of weights. iterations: the most; enough: relative fall of the cost below which it ends."""
+
+    iterations: int
+    enough: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,12 +64,11 @@ def solve(
     least: Floor,
     scale: Scale,
     start: FloatArray,
-    rounds: int,
-    iterations: int = 8,
+    rounds: Sequence[Round],
 ) -> Solution:
     """The parameters that explain ``velocity`` (n,) best.
 
-    run: parameters -> velocity (n,); rounds: how often the weights are worked out; iterations: most steps of each round.
+    run: parameters -> velocity (n,); rounds: the weights are worked out before each.
     """
     measured = layout.spectrum(velocity)
     runs = 0
@@ -76,12 +82,12 @@ def solve(
     error = left(inner)
     size = inner.size
     normal, cost, converged = np.eye(size), np.inf, False
-    for _ in range(rounds):
+    for stage in rounds:
         power = tolerance(layout, error, least)
         weight = np.sqrt(1.0 / power)[layout.band]
         cost = _cost(error * weight)
         damping, converged, fresh = 1e-3, False, True
-        for _ in range(iterations):
+        for _ in range(stage.iterations):
             if fresh:
                 columns = np.empty((size, 2 * error.size))
                 for k in range(size):
@@ -103,7 +109,7 @@ def solve(
                 fall = (cost - new) / cost
                 inner, error, cost, fresh = trial, found, new, True
                 damping = max(damping * 0.2, 1e-9)
-                if fall < ENOUGH:
+                if fall < stage.enough:
                     converged = True
                     break
             else:
