@@ -1,0 +1,258 @@
+"""Two masses that touch across a gap, followed sample by sample: an extended Kalman filter on the motor's position.
+
+Contact is chaotic: free simulations of the same gap part within milliseconds, so a model with backlash can only be judged
+by how well it predicts the next sample from what was measured up to now (one-step prediction; Ljung, System
+Identification, 2nd ed., sec. 3.2; the filter: Jazwinski, Stochastic Processes and Filtering Theory, 1970, sec. 8.3).
+
+State: motor position and speed, motor minus table, its rate. Flanks push as k depth (1 + loss speed) + c speed and never
+pull (Hunt & Crossley, J. Appl. Mech. 42, 1975, eq. 8). Integrated by the explicit midpoint rule within each of a sample's
+two pieces of constant voltage.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.optimize
+
+from xy_sysid.compiled import compiled
+from xy_sysid.stream import FloatArray
+
+NAMES = ("gain", "delay", "pole", "gap", "share", "rate", "damping", "loss", "guide", "coulomb")
+LOG = np.array([name in ("pole", "gap", "rate") for name in NAMES])
+GAPS = np.geomspace(2e-6, 150e-6, 10)  # m, tried first
+SLOW = 1e-3  # m/s at which the smoothed friction reaches its level
+DRIFT = 0.3  # process noise per rms speed, 1/sqrt(s): the filter forgives this much acceleration
+SETTLED = 0.5  # s until the filter is judged
+
+
+@dataclass(frozen=True, slots=True)
+class Followed:
+    """What the filter found.
+
+    values:     by ``NAMES``, SI (rate: rad/s of the contact on the reduced mass; damping: its ratio; loss: s/m; guide: part
+                of the drag that acts on the table; coulomb: V); spread: standard errors of them, infinite where not seen
+    noise:      standard deviation of the encoder, m
+    training:   rms of the one-step innovation on the fit's data; held_out: on data that it did not see, m
+    without:    the same as ``held_out`` with the gap taken out and everything else refitted
+    runs:       how often the filter ran
+    """
+
+    values: tuple[float, ...]
+    spread: tuple[float, ...]
+    noise: float
+    training: float
+    held_out: float
+    without: float
+    runs: int
+
+    @property
+    def over_noise(self) -> float:
+        """Held-out innovation over the encoder's noise."""
+        return self.held_out / self.noise
+
+
+def follow(
+    sampling_rate: float, voltage: FloatArray, position: FloatArray, base: tuple[float, float, float], noise: float, first: int, training: int
+) -> Followed:
+    """Fit gap, masses and contact by the innovations of the first samples; judge on those after ``training``.
+
+    voltage, position: (n,) V and m; base: gain m/s/V, delay s, pole rad/s to begin with; noise: of the encoder, m (rms)
+    """
+    fit = _Fit(sampling_rate, voltage, position, base, noise)
+    brief = min(first, int(8.0 * sampling_rate))
+    start = fit.inner(np.array([*base, GAPS[0], 0.4, 1500.0, 0.2, 5.0, 0.03, 0.0]))
+    starts = []
+    for gap in GAPS:
+        start[3] = np.log(gap)
+        starts.append((float(np.mean(fit.innovation(start, brief, 5.0, 2) ** 2)), start.copy()))
+    best = min(starts, key=lambda item: item[0])[1]
+    every = np.arange(len(NAMES))
+    best = fit.solve(best, every, brief, 5.0, 2, 10)
+    best = fit.solve(best, every, brief, 1.0, 2, 15)
+    best = fit.solve(best, every, first, 1.0, 4, 8)
+    rigid = best.copy()
+    rigid[3] = np.log(1e-10)
+    rigid = fit.solve(rigid, np.delete(every, 3), brief, 5.0, 2, 6)
+    rigid = fit.solve(rigid, np.delete(every, 3), brief, 1.0, 2, 8)
+    n = position.size - 1
+    settled = int(SETTLED * sampling_rate)
+    errors = fit.innovation(best, n, 1.0, 4) * noise
+    without = fit.innovation(rigid, n, 1.0, 4) * noise
+    return Followed(
+        tuple(float(value) for value in fit.outer(best)),
+        tuple(float(value) for value in fit.spread(best, every, first)),
+        noise,
+        _rms(errors[settled:training]),
+        _rms(errors[training:]),
+        _rms(without[training:]),
+        fit.runs,
+    )
+
+
+class _Fit:
+    """Least squares on the innovations over the noise."""
+
+    def __init__(
+        self, sampling_rate: float, voltage: FloatArray, position: FloatArray, base: tuple[float, float, float], noise: float
+    ) -> None:
+        self.fs, self.u, self.y, self.noise, self.runs = sampling_rate, voltage, position - position[0], noise, 0
+        self.speed = float(np.std(np.diff(position))) * sampling_rate
+        self.unit = np.array([0.02 * abs(base[0]), 0.1 / sampling_rate, 0.05, 0.1, 0.05, 0.1, 0.05, 2.0, 0.02, 0.01])
+        longest = max(20.0 / sampling_rate, 2.0 * base[1])
+        self.low = np.array([-np.inf, 0.0, np.log(1e-2), np.log(1e-10), 0.02, np.log(0.1 * sampling_rate), 0.0, 0.0, 0.0, 0.0])
+        self.high = np.array([np.inf, longest, np.log(1e5), np.log(1e-2), 0.98, np.log(5.0 * sampling_rate), 2.0, 500.0, 0.9, 5.0])
+
+    def inner(self, values: FloatArray) -> FloatArray:
+        return np.where(LOG, np.log(np.where(LOG, values, 1.0)), values)
+
+    def outer(self, inner: FloatArray) -> FloatArray:
+        return np.where(LOG, np.exp(np.where(LOG, inner, 0.0)), inner)
+
+    def innovation(self, inner: FloatArray, samples: int, looseness: float, cuts: int) -> FloatArray:
+        """(samples,) over the noise."""
+        self.runs += 1
+        out = np.empty(samples)
+        drift = (looseness * DRIFT * self.speed) ** 2
+        innovations(self.u, self.y, self.outer(np.clip(inner, self.low, self.high)), self.fs, self.noise**2, drift, cuts, out)
+        return np.clip(np.nan_to_num(out / self.noise, nan=1e6), -1e6, 1e6)
+
+    def solve(self, start: FloatArray, free: np.ndarray, samples: int, looseness: float, cuts: int, most: int) -> FloatArray:
+        """The free coordinates that make the innovations least, from a start."""
+        skip = min(int(SETTLED * self.fs), samples // 4)
+
+        def whole(part: FloatArray) -> FloatArray:
+            inner = start.copy()
+            inner[free] = part * self.unit[free]
+            return inner
+
+        def left(part: FloatArray) -> FloatArray:
+            return self.innovation(whole(part), samples, looseness, cuts)[skip:]
+
+        bounds = (self.low[free] / self.unit[free], self.high[free] / self.unit[free])
+        begin = np.clip(start[free] / self.unit[free], bounds[0] + 1e-9, bounds[1] - 1e-9)
+        found = scipy.optimize.least_squares(left, begin, self._slopes(left), bounds, ftol=1e-4, xtol=1e-5, max_nfev=most)
+        return whole(found.x)
+
+    @staticmethod
+    def _slopes(left: Callable[[FloatArray], FloatArray]) -> Callable[[FloatArray], FloatArray]:
+        def slopes(part: FloatArray) -> FloatArray:
+            here = left(part)
+            columns = np.empty((here.size, part.size))
+            for k in range(part.size):
+                moved = part.copy()
+                moved[k] += 1e-2
+                columns[:, k] = (left(moved) - here) / 1e-2
+            return columns
+
+        return slopes
+
+    def spread(self, inner: FloatArray, free: np.ndarray, samples: int) -> FloatArray:
+        """(10,) standard errors of the parameters, from the innovations' slopes."""
+        part = inner[free] / self.unit[free]
+
+        def left(part: FloatArray) -> FloatArray:
+            return self.innovation(part * self.unit, samples, 1.0, 4)
+
+        slopes = self._slopes(left)(part)
+        variance = float(np.mean(left(part) ** 2))
+        normal = slopes.T @ slopes
+        size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+        covariance = np.linalg.pinv(normal / np.outer(size, size), rcond=1e-10, hermitian=True) / np.outer(size, size)
+        inner_spread = np.sqrt(np.maximum(np.diag(covariance), 0.0) * variance) * self.unit
+        return np.where(LOG, inner_spread * self.outer(inner), inner_spread)
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2))) if values.size else float("inf")
+
+
+@compiled
+def _push(depth_of: float, rate: float, half: float, k: float, c: float, loss: float) -> tuple[float, float, float]:
+    """Force of the contact, and its derivatives by distance and by its rate."""
+    if depth_of > half:
+        depth = depth_of - half
+        force = k * depth * (1.0 + loss * rate) + c * rate
+        if force > 0.0:
+            return force, k * (1.0 + loss * rate), k * depth * loss + c
+    elif depth_of < -half:
+        depth = depth_of + half
+        force = k * depth * (1.0 - loss * rate) + c * rate
+        if force < 0.0:
+            return force, k * (1.0 - loss * rate), -k * depth * loss + c
+    return 0.0, 0.0, 0.0
+
+
+@compiled
+def innovations(u: FloatArray, y: FloatArray, values: FloatArray, fs: float, noise: float, drift: float, cuts: int, out: FloatArray) -> None:
+    """One pass of the filter: (n,) measured minus predicted position, m.
+
+    u, y: (n + 1 or more,) V and m; values: by ``NAMES``; noise: variance of the encoder, m^2; drift: of the speeds, m^2/s^3
+    """
+    gain, delay, pole, gap, share = values[0], values[1], values[2], values[3], values[4]
+    reduced = share * (1.0 - share)
+    k, c, loss = reduced * values[5] ** 2, 2.0 * reduced * values[6] * values[5], values[7]
+    guide, dry = values[8], values[9]
+    drag_motor, drag_table = pole * (1.0 - guide), pole * guide
+    per_motor, per_table = 1.0 / share, 1.0 / (1.0 - share)
+    half = 0.5 * gap
+    late = delay * fs
+    whole = int(late)
+    part = late - whole
+    turn = 1.0 if gain > 0.0 else -1.0
+    p = np.zeros((4, 4))
+    b = np.zeros((4, 4))
+    p[0, 0], p[1, 1], p[2, 2], p[3, 3] = noise, 1e-8, half * half + 1e-14, 1e-8
+    x, v, d, w = y[0], 0.0, 0.0, 0.0
+    for i in range(out.shape[0]):
+        for piece in range(2):
+            h = (part if piece == 0 else 1.0 - part) / fs / cuts
+            if h <= 0.0:
+                continue
+            at = i - whole - 1 + piece
+            push = pole * gain * u[at] if at >= 0 else 0.0
+            for _ in range(cuts):
+                force, _by_d, _by_w = _push(d, w, half, k, c, loss)
+                rub = pole * abs(gain) * dry * np.tanh(v / SLOW) if dry > 0.0 else 0.0
+                a = (push - rub - drag_motor * v - force) * per_motor
+                r = a - (force - drag_table * (v - w)) * per_table
+                vm, dm, wm = v + 0.5 * h * a, d + 0.5 * h * w, w + 0.5 * h * r
+                force, by_d, by_w = _push(dm, wm, half, k, c, loss)
+                slip = 0.0
+                if dry > 0.0:
+                    bend = np.tanh(vm / SLOW)
+                    rub = pole * abs(gain) * dry * bend
+                    slip = pole * abs(gain) * dry * (1.0 - bend * bend) / SLOW
+                a = (push - rub - drag_motor * vm - force) * per_motor
+                r = a - (force - drag_table * (vm - wm)) * per_table
+                x, v, d, w = x + h * vm, v + h * a, d + h * wm, w + h * r
+                v_v, v_d, v_w = -(drag_motor + slip) * per_motor, -by_d * per_motor, -by_w * per_motor
+                w_v, w_d, w_w = v_v + drag_table * per_table, v_d - by_d * per_table, v_w - (by_w + drag_table) * per_table
+                for q in range(4):
+                    b[0, q] = p[0, q] + h * p[1, q]
+                    b[1, q] = p[1, q] + h * (v_v * p[1, q] + v_d * p[2, q] + v_w * p[3, q])
+                    b[2, q] = p[2, q] + h * p[3, q]
+                    b[3, q] = p[3, q] + h * (w_v * p[1, q] + w_d * p[2, q] + w_w * p[3, q])
+                for q in range(4):
+                    p[q, 0] = b[q, 0] + h * b[q, 1]
+                    p[q, 1] = b[q, 1] + h * (v_v * b[q, 1] + v_d * b[q, 2] + v_w * b[q, 3])
+                    p[q, 2] = b[q, 2] + h * b[q, 3]
+                    p[q, 3] = b[q, 3] + h * (w_v * b[q, 1] + w_d * b[q, 2] + w_w * b[q, 3])
+                p[1, 1] += drift * h
+                p[1, 3] += drift * h
+                p[3, 1] += drift * h
+                p[3, 3] += 2.0 * drift * h
+        seen = p[0, 0] + noise
+        error = y[i + 1] - x
+        out[i] = error
+        k0, k1, k2, k3 = p[0, 0] / seen, p[1, 0] / seen, p[2, 0] / seen, p[3, 0] / seen
+        x, v, d, w = x + k0 * error, v + k1 * error, d + k2 * error, w + k3 * error
+        for q in range(4):
+            b[0, q] = p[0, q]
+        for q in range(4):
+            p[0, q] -= k0 * b[0, q]
+            p[1, q] -= k1 * b[0, q]
+            p[2, q] -= k2 * b[0, q]
+            p[3, q] -= k3 * b[0, q]
