@@ -13,7 +13,9 @@ import numpy as np
 
 from xy_sysid.axis_model import STANDARD, Library
 from xy_sysid.effects import Effect
-from xy_sysid.greybox import AxisData, GreyboxFit, finish, fit, fit_base, fit_with, look
+from xy_sysid.errors import BadInput
+from xy_sysid.greybox import EPSILON, AxisData, GreyboxFit, finish, fit, fit_base, fit_with, look
+from xy_sysid.one_step import one_step_fit
 
 # Tuned on development seeds 1-40 of the simulated machine's hidden effects.
 AT_FLOOR = 0.15  # excess below which nothing is left to explain; clean axes stay below 0.02
@@ -23,6 +25,7 @@ NEAR = 0.3  # excess on the first stage within which candidates run the whole di
 LEAST_SHARE = 5e-4  # of the error that an effect's trace must explain to be tried
 LEAST_GAIN = 0.1  # excess that an addition must win, and
 PART_GAIN = 0.05  # the part of the excess that it must win
+SUSPICIOUS = 0.1  # share of a look-alike from which an effect that free simulation cannot judge is tried
 NEEDED = 0.05  # excess that taking an effect out again must cost, or it goes
 MOST_EFFECTS = 4
 
@@ -65,11 +68,13 @@ def refine(data: AxisData, library: Library = STANDARD, most: int = MOST_EFFECTS
     now = fit_base(data, library)
     steps = [Step(None, now, ())]
     for name in given:
-        now = fit_with(data, now, [name])
+        now = added(data, now, name)
         steps.append(Step(name, now, ()))
     rejected: tuple[Candidate, ...] = ()
     while now.excess >= AT_FLOOR and len(steps) <= most:
         tried = candidates(data, now, library)
+        if len(steps) == 1 and data.floor.epsilon <= EPSILON:
+            tried = (*suspected(data, now, tried, library), *tried)
         taken = choose(tried, library)
         if taken is None or taken.fit is None or now.excess - taken.fit.excess < max(LEAST_GAIN, PART_GAIN * now.excess):
             rejected = tried
@@ -78,6 +83,31 @@ def refine(data: AxisData, library: Library = STANDARD, most: int = MOST_EFFECTS
         steps.append(Step(taken.effect, now, tried))
     pruned = prune(data, now, keep=tuple(given)) if len(steps) > 2 else now
     return Ladder(tuple(steps), rejected, pruned, tuple(name for name, _ in pruned.model.effects))
+
+
+def added(data: AxisData, now: GreyboxFit, name: str) -> GreyboxFit:
+    """A fit with one more effect, by whatever can judge it. Raises BadInput where one-step prediction stands alone."""
+    effect = now.model.library[name]
+    if effect.one_step is None and not any(now.model.library[own].one_step for own, _ in now.model.effects):
+        return fit_with(data, now, [name])
+    if effect.one_step is None or now.model.effects:
+        raise BadInput("effects", f"{name} with {', '.join(own for own, _ in now.model.effects)}", "backlash alone", "Fit them one at a time.")
+    return one_step_fit(data, now, effect)
+
+
+def suspected(data: AxisData, now: GreyboxFit, tried: tuple[Candidate, ...], library: Library) -> tuple[Candidate, ...]:
+    """Effects that only one-step prediction can judge, where no other explains the error and a look-alike left its trace."""
+    if any(item.fit is not None and item.fit.excess < AT_FLOOR for item in tried):
+        return ()
+    shares = {item.effect: item.share for item in tried}
+    found = []
+    for effect in library.acting:
+        share = max((shares.get(name, 0.0) for name in effect.look_alikes), default=0.0)
+        if effect.one_step is not None and share >= SUSPICIOUS:
+            fitted = one_step_fit(data, now, effect)
+            if fitted.excess < AT_FLOOR:
+                found.append(Candidate(effect.name, share, fitted))
+    return tuple(found)
 
 
 def candidates(data: AxisData, now: GreyboxFit, library: Library = STANDARD) -> tuple[Candidate, ...]:

@@ -12,46 +12,24 @@ two pieces of constant voltage.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 import scipy.optimize
+from numpy.typing import NDArray
 
 from xy_sysid.compiled import compiled
+from xy_sysid.effects.contract import Followed
 from xy_sysid.stream import FloatArray
 
 NAMES = ("gain", "delay", "pole", "gap", "share", "rate", "damping", "loss", "guide", "coulomb")
 LOG = np.array([name in ("pole", "gap", "rate") for name in NAMES])
 GAPS = np.geomspace(2e-6, 150e-6, 10)  # m, tried first
+STIFF = 2.0 * np.pi * 180.0  # rad/s of the contact at least: flanks of steel; a softer one is a loosely held mass, not play in the drive
+DEAF = 12.0  # the filter is told this much more encoder noise on the way: a smoother valley
 SLOW = 1e-3  # m/s at which the smoothed friction reaches its level
 DRIFT = 0.3  # process noise per rms speed, 1/sqrt(s): the filter forgives this much acceleration
+TELLING = 0.005  # dry friction over the rms voltage from which it is named
 SETTLED = 0.5  # s until the filter is judged
-
-
-@dataclass(frozen=True, slots=True)
-class Followed:
-    """What the filter found.
-
-    values:     by ``NAMES``, SI (rate: rad/s of the contact on the reduced mass; damping: its ratio; loss: s/m; guide: part
-                of the drag that acts on the table; coulomb: V); spread: standard errors of them, infinite where not seen
-    noise:      standard deviation of the encoder, m
-    training:   rms of the one-step innovation on the fit's data; held_out: on data that it did not see, m
-    without:    the same as ``held_out`` with the gap taken out and everything else refitted
-    runs:       how often the filter ran
-    """
-
-    values: tuple[float, ...]
-    spread: tuple[float, ...]
-    noise: float
-    training: float
-    held_out: float
-    without: float
-    runs: int
-
-    @property
-    def over_noise(self) -> float:
-        """Held-out innovation over the encoder's noise."""
-        return self.held_out / self.noise
 
 
 def follow(
@@ -62,32 +40,36 @@ def follow(
     voltage, position: (n,) V and m; base: gain m/s/V, delay s, pole rad/s to begin with; noise: of the encoder, m (rms)
     """
     fit = _Fit(sampling_rate, voltage, position, base, noise)
-    brief = min(first, int(8.0 * sampling_rate))
+    brief = min(first, int(6.0 * sampling_rate))
+    fit.deaf = DEAF
     start = fit.inner(np.array([*base, GAPS[0], 0.4, 1500.0, 0.2, 5.0, 0.03, 0.0]))
     starts = []
     for gap in GAPS:
         start[3] = np.log(gap)
-        starts.append((float(np.mean(fit.innovation(start, brief, 5.0, 2) ** 2)), start.copy()))
+        starts.append((float(np.mean(fit.innovation(start, brief, 2.0, 2) ** 2)), start.copy()))
     best = min(starts, key=lambda item: item[0])[1]
     every = np.arange(len(NAMES))
-    best = fit.solve(best, every, brief, 5.0, 2, 10)
-    best = fit.solve(best, every, brief, 1.0, 2, 15)
+    best = fit.solve(best, every, brief, 2.0, 2, 15)
+    best = fit.solve(best, every, brief, 1.0, 2, 40)
     best = fit.solve(best, every, first, 1.0, 4, 8)
+    fit.deaf = 1.0
     rigid = best.copy()
     rigid[3] = np.log(1e-10)
-    rigid = fit.solve(rigid, np.delete(every, 3), brief, 5.0, 2, 6)
-    rigid = fit.solve(rigid, np.delete(every, 3), brief, 1.0, 2, 8)
+    rigid = fit.solve(rigid, np.delete(every, 3), brief, 1.0, 2, 6)
     n = position.size - 1
-    settled = int(SETTLED * sampling_rate)
-    errors = fit.innovation(best, n, 1.0, 4) * noise
-    without = fit.innovation(rigid, n, 1.0, 4) * noise
+    without = fit.innovation(rigid, n, 1.0, 4)[training:] * noise
+    values, spread = fit.outer(best), fit.spread(best, every, first)
+    dry = float(values[9])
+    friction = (("coulomb_friction", (dry,), (float(spread[9]),)),) if dry > TELLING * float(np.std(voltage)) and dry > 5.0 * spread[9] else ()
     return Followed(
-        tuple(float(value) for value in fit.outer(best)),
-        tuple(float(value) for value in fit.spread(best, every, first)),
+        (float(values[0]), float(values[1]), float(values[2])),
+        tuple(float(value) for value in values[3:9]),
+        (float(spread[0]), float(spread[1]), float(spread[2])),
+        tuple(float(value) for value in spread[3:9]),
+        friction,
+        fit.innovation(best, n, 1.0, 4) * noise,
+        float(np.sqrt(np.mean(without**2))) if without.size else float("inf"),
         noise,
-        _rms(errors[settled:training]),
-        _rms(errors[training:]),
-        _rms(without[training:]),
         fit.runs,
     )
 
@@ -99,11 +81,12 @@ class _Fit:
         self, sampling_rate: float, voltage: FloatArray, position: FloatArray, base: tuple[float, float, float], noise: float
     ) -> None:
         self.fs, self.u, self.y, self.noise, self.runs = sampling_rate, voltage, position - position[0], noise, 0
+        self.deaf = 1.0
         self.speed = float(np.std(np.diff(position))) * sampling_rate
         self.unit = np.array([0.02 * abs(base[0]), 0.1 / sampling_rate, 0.05, 0.1, 0.05, 0.1, 0.05, 2.0, 0.02, 0.01])
         longest = max(20.0 / sampling_rate, 2.0 * base[1])
-        self.low = np.array([-np.inf, 0.0, np.log(1e-2), np.log(1e-10), 0.02, np.log(0.1 * sampling_rate), 0.0, 0.0, 0.0, 0.0])
-        self.high = np.array([np.inf, longest, np.log(1e5), np.log(1e-2), 0.98, np.log(5.0 * sampling_rate), 2.0, 500.0, 0.9, 5.0])
+        self.low = np.array([-np.inf, 0.0, np.log(1e-2), np.log(1e-10), 0.02, np.log(STIFF), 0.0, 0.0, 0.0, 0.0])
+        self.high = np.array([np.inf, longest, np.log(1e5), np.log(1e-2), 0.98, np.log(max(5.0 * sampling_rate, 2.0 * STIFF)), 2.0, 500.0, 0.9, 5.0])
 
     def inner(self, values: FloatArray) -> FloatArray:
         return np.where(LOG, np.log(np.where(LOG, values, 1.0)), values)
@@ -116,10 +99,10 @@ class _Fit:
         self.runs += 1
         out = np.empty(samples)
         drift = (looseness * DRIFT * self.speed) ** 2
-        innovations(self.u, self.y, self.outer(np.clip(inner, self.low, self.high)), self.fs, self.noise**2, drift, cuts, out)
+        innovations(self.u, self.y, self.outer(np.clip(inner, self.low, self.high)), self.fs, (self.deaf * self.noise) ** 2, drift, cuts, out)
         return np.clip(np.nan_to_num(out / self.noise, nan=1e6), -1e6, 1e6)
 
-    def solve(self, start: FloatArray, free: np.ndarray, samples: int, looseness: float, cuts: int, most: int) -> FloatArray:
+    def solve(self, start: FloatArray, free: NDArray[np.int64], samples: int, looseness: float, cuts: int, most: int) -> FloatArray:
         """The free coordinates that make the innovations least, from a start."""
         skip = min(int(SETTLED * self.fs), samples // 4)
 
@@ -149,7 +132,7 @@ class _Fit:
 
         return slopes
 
-    def spread(self, inner: FloatArray, free: np.ndarray, samples: int) -> FloatArray:
+    def spread(self, inner: FloatArray, free: NDArray[np.int64], samples: int) -> FloatArray:
         """(10,) standard errors of the parameters, from the innovations' slopes."""
         part = inner[free] / self.unit[free]
 
@@ -163,10 +146,6 @@ class _Fit:
         covariance = np.linalg.pinv(normal / np.outer(size, size), rcond=1e-10, hermitian=True) / np.outer(size, size)
         inner_spread = np.sqrt(np.maximum(np.diag(covariance), 0.0) * variance) * self.unit
         return np.where(LOG, inner_spread * self.outer(inner), inner_spread)
-
-
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(values**2))) if values.size else float("inf")
 
 
 @compiled

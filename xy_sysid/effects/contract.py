@@ -20,18 +20,59 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal, ParamSpec, TypeVar
+from typing import Any, Literal, ParamSpec, Protocol, TypeVar
 
 from numba.extending import register_jitable
 
 from xy_sysid.effects.scene import Guess, Scene
 from xy_sysid.errors import BadInput
+from xy_sysid.stream import FloatArray
 
 P = ParamSpec("P")
 R = TypeVar("R")
 
 Category = Literal["base", "input", "state", "force", "friction", "bristle", "motion", "encoder"]
 Law = Callable[..., Any]
+
+
+
+class OneStep(Protocol):
+    """Fits base and effect together by one-step prediction."""
+
+    def __call__(
+        self,
+        sampling_rate: float,
+        voltage: FloatArray,
+        position: FloatArray,
+        base: tuple[float, float, float],
+        noise: float,
+        first: int,
+        training: int,
+    ) -> Followed:
+        """voltage, position: (n,) V, m; base: gain, delay, pole; noise: of the encoder, m; samples of the two stages."""
+
+
+@dataclass(frozen=True, slots=True)
+class Followed:
+    """What one-step prediction found.
+
+    base, values: gain, delay, pole, and the effect's parameters, SI; base_spread, spread: their standard errors
+    others:       effects that came out beside it: (name, values, standard errors)
+    innovation:   (n - 1,) measured minus predicted position, one step ahead, m
+    without:      rms of the held-out innovation with the effect taken out and all else refitted, m
+    noise:        standard deviation of the encoder, m; runs: how often the filter ran
+    """
+
+    base: tuple[float, float, float]
+    values: tuple[float, ...]
+    base_spread: tuple[float, float, float]
+    spread: tuple[float, ...]
+    others: tuple[tuple[str, tuple[float, ...], tuple[float, ...]], ...]
+    innovation: FloatArray
+    without: float
+    noise: float
+    runs: int
+
 
 FUNCTIONS: Mapping[str, tuple[str, ...]] = {
     "base": (),
@@ -100,7 +141,8 @@ class Effect:
     states:      names of the law's states; all start at zero
     family:      effects of one family replace one another
     order:       place among the effects of its category, in the direction of the signal
-    simulable:   False if free simulation cannot judge it (one-step prediction must)
+    simulable:   False if free simulation cannot judge it
+    one_step:    then this does: fits the effect by one-step prediction (see ``contact.follow``)
     """
 
     name: str
@@ -120,6 +162,7 @@ class Effect:
     family: str = ""
     order: int = 0
     simulable: bool = True
+    one_step: OneStep | None = None
 
     def __post_init__(self) -> None:
         """Raises BadInput if the functions do not fit the category or ask for words that nobody knows."""
