@@ -53,7 +53,7 @@ EFFECT = Effect(
     law="m_motor v' = drive - contact(x_motor - x_table, gap / 2); m_table v_table' = contact; contact = k d (1 + loss d') + c d', never pulling",
     meaning="a nut without preload, a worn coupling",
     validity="free simulation is chaotic at the contact: use it for pictures and one-step prediction, not to judge a fit",
-    source="Nordin & Gutman, Controlling mechanical systems with backlash, Automatica 38 (2002), sec. 2.2; Hunt & Crossley, J. Appl. Mech. 42 (1975), eq. 8",
+    source="Nordin & Gutman, Automatica 38 (2002), sec. 2.2; Hunt & Crossley, J. Appl. Mech. 42 (1975), eq. 8",
     category="state",
     parameters=(
         Parameter("gap", "m", 1e-9, 1e-2, 20e-6, "free play, flank to flank"),

@@ -77,9 +77,7 @@ def follow(
 class _Fit:
     """Least squares on the innovations over the noise."""
 
-    def __init__(
-        self, sampling_rate: float, voltage: FloatArray, position: FloatArray, base: tuple[float, float, float], noise: float
-    ) -> None:
+    def __init__(self, sampling_rate: float, voltage: FloatArray, position: FloatArray, base: tuple[float, float, float], noise: float) -> None:
         self.fs, self.u, self.y, self.noise, self.runs = sampling_rate, voltage, position - position[0], noise, 0
         self.deaf = 1.0
         self.speed = float(np.std(np.diff(position))) * sampling_rate
@@ -145,7 +143,7 @@ class _Fit:
         size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
         covariance = np.linalg.pinv(normal / np.outer(size, size), rcond=1e-10, hermitian=True) / np.outer(size, size)
         inner_spread = np.sqrt(np.maximum(np.diag(covariance), 0.0) * variance) * self.unit
-        return np.where(LOG, inner_spread * self.outer(inner), inner_spread)
+        return np.asarray(np.where(LOG, inner_spread * self.outer(inner), inner_spread))
 
 
 @compiled
@@ -180,7 +178,6 @@ def innovations(u: FloatArray, y: FloatArray, values: FloatArray, fs: float, noi
     late = delay * fs
     whole = int(late)
     part = late - whole
-    turn = 1.0 if gain > 0.0 else -1.0
     p = np.zeros((4, 4))
     b = np.zeros((4, 4))
     p[0, 0], p[1, 1], p[2, 2], p[3, 3] = noise, 1e-8, half * half + 1e-14, 1e-8

@@ -35,7 +35,6 @@ Category = Literal["base", "input", "state", "force", "friction", "bristle", "mo
 Law = Callable[..., Any]
 
 
-
 class OneStep(Protocol):
     """Fits base and effect together by one-step prediction."""
 
