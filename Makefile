@@ -10,7 +10,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check -qq install --no-compile
 FITS := import ensurepip, sys, venv; sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 13))
 
 .DEFAULT_GOAL := help
-.PHONY: help install demo test lint types unit bench clean
+.PHONY: help install demo test lint types unit bench pictures clean
 
 help: ## this text
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 18
@@ -51,6 +51,9 @@ bench: $(VENV)/.bench ## measure against other software, and write the table (AR
 $(VENV)/.bench: $(INSTALLED)
 	@$(PIP) --no-build-isolation --editable '.[bench]'
 	@touch $@
+
+pictures: $(INSTALLED) ## make the pictures and the text of docs/reading-pictures.md (needs chromium; ARGS names some)
+	@$(BIN)/python -m pictures $(ARGS)
 
 clean: ## remove what the other targets made
 	rm -rf $(VENV) build install log .mypy_cache .ruff_cache .pytest_cache .hypothesis *.egg-info

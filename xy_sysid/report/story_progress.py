@@ -41,10 +41,11 @@ def ladder(document: Document, mode: str = "light") -> go.Figure:
     )
     for place, item in enumerate(rungs):
         value = float(item["held_out_error"]) * scale
+        above = max(value, float(item["train_error"]) * scale)
         figure.add_annotation(
             text=f"<b>{number(value, 3)}</b>" + (" ✓" if item["explained"] else ""),
             x=place,
-            y=np.log10(value),
+            y=np.log10(above),
             yanchor="bottom",
             yshift=3,
             showarrow=False,

@@ -93,7 +93,7 @@ def size(story: Document, speed: float) -> str:
     if last["effects"]:
         times = float(first["held_out_error"]) / max(float(last["held_out_error"]), 1e-300)
         text += f" Without {' and '.join(words(name) for name in last['effects'])} it was off by {quantity(float(first['held_out_error']), unit, 3)}"
-        text += f", {number(times, 2)} times as much." if times >= 1 else "."
+        text += f", {number(times, 2)} times as much." if times >= 1.1 else "."
     return text
 
 
