@@ -15,7 +15,7 @@ from xy_sysid.page.downloads import offer
 from xy_sysid.page.facts import seconds_text
 from xy_sysid.page.picture_card import Plot
 from xy_sysid.page.session import Session
-from xy_sysid.page.story_words import candidate_rows, look_alike_lines, model_effects, step_names, verdict_words
+from xy_sysid.page.story_words import candidate_rows, ladder_words, look_alike_lines, model_effects, step_names, verdict_words
 from xy_sysid.page.wishes import Act, Source
 from xy_sysid.report import story_figures as draw
 
@@ -96,6 +96,7 @@ class StoryCard:
         if document is None:
             return
         key = (self._source.key, axis, self._source.stamp(axis))
+        self._ladder.say(ladder_words(document))
         await self._ladder.show(self._session, (*key, "ladder"), draw.ladder, document)
         if document["candidates"]:
             await self._candidates.show(self._session, (*key, "candidates"), draw.candidates, document)

@@ -75,6 +75,14 @@ def look_alike_lines(document: Document) -> list[str]:
     return lines
 
 
+def ladder_words(document: Document) -> str:
+    """The staircase for who cannot see it."""
+    unit = str(document["error"]["unit"])
+    rungs = [f"{str(rung['label']).replace('_', ' ')} {quantity(rung['held_out_error'], unit, 3)}" for rung in document.get("ladder") or []]
+    floor = f"; noise floor {quantity(document['ladder'][-1]['noise_floor'], unit, 3)}" if rungs else ""
+    return f"The error ladder of axis {document['axis']}, held-out: {', '.join(rungs) or 'no step yet'}{floor}."
+
+
 def step_names(document: Document) -> dict[int, str]:
     """Steps that have pictures, by their place."""
     return {k: f"{k}: {str(step['label']).replace('_', ' ')}" for k, step in enumerate(document.get("steps") or []) if step.get("pictures")}

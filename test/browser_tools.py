@@ -1,0 +1,140 @@
+"""A real browser and a real page server in tests.
+
+Import from a test module that starts with ``pytestmark = needs_browser``.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+CHROMIUM = next((path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None)
+needs_browser = pytest.mark.skipif(
+    CHROMIUM is None or importlib.util.find_spec("playwright") is None, reason="no Chromium (Debian: apt-get install chromium) or no playwright"
+)
+ARGUMENTS = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+
+
+class Server:
+    """``xy-sysid page`` as a process; ``address`` is what it printed."""
+
+    def __init__(self, folder: Path, *arguments: object, **environment: str) -> None:
+        self.log = folder / f"page{time.monotonic_ns()}.log"
+        path = os.pathsep.join(filter(None, (str(ROOT), os.environ.get("PYTHONPATH"))))
+        words = [sys.executable, "-m", "xy_sysid", "page", *map(str, arguments), "--port", "0", "--no-browse", "--folder", str(folder)]
+        self.begun = time.monotonic()
+        with self.log.open("wb") as err:
+            self.process = subprocess.Popen(
+                words, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=err, text=True, env={**os.environ, "PYTHONPATH": path, **environment}
+            )
+        assert self.process.stdout is not None
+        self.address = self.process.stdout.readline().strip()
+        assert self.address.startswith("http"), self.said()
+
+    def said(self) -> str:
+        """All it wrote on stderr."""
+        return self.log.read_text(encoding="utf-8", errors="replace")
+
+    def children(self) -> list[int]:
+        """Its processes: one for each recording, and Python's own helper."""
+        return [int(word) for word in Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text().split()]
+
+    def end(self) -> int:
+        """Ctrl-C; the exit code."""
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGINT)
+        try:
+            return self.process.wait(15)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            return self.process.wait(5)
+
+
+@contextmanager
+def browser() -> Iterator[Any]:
+    """A browser with a profile of its own."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as play:
+        made = play.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        try:
+            yield made
+        finally:
+            made.close()
+
+
+class Tab:
+    """One tab on the page, with what went wrong in it."""
+
+    def __init__(self, made: Any, address: str, width: int = 1400, mode: str = "light") -> None:
+        self.context = made.new_context(viewport={"width": width, "height": 900}, color_scheme=mode)
+        self.page = self.context.new_page()
+        self.errors: list[str] = []
+        self.asked: list[str] = []
+        self.page.on("pageerror", lambda error: self.errors.append(str(error)))
+        self.page.on("console", lambda message: self.errors.append(message.text) if message.type == "error" else None)
+        self.page.on("request", lambda request: self.asked.append(request.url))
+        self.page.goto(address)
+
+    def until(self, done: Callable[[], object], seconds: float = 20.0, why: str = "") -> None:
+        """Let the browser work until it is done."""
+        end = time.monotonic() + seconds
+        while not done():
+            assert time.monotonic() < end, f"{why or 'waited in vain'}: {self.verdict()!r}; messages: {self.notices()}"
+            self.page.wait_for_timeout(50)
+
+    def verdict(self) -> str:
+        """The sentence of the first story."""
+        found = self.page.locator("[data-part=verdict]")
+        return str(found.first.text_content()) if found.count() else ""
+
+    def notices(self) -> str:
+        """All messages and warnings that can be seen."""
+        return " | ".join(text for text in self.page.locator(".notice:visible").all_text_contents())
+
+    def curve(self, label: str, name: str) -> list[float]:
+        """y of a named curve of the plot whose description begins so; empty while it is not drawn."""
+        script = """([label, name]) => {
+            const plot = [...document.querySelectorAll(".js-plotly-plot")].find(p => (p.getAttribute("aria-label") || "").startsWith(label));
+            const trace = plot && plot._fullData && plot._fullData.find(t => t.name === name);
+            return trace ? Array.from(trace.y, Number) : [];
+        }"""
+        return [float(value) for value in self.page.evaluate(script, [label, name])]
+
+    def ladder(self) -> list[float]:
+        """Held-out error of each step over the noise floor there."""
+        held, floor = self.curve("The error ladder", "held-out error"), self.curve("The error ladder", "noise floor")
+        return [a / b for a, b in zip(held[::2], floor[::2], strict=True)]
+
+    def press(self, act: str) -> None:
+        """A button by what it does."""
+        self.page.locator(f"[data-act={act}]").first.click()
+
+    def wide(self) -> int:
+        """Width of the content, px."""
+        return int(self.page.evaluate("document.documentElement.scrollWidth"))
+
+    def close(self) -> None:
+        """Away with it."""
+        self.context.close()

@@ -1,0 +1,209 @@
+"""The page on recordings in a real browser: pictures, diagnosis, effects by clicks, reload, two tabs, who may come in."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import urllib.error
+import urllib.request
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from browser_tools import Server, Tab, browser, needs_browser
+from cli_tools import cli
+
+pytestmark = needs_browser
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two recordings: dry friction that the rigid model does not know, and a table with nothing to find."""
+    made = tmp_path_factory.mktemp("recordings")
+    said = cli("simulate", made / "dry.npz", "--machine", "rigid.yaml", "--effect", "coulomb_friction", "--duration", "12")
+    assert said.code == 0, said.err
+    assert cli("simulate", made / "plain.npz", "--machine", "rigid.yaml", "--duration", "8").code == 0
+    return made
+
+
+@pytest.fixture(scope="module")
+def server(folder: Path) -> Iterator[Server]:
+    made = Server(folder, folder / "dry.npz")
+    yield made
+    made.end()
+    assert "Traceback" not in made.said(), made.said()
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Any]:
+    with browser() as made:
+        yield made
+
+
+@pytest.fixture
+def tab(chromium: Any, server: Server) -> Iterator[Callable[..., Tab]]:
+    made: list[Tab] = []
+
+    def open_tab(width: int = 1400, mode: str = "light", address: str = "") -> Tab:
+        made.append(Tab(chromium, address or server.address, width, mode))
+        return made[-1]
+
+    yield open_tab
+    for one in made:
+        one.close()
+
+
+def ready(one: Tab) -> Tab:
+    one.until(lambda: one.ladder() and one.page.locator("[data-act=diagnose]").is_enabled(), 40, "the rigid base was not fitted")
+    return one
+
+
+def test_everything_is_drawn_and_nothing_is_fetched_from_elsewhere(tab: Callable[..., Tab], server: Server) -> None:
+    """Each picture has curves and a description; no request leaves this server, and no error is in the console."""
+    one = ready(tab())
+    one.until(lambda: one.curve("Measured and modelled over frequency, bode", "model"))
+    described = [text for text in one.page.eval_on_selector_all(".js-plotly-plot", "plots => plots.map(p => p.getAttribute('aria-label'))") if text]
+    names = ("bode", "coherence", "residual", "residual speed", "zoom", "poles zeros")
+    assert all(any(f", {name}, axis x" in text for text in described) for name in names), described
+    assert any("fails" in text or "times the floor" in text for text in one.page.locator(".annotation-text").all_text_contents())
+    assert one.errors == [] and all(url.startswith((server.address, "data:", "blob:")) for url in one.asked), one.asked
+    assert "12 s at 2000 Hz" in str(one.page.locator(".panel").first.text_content())
+
+
+@pytest.mark.parametrize(("width", "mode"), [(400, "dark"), (1400, "light")])
+def test_it_fits_a_phone_and_follows_light_and_dark(tab: Callable[..., Tab], width: int, mode: str) -> None:
+    """No sideways scrolling; paper and ink follow the system; every button and picture has a name for screen readers."""
+    one = ready(tab(width, mode))
+    assert one.wide() <= width
+    shade = one.page.evaluate("getComputedStyle(document.body).backgroundColor")
+    bright = sum(int(part) for part in shade.strip("rgba()").split(",")[:3]) / 3
+    assert bright < 60 if mode == "dark" else bright > 200
+    nameless = "all => all.filter(e => e.offsetParent && !(e.textContent.trim() || e.getAttribute('aria-label') || e.labels?.length)).length"
+    assert one.page.eval_on_selector_all("button, [role=img], select", nameless) == 0
+    assert one.page.evaluate("document.documentElement.lang") == "en-US"
+    one.page.keyboard.press("Tab")
+    assert one.page.evaluate("document.activeElement.textContent") == "to the pictures"
+
+
+def test_an_effect_is_diagnosed_and_added_by_clicks_until_the_error_is_at_the_floor(tab: Callable[..., Tab]) -> None:
+    """The point of it all: Diagnose names it, Add brings the ladder down, in a second tab too; Remove brings it up again."""
+    one, other = ready(tab()), tab()
+    assert one.ladder()[0] > 5
+    one.press("diagnose")
+    one.until(lambda: "Missing: coulomb_friction" in one.verdict(), 60)
+    one.page.locator("[data-add=coulomb_friction]").click()
+    one.until(lambda: len(one.ladder()) == 2, 60)
+    assert one.ladder()[1] < 1.2 and "at the noise floor" in one.verdict()
+    other.until(lambda: len(other.ladder()) == 2 and "at the noise floor" in other.verdict(), 10, "the second tab does not follow")
+    one.page.locator("[data-remove=coulomb_friction]").click()
+    other.until(lambda: len(other.ladder()) == 3 and other.ladder()[2] > 5, 60)
+    with one.page.expect_download() as taken:
+        one.page.get_by_text("Download").first.click()
+        one.page.locator("[data-take=model]").click()
+    model = yaml.safe_load(Path(taken.value.path()).read_text(encoding="utf-8"))
+    assert set(model["axes"]) == {"x", "y"} and model["axes"]["x"]["parameters"]["gain"]["unit"]
+    with one.page.expect_download() as taken:
+        one.page.locator("[aria-label='save ladder as SVG']").click()
+    assert "<svg" in Path(taken.value.path()).read_text(encoding="utf-8")[:200]
+    assert one.errors == [] == other.errors
+
+
+def test_a_reload_in_the_middle_loses_nothing_and_a_fit_can_be_left(tab: Callable[..., Tab]) -> None:
+    """The work goes on without the browser; Cancel leaves the story as it was."""
+    one = ready(tab())
+    steps = len(one.ladder())
+    one.page.get_by_role("button", name="axis y").click()
+    one.until(lambda: one.page.locator("[data-act=auto]").is_enabled())
+    one.page.get_by_role("button", name="axis x").click()
+    one.until(lambda: len(one.ladder()) == steps)
+    one.press("auto")
+    one.until(lambda: one.page.locator("[data-act=cancel]").is_visible(), 5)
+    one.page.reload()
+    one.until(lambda: one.page.locator("[data-act=cancel]").is_visible() or len(one.ladder()) > steps, 15)
+    one.until(lambda: len(one.ladder()) > steps and one.ladder()[-1] < 1.2, 60)
+    one.until(lambda: one.page.locator("[data-act=diagnose]").is_enabled())
+    steps = len(one.ladder())
+    one.press("diagnose")
+    one.press("cancel")
+    one.until(lambda: "Left as it was" in one.notices(), 20)
+    one.until(lambda: one.page.locator("[data-act=diagnose]").is_enabled() and len(one.ladder()) == steps)
+
+
+def test_wrong_use_is_answered_in_a_sentence(tab: Callable[..., Tab]) -> None:
+    """Nothing chosen to add: the page says what is allowed."""
+    one = ready(tab())
+    one.press("add")
+    one.until(lambda: "effect is ''" in one.notices() and "coulomb_friction" in one.notices(), 10)
+
+
+def test_recordings_stand_side_by_side_and_a_lost_one_says_so(tab: Callable[..., Tab], server: Server) -> None:
+    """Opened from the list of the folder; when its process dies, the page says that it is closed, and the other goes on."""
+    one = ready(tab())
+    before = set(server.children())
+    one.page.get_by_role("button", name="Open a recording").click()
+    one.page.get_by_label("recording").last.click()
+    one.page.get_by_role("option", name="plain.npz").click()
+    one.page.get_by_role("button", name="Open", exact=True).click()
+    second = one.page.locator(".panel").nth(1)
+    one.until(lambda: one.page.locator(".panel").count() == 2 and "8 s at 2000 Hz" in str(second.text_content()), 30)
+    first, last = (one.page.locator(".panel").nth(k).bounding_box() for k in (0, 1))
+    assert abs(first["y"] - last["y"]) < 2 and last["x"] > first["x"] + 300
+    one.until(lambda: second.locator("[data-act=diagnose]").is_enabled(), 30)
+    (worker,) = set(server.children()) - before
+    os.kill(worker, signal.SIGKILL)
+    one.until(lambda: "Closed: its process has ended" in str(second.text_content()) and "plain.npz is closed" in one.notices(), 10)
+    assert one.page.locator("[data-act=diagnose]").first.is_enabled()
+    second.get_by_role("button", name="close recording").click()
+    one.until(lambda: one.page.locator(".panel").count() == 1)
+
+
+def answer(url: str, method: str = "GET", **headers: str) -> tuple[int, str]:
+    """Status and text of a plain request."""
+    request = urllib.request.Request(url, method=method, headers={name.replace("_", "-"): value for name, value in headers.items()})
+    try:
+        with urllib.request.urlopen(request, timeout=5) as found:
+            return found.status, found.read().decode()
+    except urllib.error.HTTPError as problem:
+        return problem.code, problem.read().decode()
+
+
+def test_a_page_from_elsewhere_cannot_give_orders(tab: Callable[..., Tab], server: Server) -> None:
+    """A real page of another origin (another name for this machine is one): its POST and its WebSocket are refused."""
+    port = server.address.rstrip("/").rpartition(":")[2]
+    foreign = tab(address=f"http://localhost:{port}/alive")
+    script = """async ([url]) => {
+        const posted = await fetch(url + "stop", {method: "POST", mode: "no-cors"}).then(r => r.type, e => "failed");
+        const socket = await new Promise(done => {
+            const made = new WebSocket(url.replace("http", "ws") + "_nicegui_ws/socket.io/?EIO=4&transport=websocket");
+            made.onopen = () => done("open"); made.onerror = () => done("refused");
+        });
+        return [posted, socket];
+    }"""
+    foreign.page.evaluate("document.querySelectorAll('meta').forEach(m => m.remove())")
+    assert foreign.page.evaluate(script, [server.address])[1] == "refused"
+    assert answer(f"{server.address}stop", "POST", origin="http://evil.example")[0] == 403
+    assert answer(server.address, host="evil.example")[0] == 403
+    for path in ("..%2f..%2fetc/passwd", "_nicegui/../../setup.py", "static/..%5c..%5cx", "%2e%2e/%2e%2e/setup.py"):
+        status, text = answer(server.address + path)
+        assert "install_requires" not in text and "root:" not in text, status
+
+
+def test_from_another_machine_a_token_is_needed(chromium: Any, folder: Path) -> None:
+    """Listening on all addresses: the printed address lets in, and only it; the token does not stay in the address."""
+    made = Server(folder, folder / "plain.npz", "--host", "0.0.0.0", XY_SYSID_TOKEN="a-token-of-this-test")
+    try:
+        port = made.address.partition("?")[0].rstrip("/").rpartition(":")[2]
+        here = f"http://127.0.0.1:{port}/"
+        assert made.address.endswith("?token=a-token-of-this-test")
+        assert answer(here)[0] == 401 and "token" in answer(f"{here}?token=wrong")[1]
+        assert answer(f"{here}stop", "POST")[0] == 401
+        one = Tab(chromium, f"{here}?token=a-token-of-this-test")
+        one.until(lambda: one.page.locator(".panel").count() == 1)
+        assert "token" not in one.page.url
+        assert all("httpOnly" in json.dumps(cookie) and cookie["httpOnly"] for cookie in one.context.cookies() if "token" in cookie["name"])
+        one.close()
+    finally:
+        assert made.end() == 130
