@@ -39,11 +39,11 @@ setup(
             f"ros-jazzy-rclpy[fastrtps]==7.1.6; {ROS_WHEELS}",
             f"ros-jazzy-common-interfaces==5.3.6; {ROS_WHEELS}",
         ],
-        "page": ["nicegui>=3.2,<4"],
+        "page": ["nicegui>=3.13,<4"],
         "control": ["control"],
         "bench": ["scikit-rf", "pyFRF", "threadpoolctl"],
         "test": [
-            "nicegui>=3.2,<4",
+            "nicegui>=3.13,<4",
             "playwright",
             "pytest",
             "hypothesis",

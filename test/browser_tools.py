@@ -113,18 +113,20 @@ class Tab:
         """All messages and warnings that can be seen."""
         return " | ".join(text for text in self.page.locator(".notice:visible").all_text_contents())
 
-    def curve(self, label: str, name: str) -> list[float]:
-        """y of a named curve of the plot whose description begins so; empty while it is not drawn."""
-        script = """([label, name]) => {
+    def curves(self, label: str, *names: str) -> list[list[float]]:
+        """y of named curves of the plot whose description begins so, all of one moment; empty lists while it is not drawn."""
+        script = """([label, names]) => {
             const plot = [...document.querySelectorAll(".js-plotly-plot")].find(p => (p.getAttribute("aria-label") || "").startsWith(label));
-            const trace = plot && plot._fullData && plot._fullData.find(t => t.name === name);
-            return trace ? Array.from(trace.y, Number) : [];
+            return names.map(name => {
+                const trace = plot && plot._fullData && plot._fullData.find(t => t.name === name);
+                return trace ? Array.from(trace.y, Number) : [];
+            });
         }"""
-        return [float(value) for value in self.page.evaluate(script, [label, name])]
+        return [[float(value) for value in row] for row in self.page.evaluate(script, [label, list(names)])]
 
     def ladder(self) -> list[float]:
         """Held-out error of each step over the noise floor there."""
-        held, floor = self.curve("The error ladder", "held-out error"), self.curve("The error ladder", "noise floor")
+        held, floor = self.curves("The error ladder", "held-out error", "noise floor")
         return [a / b for a, b in zip(held[::2], floor[::2], strict=True)]
 
     def press(self, act: str) -> None:

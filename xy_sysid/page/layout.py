@@ -18,7 +18,6 @@ GOOD_STAYS, BAD_STAYS = 8.0, 60.0  # s that a message stays
 
 def build(session: Session) -> None:
     """Everything; then look for news for as long as the browser is there."""
-    ui.html('<a class="skip" href="#main">to the pictures</a>', sanitize=False)
     page = Page(session)
     ui.timer(EVERY, page.refresh)
 
@@ -32,13 +31,14 @@ class Page:
         self._told: list[int] = []
         self._alarms: list[str] = []
         self._bar()
-        with ui.element("main").classes("pages").props("id=main"):
+        with ui.element("main").classes("pages") as main:
             self._alarm = ui.element("div").classes("notices").props("role=alert")
             self._notices = ui.element("div").classes("notices").props("role=status aria-live=polite")
             self._empty = ui.element("div").classes("card")
             with self._empty:
                 ui.label("No recording is open. Open one of the folder in which the page was started.")
             self._grid = ui.element("div").classes("panels")
+        ui.skip_link("to the pictures", target=main)
 
     async def refresh(self) -> None:
         """Draw what has changed."""

@@ -81,7 +81,7 @@ class SettingsForm:
         if item.choices:
             made: Any = ui.select(list(item.choices), label=label, value=item.value)
         else:
-            made = ui.number(label, value=item.value, min=item.low, max=item.high, step=1 if isinstance(item.value, int) else None)
+            made = ui.number(label, value=item.value)  # no min and max: a wrong value is refused in words, not silently changed
         made.props(f"outlined dense data-knob={self._axis}.{item.name}")
         with made:
             ui.tooltip(f"{item.meaning}; {limits(item)}")
