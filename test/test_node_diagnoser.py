@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import signal
 from collections.abc import Iterator
 from functools import cache
@@ -12,9 +13,9 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from ros_tools import World, needs_ros, world_in
+from ros_tools import ROOT, World, needs_ros, world_in
 from test_diagnosis import recorded
-from test_node_identifier import FAST, drive, newest, ready
+from test_node_identifier import FAST, Source, drive, newest, ready
 
 from xy_sysid.cli import run
 from xy_sysid.messages import ArrayMessage
@@ -174,3 +175,31 @@ def test_what_lacks_is_said_and_the_model_waits_for_data(world: World) -> None:
     node.send(signal.SIGINT)
     assert node.wait() == 0
     assert "Traceback" not in node.output()
+
+
+def test_joint_states_and_an_effect_of_ones_own(world: World, tmp_path: Path) -> None:
+    """Joints by name, effort as input, parameters effects.<joint>, and a file with an effect that the library has not."""
+    from sensor_msgs.msg import JointState
+
+    own = tmp_path / "quadratic_drag.py"
+    guide = (ROOT / "docs" / "your-own-effect.md").read_text(encoding="utf-8")
+    own.write_text(re.findall(r"```python\n(.*?)```", guide, re.DOTALL)[0], encoding="utf-8")
+    axes, results = ("y", "x"), Results(world)
+    statuses = world.statuses()
+    settings = {"axes": json.dumps(axes), "source": "joint_state", "effort_as_voltage": True, "effect_files": json.dumps([str(own)])}
+    node = world.start(DIAGNOSER, {**settings, "effects.x": '["quadratic_drag"]'})
+    source = Source(world, axes, rate=125.0)
+    publisher = world.node.create_publisher(JointState, "joint_states", 10_000)
+    assert world.until(lambda: publisher.get_subscription_count() > 0, 30.0), node.output()
+    for n in range(2500):
+        message = JointState(name=["x", "y"], position=source.y[n, ::-1].tolist(), effort=source.u[n, ::-1].tolist())
+        stamp = 5.0 + n / 125.0
+        message.header.stamp.sec, message.header.stamp.nanosec = int(stamp), round((stamp % 1) * 1e9)
+        publisher.publish(message)
+        if n % 100 == 0:
+            world.spin(0.005)
+    assert world.until(lambda: float(newest(statuses, "diagnoser").get("seconds kept (s)", "0")) >= 19.9, 20.0)
+    ok, text = trigger(world, "diagnose")
+    assert ok and "axis y: Nothing is missing" in text, node.output()
+    assert world.until(lambda: len(results.held_out("x")) == 2, 5.0)
+    assert json.loads(results.stories["x"][-1])["ladder"][1]["added"] == "quadratic_drag"
