@@ -124,6 +124,17 @@ def test_a_wrong_name_is_refused_in_one_line(name: str, words: str) -> None:
         added(told(), *data(), name)
 
 
+def test_backlash_is_told_one_sample_ahead() -> None:
+    """What free simulation cannot judge: the label says so, and the pictures are those of the prediction."""
+    story = tell("x", RATE, *recorded("x:backlash", seconds=20.0).axis("x"))
+    last = story.steps[-1]
+    assert (last.rung.added, last.rung.explained) == ("backlash", True)
+    assert "one sample ahead" in last.rung.label
+    assert len(last.pictures.failing) < len(story.steps[0].pictures.failing)
+    error = np.std(last.pictures.zoom_velocity - (story.measured.zoom_velocity if story.measured else 0.0))
+    assert error < 2.0 * last.rung.held_out_error
+
+
 def test_without_enough_data_the_story_says_what_lacks() -> None:
     """No steps, and a document all the same."""
     story = tell("x", RATE, np.ones(4000), np.zeros(4000))

@@ -51,6 +51,8 @@ def rung(fit: GreyboxFit, added: str | None = None, removed: str | None = None) 
     else:
         label = "rigid, with delay" if removed is None else f"without {removed}"
     model = fit.model
+    if any(model.library[name].one_step is not None for name, _ in model.effects):
+        label += " (error one sample ahead)"  # free simulation cannot judge these; see ``one_step``
     errors = fit.training_error, fit.held_out_error, fit.noise_floor, fit.excess
     return Rung(label, added, removed, model.gain, model.delay, model.pole, model.effects, fit.parameters, *errors, fit.excess < AT_FLOOR)
 
@@ -121,7 +123,7 @@ def findings(item: Diagnosis, library: Library) -> Findings:
         item.where.places if item.where is not None else (),
         tuple(_tried(candidate, fit, before) for candidate, fit in fitted),
         _runner_up(fitted, item.effects, library) if named else None,
-        _look_alikes(fitted, item.effects[0], library) if named else (),
+        _look_alikes(fitted, {one.effect: one.share for one in item.candidates}, item.effects[0], library) if named else (),
         rungs,
         item.next_experiment,
     )
@@ -155,7 +157,7 @@ def _runner_up(fitted: list[tuple[Candidate, GreyboxFit]], names: tuple[str, ...
     return name, f"{name} does nearly as well as {names[0]}: these data hardly tell them apart."
 
 
-def _look_alikes(fitted: list[tuple[Candidate, GreyboxFit]], name: str, library: Library) -> tuple[LookAlike, ...]:
+def _look_alikes(fitted: list[tuple[Candidate, GreyboxFit]], shares: Mapping[str, float], name: str, library: Library) -> tuple[LookAlike, ...]:
     fits = {candidate.effect: fit for candidate, fit in fitted}
     if name not in fits:
         return ()
@@ -163,14 +165,15 @@ def _look_alikes(fitted: list[tuple[Candidate, GreyboxFit]], name: str, library:
     for other in library[name].look_alikes:
         if other not in library.effects or library[other].category == "base":
             continue
-        if other not in fits:
+        richer = len(library[other].parameters) > len(library[name].parameters)
+        if other not in fits and shares.get(other, 0.0) > 0.0 and richer:
+            apart, text = False, f"{other}, with more parameters, was not fitted: nothing in these data asks for more than {name}"
+        elif other not in fits:
             apart, text = True, f"the error has no trace of {other}, or a weak one"
         elif fits[other].excess > fits[name].excess + SIMPLER:
             apart = True
             text = f"{other} leaves {1e3 * fits[other].held_out_error:.3g} mm/s, {name} {1e3 * fits[name].held_out_error:.3g}"
-        elif (
-            library[other].family and library[other].family == library[name].family and len(library[other].parameters) > len(library[name].parameters)
-        ):
+        elif library[other].family and library[other].family == library[name].family and richer:
             apart, text = False, f"{other} contains {name} and does as well; nothing in these data asks for more than {name}"
         else:
             apart, text = False, f"these data cannot tell {name} from {other}"

@@ -15,8 +15,10 @@ from xy_sysid.axis_model import STANDARD, AxisModel, Library, simulate
 from xy_sysid.diagnosis import diagnose, lacking
 from xy_sysid.errors import BadInput
 from xy_sysid.findings import Findings, Rung, findings, rung
-from xy_sysid.greybox import EPSILON, AxisData, GreyboxFit, fit, fit_base, fit_with, prepare
-from xy_sysid.refinement import LEAST_GAIN, MOST_EFFECTS, PART_GAIN, candidates, choose, prune
+from xy_sysid.greybox import EPSILON, AxisData, GreyboxFit, fit, fit_base, prepare
+from xy_sysid.one_step import one_step_fit
+from xy_sysid.refinement import LEAST_GAIN, MOST_EFFECTS, PART_GAIN, candidates, choose, prune, suspected
+from xy_sysid.refinement import added as fitted_with
 from xy_sysid.settings import unknown_name
 from xy_sysid.story_pictures import Measured, Pictures, measured, pictures
 from xy_sysid.stream import FloatArray
@@ -105,7 +107,7 @@ def added(story: Story, voltage: FloatArray, position: FloatArray, name: str, li
     relative = next((own for own in story.effects if library[own].family and library[own].family == library[name].family), None)
     try:
         before = now if relative is None else fit(data, now.model.without(relative))
-        found = fit_with(data, before, [name])
+        found = fitted_with(data, before, name)
     except np.linalg.LinAlgError:
         return replace(story, note=f"{name} could not be fitted to these data.")
     return _grown(story, data, found, name, relative)
@@ -147,7 +149,10 @@ def next_best(story: Story, voltage: FloatArray, position: FloatArray, library: 
     if planned is not None:
         return _shown(story, data, planned, library)
     now = _fit_of(story, data, library)
-    taken = choose(candidates(data, now, library), library)
+    tried = candidates(data, now, library)
+    if not story.effects and story.tolerance <= EPSILON:
+        tried = (*suspected(data, now, tried, library), *tried)
+    taken = choose(tried, library)
     if taken is None or taken.fit is None or now.excess - taken.fit.excess < max(LEAST_GAIN, PART_GAIN * now.excess):
         return replace(story, note="No effect of the library helps any further.")
     return _grown(story, data, taken.fit, taken.effect, None)
@@ -209,7 +214,7 @@ def _planned(story: Story) -> Rung | None:
 
 def _shown(story: Story, data: AxisData, step: Rung, library: Library) -> Story:
     """The story with a step whose fit is known."""
-    again = _simulated(data, step, library)
+    again = _simulated(data, step, story.steps[0].rung if story.steps else step, library)
     shown = story.measured or measured(data, again)
     return replace(story, measured=shown, steps=(*story.steps, StoryStep(step, pictures(data, again, shown))), note="")
 
@@ -227,11 +232,14 @@ def _model(story: Story, library: Library) -> AxisModel:
 
 def _fit_of(story: Story, data: AxisData, library: Library) -> GreyboxFit:
     assert story.now is not None
-    return _simulated(data, story.now, library)
+    return _simulated(data, story.now, story.steps[0].rung, library)
 
 
-def _simulated(data: AxisData, step: Rung, library: Library) -> GreyboxFit:
-    """The fit of a step again, by one simulation."""
+def _simulated(data: AxisData, step: Rung, base: Rung, library: Library) -> GreyboxFit:
+    """The fit of a step again: by one simulation, or as it was made where free simulation cannot judge it."""
+    alone = next((library[name] for name in step.effects if library[name].one_step is not None), None)
+    if alone is not None:
+        return one_step_fit(data, _simulated(data, base, base, library), alone)
     model = AxisModel(step.gain, step.delay, step.pole, step.values, library)
     simulated = simulate(model, data.sampling_rate, data.voltage, data.position)
     errors = step.train_error, step.held_out_error, step.noise_floor, step.excess
