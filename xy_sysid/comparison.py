@@ -67,6 +67,8 @@ class Comparison:
     @property
     def sentence(self) -> str:
         """For people."""
+        if not np.isfinite(self.error):
+            return "the simulated model runs away: it is not stable."
         ratio = self.error / self.noise_floor if self.noise_floor > 0 else float("inf")
         if not self.places:
             return f"nothing stands out: the error is {ratio:.2g} times the noise floor."

@@ -10,8 +10,10 @@ import numpy as np
 from xy_sysid.batch import batch_spectra
 from xy_sysid.errors import BadInput
 from xy_sysid.estimate import frequency_response
+from xy_sysid.fitting import Fit, identify
 from xy_sysid.frf import FrequencyResponse
 from xy_sysid.friction_hint import friction_hint, friction_note
+from xy_sysid.live_fit import structure_from
 from xy_sysid.period import find_period, period_note
 from xy_sysid.recording import Recording
 from xy_sysid.settings import IdentifierSettings
@@ -175,6 +177,18 @@ def judged(frf: FrequencyResponse) -> None:
     if frf.averages < 2.0:
         act = "Record longer, or shorten the window with --set length=."
         raise BadInput("number of independent windows", f"{frf.averages:.1f}", "2 or more, so that there is an uncertainty", act)
+
+
+def fitted(frf: FrequencyResponse, settings: IdentifierSettings) -> Fit:
+    """A transfer function that can be simulated: of rigid orders where the default orders give none that is stable."""
+    fit = identify(frf, structure_from(settings))
+    defaults = IdentifierSettings()
+    asked = settings.numerator_order, settings.denominator_order
+    if asked != (defaults.numerator_order, defaults.denominator_order) or (fit.converged and fit.tf.is_stable):
+        return fit
+    rigid = settings.model_copy(update={"numerator_order": 0, "denominator_order": settings.integrators + 1})
+    other = identify(frf, structure_from(rigid))
+    return other if other.converged and other.tf.is_stable else fit
 
 
 def split(recording: Recording, held_out: float) -> tuple[Recording, Recording]:

@@ -101,15 +101,13 @@ def compare(
 def _compared(recording: Recording, name: str, saved: Saved | None, settings: Any, quiet: bool) -> Comparison:
     """On the whole recording for a model of another one; else on its last third, with a model fitted to the rest if there is none."""
     from xy_sysid.comparison import compare_velocity
-    from xy_sysid.fitting import identify
-    from xy_sysid.live_fit import structure_from
-    from xy_sysid.offline import estimate, split
+    from xy_sysid.offline import estimate, fitted, split
     from xy_sysid.saved_models import Saved
 
     seen = saved is not None and saved.data == fingerprint(recording, name)
     training, unseen = split(recording, HELD_OUT if saved is None else 0.0)
     if saved is None:
-        saved = Saved(identify(estimate(training, name, settings).frf, structure_from(settings)).tf, None, "zoh", "")
+        saved = Saved(fitted(estimate(training, name, settings).frf, settings).tf, None, "zoh", "")
         data = unseen
     else:
         data = recording
