@@ -28,7 +28,7 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
-        (f"share/{NAME}/config", files("config/*.yaml", "config/*.xml", "config/*.md")),
+        (f"share/{NAME}/config", files("config/*.yaml", "config/*.xml", "config/*.json", "config/*.md")),
         (f"share/{NAME}/config/machines", files("config/machines/*.yaml")),
         (f"share/{NAME}/launch", files("launch/*.py")),
     ],

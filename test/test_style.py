@@ -32,7 +32,7 @@ linear_part paired distortion findings story_pictures story story_document
 hearing live_story diagnoser
 """)
 EDGE = names("""
-shipped parameter_file settings_doc effects_doc user_effects run_plan starter
+shipped parameter_file settings_doc effects_doc tool_layouts user_effects run_plan starter
 bags imports exports saved_models state_file work_queue story_worker
 nodes
 report page
