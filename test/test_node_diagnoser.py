@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import signal
+import subprocess
+import sys
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -13,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from ros_tools import ROOT, World, needs_ros, world_in
+from ros_tools import ROOT, World, needs_ros, new_domain, world_in
 from test_diagnosis import recorded
 from test_node_identifier import FAST, Source, drive, newest, ready
 
@@ -203,3 +206,19 @@ def test_joint_states_and_an_effect_of_ones_own(world: World, tmp_path: Path) ->
     assert ok and "axis y: Nothing is missing" in text, node.output()
     assert world.until(lambda: len(results.held_out("x")) == 2, 5.0)
     assert json.loads(results.stories["x"][-1])["ladder"][1]["added"] == "quadratic_drag"
+
+
+@pytest.mark.parametrize(("arguments", "words"), [
+    (["-p", "memry:=3.0"], "Did you mean 'memory'?"),
+    (["-p", 'effects.x:=["coging"]'], "Did you mean 'cogging'?"),
+    (["-p", 'effects.z:=["cogging"]'], "effects.y"),
+])  # fmt: skip
+def test_wrong_parameters_end_in_one_line(arguments: list[str], words: str, tmp_path: Path) -> None:
+    """Exit code 2, one line, no traceback."""
+    environment = {**os.environ, "ROS_DOMAIN_ID": str(new_domain()), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        [sys.executable, "-m", DIAGNOSER, "--ros-args", *arguments], capture_output=True, text=True, timeout=60, env=environment, cwd=tmp_path
+    )
+    assert done.returncode == 2
+    assert words in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1

@@ -96,6 +96,8 @@ def test_compare_and_validate_take_axis_models(folder: Path, capsys: pytest.Capt
     wrong = answer(capsys, "compare", folder / "other.npz", folder / "wrong.yaml", "-a", "x")["axes"]["x"]
     assert right["where"] == [] and right["error"]["now"] < 1.5 * right["error"]["noise_floor"]
     assert wrong["where"] and wrong["error"]["now"] > 5 * wrong["error"]["noise_floor"]
+    assert len(right["lines"]["frequency"]) == len(right["lines"]["residual_sigma"]) > 100
+    assert right["lines"]["rms_sigma"] < 1.0 and "sigma rms" in right["lines"]["sentence"]
     checked = answer(capsys, "validate", folder / "other.npz", folder / "right.yaml", "-a", "x")
     assert checked["same_data_as_the_fit"] == []
     assert checked["axes"]["x"]["rms_sigma"] < 1.0 and checked["axes"]["x"]["simulation"]["nrmse"] > 98.0

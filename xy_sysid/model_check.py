@@ -22,6 +22,7 @@ class ModelCheck:
     """How a model does on data that it has not seen.
 
     frequency, measured, predicted: (m,) trusted lines, Hz; the data; the model through hold and window
+    sigmas: (m,) |measured - predicted| in standard deviations of the measurement
     relative_error: rms of |measured - predicted| / |measured|; noise_floor: the same of the measurement's own sigma
     rms_sigma, worst_sigma: of the residual in sigma; worst_hz: where
     simulation: in the time domain, None if the data are too short
@@ -30,6 +31,7 @@ class ModelCheck:
     frequency: FloatArray
     measured: ComplexArray
     predicted: ComplexArray
+    sigmas: FloatArray
     relative_error: float
     noise_floor: float
     rms_sigma: float
@@ -102,5 +104,15 @@ def _judged(lines: FrequencyResponse, predicted: ComplexArray, simulated: Simula
             f"most at {lines.frequency[worst]:.4g} Hz ({sigmas[worst]:.3g} sigma)."
         )
     return ModelCheck(
-        lines.frequency, lines.response, predicted, relative, floor, rms, float(sigmas[worst]), float(lines.frequency[worst]), simulated, sentence
+        lines.frequency,
+        lines.response,
+        predicted,
+        sigmas,
+        relative,
+        floor,
+        rms,
+        float(sigmas[worst]),
+        float(lines.frequency[worst]),
+        simulated,
+        sentence,
     )

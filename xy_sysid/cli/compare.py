@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from xy_sysid.cli import options as o
+from xy_sysid.cli.checking import checked, longest
 from xy_sysid.cli.diagnose import Own
 from xy_sysid.cli.output import aside, emit, people, quantity, table
 from xy_sysid.cli.provenance import fingerprint
@@ -16,6 +17,7 @@ from xy_sysid.cli.reading import chosen, each, read
 if TYPE_CHECKING:
     from xy_sysid.comparison import Comparison
     from xy_sysid.distortion import Distortion
+    from xy_sysid.model_check import ModelCheck
     from xy_sysid.paired import Paired
     from xy_sysid.recording import Recording
     from xy_sysid.saved_models import Saved
@@ -75,12 +77,15 @@ def compare(
             people.print(f"axis {name}: {text}", markup=False)
         return
     found: dict[str, Comparison] = {}
+    lines: dict[str, ModelCheck | None] = {}
     splits: dict[str, Distortion | None] = {}
     for name in names:
-        found[name] = _compared(recording, name, models[0][name] if models else None, settings, quiet=json)
+        found[name], lines[name] = _compared(recording, name, models[0][name] if models else None, settings, quiet=json)
         splits[name] = _split(recording, name)
     if json:
-        emit({"model": None if model is None else str(model), "axes": {name: _answer(item, splits[name]) for name, item in found.items()}})
+        emit(
+            {"model": None if model is None else str(model), "axes": {name: _answer(item, lines[name], splits[name]) for name, item in found.items()}}
+        )
         return
     for name, item in found.items():
         people.print(f"axis {name}: {item.sentence}", markup=False)
@@ -90,7 +95,9 @@ def compare(
             ("up to", f"{item.band_end:.4g} Hz"),
         ]
         people.print("  " + ", ".join(f"{label} {text}" for label, text in figures))
-        split = splits[name]
+        line, split = lines[name], splits[name]
+        if line is not None:
+            people.print(f"  {_in_frequency(line, item)}")
         if split is not None:
             people.print(f"  {split.sentence}")
         if item.places:
@@ -98,9 +105,10 @@ def compare(
             table("", ("where", "over floor", "in words"), rows)
 
 
-def _compared(recording: Recording, name: str, saved: Saved | None, settings: Any, quiet: bool) -> Comparison:
+def _compared(recording: Recording, name: str, saved: Saved | None, settings: Any, quiet: bool) -> tuple[Comparison, ModelCheck | None]:
     """On the whole recording for a model of another one; else on its last third, with a model fitted to the rest if there is none."""
     from xy_sysid.comparison import compare_velocity
+    from xy_sysid.errors import BadInput
     from xy_sysid.offline import estimate, fitted, split
     from xy_sysid.saved_models import Saved
 
@@ -113,25 +121,32 @@ def _compared(recording: Recording, name: str, saved: Saved | None, settings: An
         data = recording
     if seen and not quiet:
         aside.print(f"axis {name}: the model was fitted to this very recording; only its last third is looked at")
-    u, y = _longest(data, name)
+    u, y = longest(data, name)
     velocity = saved.velocity(data.sampling_rate, u, y)
     first = _held(len(y)) if seen else 0
-    return compare_velocity(velocity[first:], u[first:], y[first:], data.sampling_rate, f"{data.output_unit}/s", data.output_unit)
+    compared = compare_velocity(velocity[first:], u[first:], y[first:], data.sampling_rate, f"{data.output_unit}/s", data.output_unit)
+    try:
+        return compared, checked(data, name, saved, settings)[0]
+    except BadInput:  # too short for a window, or nothing coherent: time alone must do
+        return compared, None
+
+
+def _in_frequency(line: ModelCheck, compared: Comparison) -> str:
+    from xy_sysid.comparison import TWICE
+    from xy_sysid.model_check import AT_THE_FLOOR
+
+    text = f"in frequency: residual {line.rms_sigma:.3g} sigma rms, at worst {line.worst_sigma:.3g} at {line.worst_hz:.4g} Hz"
+    hidden = line.rms_sigma <= AT_THE_FLOOR and compared.error > TWICE * compared.noise_floor
+    return text + (": what fails does not repeat with the input, so a frequency response takes it for noise (friction does that)." if hidden else ".")
 
 
 def _pair(recording: Recording, name: str, before: Saved, after: Saved) -> Paired:
     from xy_sysid.paired import paired
 
-    u, y = _longest(recording, name)
+    u, y = longest(recording, name)
     first = _held(len(y)) if fingerprint(recording, name) in (before.data, after.data) else 0
     old, new = (saved.velocity(recording.sampling_rate, u, y)[first:] for saved in (before, after))
     return paired(old, new, y[first:], recording.sampling_rate)
-
-
-def _longest(recording: Recording, name: str) -> Any:
-    run = max(recording.runs(), key=lambda part: part.stop - part.start)
-    u, y = recording.axis(name)
-    return u[run], y[run]
 
 
 def _held(samples: int) -> int:
@@ -144,12 +159,12 @@ def _split(recording: Recording, name: str) -> Distortion | None:
     from xy_sysid.distortion import distortion
     from xy_sysid.period import find_period
 
-    u, y = _longest(recording, name)
+    u, y = longest(recording, name)
     period = find_period(u)
     return distortion(recording.sampling_rate, u, y, period) if period else None
 
 
-def _answer(item: Comparison, split: Distortion | None) -> dict[str, Any]:
+def _answer(item: Comparison, line: ModelCheck | None, split: Distortion | None) -> dict[str, Any]:
     return {
         "sentence": item.sentence,
         "error": {"unit": item.unit, "now": item.error, "noise_floor": item.noise_floor, "held_out": item.error},
@@ -159,6 +174,9 @@ def _answer(item: Comparison, split: Distortion | None) -> dict[str, Any]:
         ],
         "frequency": item.frequency,
         "error_over_floor": item.error_over_floor,
+        "lines": None
+        if line is None
+        else {"sentence": _in_frequency(line, item), "frequency": line.frequency, "residual_sigma": line.sigmas, "rms_sigma": line.rms_sigma},
         "distortion": None if split is None else {"sentence": split.sentence, "period": split.period, "even": split.even, "odd": split.odd},
     }
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from xy_sysid.cli import options as o
+from xy_sysid.cli.checking import checked
 from xy_sysid.cli.diagnose import Own
 from xy_sysid.cli.output import aside, emit, people, table
 from xy_sysid.cli.provenance import fingerprint
@@ -15,8 +16,6 @@ from xy_sysid.cli.reading import chosen, each, read
 
 if TYPE_CHECKING:
     from xy_sysid.model_check import ModelCheck
-    from xy_sysid.recording import Recording
-    from xy_sysid.saved_models import Saved
 
 
 def validate(
@@ -34,8 +33,6 @@ def validate(
 ) -> None:
     """Check a model on a recording that it has not seen, in frequency and in time."""
     from xy_sysid.errors import BadInput
-    from xy_sysid.model_check import check, check_motion
-    from xy_sysid.offline import estimate, judged
     from xy_sysid.saved_models import read_models
     from xy_sysid.user_effects import library
     from xy_sysid.validation import simulation_sentence
@@ -48,16 +45,7 @@ def validate(
     def work(name: str) -> tuple[ModelCheck, tuple[str, ...]]:
         if name not in models:
             raise BadInput(f"model of axis {name}", f"not in {model}", ", ".join(models), "Choose axes with --axis.")
-        found = estimate(recording, name, settings, samples)
-        judged(found.frf)
-        run = max(recording.runs(), key=lambda part: part.stop - part.start)
-        u, y = recording.axis(name)
-        saved = models[name]
-        if saved.axis is None:
-            return check(saved.tf, found.frf, u[run], y[run], saved.hold), found.notes
-        moved = estimate(simulated(recording, name, saved), name, settings, samples)
-        velocity = saved.velocity(recording.sampling_rate, u[run], y[run])
-        return check_motion(velocity, moved.frf, found.frf, y[run]), found.notes
+        return checked(recording, name, models[name], settings, samples)
 
     done, problems = each(chosen(recording, axis), work)
     answers = {name: found for name, (found, _) in done.items()}
@@ -96,19 +84,3 @@ def validate(
             people.print(f"axis {name}: {simulation_sentence(found.simulation)}")
     for name, text in problems.items():
         people.print(f"axis {name}: not checked. {text}")
-
-
-def simulated(recording: Recording, axis: str, saved: Saved) -> Recording:
-    """The recording as the model says that this axis would have moved in it, run by run."""
-    from dataclasses import replace
-
-    import numpy as np
-
-    u, y = recording.axis(axis)
-    position = recording.position.copy()
-    column = recording.axes.index(axis)
-    for run in recording.runs():
-        if run.stop - run.start > 1:
-            moved = np.cumsum(saved.velocity(recording.sampling_rate, u[run], y[run])) / recording.sampling_rate
-            position[run.start + 1 : run.stop, column] = y[run.start] + moved
-    return replace(recording, position=position)
