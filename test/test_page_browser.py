@@ -92,7 +92,7 @@ def test_an_effect_is_diagnosed_and_added_by_clicks_until_the_error_is_at_the_fl
     one, other = ready(tab()), tab()
     assert one.ladder()[0] > 5
     one.press("diagnose")
-    one.until(lambda: "Missing: coulomb_friction" in one.verdict(), 60)
+    one.until(lambda: "Missing: coulomb friction" in one.verdict(), 60)
     one.page.locator("[data-add=coulomb_friction]").click()
     one.until(lambda: len(one.ladder()) == 2, 60)
     assert one.ladder()[1] < 1.2 and "at the noise floor" in one.verdict()
@@ -126,7 +126,7 @@ def test_a_reload_in_the_middle_loses_nothing_and_a_fit_can_be_left(tab: Callabl
     one.page.reload()
     one.page.get_by_role("button", name="axis y").click()
     one.until(lambda: busy.is_visible() or "coulomb" in one.verdict(), 10)
-    one.until(lambda: "Missing: coulomb_friction" in one.verdict() and free.is_enabled(), 60)
+    one.until(lambda: "Missing: coulomb friction" in one.verdict() and free.is_enabled(), 60)
     one.press("auto")
     one.until(lambda: "at the noise floor" in one.verdict() and len(one.ladder()) == 2, 60)
 

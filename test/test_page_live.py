@@ -102,7 +102,7 @@ def test_a_hidden_effect_is_found_and_added_by_clicks(scene: Scene) -> None:
     tab.page.wait_for_timeout(2500)  # some more of the travel
     tab.page.get_by_role("button", name="axis y").click()
     tab.press("diagnose")
-    tab.until(lambda: "Missing: coulomb_friction" in tab.verdict(), 90)
+    tab.until(lambda: "Missing: coulomb friction" in tab.verdict(), 90)
     assert len(tab.ladder()) == 1 and tab.ladder()[0] > 4
     tab.until(lambda: tab.page.locator("[data-add=coulomb_friction]").is_enabled(), 60)
     tab.page.locator("[data-add=coulomb_friction]").click()

@@ -211,7 +211,10 @@ def test_the_verdict_says_what_how_sure_and_where_the_model_stands() -> None:
     """In one line, for people and screen readers."""
     words = verdict_words(story())
     assert (
-        "Something is missing (confidence 98 %)" in words and "coulomb_friction" in words and "0.33 mm/s" in words and "at the noise floor" in words
+        "Something is missing (confidence 98 %)" in words
+        and "Missing: coulomb friction." in words
+        and "0.33 mm/s" in words
+        and "at the noise floor" in words
     )
     assert standing({"ladder": []}) == ""
     poor = story(ladder=[{"held_out_error": 4e-3, "noise_floor": 4e-4, "explained": False}])

@@ -153,8 +153,9 @@ def parameter_rows(parameters: Mapping[str, Mapping[str, Any]]) -> list[tuple[st
 def transfer_function_html(numerator: FloatArray, denominator: FloatArray, delay: float) -> str:
     """H(s) = N(s)/D(s) exp(-s delay) as HTML, D monic or not, in m/V."""
     top, bottom = escape(polynomial(numerator)), escape(polynomial(denominator))
-    late = f"e<sup>−{escape(quantity(delay, 's', 4))}·s</sup>" if delay else ""
-    return f'<span class="math"><i>H</i>(<i>s</i>) = <span class="frac"><span>{top}</span><span>{bottom}</span></span> {late}</span>'
+    late = f"<span>e<sup>−<i>s</i> · {escape(quantity(delay, 's', 4))}</sup></span>" if delay else ""
+    whole = f'<span class="frac"><span>{top}</span><span>{bottom}</span></span>'
+    return f'<span class="math"><span><i>H</i>(<i>s</i>) =</span> {whole} {late}</span>'
 
 
 def polynomial(coefficients: FloatArray) -> str:

@@ -43,7 +43,10 @@ class NodeState:
 
 @dataclass
 class Heard:
-    """The newest of everything; ``version`` grows with each message of its kind, so that a page knows when to draw again."""
+    """The newest of everything; ``version`` grows with each message of its kind, so that a page knows when to draw again.
+
+    One thread writes and others read: whoever walks through a table copies it first.
+    """
 
     arrays: dict[str, ArrayMessage] = field(default_factory=dict)
     statuses: dict[str, StatusMessage] = field(default_factory=dict)
@@ -57,8 +60,8 @@ class Heard:
 
     def axes(self) -> tuple[str, ...]:
         """Axes of which something was heard, in the order of their names."""
-        named = {topic.partition("/")[2] for topic in self.arrays} | set(self.stories)
-        named |= {name.removeprefix("axis ") for name in self.statuses if name.startswith("axis ")}
+        named = {topic.partition("/")[2] for topic in list(self.arrays)} | set(self.stories)
+        named |= {name.removeprefix("axis ") for name in list(self.statuses) if name.startswith("axis ")}
         return tuple(sorted(named))
 
     def array(self, message: ArrayMessage) -> None:

@@ -60,7 +60,9 @@ class Page:
         with ui.header(elevated=False).classes("bar").props("role=banner"):
             ui.html("<h1>xy_sysid</h1>", sanitize=False)
             self._state = ui.label("").classes("say grow").props("role=status")
-            ui.button("Open a recording", on_click=lambda: open_dialog(session)).props("flat dense no-caps icon=folder_open")
+            ui.button("Open a recording", on_click=lambda: open_dialog(session)).props(
+                'flat dense no-caps icon=folder_open aria-label="Open a recording"'
+            ).classes("opener")
             dark = ui.dark_mode(None)
             theme = ui.toggle({0: "auto", 1: "light", 2: "dark"}, value=0, on_change=lambda event: dark.set_value((None, False, True)[event.value]))
             theme.props('flat dense no-caps aria-label="light or dark"').classes("hide")
@@ -80,7 +82,7 @@ class Page:
             with self._alarm:
                 for words in alarms:
                     ui.label(f"Alarm: {words}").classes("notice")
-        fresh = [message for message in session.messages if time.monotonic() - message.at < (GOOD_STAYS if message.good else BAD_STAYS)]
+        fresh = [message for message in list(session.messages) if time.monotonic() - message.at < (GOOD_STAYS if message.good else BAD_STAYS)]
         numbers = [message.number for message in fresh[-SHOWN:]]
         if numbers != self._told:
             self._told = numbers

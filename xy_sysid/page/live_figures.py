@@ -46,12 +46,15 @@ def response_figure(frf: ArrayMessage, comparison: ArrayMessage | None, tf: Tran
         if pieces:
             band(figure, row, pieces, frequency, low, high, MEASURED, "measured", "95 % band" if row == 1 else "")
             _curve(figure, row, broken(pieces, frequency), broken(pieces, middle), MEASURED, "solid", "measured", row == 1)
+    shown = {1: [level], 2: [phase]}
     if tf is not None:
         model = held_response(tf, frequency, sampling_rate) if sampling_rate > 0 else tf.response(frequency)
         shifted = phase_of(model)
         if bool(trusted.any()):
             shifted = shifted + 360 * np.round(np.median((phase - shifted)[trusted]) / 360)
-        _curve(figure, 1, frequency, decibel(model, "m"), MODEL, "dash", "model", True)
+        shown[1].append(decibel(model, "m"))
+        shown[2].append(shifted)
+        _curve(figure, 1, frequency, shown[1][1], MODEL, "dash", "model", True)
         _curve(figure, 2, frequency, shifted, MODEL, "dash", "model", False)
     _untrusted(figure, 3, frequency, coherence, ~trusted, False)
     if pieces:
@@ -61,8 +64,8 @@ def response_figure(frf: ArrayMessage, comparison: ArrayMessage | None, tf: Tran
     figure.update_yaxes(title_text="phase (°)", dtick=turns([phase[trusted] if bool(trusted.any()) else phase]), row=2, col=1)
     figure.update_yaxes(title_text="coherence", range=[-0.03, 1.05], row=3, col=1)
     figure.update_yaxes(title_text="residual (σ)", type="log", dtick=1, tickformat="~g", row=4, col=1)
-    for row, values in ((1, level), (2, phase)):
-        seen = values[trusted] if bool(trusted.any()) else values
+    for row, found in shown.items():
+        seen = np.concatenate([values[trusted] if bool(trusted.any()) else values for values in found])
         room = max(0.06 * float(np.ptp(seen)), 1.0)
         figure.update_yaxes(range=[float(seen.min()) - room, float(seen.max()) + room], row=row, col=1)
     frequency_axis(figure, 4, [frequency])

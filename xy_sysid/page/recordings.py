@@ -80,7 +80,7 @@ class OpenRecording:
         if axis in self._jobs:
             raise BadInput(f"axis {axis}", f"busy {self._jobs[axis].wish.words}", "one thing at a time", "Wait, or cancel it.")
         wish = Wish(next(self._numbers), act, axis, argument)
-        self._jobs[axis] = Job(wish, time.monotonic())
+        self._jobs[axis] = Job(wish, time.monotonic(), running=not self._jobs)
         self._changed(axis)
         self._send(wish)
 
@@ -89,7 +89,7 @@ class OpenRecording:
         job = self._jobs.get(axis)
         if job is None or self._process.pid is None or not self._process.is_alive():
             return
-        first = min(self._jobs.values(), key=lambda item: item.wish.number)
+        first = min(list(self._jobs.values()), key=lambda item: item.wish.number)
         if first is job:
             os.kill(self._process.pid, worker.LEAVE)
         else:
@@ -139,8 +139,9 @@ class OpenRecording:
             if news.kind == "failed":
                 self._say(f"{self.title}, axis {news.axis}: {news.words}")
             self._changed(news.axis)
-        for axis, job in self._jobs.items():
-            running = job.wish.number == min(item.wish.number for item in self._jobs.values())
+        waiting = list(self._jobs.items())  # another thread may ask for more meanwhile
+        for axis, job in waiting:
+            running = job.wish.number == min(item.wish.number for _, item in waiting)
             if running != job.running:
                 self._jobs[axis] = replace(job, running=running, begun=time.monotonic())
 

@@ -112,7 +112,7 @@ class Session:
         if found is None:
             found = self._figures[key] = make()
             while len(self._figures) > DRAWN:
-                self._figures.pop(next(iter(self._figures)))
+                self._figures.pop(next(iter(list(self._figures))), None)
         return found
 
     def close(self) -> None:

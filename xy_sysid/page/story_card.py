@@ -143,7 +143,7 @@ class StoryCard:
                         self._row_button("Add", "add", row.effect)
         with self._more:
             for line in look_alike_lines(document):
-                ui.label(line).classes("small")
+                ui.label(line).classes("next" if line.startswith("Next") else "small")
         steps = step_names(document)
         self._pair = (min(self._pair[0], len(steps) - 1), len(steps) - 1)
         self._first.set_options(steps, value=self._pair[0])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -33,7 +34,7 @@ def verdict_words(document: Document) -> str:
         words = f"{VERDICTS.get(str(document['verdict']), str(document['verdict']))}"
         words += f" (confidence {100 * sure:.0f} %)" if isinstance(sure, (int, float)) else ""
         sentence = f"{words}. {sentence}"
-    return f"{sentence} {standing(document)}".strip()
+    return spaced(f"{sentence} {standing(document)}").strip()
 
 
 def standing(document: Document) -> str:
@@ -58,7 +59,7 @@ def model_effects(document: Document) -> list[str]:
 
 def candidate_rows(document: Document, most: int = 8) -> list[Row]:
     """What was tried, best first, with its evidence."""
-    return [Row(str(item["effect"]), str(item["evidence"])) for item in (document.get("candidates") or [])[:most]]
+    return [Row(str(item["effect"]), spaced(str(item["evidence"]))) for item in (document.get("candidates") or [])[:most]]
 
 
 def look_alike_lines(document: Document) -> list[str]:
@@ -66,12 +67,12 @@ def look_alike_lines(document: Document) -> list[str]:
     lines = []
     runner = document.get("runner_up")
     if runner:
-        lines.append(f"Runner-up: {_spaced(str(runner['effect']), str(runner['sentence']))}")
+        lines.append(f"Runner-up: {spaced(_named(str(runner['effect']), str(runner['sentence'])))}")
     for item in document.get("look_alikes") or []:
         state = "told apart" if item["told_apart"] else "not told apart by these data"
-        lines.append(f"Look-alike {str(item['effect']).replace('_', ' ')}, {state}: {item['sentence']}.".replace("..", "."))
+        lines.append(spaced(f"Look-alike {item['effect']}, {state}: {item['sentence']}.".replace("..", ".")))
     if document.get("next_experiment"):
-        lines.append(f"Next experiment: {document['next_experiment']}")
+        lines.append(spaced(f"Next experiment: {document['next_experiment']}"))
     return lines
 
 
@@ -88,5 +89,10 @@ def step_names(document: Document) -> dict[int, str]:
     return {k: f"{k}: {str(step['label']).replace('_', ' ')}" for k, step in enumerate(document.get("steps") or []) if step.get("pictures")}
 
 
-def _spaced(name: str, sentence: str) -> str:
+def _named(name: str, sentence: str) -> str:
     return sentence if name in sentence else f"{name}: {sentence}"
+
+
+def spaced(sentence: str) -> str:
+    """Names of effects as people write them: coulomb friction."""
+    return re.sub(r"(?<=[a-z])_(?=[a-z])", " ", sentence)
