@@ -12,6 +12,7 @@ import queue
 import signal
 import threading
 from dataclasses import dataclass
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -91,7 +92,7 @@ class StoryWorker:
                         process.terminate()
             except (EOFError, OSError):
                 process.join(2.0)
-                text = f"the worker process ended (exit code {process.exitcode}); see the log"
+                text = f"the worker process ended (exit code {process.exitcode}); see the log."
                 self._news.put(News(number, "", ended=True, problem=text))
                 process = None
         if process is not None:
@@ -110,6 +111,7 @@ class StoryWorker:
 def _begin(effect_files: tuple[str, ...]) -> tuple[BaseProcess, Connection]:
     here, there = multiprocessing.Pipe()
     process = multiprocessing.get_context("spawn").Process(target=work, args=(there, effect_files), name="story", daemon=True)
+    resource_tracker.ensure_running()  # its own start would let SIGINT through again
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # the child inherits it: Ctrl-C is for its parent
     try:
         process.start()
