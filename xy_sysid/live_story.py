@@ -83,6 +83,8 @@ def sentence(story: Story) -> str:
     """What is known of the axis, in words."""
     told = story.diagnosis.sentence if story.diagnosis is not None else "Not diagnosed yet."
     now = story.now
+    if story.diagnosis is not None and story.diagnosis.verdict == "nothing_missing" and not story.effects:
+        return f"axis {story.axis}: {told}"
     if now is None or not now.effects:
         return f"axis {story.axis}: {told}{f' {story.note}' if story.note else ''}"
     error = f"held-out error {1e3 * now.held_out_error:.3g} mm/s (floor {1e3 * now.noise_floor:.3g})"

@@ -33,6 +33,15 @@ class Saved:
     hold: Hold
     data: str
 
+    @property
+    def doubt(self) -> str:
+        """What speaks against judging the model by its free simulation; empty if nothing does."""
+        effects = self.axis.effects if self.axis is not None else ()
+        names = [name for name, _ in effects if self.axis is not None and not self.axis.library[name].simulable]
+        if not names:
+            return ""
+        return f"no free simulation can follow {' and '.join(names)} (the contact is chaotic): the error says little about the model"
+
     def velocity(self, sampling_rate: float, voltage: FloatArray, position: FloatArray) -> FloatArray:
         """(n - 1,) simulated mean velocity of each sample, m/s, from rest."""
         if self.axis is not None:

@@ -31,7 +31,10 @@ def checked(recording: Recording, axis: str, saved: Saved, settings: Any, sample
     if saved.axis is None:
         return check(saved.tf, found.frf, u, y, saved.hold), found.notes
     moved = estimate(simulated(recording, axis, saved), axis, settings, samples)
-    return check_motion(saved.velocity(recording.sampling_rate, u, y), moved.frf, found.frf, y), found.notes
+    return check_motion(saved.velocity(recording.sampling_rate, u, y), moved.frf, found.frf, y), (
+        *found.notes,
+        *([saved.doubt] if saved.doubt else []),
+    )
 
 
 def simulated(recording: Recording, axis: str, saved: Saved) -> Recording:

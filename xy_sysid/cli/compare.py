@@ -72,6 +72,9 @@ def compare(
             emit({"before": str(before), "after": str(after), "axes": {name: _paired(item) for name, item in pairs.items()}, "refused": refused})
             return
         for name, pair in pairs.items():
+            for held in models:
+                if held[name].doubt:
+                    aside.print(f"axis {name}: {held[name].doubt}")
             people.print(f"axis {name}: {pair.sentence}", markup=False)
         for name, text in refused.items():
             people.print(f"axis {name}: {text}", markup=False)
@@ -119,6 +122,8 @@ def _compared(recording: Recording, name: str, saved: Saved | None, settings: An
         data = unseen
     else:
         data = recording
+    if saved.doubt and not quiet:
+        aside.print(f"axis {name}: {saved.doubt}")
     if seen and not quiet:
         aside.print(f"axis {name}: the model was fitted to this very recording; only its last third is looked at")
     u, y = longest(data, name)
