@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from browser_tools import browser, needs_browser
 from cli_tools import cli, npz, refused, rigid
 from test_report_page import parsed, plots
 
@@ -157,3 +158,41 @@ def test_the_answer_is_plain_json(answer: dict[str, Any]) -> None:
     """One document, without the pictures' rows."""
     assert len(json.dumps(answer)) < 100_000
     assert set(answer["axes"]) == {"x", "y"}
+
+
+@needs_browser
+@pytest.mark.parametrize(("width", "mode"), [(1400, "light"), (400, "dark")])
+def test_the_report_opens_in_a_browser_without_a_network(folder: Path, page: str, width: int, mode: str) -> None:
+    """No error, no request but for the file itself; every picture is drawn when it is reached; the page is as wide as the window."""
+    with browser() as made:
+        context = made.new_context(viewport={"width": width, "height": 900}, color_scheme=mode, offline=True)
+        tab = context.new_page()
+        wrong: list[str] = []
+        asked: list[str] = []
+        tab.on("pageerror", lambda error: wrong.append(str(error)))
+        tab.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)
+        tab.on("request", lambda request: asked.append(request.url))
+        tab.goto((folder / "out.html").as_uri())
+        names = list(plots(page))
+        for name in names:
+            tab.locator(f"#{name}").scroll_into_view_if_needed()
+            tab.locator(f"#{name} .main-svg").first.wait_for(timeout=10_000)
+        assert not wrong and asked == [(folder / "out.html").as_uri()]
+        assert tab.evaluate("document.documentElement.scrollWidth") <= width
+        ink = tab.evaluate("getComputedStyle(document.querySelector('#ladder-0 .xtick text')).fill")
+        assert ink == ("rgb(36, 41, 47)" if mode == "light" else "rgb(215, 220, 225)")
+        tab.emulate_media(color_scheme="dark" if mode == "light" else "light")
+        tab.wait_for_timeout(300)
+        assert tab.evaluate("getComputedStyle(document.querySelector('#ladder-0 .xtick text')).fill") != ink
+
+
+@needs_browser
+def test_every_picture_is_on_paper(folder: Path, page: str) -> None:
+    """Pictures that were never reached are drawn before the page is printed."""
+    with browser() as made:
+        tab = made.new_context(viewport={"width": 1000, "height": 700}, offline=True).new_page()
+        tab.goto((folder / "out.html").as_uri())
+        tab.evaluate("window.dispatchEvent(new Event('beforeprint'))")
+        tab.wait_for_timeout(500)
+        assert tab.locator(".plot .main-svg").count() >= len(plots(page))
+        assert tab.evaluate("[...document.querySelectorAll('.plot')].every((box) => box.querySelector('.main-svg'))")

@@ -13,6 +13,7 @@ from xy_sysid.report.words import interval_text, number, quantity
 
 PARTLY = 0.7  # of the base's excess that may be left for "partly", as in xy-sysid refine
 STANDARD_TOLERANCE = 1e-3
+AHEAD = "one sample ahead"  # in the label of a step whose error is not that of a free simulation
 
 LADDER = (
     "How the error falls as effects are added and everything is fitted again. Solid: the error on the last third, which no fit has seen; "
@@ -83,9 +84,9 @@ def size(story: Document, speed: float) -> str:
     """How large the error is, against the motion, against the rigid model and against noise."""
     unit = story["error"]["unit"]
     first, last = story["ladder"][0], story["ladder"][-1]
+    how = "Predicted one sample ahead, as a contact allows no free simulation," if AHEAD in last["label"] else "Simulated from the voltage alone"
     text = (
-        "Simulated from the voltage alone on the last third of the recording, which no fit has seen, the model is off by "
-        f"{quantity(float(last['held_out_error']), unit, 3)} rms"
+        f"{how} on the last third of the recording, which no fit has seen, the model is off by {quantity(float(last['held_out_error']), unit, 3)} rms"
     )
     if math.isfinite(speed) and speed > 0:
         text += f", {number(100 * float(last['held_out_error']) / speed, 2)} % of the speed itself"
