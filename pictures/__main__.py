@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 from pictures.examples import EXAMPLES, rigid_model, whole_story
+from pictures.page_shot import shoot_page
 from pictures.reading import page
 from pictures.shots import shoot
 from xy_sysid.errors import BadInput
@@ -19,7 +20,7 @@ def main(names: list[str]) -> int:
     """The exit code."""
     folder = DOCS / "pictures"
     folder.mkdir(exist_ok=True)
-    known = [*(example.name for example in EXAMPLES), "ladder", "before_after", "candidates", "response"]
+    known = [*(example.name for example in EXAMPLES), "ladder", "before_after", "candidates", "response", "page"]
     for name in names:
         if name not in known:
             raise BadInput("picture", repr(name), ", ".join(known), "Choose some of these.")
@@ -29,7 +30,7 @@ def main(names: list[str]) -> int:
             story = rigid_model(example)
             shoot([made(story) for made in example.pictures], folder / f"{example.name}.png", *SMALL)
             print(example.name, flush=True)
-    whole = [name for name in wanted if name in known[len(EXAMPLES) :]]
+    whole = [name for name in wanted if name in known[len(EXAMPLES) : -1]]
     if whole:
         story = whole_story()
         made = {
@@ -42,6 +43,9 @@ def main(names: list[str]) -> int:
             figures, size = made[name]
             shoot(figures, folder / f"{name}.png", *size)
             print(name, flush=True)
+    if "page" in wanted:
+        shoot_page(folder / "page.png")
+        print("page", flush=True)
     (DOCS / "reading-pictures.md").write_text(page(), encoding="utf-8")
     return 0
 
