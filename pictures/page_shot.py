@@ -14,7 +14,7 @@ from typing import Any
 from pictures.examples import SECONDS
 from pictures.shots import browser
 
-WINDOW = {"width": 1360, "height": 1000}  # px
+WIDTH, HEIGHT = 1360, 1000  # px
 EFFECTS = ("x:cogging", "x:coulomb_friction")
 PATIENCE = 120_000  # ms
 
@@ -30,7 +30,7 @@ def shoot_page(path: Path) -> None:
         subprocess.run([sys.executable, "-m", "xy_sysid", *simulate], check=True, stdout=subprocess.DEVNULL)
         with _served(Path(name), recording) as address, sync_playwright() as play:
             made = play.chromium.launch(executable_path=browser(), args=["--no-sandbox", "--disable-gpu"])
-            page = made.new_page(viewport=WINDOW)
+            page = made.new_page(viewport={"width": WIDTH, "height": HEIGHT})
             page.goto(address)
             for act, words in (("diagnose", "Missing"), ("auto", "at the noise floor")):
                 _press(page, act)
