@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from xy_sysid.cli import options as o
+from xy_sysid.cli.diagnose import Own
+
+if TYPE_CHECKING:
+    from xy_sysid.page.wishes import Reading
 
 Recs = Annotated[
     list[Path] | None, typer.Argument(metavar="[REC]...", help="recordings to open side by side; without one the page is live, over ROS 2")
@@ -23,6 +27,9 @@ def page(
     live: Annotated[
         bool | None, typer.Option("--live/--no-live", help="with recordings: the machine too; default is live without recordings")
     ] = None,
+    topic: o.Topics = None,
+    effort: o.Effort = False,
+    effect_file: Own = None,
     namespace: Annotated[str, typer.Option(help="ROS namespace of the machine")] = "/xy",
     browse: Annotated[bool, typer.Option("--browse/--no-browse", help="open a browser where there is a display")] = True,
 ) -> None:
@@ -54,7 +61,7 @@ def page(
     from xy_sysid.page.session import Session
     from xy_sysid.page.shelf import Shelf
 
-    session = Session(Shelf(folder), with_machine, namespace)
+    session = Session(Shelf(folder), with_machine, namespace, reading(topic, effort, effect_file))
     try:
         for path in rec or []:
             session.open(path)
@@ -62,6 +69,18 @@ def page(
     finally:
         session.close()
     aside.print("the page has ended")
+
+
+def reading(topics: list[str] | None, effort: bool, effect_files: list[Path] | None) -> Reading:
+    """How recordings are read, for the page and for the reports that it makes; raises BadInput."""
+    from xy_sysid.page.wishes import Reading
+    from xy_sysid.user_effects import library
+
+    library(effect_files or [])  # whatever is wrong with them is said here
+    load: dict[str, Any] = {**o.topics_from(topics), **({"effort_as_voltage": True} if effort else {})}
+    words = [word for topic in topics or [] for word in ("--topic", topic)] + ["--effort"] * effort
+    words += [word for file in effect_files or [] for word in ("--effect-file", str(file))]
+    return Reading(load, tuple(words), tuple(effect_files or ()))
 
 
 def display() -> bool:

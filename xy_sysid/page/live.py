@@ -6,6 +6,7 @@ import itertools
 import time
 from typing import Any
 
+from xy_sysid.axis_model import STANDARD
 from xy_sysid.errors import BadInput
 from xy_sysid.page.heard import Heard
 from xy_sysid.page.link import Link
@@ -58,6 +59,10 @@ class Live:
             return "The diagnoser is not running: start it with xy-sysid run, or record a bag and open it here."
         kept = self.heard.values(NODE).get("seconds kept (s)", "0")
         return f"Not diagnosed yet. {float(kept):.0f} s of data are kept; press Diagnose."
+
+    def effects(self) -> tuple[str, ...]:
+        """The library; what the diagnoser has besides can be added with its parameter."""
+        return tuple(effect.name for effect in STANDARD.acting)
 
     def problem(self) -> str:
         """The nodes that are lost are told elsewhere."""

@@ -14,6 +14,8 @@ from xy_sysid.page.session import Session
 from xy_sysid.page.story_card import StoryCard
 from xy_sysid.page.wishes import Source
 
+SHORT = 3  # letters of an axis' name that needs the word axis before it
+
 
 class Panel:
     """A source in one browser."""
@@ -52,7 +54,7 @@ class Panel:
         if axes != self._axes:
             self._axes = axes
             self._axis = self._axis if self._axis in axes else next(iter(axes), "")
-            self._choice.set_options({axis: f"axis {axis}" for axis in axes}, value=self._axis or None)
+            self._choice.set_options({axis: f"axis {axis}" if len(axis) <= SHORT else axis for axis in axes}, value=self._axis or None)
         if self._control is not None:
             self._control.refresh(self._axes)
         if self._axis:

@@ -15,7 +15,7 @@ from typing import Any
 
 from xy_sysid.errors import BadInput
 from xy_sysid.page import worker
-from xy_sysid.page.wishes import Act, Job, News, Wish
+from xy_sysid.page.wishes import Act, Job, News, Reading, Wish
 
 KEYS = itertools.count(1)
 
@@ -25,11 +25,11 @@ class OpenRecording:
 
     live = False
 
-    def __init__(self, path: Path, title: str = "", say: Callable[[str], None] | None = None) -> None:
+    def __init__(self, path: Path, title: str = "", say: Callable[[str], None] | None = None, reading: Reading | None = None) -> None:
         self.key, self.title, self.path = f"rec{next(KEYS)}", title or path.name, path
+        self.how = reading or Reading()
         self.about: dict[str, Any] = {}
         self.reading: float | None = 0.0
-        self.files: list[tuple[str, str, bytes]] = []
         self._say = say or (lambda text: None)
         self._documents: dict[str, dict[str, Any]] = {}
         self._jobs: dict[str, Job] = {}
@@ -39,7 +39,7 @@ class OpenRecording:
         context = multiprocessing.get_context("spawn")
         theirs, self._orders = context.Pipe(duplex=False)
         self._words, mine = context.Pipe(duplex=False)
-        self._process = context.Process(target=worker.main, args=(str(path), theirs, mine), name=f"recording {self.title}", daemon=True)
+        self._process = context.Process(target=worker.main, args=(str(path), self.how, theirs, mine), name=f"recording {self.title}", daemon=True)
         self._process.start()
         theirs.close()
         mine.close()
@@ -68,6 +68,10 @@ class OpenRecording:
     def words(self, axis: str) -> str:
         """While there is no story."""
         return "" if self._problem else "The rigid base is being fitted ..."
+
+    def effects(self) -> tuple[str, ...]:
+        """Of the library that the worker has, files of one's own included."""
+        return tuple(self.about.get("effects", ()))
 
     def problem(self) -> str:
         """Why it is closed."""
@@ -128,9 +132,6 @@ class OpenRecording:
             self._changed("")
         elif news.kind == "story":
             self._documents[news.axis] = news.content
-            self._changed(news.axis)
-        elif news.kind == "file":
-            self.files.append((news.axis, news.words, news.content))
             self._changed(news.axis)
         elif news.kind == "closed":
             self._lost(news.words)

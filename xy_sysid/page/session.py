@@ -17,7 +17,7 @@ from xy_sysid.page.heard import Heard
 from xy_sysid.page.recorder import Recorder
 from xy_sysid.page.recordings import OpenRecording
 from xy_sysid.page.shelf import Shelf
-from xy_sysid.page.wishes import Source
+from xy_sysid.page.wishes import Reading, Source
 
 if TYPE_CHECKING:
     from xy_sysid.page.link import Link
@@ -42,8 +42,8 @@ class Message:
 class Session:
     """The server's state. Methods may be called from any thread."""
 
-    def __init__(self, shelf: Shelf, live: bool, namespace: str = "/xy") -> None:
-        self.shelf, self.namespace = shelf, namespace
+    def __init__(self, shelf: Shelf, live: bool, namespace: str = "/xy", reading: Reading | None = None) -> None:
+        self.shelf, self.namespace, self.reading = shelf, namespace, reading or Reading()
         self.heard = Heard()
         self.recordings: list[OpenRecording] = []
         self.recorder = Recorder()
@@ -73,7 +73,7 @@ class Session:
         """Open a recording beside the others."""
         if len(self.recordings) >= MOST_OPEN:
             raise BadInput("recordings", f"{MOST_OPEN} already", f"at most {MOST_OPEN}", "Close one first.")
-        made = OpenRecording(path, title, self.say)
+        made = OpenRecording(path, title, self.say, self.reading)
         self.recordings.append(made)
         return made
 
@@ -99,7 +99,7 @@ class Session:
         """The report of a recording, as ``xy-sysid report`` writes it; raises BadInput with what it says. Takes a while."""
         with tempfile.TemporaryDirectory() as folder:
             out = Path(folder) / "report.html"
-            command = [sys.executable, "-m", "xy_sysid", "report", str(path), "-o", str(out)]
+            command = [sys.executable, "-m", "xy_sysid", "report", str(path), "-o", str(out), *self.reading.words]
             done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
             if done.returncode != 0 or not out.is_file():
                 lines = [line for line in done.stderr.splitlines() if line.strip()]

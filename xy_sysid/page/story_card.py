@@ -9,7 +9,6 @@ from typing import Any
 
 from nicegui import ui
 
-from xy_sysid.axis_model import STANDARD
 from xy_sysid.errors import XySysidError
 from xy_sysid.page.downloads import offer
 from xy_sysid.page.facts import seconds_text
@@ -57,9 +56,7 @@ class StoryCard:
                 self._ranked = ui.element("div").classes("ranked")
             with ui.element("div").classes("buttons"):
                 self._choice = (
-                    ui.select(_choices(), label="add any effect", with_input=True)
-                    .props("outlined dense options-dense")
-                    .style("flex:1;min-width:12rem")
+                    ui.select({}, label="add any effect", with_input=True).props("outlined dense options-dense").style("flex:1;min-width:12rem")
                 )
                 self._button("Add", "Fit it together with all that is in the model.", lambda: self._ask("add", str(self._choice.value or ""))).props(
                     "data-act=add"
@@ -88,6 +85,9 @@ class StoryCard:
         able = job is None and self._source.ready(axis)
         for button in self._buttons:
             button.set_enabled(able)
+        effects = self._source.effects()
+        if len(effects) != len(self._choice.options):
+            self._choice.set_options({name: _words(name) for name in effects})
         stamp = (axis, self._source.stamp(axis), document is None and self._source.words(axis))
         if stamp != self._shown:
             self._shown = stamp
@@ -158,10 +158,6 @@ class StoryCard:
     def _compare(self) -> None:
         if self._first.value is not None and self._last.value is not None:
             self._pair = (int(self._first.value), int(self._last.value))
-
-
-def _choices() -> dict[str, str]:
-    return {effect.name: _words(effect.name) for effect in STANDARD.acting}
 
 
 def _words(name: str) -> str:

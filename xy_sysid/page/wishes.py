@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Literal, Protocol
 
-Act = Literal["begin", "diagnose", "add", "remove", "next", "auto", "reset", "report", "model"]
+Act = Literal["begin", "diagnose", "add", "remove", "next", "auto", "reset"]
 
 DOING = {
     "begin": "fitting the rigid base",
@@ -15,8 +17,6 @@ DOING = {
     "next": "finding the next effect",
     "auto": "adding effects until the floor is reached",
     "reset": "going back to the rigid base",
-    "report": "writing the report",
-    "model": "writing the model",
 }
 
 
@@ -36,10 +36,19 @@ class Wish:
 
 
 @dataclass(frozen=True, slots=True)
-class News:
-    """What the worker says. kind: opened (axes in content), progress (part), story (document), file (name and content), done, failed."""
+class Reading:
+    """How a recording is read. load: arguments of ``imports.load``; words: the same for a command; effect_files: effects of one's own."""
 
-    kind: Literal["opened", "progress", "story", "file", "done", "failed", "closed"]
+    load: Mapping[str, Any] = field(default_factory=dict)
+    words: tuple[str, ...] = ()
+    effect_files: tuple[Path, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class News:
+    """What the worker says. kind: opened (axes in content), progress (part), story (document), done, failed."""
+
+    kind: Literal["opened", "progress", "story", "done", "failed", "closed"]
     wish: int = 0
     axis: str = ""
     words: str = ""
@@ -92,6 +101,10 @@ class Source(Protocol):
 
     def words(self, axis: str) -> str:
         """What there is to say while there is no story."""
+        ...
+
+    def effects(self) -> tuple[str, ...]:
+        """Names of all effects that can be added."""
         ...
 
     def problem(self) -> str:

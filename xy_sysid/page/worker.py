@@ -14,7 +14,7 @@ from types import FrameType
 from typing import Any
 
 from xy_sysid.errors import XySysidError
-from xy_sysid.page.wishes import News, Wish
+from xy_sysid.page.wishes import News, Reading, Wish
 
 LEAVE = signal.SIGUSR1
 
@@ -26,24 +26,21 @@ class Left(Exception):
 class Desk:
     """The recording, its stories, and what is done with them. Runs in the worker's process."""
 
-    def __init__(self, path: Path, say: Callable[[News], None]) -> None:
-        from xy_sysid.axis_model import STANDARD
+    def __init__(self, path: Path, reading: Reading, say: Callable[[News], None]) -> None:
         from xy_sysid.imports import load
+        from xy_sysid.user_effects import library
 
         self._say = say
-        self._path = path
-        self._recording = load(path, progress=lambda part: say(News("progress", words=f"reading {path.name}", part=part)))
-        self._library = STANDARD
+        self._library = library(reading.effect_files)
+        self._recording = load(path, **reading.load, progress=lambda part: say(News("progress", words=f"reading {path.name}", part=part)))
         self._stories: dict[str, Any] = {}
         seconds, rate = self._recording.duration, self._recording.sampling_rate
         told = {"axes": list(self._recording.axes), "seconds": seconds, "rate": rate, "notes": list(self._recording.notes)}
+        told["effects"] = [effect.name for effect in self._library.acting]
         say(News("opened", content=told))
 
     def do(self, wish: Wish) -> None:
         """One wish; raises XySysidError in a sentence, or Left."""
-        if wish.act == "report":
-            self._report(wish)
-            return
         from xy_sysid import story as core
 
         u, y = self._samples(wish.axis)
@@ -77,11 +74,8 @@ class Desk:
         u, y = self._recording.axis(axis)
         return u[run], y[run]
 
-    def _report(self, wish: Wish) -> None:
-        raise XySysidError("Reports are made by xy-sysid report.")
 
-
-def main(path: str, orders: Connection, words: Connection) -> None:
+def main(path: str, reading: Reading, orders: Connection, words: Connection) -> None:
     """The worker's process: wishes in, news out, until nobody is there any more."""
     busy = [False]
 
@@ -93,7 +87,7 @@ def main(path: str, orders: Connection, words: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the page's; it closes the pipe
     signal.signal(LEAVE, leave)
     try:
-        desk = Desk(Path(path), words.send)
+        desk = Desk(Path(path), reading, words.send)
     except XySysidError as problem:
         words.send(News("closed", words=str(problem)))
         return
