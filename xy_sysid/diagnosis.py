@@ -140,8 +140,10 @@ def _runner_up(tried: tuple[Candidate, ...], names: tuple[str, ...], library: Li
 
 
 def _gap(ladder: Ladder, runner: Candidate | None) -> float:
-    chosen = ladder.steps[1].fit
-    return 10.0 if runner is None or runner.fit is None else runner.fit.excess - chosen.excess
+    if runner is None or runner.fit is None:
+        return 10.0
+    first = runner.fit.excess - ladder.steps[1].fit.excess
+    return first if first > 0.0 else runner.fit.excess - ladder.final.excess  # of two at once, the first alone need not lead
 
 
 def _experiment(name: str, library: Library) -> str:

@@ -16,7 +16,7 @@ from xy_sysid.spectral_cost import count_size
 from xy_sysid.traces import bounded
 
 AT_NOISE = 3.5  # held-out innovation over the encoder's noise up to which an effect explains the axis
-BETTER = 1.5  # innovation without the effect over that with it, at least
+BETTER = 3.0  # innovation without the effect over that with it, at least
 
 
 def one_step_fit(data: AxisData, base: GreyboxFit, effect: Effect) -> GreyboxFit:
@@ -31,7 +31,7 @@ def one_step_fit(data: AxisData, base: GreyboxFit, effect: Effect) -> GreyboxFit
     settled = min(int(0.5 * data.sampling_rate), data.training // 4)
     held = float(np.sqrt(np.mean(error[data.training :] ** 2)))
     noise_floor = found.noise * data.sampling_rate
-    far = max(held / (AT_NOISE * noise_floor), BETTER * held / (found.without * data.sampling_rate))
+    far = max(held / (AT_NOISE * noise_floor), BETTER * held / max(found.without * data.sampling_rate, 1e-9 * held))
     gain, delay, pole = found.base
     model = AxisModel(gain, max(delay, 0.0), pole, library=base.model.library).with_effect(effect.name, bounded(effect, found.values))
     names = ["gain", "delay", "pole", *(f"{effect.name}.{item.name}" for item in effect.parameters)]

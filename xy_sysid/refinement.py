@@ -25,6 +25,10 @@ NEAR = 0.3  # excess on the first stage within which candidates run the whole di
 LEAST_SHARE = 5e-4  # of the error that an effect's trace must explain to be tried
 LEAST_GAIN = 0.1  # excess that an addition must win, and
 PART_GAIN = 0.05  # the part of the excess that it must win
+WEAK = 0.8  # of the excess that a single effect must leave at most; else two at once are tried
+WIDE = 4  # first effects of such pairs
+SURE = 0.03  # excess up to which nothing at all is left; clean axes stay below 0.02
+PART_LEFT = 0.4  # of the excess that an effect found between SURE and AT_FLOOR may leave
 SUSPICIOUS = 0.1  # share of a look-alike from which an effect that free simulation cannot judge is tried
 NEEDED = 0.05  # excess that taking an effect out again must cost, or it goes
 MOST_EFFECTS = 4
@@ -76,11 +80,23 @@ def refine(data: AxisData, library: Library = STANDARD, most: int = MOST_EFFECTS
         if len(steps) == 1 and data.floor.epsilon <= EPSILON:
             tried = (*suspected(data, now, tried, library), *tried)
         taken = choose(tried, library)
-        if taken is None or taken.fit is None or now.excess - taken.fit.excess < max(LEAST_GAIN, PART_GAIN * now.excess):
+        found = taken.fit if taken is not None else None
+        if (found is None or found.excess > WEAK * now.excess) and len(steps) < most:
+            pair = together(data, now, tried, library)
+            if pair is not None and (found is None or pair[1].fit.excess < WEAK * found.excess):
+                steps += [replace(pair[0], tried=tried), pair[1]]
+                now = pair[1].fit
+                continue
+        if taken is None or found is None or now.excess - found.excess < max(LEAST_GAIN, PART_GAIN * now.excess):
             rejected = tried
             break
-        now = taken.fit
+        now = found
         steps.append(Step(taken.effect, now, tried))
+    if SURE <= now.excess < AT_FLOOR and 1 < len(steps) <= most:
+        last = polished(data, now, library)
+        if last is not None:
+            now = last.fit
+            steps.append(last)
     pruned = prune(data, now, keep=tuple(given)) if len(steps) > 2 else now
     return Ladder(tuple(steps), rejected, pruned, tuple(name for name, _ in pruned.model.effects))
 
@@ -93,6 +109,48 @@ def added(data: AxisData, now: GreyboxFit, name: str) -> GreyboxFit:
     if effect.one_step is None or now.model.effects:
         raise BadInput("effects", f"{name} with {', '.join(own for own, _ in now.model.effects)}", "backlash alone", "Fit them one at a time.")
     return one_step_fit(data, now, effect)
+
+
+def together(data: AxisData, now: GreyboxFit, tried: tuple[Candidate, ...], library: Library) -> tuple[Step, Step] | None:
+    """Two effects at once, where each alone helps little because the other's error hides it; None if that helps little, too."""
+    if any(library[name].one_step for name, _ in now.model.effects):
+        return None
+    fitted = [item for item in tried if item.fit is not None and library[item.effect].one_step is None]
+    best: tuple[Step, Step] | None = None
+    for first in fitted[:WIDE]:
+        assert first.fit is not None
+        seconds = [item.effect for item in look(data, first.fit, _open(first.fit, library)) if item.share >= LEAST_SHARE][:2]
+        always = [effect.name for effect in _open(first.fit, library) if effect.name == "constant_load"]
+        for name in dict.fromkeys([*seconds, *always]):
+            try:
+                found = fit_with(data, now, [first.effect, name], brief=True)
+            except np.linalg.LinAlgError:
+                continue
+            if np.isfinite(found.excess) and (best is None or found.excess < best[1].fit.excess):
+                best = Step(first.effect, first.fit, ()), Step(name, found, ())
+        if best is not None and best[1].fit.excess < AT_FLOOR:
+            break
+    if best is None:
+        return None
+    whole = finish(data, best[1].fit.model, best[1].fit.runs)
+    return best[0], replace(best[1], fit=whole)
+
+
+def polished(data: AxisData, now: GreyboxFit, library: Library) -> Step | None:
+    """One more effect below the threshold of the floor, if it takes away most of what is left there."""
+    for trace in look(data, now, _open(now, library))[:2]:
+        found = _tried(data, now, trace.effect)
+        if found is not None and found.excess < now.excess:
+            found = finish(data, found.model, found.runs)
+            if found.excess < PART_LEFT * now.excess:
+                return Step(trace.effect, found, ())
+    return None
+
+
+def _open(now: GreyboxFit, library: Library) -> list[Effect]:
+    """What may still be added."""
+    families = {library[name].family for name, _ in now.model.effects if library[name].family}
+    return [e for e in library.acting if e.simulable and e.name not in now.model and not (e.family and e.family in families)]
 
 
 def suspected(data: AxisData, now: GreyboxFit, tried: tuple[Candidate, ...], library: Library) -> tuple[Candidate, ...]:
@@ -116,8 +174,7 @@ def candidates(data: AxisData, now: GreyboxFit, library: Library = STANDARD) -> 
     A race: simpler effects first, each on the first stage's data only. Once one is at the floor, richer ones cannot be
     preferred to it and are left out; those that come near the best run the whole distance.
     """
-    families = {library[name].family for name, _ in now.model.effects if library[name].family}
-    open_to = [e for e in library.acting if e.simulable and e.name not in now.model and not (e.family and e.family in families)]
+    open_to = _open(now, library)
     traces = [trace for trace in look(data, now, open_to) if trace.share >= LEAST_SHARE]
     shares = {trace.effect: trace.share for trace in traces}
     names = _with_relatives([trace.effect for trace in traces[:TRIED]], open_to)
@@ -176,6 +233,7 @@ def prune(data: AxisData, now: GreyboxFit, keep: tuple[str, ...] = ()) -> Greybo
             without = fit(data, now.model.without(name))
         except np.linalg.LinAlgError:
             continue
-        if without.excess <= now.excess + NEEDED:
+        needless = without.excess < SURE or PART_LEFT * without.excess < now.excess
+        if without.excess <= now.excess + NEEDED and (needless or without.excess >= AT_FLOOR):
             now = without
     return now

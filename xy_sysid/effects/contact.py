@@ -25,6 +25,8 @@ NAMES = ("gain", "delay", "pole", "gap", "share", "rate", "damping", "loss", "gu
 LOG = np.array([name in ("pole", "gap", "rate") for name in NAMES])
 GAPS = np.geomspace(2e-6, 150e-6, 10)  # m, tried first
 STIFF = 2.0 * np.pi * 180.0  # rad/s of the contact at least: flanks of steel; a softer one is a loosely held mass, not play in the drive
+SEEN = 4.0  # encoder noises that a gap must have to be one
+PROMISING = 10.0  # innovation over noise above which the fit is given up
 DEAF = 12.0  # the filter is told this much more encoder noise on the way: a smoother valley
 SLOW = 1e-3  # m/s at which the smoothed friction reaches its level
 DRIFT = 0.3  # process noise per rms speed, 1/sqrt(s): the filter forgives this much acceleration
@@ -53,11 +55,17 @@ def follow(
     best = fit.solve(best, every, brief, 1.0, 2, 40)
     best = fit.solve(best, every, first, 1.0, 4, 8)
     fit.deaf = 1.0
-    rigid = best.copy()
-    rigid[3] = np.log(1e-10)
-    rigid = fit.solve(rigid, np.delete(every, 3), brief, 1.0, 2, 6)
+    loose, fixed = np.mean(fit.innovation(best, first, 1.0, 4) ** 2), np.delete(every, 3)
+    without = np.empty(0)
+    if loose < PROMISING**2 and np.exp(best[3]) > SEEN * noise:  # else it is no gap, whatever the rest may be
+        fit.deaf, fit.low[5] = DEAF, np.log(10.0)  # without a gap, any spring will do
+        rigid = fit.inner(np.array([*base, 1e-10, 0.4, 1500.0, 0.1, 0.0, 0.03, 0.0]))
+        rigid = fit.solve(rigid, fixed, brief, 2.0, 2, 15)
+        rigid = fit.solve(rigid, fixed, brief, 1.0, 2, 20)
+        rigid = fit.solve(rigid, fixed, brief, 1.0, 4, 6)
+        fit.deaf = 1.0
+        without = fit.innovation(rigid, position.size - 1, 1.0, 4)[training:] * noise
     n = position.size - 1
-    without = fit.innovation(rigid, n, 1.0, 4)[training:] * noise
     values, spread = fit.outer(best), fit.spread(best, every, first)
     dry = float(values[9])
     friction = (("coulomb_friction", (dry,), (float(spread[9]),)),) if dry > TELLING * float(np.std(voltage)) and dry > 5.0 * spread[9] else ()
@@ -68,7 +76,7 @@ def follow(
         tuple(float(value) for value in spread[3:9]),
         friction,
         fit.innovation(best, n, 1.0, 4) * noise,
-        float(np.sqrt(np.mean(without**2))) if without.size else float("inf"),
+        float(np.sqrt(np.mean(without**2))) if without.size else 0.0,
         noise,
         fit.runs,
     )
