@@ -10,7 +10,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check -qq install --no-compile
 FITS := import ensurepip, sys, venv; sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 13))
 
 .DEFAULT_GOAL := help
-.PHONY: help install demo test lint types unit bench pictures clean
+.PHONY: help install demo test lint types unit bench blind pictures clean
 
 help: ## this text
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 18
@@ -47,6 +47,9 @@ unit: $(INSTALLED) ## every test (ARGS="-k words" for some)
 
 bench: $(VENV)/.bench ## measure against other software, and write the table (ARGS names one)
 	@$(BIN)/python -m bench $(ARGS)
+
+blind: $(INSTALLED) ## name hidden effects on machines never tuned on, and write docs/blind.md (ARGS="--part 3" for a third)
+	@$(BIN)/python -m blind $(ARGS)
 
 $(VENV)/.bench: $(INSTALLED)
 	@$(PIP) --no-build-isolation --editable '.[bench]'

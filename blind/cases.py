@@ -114,7 +114,6 @@ class Case:
     def record(self) -> tuple[Machine, Recording]:
         """Drive it."""
         machine = self.machine()
-        machine.reset() if hasattr(machine, "reset") else None
         seed = int(self.random().integers(2**20)) + 1
         own = build(AxisExcitation, {"seed": seed, "kind": self.kind, "rms": AxisExcitation().rms * self.strength})
         settings = build(ExcitationSettings, {"rate": self.rate, "lockstep": True, "speed": 0.0, "axes": {"x": own}})

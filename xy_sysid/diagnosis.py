@@ -101,7 +101,8 @@ def _judged(data: AxisData, ladder: Ladder, library: Library, tolerance: float, 
         text = f"Nothing is missing: the rigid model with delay leaves {_mm(base.held_out_error)} mm/s, the floor is {_mm(base.noise_floor)} mm/s."
         return Diagnosis("nothing_missing", (), certainty, tolerance, text, ladder, tried, where, "None is needed.")
     # the pruned model keeps the order of importance in which effects were added
-    names = tuple(step.added for step in ladder.steps if step.added in ladder.effects and step.added is not None)
+    added = [step.added for step in ladder.steps if step.added in ladder.effects and step.added is not None]
+    names = tuple(dict.fromkeys([*added, *ladder.effects]))
     gone = 1.0 - final.excess / base.excess
     fall = f"the held-out error falls from {_mm(base.held_out_error)} to {_mm(final.held_out_error)} mm/s (floor {_mm(final.noise_floor)})"
     if names and ladder.explained:

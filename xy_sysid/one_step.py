@@ -26,7 +26,8 @@ def one_step_fit(data: AxisData, base: GreyboxFit, effect: Effect) -> GreyboxFit
     count = count_size(data.position)
     noise = min(data.floor.encoder, max(count / np.sqrt(12.0), 1e-12)) if count > 0.0 else data.floor.encoder
     start = base.model.gain, base.model.delay, base.model.pole
-    found = effect.one_step(data.sampling_rate, data.voltage, data.position, start, noise, data.first, data.training)
+    dry = next((values[0] for name, values in base.model.effects if name == "coulomb_friction"), 0.0)
+    found = effect.one_step(data.sampling_rate, data.voltage, data.position, start, noise, data.first, data.training, dry)
     error = found.innovation * data.sampling_rate
     settled = min(int(0.5 * data.sampling_rate), data.training // 4)
     held = float(np.sqrt(np.mean(error[data.training :] ** 2)))

@@ -75,13 +75,15 @@ def refine(data: AxisData, library: Library = STANDARD, most: int = MOST_EFFECTS
         now = added(data, now, name)
         steps.append(Step(name, now, ()))
     rejected: tuple[Candidate, ...] = ()
+    paired = False
     while now.excess >= AT_FLOOR and len(steps) <= most:
         tried = candidates(data, now, library)
         if len(steps) == 1 and data.floor.epsilon <= EPSILON:
             tried = (*suspected(data, now, tried, library), *tried)
         taken = choose(tried, library)
         found = taken.fit if taken is not None else None
-        if (found is None or found.excess > WEAK * now.excess) and len(steps) < most:
+        if (found is None or found.excess > WEAK * now.excess) and len(steps) < most and not paired:
+            paired = True
             pair = together(data, now, tried, library)
             if pair is not None and (found is None or pair[1].fit.excess < WEAK * found.excess):
                 steps += [replace(pair[0], tried=tried), pair[1]]
@@ -162,7 +164,8 @@ def suspected(data: AxisData, now: GreyboxFit, tried: tuple[Candidate, ...], lib
     for effect in library.acting:
         share = max((shares.get(name, 0.0) for name in effect.look_alikes), default=0.0)
         if effect.one_step is not None and share >= SUSPICIOUS:
-            fitted = one_step_fit(data, now, effect)
+            rubbing = [item.fit for item in tried if item.effect == "coulomb_friction" and item.fit is not None and item.share >= SUSPICIOUS]
+            fitted = one_step_fit(data, rubbing[0] if rubbing else now, effect)
             if fitted.excess < AT_FLOOR:
                 found.append(Candidate(effect.name, share, fitted))
     return tuple(found)

@@ -35,16 +35,24 @@ SETTLED = 0.5  # s until the filter is judged
 
 
 def follow(
-    sampling_rate: float, voltage: FloatArray, position: FloatArray, base: tuple[float, float, float], noise: float, first: int, training: int
+    sampling_rate: float,
+    voltage: FloatArray,
+    position: FloatArray,
+    base: tuple[float, float, float],
+    noise: float,
+    first: int,
+    training: int,
+    dry: float = 0.0,
 ) -> Followed:
     """Fit gap, masses and contact by the innovations of the first samples; judge on those after ``training``.
 
-    voltage, position: (n,) V and m; base: gain m/s/V, delay s, pole rad/s to begin with; noise: of the encoder, m (rms)
+    voltage, position: (n,) V and m; base: gain m/s/V, delay s, pole rad/s to begin with; noise: of the encoder, m (rms);
+    dry: Coulomb friction to begin with, V
     """
     fit = _Fit(sampling_rate, voltage, position, base, noise)
     brief = min(first, int(6.0 * sampling_rate))
     fit.deaf = DEAF
-    start = fit.inner(np.array([*base, GAPS[0], 0.4, 1500.0, 0.2, 5.0, 0.03, 0.0]))
+    start = fit.inner(np.array([*base, GAPS[0], 0.4, 1500.0, 0.2, 5.0, 0.03, dry]))
     starts = []
     for gap in GAPS:
         start[3] = np.log(gap)
@@ -59,7 +67,7 @@ def follow(
     without = np.empty(0)
     if loose < PROMISING**2 and np.exp(best[3]) > SEEN * noise:  # else it is no gap, whatever the rest may be
         fit.deaf, fit.low[5] = DEAF, np.log(10.0)  # without a gap, any spring will do
-        rigid = fit.inner(np.array([*base, 1e-10, 0.4, 1500.0, 0.1, 0.0, 0.03, 0.0]))
+        rigid = fit.inner(np.array([*base, 1e-10, 0.4, 1500.0, 0.1, 0.0, 0.03, dry]))
         rigid = fit.solve(rigid, fixed, brief, 2.0, 2, 15)
         rigid = fit.solve(rigid, fixed, brief, 1.0, 2, 20)
         rigid = fit.solve(rigid, fixed, brief, 1.0, 4, 6)
@@ -67,8 +75,8 @@ def follow(
         without = fit.innovation(rigid, position.size - 1, 1.0, 4)[training:] * noise
     n = position.size - 1
     values, spread = fit.outer(best), fit.spread(best, every, first)
-    dry = float(values[9])
-    friction = (("coulomb_friction", (dry,), (float(spread[9]),)),) if dry > TELLING * float(np.std(voltage)) and dry > 5.0 * spread[9] else ()
+    rubs = float(values[9])
+    friction = (("coulomb_friction", (rubs,), (float(spread[9]),)),) if rubs > TELLING * float(np.std(voltage)) and rubs > 5.0 * spread[9] else ()
     return Followed(
         (float(values[0]), float(values[1]), float(values[2])),
         tuple(float(value) for value in values[3:9]),

@@ -47,8 +47,10 @@ class OneStep(Protocol):
         noise: float,
         first: int,
         training: int,
+        dry: float = 0.0,
     ) -> Followed:
-        """voltage, position: (n,) V, m; base: gain, delay, pole; noise: of the encoder, m; samples of the two stages."""
+        """voltage, position: (n,) V, m; base: gain, delay, pole; noise: of the encoder, m; samples of the two stages;
+        dry: Coulomb friction to begin with, V."""
 
 
 @dataclass(frozen=True, slots=True)
