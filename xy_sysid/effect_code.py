@@ -12,7 +12,7 @@ from string import Template
 from xy_sysid.effects.contract import Effect, arguments
 
 BASE = ("gain", "delay", "pole")
-INNER = 4000.0  # Hz: sub-steps of each of a sample's two pieces; LuGre bristles of 10 um and Stribeck curves of 10 mm/s need it
+INNER = 8000.0  # Hz: sub-steps of each of a sample's two pieces; LuGre bristles of 10 um and Stribeck curves of 10 mm/s need it
 
 
 def slots(effects: Sequence[Effect]) -> dict[str, int]:
