@@ -196,3 +196,12 @@ def test_every_picture_is_on_paper(folder: Path, page: str) -> None:
         tab.wait_for_timeout(500)
         assert tab.locator(".plot .main-svg").count() >= len(plots(page))
         assert tab.evaluate("[...document.querySelectorAll('.plot')].every((box) => box.querySelector('.main-svg'))")
+
+
+def test_a_long_recording_is_judged_on_its_first_part(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Memory stays bounded, and the page says so."""
+    monkeypatch.setattr("xy_sysid.report.axis_report.LONGEST", 8.0)
+    path = npz(tmp_path / "long.npz", rows=12_000)
+    said = cli("report", path, "-o", tmp_path / "long.html", "--json")
+    assert said.json["axes"]["x"]["story"]["seconds"] == pytest.approx(8.0)
+    assert "on the first 8 s of the longest stretch, of 12 s" in words_of((tmp_path / "long.html").read_text(encoding="utf-8"))

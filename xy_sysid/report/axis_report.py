@@ -23,6 +23,7 @@ from xy_sysid.story_document import document
 from xy_sysid.validation import HeldOut, Validation, validate
 
 HELD_OUT = 1.0 / 3.0  # of the recording, as in every story
+LONGEST = 600.0  # s of which the story is told: more would teach it nothing and take memory (2 MB a second at 2 kHz)
 STAGES = ("response and fits", "rigid model", "diagnosis", "refinement")
 
 Tell = Callable[[str], None]
@@ -34,7 +35,7 @@ class AxisReport:
 
     study: excitation and motion of the whole recording, response and fits of its first two thirds
     verdicts: on the ML fit, None without one; story: the document of ``story_document``, None if ``problem`` says why
-    speed: rms of the measured speed, output unit / s; note: what a reader should know about the orders
+    speed: rms of the measured speed, output unit / s; note: what a reader should know about orders and length
     """
 
     study: AxisStudy
@@ -61,6 +62,9 @@ def axis_report(
     """All that can be said about one axis; what cannot is said in words. tell: called with each of STAGES as it begins."""
     tell(STAGES[0])
     studied, verdicts, note = _linear(recording, axis, settings, period)
+    data = longest_run(recording, axis)
+    if data is not None and data[0].size > round(LONGEST * data[2]):
+        note = f"{note} What is missing is judged on the first {LONGEST:g} s of the longest stretch, of {data[0].size / data[2]:.4g} s.".strip()
     try:
         story = _story(recording, axis, library, tell)
     except BadInput as problem:
@@ -122,6 +126,7 @@ def _story(recording: Recording, axis: str, library: Library, tell: Tell) -> Map
     if data is None:
         raise BadInput("recording", "without a stretch that is free of gaps", "one", "Record again.")
     u, y, rate = data
+    u, y = u[: round(LONGEST * rate)], y[: round(LONGEST * rate)]
     tell(STAGES[1])
     story = begin(axis, rate, u, y, library, units=(recording.input_unit, recording.output_unit))
     if story.steps:
