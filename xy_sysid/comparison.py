@@ -28,6 +28,7 @@ UNEVEN = 0.3  # of the whole error that the two directions must differ by
 FEWEST = 200  # samples in a bin
 PERIODS = 200  # spatial periods tried, from SHORTEST to a third of the travel
 SHORTEST = 2e-4  # m
+SMALL = {"m/s": (1e3, "mm/s"), "m": (1e3, "mm")}  # units that people read in thousandths
 ENVELOPE = 0.1  # s over which the amplitude of the input is taken
 
 
@@ -108,7 +109,7 @@ def compare_velocity(
     total = float(np.sqrt(np.mean(low_error**2)))
     offset = float(np.mean(error))
     if abs(offset) > TWICE * noise:
-        text = f"a constant error of {offset * 1e3:.3g} mm/s, {abs(offset) / noise:.3g} times the floor"
+        text = f"a constant error of {_shown(offset, unit)}, {abs(offset) / noise:.3g} times the floor"
         places.append(Place("frequency", 0.0, float(grid.edges[0]), "Hz", abs(offset) / noise, text))
     if total > TWICE * noise:
         width = max(int(ENVELOPE * sampling_rate), 1)
@@ -170,11 +171,17 @@ def _binned(kind: Kind, by: FloatArray, error: FloatArray, total: float, noise: 
     while right < high.size - 1 and high[right + 1]:
         right += 1
     ratio = float(size[worst] / noise)
-    scale, shown = {"m/s": (1e3, "mm/s"), "m": (1e3, "mm")}.get(unit, (1.0, unit))
+    scale, shown = SMALL.get(unit, (1.0, unit))
     span = f"{edges[left] * scale:.3g} to {edges[right + 1] * scale:.3g} {shown}"
     words = {"speed": f"at speeds of {span}", "position": f"at positions of {span}", "amplitude": f"at input amplitudes of {span}"}
     sentence = f"{ratio:.3g} times the floor {words.get(kind, f'from {span}')}"
     return [Place(kind, float(edges[left]), float(edges[right + 1]), unit, ratio, sentence)]
+
+
+def _shown(value: float, unit: str) -> str:
+    """A length or speed as people read it: mm for m."""
+    scale, name = SMALL.get(unit, (1.0, unit))
+    return f"{value * scale:.3g} {name}"
 
 
 def _direction(speed: FloatArray, error: FloatArray, noise: float, unit: str) -> list[Place]:
@@ -205,4 +212,4 @@ def _periodic(position: FloatArray, error: FloatArray, noise: float, unit: str) 
     if ratio < TWICE / 2 or size[best] < 6.0 * float(np.median(size)):
         return []
     period = float(periods[best])
-    return [Place("position", period, period, unit, ratio, f"{ratio:.3g} times the floor repeating every {period * 1e3:.3g} mm of position")]
+    return [Place("position", period, period, unit, ratio, f"{ratio:.3g} times the floor repeating every {_shown(period, unit)} of position")]

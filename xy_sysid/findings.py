@@ -13,6 +13,7 @@ from xy_sysid.axis_model import Library
 from xy_sysid.comparison import Place
 from xy_sysid.diagnosis import Diagnosis, Kind
 from xy_sysid.greybox import Estimate, GreyboxFit
+from xy_sysid.own_units import in_units
 from xy_sysid.refinement import AT_FLOOR, SIMPLER, Candidate
 
 
@@ -184,7 +185,7 @@ def _look_alikes(fitted: list[tuple[Candidate, GreyboxFit]], shares: Mapping[str
 def answer(item: Findings, units: tuple[str, str] = ("V", "m")) -> dict[str, Any]:
     """One axis of the document that ``diagnose --json`` gives."""
     first, last = (item.ladder[0], item.ladder[-1]) if item.ladder else (None, None)
-    return {
+    made = {
         "verdict": item.verdict,
         "effect": item.effect if item.verdict == "missing_effect" else None,
         "effects": list(item.effects),
@@ -216,6 +217,7 @@ def answer(item: Findings, units: tuple[str, str] = ("V", "m")) -> dict[str, Any
         ],
         "next_experiment": item.next_experiment,
     }
+    return in_units(made, units)
 
 
 def place(item: Place) -> dict[str, Any]:

@@ -21,6 +21,11 @@ def unit_in(unit: str, units: tuple[str, str]) -> str:
     return re.sub(r"\bV\b|\bm\b", lambda found: units[0] if found.group() == "V" else units[1], unit)
 
 
+def text_in(text: str, units: tuple[str, str]) -> str:
+    """A sentence: 3 mm/s at 2 V becomes 3 mrad/s at 2 A."""
+    return re.sub(r"(?<=\d )V\b", units[0], re.sub(r"\bmm\b", f"m{units[1]}", text))
+
+
 def _named(key: str, value: Any, units: tuple[str, str]) -> Any:
     if isinstance(value, Mapping):
         return {name: _named(name, item, units) for name, item in value.items()}
@@ -28,7 +33,4 @@ def _named(key: str, value: Any, units: tuple[str, str]) -> Any:
         return [_named(key, item, units) for item in value]
     if isinstance(value, str) and key == "unit":
         return unit_in(value, units)
-    if isinstance(value, str) and key in WORDS:
-        text = re.sub(r"\bmm\b", f"m{units[1]}", value)
-        return re.sub(r"(?<=\d )V\b", units[0], text)
-    return value
+    return text_in(value, units) if isinstance(value, str) and key in WORDS else value

@@ -70,9 +70,12 @@ def samples(recording: Recording, axis: str) -> Any:
 
 
 def _show(name: str, item: Diagnosis, units: tuple[str, str]) -> None:
-    people.print(f"axis {name}: {item.sentence} (confidence {item.confidence:.2f})", markup=False)
+    from xy_sysid.own_units import text_in
+
+    people.print(f"axis {name}: {text_in(item.sentence, units)} (confidence {item.confidence:.2f})", markup=False)
     if item.where is not None and item.where.places:
-        people.print(f"  the rigid model fails: {'; '.join(place.sentence for place in item.where.places[:3])}", markup=False)
+        places = "; ".join(place.sentence for place in item.where.places[:3])
+        people.print(f"  the rigid model fails: {text_in(places, units)}", markup=False)
     if item.ladder is not None and item.verdict != "nothing_missing":
         rows = [
             (c.effect, f"{1e3 * c.fit.held_out_error:.4g}", f"{c.fit.excess:.2f}", f"{100 * c.share:.2g} %")
@@ -81,11 +84,13 @@ def _show(name: str, item: Diagnosis, units: tuple[str, str]) -> None:
         ]
         if rows:
             table("candidates", ("effect", f"held-out error m{units[1]}/s", "excess", "share of error"), rows)
-        parameter_table(item.ladder.final)
+        parameter_table(item.ladder.final, units)
     people.print(f"  Next experiment: {item.next_experiment}\n", markup=False)
 
 
-def parameter_table(fit: GreyboxFit) -> None:
-    """Parameters of a fit, as people read them."""
-    rows = [(p.name, f"{p.value:.5g}", f"{p.low:.5g} .. {p.high:.5g}", p.unit) for p in fit.parameters]
+def parameter_table(fit: GreyboxFit, units: tuple[str, str]) -> None:
+    """Parameters of a fit, as people read them; units: of the recording's input and output."""
+    from xy_sysid.own_units import unit_in
+
+    rows = [(p.name, f"{p.value:.5g}", f"{p.low:.5g} .. {p.high:.5g}", unit_in(p.unit, units)) for p in fit.parameters]
     table("", ("parameter", "value", "95 % interval", "unit"), rows)

@@ -39,6 +39,7 @@ def refine(
     """Add physical effects to the rigid model, refit everything together, and print the ladder of falling errors."""
     from xy_sysid.errors import BadInput
     from xy_sysid.greybox import prepare
+    from xy_sysid.own_units import in_units
     from xy_sysid.refinement import refine as logic
     from xy_sysid.saved_models import write_axis_mat, write_axis_models
     from xy_sysid.user_effects import library
@@ -68,9 +69,9 @@ def refine(
         write_axis_models(model, {name: ladder.final for name, ladder in found.items()}, origin)
     if mat is not None:
         write_axis_mat(mat, {name: ladder.final for name, ladder in found.items()})
-    unit = f"{recording.output_unit}/s"
+    units, unit = (recording.input_unit, recording.output_unit), f"{recording.output_unit}/s"
     if json:
-        answers: dict[str, Any] = {name: _answer(ladder, unit) for name, ladder in found.items()}
+        answers: dict[str, Any] = {name: in_units(_answer(ladder, unit), units) for name, ladder in found.items()}
         emit({"recording": origin, "axes": answers, "refused": refused})
         return
     for name, ladder in found.items():
@@ -84,7 +85,7 @@ def refine(
         ]
         table(f"axis {name}: m{unit}, floor {1e3 * ladder.final.noise_floor:.4g}", ("added", "training error", "held-out error", "excess"), rows)
         people.print(f"  {_words(ladder)}", markup=False)
-        parameter_table(ladder.final)
+        parameter_table(ladder.final, units)
         people.print()
     for name, text in refused.items():
         people.print(f"axis {name}: {text}", markup=False)

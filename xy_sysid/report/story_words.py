@@ -11,7 +11,7 @@ from xy_sysid.report.story_parts import Document, words
 from xy_sysid.report.tables import Table
 from xy_sysid.report.words import interval_text, number, quantity
 
-PARTLY = 0.7  # of the base's excess that may be left for "partly", as in xy-sysid refine
+PARTLY = 0.7  # of the base's excess or error that may be left for "partly", as in xy-sysid refine
 STANDARD_TOLERANCE = 1e-3
 AHEAD = "one sample ahead"  # in the label of a step whose error is not that of a free simulation
 
@@ -46,7 +46,8 @@ def status(story: Document | None) -> str:
     first, last = story["ladder"][0], story["ladder"][-1]
     if last["explained"]:
         return "explained"
-    return "partly explained" if last["effects"] and last["excess"] < PARTLY * first["excess"] else "not explained"
+    gone = any(float(last[name]) < PARTLY * float(first[name]) for name in ("excess", "held_out_error"))
+    return "partly explained" if last["effects"] and gone else "not explained"
 
 
 def named(name: str, library: Library) -> str:
