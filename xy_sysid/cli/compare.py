@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -113,6 +114,7 @@ def _compared(recording: Recording, name: str, saved: Saved | None, settings: An
     from xy_sysid.comparison import compare_velocity
     from xy_sysid.errors import BadInput
     from xy_sysid.offline import estimate, fitted, split
+    from xy_sysid.own_units import text_in, unit_in
     from xy_sysid.saved_models import Saved
 
     seen = saved is not None and saved.data == fingerprint(recording, name)
@@ -130,6 +132,9 @@ def _compared(recording: Recording, name: str, saved: Saved | None, settings: An
     velocity = saved.velocity(data.sampling_rate, u, y)
     first = _held(len(y)) if seen else 0
     compared = compare_velocity(velocity[first:], u[first:], y[first:], data.sampling_rate, f"{data.output_unit}/s", data.output_unit)
+    units = data.input_unit, data.output_unit
+    places = (replace(place, sentence=text_in(place.sentence, units), unit=unit_in(place.unit, units)) for place in compared.places)
+    compared = replace(compared, places=tuple(places))
     try:
         return compared, checked(data, name, saved, settings)[0]
     except BadInput:  # too short for a window, or nothing coherent: time alone must do
