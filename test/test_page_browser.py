@@ -56,6 +56,12 @@ def tab(chromium: Any, server: Server) -> Iterator[Callable[..., Tab]]:
         one.close()
 
 
+def turn(one: Tab, axis: str) -> None:
+    """Show another axis, and wait until it is what is shown."""
+    one.page.get_by_role("button", name=f"axis {axis}").click()
+    one.until(lambda: one.page.locator(f".plot[aria-label^='The error ladder of axis {axis}']").count() == 1)
+
+
 LEAVE_AT_ONCE = """async () => {
     document.querySelector("[data-act=diagnose]").click();
     const leave = document.querySelector("[data-act=cancel]");
@@ -122,8 +128,8 @@ def test_a_reload_in_the_middle_loses_nothing_and_a_fit_can_be_left(tab: Callabl
     """The work goes on without the browser; Cancel leaves the story as it was."""
     one = ready(tab())
     busy, free = one.page.locator("[data-act=cancel]"), one.page.locator("[data-act=diagnose]")
-    one.page.get_by_role("button", name="axis y").click()
-    one.until(lambda: "axis y" in str(one.page.locator(".plot[aria-label^='The error ladder']").get_attribute("aria-label")) and free.is_enabled())
+    turn(one, "y")
+    one.until(free.is_enabled)
     for _ in range(6):  # a short fit may be over before the click
         one.page.evaluate(LEAVE_AT_ONCE)
         one.until(free.is_enabled, 60)
@@ -132,7 +138,7 @@ def test_a_reload_in_the_middle_loses_nothing_and_a_fit_can_be_left(tab: Callabl
     assert "Left as it was" in one.notices() and len(one.ladder()) == 1
     one.press("diagnose")
     one.page.reload()
-    one.page.get_by_role("button", name="axis y").click()
+    turn(one, "y")
     one.until(lambda: busy.is_visible() or "coulomb" in one.verdict(), 10)
     one.until(lambda: "Missing: coulomb friction" in one.verdict() and free.is_enabled(), 60)
     one.press("auto")

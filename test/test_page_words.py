@@ -230,3 +230,15 @@ def test_a_downloaded_model_is_the_yaml_of_refine() -> None:
     loaded = yaml.safe_load(text)
     assert loaded["format"] == "xy_sysid axis model 1" and loaded["axes"]["y"]["parameters"]["gain"]["ci95"] == [0.096, 0.098]
     assert plain_name("../a b/c.npz") == ".._a_b_c.npz" and plain_name("") == "axis"
+
+
+def test_a_picture_is_never_kept_under_a_stamp_that_is_newer_than_its_story() -> None:
+    """Readers take the stamp before the document: whatever comes between them, the next look draws again."""
+    heard = Heard()
+    heard.story("x", json.dumps({"axis": "x", "n": 1}))
+    seen = heard.version["story x"], heard.stories["x"]["n"]
+    heard.story("x", json.dumps({"axis": "x", "n": 2}))
+    assert seen == (1, 1) and heard.version["story x"] == 2  # the document is exchanged before its version grows
+    source = (Path(__file__).parents[1] / "xy_sysid" / "page" / "story_card.py").read_text(encoding="utf-8")
+    refresh = source[source.index("async def refresh") :]
+    assert refresh.index("self._source.stamp(axis)") < refresh.index("self._source.document(axis)") and refresh.count("source.stamp(") == 1

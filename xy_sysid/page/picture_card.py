@@ -106,13 +106,13 @@ class Cards:
         """Draw again what has changed."""
         if self._live is not None:
             await self._live.refresh(axis)
+        stamp = self._source.stamp(axis)  # before the document: see StoryCard
         document = self._source.document(axis)
         there = document is not None and bool(document["steps"])
         for card in self._cards.values():
             card.set_visibility(there)
         if document is None or not there:
             return
-        stamp = self._source.stamp(axis)
         for picture in PICTURES:
             key = (self._source.key, axis, stamp, len(document["steps"]), picture.name)
             await self._plots[picture.name].show(self._session, key, picture.figure, document)
@@ -225,13 +225,13 @@ class LiveCards:
         from xy_sysid.page.live_figures import failing_words, response_figure, tracking_figure
 
         heard = self._session.heard
+        key = ("live", axis, heard.version.get(f"axis {axis}", 0))
         frf, comparison = heard.arrays.get(f"frf/{axis}"), heard.arrays.get(f"comparison/{axis}")
         self._card.set_visibility(frf is not None)
         history = list(heard.resonances.get(axis, ()))
         self._track_card.set_visibility(len(history) > 1)
         if frf is not None:
             self._words.set_text(failing_words(comparison))
-            key = ("live", axis, heard.version.get(f"axis {axis}", 0))
             await self._plot.show(self._session, key, response_figure, frf, comparison, heard.transfer_function(axis), heard.rate(axis))
             self._plot.say(f"Frequency response of axis {axis}, live. {failing_words(comparison)}")
         if len(history) > 1:

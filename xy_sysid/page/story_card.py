@@ -76,6 +76,7 @@ class StoryCard:
     async def refresh(self, axis: str) -> None:
         """Write and draw again what has changed."""
         self._axis = axis
+        at = self._source.stamp(axis)  # before the document, which another thread may exchange: never an old picture under a new stamp
         job = self._source.job(axis)
         self._busy.set_visibility(job is not None)
         if job is not None:
@@ -88,14 +89,14 @@ class StoryCard:
         effects = self._source.effects()
         if len(effects) != len(self._choice.options):
             self._choice.set_options({name: _words(name) for name in effects})
-        stamp = (axis, self._source.stamp(axis), document is None and self._source.words(axis))
+        stamp = (axis, at, document is None and self._source.words(axis))
         if stamp != self._shown:
             self._shown = stamp
             self._write(document)
         self._ladder.root.set_visibility(bool(document and document["ladder"]))
         if document is None:
             return
-        key = (self._source.key, axis, self._source.stamp(axis))
+        key = (self._source.key, axis, at)
         self._ladder.say(ladder_words(document))
         await self._ladder.show(self._session, (*key, "ladder"), draw.ladder, document)
         if document["candidates"]:

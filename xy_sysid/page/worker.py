@@ -84,10 +84,16 @@ def main(path: str, reading: Reading, orders: Connection, words: Connection) -> 
             busy[0] = False
             raise Left
 
+    def say(news: News) -> None:
+        """Whole, or not at all: half a message would end all talk."""
+        at_work, busy[0] = busy[0], False
+        words.send(news)
+        busy[0] = at_work
+
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the page's; it closes the pipe
     signal.signal(LEAVE, leave)
     try:
-        desk = Desk(Path(path), reading, words.send)
+        desk = Desk(Path(path), reading, say)
     except XySysidError as problem:
         words.send(News("closed", words=str(problem)))
         return
