@@ -105,8 +105,9 @@ def test_a_hidden_effect_is_found_and_added_by_clicks(scene: Scene) -> None:
     tab.press("diagnose")
     tab.until(lambda: "Missing: coulomb friction" in tab.verdict(), 90)
     assert len(tab.ladder()) == 1 and tab.ladder()[0] > 4
-    tab.until(lambda: tab.page.locator("[data-add=coulomb_friction]").is_enabled(), 60)
-    tab.page.locator("[data-add=coulomb_friction]").click()
+    add = tab.page.locator("[data-add=coulomb_friction]:enabled")
+    tab.until(add.count, 60, f"no button to add it among {tab.page.locator('.ranked').all_text_contents()}")
+    add.click()
     tab.until(lambda: len(tab.ladder()) == 2 and tab.ladder()[1] < 1.2 and "at the noise floor" in tab.verdict(), 60)
 
 
@@ -162,12 +163,15 @@ def test_stop_really_makes_the_excitation_inactive(scene: Scene, way: str) -> No
     world.spin(0.3)
     assert scene.blocks[-1].values.any() or scene.blocks[-2].values.any()
     if way == "button":
+        tab.page.get_by_role("button", name="Open a recording").click()  # even with a dialog over the page
         tab.page.get_by_role("button", name="STOP").click()
     else:
         tab.page.locator("body").press("Escape")
     scene.lifecycle("nothing moves before Activate")
     tab.until(lambda: "stopped: the excitation is inactive" in tab.notices(), 10)
     assert world.state("excitation") == "inactive" and scene.silent()
+    if way == "button":
+        tab.page.get_by_role("button", name="Cancel").last.click()
 
 
 def test_a_lost_node_is_named(scene: Scene) -> None:

@@ -70,7 +70,7 @@ def test_numbers_are_in_people_s_units_with_intervals_and_a_meaning() -> None:
     assert found["delay"].text == "1.290 [1.280, 1.300] ms"
     assert found["gain"].text == "97 mm/s/V"
     assert found["relative error"].text == "1.23 %" and found["relative error"].good is True
-    assert found["windows dropped"].text == "3 (2 samples lost, 1 encoder frozen)" and found["windows dropped"].good is False
+    assert found["windows dropped"].text == "3 (samples lost 2, encoder frozen 1)" and found["windows dropped"].good is False
     assert all(len(fact.meaning) > 20 for fact in found.values())
     assert facts({}) == [] and dropped_words({"dropped windows": "0"}) == "none"
     assert {fact.label: fact.good for fact in facts({"relative error (1)": "0.2"})} == {"relative error": False}

@@ -102,7 +102,7 @@ def dropped_words(values: Values) -> str:
     """Number and reasons; empty while nothing is known."""
     if "dropped windows" not in values:
         return ""
-    reasons = [f"{values[key]} {_reason(key)}" for key in values if key.startswith("dropped windows: ") and values[key] != "0"]
+    reasons = [f"{_reason(key)} {values[key]}" for key in values if key.startswith("dropped windows: ") and values[key] != "0"]
     if values["dropped windows"] == "0":
         return "none"
     return f"{values['dropped windows']} ({', '.join(reasons)})" if reasons else values["dropped windows"]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from html import escape
 from typing import Any
 
 import numpy as np
@@ -42,7 +41,8 @@ class Numbers:
 def show(fact: Fact) -> None:
     """One number with its meaning as a tooltip, which a screen reader reads too."""
     state = {True: " good", False: " bad", None: ""}[fact.good]
-    with ui.element("div").classes(f"fact{state}").props("tabindex=0 role=group").props(f'aria-label="{escape(fact.label)}"'):
+    with ui.element("div").classes(f"fact{state}").props("tabindex=0 role=group") as card:
+        card.props["aria-label"], card.props["aria-description"] = fact.label, fact.meaning
         ui.label(fact.label).classes("label")
         ui.label(fact.text).classes("value")
         ui.tooltip(fact.meaning)

@@ -34,7 +34,7 @@ class Panel:
             self._problem = ui.label("").classes("notice").props("role=alert")
             self._wait = ui.linear_progress(0, show_value=False).props('instant-feedback aria-label="reading"')
             with ui.element("div").classes("split") as self._split:
-                with ui.element("div").classes("stack"):
+                with ui.element("div").classes("stack") as self._pictures:
                     self._numbers = Numbers()
                     self._cards = Cards(session, source)
                 with ui.element("div").classes("stack side"):
@@ -57,6 +57,8 @@ class Panel:
             self._choice.set_options({axis: f"axis {axis}" if len(axis) <= SHORT else axis for axis in axes}, value=self._axis or None)
         if self._control is not None:
             self._control.refresh(self._axes)
+        self._pictures.set_visibility(bool(self._axis))
+        self._story.root.set_visibility(bool(self._axis))
         if self._axis:
             self._numbers.refresh(self._session, source, self._axis)
             await self._story.refresh(self._axis)

@@ -33,7 +33,7 @@ class StoryCard:
         self._session, self._source, self._axis = session, source, ""
         self._shown: object = None
         self._buttons: list[ui.button] = []
-        with ui.element("section").classes("card").props('aria-label="story"'):
+        with ui.element("section").classes("card").props('aria-label="story"') as self.root:
             ui.html("<h2>The story</h2>", sanitize=False)
             self._verdict = ui.label("").classes("sentence").props("role=status aria-live=polite data-part=verdict")
             self._note = ui.label("").classes("soft")
