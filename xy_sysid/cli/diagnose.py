@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -92,5 +93,9 @@ def parameter_table(fit: GreyboxFit, units: tuple[str, str]) -> None:
     """Parameters of a fit, as people read them; units: of the recording's input and output."""
     from xy_sysid.own_units import unit_in
 
-    rows = [(p.name, f"{p.value:.5g}", f"{p.low:.5g} .. {p.high:.5g}", unit_in(p.unit, units)) for p in fit.parameters]
+    rows = [(p.name, f"{p.value:.5g}", _interval(p.low, p.high), unit_in(p.unit, units)) for p in fit.parameters]
     table("", ("parameter", "value", "95 % interval", "unit"), rows)
+
+
+def _interval(low: float, high: float) -> str:
+    return f"{low:.5g} .. {high:.5g}" if math.isfinite(low) or math.isfinite(high) else "-"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,6 +15,7 @@ from xy_sysid.cli.provenance import provenance
 from xy_sysid.cli.reading import chosen, each, read
 
 if TYPE_CHECKING:
+    from xy_sysid.open_loop import OpenLoop
     from xy_sysid.refinement import Ladder
 
 
@@ -32,6 +34,12 @@ def refine(
     tolerance: Annotated[
         float, typer.Option(help="part of the signal that the model may leave; real machines need 0.01 or more", min=1e-6, max=0.5)
     ] = 1e-3,
+    simulate_alone: Annotated[
+        bool,
+        typer.Option(
+            "--open-loop", help="fit the named effects once more, to the whole record, for the best simulation of the position from the input alone"
+        ),
+    ] = False,
     model: Annotated[Path | None, typer.Option("--model", metavar="FILE", help="write the model with its physical parameters as YAML")] = None,
     mat: Annotated[Path | None, typer.Option("--mat", metavar="FILE", help="write the linear part and all parameters for MATLAB")] = None,
     json: o.Json = False,
@@ -39,6 +47,7 @@ def refine(
     """Add physical effects to the rigid model, refit everything together, and print the ladder of falling errors."""
     from xy_sysid.errors import BadInput
     from xy_sysid.greybox import prepare
+    from xy_sysid.open_loop import open_loop, settled
     from xy_sysid.own_units import in_units
     from xy_sysid.refinement import refine as logic
     from xy_sysid.saved_models import write_axis_mat, write_axis_models
@@ -52,6 +61,7 @@ def refine(
             raise BadInput("--add", name, "an effect that is not in every model already", "See xy-sysid effects.")
     recording = read(rec, axis, topic, effort, span, json)
     names = chosen(recording, axis)
+    alone: dict[str, OpenLoop] = {}
     with progress() as bar:
         task = bar.add_task("refining", total=len(names))
 
@@ -60,6 +70,9 @@ def refine(
             u, y = samples(recording, name)
             data = prepare(recording.sampling_rate, u, y, tolerance)
             found = logic(data, known, given=tuple(add or ()), most=len(add or ()) + 4 if auto else 0)
+            if not any(known[own].one_step for own in found.effects):  # free simulation says nothing about those
+                found = replace(found, final=settled(data, found.final)) if simulate_alone else found
+                alone[name] = open_loop(recording.sampling_rate, y, found.final.simulated)
             bar.advance(task)
             return found
 
@@ -71,7 +84,9 @@ def refine(
         write_axis_mat(mat, {name: ladder.final for name, ladder in found.items()})
     units, unit = (recording.input_unit, recording.output_unit), f"{recording.output_unit}/s"
     if json:
-        answers: dict[str, Any] = {name: in_units(_answer(ladder, unit), units) for name, ladder in found.items()}
+        answers: dict[str, Any] = {
+            name: in_units(_answer(ladder, unit) | _alone(alone.get(name), recording.output_unit), units) for name, ladder in found.items()
+        }
         emit({"recording": origin, "axes": answers, "refused": refused})
         return
     for name, ladder in found.items():
@@ -86,6 +101,8 @@ def refine(
         table(f"axis {name}: m{unit}, floor {1e3 * ladder.final.noise_floor:.4g}", ("added", "training error", "held-out error", "excess"), rows)
         people.print(f"  {_words(ladder)}", markup=False)
         parameter_table(ladder.final, units)
+        if name in alone:
+            people.print(f"  {_alone_in_words(alone[name], recording.output_unit)}", markup=False)
         people.print()
     for name, text in refused.items():
         people.print(f"axis {name}: {text}", markup=False)
@@ -107,6 +124,17 @@ def _words(ladder: Ladder) -> str:
         "partly": f"{names} explain a part; the rest is not at the floor.",
         "not_in_library": "No effect of the library brings the error down.",
     }[verdict(ladder)]
+
+
+def _alone_in_words(found: OpenLoop, unit: str) -> str:
+    where = f"{1e3 * found.rms:.3g} m{unit} rms, {1e3 * found.worst:.3g} at worst ({100 * found.share:.2g} % of the measured spread)"
+    return f"Open loop, the position of the whole record simulated from the input alone: off by {where}."
+
+
+def _alone(found: OpenLoop | None, unit: str) -> dict[str, Any]:
+    if found is None:
+        return {"open_loop": None}
+    return {"open_loop": {"rms": found.rms, "worst": found.worst, "share": found.share, "unit": unit}}
 
 
 def _answer(ladder: Ladder, unit: str) -> dict[str, Any]:
