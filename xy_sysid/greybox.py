@@ -141,14 +141,22 @@ def fit_base(data: AxisData, library: Library = STANDARD) -> GreyboxFit:
 
 
 def fit_with(
-    data: AxisData, base: GreyboxFit, names: Iterable[str], starts: Mapping[str, tuple[float, ...]] | None = None, brief: bool = False
+    data: AxisData,
+    base: GreyboxFit,
+    names: Iterable[str],
+    starts: Mapping[str, tuple[float, ...]] | None = None,
+    brief: bool = False,
+    hopeless: float = np.inf,
 ) -> GreyboxFit:
-    """The model of ``base`` with more effects, all refitted together; starts: their first values, else read from the data."""
+    """The model of ``base`` with more effects, all refitted together; starts: their first values, else read from the data.
+
+    brief: on the first stage's data only, and no longer than a first round if that leaves more excess than ``hopeless``
+    """
     model = base.model
     for name in names:
         values = (starts or {}).get(name)
         model = _begun(data, base, model, name) if values is None else model.with_effect(name, bounded(model.library[name], values))
-    return fit(data, model, brief)
+    return fit(data, model, brief, hopeless)
 
 
 def _begun(data: AxisData, base: GreyboxFit, model: AxisModel, name: str) -> AxisModel:
@@ -204,10 +212,14 @@ def _scene(data: AxisData, fitted: GreyboxFit) -> Scene:
     )
 
 
-def fit(data: AxisData, start: AxisModel, brief: bool = False) -> GreyboxFit:
-    """All parameters of a model, from where it is; brief: on the first stage's data only."""
+def fit(data: AxisData, start: AxisModel, brief: bool = False, hopeless: float = np.inf) -> GreyboxFit:
+    """All parameters of a model, from where it is; brief, hopeless: see ``fit_with``."""
     run, values, scale = _problem(data, start, data.first)
-    found = solve(run, data.velocity[: data.first], data.layout, data.floor, scale, values, BRIEF)
+    velocity = data.velocity[: data.first]
+    found = solve(run, velocity, data.layout, data.floor, scale, values, BRIEF[:1])
+    if not (brief and excess(data.layout, velocity - run(found.values), data.floor) > hopeless):
+        more = solve(run, velocity, data.layout, data.floor, scale, found.values, BRIEF[1:])
+        found = replace(more, runs=found.runs + more.runs)
     if not brief:
         return finish(data, _model(start, found.values), found.runs)
     return _result(data, start, scale, found, found.runs)

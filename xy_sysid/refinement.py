@@ -22,11 +22,12 @@ AT_FLOOR = 0.15  # excess below which nothing is left to explain; clean axes sta
 SIMPLER = 0.08  # excess that a simpler model may be worse by and still be preferred
 TRIED = 5  # effects that are fitted in full at each step, by their share of the error
 NEAR = 0.3  # excess on the first stage within which candidates run the whole distance
+HOPELESS = 1.5  # excess behind the best so far at which a candidate is given up after its first round
 LEAST_SHARE = 5e-4  # of the error that an effect's trace must explain to be tried
 LEAST_GAIN = 0.1  # excess that an addition must win, and
-PART_GAIN = 0.05  # the part of the excess that it must win
+PART_GAIN = 0.11  # the part of the excess that it must win
 WEAK = 0.8  # of the excess that a single effect must leave at most; else two at once are tried
-WIDE = 4  # first effects of such pairs
+WIDE = 3  # first effects of such pairs
 SURE = 0.03  # excess up to which nothing at all is left; clean axes stay below 0.02
 PART_LEFT = 0.4  # of the excess that an effect found between SURE and AT_FLOOR may leave
 SUSPICIOUS = 0.1  # share of a look-alike from which an effect that free simulation cannot judge is tried
@@ -82,7 +83,7 @@ def refine(data: AxisData, library: Library = STANDARD, most: int = MOST_EFFECTS
             tried = (*suspected(data, now, tried, library), *tried)
         taken = choose(tried, library)
         found = taken.fit if taken is not None else None
-        if (found is None or found.excess > WEAK * now.excess) and len(steps) < most and not paired:
+        if (found is None or found.excess > WEAK * now.excess) and len(steps) < most and not paired and data.floor.epsilon <= EPSILON:
             paired = True
             pair = together(data, now, tried, library)
             if pair is not None and (found is None or pair[1].fit.excess < WEAK * found.excess):
@@ -118,10 +119,12 @@ def together(data: AxisData, now: GreyboxFit, tried: tuple[Candidate, ...], libr
     if any(library[name].one_step for name, _ in now.model.effects):
         return None
     fitted = [item for item in tried if item.fit is not None and library[item.effect].one_step is None]
+    richest = [item for item in fitted if library[item.effect].category == "bristle"]  # all dry friction goes through bristles
+    fitted = [*richest, *(item for item in fitted if item not in richest)]
     best: tuple[Step, Step] | None = None
     for first in fitted[:WIDE]:
         assert first.fit is not None
-        seconds = [item.effect for item in look(data, first.fit, _open(first.fit, library)) if item.share >= LEAST_SHARE][:2]
+        seconds = [item.effect for item in look(data, first.fit, _open(first.fit, library)) if item.share >= LEAST_SHARE][:1]
         always = [effect.name for effect in _open(first.fit, library) if effect.name == "constant_load"]
         for name in dict.fromkeys([*seconds, *always]):
             try:
@@ -187,7 +190,8 @@ def candidates(data: AxisData, now: GreyboxFit, library: Library = STANDARD) -> 
         if len(library[name].parameters) > enough:
             found.append(Candidate(name, shares.get(name, 0.0), None))
             continue
-        fitted = _tried(data, now, name)
+        least = min((item.fit.excess for item in found if item.fit), default=np.inf)
+        fitted = _tried(data, now, name, least + HOPELESS)
         if fitted is not None and fitted.excess < AT_FLOOR:
             fitted = finish(data, fitted.model, fitted.runs)
             if fitted.excess < SIMPLER:
@@ -209,9 +213,9 @@ def _with_relatives(names: list[str], open_to: list[Effect]) -> list[str]:
     return [*names, *(name for name in family if family[name] in wanted and name not in names)]
 
 
-def _tried(data: AxisData, now: GreyboxFit, name: str) -> GreyboxFit | None:
+def _tried(data: AxisData, now: GreyboxFit, name: str, hopeless: float = np.inf) -> GreyboxFit | None:
     try:
-        found = fit_with(data, now, [name], brief=True)
+        found = fit_with(data, now, [name], brief=True, hopeless=hopeless)
     except np.linalg.LinAlgError:
         return None
     return found if np.isfinite(found.excess) else None
