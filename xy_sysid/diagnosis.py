@@ -6,6 +6,9 @@ import math
 from dataclasses import dataclass, replace
 from typing import Literal
 
+import numpy as np
+import scipy.signal
+
 from xy_sysid.axis_model import STANDARD, Library
 from xy_sysid.comparison import Comparison, compare_velocity
 from xy_sysid.errors import BadInput
@@ -21,6 +24,7 @@ TELLING = 1.0  # excess that the base must have at a looser tolerance, for a nam
 HOPELESS = 0.6  # excess that the strict ladder's end may have at a looser tolerance for a ladder of its own to be worth its time
 CLEAR = 0.3  # excess by which a runner-up must be behind for the confidence to reach 63 % of its most
 EXPLAINS = 0.6  # part of the excess that must be gone for a name with a rest left over
+FOLLOWS = 0.15  # coherence of input and velocity, mean over an octave: of unrelated signals it is below 0.08
 SHORTEST = 4.0  # s
 FEWEST_BANDS = 6  # excited bands
 LEAST_TRAVEL = 20.0  # encoder counts
@@ -84,6 +88,9 @@ def lacking(sampling_rate: float, voltage: FloatArray, position: FloatArray) -> 
         return "the input does not move; excite the axis."
     if float(position.std()) == 0.0:
         return "the output does not move; excite more, or check the encoder."
+    followed = _coherence(sampling_rate, voltage, position)
+    if followed < FOLLOWS:
+        return f"the output does not follow the input (coherence {followed:.2g} at best, {FOLLOWS:g} is the least); check which signals these are."
     try:
         data = prepare(sampling_rate, voltage, position)
     except BadInput as problem:
@@ -91,6 +98,15 @@ def lacking(sampling_rate: float, voltage: FloatArray, position: FloatArray) -> 
     if int(data.floor.excited.sum()) < FEWEST_BANDS:
         return f"only {int(data.floor.excited.sum())} bands of frequency are excited; use noise or a multisine over the whole band."
     return ""
+
+
+def _coherence(sampling_rate: float, voltage: FloatArray, position: FloatArray) -> float:
+    """The best of eight octaves' mean coherence of input and velocity."""
+    length = int(2 ** np.floor(np.log2(voltage.size / 16)))
+    frequency, value = scipy.signal.coherence(voltage[:-1], np.diff(position), sampling_rate, nperseg=length)
+    octave = np.floor(np.log2(np.maximum(frequency, frequency[1]) / frequency[-1])).astype(np.int64)
+    means = [float(np.nanmean(np.nan_to_num(value[octave == k]))) for k in range(-8, 0) if int(np.sum(octave == k)) >= 4]
+    return max(means, default=0.0)
 
 
 def _judged(data: AxisData, ladder: Ladder, library: Library, tolerance: float, certainty: float) -> Diagnosis:
@@ -101,8 +117,7 @@ def _judged(data: AxisData, ladder: Ladder, library: Library, tolerance: float, 
         text = f"Nothing is missing: the rigid model with delay leaves {_mm(base.held_out_error)} mm/s, the floor is {_mm(base.noise_floor)} mm/s."
         return Diagnosis("nothing_missing", (), certainty, tolerance, text, ladder, tried, where, "None is needed.")
     # the pruned model keeps the order of importance in which effects were added
-    added = [step.added for step in ladder.steps if step.added in ladder.effects and step.added is not None]
-    names = tuple(dict.fromkeys([*added, *ladder.effects]))
+    names = _ordered(ladder, library)
     gone = 1.0 - final.excess / base.excess
     fall = f"the held-out error falls from {_mm(base.held_out_error)} to {_mm(final.held_out_error)} mm/s (floor {_mm(final.noise_floor)})"
     if names and ladder.explained:
@@ -118,6 +133,14 @@ def _judged(data: AxisData, ladder: Ladder, library: Library, tolerance: float, 
         return Diagnosis("not_in_library", names, 0.5 * certainty, tolerance, sentence, ladder, tried, where, _experiment(names[0], library))
     sentence = f"Not in the library: no effect brings the error to the floor; at best {fall}."
     return Diagnosis("not_in_library", (), certainty * (1.0 - max(gone, 0.0)), tolerance, sentence, ladder, tried, where, _UNKNOWN)
+
+
+def _ordered(ladder: Ladder, library: Library) -> tuple[str, ...]:
+    """The effects that remain, in the order in which they (or a relative that they replaced) were added."""
+    order = [library[step.added] for step in ladder.steps if step.added is not None]
+    place = {effect.name: k for k, effect in reversed(list(enumerate(order)))}
+    of_family = {effect.family: k for k, effect in reversed(list(enumerate(order))) if effect.family}
+    return tuple(sorted(ladder.effects, key=lambda name: place.get(name, of_family.get(library[name].family, len(order)))))
 
 
 _UNKNOWN = "Look at where the model fails, then excite only there: half and double the amplitude, another part of the travel, one direction."

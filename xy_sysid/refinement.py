@@ -100,7 +100,7 @@ def refine(data: AxisData, library: Library = STANDARD, most: int = MOST_EFFECTS
         if last is not None:
             now = last.fit
             steps.append(last)
-    pruned = prune(data, now, keep=tuple(given)) if len(steps) > 2 else now
+    pruned = simplified(data, prune(data, now, keep=tuple(given)), keep=tuple(given)) if len(steps) > 2 else now
     return Ladder(tuple(steps), rejected, pruned, tuple(name for name, _ in pruned.model.effects))
 
 
@@ -131,7 +131,7 @@ def together(data: AxisData, now: GreyboxFit, tried: tuple[Candidate, ...], libr
                 found = fit_with(data, now, [first.effect, name], brief=True)
             except np.linalg.LinAlgError:
                 continue
-            if np.isfinite(found.excess) and (best is None or found.excess < best[1].fit.excess):
+            if np.isfinite(found.excess) and _plausible(found) and (best is None or found.excess < best[1].fit.excess):
                 best = Step(first.effect, first.fit, ()), Step(name, found, ())
         if best is not None and best[1].fit.excess < AT_FLOOR:
             break
@@ -218,7 +218,13 @@ def _tried(data: AxisData, now: GreyboxFit, name: str, hopeless: float = np.inf)
         found = fit_with(data, now, [name], brief=True, hopeless=hopeless)
     except np.linalg.LinAlgError:
         return None
-    return found if np.isfinite(found.excess) else None
+    return found if np.isfinite(found.excess) and _plausible(found) else None
+
+
+def _plausible(found: GreyboxFit) -> bool:
+    """No effect has values that no machine has."""
+    checks = ((found.model.library[name].plausible, values) for name, values in found.model.effects)
+    return all(check is None or check(values) for check, values in checks)
 
 
 def choose(tried: tuple[Candidate, ...], library: Library = STANDARD) -> Candidate | None:
@@ -243,4 +249,28 @@ def prune(data: AxisData, now: GreyboxFit, keep: tuple[str, ...] = ()) -> Greybo
         needless = without.excess < SURE or PART_LEFT * without.excess < now.excess
         if without.excess <= now.excess + NEEDED and (needless or without.excess >= AT_FLOOR):
             now = without
+    return now
+
+
+def simplified(data: AxisData, now: GreyboxFit, keep: tuple[str, ...] = ()) -> GreyboxFit:
+    """A simpler relative in the place of each effect of a family, where that costs next to nothing.
+
+    While another effect was still missing, the richer relative may have looked better.
+    """
+    library = now.model.library
+    for name, values in now.model.effects:
+        effect = library[name]
+        if not effect.family or name in keep or now.excess >= AT_FLOOR or effect.one_step is not None:
+            continue
+        own = dict(zip(effect.names, values, strict=True))
+        simpler = [e for e in library.acting if e.family == effect.family and len(e.parameters) < len(effect.parameters)]
+        for relative in sorted(simpler, key=lambda e: len(e.parameters)):
+            start = tuple(own.get(key, usual) for key, usual in zip(relative.names, relative.typical, strict=True))
+            try:
+                other = fit(data, now.model.without(name).with_effect(relative.name, start))
+            except np.linalg.LinAlgError:
+                continue
+            if other.excess <= now.excess + SURE and _plausible(other):
+                now = other
+                break
     return now

@@ -18,7 +18,7 @@ the simulation knows at that moment (``WORDS``). So a law reads as the equation 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, ParamSpec, Protocol, TypeVar
 
@@ -143,6 +143,7 @@ class Effect:
     family:      effects of one family replace one another
     order:       place among the effects of its category, in the direction of the signal
     simulable:   False if free simulation cannot judge it
+    plausible:   False for values that no machine has, though each is within its bounds
     one_step:    then this does: fits the effect by one-step prediction (see ``contact.follow``)
     """
 
@@ -164,6 +165,7 @@ class Effect:
     order: int = 0
     simulable: bool = True
     one_step: OneStep | None = None
+    plausible: Callable[[Sequence[float]], bool] | None = None
 
     def __post_init__(self) -> None:
         """Raises BadInput if the functions do not fit the category or ask for words that nobody knows."""

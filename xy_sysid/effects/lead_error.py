@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -38,6 +38,12 @@ class _Reader:
         return (max(math.hypot(float(c[0]), float(c[1])), 1e-8), self.period, math.atan2(float(c[1]), float(c[0])))
 
 
+def plausible(values: Sequence[float]) -> bool:
+    """A reading that changes by less than a fifth more or less than the motion; beyond, it explains any signal by itself."""
+    amplitude, period, _ = values
+    return 2.0 * math.pi * amplitude / period < 0.2
+
+
 EFFECT = Effect(
     name="lead_error",
     law="y = x + amplitude sin(2 pi x / period + phase)",
@@ -55,4 +61,5 @@ EFFECT = Effect(
     experiment="traverse at two speeds: the error in position is the same at both",
     functions={"error": error},
     guesses=guesses,
+    plausible=plausible,
 )
