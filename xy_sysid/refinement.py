@@ -31,6 +31,7 @@ WIDE = 3  # first effects of such pairs
 SURE = 0.03  # excess up to which nothing at all is left; clean axes stay below 0.02
 PART_LEFT = 0.4  # of the excess that an effect found between SURE and AT_FLOOR may leave
 SUSPICIOUS = 0.1  # share of a look-alike from which an effect that free simulation cannot judge is tried
+MUCH = 0.75  # of the held-out error
 NEEDED = 0.05  # excess that taking an effect out again must cost, or it goes
 MOST_EFFECTS = 4
 
@@ -90,7 +91,7 @@ def refine(data: AxisData, library: Library = STANDARD, most: int = MOST_EFFECTS
                 steps += [replace(pair[0], tried=tried), pair[1]]
                 now = pair[1].fit
                 continue
-        if taken is None or found is None or now.excess - found.excess < max(LEAST_GAIN, PART_GAIN * now.excess):
+        if taken is None or found is None or not _worth(now, found):
             rejected = tried
             break
         now = found
@@ -102,6 +103,12 @@ def refine(data: AxisData, library: Library = STANDARD, most: int = MOST_EFFECTS
             steps.append(last)
     pruned = simplified(data, prune(data, now, keep=tuple(given)), keep=tuple(given)) if len(steps) > 2 else now
     return Ladder(tuple(steps), rejected, pruned, tuple(name for name, _ in pruned.model.effects))
+
+
+def _worth(now: GreyboxFit, then: GreyboxFit) -> bool:
+    """Enough is won in the mean over the bands, or something there and much in the error as a whole."""
+    gain = now.excess - then.excess
+    return gain >= max(LEAST_GAIN, PART_GAIN * now.excess) or (gain >= LEAST_GAIN and then.held_out_error < MUCH * now.held_out_error)
 
 
 def added(data: AxisData, now: GreyboxFit, name: str) -> GreyboxFit:
