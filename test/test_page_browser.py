@@ -43,8 +43,17 @@ def chromium() -> Iterator[Any]:
         yield made
 
 
+@pytest.fixture(scope="module")
+def usual(chromium: Any, server: Server) -> Iterator[Tab]:
+    """A tab that most tests share, as loading takes longer than most of them."""
+    made = Tab(chromium, server.address)
+    yield made
+    made.close()
+
+
 @pytest.fixture
 def tab(chromium: Any, server: Server) -> Iterator[Callable[..., Tab]]:
+    """Open a tab of one's own."""
     made: list[Tab] = []
 
     def open_tab(width: int = 1400, mode: str = "light", address: str = "") -> Tab:
@@ -75,9 +84,9 @@ def ready(one: Tab) -> Tab:
     return one
 
 
-def test_everything_is_drawn_and_nothing_is_fetched_from_elsewhere(tab: Callable[..., Tab], server: Server) -> None:
+def test_everything_is_drawn_and_nothing_is_fetched_from_elsewhere(usual: Tab, server: Server) -> None:
     """Each picture has curves and a description; no request leaves this server, and no error is in the console."""
-    one = ready(tab())
+    one = ready(usual)
     one.until(lambda: one.curves("Measured and modelled over frequency, bode", "model")[0])
     for name in ("bode", "coherence", "residual", "residual speed", "zoom", "poles zeros"):
         one.until(one.page.locator(f".js-plotly-plot[aria-label*=', {name}, axis x'] .main-svg").count, 10, name)
@@ -101,9 +110,9 @@ def test_it_fits_a_phone_and_follows_light_and_dark(tab: Callable[..., Tab], wid
     assert one.page.evaluate("document.activeElement.textContent") == "to the pictures"
 
 
-def test_an_effect_is_diagnosed_and_added_by_clicks_until_the_error_is_at_the_floor(tab: Callable[..., Tab]) -> None:
+def test_an_effect_is_diagnosed_and_added_by_clicks_until_the_error_is_at_the_floor(usual: Tab, tab: Callable[..., Tab]) -> None:
     """The point of it all: Diagnose names it, Add brings the ladder down, in a second tab too; Remove brings it up again."""
-    one, other = ready(tab()), tab()
+    one, other = ready(usual), tab()
     assert one.ladder()[0] > 5
     one.press("diagnose")
     one.until(lambda: "Missing: coulomb friction" in one.verdict(), 60)
@@ -124,9 +133,9 @@ def test_an_effect_is_diagnosed_and_added_by_clicks_until_the_error_is_at_the_fl
     assert one.errors == [] == other.errors
 
 
-def test_a_reload_in_the_middle_loses_nothing_and_a_fit_can_be_left(tab: Callable[..., Tab]) -> None:
+def test_a_reload_in_the_middle_loses_nothing_and_a_fit_can_be_left(usual: Tab) -> None:
     """The work goes on without the browser; Cancel leaves the story as it was."""
-    one = ready(tab())
+    one = ready(usual)
     busy, free = one.page.locator("[data-act=cancel]"), one.page.locator("[data-act=diagnose]")
     turn(one, "y")
     one.until(free.is_enabled)
@@ -145,16 +154,16 @@ def test_a_reload_in_the_middle_loses_nothing_and_a_fit_can_be_left(tab: Callabl
     one.until(lambda: "at the noise floor" in one.verdict() and len(one.ladder()) == 2, 60)
 
 
-def test_wrong_use_is_answered_in_a_sentence(tab: Callable[..., Tab]) -> None:
+def test_wrong_use_is_answered_in_a_sentence(usual: Tab) -> None:
     """Nothing chosen to add: the page says what is allowed."""
-    one = ready(tab())
+    one = ready(usual)
     one.press("add")
     one.until(lambda: "effect: name is ''" in one.notices() and "coulomb_friction" in one.notices(), 10)
 
 
-def test_recordings_stand_side_by_side_and_a_lost_one_says_so(tab: Callable[..., Tab], server: Server) -> None:
+def test_recordings_stand_side_by_side_and_a_lost_one_says_so(usual: Tab, server: Server) -> None:
     """Opened from the list of the folder; when its process dies, the page says that it is closed, and the other goes on."""
-    one = ready(tab())
+    one = ready(usual)
     before = set(server.children())
     one.page.get_by_role("button", name="Open a recording").click()
     one.page.get_by_role("combobox", name="recording").click()
