@@ -37,7 +37,7 @@ ARGUMENTS = [
 
 
 class Server:
-    """``xy-sysid page`` as a process; ``address`` is what it printed."""
+    """``xy-sysid page`` as a process; ``first`` is the line that it printed, ``address`` the same if it is one."""
 
     def __init__(self, folder: Path, *arguments: object, **environment: str) -> None:
         self.log = folder / f"page{time.monotonic_ns()}.log"
@@ -49,8 +49,9 @@ class Server:
                 words, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=err, text=True, env={**os.environ, "PYTHONPATH": path, **environment}
             )
         assert self.process.stdout is not None
-        self.address = self.process.stdout.readline().strip()
-        assert self.address.startswith("http"), self.said()
+        self.first = self.process.stdout.readline().strip()
+        self.address = self.first if self.first.startswith("http") else ""
+        assert self.first, self.said()
 
     def said(self) -> str:
         """All it wrote on stderr."""

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import socket
+import urllib.request
 from pathlib import Path
 
 import pytest
+from browser_tools import Server
 from cli_tools import npz, refused
 
 from xy_sysid.cli.page import reading
@@ -52,6 +55,17 @@ def test_a_port_that_is_taken_gives_the_next() -> None:
     assert url("127.0.0.1", 8080, rules("127.0.0.1")) == "http://127.0.0.1:8080/"
     assert url("::1", 8080, rules("::1")) == "http://[::1]:8080/"
     assert url("0.0.0.0", 8080, rules("0.0.0.0", "abc")) == f"http://{socket.gethostname()}:8080/?token=abc"
+
+
+def test_the_address_comes_as_json_and_ctrl_c_ends_the_page(tmp_path: Path) -> None:
+    """One document with the address that answers; afterwards 130 and no traceback."""
+    server = Server(tmp_path, npz(tmp_path / "a.npz", rows=600), "--json")
+    try:
+        with urllib.request.urlopen(json.loads(server.first)["address"] + "alive", timeout=5) as answer:
+            assert json.loads(answer.read()) == {"page": "xy_sysid"}
+    finally:
+        code = server.end()
+    assert code == 130 and "Traceback" not in server.said(), server.said()
 
 
 def test_what_is_done_is_told_in_words() -> None:

@@ -32,11 +32,12 @@ def page(
     effect_file: Own = None,
     namespace: Annotated[str, typer.Option(help="ROS namespace of the machine")] = "/xy",
     browse: Annotated[bool, typer.Option("--browse/--no-browse", help="open a browser where there is a display")] = True,
+    json: o.Json = False,
 ) -> None:
     """See measurement and model in a browser, where they part and what is missing; add it and watch the error fall. Ctrl-C ends it."""
     import re
 
-    from xy_sysid.cli.output import aside, people
+    from xy_sysid.cli.output import aside, emit, people
     from xy_sysid.errors import BadInput, BadRecording, MissingExtra
 
     try:
@@ -61,11 +62,17 @@ def page(
     from xy_sysid.page.session import Session
     from xy_sysid.page.shelf import Shelf
 
+    def told(address: str) -> None:
+        if json:
+            emit({"address": address})
+        else:
+            people.print(address)
+
     session = Session(Shelf(folder), with_machine, namespace, reading(topic, effort, effect_file))
     try:
         for path in rec or []:
             session.open(path)
-        serve(session, host, port, os.environ.get("XY_SYSID_TOKEN", ""), browse and display(), people.print)
+        serve(session, host, port, os.environ.get("XY_SYSID_TOKEN", ""), browse and display(), told)
     finally:
         session.close()
     aside.print("the page has ended")
