@@ -102,7 +102,24 @@ def refine(data: AxisData, library: Library = STANDARD, most: int = MOST_EFFECTS
             now = last.fit
             steps.append(last)
     pruned = simplified(data, prune(data, now, keep=tuple(given)), keep=tuple(given)) if len(steps) > 2 else now
-    return Ladder(tuple(steps), rejected, pruned, tuple(name for name, _ in pruned.model.effects))
+    names = tuple(name for name, _ in pruned.model.effects)
+    if any(name not in {step.added for step in steps} for name in names) and not any(library[name].one_step for name in names):
+        steps = _again(data, steps, names, library)
+    return Ladder(tuple(steps), rejected, pruned, names)
+
+
+def _again(data: AxisData, steps: list[Step], names: tuple[str, ...], library: Library) -> list[Step]:
+    """The rungs once more, with the relatives that were preferred in the end."""
+    families = {library[name].family: name for name in names if library[name].family}
+    now, found = steps[0].fit, steps[:1]
+    for step in steps[1:]:
+        if step.added is None:
+            continue
+        name = step.added if step.added in names else families.get(library[step.added].family)
+        if name is not None and name not in now.model:
+            now = fit_with(data, now, [name])
+            found.append(Step(name, now, step.tried))
+    return found
 
 
 def _worth(now: GreyboxFit, then: GreyboxFit) -> bool:
@@ -267,7 +284,7 @@ def simplified(data: AxisData, now: GreyboxFit, keep: tuple[str, ...] = ()) -> G
     library = now.model.library
     for name, values in now.model.effects:
         effect = library[name]
-        if not effect.family or name in keep or now.excess >= AT_FLOOR or effect.one_step is not None:
+        if not effect.family or name in keep or effect.one_step is not None:
             continue
         own = dict(zip(effect.names, values, strict=True))
         simpler = [e for e in library.acting if e.family == effect.family and len(e.parameters) < len(effect.parameters)]
@@ -277,7 +294,8 @@ def simplified(data: AxisData, now: GreyboxFit, keep: tuple[str, ...] = ()) -> G
                 other = fit(data, now.model.without(name).with_effect(relative.name, start))
             except np.linalg.LinAlgError:
                 continue
-            if other.excess <= now.excess + SURE and _plausible(other):
+            same = other.excess <= now.excess + SURE and other.held_out_error <= 1.1 * now.held_out_error
+            if same and _plausible(other):
                 now = other
                 break
     return now
