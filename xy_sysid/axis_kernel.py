@@ -19,6 +19,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from xy_sysid import swing
 from xy_sysid.compiled import compiled
 from xy_sysid.effect_code import called, text
 from xy_sysid.effects import modes
@@ -48,7 +49,7 @@ class _Text(importlib.abc.InspectLoader):
 def fingerprint(effects: Sequence[Effect]) -> str:
     """Check sum of the loop and of every module that has a part in it."""
     functions = [item for effect in effects for item in effect.functions.values()]
-    parts = {inspect.getsource(inspect.getmodule(item) or item) for item in functions} | {inspect.getsource(modes)}
+    parts = {inspect.getsource(inspect.getmodule(item) or item) for item in functions} | {inspect.getsource(modes), inspect.getsource(swing)}
     total = hashlib.sha256(text("loop", effects).encode())
     for part in sorted(parts):
         total.update(part.encode())
@@ -59,7 +60,7 @@ def build(effects: Sequence[Effect]) -> Kernel:
     """The compiled loop of these effects; compiling happens at its first call, or never if the disk has it."""
     name = f"run_{fingerprint(effects)}"
     laws: dict[str, object] = {called(effect, function): item for effect in effects for function, item in effect.functions.items()}
-    loader = _Text(text(name, effects), {"math": math, "__name__": __name__, **laws})  # numba's cache comes back by this name
+    loader = _Text(text(name, effects), {"math": math, "np": np, "__name__": __name__, **swing.LOOP, **laws})  # numba's cache comes back by this name
     spec = importlib.util.spec_from_loader(f"{__name__}_{name}", loader)
     assert spec is not None
     module = importlib.util.module_from_spec(spec)

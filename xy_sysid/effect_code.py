@@ -7,9 +7,10 @@ not depend on speed is worked out before the loop, or once per piece of a sample
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from string import Template
 
+from xy_sysid.effect_loop import TEMPLATE
 from xy_sysid.effects.contract import Effect, arguments
+from xy_sysid.swing import CUTS, FINE, STIFF, TERMS
 
 BASE = ("gain", "delay", "pole")
 INNER = 8000.0  # Hz: sub-steps of each of a sample's two pieces; LuGre bristles of 10 um and Stribeck curves of 10 mm/s need it
@@ -35,6 +36,9 @@ def text(name: str, effects: Sequence[Effect]) -> str:
     return TEMPLATE.substitute(
         name=name,
         inner=f"{INNER:.1f}",
+        stiff=f"{STIFF:.2f}",
+        most=f"{CUTS}",
+        terms=f"{TERMS}",
         unpack=_unpack(effects),
         flags=_flags(effects),
         inputs=_inputs(effects),
@@ -47,7 +51,9 @@ def text(name: str, effects: Sequence[Effect]) -> str:
         drag_free=_drags(effects, "middle", 6),
         level_start=_moving_levels(effects, "v"),
         level_middle=_moving_levels(effects, "middle"),
-        bristle=_bristle(effects),
+        bristle=_bristle(effects, hung=False),
+        bristle_hung=_bristle(effects, hung=True),
+        hang=_hang(effects),
         motions=_motions(effects),
         encoders=_encoders(effects),
     )
@@ -58,6 +64,13 @@ def needs_speed(effect: Effect) -> bool:
     if effect.category in ("state", "bristle"):
         return True
     return effect.category in ("force", "friction") and any("v" in arguments(item) for item in effect.functions.values())
+
+
+def heeds_speed(effect: Effect) -> bool:
+    """True if the law asks for the speed: then a resonance must be in the loop with it."""
+    if effect.category in ("friction", "bristle"):
+        return True
+    return effect.category in ("force", "state") and any("v" in arguments(item) for item in effect.functions.values())
 
 
 def _call(effect: Effect, function: str, words: Mapping[str, str]) -> str:
@@ -82,12 +95,14 @@ def _unpack(effects: Sequence[Effect]) -> str:
 def _flags(effects: Sequence[Effect]) -> str:
     lines = [f"has_{effect.name} = on[{place}] != 0" for place, effect in enumerate(effects)]
     groups = {
+        "heeded": [effect for effect in effects if heeds_speed(effect)],
         "curved": [effect for effect in effects if needs_speed(effect)],
         "any_state": _of(effects, "state"),
         "any_pull": [effect for effect in _of(effects, "force") if not needs_speed(effect)],
         "dry": _of(effects, "friction"),
         "bristled": _of(effects, "bristle"),
     }
+    lines += [f"inside_{effect.name} = False" for effect in _of(effects, "motion")]
     lines += [f"{group} = {' or '.join(f'has_{effect.name}' for effect in members) or 'False'}" for group, members in groups.items()]
     return _lines(1, lines)
 
@@ -153,8 +168,11 @@ def _moving_levels(effects: Sequence[Effect], speed: str) -> str:
     return _lines(5, lines)
 
 
-def _bristle(effects: Sequence[Effect]) -> str:
-    """Half a step of bending, the force there for the whole step, the other half: each at the mean speed of its half."""
+def _bristle(effects: Sequence[Effect], hung: bool) -> str:
+    """Half a step of bending, the force there for the whole step, the other half: each at the mean speed of its half.
+
+    hung: with resonances in the loop
+    """
 
     def words(speed: str) -> dict[str, str]:
         return {"v": speed, "h": "0.5 * h", "level": "level"}
@@ -166,16 +184,36 @@ def _bristle(effects: Sequence[Effect]) -> str:
         bends += [flag, f"    {state} = {_call(effect, 'bend', words('0.5 * (v + middle)'))}"]
         forces += [flag, f"    push -= turn * {_call(effect, 'force', words('middle'))}"]
         relaxes += [flag, f"    {state} = {_call(effect, 'bend', words('0.5 * (middle + end)'))}"]
-    predict = ["turn = math.copysign(1.0, gain)", "first = push", *begins, "middle = v + 0.5 * (gain * first - v) * (1.0 - decay)"]
-    move = ["reach = gain * push", "end = reach + (v - reach) * decay", "moved += reach * h + (v - reach) * spent"]
-    return _lines(6, [*predict, *bends, *forces, *move, *relaxes, "v = end"])
+    if hung:
+        half = "middle = 0.5 * (v + ahead(moving, swung, first))"
+        move = ["moved += step(moving, swung, push, spare)", "end = swung[1]"]
+    else:
+        half = "middle = v + 0.5 * (gain * first - v) * (1.0 - decay)"
+        move = ["reach = gain * push", "end = reach + (v - reach) * decay", "moved += reach * h + (v - reach) * spent"]
+    return _lines(6, ["turn = math.copysign(1.0, gain)", "first = push", *begins, half, *bends, *forces, *move, *relaxes, "v = end"])
+
+
+def _hang(effects: Sequence[Effect]) -> str:
+    """The resonances as polynomials, 1 at 0 Hz; one without roots in s is left to act on the sampled motion."""
+    lines = []
+    for effect in _of(effects, "motion"):
+        lines += [
+            f"if has_{effect.name}:",
+            f"    b0, b1, b2, a1, a2 = {_call(effect, 'section', {'fs': f'{FINE:.1f}'})}",
+            "    z0, z1 = roots(b1 / b0, b2 / b0, fs)",
+            "    p0, p1 = roots(a1, a2, fs)",
+            "    if z0 > 0.0 and p0 > 0.0 and abs((b0 + b1 + b2) / (1.0 + a1 + a2) - 1.0) < 1e-4:",
+            f"        hung = inside_{effect.name} = True",
+            "        top, bottom = times(top, np.array([z0, z1, 1.0])), times(bottom, np.array([p0, p1, 1.0]))",
+        ]
+    return _lines(2, lines)
 
 
 def _motions(effects: Sequence[Effect]) -> str:
     lines = []
     for effect in _of(effects, "motion"):
         lines += [
-            f"if has_{effect.name}:",
+            f"if has_{effect.name} and not inside_{effect.name}:",
             f"    b0, b1, b2, a1, a2 = {_call(effect, 'section', {'fs': 'fs'})}",
             "    first = second = 0.0",
             "    for i in range(n):",
@@ -199,158 +237,3 @@ def _encoders(effects: Sequence[Effect]) -> str:
             "        before = after",
         ]
     return _lines(1, lines)
-
-
-TEMPLATE = Template("""\
-def $name(u, x, p, on, fs, out):
-    n = out.shape[0]
-    gain, delay, pole = p[0], p[1], p[2]
-$unpack
-$flags
-    held = u.copy()
-$inputs
-    rest_forth = rest_back = fixed_forth = fixed_back = 0.0
-$levels
-$states
-    late = delay * fs
-    whole = int(late)
-    part = late - whole
-    cuts = math.ceil($inner / fs) if curved else 1
-    h_old, h_new = part / fs / cuts, (1.0 - part) / fs / cuts
-    decay_old, decay_new = math.exp(-pole * h_old), math.exp(-pole * h_new)
-    spent_old, spent_new = -math.expm1(-pole * h_old) / pole, -math.expm1(-pole * h_new) / pole
-    turn = math.copysign(1.0, gain)  # friction opposes motion, whatever the sign of the gain
-    v = 0.0
-    if not curved:
-        # v runs in the direction of the voltage here; forth and back are directions of motion
-        size = abs(gain)
-        plus, minus = (fixed_forth, fixed_back) if gain > 0.0 else (fixed_back, fixed_forth)
-        for i in range(n):
-            moved = 0.0
-            for piece in range(2):
-                if piece == 0:
-                    h, decay, spent, middle_of = h_old, decay_old, spent_old, 0.5 * part
-                else:
-                    h, decay, spent, middle_of = h_new, decay_new, spent_new, 0.5 * (1.0 + part)
-                if h <= 0.0:
-                    continue
-                k = i - whole - 1 + piece
-                volts = held[k] if k >= 0 else 0.0
-                push = volts
-                if any_pull:
-                    time = (i + middle_of) / fs
-                    place = x[i] + middle_of * (x[i + 1] - x[i])
-                    pull = 0.0
-$pulls
-                    push = volts - pull
-                if not dry:
-                    reach = size * push
-                    moved += reach * h + (v - reach) * spent
-                    v = reach + (v - reach) * decay
-                    continue
-                if v > 0.0 or (v == 0.0 and push > plus):
-                    reach = size * (push - plus)
-                    end = reach + (v - reach) * decay
-                    if end >= 0.0:
-                        moved += reach * h + (v - reach) * spent
-                        v = end
-                        continue
-                elif v < 0.0 or push < -minus:
-                    reach = size * (push + minus)
-                    end = reach + (v - reach) * decay
-                    if end <= 0.0:
-                        moved += reach * h + (v - reach) * spent
-                        v = end
-                        continue
-                else:
-                    continue
-                # it comes to rest within the piece: find when, then see whether it sticks or turns
-                gone = min(math.log1p(-v / reach) / pole, h)
-                moved += reach * gone + v / pole
-                v = 0.0
-                if push > plus:
-                    reach = size * (push - plus)
-                elif push < -minus:
-                    reach = size * (push + minus)
-                else:
-                    continue
-                left = h - gone
-                grown = -math.expm1(-pole * left)
-                moved += reach * (left - grown / pole)
-                v = reach * grown
-            out[i] = turn * moved * fs
-    else:
-        for i in range(n):
-            moved = 0.0
-            for piece in range(2):
-                if piece == 0:
-                    h, decay, spent, middle_of = h_old, decay_old, spent_old, 0.5 * part
-                else:
-                    h, decay, spent, middle_of = h_new, decay_new, spent_new, 0.5 * (1.0 + part)
-                if h <= 0.0:
-                    continue
-                k = i - whole - 1 + piece
-                volts = held[k] if k >= 0 else 0.0
-                time = (i + middle_of) / fs
-                place = x[i] + middle_of * (x[i + 1] - x[i])
-                pull = 0.0
-                if any_pull:
-$pulls
-                for cut in range(cuts):
-                    drive = volts
-                    if any_state:
-$advance
-                    net = drive - pull
-                    drag = 0.0
-$drag_start
-                    push = net - drag
-                    if not dry and not bristled:
-                        middle = v + 0.5 * (gain * push - v) * (1.0 - decay)
-                        drag = 0.0
-$drag_free
-                        reach = gain * (net - drag)
-                        moved += reach * h + (v - reach) * spent
-                        v = reach + (v - reach) * decay
-                        continue
-                    if v != 0.0:
-                        direction = 1.0 if v > 0.0 else -1.0
-                    else:
-                        direction = turn if push > 0.0 else -turn
-                    level = fixed_forth if direction > 0.0 else fixed_back
-$level_start
-                    if bristled:
-$bristle
-                        continue
-                    if v == 0.0:
-                        level = rest_forth if direction > 0.0 else rest_back
-                        if abs(push) <= level:
-                            continue
-                    middle = v + 0.5 * (gain * (push - turn * direction * level) - v) * (1.0 - decay)
-                    if middle * direction < 0.0:
-                        middle = 0.0
-                    drag = 0.0
-$drag_middle
-                    push = net - drag
-                    level = fixed_forth if direction > 0.0 else fixed_back
-$level_middle
-                    reach = gain * (push - turn * direction * level)
-                    end = reach + (v - reach) * decay
-                    if end * direction >= 0.0:
-                        moved += reach * h + (v - reach) * spent
-                        v = end
-                        continue
-                    gone = min(math.log1p(-v / reach) / pole, h) if v != 0.0 else 0.0
-                    moved += reach * gone + v / pole
-                    v = 0.0
-                    direction = turn if push > 0.0 else -turn
-                    rest = rest_forth if direction > 0.0 else rest_back
-                    if abs(push) > rest:
-                        reach = gain * (push - turn * direction * rest)
-                        left = h - gone
-                        grown = -math.expm1(-pole * left)
-                        moved += reach * (left - grown / pole)
-                        v = reach * grown
-            out[i] = moved * fs
-$motions
-$encoders
-""")
