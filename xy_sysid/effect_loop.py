@@ -36,7 +36,9 @@ $hang
         generator_moving = generator(gain, pole, top, bottom, fs)
         generator_still = resting(generator_moving)
         stiff = math.ceil(fastest(pole, bottom, fs) / ($stiff * fs))
-        cuts = max(math.ceil($inner / fs), min(stiff, $most))
+        lighter = generator_moving[1, top.size + 1] / (gain * pole)  # without what hangs on it: sooner does it follow the friction
+        wanted = $inner * lighter * lighter if curved else $inner
+        cuts = min(max(math.ceil(wanted / fs), stiff), $most)
         h_old, h_new = part / fs / cuts, (1.0 - part) / fs / cuts
         moving_old, moving_new = exponential(generator_moving, h_old), exponential(generator_moving, h_new)
         still_old, still_new = exponential(generator_still, h_old), exponential(generator_still, h_new)
