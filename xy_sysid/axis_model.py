@@ -3,7 +3,8 @@
 The velocity is simulated from rest. What depends on position uses the measured one, so that nothing drifts. Scheme:
 each sample is split where the delayed voltage changes; between, the viscous pole is integrated exactly for a constant
 force, and dry friction finds its zero crossings in time (Karnopp 1985's problem without his dead band). Laws that bend
-with speed get sub-steps (two in each piece at 2 kHz), by the midpoint rule.
+with speed get sub-steps (two in each piece at 2 kHz), by the midpoint rule. Resonances filter the sampled motion, unless
+a law heeds the speed: then they are in the loop with it (``swing``), with the same parameters and the same linear limit.
 """
 
 from __future__ import annotations

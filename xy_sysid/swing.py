@@ -140,7 +140,7 @@ def exponential(a: FloatArray, h: float) -> FloatArray:
 def ahead(by: FloatArray, state: FloatArray, force: float) -> float:
     """Speed at the end of a sub-step under a constant force."""
     n = state.size
-    total = by[1, n - 1] * force
+    total: float = by[1, n - 1] * force
     for j in range(1, n - 1):
         total += by[1, j] * state[j]
     return total
@@ -158,16 +158,18 @@ def step(by: FloatArray, state: FloatArray, force: float, spare: FloatArray) -> 
         spare[i] = total
     for i in range(n - 1):
         state[i] = spare[i]
-    return state[0]
+    distance: float = spare[0]
+    return distance
 
 
 @inner
 def tug(moving: FloatArray, state: FloatArray) -> float:
     """What the hanging masses add to the force at this instant, V."""
-    n, total = state.size, 0.0
+    n = state.size
+    total: float = 0.0
     for j in range(2, n - 1):
-        total += moving[1, j] * state[j]
-    return total / moving[1, n - 1]
+        total += moving[1, j] * state[j] / moving[1, n - 1]
+    return total
 
 
 @inner
@@ -193,7 +195,8 @@ def follow(series: FloatArray, t: float, state: FloatArray) -> float:
         for k in range(TERMS):
             total = total * t + series[TERMS - 1 - k, i]
         state[i] = total
-    return state[0]
+    distance: float = state[0]
+    return distance
 
 
 @inner

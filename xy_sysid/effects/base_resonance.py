@@ -29,7 +29,7 @@ EFFECT = Effect(
     name="base_resonance",
     law="v = v_rigid (s^2 + 2 d w s + w^2) / (s^2 + 2 d_p w_p s + w_p^2) (w_p / w)^2; w = 2 pi frequency, w_p = w (1 + split)",
     meaning="machine frame on its feet or its bolts; the encoder, fixed to it, sees antiresonance before resonance",
-    validity="one mode, small amplitude; dry friction is taken to act on the rigid motion",
+    validity="one mode, small amplitude; friction acts between table and base, whose motion the encoder sees",
     source="Preumont, Vibration Control of Active Structures, 3rd ed., sec. 2.4 (alternating poles and zeros)",
     category="motion",
     parameters=(

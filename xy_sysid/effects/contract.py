@@ -11,7 +11,7 @@ the simulation knows at that moment (``WORDS``). So a law reads as the equation 
 | force | force(u, v, x, t, gain) | V against the drive | in each sub-step; x is the measured position |
 | friction | level(v, direction) | V, never negative | dry friction: sticks, and zero crossings are found in time |
 | bristle | bend(state, v, h, level), force(state, v, level) | new state; V | takes over all dry friction |
-| motion | section(fs) | b0, b1, b2, a1, a2 | linear section that the sampled motion passes |
+| motion | section(fs) | b0, b1, b2, a1, a2 | linear section, 1 at 0 Hz, that the motion passes (see ``swing``) |
 | encoder | error(x) | m | added to what the encoder reads |
 """
 

@@ -29,7 +29,7 @@ EFFECT = Effect(
     name="screw_compliance",
     law="v = v_rigid (s^2 + 2 d w s + w^2) / (s^2 + 2 d_p w_p s + w_p^2) (w_p / w)^2; w = 2 pi frequency, w_p = w (1 + split)",
     meaning="axial and torsional give of screw, nut and bearing; the encoder sits on the motor",
-    validity="one mode, small amplitude; dry friction is taken to act on the rigid motion",
+    validity="one mode, small amplitude; friction sits at the motor, whose motion the encoder sees",
     source="Varanasi & Nayfeh, The dynamics of lead-screw drives, J. Dyn. Sys. Meas. Control 126 (2004), sec. 3",
     category="motion",
     parameters=(
