@@ -51,7 +51,10 @@ def test_ctrl_c_in_the_middle_of_long_work_is_130_without_a_traceback(arguments:
     time.sleep(0.8)
     process.send_signal(signal.SIGINT)
     begun = time.monotonic()
-    out, err = process.communicate(timeout=20)
+    try:
+        out, err = process.communicate(timeout=20)
+    finally:
+        process.kill()  # nothing is left over when it does not heed
     assert process.returncode in (130, -signal.SIGINT) and out == b"", err  # either is 130 to a shell
     assert b"Traceback" not in err and time.monotonic() - begun < 5
     assert not (tmp_path / "out").exists()

@@ -113,7 +113,7 @@ def _judged(data: AxisData, ladder: Ladder, library: Library, tolerance: float, 
     base, final = ladder.steps[0].fit, ladder.final
     tried = ladder.steps[1].tried if len(ladder.steps) > 1 else ladder.rejected
     where = _where(data, base)
-    if base.excess < AT_FLOOR:
+    if base.excess < AT_FLOOR and not ladder.effects:
         text = f"Nothing is missing: the rigid model with delay leaves {_mm(base.held_out_error)} mm/s, the floor is {_mm(base.noise_floor)} mm/s."
         return Diagnosis("nothing_missing", (), certainty, tolerance, text, ladder, tried, where, "None is needed.")
     # the pruned model keeps the order of importance in which effects were added

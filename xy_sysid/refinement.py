@@ -96,7 +96,7 @@ def refine(data: AxisData, library: Library = STANDARD, most: int = MOST_EFFECTS
             break
         now = found
         steps.append(Step(taken.effect, now, tried))
-    if SURE <= now.excess < AT_FLOOR and 1 < len(steps) <= most:
+    if SURE <= now.excess < AT_FLOOR and len(steps) <= most:
         last = polished(data, now, library)
         if last is not None:
             now = last.fit
