@@ -89,7 +89,7 @@ def test_settling_keeps_what_the_fast_motion_knows_better() -> None:
 
 
 def test_the_linear_guide_shows_its_mode_its_spring_and_its_friction(tmp_path: Any) -> None:
-    """Zeros near 11.7 Hz, poles near 13.4 Hz, 0.77 Hz by the spring; on the second recording better than the linear model."""
+    """Zeros near 11.7 Hz, poles near 13.4 Hz, 0.77 Hz by the spring; of the second recording it explains a small part only, as the page says."""
     model = tmp_path / "guide.yaml"
     effects = ("base_resonance", "hardening_stiffness", "coulomb_friction", "constant_load")
     added = [word for name in effects for word in ("--add", name)]
@@ -102,7 +102,7 @@ def test_the_linear_guide_shows_its_mode_its_spring_and_its_friction(tmp_path: A
     assert 0.01 < value(found, "coulomb_friction.coulomb") < 0.05
     assert power_gone(found) > 0.9
     seen = cli("validate", data("lsb250/lsb250_exp2.npz"), model, "--json").json["axes"]["x"]
-    assert seen["simulation"]["nrmse"] == pytest.approx(28, abs=5)
+    assert seen["simulation"]["nrmse"] == pytest.approx(17, abs=5)
 
 
 def test_the_robot_is_not_given_a_wrong_name() -> None:
