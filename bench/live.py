@@ -36,7 +36,7 @@ def nodes(excitation: dict[str, str]) -> Iterator[tuple[Monitor, dict[str, subpr
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, (str(Path.cwd()), os.environ.get("PYTHONPATH"))))}
     started: dict[str, subprocess.Popen[bytes]] = {}
     with tempfile.TemporaryFile() as log:
-        monitor = Monitor(("x", "y"))
+        monitor = Monitor(("x", "y"), listeners=2)  # no diagnoser here
         try:
             for name in ("ballscrew", "identifier", "excitation"):
                 pairs = excitation.items() if name == "excitation" else ()

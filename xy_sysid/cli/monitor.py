@@ -27,7 +27,8 @@ QUIET = 1.0  # s without a new result after which the last one has been heard
 class Monitor:
     """One node that hears results and statuses; call ``spin`` often."""
 
-    def __init__(self, axes: tuple[str, ...]) -> None:
+    def __init__(self, axes: tuple[str, ...], listeners: int = LISTENERS) -> None:
+        self._listeners = listeners
         self.arrays: dict[str, ArrayMessage] = {}
         self.statuses: dict[str, tuple[int, str, dict[str, str]]] = {}
         self.changed = time.monotonic()
@@ -82,7 +83,7 @@ class Monitor:
         if not self._wanted or "streams" not in self.statuses or not self._client.service_is_ready():
             return
         for name in ("excitation", "ballscrew"):
-            if int(self.statuses.get(name, (0, "", {}))[2].get("listeners", "0")) < LISTENERS:
+            if int(self.statuses.get(name, (0, "", {}))[2].get("listeners", "0")) < self._listeners:
                 return
         if self._call is not None and not self._call.done():
             return
