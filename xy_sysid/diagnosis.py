@@ -13,7 +13,8 @@ from xy_sysid.axis_model import STANDARD, Library
 from xy_sysid.comparison import Comparison, compare_velocity
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox import AxisData, GreyboxFit, excess_of, loosened, prepare
-from xy_sysid.refinement import AT_FLOOR, Candidate, Ladder, refine
+from xy_sysid.race import AT_FLOOR, Candidate
+from xy_sysid.refinement import Ladder, refine
 from xy_sysid.stream import FloatArray
 
 Kind = Literal["missing_effect", "nothing_missing", "not_in_library", "not_enough_data"]

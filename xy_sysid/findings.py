@@ -14,7 +14,7 @@ from xy_sysid.comparison import Place
 from xy_sysid.diagnosis import Diagnosis, Kind
 from xy_sysid.greybox import Estimate, GreyboxFit
 from xy_sysid.own_units import in_units
-from xy_sysid.refinement import AT_FLOOR, SIMPLER, Candidate
+from xy_sysid.race import AT_FLOOR, SIMPLER, Candidate
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.findings import Findings, Rung, findings, rung
 from xy_sysid.greybox import EPSILON, AxisData, GreyboxFit, fit, fit_base, prepare
 from xy_sysid.one_step import one_step_fit
-from xy_sysid.refinement import LEAST_GAIN, MOST_EFFECTS, PART_GAIN, candidates, choose, prune, suspected
+from xy_sysid.refinement import MOST_EFFECTS, advance, settle
 from xy_sysid.refinement import added as fitted_with
 from xy_sysid.settings import unknown_name
 from xy_sysid.story_pictures import Measured, Pictures, measured, pictures
@@ -142,20 +142,18 @@ def next_best(story: Story, voltage: FloatArray, position: FloatArray, library: 
     """With the effect that helps most now; with a note instead if nothing is left to explain, or nothing helps."""
     if story.now is None:
         return story
-    if story.now.explained:
-        return replace(story, note="Nothing is left to explain: the held-out error is at the noise floor.")
     planned = _planned(story)
     data = prepare(story.sampling_rate, voltage, position, story.tolerance)
     if planned is not None:
         return _shown(story, data, planned, library)
-    now = _fit_of(story, data, library)
-    tried = candidates(data, now, library)
-    if not story.effects and story.tolerance <= EPSILON:
-        tried = (*suspected(data, now, tried, library), *tried)
-    taken = choose(tried, library)
-    if taken is None or taken.fit is None or now.excess - taken.fit.excess < max(LEAST_GAIN, PART_GAIN * now.excess):
+    move = advance(data, _fit_of(story, data, library), library)
+    if not move.steps and story.now.explained:
+        return replace(story, note="Nothing is left to explain: the held-out error is at the noise floor.")
+    if not move.steps:
         return replace(story, note="No effect of the library helps any further.")
-    return _grown(story, data, taken.fit, taken.effect, None)
+    for step in move.steps:
+        story = _grown(story, data, step.fit, step.added, None)
+    return story
 
 
 def auto(story: Story, voltage: FloatArray, position: FloatArray, library: Library = STANDARD) -> Story:
@@ -170,13 +168,14 @@ def auto(story: Story, voltage: FloatArray, position: FloatArray, library: Libra
 
 
 def pruned(story: Story, voltage: FloatArray, position: FloatArray, library: Library = STANDARD) -> Story:
-    """Without the effects that are no longer needed; the same story if all are."""
+    """Without the effects that are no longer needed, and with simpler relatives that do as well; the same story if all stay."""
     if len(story.effects) < 2:
         return story
     data = prepare(story.sampling_rate, voltage, position, story.tolerance)
-    found = prune(data, _fit_of(story, data, library))
+    found = settle(data, _fit_of(story, data, library))
     gone = [name for name in story.effects if name not in found.model]
-    return _grown(story, data, found, None, " and ".join(gone)) if gone else story
+    new = [name for name, _ in found.model.effects if name not in story.effects]
+    return _grown(story, data, found, " and ".join(new) or None, " and ".join(gone)) if gone else story
 
 
 def tell(

@@ -1,0 +1,161 @@
+"""Which effect next? The candidates race: simple ones first, on little data, and only those that come near run the whole distance.
+
+Also what a race of single effects cannot find: two that hide one another, one just below the floor's threshold, and one that
+only one-step prediction can judge.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from xy_sysid.axis_model import STANDARD, Library
+from xy_sysid.effects import Effect
+from xy_sysid.greybox import AxisData, GreyboxFit, finish, fit_with, look
+from xy_sysid.one_step import one_step_fit
+
+# Tuned on development draws of the simulated machine only (blind/cases.py).
+AT_FLOOR = 0.15  # excess below which nothing is left to explain; clean axes stay below 0.02
+SURE = 0.03  # excess up to which nothing at all is left
+SIMPLER = 0.08  # excess that a simpler model may be worse by and still be preferred
+TRIED = 5  # effects that are fitted at each step, by their share of the error
+LEAST_SHARE = 5e-4  # of the error that an effect's trace must explain to be tried
+HOPELESS = 1.5  # excess behind the best so far at which a candidate is given up after its first round
+NEAR = 0.3  # excess on the first stage within which candidates run the whole distance
+WIDE = 3  # first effects of the pairs that are tried
+PART_LEFT = 0.4  # of the excess that an effect found between SURE and AT_FLOOR may leave
+SUSPICIOUS = 0.1  # share of a look-alike from which an effect that free simulation cannot judge is tried
+UNSEEN = ("constant_load",)  # effects with next to no trace in the error's spectrum: always tried as the second of a pair
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """One effect tried: the share of the error that its trace explains, and its full fit (None if that failed)."""
+
+    effect: str
+    share: float
+    fit: GreyboxFit | None
+
+
+def candidates(data: AxisData, now: GreyboxFit, library: Library = STANDARD) -> tuple[Candidate, ...]:
+    """The effects that may be added to a fit, the best few fitted, least excess first.
+
+    A race: simpler effects first, each on the first stage's data only. Once one is at the floor, richer ones cannot be
+    preferred to it and are left out; those that come near the best run the whole distance.
+    """
+    open_to = _open(now, library)
+    traces = [trace for trace in look(data, now, open_to) if trace.share >= LEAST_SHARE]
+    shares = {trace.effect: trace.share for trace in traces}
+    names = _with_relatives([trace.effect for trace in traces[:TRIED]], open_to)
+    found: list[Candidate] = []
+    enough = np.inf
+    for name in sorted(names, key=lambda name: (len(library[name].parameters), -shares.get(name, 0.0))):
+        if len(library[name].parameters) > enough:
+            found.append(Candidate(name, shares.get(name, 0.0), None))
+            continue
+        least = min((item.fit.excess for item in found if item.fit), default=np.inf)
+        fitted = _tried(data, now, name, least + HOPELESS)
+        if fitted is not None and fitted.excess < AT_FLOOR:
+            fitted = finish(data, fitted.model, fitted.runs)
+            if fitted.excess < SIMPLER:
+                enough = len(library[name].parameters)
+        found.append(Candidate(name, shares.get(name, 0.0), fitted))
+    least = min((item.fit.excess for item in found if item.fit), default=np.inf)
+    near = [item for item in found if item.fit and AT_FLOOR <= item.fit.excess <= least + NEAR]
+    for item in near:
+        assert item.fit is not None
+        found[found.index(item)] = replace(item, fit=finish(data, item.fit.model, item.fit.runs))
+    rest = [Candidate(trace.effect, trace.share, None) for trace in traces[TRIED:] if trace.effect not in names]
+    return tuple(sorted(found, key=lambda item: item.fit.excess if item.fit else np.inf)) + tuple(rest)
+
+
+def choose(tried: tuple[Candidate, ...], library: Library = STANDARD) -> Candidate | None:
+    """The simplest (fewest parameters) of those within SIMPLER of the least excess; None if nothing could be fitted."""
+    fitted = [item for item in tried if item.fit is not None]
+    if not fitted:
+        return None
+    least = min(item.fit.excess for item in fitted if item.fit)
+    good = [item for item in fitted if item.fit and item.fit.excess <= least + SIMPLER]
+    return min(good, key=lambda item: (len(library[item.effect].parameters), item.fit.excess if item.fit else np.inf))
+
+
+def suspected(data: AxisData, now: GreyboxFit, tried: tuple[Candidate, ...], library: Library) -> tuple[Candidate, ...]:
+    """Effects that only one-step prediction can judge, where no other explains the error and a look-alike left its trace."""
+    if any(item.fit is not None and item.fit.excess < AT_FLOOR for item in tried):
+        return ()
+    shares = {item.effect: item.share for item in tried}
+    found = []
+    for effect in library.acting:
+        share = max((shares.get(name, 0.0) for name in effect.look_alikes), default=0.0)
+        if effect.one_step is not None and share >= SUSPICIOUS:
+            rubbing = [item.fit for item in tried if item.effect == "coulomb_friction" and item.fit is not None and item.share >= SUSPICIOUS]
+            fitted = one_step_fit(data, rubbing[0] if rubbing else now, effect)
+            if fitted.excess < AT_FLOOR:
+                found.append(Candidate(effect.name, share, fitted))
+    return tuple(found)
+
+
+def together(data: AxisData, now: GreyboxFit, tried: tuple[Candidate, ...], library: Library) -> tuple[Candidate, Candidate] | None:
+    """Two effects at once, where each alone helps little because the other's error hides it; None if that helps little, too."""
+    if any(library[name].one_step for name, _ in now.model.effects):
+        return None
+    fitted = [item for item in tried if item.fit is not None and library[item.effect].one_step is None]
+    richest = [item for item in fitted if library[item.effect].category == "bristle"]  # all dry friction goes through bristles
+    fitted = [*richest, *(item for item in fitted if item not in richest)]
+    best: tuple[Candidate, Candidate] | None = None
+    least = np.inf
+    for first in fitted[:WIDE]:
+        assert first.fit is not None
+        seconds = [item.effect for item in look(data, first.fit, _open(first.fit, library)) if item.share >= LEAST_SHARE][:1]
+        always = [effect.name for effect in _open(first.fit, library) if effect.name in UNSEEN]
+        for name in dict.fromkeys([*seconds, *always]):
+            try:
+                found = fit_with(data, now, [first.effect, name], brief=True)
+            except np.linalg.LinAlgError:
+                continue
+            if found.excess < least and plausible(found):  # false for a fit that is not a number
+                best, least = (first, Candidate(name, 0.0, found)), found.excess
+        if least < AT_FLOOR:
+            break
+    if best is None or best[1].fit is None:
+        return None
+    return best[0], replace(best[1], fit=finish(data, best[1].fit.model, best[1].fit.runs))
+
+
+def polished(data: AxisData, now: GreyboxFit, library: Library) -> Candidate | None:
+    """One more effect below the threshold of the floor, if it takes away most of what is left there."""
+    for trace in look(data, now, _open(now, library))[:2]:
+        found = _tried(data, now, trace.effect)
+        if found is not None and found.excess < now.excess:
+            found = finish(data, found.model, found.runs)
+            if found.excess < PART_LEFT * now.excess:
+                return Candidate(trace.effect, trace.share, found)
+    return None
+
+
+def plausible(found: GreyboxFit) -> bool:
+    """No effect has values that no machine has."""
+    checks = ((found.model.library[name].plausible, values) for name, values in found.model.effects)
+    return all(check is None or check(values) for check, values in checks)
+
+
+def _open(now: GreyboxFit, library: Library) -> list[Effect]:
+    """What may still be added."""
+    families = {library[name].family for name, _ in now.model.effects if library[name].family}
+    return [e for e in library.acting if e.simulable and e.name not in now.model and not (e.family and e.family in families)]
+
+
+def _with_relatives(names: list[str], open_to: list[Effect]) -> list[str]:
+    """The names, and the rest of a family of which one is among the first two: relatives share their trace."""
+    family = {effect.name: effect.family for effect in open_to}
+    wanted = {family[name] for name in names[:2] if family[name]}
+    return [*names, *(name for name in family if family[name] in wanted and name not in names)]
+
+
+def _tried(data: AxisData, now: GreyboxFit, name: str, hopeless: float = np.inf) -> GreyboxFit | None:
+    try:
+        found = fit_with(data, now, [name], brief=True, hopeless=hopeless)
+    except np.linalg.LinAlgError:
+        return None
+    return found if np.isfinite(found.excess) and plausible(found) else None
