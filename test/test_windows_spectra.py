@@ -249,6 +249,25 @@ def test_the_batch_agrees_with_the_incremental_run_to_1e_12(differenced: bool) -
         assert np.max(np.abs(a - b)) < 1e-12 * np.max(np.abs(b))
 
 
+@pytest.mark.parametrize("unit", [1e-9, 1.0, 1e6])
+def test_the_batch_is_as_exact_in_any_unit(unit: float) -> None:
+    """Both signals share one complex transform: the rounding of the larger one must not show in the smaller one."""
+    u, y = noise(20_000, 12)
+    shape = WindowShape.of("hann", 1024, 0.5)
+    batch, full = batch_spectra([(0, u, unit * y)], shape, False), full_buffer(u, y, shape, differenced=False)
+    for a, b in ((batch.gxx, full.gxx), (batch.gyy, unit**2 * full.gyy), (batch.gyx, unit * full.gyx)):
+        assert np.max(np.abs(a - b)) < 1e-12 * np.max(np.abs(b))
+
+
+def test_an_output_that_stands_still_has_no_spectrum() -> None:
+    """A constant leaves nothing once its mean is gone, and the input is what it is."""
+    u, y = noise(5_000, 13)
+    shape = WindowShape.of("hann", 1024, 0.5)
+    still = batch_spectra([(0, u, np.full(u.size, 0.25))], shape, False)
+    assert np.max(np.abs(still.gyy)) < 1e-24 * np.max(still.gxx)
+    assert np.allclose(still.gxx, batch_spectra([(0, u, y)], shape, False).gxx, rtol=1e-9)
+
+
 def test_a_recording_without_a_whole_window_says_how_long_it_is() -> None:
     """The error names the longest run and what is needed."""
     with pytest.raises(BadInput, match=r"longest gap-free run is 100 samples; allowed: >= 1025"):

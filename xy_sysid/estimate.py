@@ -11,6 +11,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from xy_sysid.compiled import compiled
 from xy_sysid.frf import ComplexArray, FrequencyResponse
 from xy_sysid.spectra import Spectra
 from xy_sysid.stream import FloatArray
@@ -33,11 +34,6 @@ def _kernel(shape: WindowShape) -> FloatArray:
     kernel = blur_kernel(shape)
     kernel.setflags(write=False)
     return kernel
-
-
-@lru_cache(maxsize=8)
-def _correlation(shape: WindowShape) -> FloatArray:
-    return error_correlation(shape)
 
 
 def divisor(frequency: FloatArray, sampling_rate: float) -> ComplexArray:
@@ -75,7 +71,7 @@ def frequency_response(
     coherence = np.clip(1.0 - unexplained / np.maximum(gyy, np.finfo(float).tiny), 0.0, 1.0)
     excited = _excited(gxx, inside, 0 if periodic else main_lobe(shape))
     if not periodic:
-        unexplained = _smoothed(unexplained)
+        unexplained = smoothed(unexplained, 2 * NOISE_SMOOTHING + 1)
         excited &= np.arange(near.start, near.stop) >= main_lobe(shape)
     averages = spectra.averages
     with np.errstate(divide="ignore", over="ignore"):
@@ -89,6 +85,7 @@ def frequency_response(
     kernel = np.ones(1) if periodic else _kernel(shape)
     half = (kernel.shape[0] - 1) // 2
     apart = np.ones(1) if periodic else spectra.quadratic / max(spectra.quadratic[0], np.finfo(float).tiny)
+    apart = np.where(apart < 1e-6, 0.0, apart)
     return FrequencyResponse(
         frequency=frequency[inside],
         response=response[inside],
@@ -100,7 +97,7 @@ def frequency_response(
         resolution=sampling_rate / shape.length,
         input_unit=units[0],
         output_unit=units[1],
-        line_correlation=np.trim_zeros(np.where(apart < 1e-6, 0.0, apart), "b"),
+        line_correlation=apart[: int(np.max(np.flatnonzero(apart), initial=-1)) + 1],
         kernel_offset=np.arange(-half, half + 1) * 0.5 * sampling_rate / shape.length,
         kernel_weight=kernel,
         kernel_amplitude=np.zeros(0) if periodic else _amplitude(shape),
@@ -127,14 +124,19 @@ def _pairs(spectra: Spectra, shape: WindowShape) -> FloatArray:
     Worked out from what the noise's correlation sums up to; every distance up to the overlap is taken to be as frequent as
     any other (true without gaps and with slow forgetting).
     """
-    correlation = _correlation(shape)
     if spectra.weight <= 0:
         return np.ones(1)
-    apart = np.stack((correlation[0], 2.0 * np.sum(correlation[1:], axis=0)), axis=1)
-    single, double = np.linalg.lstsq(apart, spectra.quadratic / spectra.weight**2, rcond=None)[0]
-    shares = np.full(correlation.shape[0], 2.0 * max(float(double), 0.0))
+    single, double = _unmixing(shape) @ (spectra.quadratic / spectra.weight**2)
+    shares = np.full(error_correlation(shape).shape[0], 2.0 * max(float(double), 0.0))
     shares[0] = max(float(single), 0.0)
     return shares
+
+
+@lru_cache(maxsize=8)
+def _unmixing(shape: WindowShape) -> FloatArray:
+    """(2, LINES_APART) least squares: from the sums of the errors' correlation to the shares of windows 0, and 1 or more, hops apart."""
+    correlation = error_correlation(shape)
+    return np.asarray(np.linalg.pinv(np.stack((correlation[0], 2.0 * np.sum(correlation[1:], axis=0)), axis=1)))
 
 
 def _excited(gxx: FloatArray, inside: slice, reach: int) -> NDArray[np.bool_]:
@@ -154,7 +156,12 @@ def _excited(gxx: FloatArray, inside: slice, reach: int) -> NDArray[np.bool_]:
     return result
 
 
-def _smoothed(power: FloatArray) -> FloatArray:
-    width = 2 * NOISE_SMOOTHING + 1
-    padded = np.pad(power, NOISE_SMOOTHING, mode="edge")
-    return np.asarray(np.convolve(padded, np.full(width, 1.0 / width), mode="valid"), dtype=np.float64)
+@compiled
+def smoothed(power: FloatArray, width: int) -> FloatArray:
+    """(m,) mean over ``width`` lines (odd) around each; the first and the last line stand for those beyond them."""
+    half, last = width // 2, power.shape[0] - 1
+    out = np.zeros(power.shape[0])
+    for shift in range(-half, half + 1):
+        for i in range(power.shape[0]):
+            out[i] += power[min(max(i + shift, 0), last)]
+    return out / width

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from xy_sysid.pairing import RATE_SAMPLES
 from xy_sysid.recording import rate_from_time
+from xy_sysid.ring import RATE_SAMPLES
 from xy_sysid.stream import Block, FloatArray
 
 RESTART = 1.0  # s that a stamp must go back to mean that the source has started again

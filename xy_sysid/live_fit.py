@@ -19,9 +19,11 @@ from xy_sysid.fitting.structure import FitOptions, Structure
 from xy_sysid.frf import FrequencyResponse
 from xy_sysid.identifier import AxisRequest, FitRequest
 from xy_sysid.messages import ERROR, OK, WARN, ArrayMessage, StatusMessage, comparison_message, frf_message, transfer_function_message
+from xy_sysid.pairing import KINDS, Pairer
+from xy_sysid.ring import RATE_SAMPLES
 from xy_sysid.settings import IdentifierSettings
 from xy_sysid.spectra import RunningSpectra, State, Transformer
-from xy_sysid.stream import FloatArray
+from xy_sysid.stream import FloatArray, columns, unpack
 from xy_sysid.tracking import Resonance, Track, alarm_sentence, follow
 from xy_sysid.windows import Window, WindowShape
 
@@ -198,8 +200,14 @@ def _verdict(axis: str, update: AxisUpdate, request: FitRequest) -> tuple[int, s
 
 
 def warm_up(settings: IdentifierSettings) -> None:
-    """Fit a made-up response once, so that everything is compiled before data come in."""
+    """Pair made-up samples and fit a made-up response once, so that everything is compiled before data come in."""
     rate, lines = 2000.0, 200
+    pairer = Pairer(("x",), settings.reorder)
+    for first in range(0, 3 * RATE_SAMPLES, RATE_SAMPLES):
+        seq = np.arange(first, first + RATE_SAMPLES, dtype=np.float64)
+        table = np.stack((seq, seq / rate, np.zeros(RATE_SAMPLES)), axis=1)
+        for kind in KINDS:
+            pairer.feed(kind, unpack(columns(pairer.axes), RATE_SAMPLES, 3, table.ravel()))
     shape = WindowShape.of(settings.window, settings.length, settings.overlap)
     random = np.random.default_rng(0)
     running = RunningSpectra(shape)

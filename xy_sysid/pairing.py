@@ -13,15 +13,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from xy_sysid.errors import BadInput
-from xy_sysid.recording import rate_from_time
+from xy_sysid.ring import Ring, shared
 from xy_sysid.stream import Block, FloatArray
 from xy_sysid.windows import Samples
 
 Kind = Literal["voltage", "position"]
 KINDS: tuple[Kind, Kind] = ("voltage", "position")
 
-RATE_SAMPLES = 200  # samples of one stream from which its rate is read
 RATE_TOLERANCE = 1e-3  # two streams, or one before and after a restart, have the same rate within this
 TIME_TOLERANCE = 1.5  # samples by which a time stamp may leave its place before that counts as a jump
 REORDER_UNKNOWN = 1000  # samples a block may be late as long as the rate is not known
@@ -50,61 +48,6 @@ class Gap:
     reason: str
 
 
-class _Ring:
-    """One stream, by counter modulo capacity."""
-
-    def __init__(self, capacity: int, axes: int) -> None:
-        self.capacity = capacity
-        self.tag: NDArray[np.int64] = np.full(capacity, -1, dtype=np.int64)
-        self.value: FloatArray = np.zeros((capacity, axes))
-        self.newest = -1
-        self.offset: float | None = None
-        self.rate: float | None = None
-        self.behind = 0
-        self.behind_next = -1
-        self._seqs: list[FloatArray] = []
-        self._times: list[FloatArray] = []
-
-    def put(self, seq: NDArray[np.int64], values: FloatArray) -> int:
-        """Store what is new; the number of samples that were there already."""
-        place = seq % self.capacity
-        fresh = self.tag[place] != seq
-        if bool(fresh.all()):
-            self.tag[place], self.value[place] = seq, values
-        else:
-            self.tag[place[fresh]], self.value[place[fresh]] = seq[fresh], values[fresh]
-        if seq.size:
-            self.newest = max(self.newest, int(seq[-1]))
-        return int(seq.size - np.count_nonzero(fresh))
-
-    def filled(self, first: int, last: int) -> NDArray[np.bool_]:
-        """(last - first,) whether each counter is there."""
-        seq = np.arange(first, last)
-        return np.asarray(self.tag[seq % self.capacity] == seq, dtype=np.bool_)
-
-    def take(self, first: int, last: int) -> FloatArray:
-        return self.value[np.arange(first, last) % self.capacity]
-
-    def clear(self) -> None:
-        self.tag.fill(-1)
-        self.newest, self.offset, self.behind = -1, None, 0
-
-    def learn_rate(self, block: Block) -> None:
-        """Read the rate from the first samples."""
-        if self.rate is None:
-            self._seqs.append(block.seq.copy())
-            self._times.append(block.time.copy())
-            if sum(map(len, self._seqs)) >= RATE_SAMPLES:
-                seq, time = np.concatenate(self._seqs), np.concatenate(self._times)
-                order = np.argsort(seq, kind="stable")
-                keep = order[np.concatenate(([True], np.diff(seq[order]) > 0))]
-                self._seqs, self._times = [], []
-                try:
-                    self.rate = rate_from_time(time[keep], seq[keep].astype(np.int64))
-                except BadInput:
-                    self.rate = None
-
-
 class Pairer:
     """feed(kind, block) -> paired samples and gaps, in order of the counter."""
 
@@ -114,7 +57,7 @@ class Pairer:
         self.counts: Counter[str] = Counter()
         self.said: dict[str, str] = {}
         self._reorder_time = reorder
-        self._rings = {kind: _Ring(capacity, len(axes)) for kind in KINDS}
+        self._rings = {kind: Ring(capacity, len(axes)) for kind in KINDS}
         self._next: int | None = None
         self._cuts: dict[int, str] = {}
         self._bad: dict[int, str] = {}
@@ -137,14 +80,19 @@ class Pairer:
 
     def feed(self, kind: Kind, block: Block) -> list[Samples | Gap]:
         """Take one block of one stream; blocks may have any length."""
-        found: list[Samples | Gap] = []
         step = self._rings[kind].capacity // 4
-        for start in range(0, max(len(block), 1), step):
+        if len(block) <= step:
+            return self._feed(kind, block)
+        found: list[Samples | Gap] = []
+        for start in range(0, len(block), step):
             part = slice(start, start + step)
             found += self._feed(kind, Block(block.axes, block.seq[part], block.time[part], block.values[part]))
         return found
 
     def _feed(self, kind: Kind, block: Block) -> list[Samples | Gap]:
+        ring = self._rings[kind]
+        if block.axes == self.axes and self._next is not None and ring.follow(block, self._next, TIME_TOLERANCE):
+            return [] if self._rates_differ() else self._emit()
         columns = self._columns(kind, block)
         if columns is None or len(block) == 0:
             return []
@@ -153,7 +101,6 @@ class Pairer:
             return []
         seq = block.seq.astype(np.int64)
         found: list[Samples | Gap] = []
-        ring = self._rings[kind]
         if self._restarted(ring, seq):
             self._fault("restart", f"{kind}: the counter went back from {ring.newest} to {int(seq[0])}")
             for other in self._rings.values():
@@ -190,7 +137,7 @@ class Pairer:
         self.counts[reason] += number
         self.said[reason] = text
 
-    def _restarted(self, ring: _Ring, seq: NDArray[np.int64]) -> bool:
+    def _restarted(self, ring: Ring, seq: NDArray[np.int64]) -> bool:
         """A jump far back that goes on consistently is a restart; a single old block is only late."""
         if ring.newest < 0 or int(seq[0]) > ring.newest - self._reorder:
             ring.behind = 0
@@ -207,7 +154,7 @@ class Pairer:
             self._bad.update(dict.fromkeys(bad.tolist(), "not_finite"))
         return good
 
-    def _check_time(self, kind: Kind, ring: _Ring, seq: NDArray[np.int64], time: FloatArray) -> NDArray[np.bool_]:
+    def _check_time(self, kind: Kind, ring: Ring, seq: NDArray[np.int64], time: FloatArray) -> NDArray[np.bool_]:
         """Time must follow the counter; where it leaves it for good, a run is cut, where it is nonsense, samples are refused."""
         good = np.asarray(np.isfinite(time), dtype=np.bool_)
         if ring.rate is not None and bool(good.any()):
@@ -252,13 +199,12 @@ class Pairer:
             self._next = max(self._first(voltage), self._first(position))
         found: list[Samples | Gap] = []
         while self._next < end:
-            both = voltage.filled(self._next, end) & position.filled(self._next, end)
-            hole = int(np.argmin(both)) if not bool(both.all()) else len(both)
-            if hole:
-                found += self._run(self._next, self._next + hole)
-                self._next += hole
+            whole = shared(voltage, position, self._next, end)
+            if whole:
+                found += self._run(self._next, self._next + whole)
+                self._next += whole
                 continue
-            rest = np.flatnonzero(both)
+            rest = np.flatnonzero(voltage.filled(self._next, end) & position.filled(self._next, end))
             if end - self._next <= self._reorder and not self._all_known_bad(int(rest[0]) if rest.size else 0):
                 break
             skip = int(rest[0]) if rest.size else end - self._next
@@ -276,7 +222,7 @@ class Pairer:
         return length > 0 and all(start + i in self._bad for i in range(length))
 
     @staticmethod
-    def _first(ring: _Ring) -> int:
+    def _first(ring: Ring) -> int:
         return int(ring.tag[ring.tag >= 0].min()) if bool(np.any(ring.tag >= 0)) else ring.newest + 1
 
     def _run(self, first: int, last: int) -> list[Samples | Gap]:

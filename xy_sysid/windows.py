@@ -7,6 +7,7 @@ any chunking, and an observer that starts late sees the same windows as one that
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy import signal
@@ -36,8 +37,15 @@ class WindowShape:
         return cls(name, length, hop)
 
     def taper(self) -> FloatArray:
-        """(length,) periodic taper, as scipy.signal.get_window gives it."""
-        return np.asarray(signal.get_window(self.name, self.length, fftbins=True), dtype=np.float64)
+        """(length,) periodic taper, as scipy.signal.get_window gives it; not to be written to."""
+        return _taper(self.name, self.length)
+
+
+@lru_cache(maxsize=8)
+def _taper(name: str, length: int) -> FloatArray:
+    values = np.asarray(signal.get_window(name, length, fftbins=True), dtype=np.float64)
+    values.setflags(write=False)
+    return values
 
 
 def blur_kernel(shape: WindowShape) -> FloatArray:
@@ -57,6 +65,7 @@ def blur_kernel(shape: WindowShape) -> FloatArray:
     return np.asarray(weights / weights.sum(), dtype=np.float64)
 
 
+@lru_cache(maxsize=8)
 def error_correlation(shape: WindowShape) -> FloatArray:
     """(m, LINES_APART) correlation of H1 errors of windows m hops apart, of lines k apart; [0, 0] is 1.
 
@@ -71,7 +80,9 @@ def error_correlation(shape: WindowShape) -> FloatArray:
         shift = m * shape.hop
         product = taper[: shape.length - shift] * taper[shift:]
         rows[m] = np.abs(product @ turn[: shape.length - shift]) ** 2
-    return np.asarray(rows / rows[0, 0], dtype=np.float64)
+    rows /= rows[0, 0]
+    rows.setflags(write=False)
+    return rows
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xy_sysid.compiled import compiled
+from xy_sysid.estimate import smoothed
 from xy_sysid.fitting.damped import triangle
 from xy_sysid.fitting.leakage import leakage
 from xy_sysid.fitting.prediction import unblurred
@@ -43,13 +44,16 @@ def covariance(task: Problem, at: Point, table: FloatArray) -> tuple[FloatArray,
     straight, folded = error_covariance(task, at, task.sigma, place)
     meat = _meat(np.ascontiguousarray(table[:-1] / scale[:, None]), straight, folded, place)
     expected = 0.5 * (float(np.sum(straight[0].real)) - float(np.trace(bread @ meat)))
-    squares = np.abs(straight) ** 2 + np.abs(folded) ** 2
-    spread = float(np.sum(squares[0]) + 2.0 * np.sum(squares[1:]))
+    spread = 2.0 * _square(straight) + 2.0 * _square(folded) - _square(straight[0]) - _square(folded[0])
     freedom = _freedom(task.frf)
     if task.structure.weighting == "sigma" and freedom > 4.5:  # sigma is itself estimated: |error|^2 / sigma^2 is F(2, freedom)
         expected *= freedom / (freedom - 2.0)
         spread *= freedom**3 / ((freedom - 2.0) ** 2 * (freedom - 4.0))
     return (bread @ meat @ bread) / np.outer(scale, scale), expected, 0.5 * float(np.sqrt(spread))
+
+
+def _square(values: ComplexArray) -> float:
+    return float(np.vdot(values, values).real)
 
 
 def _leaky(frf: FrequencyResponse) -> bool:
@@ -75,7 +79,8 @@ def _noise(total: FloatArray, leaks: FloatArray, after: FloatArray, freedom: flo
     size = rest.size // BLOCK
     if size < 2:
         return np.maximum(rest, 0.0)
-    blocks = np.median((rest / after)[: size * BLOCK].reshape(size, BLOCK), axis=1)
+    ranked = np.sort((rest / after)[: size * BLOCK].reshape(size, BLOCK), axis=1)
+    blocks = 0.5 * (ranked[:, BLOCK // 2 - 1] + ranked[:, BLOCK // 2])  # median
     around = np.interp(np.arange(rest.size), (np.arange(size) + 0.5) * BLOCK - 0.5, blocks) * after
     return np.where(rest > chance, rest, np.clip(around, 0.0, chance))
 
@@ -104,7 +109,7 @@ def error_covariance(task: Problem, at: Point, sigma: FloatArray, place: NDArray
         bends, single = _bends(near, plan.index, plan.kernel, plan.after, plan.seen, place, frf.kernel_amplitude.size)
         straight, folded = leakage(frf, bends)
         single -= straight[0].real  # what leakage adds to the scatter
-        share = np.convolve(np.pad(single, frf.smoothing // 2, mode="edge"), np.full(frf.smoothing, 1.0 / frf.smoothing), mode="valid")
+        share = smoothed(single, frf.smoothing)
         noise[place] = _noise(sigma**2, share[place] / max(frf.averages - 1.0, 1.0), np.abs(plan.after) ** 2, 2.0 * (frf.averages - 1.0))
     return _weighted(frf.line_correlation, np.sqrt(noise), straight, weight), _weighted(np.zeros(1), noise, folded, weight)
 
