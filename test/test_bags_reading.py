@@ -48,15 +48,15 @@ def test_blocks_come_back_number_for_number(tmp_path: Path, storage: str, rows: 
 
 @STORAGES
 def test_the_two_topics_stay_side_by_side(tmp_path: Path, storage: str) -> None:
-    """At no place in the stream is one topic more than 500 samples ahead, and pieces are no smaller than they must be."""
+    """At no place in the stream is one topic more than 2000 samples ahead, and pieces are no smaller than they must be."""
     place = {"voltage": 0.0, "position": 0.0}
     blocks = 0
     for kind, content in stream_blocks(a_bag(tmp_path / "bag", both(range(0, 100_000, 20)), storage=storage)):
         place[kind] = content.seq[-1]
         blocks += 1
-        assert abs(place["voltage"] - place["position"]) <= 520
+        assert abs(place["voltage"] - place["position"]) <= 2020
     assert place == {"voltage": 99_999, "position": 99_999}
-    assert blocks < 2 * 100_000 / 300
+    assert blocks < 2 * 100_000 / 1000
 
 
 @STORAGES

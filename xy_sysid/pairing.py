@@ -85,8 +85,7 @@ class Pairer:
             return self._feed(kind, block)
         found: list[Samples | Gap] = []
         for start in range(0, len(block), step):
-            part = slice(start, start + step)
-            found += self._feed(kind, Block(block.axes, block.seq[part], block.time[part], block.values[part]))
+            found += self._feed(kind, block.rows(start, start + step))
         return found
 
     def _feed(self, kind: Kind, block: Block) -> list[Samples | Gap]:

@@ -36,6 +36,10 @@ class Block:
     def __len__(self) -> int:
         return int(self.seq.shape[0])
 
+    def rows(self, first: int, last: int) -> Block:
+        """The samples from ``first`` to before ``last``."""
+        return Block(self.axes, self.seq[first:last], self.time[first:last], self.values[first:last])
+
 
 def columns(axes: Sequence[str]) -> str:
     """The label of ``layout.dim[1]`` for these axes."""

@@ -24,6 +24,7 @@ MAGIC = b"\x89MCAP0\r\n"
 FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, DATA_END = 2, 3, 4, 5, 6, 15
 WINDOW = 1 << 20  # bytes read at once where messages are not in chunks
 LARGEST = 1 << 31  # bytes; a record that claims to be longer is damage
+ROWS = 1024  # messages given on at once: they stay in the cache of the processor
 
 
 @compiled
@@ -52,11 +53,11 @@ def messages(data: Bytes, at: int, rows: Indices) -> tuple[int, int]:
     return found, at
 
 
-def _text(data: bytes, at: int) -> tuple[str, int]:
+def _text(data: bytes | memoryview, at: int) -> tuple[str, int]:
     (length,) = struct.unpack_from("<I", data, at)
     if at + 4 + length > len(data):
         raise struct.error("text is longer than its record")
-    return data[at + 4 : at + 4 + length].decode("utf-8", "replace"), at + 4 + length
+    return str(data[at + 4 : at + 4 + length], "utf-8", "replace"), at + 4 + length
 
 
 class McapFile:
@@ -69,6 +70,7 @@ class McapFile:
         self.handle = os.open(path, os.O_RDONLY)
         self.size = os.fstat(self.handle).st_size
         self.damage = ""
+        self._memory = np.empty(0, np.uint8)
         try:
             if os.pread(self.handle, 8, 0) != MAGIC:
                 raise BadRecording(path, "not an MCAP file (its first bytes are wrong)", "Give a bag that ros2 or xy-sysid recorded.")
@@ -139,18 +141,24 @@ class McapFile:
                 at += used
                 continue
             if kind == CHUNK:
-                yield from self._chunk(os.pread(self.handle, length, at + 9), length, wanted, at)
+                yield from self._chunk(self._read(length, at + 9), length, wanted, at)
             elif kind in (SCHEMA, CHANNEL):
                 self._learn(kind, os.pread(self.handle, length, at + 9))
             at += 9 + length
         if at < self.size or (at > self.size):
             self.damage = self.damage or "cut short"
 
-    def _chunk(self, record: bytes, length: int, wanted: Sequence[str], place: int) -> Iterator[tuple[Batch, float]]:
+    def _read(self, length: int, at: int) -> memoryview:
+        """Bytes of the file, in memory that the next call uses again: fresh memory for each chunk costs as much as reading it."""
+        if self._memory.size < length:
+            self._memory = np.empty(length, np.uint8)
+        return self._memory.data[: os.preadv(self.handle, [self._memory[:length].data], at)]
+
+    def _chunk(self, record: memoryview, length: int, wanted: Sequence[str], place: int) -> Iterator[tuple[Batch, float]]:
         try:
             _, _, full, checksum = struct.unpack_from("<QQQI", record)
             method, at = _text(record, 28)
-            raw = memoryview(record)[at + 8 :]
+            raw = record[at + 8 :]
             if full > LARGEST:
                 raise Damaged("its size is not possible")
             data = raw if not method else decompressor(method, self.path)(bytes(raw))
@@ -177,7 +185,7 @@ class McapFile:
 
     def _walk(self, data: Bytes, at: int, wanted: Sequence[str], place: int) -> Generator[tuple[Batch, float], None, int]:
         """Yield the messages from ``at`` on; the value of the generator is how many bytes they take."""
-        rows = np.empty((4096, 4), np.int64)
+        rows = np.empty((ROWS, 4), np.int64)
         start = at
         lookup = np.full(max([*self.channels, 0]) + 2, -1, np.int64)
         for number, (name, _) in self.channels.items():

@@ -21,6 +21,7 @@ from xy_sysid.errors import BadRecording
 
 STORAGES: Mapping[str, type[SqliteFile] | type[McapFile]] = {".db3": SqliteFile, ".mcap": McapFile}
 ANOTHER_COPY = "Take another copy of the bag."
+LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # the compiled one where there is one
 KNOWN = "a rosbag2 folder, .db3, .mcap"
 
 
@@ -135,7 +136,7 @@ class Bag:
         if not file.exists():
             return None
         try:
-            content = yaml.safe_load(file.read_text("utf-8"))
+            content = yaml.load(file.read_text("utf-8"), Loader=LOADER)
         except OSError as error:
             raise BadRecording(file, f"cannot be read ({error.strerror})", "Check the permissions.") from None
         except (yaml.YAMLError, UnicodeDecodeError):

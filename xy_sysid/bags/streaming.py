@@ -9,16 +9,19 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from xy_sysid.bags.cdr import ARRAY_TYPE, JOINT_TYPE, Layout, array_layout, joint_layout
 from xy_sysid.bags.reading import Bag
 from xy_sysid.bags.stride import Batch, Indices, Reader, Stretch, doubles, stamps
+from xy_sysid.compiled import compiled
 from xy_sysid.errors import BadInput
 from xy_sysid.stream import Block, FloatArray, unpack
 
 Kind = Literal["voltage", "position", "reference"]
 VOLTAGE, POSITION, REFERENCE = "/xy/voltage", "/xy/position", "/xy/reference"
-PIECE = 500  # samples; a consumer that waits 1000 samples for a late partner never sees the two topics drift apart
+PIECE = 2000  # samples; the rings that pair them hold sixteen times as many
+AFTER_ODD = 2  # messages after one whose counter went back that come one by one, until the pairer has decided what that meant
 CLOCK_SAMPLES = 2000  # stamps from which the period of a joint state stream is learnt
 EFFORT_UNITS = ("effort", "position")  # joint states name no unit: N m or N, rad or m
 OTHERS = "Name others with --topic voltage=NAME, position=NAME or joints=NAME."
@@ -188,8 +191,27 @@ class _Decoder:
             self.bag.notes.append("the stamps of the joint states are zero; the time of recording is used")
 
 
-def _cut(parts: list[_Part], most: int) -> Iterator[tuple[Kind, Block]]:
-    """Blocks of about ``most`` samples, those of all kinds side by side, in log order."""
+@compiled
+def _alone(seq: FloatArray, rows: int, before: float) -> NDArray[np.bool_]:
+    """(messages,) whether a message must not be joined to the one before it: where the counter does not go on upwards.
+
+    Such messages come one by one, as they came live: what is odd about one must not be laid at the door of others.
+    before: the counter before the first
+    """
+    size = seq.shape[0] // rows
+    alone = np.zeros(size, dtype=np.bool_)
+    for message in range(size):
+        odd = False
+        for i in range(message * rows, (message + 1) * rows):
+            odd |= not seq[i] > before
+            before = seq[i]
+        if odd:
+            alone[message : message + 1 + AFTER_ODD] = True
+    return alone
+
+
+def _cut(parts: list[_Part], most: int, newest: dict[Kind, float]) -> Iterator[tuple[Kind, Block]]:
+    """Blocks of about ``most`` samples, those of all kinds side by side, in log order. newest: last counter of each kind so far."""
     if not parts:
         return
     last = 1 + max(int(part.message[-1]) for part in parts)
@@ -201,17 +223,16 @@ def _cut(parts: list[_Part], most: int) -> Iterator[tuple[Kind, Block]]:
                 filled[part.message] = part.rows
         np.maximum(level, np.cumsum(filled) - filled, out=level)
     group = level // most
-    pieces: list[tuple[int, int, Kind, Block]] = []
-    for part in parts:
+    pieces: list[tuple[int, int, int, int, int]] = []  # group, first message, part, first and last sample
+    for index, part in enumerate(parts):
         number = group[part.message]
-        edges = [0, *(np.flatnonzero(np.diff(number)) + 1).tolist(), len(number)]
-        for a, b in itertools.pairwise(edges):
-            rows = slice(a * part.rows, b * part.rows)
-            block = Block(part.block.axes, part.block.seq[rows], part.block.time[rows], part.block.values[rows])
-            pieces.append((int(number[a]), int(part.message[a]), part.kind, block))
-    pieces.sort(key=lambda piece: piece[:2])
-    for _, _, kind, block in pieces:
-        yield kind, block
+        alone = _alone(part.block.seq, part.rows, newest.get(part.kind, -np.inf))
+        newest[part.kind] = float(part.block.seq[-1])
+        edges = [0, *(np.flatnonzero((number[1:] != number[:-1]) | alone[1:]) + 1).tolist(), len(number)]
+        pieces += [(number[a], part.message[a], index, a * part.rows, b * part.rows) for a, b in itertools.pairwise(edges)]
+    pieces.sort()
+    for _, _, index, first, last in pieces:
+        yield parts[index].kind, parts[index].block.rows(first, last)
 
 
 def _period(bag: Bag, source: Source) -> float:
@@ -248,8 +269,9 @@ def pieces(bag: Bag, source: Source, most: int, progress: Callable[[float], None
         before = len(bag.notes)
         decoder.clock = _Clock(_period(bag, source))
         del bag.notes[before:]
+    newest: dict[Kind, float] = {}
     for batch, part in bag.batches(decoder.names):
-        yield from _cut(decoder.parts(batch), most)
+        yield from _cut(decoder.parts(batch), most, newest)
         if progress is not None:
             progress(part)
     decoder.finish()

@@ -16,6 +16,7 @@ from xy_sysid.stream import Block, FloatArray
 LATE = 0.5  # s; a sample number that falls back further than that, for good, is a restart of the source
 SAME_RATE = 1e-3  # relative; sampling rates that differ by more do not belong together
 FEW = 0.01  # part of the samples; more steps than that off their grid in both directions are jitter, not gaps
+STEPS = 100_000  # time steps from which the period is taken; of a longer stream every second, third, ... is looked at
 LARGEST = 2.0**53  # a counter beyond it is not exact in a double, so it is no counter
 Fail = Callable[[str, str], BadRecording]
 Rows = NDArray[np.int64] | slice
@@ -45,16 +46,21 @@ def steady(time: FloatArray) -> FloatArray:
 
 def gather(name: str, blocks: Sequence[Block], axes: tuple[str, ...], notes: list[str], fail: Fail) -> Stream:
     """One stream from blocks, with the columns in the order of ``axes``; rows that are not finite become gaps."""
-    table = [np.column_stack((block.seq, block.time, block.values[:, [block.axes.index(axis) for axis in axes]])) for block in blocks]
-    rows = np.concatenate(table) if table else np.empty((0, 2 + len(axes)))
-    finite = np.isfinite(rows).all(axis=1) & (np.abs(rows[:, 0]) < LARGEST)
-    if not finite.all():
+    size, end = sum(map(len, blocks)), 0
+    seq, time, values = np.empty(size), np.empty(size), np.empty((size, len(axes)))
+    for block in blocks:
+        rows = slice(end, end + len(block))
+        seq[rows], time[rows] = block.seq, block.time
+        values[rows] = block.values if block.axes == axes else block.values[:, [block.axes.index(axis) for axis in axes]]
+        end = rows.stop
+    np.rint(seq, out=seq)
+    if not (np.isfinite(time).all() and np.isfinite(values).all() and bool(np.all(np.abs(seq) < LARGEST))):
+        finite = np.isfinite(time) & np.isfinite(values).all(axis=1) & (np.abs(seq) < LARGEST)
         notes.append(f"{int(np.sum(~finite))} rows of {name} are not numbers; they are left out")
-        rows = rows[finite]
-    if not len(rows):
+        seq, time, values = seq[finite], time[finite], values[finite]
+    if not len(seq):
         raise fail(f"no samples of {name}", "Record while the source publishes.")
-    whole = np.rint(rows[:, 0])
-    return Stream(axes, whole, rows[:, 1], rows[:, 2:])
+    return Stream(axes, seq, time, values)
 
 
 def sessions(seq: FloatArray, tolerance: float) -> list[int]:
@@ -64,6 +70,8 @@ def sessions(seq: FloatArray, tolerance: float) -> list[int]:
     a straggler, and sorting puts it right).
     """
     starts = [0]
+    if bool(np.all(seq[1:] > seq[:-1])):
+        return starts
     while True:
         part = seq[starts[-1] :]
         highest = np.maximum.accumulate(part)
@@ -80,10 +88,16 @@ def sessions(seq: FloatArray, tolerance: float) -> list[int]:
         starts.append(starts[-1] + begin)
 
 
+def _steps(stream: Stream) -> FloatArray:
+    """Time steps from one sample number to the next."""
+    at = np.arange(1, len(stream.seq), 1 + len(stream.seq) // STEPS)
+    return np.asarray((stream.time[at] - stream.time[at - 1])[stream.seq[at] - stream.seq[at - 1] == 1])
+
+
 def _merge(streams: dict[str, Stream], notes: list[str]) -> tuple[dict[str, Stream], float]:
     """Give each session numbers and times of its own, after those of the session before; also the sampling period."""
-    steps = {name: np.diff(stream.time)[np.diff(stream.seq) == 1] for name, stream in streams.items()}
-    period = float(np.median(np.concatenate(list(steps.values())))) if any(len(s) for s in steps.values()) else 0.0
+    steps = np.concatenate([_steps(stream) for stream in streams.values()])
+    period = float(np.median(steps)) if len(steps) else 0.0
     tolerance = LATE / period if period > 0 else 1000.0
     starts = {name: sessions(stream.seq, tolerance) for name, stream in streams.items()}
     counts = {name: len(found) for name, found in starts.items()}
@@ -164,8 +178,9 @@ def pair(streams: dict[str, Stream], source: str, units: tuple[str, str], notes:
     if period > 0 and abs(apart) > 0.1 * period:
         notes.append(f"samples of the same number are stamped {1e3 * abs(apart):.4g} ms apart; they are paired by number")
     reference = _reference(streams.get("reference"), seq, notes)
+    whole = len(seq) == len(position.seq)
     return Recording(
-        sampling_rate=rate_from_time(position.time[right], seq.astype(np.int64)),
+        sampling_rate=rates["position"] if whole else rate_from_time(position.time[right], seq.astype(np.int64)),
         axes=position.axes,
         seq=seq.astype(np.int64),
         time=position.time[right],
@@ -189,11 +204,10 @@ def _common(one: FloatArray, other: FloatArray) -> tuple[FloatArray, Rows, Rows]
 
 
 def _rate(name: str, stream: Stream, fail: Fail) -> float:
-    seq: NDArray[np.int64] = stream.seq.astype(np.int64)
-    steps = np.diff(stream.time) / np.diff(stream.seq)
-    if not np.median(steps) > 0:
-        raise fail(f"the time of {name} does not increase", "Stamp each sample with its instant in seconds.")
-    return rate_from_time(stream.time, seq)
+    try:
+        return rate_from_time(stream.time, stream.seq.astype(np.int64))
+    except BadInput:
+        raise fail(f"the time of {name} does not increase", "Stamp each sample with its instant in seconds.") from None
 
 
 def _reference(stream: Stream | None, seq: FloatArray, notes: list[str]) -> FloatArray | None:
