@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,12 +58,18 @@ def unpack(label: str, rows: int, width: int, data: FloatArray) -> Block:
     label: ``layout.dim[1].label``; rows, width: the sizes of dim[0] and dim[1]; data: the message's numbers.
     Raises BadInput if the columns are not ``seq,time,<axis>...`` or the sizes do not fit the data.
     """
+    axes = _axes(label)
+    if width != 2 + len(axes) or rows < 0 or rows * width != data.size:
+        raise BadInput(
+            "block size", f"{rows} x {width} with {data.size} numbers", f"rows x {2 + len(axes)} columns", "Set layout.dim sizes to rows and columns."
+        )
+    table = np.asarray(data, dtype=np.float64).reshape(rows, width)
+    return Block(axes, table[:, 0], table[:, 1], table[:, 2:])
+
+
+@lru_cache(maxsize=64)
+def _axes(label: str) -> tuple[str, ...]:
     names = [name.strip() for name in label.split(",")]
     if len(names) < 3 or names[0] != SEQ or names[1] != TIME or len(set(names)) != len(names):
         raise BadInput("column label", repr(label), "'seq,time,' and one name per axis", "Name the columns in layout.dim[1].label.")
-    if width != len(names) or rows < 0 or rows * width != data.size:
-        raise BadInput(
-            "block size", f"{rows} x {width} with {data.size} numbers", f"rows x {len(names)} columns", "Set layout.dim sizes to rows and columns."
-        )
-    table = np.asarray(data, dtype=np.float64).reshape(rows, width)
-    return Block(tuple(names[2:]), table[:, 0], table[:, 1], table[:, 2:])
+    return tuple(names[2:])

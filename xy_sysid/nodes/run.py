@@ -14,6 +14,7 @@ from typing import Any, Protocol, cast
 
 from xy_sysid.errors import MissingExtra, XySysidError
 
+LOOK = 0.1  # s between two looks whether the node is to end
 LONGEST_STOP = 3.0  # s an orderly end may take; then the last words are said without waiting
 
 
@@ -79,11 +80,12 @@ def run_node(factory: Callable[[], Runnable], args: Sequence[str] | None = None)
 
 def _spin(node: Runnable, asked: list[int]) -> None:
     from rclpy.experimental.events_executor import EventsExecutor
+    from rclpy.task import Future
 
-    executor = EventsExecutor()
+    executor, never = EventsExecutor(), Future()
     executor.add_node(cast("Any", node))
     while not asked and node.exit_code is None:
-        executor.spin_once(timeout_sec=0.1)
+        executor.spin_until_future_complete(never, timeout_sec=LOOK)  # spin_once comes back after every message, which costs more
     node.ask_to_stop(signal.Signals(asked[0]).name if asked else "finished")
     until = time.monotonic() + LONGEST_STOP
     while not node.has_stopped() and time.monotonic() < until:

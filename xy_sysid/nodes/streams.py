@@ -44,7 +44,8 @@ class Streams:
         self._joints = JointCounter(axes, with_voltage=not effort)
         self._heard = dict.fromkeys(KINDS, 0)
         self._before = dict(self._heard)
-        if source == "joint_state":
+        self._by_stamp = source == "joint_state"
+        if self._by_stamp:
             node.create_subscription(JointState, "joint_states", self._on_joints, JOINT_QOS)
         else:
             node.create_subscription(Float64MultiArray, "position", self._on_position, DATA_QOS)
@@ -70,7 +71,7 @@ class Streams:
             self._refuse(f"{kind}: {problem}")
             return
         self._feed(kind, block)
-        if kind == "voltage":
+        if kind == "voltage" and self._by_stamp:
             self._joints.see_voltage(block)
 
     def _on_joints(self, message: JointState) -> None:
