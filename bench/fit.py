@@ -21,8 +21,9 @@ from xy_sysid.fitting import FitOptions, Structure, identify
 from xy_sysid.fitting.prediction import predict
 from xy_sysid.fitting.problem import from_transfer_function, model, problem
 from xy_sysid.frf import ComplexArray, FrequencyResponse
+from xy_sysid.simulation import held_response
 from xy_sysid.stream import FloatArray
-from xy_sysid.transfer_function import TransferFunction, held_response
+from xy_sysid.transfer_function import TransferFunction
 
 LINES, REPEATS = 612, 15
 

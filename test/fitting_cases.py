@@ -9,8 +9,9 @@ import scipy.linalg
 import scipy.signal
 
 from xy_sysid.frf import ComplexArray, FrequencyResponse
+from xy_sysid.simulation import held_response
 from xy_sysid.stream import FloatArray
-from xy_sysid.transfer_function import TransferFunction, held_response
+from xy_sysid.transfer_function import TransferFunction
 
 RATE = 2000.0
 RESOLUTION = RATE / 4096

@@ -15,9 +15,9 @@ from xy_sysid.fitting import Structure, identify
 from xy_sysid.fitting.damped import weighted
 from xy_sysid.fitting.problem import Point, Problem, from_transfer_function, moved, problem, response
 from xy_sysid.frf import ComplexArray, FrequencyResponse
-from xy_sysid.simulation import simulate, state_space
+from xy_sysid.simulation import held_response, simulate, state_space
 from xy_sysid.stream import FloatArray
-from xy_sysid.transfer_function import TransferFunction, held_response
+from xy_sysid.transfer_function import TransferFunction
 from xy_sysid.windows import WindowShape, blur_kernel
 
 SHAPE = WindowShape.of("hann", 4096, 0.5)
@@ -66,6 +66,19 @@ def test_the_held_response_is_that_of_the_matrix_exponential(base: TransferFunct
         frequency = frequency[:5]  # a jump that falls between samples has aliases that fade as 1 / k only
     truth = by_exponential(tf, frequency)
     assert np.max(np.abs(held_response(tf, frequency, RATE) / truth - 1.0)) < 1e-7
+
+
+@pytest.mark.parametrize("pole", [1e3, 1e5, 1e7])
+@pytest.mark.parametrize("delay", [0.0, 0.4e-3, 1.29e-3])
+def test_the_held_response_is_exact_for_poles_of_any_speed(pole: float, delay: float) -> None:
+    """A lag behind a hold: y goes to u as 1 - exp(-pole t), written down by hand."""
+    frequency = np.array([0.1, 47.0, 300.0, 990.0])
+    z = np.exp(2j * np.pi * frequency / RATE)
+    whole, part = divmod(delay * RATE, 1.0)
+    settled, late = np.exp(-pole / RATE), np.exp(-pole * (1.0 - part) / RATE)
+    truth = ((1.0 - late) + (late - settled) / z) / (z - settled) * z**-whole
+    lag = TransferFunction(np.array([pole]), np.array([1.0, pole]), delay)
+    assert np.max(np.abs(held_response(lag, frequency, RATE) / truth - 1.0)) < 1e-10
 
 
 STRUCTURES = {

@@ -7,6 +7,8 @@ from typing import Literal
 
 import numpy as np
 import pytest
+from fitting_cases import function
+from fitting_cases import held as noisy
 from fitting_data import RATE, held, lines, measured, paper_machine
 
 from xy_sysid.fitting import ESTIMATORS, FitOptions, Structure, identify
@@ -128,3 +130,15 @@ def test_a_warm_start_ends_where_a_cold_one_does() -> None:
     assert warm.start == "the last model"
     assert warm.iterations <= 8
     assert warm.tf.delay == pytest.approx(cold.tf.delay, abs=1e-10)
+
+
+@pytest.mark.parametrize("integrators", [0, 1])
+@pytest.mark.parametrize("delay", [0.0, 0.4e-3, 1.29e-3])
+@pytest.mark.parametrize("noise", [1e-4, 1e-2, 5e-2])
+def test_a_fast_pole_is_not_left_on_the_wrong_side(integrators: int, delay: float, noise: float) -> None:
+    """A fast pole and one mirrored to the right half plane with a longer delay look alike: a cold start ends at the better one."""
+    true = function([3e6], np.polymul(np.poly([-1000.0, -3000.0]), [1.0, *[0.0] * integrators]), delay)
+    frf, structure = noisy(true, noise), Structure(0, 2 + integrators, integrators)
+    cold, warm = identify(frf, structure), identify(frf, structure, true, doubt=False)
+    assert cold.cost == pytest.approx(warm.cost, rel=1e-3)
+    assert np.all(cold.poles.real <= 0.0)

@@ -11,7 +11,8 @@ from fitting_cases import LINES, RATE, held, paper_machine, response_of
 from xy_sysid.errors import BadInput
 from xy_sysid.fitting import Fit, Structure, identify
 from xy_sysid.frf import FrequencyResponse
-from xy_sysid.transfer_function import TransferFunction, held_response
+from xy_sysid.simulation import held_response
+from xy_sysid.transfer_function import TransferFunction
 
 MACHINE = Structure(2, 4, 1)
 RUNS = 60

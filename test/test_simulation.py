@@ -11,9 +11,9 @@ import scipy.integrate
 from fitting_data import RATE, lines, paper_machine
 
 from xy_sysid.errors import BadInput
-from xy_sysid.simulation import discrete, simulate, simulation_error, state_space
+from xy_sysid.simulation import discrete, held_response, simulate, simulation_error, state_space
 from xy_sysid.stream import FloatArray
-from xy_sysid.transfer_function import TransferFunction, held_response
+from xy_sysid.transfer_function import TransferFunction
 
 DELAYS = [0.0, 0.3e-3, 0.5e-3, 1.29e-3, 4.9999e-3]
 

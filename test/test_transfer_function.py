@@ -9,8 +9,8 @@ import pytest
 from fitting_data import RATE, lines, paper_machine
 
 from xy_sysid.errors import BadInput
-from xy_sysid.simulation import discrete
-from xy_sysid.transfer_function import TransferFunction, held_response
+from xy_sysid.simulation import discrete, held_response
+from xy_sysid.transfer_function import TransferFunction
 
 
 def test_the_response_is_the_quotient_turned_by_the_delay() -> None:

@@ -9,8 +9,7 @@ import pytest
 from fitting_cases import LINES, RATE, function, held, paper_machine, response_of
 
 from xy_sysid.fitting import ESTIMATORS, Structure, identify
-from xy_sysid.simulation import simulate
-from xy_sysid.transfer_function import held_response
+from xy_sysid.simulation import held_response, simulate
 from xy_sysid.validation import Validation, Verdict, validate
 
 MACHINE = Structure(2, 4, 1)

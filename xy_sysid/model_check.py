@@ -10,9 +10,9 @@ import numpy as np
 from xy_sysid.errors import BadInput
 from xy_sysid.estimate import divisor
 from xy_sysid.frf import ComplexArray, FrequencyResponse
-from xy_sysid.simulation import SimulationError, simulation_error, velocity_error
+from xy_sysid.simulation import SimulationError, held_response, simulation_error, velocity_error
 from xy_sysid.stream import FloatArray
-from xy_sysid.transfer_function import TransferFunction, held_response
+from xy_sysid.transfer_function import TransferFunction
 
 AT_THE_FLOOR = 1.3  # rms residual in sigma up to which a model that was fitted elsewhere is as good as noise allows
 

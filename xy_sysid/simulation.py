@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from xy_sysid.compiled import compiled
 from xy_sysid.errors import BadInput
+from xy_sysid.frf import ComplexArray
 from xy_sysid.stream import FloatArray
 from xy_sysid.transfer_function import TransferFunction
 
@@ -117,6 +118,24 @@ def _run(
         for i in range(order):
             x[i] = following[i]
     return y
+
+
+def held_response(tf: TransferFunction, frequency: FloatArray, sampling_rate: float) -> ComplexArray:
+    """(m,) exact response from held samples to samples: zero-order hold, delay, plant, sampler.
+
+    The sampled form at z = exp(j w T), so right for poles of any speed; a discrete function answers as it is.
+    Raises BadInput if it has more zeros than poles.
+    """
+    if tf.sampling_time is not None:
+        return tf.response(frequency)
+    s = stepper(tf, sampling_rate)
+    turns = np.asarray(frequency, dtype=np.float64) / sampling_rate
+    standing = turns == np.rint(turns)  # a multiple of the sampling rate is seen as 0 Hz
+    z = np.exp(2j * np.pi * np.where(standing, 0.5, turns))
+    driven = s.new + s.old / z[:, None]
+    state = np.linalg.solve(z[:, None, None] * np.eye(s.out.size) - s.step, driven[:, :, None])[:, :, 0]
+    value = (state @ s.out + s.direct_new + s.direct_old / z) * z ** -float(s.whole)
+    return np.asarray(np.where(standing, tf.response(np.zeros_like(turns)), value), dtype=np.complex128)
 
 
 def discrete(tf: TransferFunction, sampling_rate: float) -> TransferFunction:

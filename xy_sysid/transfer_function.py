@@ -1,4 +1,4 @@
-"""A rational transfer function with delay: response, poles and zeros, stability, Pade form, response behind a hold."""
+"""A rational transfer function with delay: response, poles and zeros, stability, Pade form."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import numpy as np
 
 from xy_sysid.errors import BadInput
 from xy_sysid.frf import ComplexArray
-from xy_sysid.hold import SERIES, TAIL_POINTS, interpolation, tail_sums
 from xy_sysid.stream import FloatArray
 
 ON_THE_EDGE = 1e-9  # relative distance from the stability limit that counts as on it
@@ -159,48 +158,3 @@ def _modes(roots: ComplexArray, sampling_time: float | None) -> tuple[Mode, ...]
         size = abs(s)
         out.append(Mode(complex(root), size / (2 * np.pi), -s.real / size if 0 < size < inf else 1.0))
     return tuple(sorted(out, key=lambda mode: mode.frequency))
-
-
-def held_response(tf: TransferFunction, frequency: FloatArray, sampling_rate: float) -> ComplexArray:
-    """(m,) exact response from held samples to samples: zero-order hold, delay, plant, sampler (see ``hold``).
-
-    H(w) = (1 - exp(-j w T)) / T sum_k exp(-s_k delay) G(s_k) / s_k, with aliases beyond the last one in closed form.
-    A discrete function answers as it is.
-    """
-    if tf.sampling_time is not None:
-        return tf.response(frequency)
-    period = 1.0 / sampling_rate
-    x = np.asarray(frequency, dtype=np.float64) * period
-    x = x - np.rint(x)
-    scale = 2 * np.pi * sampling_rate
-    up, down = _series(tf, scale)
-    radius = 2.0 * max((abs(down[j] / down[0]) ** (1.0 / j) for j in range(1, down.size)), default=0.0)
-    aliases = int(np.clip(np.ceil(3.0 * radius), 24, 400))
-    total = np.zeros(x.size, dtype=np.complex128)
-    for k in (*range(-aliases, 0), *range(1, aliases + 1)):
-        s = 1j * scale * (x + k)
-        total += np.exp(-2j * np.pi * k * tf.delay * sampling_rate) * _rational(tf, s) / s
-    lowest = tf.denominator.size - tf.numerator.size + 1
-    if radius < 0.5 * aliases and lowest >= 1:
-        sums = tail_sums(TAIL_POINTS, tf.delay * sampling_rate, aliases, lowest, SERIES)
-        ratio = np.zeros(SERIES)
-        for j in range(SERIES):
-            ratio[j] = (up[j] - ratio[:j] @ down[j:0:-1]) / down[0]
-        power = (2 * np.pi) ** (lowest - 1.0 + np.arange(SERIES))
-        total += interpolation(TAIL_POINTS, x) @ (sums @ (ratio * power)) * period
-    omega = scale * x
-    hold = -np.expm1(-1j * omega * period)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        base = np.where(x == 0, 1.0, hold / (1j * np.where(x == 0, 1.0, omega) * period)) * _rational(tf, np.asarray(1j * omega))
-    return np.asarray(np.exp(-1j * omega * tf.delay) * (base + np.where(x == 0, 0.0, hold / period * total)), dtype=np.complex128)
-
-
-def _series(tf: TransferFunction, scale: float) -> tuple[FloatArray, FloatArray]:
-    """First SERIES coefficients of numerator and denominator in falling powers of s / scale."""
-    out = []
-    for part, shift in ((tf.numerator, tf.numerator.size - tf.denominator.size), (tf.denominator, 0)):
-        full = np.zeros(SERIES)
-        width = min(SERIES, part.size)
-        full[:width] = part[:width] * scale ** (float(shift) - np.arange(width))
-        out.append(full)
-    return out[0], out[1]

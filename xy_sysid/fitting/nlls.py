@@ -51,7 +51,27 @@ def cold(task: Problem, options: FitOptions) -> Minimum:
         if best.cost <= 1.5 * float(len(task.frf)) and task.structure.weighting == "sigma":
             break  # as good as the noise allows
     assert best is not None
-    return best
+    mirrored = _mirrored(task, best.point)
+    found = minimise(task, mirrored, options) if mirrored is not None else best
+    return found if found.cost < best.cost and (found.converged or not best.converged) else best
+
+
+def _mirrored(task: Problem, at: Point) -> Point | None:
+    """The same with unstable poles made stable; None if there are none.
+
+    A fast pole is hardly more than a lag of 1 / |pole|, one in the right half plane a lead: what the delay can make up for.
+    So a fit may end with the pole on the wrong side and the delay too long, by 2 / pole.
+    """
+    poles = at.denominator.roots(at.a)
+    wrong = poles[poles.real > 0]
+    if task.structure.domain != "s" or not task.structure.free_delay or not wrong.size:
+        return None
+    line = task.plan.line[:, None]
+    up, down = rational(task, at)
+    down = down * np.prod((line + wrong.conj()) / (line - wrong), axis=1)
+    up = up * float(np.prod(wrong.conj() / -wrong).real)  # the gain stays what it is
+    delay = max(at.delay - float(np.sum(2.0 / wrong).real) / task.plan.scale, 0.0)
+    return in_bases(task, up, down, delay, task.weight * np.abs(task.plan.line_factor / down))
 
 
 def _followed(task: Problem, delay: float, start: Point, options: FitOptions) -> Minimum:

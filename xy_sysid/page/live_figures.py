@@ -11,8 +11,9 @@ from xy_sysid.messages import ArrayMessage
 from xy_sysid.page.heard import Tracked, columns, thinned
 from xy_sysid.report.parts import QUANTILE, band, broken, decibel, frequency_axis, phase_of, positive, rows, turns, unbroken
 from xy_sysid.report.theme import BEFORE, FAILS, MEASURED, MODEL, UNTRUSTED, fade
+from xy_sysid.simulation import held_response
 from xy_sysid.stream import FloatArray
-from xy_sysid.transfer_function import TransferFunction, held_response
+from xy_sysid.transfer_function import TransferFunction
 
 MOST = 1200  # lines drawn
 LEAST = 0.3  # coherence of a trusted line
