@@ -1,8 +1,9 @@
 """H1 and coherence of five minutes, against scipy.signal, pyFRF and the bare FFTs.
 
 600,000 samples of one axis at 2 kHz, Hann windows of 4096, half overlapped, the window's mean removed. Ours gives the response,
-the coherence and sigma; scipy.signal runs ``csd`` and two ``welch``; the bare FFTs are one real FFT a window and a signal, of
-windows already cut and tapered, one by one or four together (in cache) or all in one call.
+the coherence and sigma, and takes both signals through one complex FFT a window; scipy.signal runs ``csd`` and two ``welch``;
+the bare FFTs are one real FFT a window and a signal, of windows already cut and tapered, one by one or four together (in cache)
+or all in one call.
 """
 
 from __future__ import annotations

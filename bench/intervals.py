@@ -1,6 +1,6 @@
 """How often the 95 % intervals hold the truth: many simulated recordings of a machine that is known exactly.
 
-    python -m bench coverage
+    python -m bench intervals
 
 Band-limited noise (0.1-300 Hz, 1 V) is held at 2 kHz and sent through the paper's machine (hold and fractional delay exact);
 white noise is added to the position; spectra with Hann windows of 4096 samples, half overlapped; H1; maximum likelihood.

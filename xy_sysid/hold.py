@@ -20,7 +20,7 @@ from xy_sysid.compiled import compiled
 from xy_sysid.stream import FloatArray
 
 # Terms on each side. With 5 series terms the rest is below 1e-8 of the response for poles up to Nyquist, below 1e-6 up to twice the
-# sampling rate; a pole faster than that (4e-5 to 1e-2 at eight times) is hardly more than a delay. ``simulation.held_response`` is exact.
+# sampling rate; a pole faster than that (4e-5 to 0.1 at eight times) is hardly more than a delay. ``simulation.held_response`` is exact.
 ALIASES = 16
 SERIES = 5
 # where the tail is computed: away from x = 0, where its closed form would cancel; it is a smooth function of x

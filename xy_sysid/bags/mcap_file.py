@@ -24,7 +24,7 @@ MAGIC = b"\x89MCAP0\r\n"
 FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, DATA_END = 2, 3, 4, 5, 6, 15
 WINDOW = 1 << 20  # bytes read at once where messages are not in chunks
 LARGEST = 1 << 31  # bytes; a record that claims to be longer is damage
-ROWS = 1024  # messages given on at once: they stay in the cache of the processor
+ROWS, BYTES = 4096, 1 << 20  # messages given on at once, and where they may end: they stay in the cache of the processor
 
 
 @compiled
@@ -32,10 +32,10 @@ def messages(data: Bytes, at: int, rows: Indices) -> tuple[int, int]:
     """Walk over records from ``at`` while they are messages.
 
     rows: out, one per message: channel, log time, start, length. Returns how many, and where the walk stopped:
-    at another record, at an incomplete one, or because ``rows`` is full.
+    at another record, at an incomplete one, after BYTES, or because ``rows`` is full.
     """
-    found, size = 0, data.shape[0]
-    while at + 9 <= size and data[at] == 5 and found < rows.shape[0]:
+    found, size, enough = 0, data.shape[0], at + BYTES
+    while at + 9 <= size and at < enough and data[at] == 5 and found < rows.shape[0]:
         length = np.int64(0)
         for index in range(8):
             length |= np.int64(data[at + 1 + index]) << (8 * index)
@@ -198,5 +198,5 @@ class McapFile:
                 kept = rows[:found][topic >= 0]
                 if len(kept):
                     yield Batch(topic[topic >= 0], kept[:, 1], kept[:, 2], kept[:, 3], data), min(1.0, place / self.size)
-            if found < len(rows):
+            if not found:
                 return at - start
