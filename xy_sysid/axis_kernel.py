@@ -26,7 +26,7 @@ from xy_sysid.effects import modes
 from xy_sysid.effects.contract import Effect
 from xy_sysid.stream import FloatArray
 
-Kernel = Callable[[FloatArray, FloatArray, FloatArray, NDArray[np.uint8], float, FloatArray], None]
+Kernel = Callable[[FloatArray, FloatArray, FloatArray, NDArray[np.uint8], float, float, FloatArray], None]
 
 
 class _Text(importlib.abc.InspectLoader):

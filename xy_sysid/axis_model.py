@@ -21,6 +21,8 @@ from xy_sysid.errors import BadInput
 from xy_sysid.settings import unknown_name
 from xy_sysid.stream import FloatArray
 
+FINE = 8000.0  # Hz: sub-steps of each of a sample's two pieces; LuGre bristles of 10 um and Stribeck curves of 10 mm/s need it
+
 
 class Library:
     """A set of effects that simulate in one compiled loop, which is made at its first use."""
@@ -101,12 +103,12 @@ class AxisModel:
 
 
 def simulator(
-    library: Library, active: Iterable[str], sampling_rate: float, voltage: FloatArray, position: FloatArray
+    library: Library, active: Iterable[str], sampling_rate: float, voltage: FloatArray, position: FloatArray, fine: float = FINE
 ) -> Callable[[FloatArray], FloatArray]:
     """A function from parameters to the simulated velocity (n - 1,), m/s, for many runs on the same data.
 
     Its argument is a row: gain, delay, pole, then each active effect's parameters, in the order of ``active``.
-    voltage, position: (n,) V and m; the voltage of sample k is held to k + 1.
+    voltage, position: (n,) V and m; the voltage of sample k is held to k + 1; fine: Hz, sub-steps for what heeds speed
     """
     if voltage.shape != position.shape or voltage.ndim != 1 or voltage.size < 2:
         raise BadInput("shape of voltage and position", f"{voltage.shape} and {position.shape}", "one and the same (n,), n >= 2", "Give one axis.")
@@ -125,7 +127,7 @@ def simulator(
         for place, size in sizes:
             on[place] = row[size] != 0.0
         out = np.empty(u.size)
-        kernel(u, x, row, on, float(sampling_rate), out)
+        kernel(u, x, row, on, float(sampling_rate), fine, out)
         return out
 
     return run

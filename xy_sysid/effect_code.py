@@ -13,7 +13,6 @@ from xy_sysid.effects.contract import Effect, arguments
 from xy_sysid.swing import CUTS, FINE, STIFF, TERMS
 
 BASE = ("gain", "delay", "pole")
-INNER = 8000.0  # Hz: sub-steps of each of a sample's two pieces; LuGre bristles of 10 um and Stribeck curves of 10 mm/s need it
 
 
 def slots(effects: Sequence[Effect]) -> dict[str, int]:
@@ -28,14 +27,13 @@ def called(effect: Effect, function: str) -> str:
 
 
 def text(name: str, effects: Sequence[Effect]) -> str:
-    """Source of ``name(u, x, p, on, fs, out)``.
+    """Source of ``name(u, x, p, on, fs, fine, out)``.
 
     u: (n,) held voltage, V; x: (n + 1,) measured position, m; p: numbers in the order of ``slots``; on: (effects,) flags;
-    fs: Hz; out: (n,) receives the mean velocity of each sample, m/s.
+    fs: Hz; fine: Hz, sub-steps of each of a sample's two pieces; out: (n,) receives the mean velocity of each sample, m/s.
     """
     return TEMPLATE.substitute(
         name=name,
-        inner=f"{INNER:.1f}",
         stiff=f"{STIFF:.2f}",
         most=f"{CUTS}",
         terms=f"{TERMS}",

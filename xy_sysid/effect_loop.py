@@ -9,7 +9,7 @@ from __future__ import annotations
 from string import Template
 
 TEMPLATE = Template("""\
-def $name(u, x, p, on, fs, out):
+def $name(u, x, p, on, fs, fine, out):
     n = out.shape[0]
     gain, delay, pole = p[0], p[1], p[2]
 $unpack
@@ -22,7 +22,7 @@ $states
     late = delay * fs
     whole = int(late)
     part = late - whole
-    cuts = math.ceil($inner / fs) if curved else 1
+    cuts = math.ceil(fine / fs) if curved else 1
     h_old, h_new = part / fs / cuts, (1.0 - part) / fs / cuts
     decay_old, decay_new = math.exp(-pole * h_old), math.exp(-pole * h_new)
     spent_old, spent_new = -math.expm1(-pole * h_old) / pole, -math.expm1(-pole * h_new) / pole
@@ -37,7 +37,7 @@ $hang
         generator_still = resting(generator_moving)
         stiff = math.ceil(fastest(pole, bottom, fs) / ($stiff * fs))
         lighter = generator_moving[1, top.size + 1] / (gain * pole)  # without what hangs on it: sooner does it follow the friction
-        wanted = $inner * lighter * lighter if curved else $inner
+        wanted = fine * lighter if curved else fine
         cuts = min(max(math.ceil(wanted / fs), stiff), $most)
         h_old, h_new = part / fs / cuts, (1.0 - part) / fs / cuts
         moving_old, moving_new = exponential(generator_moving, h_old), exponential(generator_moving, h_new)

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from xy_sysid.axis_model import STANDARD, AxisModel, Library, sample_velocity, simulator
+from xy_sysid.axis_model import FINE, STANDARD, AxisModel, Library, sample_velocity, simulator
 from xy_sysid.base_start import base_start
 from xy_sysid.effects import Effect, Parameter, Scene
 from xy_sysid.errors import BadInput
@@ -24,6 +24,7 @@ FIRST = 14.0  # s of the first stage
 TRAINING = 2.0 / 3.0  # of the record; the rest is held out
 BRIEF = (Round(6, 1e-2), Round(6, 3e-3), Round(8, 1e-4))  # weights are worked out before each round
 LONG = (Round(4, 1e-3), Round(6, 1e-5))
+COARSE, MIDDLING = 2000.0, 4000.0  # Hz: sub-steps of first rounds (errors up to 3e-3 of the motion) and of brief fits (6e-4)
 EPSILON = 1e-3  # of the signal that a model may leave (the next rungs of the ladder are 1 % and 3 %)
 Z95 = 1.959964
 
@@ -159,6 +160,17 @@ def fit_with(
     return fit(data, model, brief, hopeless)
 
 
+def fit_instead(data: AxisData, base: GreyboxFit, own: str, name: str, brief: bool = False, hopeless: float = np.inf) -> GreyboxFit:
+    """The model of ``base`` with the effect ``name`` in the place of its relative ``own``, all refitted together."""
+    effect, before = base.model.library[name], dict(base.model.effects)[own]
+    known = dict(zip(base.model.library[own].names, before, strict=True))
+    rest = base.model.without(own)
+    starts = (look(data, base, [effect])[0].values, effect.typical)
+    shared = [tuple(known.get(key, value) for key, value in zip(effect.names, start, strict=True)) for start in starts]
+    candidates = [rest.with_effect(name, bounded(effect, values)) for values in shared]
+    return fit(data, min(candidates, key=lambda candidate: _misfit(data, candidate)), brief, hopeless)
+
+
 def _begun(data: AxisData, base: GreyboxFit, model: AxisModel, name: str) -> AxisModel:
     """The model with one more effect, its start read from the data: the best of trace, inverse and joint starts."""
     effect = model.library[name]
@@ -180,7 +192,7 @@ def _misfit(data: AxisData, model: AxisModel) -> float:
     The second part is for real machines, whose small errors in many high bands would else hide a large one in a few low
     bands: on EMPS it chooses the valley with the true friction.
     """
-    run, values, _ = _problem(data, model, data.first)
+    run, values, _ = _problem(data, model, data.first, COARSE)
     error = data.velocity[: data.first] - run(values)
     whole = _rms(data.layout, data.layout.power(data.layout.spectrum(error))) / _rms(data.layout, data.floor.power)
     return excess(data.layout, error, data.floor) + 2.0 * float(np.log(max(whole, 1e-6)))
@@ -189,13 +201,13 @@ def _misfit(data: AxisData, model: AxisModel) -> float:
 def look(data: AxisData, fitted: GreyboxFit, effects: Iterable[Effect]) -> list[Trace]:
     """What each effect would explain of the error of a fit, best first, with start values."""
     model, n = fitted.model, data.training
-    run, values, scale = _problem(data, model, n)
+    run, values, scale = _problem(data, model, n, COARSE)
     inner = scale.inner(values)
-    nuisance = []
+    here, nuisance = run(values), []
     for k in range(values.size):
         moved = inner.copy()
         moved[k] += 1e-4
-        nuisance.append(run(scale.outer(moved)) - fitted.simulated[:n])
+        nuisance.append(run(scale.outer(moved)) - here)
     return screen(effects, _scene(data, fitted), np.array(nuisance), data.layout, data.floor, data.first)
 
 
@@ -214,10 +226,11 @@ def _scene(data: AxisData, fitted: GreyboxFit) -> Scene:
 
 def fit(data: AxisData, start: AxisModel, brief: bool = False, hopeless: float = np.inf) -> GreyboxFit:
     """All parameters of a model, from where it is; brief, hopeless: see ``fit_with``."""
-    run, values, scale = _problem(data, start, data.first)
+    run, values, scale = _problem(data, start, data.first, COARSE)
     velocity = data.velocity[: data.first]
     found = solve(run, velocity, data.layout, data.floor, scale, values, BRIEF[:1])
     if not (brief and excess(data.layout, velocity - run(found.values), data.floor) > hopeless):
+        run, _, _ = _problem(data, start, data.first, MIDDLING)
         more = solve(run, velocity, data.layout, data.floor, scale, found.values, BRIEF[1:])
         found = replace(more, runs=found.runs + more.runs)
     if not brief:
@@ -260,10 +273,10 @@ def _result(data: AxisData, start: AxisModel, scale: Scale, found: Solution, run
     )
 
 
-def _problem(data: AxisData, model: AxisModel, samples: int) -> tuple[Callable[[FloatArray], FloatArray], FloatArray, Scale]:
-    """Simulation of the first samples, the model's parameters as a row, and how each may move."""
+def _problem(data: AxisData, model: AxisModel, samples: int, fine: float = FINE) -> tuple[Callable[[FloatArray], FloatArray], FloatArray, Scale]:
+    """Simulation of the first samples in sub-steps of ``fine`` Hz, the model's parameters as a row, and how each may move."""
     names = [name for name, _ in model.effects]
-    run = simulator(model.library, names, data.sampling_rate, data.voltage[: samples + 1], data.position[: samples + 1])
+    run = simulator(model.library, names, data.sampling_rate, data.voltage[: samples + 1], data.position[: samples + 1], fine)
     items = [item for name in names for item in model.library[name].parameters]
     values = np.array([model.gain, model.delay, model.pole, *(value for _, row in model.effects for value in row)])
     scale = Scale(

@@ -12,7 +12,7 @@ import numpy as np
 
 from xy_sysid.axis_model import STANDARD, Library
 from xy_sysid.effects import Effect
-from xy_sysid.greybox import AxisData, GreyboxFit, finish, fit_with, look
+from xy_sysid.greybox import AxisData, GreyboxFit, finish, fit_instead, fit_with, look
 from xy_sysid.one_step import one_step_fit
 
 # Tuned on development draws of the simulated machine only (blind/cases.py).
@@ -22,6 +22,7 @@ SIMPLER = 0.08  # excess that a simpler model may be worse by and still be prefe
 TRIED = 5  # effects that are fitted at each step, by their share of the error
 LEAST_SHARE = 5e-4  # of the error that an effect's trace must explain to be tried
 HOPELESS = 1.5  # excess behind the best so far at which a candidate is given up after its first round
+HELPS = 0.05  # excess that a candidate must win on the first stage to run the whole distance
 NEAR = 0.3  # excess on the first stage within which candidates run the whole distance
 WIDE = 3  # first effects of the pairs that are tried
 PART_LEFT = 0.4  # of the excess that an effect found between SURE and AT_FLOOR may leave
@@ -44,14 +45,14 @@ def candidates(data: AxisData, now: GreyboxFit, library: Library = STANDARD) -> 
     A race: simpler effects first, each on the first stage's data only. Once one is at the floor, richer ones cannot be
     preferred to it and are left out; those that come near the best run the whole distance.
     """
-    open_to = _open(now, library)
+    open_to = [*_open(now, library), *(library[name] for name in _richer(now, library))]
     traces = [trace for trace in look(data, now, open_to) if trace.share >= LEAST_SHARE]
     shares = {trace.effect: trace.share for trace in traces}
     names = _with_relatives([trace.effect for trace in traces[:TRIED]], open_to)
     found: list[Candidate] = []
     enough = np.inf
-    for name in sorted(names, key=lambda name: (len(library[name].parameters), -shares.get(name, 0.0))):
-        if len(library[name].parameters) > enough:
+    for name in sorted(names, key=lambda name: (_more(now, library, name), -shares.get(name, 0.0))):
+        if _more(now, library, name) > enough:
             found.append(Candidate(name, shares.get(name, 0.0), None))
             continue
         least = min((item.fit.excess for item in found if item.fit), default=np.inf)
@@ -59,10 +60,11 @@ def candidates(data: AxisData, now: GreyboxFit, library: Library = STANDARD) -> 
         if fitted is not None and fitted.excess < AT_FLOOR:
             fitted = finish(data, fitted.model, fitted.runs)
             if fitted.excess < SIMPLER:
-                enough = len(library[name].parameters)
+                enough = _more(now, library, name)
         found.append(Candidate(name, shares.get(name, 0.0), fitted))
     least = min((item.fit.excess for item in found if item.fit), default=np.inf)
-    near = [item for item in found if item.fit and AT_FLOOR <= item.fit.excess <= least + NEAR]
+    enough = min(least + NEAR, now.excess - HELPS)
+    near = [item for item in found if item.fit and AT_FLOOR <= item.fit.excess <= enough]
     for item in near:
         assert item.fit is not None
         found[found.index(item)] = replace(item, fit=finish(data, item.fit.model, item.fit.runs))
@@ -70,14 +72,14 @@ def candidates(data: AxisData, now: GreyboxFit, library: Library = STANDARD) -> 
     return tuple(sorted(found, key=lambda item: item.fit.excess if item.fit else np.inf)) + tuple(rest)
 
 
-def choose(tried: tuple[Candidate, ...], library: Library = STANDARD) -> Candidate | None:
-    """The simplest (fewest parameters) of those within SIMPLER of the least excess; None if nothing could be fitted."""
+def choose(now: GreyboxFit, tried: tuple[Candidate, ...], library: Library = STANDARD) -> Candidate | None:
+    """The simplest (fewest parameters more than now) of those within SIMPLER of the least excess; None if nothing could be fitted."""
     fitted = [item for item in tried if item.fit is not None]
     if not fitted:
         return None
     least = min(item.fit.excess for item in fitted if item.fit)
     good = [item for item in fitted if item.fit and item.fit.excess <= least + SIMPLER]
-    return min(good, key=lambda item: (len(library[item.effect].parameters), item.fit.excess if item.fit else np.inf))
+    return min(good, key=lambda item: (_more(now, library, item.effect), item.fit.excess if item.fit else np.inf))
 
 
 def suspected(data: AxisData, now: GreyboxFit, tried: tuple[Candidate, ...], library: Library) -> tuple[Candidate, ...]:
@@ -96,13 +98,14 @@ def suspected(data: AxisData, now: GreyboxFit, tried: tuple[Candidate, ...], lib
     return tuple(found)
 
 
-def together(data: AxisData, now: GreyboxFit, tried: tuple[Candidate, ...], library: Library) -> tuple[Candidate, Candidate] | None:
-    """Two effects at once, where each alone helps little because the other's error hides it; None if that helps little, too."""
+def together(data: AxisData, now: GreyboxFit, tried: tuple[Candidate, ...], library: Library, bar: float) -> tuple[Candidate, Candidate] | None:
+    """Two effects at once, where each alone helps little because the other's error hides it; None if that helps little, too.
+
+    bar: excess above which a pair is not worth the whole distance
+    """
     if any(library[name].one_step for name, _ in now.model.effects):
         return None
-    fitted = [item for item in tried if item.fit is not None and library[item.effect].one_step is None]
-    richest = [item for item in fitted if library[item.effect].category == "bristle"]  # all dry friction goes through bristles
-    fitted = [*richest, *(item for item in fitted if item not in richest)]
+    fitted = _one_of_each_family([item for item in tried if item.fit is not None and library[item.effect].one_step is None], now, library)
     best: tuple[Candidate, Candidate] | None = None
     least = np.inf
     for first in fitted[:WIDE]:
@@ -111,14 +114,14 @@ def together(data: AxisData, now: GreyboxFit, tried: tuple[Candidate, ...], libr
         always = [effect.name for effect in _open(first.fit, library) if effect.name in UNSEEN]
         for name in dict.fromkeys([*seconds, *always]):
             try:
-                found = fit_with(data, now, [first.effect, name], brief=True)
+                found = fit_with(data, now, [first.effect, name], brief=True, hopeless=now.excess)
             except np.linalg.LinAlgError:
                 continue
             if found.excess < least and plausible(found):  # false for a fit that is not a number
                 best, least = (first, Candidate(name, 0.0, found)), found.excess
         if least < AT_FLOOR:
             break
-    if best is None or best[1].fit is None:
+    if best is None or best[1].fit is None or least > bar:
         return None
     return best[0], replace(best[1], fit=finish(data, best[1].fit.model, best[1].fit.runs))
 
@@ -146,6 +149,31 @@ def _open(now: GreyboxFit, library: Library) -> list[Effect]:
     return [e for e in library.acting if e.simulable and e.name not in now.model and not (e.family and e.family in families)]
 
 
+def _richer(now: GreyboxFit, library: Library) -> dict[str, str]:
+    """Effects with more parameters that may take the place of a relative in the model: name and relative."""
+    found = {}
+    for own, _ in now.model.effects:
+        relatives = (e for e in library.acting if e.family and e.family == library[own].family and e.simulable)
+        found.update({e.name: own for e in relatives if e.name not in now.model and len(e.parameters) > len(library[own].parameters)})
+    return found
+
+
+def _more(now: GreyboxFit, library: Library, name: str) -> float:
+    """Parameters that a candidate adds; one effect in the place of another counts half a parameter less than one more."""
+    own = _richer(now, library).get(name)
+    return len(library[name].parameters) - (0.0 if own is None else len(library[own].parameters) + 0.5)
+
+
+def _one_of_each_family(fitted: list[Candidate], now: GreyboxFit, library: Library) -> list[Candidate]:
+    """The simplest stands for its relatives: what it leaves to them they may take later. None in place of one in the model."""
+    richer, found = _richer(now, library), list[Candidate]()
+    for item in sorted(fitted, key=lambda item: len(library[item.effect].parameters)):
+        family = library[item.effect].family
+        if item.effect not in richer and not (family and any(library[other.effect].family == family for other in found)):
+            found.append(item)
+    return sorted(found, key=fitted.index)
+
+
 def _with_relatives(names: list[str], open_to: list[Effect]) -> list[str]:
     """The names, and the rest of a family of which one is among the first two: relatives share their trace."""
     family = {effect.name: effect.family for effect in open_to}
@@ -154,8 +182,12 @@ def _with_relatives(names: list[str], open_to: list[Effect]) -> list[str]:
 
 
 def _tried(data: AxisData, now: GreyboxFit, name: str, hopeless: float = np.inf) -> GreyboxFit | None:
+    own = _richer(now, now.model.library).get(name)
     try:
-        found = fit_with(data, now, [name], brief=True, hopeless=hopeless)
+        if own is None:
+            found = fit_with(data, now, [name], brief=True, hopeless=hopeless)
+        else:
+            found = fit_instead(data, now, own, name, brief=True, hopeless=hopeless)
     except np.linalg.LinAlgError:
         return None
     return found if np.isfinite(found.excess) and plausible(found) else None

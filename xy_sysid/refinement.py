@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from xy_sysid.axis_model import STANDARD, Library
+from xy_sysid.axis_model import STANDARD, AxisModel, Library
 from xy_sysid.errors import BadInput
-from xy_sysid.greybox import EPSILON, AxisData, GreyboxFit, fit, fit_base, fit_with
+from xy_sysid.greybox import EPSILON, AxisData, GreyboxFit, finish, fit, fit_base, fit_with
 from xy_sysid.one_step import one_step_fit
-from xy_sysid.race import AT_FLOOR, PART_LEFT, SURE, Candidate, candidates, choose, plausible, polished, suspected, together
+from xy_sysid.race import AT_FLOOR, HOPELESS, NEAR, PART_LEFT, SURE, Candidate, candidates, choose, plausible, polished, suspected, together
 
 LEAST_GAIN = 0.1  # excess that an addition must win, and
 PART_GAIN = 0.11  # the part of the excess that it must win; or
@@ -94,11 +94,12 @@ def advance(data: AxisData, now: GreyboxFit, library: Library = STANDARD, pairs:
     tried = candidates(data, now, library)
     if strict and not now.model.effects:
         tried = (*suspected(data, now, tried, library), *tried)
-    taken = choose(tried, library)
+    taken = choose(now, tried, library)
     found = taken.fit if taken is not None else None
     paired = strict and pairs and (found is None or found.excess > WEAK * now.excess)
     if paired:
-        pair = together(data, now, tried, library)
+        bar = WEAK * (now.excess if found is None else min(found.excess, now.excess))
+        pair = together(data, now, tried, library, bar + NEAR)
         if pair is not None and pair[0].fit and pair[1].fit and (found is None or pair[1].fit.excess < WEAK * found.excess):
             return Move((Step(pair[0].effect, pair[0].fit, tried), Step(pair[1].effect, pair[1].fit, ())), tried, paired)
     if taken is None or found is None or not _worth(now, found):
@@ -147,14 +148,22 @@ def prune(data: AxisData, now: GreyboxFit, keep: tuple[str, ...] = ()) -> Greybo
     for name, _ in now.model.effects:
         if name in keep or len(now.model.effects) < 2:
             continue
-        try:
-            without = fit(data, now.model.without(name))
-        except np.linalg.LinAlgError:
+        without = _unless_hopeless(data, now.model.without(name), now.excess + NEEDED)
+        if without is None:
             continue
         needless = without.excess < SURE or PART_LEFT * without.excess < now.excess
         if without.excess <= now.excess + NEEDED and (needless or without.excess >= AT_FLOOR):
             now = without
     return now
+
+
+def _unless_hopeless(data: AxisData, model: AxisModel, bar: float) -> GreyboxFit | None:
+    """The fit of a model, or None if the first stage shows that its excess will stay far above ``bar``."""
+    try:
+        found = fit(data, model, brief=True, hopeless=bar + HOPELESS)
+        return finish(data, found.model, found.runs) if found.excess <= bar + NEAR else None
+    except np.linalg.LinAlgError:
+        return None
 
 
 def simplified(data: AxisData, now: GreyboxFit, keep: tuple[str, ...] = ()) -> GreyboxFit:
@@ -171,9 +180,8 @@ def simplified(data: AxisData, now: GreyboxFit, keep: tuple[str, ...] = ()) -> G
         simpler = [e for e in library.acting if e.family == effect.family and len(e.parameters) < len(effect.parameters)]
         for relative in sorted(simpler, key=lambda e: len(e.parameters)):
             start = tuple(own.get(key, usual) for key, usual in zip(relative.names, relative.typical, strict=True))
-            try:
-                other = fit(data, now.model.without(name).with_effect(relative.name, start))
-            except np.linalg.LinAlgError:
+            other = _unless_hopeless(data, now.model.without(name).with_effect(relative.name, start), now.excess + SURE)
+            if other is None:
                 continue
             same = other.excess <= now.excess + SURE and other.held_out_error <= 1.1 * now.held_out_error
             if same and plausible(other):

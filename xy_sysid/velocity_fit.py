@@ -1,7 +1,8 @@
 """Levenberg-Marquardt on the whitened error in velocity.
 
 Levenberg 1944, Marquardt 1963; whitening by the error's own power, worked out again a few times: iteratively reweighted
-least squares towards the Whittle likelihood. Derivatives are forward differences of the simulation.
+least squares towards the Whittle likelihood. Derivatives are forward differences of the simulation, taken anew only when a
+step did not do what they promised, and else brought up to date with what it did (Broyden 1965).
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from xy_sysid.spectral_cost import Bands, Floor, tolerance
 from xy_sysid.stream import FloatArray
 
+TRUSTED = 0.25  # a step whose fall differs by less than this part from the one expected needs no new derivatives
 STEP = 1e-4  # of a logarithm, or of a parameter's scale: far above rounding, far below what bends
 
 
@@ -78,27 +80,30 @@ def solve(
         runs += 1
         return np.asarray(measured - layout.spectrum(run(scale.outer(inner))))
 
+    def slopes(inner: FloatArray, error: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        taken = np.empty((inner.size, *error.shape), dtype=np.complex128)
+        for k in range(inner.size):
+            step = STEP if scale.outer(inner)[k] < scale.high[k] else -STEP
+            moved = inner.copy()
+            moved[k] += step
+            taken[k] = (left(moved) - error) / step
+        return taken
+
     inner = scale.inner(start)
     error = left(inner)
     size = inner.size
     normal, cost, converged = np.eye(size), np.inf, False
+    change, exact = slopes(inner, error), True
     for stage in rounds:
         power = tolerance(layout, error, least)
         weight = np.sqrt(1.0 / power)[layout.band]
         cost = _cost(error * weight)
-        damping, converged, fresh = 1e-3, False, True
+        damping, converged, fresh = 1e-3, False, False
         for _ in range(stage.iterations):
-            if fresh:
-                columns = np.empty((size, 2 * error.size))
-                for k in range(size):
-                    step = STEP if scale.outer(inner)[k] < scale.high[k] else -STEP
-                    moved = inner.copy()
-                    moved[k] += step
-                    change = (left(moved) - error) * (weight / step)
-                    columns[k] = np.concatenate((change.real.ravel(), change.imag.ravel()))
-                now = error * weight
-                residual = np.concatenate((now.real.ravel(), now.imag.ravel()))
-                normal, slope = columns @ columns.T, columns @ residual
+            if not fresh:
+                columns = (change * weight).reshape(size, -1).view(np.float64)
+                normal, slope = columns @ columns.T, columns @ (error * weight).ravel().view(np.float64)
+                fresh = True
             diagonal = np.maximum(np.diag(normal), 1e-12 * float(np.max(np.diag(normal))) + 1e-300)
             move = -np.linalg.solve(normal + damping * np.diag(diagonal), slope)
             move *= min(1.0, 2.0 / float(np.max(np.abs(move)) + 1e-300))
@@ -106,19 +111,34 @@ def solve(
             found = left(trial)
             new = _cost(found * weight)
             if np.isfinite(new) and new < cost:
-                fall = (cost - new) / cost
-                inner, error, cost, fresh = trial, found, new, True
+                fall, gone = (cost - new) / cost, trial - inner
+                hoped = -float(2.0 * slope @ gone + gone @ normal @ gone)
+                if abs((cost - new) - hoped) < TRUSTED * hoped:
+                    change, exact = _updated(change, gone, diagonal, found - error), False
+                else:
+                    change, exact = slopes(trial, found), True
+                inner, error, cost, fresh = trial, found, new, False
                 damping = max(damping * 0.2, 1e-9)
                 if fall < stage.enough:
                     converged = True
                     break
+            elif not exact:
+                change, exact, fresh = slopes(inner, error), True, False
             else:
-                fresh = False
                 damping *= 10.0
                 if damping > 1e6:
                     converged = True
                     break
     return Solution(scale.outer(inner), _covariance(normal), cost, runs, converged)
+
+
+def _updated(change: NDArray[np.complex128], gone: FloatArray, size: FloatArray, moved: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Derivatives (k, windows, lines) that agree with the step just taken, else as they were (Broyden 1965, eq. 4.5).
+
+    gone: (k,) step; size: (k,) its weights; moved: change of the error that it made
+    """
+    missing = moved - np.tensordot(gone, change, 1)
+    return np.asarray(change + np.multiply.outer(size * gone / float(size @ gone**2), missing))
 
 
 def _covariance(normal: FloatArray) -> FloatArray:

@@ -26,7 +26,8 @@ LOG = np.array([name in ("pole", "gap", "rate") for name in NAMES])
 GAPS = np.geomspace(2e-6, 150e-6, 10)  # m, tried first
 STIFF = 2.0 * np.pi * 180.0  # rad/s of the contact at least: flanks of steel; a softer one is a loosely held mass, not play in the drive
 SEEN = 4.0  # encoder noises that a gap must have to be one
-PROMISING = 10.0  # innovation over noise above which the fit is given up
+WORTH_A_LOOK = 60.0  # innovation over noise after the first few steps above which the fit is given up
+PROMISING = 10.0  # the same on the whole first stage; on the way to it twice that
 DEAF = 12.0  # the filter is told this much more encoder noise on the way: a smoother valley
 SLOW = 1e-3  # m/s at which the smoothed friction reaches its level
 DRIFT = 0.3  # process noise per rms speed, 1/sqrt(s): the filter forgives this much acceleration
@@ -60,12 +61,14 @@ def follow(
     best = min(starts, key=lambda item: item[0])[1]
     every = np.arange(len(NAMES))
     best = fit.solve(best, every, brief, 2.0, 2, 15)
-    best = fit.solve(best, every, brief, 1.0, 2, 40)
-    best = fit.solve(best, every, first, 1.0, 4, 8)
+    if fit.size(best, brief, 2.0, 2) < WORTH_A_LOOK:
+        best = fit.solve(best, every, brief, 1.0, 2, 40)
+    if fit.size(best, brief, 1.0, 2) < 2.0 * PROMISING:
+        best = fit.solve(best, every, first, 1.0, 4, 8)
     fit.deaf = 1.0
-    loose, fixed = np.mean(fit.innovation(best, first, 1.0, 4) ** 2), np.delete(every, 3)
+    fixed = np.delete(every, 3)
     without = np.empty(0)
-    if loose < PROMISING**2 and np.exp(best[3]) > SEEN * noise:  # else it is no gap, whatever the rest may be
+    if fit.size(best, first, 1.0, 4) < PROMISING and np.exp(best[3]) > SEEN * noise:  # else it is no gap, whatever the rest may be
         fit.deaf, fit.low[5] = DEAF, np.log(10.0)  # without a gap, any spring will do
         rigid = fit.inner(np.array([*base, 1e-10, 0.4, 1500.0, 0.1, 0.0, 0.03, dry]))
         rigid = fit.solve(rigid, fixed, brief, 2.0, 2, 15)
@@ -115,6 +118,10 @@ class _Fit:
         drift = (looseness * DRIFT * self.speed) ** 2
         innovations(self.u, self.y, self.outer(np.clip(inner, self.low, self.high)), self.fs, (self.deaf * self.noise) ** 2, drift, cuts, out)
         return np.clip(np.nan_to_num(out / self.noise, nan=1e6), -1e6, 1e6)
+
+    def size(self, inner: FloatArray, samples: int, looseness: float, cuts: int) -> float:
+        """rms of the innovations over the noise."""
+        return float(np.sqrt(np.mean(self.innovation(inner, samples, looseness, cuts) ** 2)))
 
     def solve(self, start: FloatArray, free: NDArray[np.int64], samples: int, looseness: float, cuts: int, most: int) -> FloatArray:
         """The free coordinates that make the innovations least, from a start."""

@@ -5,8 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+import numpy as np
+
+from xy_sysid.compiled import compiled
 from xy_sysid.effects.contract import Effect, Parameter, law
 from xy_sysid.effects.scene import Guess, Scene, columns
+from xy_sysid.stream import FloatArray
+
+LENGTHS = (3e-6, 10e-6, 30e-6, 100e-6)  # m
 
 
 @law
@@ -27,8 +33,31 @@ def force(coulomb: float, length: float, damping: float, bristle: float, v: floa
 
 
 def guesses(scene: Scene) -> Iterator[Guess]:
-    """The direction of motion; 10 um to begin with."""
-    yield Guess(columns(scene.direction()), lambda c: (max(float(c[0]), 1e-2), 10e-6, 2.0))
+    """Bristles that follow the measured motion, for lengths from 3 to 100 um."""
+    v = scene.smooth(scene.velocity, 300.0)
+    for length in LENGTHS:
+        yield Guess(columns(_deflection(v, 1.0 / scene.sampling_rate, length)), _Reader(length))
+
+
+class _Reader:
+    """(coulomb, length, damping) from the coefficient at one length."""
+
+    def __init__(self, length: float) -> None:
+        self.length = length
+
+    def __call__(self, c: FloatArray) -> tuple[float, ...]:
+        return (max(float(c[0]), 1e-2), self.length, 2.0)
+
+
+@compiled
+def _deflection(v: FloatArray, period: float, length: float) -> FloatArray:
+    """(n,) of bristles over their length, -1..1, at the middle of samples with the mean speeds ``v``."""
+    bristle, found = 0.0, np.empty(v.size)
+    for i in range(v.size):
+        middle = bend(1.0, length, bristle, v[i], 0.5 * period, 0.0)
+        found[i] = middle / length
+        bristle = bend(1.0, length, middle, v[i], 0.5 * period, 0.0)
+    return found
 
 
 EFFECT = Effect(
