@@ -57,12 +57,18 @@ def run(case: Case) -> Judged:
     elif not case.truth:
         right = found.verdict == "nothing_missing"
     else:
-        right = set(named) == set(case.truth) if one else set(case.truth) <= set(named)
-    first = bool(named) and named[0] in case.truth
+        right = set(named) == set(case.truth) if one else set(case.truth) <= set(named) or _laws(case.truth) <= _laws(named)
+    first = bool(named) and (named[0] in case.truth or (not one and _laws(named[:1]) <= _laws(case.truth)))
     stray = bool(named) and not first and not (case.nuisance and named[0] in _parts(machine))
     wrong = stray and found.confidence >= CONFIDENT
     ratio, errors, inside = _measured(case, machine, recording.sampling_rate, u, y, found) if right and one and case.known else (None, {}, {})
     return Judged(case, found.verdict, found.effects, found.confidence, seconds, right, first, wrong, ratio, errors, inside)
+
+
+def _laws(names: tuple[str, ...]) -> set[str]:
+    """Names, with those that are the sum of others taken apart: no data can tell these from the others together."""
+    sums = {name: STANDARD[name].sum_of for name in names if name in STANDARD.effects}
+    return {part for name in names for part in (sums[name].parts if sums.get(name) else (name,))}
 
 
 def _parts(machine: Machine) -> set[str]:

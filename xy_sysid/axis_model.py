@@ -96,6 +96,25 @@ class AxisModel:
         """The model without this effect."""
         return replace(self, effects=tuple(item for item in self.effects if item[0] != name))
 
+    def taken_apart(self, name: str) -> AxisModel:
+        """The same model with an effect written as those that it is the sum of."""
+        whole = self.library[name].sum_of
+        if whole is None or any(part in self for part in whole.parts):
+            return self
+        parts = zip(whole.parts, whole.apart(dict(self.effects)[name]), strict=True)
+        return replace(self, effects=(*self.without(name).effects, *parts))
+
+    def joined(self) -> AxisModel:
+        """The same model with one effect for several where they are its very law."""
+        own = dict(self.effects)
+        for effect in self.library.acting:
+            if effect.sum_of is not None and all(part in own for part in effect.sum_of.parts):
+                values = effect.sum_of.joined([own[part] for part in effect.sum_of.parts])
+                if all(item.low <= value <= item.high for item, value in zip(effect.parameters, values, strict=True)):
+                    kept = tuple((name, old) for name, old in self.effects if name not in effect.sum_of.parts)
+                    return replace(self, effects=(*kept, (effect.name, values)))
+        return self
+
     def values(self) -> dict[str, float]:
         """Every parameter by ``gain``, ``delay``, ``pole``, ``effect.parameter``."""
         own = {f"{name}.{key}": value for name, row in self.effects for key, value in zip(self.library[name].names, row, strict=True)}

@@ -13,6 +13,7 @@ from xy_sysid.effects.contract import Effect, arguments
 from xy_sysid.swing import CUTS, FINE, STIFF, TERMS
 
 BASE = ("gain", "delay", "pole")
+PLACED = 2  # iterations: an error that changes by 1 per cent of the motion is known to 1e-4 of itself after them
 
 
 def slots(effects: Sequence[Effect]) -> dict[str, int]:
@@ -39,6 +40,7 @@ def text(name: str, effects: Sequence[Effect]) -> str:
         terms=f"{TERMS}",
         unpack=_unpack(effects),
         flags=_flags(effects),
+        places=_places(effects),
         inputs=_inputs(effects),
         levels=_levels(effects),
         states=_states(effects),
@@ -223,15 +225,22 @@ def _motions(effects: Sequence[Effect]) -> str:
     return _lines(1, lines)
 
 
-def _encoders(effects: Sequence[Effect]) -> str:
-    lines = []
+def _places(effects: Sequence[Effect]) -> str:
+    """Where the axis is, by iteration: x = shown - (error(x) - error(0)), so that both are 0 at the same place."""
+    lines = ["shown, encoded, offset = x, False, 0.0"]
     for effect in _of(effects, "encoder"):
-        lines += [
-            f"if has_{effect.name}:",
-            f"    before = {_call(effect, 'error', {'x': 'x[0]'})}",
-            "    for i in range(n):",
-            f"        after = {_call(effect, 'error', {'x': 'x[i + 1]'})}",
-            "        out[i] += (after - before) * fs",
-            "        before = after",
-        ]
-    return _lines(1, lines)
+        lines += [f"if has_{effect.name}:", "    encoded = True", f"    offset += {_call(effect, 'error', {'x': '0.0'})}"]
+    lines += [
+        "if encoded:",
+        "    x = shown.copy()",
+        "    for i in range(n + 1):",
+        f"        for _ in range({PLACED}):",
+        "            wrong = -offset",
+    ]
+    for effect in _of(effects, "encoder"):
+        lines += [f"            if has_{effect.name}:", f"                wrong += {_call(effect, 'error', {'x': 'x[i]'})}"]
+    return _lines(1, [*lines, "            x[i] = shown[i] - wrong"])
+
+
+def _encoders(effects: Sequence[Effect]) -> str:
+    return _lines(1, ["if encoded:", "    for i in range(n):", "        out[i] += ((shown[i + 1] - x[i + 1]) - (shown[i] - x[i])) * fs"])

@@ -14,6 +14,7 @@ def $name(u, x, p, on, fs, fine, out):
     gain, delay, pole = p[0], p[1], p[2]
 $unpack
 $flags
+$places
     held = u.copy()
 $inputs
     rest_forth = rest_back = fixed_forth = fixed_back = 0.0

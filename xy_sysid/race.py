@@ -24,7 +24,7 @@ LEAST_SHARE = 5e-4  # of the error that an effect's trace must explain to be tri
 HOPELESS = 1.5  # excess behind the best so far at which a candidate is given up after its first round
 HELPS = 0.05  # excess that a candidate must win on the first stage to run the whole distance
 NEAR = 0.3  # excess on the first stage within which candidates run the whole distance
-WIDE = 3  # first effects of the pairs that are tried
+WIDE = 3  # candidates that run the whole distance, and first effects of the pairs that are tried
 PART_LEFT = 0.4  # of the excess that an effect found between SURE and AT_FLOOR may leave
 SUSPICIOUS = 0.1  # share of a look-alike from which an effect that free simulation cannot judge is tried
 UNSEEN = ("constant_load",)  # effects with next to no trace in the error's spectrum: always tried as the second of a pair
@@ -65,7 +65,7 @@ def candidates(data: AxisData, now: GreyboxFit, library: Library = STANDARD) -> 
     least = min((item.fit.excess for item in found if item.fit), default=np.inf)
     enough = min(least + NEAR, now.excess - HELPS)
     near = [item for item in found if item.fit and AT_FLOOR <= item.fit.excess <= enough]
-    for item in near:
+    for item in sorted(near, key=lambda item: item.fit.excess if item.fit else np.inf)[:WIDE]:
         assert item.fit is not None
         found[found.index(item)] = replace(item, fit=finish(data, item.fit.model, item.fit.runs))
     rest = [Candidate(trace.effect, trace.share, None) for trace in traces[TRIED:] if trace.effect not in names]
@@ -150,18 +150,28 @@ def _open(now: GreyboxFit, library: Library) -> list[Effect]:
 
 
 def _richer(now: GreyboxFit, library: Library) -> dict[str, str]:
-    """Effects with more parameters that may take the place of a relative in the model: name and relative."""
+    """Effects that may take the place of a relative in the model which says less: name and relative.
+
+    That is one with more parameters, or of an effect that is the sum of others, one with more than its own relative among them.
+    """
     found = {}
     for own, _ in now.model.effects:
-        relatives = (e for e in library.acting if e.family and e.family == library[own].family and e.simulable)
-        found.update({e.name: own for e in relatives if e.name not in now.model and len(e.parameters) > len(library[own].parameters)})
+        relatives = [e for e in library.acting if e.family and e.family == library[own].family and e.simulable and e.name not in now.model]
+        whole = library[own].sum_of
+        parts = () if whole is None else tuple(library[part] for part in whole.parts)
+        least = min((len(part.parameters) for part in parts if part.family == library[own].family), default=len(library[own].parameters))
+        found.update({e.name: own for e in relatives if len(e.parameters) > least})
     return found
 
 
 def _more(now: GreyboxFit, library: Library, name: str) -> float:
     """Parameters that a candidate adds; one effect in the place of another counts half a parameter less than one more."""
     own = _richer(now, library).get(name)
-    return len(library[name].parameters) - (0.0 if own is None else len(library[own].parameters) + 0.5)
+    if own is None:
+        return len(library[name].parameters)
+    kept = library[own].sum_of
+    stays = 0 if kept is None else sum(len(library[part].parameters) for part in kept.parts if library[part].family != library[own].family)
+    return stays + len(library[name].parameters) - len(library[own].parameters) - 0.5
 
 
 def _one_of_each_family(fitted: list[Candidate], now: GreyboxFit, library: Library) -> list[Candidate]:

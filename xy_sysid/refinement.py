@@ -57,13 +57,17 @@ def refine(data: AxisData, library: Library = STANDARD, most: int = MOST_EFFECTS
         now = added(data, now, name)
         steps.append(Step(name, now, ()))
     rejected: tuple[Candidate, ...] = ()
-    pairs = True
+    paired: set[int] = set()  # rungs from which pairs were tried
     while len(steps) <= most:
-        move = advance(data, now, library, pairs and len(steps) < most)
-        pairs = pairs and not move.paired
+        move = advance(data, now, library, pairs=len(steps) < most)
+        if move.paired:
+            paired.add(len(steps) - 1)
         if not move.steps:
-            rejected = move.tried
-            break
+            better = _another_way(data, steps, len(kept), paired, library) if now.excess >= AT_FLOOR else None
+            if better is None:
+                rejected = move.tried
+                break
+            steps = better
         steps += move.steps
         now = steps[-1].fit
     settled = settle(data, now, kept) if len(steps) > 2 else now
@@ -71,6 +75,21 @@ def refine(data: AxisData, library: Library = STANDARD, most: int = MOST_EFFECTS
     if any(name not in {step.added for step in steps} for name in names) and not any(library[name].one_step for name in names):
         steps = _again(data, steps, names, library)
     return Ladder(tuple(steps), rejected, settled, names)
+
+
+def _another_way(data: AxisData, steps: list[Step], given: int, paired: set[int], library: Library) -> list[Step] | None:
+    """Where one at a time has led astray: two at once from an earlier rung, if that leads further down than all since."""
+    now = steps[-1].fit
+    for rung in range(len(steps) - 2, given - 1, -1):
+        here, tried = steps[rung].fit, steps[rung + 1].tried
+        if rung in paired or not tried or data.floor.epsilon > EPSILON:
+            continue
+        paired.add(rung)
+        others = tuple(item for item in tried if item.effect != steps[rung + 1].added)
+        pair = together(data, here, others, library, WEAK * now.excess + NEAR)
+        if pair is not None and pair[0].fit and pair[1].fit and pair[1].fit.excess < WEAK * now.excess:
+            return [*steps[: rung + 1], Step(pair[0].effect, pair[0].fit, tried), Step(pair[1].effect, pair[1].fit, ())]
+    return None
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,6 +137,10 @@ def _again(data: AxisData, steps: list[Step], names: tuple[str, ...], library: L
         if name is not None and name not in now.model:
             now = fit_with(data, now, [name])
             found.append(Step(name, now, step.tried))
+    for name in names:
+        if name not in now.model:
+            now = fit_with(data, now, [name])
+            found.append(Step(name, now, ()))
     return found
 
 
@@ -139,8 +162,15 @@ def added(data: AxisData, now: GreyboxFit, name: str) -> GreyboxFit:
 
 
 def settle(data: AxisData, now: GreyboxFit, keep: tuple[str, ...] = ()) -> GreyboxFit:
-    """Without what is no longer needed, and with simpler relatives where they do as well; ``keep`` stays as it is."""
-    return simplified(data, prune(data, now, keep), keep)
+    """Without what is no longer needed, with simpler relatives where they do as well, and one law for several that are the same.
+
+    keep: effects that stay as they are
+    """
+    found = simplified(data, prune(data, now, keep), keep)
+    whole = found.model.joined()
+    if whole is found.model or any(name not in whole for name in keep):
+        return found
+    return finish(data, whole)
 
 
 def prune(data: AxisData, now: GreyboxFit, keep: tuple[str, ...] = ()) -> GreyboxFit:

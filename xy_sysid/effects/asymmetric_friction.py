@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
-from xy_sysid.effects.contract import Effect, Parameter, law
+from xy_sysid.effects.contract import Effect, Parameter, Sum, law
 from xy_sysid.effects.scene import Guess, Scene, columns
 from xy_sysid.stream import FloatArray
 
@@ -26,11 +26,23 @@ def guesses(scene: Scene) -> Iterator[Guess]:
     yield Guess(columns(direction, abs(direction)), read)
 
 
+def apart(values: Sequence[float]) -> tuple[tuple[float, ...], ...]:
+    """Mean level, and a load that makes the difference."""
+    coulomb, asymmetry = values
+    return (coulomb,), (coulomb * asymmetry,)
+
+
+def joined(values: Sequence[Sequence[float]]) -> tuple[float, ...]:
+    """The way back."""
+    (coulomb,), (load,) = values
+    return coulomb, load / coulomb
+
+
 EFFECT = Effect(
     name="asymmetric_friction",
     law="F = coulomb (1 + asymmetry sign(v)) sign(v)",
     meaning="worn or tilted nut, one-sided wiper: forth costs more than back",
-    validity="speeds well above breakaway; each direction has one level",
+    validity="speeds well above breakaway; each direction has one level; the very law of Coulomb friction and a smaller constant load together",
     source="Armstrong-Helouvry, Control of Machines with Friction, Kluwer 1991, ch. 3",
     category="friction",
     parameters=(
@@ -39,8 +51,9 @@ EFFECT = Effect(
     ),
     shows="error of another size forth than back, that vanishes at rest",
     look_alikes=("constant_load", "coulomb_friction"),
-    experiment="rest under small voltages of both signs: a load shifts the two breakaway levels even where nothing moves",
+    experiment="another mounting or payload: a load changes with gravity, a nut does not; no record of one mounting tells them apart",
     functions={"level": level},
     guesses=guesses,
     family="dry_friction",
+    sum_of=Sum(("coulomb_friction", "constant_load"), apart, joined),
 )

@@ -12,7 +12,7 @@ the simulation knows at that moment (``WORDS``). So a law reads as the equation 
 | friction | level(v, direction) | V, never negative | dry friction: sticks, and zero crossings are found in time |
 | bristle | bend(state, v, h, level), force(state, v, level) | new state; V | takes over all dry friction |
 | motion | section(fs) | b0, b1, b2, a1, a2 | linear section, 1 at 0 Hz, that the motion passes (see ``swing``) |
-| encoder | error(x) | m | added to what the encoder reads |
+| encoder | error(x) | m | added to what the encoder reads; x is where the axis is, 0 where the encoder shows 0 |
 """
 
 from __future__ import annotations
@@ -123,6 +123,18 @@ class Parameter:
 
 
 @dataclass(frozen=True, slots=True)
+class Sum:
+    """One law written as several effects.
+
+    parts: their names; apart: the effect's values -> values of each part; joined: the way back
+    """
+
+    parts: tuple[str, ...]
+    apart: Callable[[Sequence[float]], tuple[tuple[float, ...], ...]]
+    joined: Callable[[Sequence[Sequence[float]]], tuple[float, ...]]
+
+
+@dataclass(frozen=True, slots=True)
 class Effect:
     """One physical effect.
 
@@ -145,6 +157,7 @@ class Effect:
     simulable:   False if free simulation cannot judge it
     plausible:   False for values that no machine has, though each is within its bounds
     one_step:    then this does: fits the effect by one-step prediction (see ``contact.follow``)
+    sum_of:      other effects that together are the very same law, if there are
     """
 
     name: str
@@ -166,6 +179,7 @@ class Effect:
     simulable: bool = True
     one_step: OneStep | None = None
     plausible: Callable[[Sequence[float]], bool] | None = None
+    sum_of: Sum | None = None
 
     def __post_init__(self) -> None:
         """Raises BadInput if the functions do not fit the category or ask for words that nobody knows."""

@@ -54,7 +54,7 @@ EFFECT = Effect(
     parameters=(
         Parameter("amplitude", "m", 1e-9, 1e-2, 8e-6, "largest error"),
         Parameter("period", "m", 1e-5, 10.0, 0.01, "length of one period"),
-        Parameter("phase", "rad", -100.0, 100.0, 0.0, "phase at x = 0", positive=False),
+        Parameter("phase", "rad", -100.0, 100.0, 0.0, "phase where the encoder shows 0", positive=False),
     ),
     shows="error repeats along the travel and grows with speed",
     look_alikes=("cogging", "position_dependent_gain"),
