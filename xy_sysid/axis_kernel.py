@@ -21,11 +21,12 @@ from numpy.typing import NDArray
 
 from xy_sysid import swing
 from xy_sysid.compiled import compiled
-from xy_sysid.effect_code import called, text
+from xy_sysid.effect_code import called, text, undoable, undoing
 from xy_sysid.effects import modes
 from xy_sysid.effects.contract import Effect
 from xy_sysid.stream import FloatArray
 
+Undoing = Callable[[FloatArray, FloatArray, FloatArray, NDArray[np.uint8], float, FloatArray, FloatArray, FloatArray], None]
 Kernel = Callable[[FloatArray, FloatArray, FloatArray, NDArray[np.uint8], float, float, FloatArray], None]
 
 
@@ -46,11 +47,11 @@ class _Text(importlib.abc.InspectLoader):
         super().exec_module(module)
 
 
-def fingerprint(effects: Sequence[Effect]) -> str:
-    """Check sum of the loop and of every module that has a part in it."""
+def fingerprint(source: str, effects: Sequence[Effect]) -> str:
+    """Check sum of a loop and of every module that has a part in it."""
     functions = [item for effect in effects for item in effect.functions.values()]
     parts = {inspect.getsource(inspect.getmodule(item) or item) for item in functions} | {inspect.getsource(modes), inspect.getsource(swing)}
-    total = hashlib.sha256(text("loop", effects).encode())
+    total = hashlib.sha256(source.encode())
     for part in sorted(parts):
         total.update(part.encode())
     return total.hexdigest()[:16]
@@ -58,15 +59,24 @@ def fingerprint(effects: Sequence[Effect]) -> str:
 
 def build(effects: Sequence[Effect]) -> Kernel:
     """The compiled loop of these effects; compiling happens at its first call, or never if the disk has it."""
-    name = f"run_{fingerprint(effects)}"
+    return cast("Kernel", _compiled(text, effects))
+
+
+def build_undoing(effects: Sequence[Effect]) -> Undoing:
+    """The compiled loop that takes these effects out of a recording."""
+    return cast("Undoing", _compiled(undoing, [effect for effect in effects if undoable(effect)]))
+
+
+def _compiled(source: Callable[[str, Sequence[Effect]], str], effects: Sequence[Effect]) -> Callable[..., None]:
+    name = f"run_{fingerprint(source('loop', effects), effects)}"
     laws: dict[str, object] = {called(effect, function): item for effect in effects for function, item in effect.functions.items()}
-    loader = _Text(text(name, effects), {"math": math, "np": np, "__name__": __name__, **swing.LOOP, **laws})  # numba's cache comes back by this name
+    loader = _Text(source(name, effects), {"math": math, "np": np, "__name__": __name__, **swing.LOOP, **laws})  # numba's cache comes back by this name
     spec = importlib.util.spec_from_loader(f"{__name__}_{name}", loader)
     assert spec is not None
     module = importlib.util.module_from_spec(spec)
     loader.exec_module(module)
-    function: Kernel = module.__dict__[name]
+    function: Callable[..., None] = module.__dict__[name]
     try:
         return compiled(function)
     except RuntimeError:  # no folder that numba may write to: compile for this process only
-        return cast("Kernel", numba.njit(function))
+        return cast("Callable[..., None]", numba.njit(function))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from xy_sysid.effect_loop import TEMPLATE
+from xy_sysid.effect_loop import TEMPLATE, UNDOING
 from xy_sysid.effects.contract import Effect, arguments
 from xy_sysid.swing import CUTS, FINE, STIFF, TERMS
 
@@ -57,6 +57,30 @@ def text(name: str, effects: Sequence[Effect]) -> str:
         motions=_motions(effects),
         encoders=_encoders(effects),
     )
+
+
+def undoing(name: str, effects: Sequence[Effect]) -> str:
+    """Source of ``name(u, x, p, on, fs, held, where, against)``: a recording as it were without some effects.
+
+    u, x, p, on, fs: as in ``text``; held: (n,) receives the voltage behind the amplifier, V; where: (n + 1,) the position of the
+    axis before resonances and the scale's errors, m; against: (n,) forces against the drive, V. Only effects of ``undoable``.
+    """
+    return UNDOING.substitute(
+        name=name,
+        unpack=_unpack(effects),
+        flags=_flags(effects),
+        places=_places(effects),
+        inputs=_inputs(effects),
+        states=_states(effects),
+        advance=_advance([effect for effect in effects if not heeds_speed(effect)], 2),
+        pulls=_pulls(effects, 2),
+        motions=_motions_taken_back(effects),
+    )
+
+
+def undoable(effect: Effect) -> bool:
+    """True if what the effect does follows from voltage, position and time alone."""
+    return effect.category in ("input", "encoder", "motion") or (effect.category in ("force", "state") and not heeds_speed(effect))
 
 
 def needs_speed(effect: Effect) -> bool:
@@ -132,22 +156,22 @@ def _states(effects: Sequence[Effect]) -> str:
     return _lines(1, [f"{effect.name}_{state} = 0.0" for effect in effects for state in effect.states])
 
 
-def _pulls(effects: Sequence[Effect]) -> str:
+def _pulls(effects: Sequence[Effect], depth: int = 5) -> str:
     words = {"x": "place", "t": "time", "u": "volts", "gain": "gain", "pole": "pole"}
     lines = []
     for effect in _of(effects, "force"):
         if not needs_speed(effect):
             lines += [f"if has_{effect.name}:", f"    pull += {_call(effect, 'force', words)}"]
-    return _lines(5, lines)
+    return _lines(depth, lines)
 
 
-def _advance(effects: Sequence[Effect]) -> str:
+def _advance(effects: Sequence[Effect], depth: int = 6) -> str:
     words = {"u": "drive", "v": "v", "x": "place", "t": "time", "h": "h", "gain": "gain", "pole": "pole"}
     lines = []
     for effect in _of(effects, "state"):
         targets = ", ".join(["drive", *(f"{effect.name}_{state}" for state in effect.states)])
         lines += [f"if has_{effect.name}:", f"    {targets} = {_call(effect, 'advance', words)}"]
-    return _lines(6, lines)
+    return _lines(depth, lines)
 
 
 def _drags(effects: Sequence[Effect], speed: str, depth: int) -> str:
@@ -221,6 +245,26 @@ def _motions(effects: Sequence[Effect]) -> str:
             "        first = b1 * out[i] - a1 * value + second",
             "        second = b2 * out[i] - a2 * value",
             "        out[i] = value",
+        ]
+    return _lines(1, lines)
+
+
+def _motions_taken_back(effects: Sequence[Effect]) -> str:
+    """The same sections solved for what goes in: their zeros are damped, so that nothing grows."""
+    lines = []
+    for effect in _of(effects, "motion"):
+        lines += [
+            f"if has_{effect.name}:",
+            f"    b0, b1, b2, a1, a2 = {_call(effect, 'section', {'fs': 'fs'})}",
+            "    first = second = 0.0",
+            "    before = where[0]",
+            "    for i in range(n):",
+            "        seen = where[i + 1] - before",
+            "        before = where[i + 1]",
+            "        value = (seen - first) / b0",
+            "        first = b1 * value - a1 * seen + second",
+            "        second = b2 * value - a2 * seen",
+            "        where[i + 1] = where[i] + value",
         ]
     return _lines(1, lines)
 

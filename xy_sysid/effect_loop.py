@@ -2,6 +2,7 @@
 
 Three ways through it: forces that are constant between switching instants, exactly; laws that bend with speed, in
 sub-steps; and laws that heed speed on an axis with resonances, in sub-steps with the resonances inside (``swing``).
+The second frame takes effects out of a recording, for those that only one-step prediction can judge.
 """
 
 from __future__ import annotations
@@ -235,4 +236,27 @@ $level_middle
             out[i] = moved * fs
 $motions
 $encoders
+""")
+
+UNDOING = Template("""\
+def $name(u, x, p, on, fs, held, where, against):
+    n = held.shape[0]
+    gain, delay, pole = p[0], p[1], p[2]
+$unpack
+$flags
+$places
+    where[:] = x[: n + 1]
+$motions
+    held[:] = u[:n]
+$inputs
+$states
+    h, late = 1.0 / fs, int(delay * fs + 0.5)
+    for i in range(n):
+        drive = held[i]
+$advance
+        held[i] = drive
+    for i in range(n):
+        volts, pull, time, place = held[max(i - late, 0)], 0.0, (i + 0.5) / fs, 0.5 * (x[i] + x[i + 1])
+$pulls
+        against[i] = pull
 """)

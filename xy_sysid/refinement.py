@@ -70,6 +70,9 @@ def refine(data: AxisData, library: Library = STANDARD, most: int = MOST_EFFECTS
             steps = better
         steps += move.steps
         now = steps[-1].fit
+    while now.excess >= AT_FLOOR and len(steps) > 1 + len(kept) and not _worth(steps[-2].fit, now):  # hope that did not come true
+        rejected, now = steps[-1].tried, steps[-2].fit
+        del steps[-1]
     settled = settle(data, now, kept) if len(steps) > 2 else now
     names = tuple(name for name, _ in settled.model.effects)
     if any(name not in {step.added for step in steps} for name in names) and not any(library[name].one_step for name in names):
@@ -121,7 +124,8 @@ def advance(data: AxisData, now: GreyboxFit, library: Library = STANDARD, pairs:
         pair = together(data, now, tried, library, bar + NEAR)
         if pair is not None and pair[0].fit and pair[1].fit and (found is None or pair[1].fit.excess < WEAK * found.excess):
             return Move((Step(pair[0].effect, pair[0].fit, tried), Step(pair[1].effect, pair[1].fit, ())), tried, paired)
-    if taken is None or found is None or not _worth(now, found):
+    hope = strict and found is not None and now.excess - found.excess >= LEAST_GAIN
+    if taken is None or found is None or not (_worth(now, found) or hope):
         return Move((), tried, paired)
     return Move((Step(taken.effect, found, tried),), tried, paired)
 
