@@ -13,7 +13,7 @@ import inspect
 import math
 from collections.abc import Callable, Sequence
 from types import CodeType, ModuleType
-from typing import cast
+from typing import Any, cast
 
 import numba
 import numpy as np
@@ -26,7 +26,7 @@ from xy_sysid.effects import modes
 from xy_sysid.effects.contract import Effect
 from xy_sysid.stream import FloatArray
 
-Undoing = Callable[[FloatArray, FloatArray, FloatArray, NDArray[np.uint8], float, FloatArray, FloatArray, FloatArray], None]
+Undoing = Callable[[FloatArray, FloatArray, FloatArray, NDArray[np.uint8], float, FloatArray, FloatArray, FloatArray], float]
 Kernel = Callable[[FloatArray, FloatArray, FloatArray, NDArray[np.uint8], float, float, FloatArray], None]
 
 
@@ -67,16 +67,18 @@ def build_undoing(effects: Sequence[Effect]) -> Undoing:
     return cast("Undoing", _compiled(undoing, [effect for effect in effects if undoable(effect)]))
 
 
-def _compiled(source: Callable[[str, Sequence[Effect]], str], effects: Sequence[Effect]) -> Callable[..., None]:
+def _compiled(source: Callable[[str, Sequence[Effect]], str], effects: Sequence[Effect]) -> Callable[..., Any]:
     name = f"run_{fingerprint(source('loop', effects), effects)}"
     laws: dict[str, object] = {called(effect, function): item for effect in effects for function, item in effect.functions.items()}
-    loader = _Text(source(name, effects), {"math": math, "np": np, "__name__": __name__, **swing.LOOP, **laws})  # numba's cache comes back by this name
+    loader = _Text(
+        source(name, effects), {"math": math, "np": np, "__name__": __name__, **swing.LOOP, **laws}
+    )  # numba's cache comes back by this name
     spec = importlib.util.spec_from_loader(f"{__name__}_{name}", loader)
     assert spec is not None
     module = importlib.util.module_from_spec(spec)
     loader.exec_module(module)
-    function: Callable[..., None] = module.__dict__[name]
+    function: Callable[..., Any] = module.__dict__[name]
     try:
         return compiled(function)
     except RuntimeError:  # no folder that numba may write to: compile for this process only
-        return cast("Callable[..., None]", numba.njit(function))
+        return cast("Callable[..., Any]", numba.njit(function))

@@ -14,8 +14,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from xy_sysid.axis_kernel import Kernel, build
-from xy_sysid.effect_code import BASE, slots
+from xy_sysid.axis_kernel import Kernel, Undoing, build, build_undoing
+from xy_sysid.effect_code import BASE, slots, undoable
 from xy_sysid.effects import EFFECTS, Effect
 from xy_sysid.errors import BadInput
 from xy_sysid.settings import unknown_name
@@ -32,6 +32,7 @@ class Library:
         self.acting: tuple[Effect, ...] = tuple(effect for effect in self.effects.values() if effect.category != "base")
         self.places: Mapping[str, int] = slots(self.acting)
         self._kernel: Kernel | None = None
+        self._undoing: Undoing | None = None
 
     def __getitem__(self, name: str) -> Effect:
         """The effect of this name; raises BadInput with the nearest spelling."""
@@ -45,6 +46,13 @@ class Library:
         if self._kernel is None:
             self._kernel = build(self.acting)
         return self._kernel
+
+    @property
+    def undoing(self) -> Undoing:
+        """The compiled loop that takes effects out of a recording; see ``effect_code.undoing``."""
+        if self._undoing is None:
+            self._undoing = build_undoing(self.acting)
+        return self._undoing
 
     def extended(self, effects: Iterable[Effect]) -> Library:
         """A library with more effects; raises BadInput for a name that is taken."""
@@ -150,6 +158,33 @@ def simulator(
         return out
 
     return run
+
+
+def undoer(
+    library: Library, active: Iterable[str], sampling_rate: float, voltage: FloatArray, position: FloatArray
+) -> Callable[[FloatArray, int], tuple[FloatArray, FloatArray, FloatArray, float]]:
+    """A function that takes effects (of ``undoable``) out of the first samples of a recording.
+
+    Its arguments are a row as of ``simulator``, and n; it returns the voltage behind the amplifier (n,), V, the position before
+    resonances and the scale's errors (n + 1,), m, the forces against the drive (n,), V, and how much of a sudden change of that
+    position the encoder shows at once.
+    """
+    members = [effect for effect in library.acting if undoable(effect)]
+    places, names = slots(members), [effect.name for effect in members]
+    chosen = [library[name] for name in active]
+    row, on = np.ones(len(places)), np.zeros(len(names), dtype=np.uint8)
+    on[[names.index(effect.name) for effect in chosen]] = 1
+    where = np.array([places[name] for name in (*BASE, *(f"{effect.name}.{key}" for effect in chosen for key in effect.names))])
+    u, x = np.ascontiguousarray(voltage, dtype=np.float64), np.ascontiguousarray(position, dtype=np.float64)
+    kernel = library.undoing
+
+    def undo(parameters: FloatArray, samples: int) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+        row[where] = parameters
+        held, place, against = np.empty(samples), np.empty(samples + 1), np.empty(samples)
+        through = kernel(u[:samples], x[: samples + 1], row, on, float(sampling_rate), held, place, against)
+        return held, place, against, through
+
+    return undo
 
 
 def simulate(model: AxisModel, sampling_rate: float, voltage: FloatArray, position: FloatArray) -> FloatArray:

@@ -63,7 +63,8 @@ def undoing(name: str, effects: Sequence[Effect]) -> str:
     """Source of ``name(u, x, p, on, fs, held, where, against)``: a recording as it were without some effects.
 
     u, x, p, on, fs: as in ``text``; held: (n,) receives the voltage behind the amplifier, V; where: (n + 1,) the position of the
-    axis before resonances and the scale's errors, m; against: (n,) forces against the drive, V. Only effects of ``undoable``.
+    axis before resonances and the scale's errors, m; against: (n,) forces against the drive, V; returns how much of
+    a sudden change of ``where`` the encoder shows at once. Only effects of ``undoable``.
     """
     return UNDOING.substitute(
         name=name,
@@ -256,6 +257,7 @@ def _motions_taken_back(effects: Sequence[Effect]) -> str:
         lines += [
             f"if has_{effect.name}:",
             f"    b0, b1, b2, a1, a2 = {_call(effect, 'section', {'fs': 'fs'})}",
+            "    through *= b0",
             "    first = second = 0.0",
             "    before = where[0]",
             "    for i in range(n):",

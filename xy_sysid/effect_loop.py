@@ -246,6 +246,7 @@ $unpack
 $flags
 $places
     where[:] = x[: n + 1]
+    through = 1.0
 $motions
     held[:] = u[:n]
 $inputs
@@ -259,4 +260,5 @@ $advance
         volts, pull, time, place = held[max(i - late, 0)], 0.0, (i + 0.5) / fs, 0.5 * (x[i] + x[i + 1])
 $pulls
         against[i] = pull
+    return through
 """)

@@ -288,12 +288,13 @@ def _problem(data: AxisData, model: AxisModel, samples: int, fine: float = FINE)
         np.array([-np.inf, 0.0, 1e-2, *(item.low for item in items)]),
         np.array([np.inf, max(data.first / data.sampling_rate / 4.0, model.delay), 1e5, *(item.high for item in items)]),
         np.array([False, False, True, *(item.positive for item in items)]),
-        np.array([abs(model.gain) or 1.0, 20.0 / data.sampling_rate, 1.0, *(_unit(item) for item in items)]),
+        np.array([abs(model.gain) or 1.0, 20.0 / data.sampling_rate, 1.0, *(unit_of(item) for item in items)]),
     )
     return run, values, scale
 
 
-def _unit(item: Parameter) -> float:
+def unit_of(item: Parameter) -> float:
+    """Size of 1 in a solver, for a parameter that is not fitted as a logarithm."""
     return abs(item.typical) or min(1.0, item.high - item.low)
 
 

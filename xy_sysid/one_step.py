@@ -1,52 +1,123 @@
-"""Effects that only one-step prediction can judge, as fits like all others.
+"""Effects that only one-step prediction can judge, alone or with others beside them, as fits like all others.
 
 Their error is the filter's innovation, measured minus predicted position one sample ahead, times the sampling rate: m/s,
-as for a free simulation. Their floor is the encoder's noise.
+as for a free simulation. Their floor is the encoder's noise. What acts beside them is taken out of the recording first,
+with numbers that are fitted together with theirs.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from xy_sysid.axis_model import AxisModel
+from xy_sysid.axis_model import AxisModel, Library, undoer
+from xy_sysid.effect_code import undoable
 from xy_sysid.effects import Effect
+from xy_sysid.effects.contract import Beside, Followed, arguments
 from xy_sysid.errors import BadInput
-from xy_sysid.greybox import Z95, AxisData, Estimate, GreyboxFit
+from xy_sysid.greybox import Z95, AxisData, Estimate, GreyboxFit, unit_of
 from xy_sysid.spectral_cost import count_size
 from xy_sysid.traces import bounded
 
 AT_NOISE = 3.5  # held-out innovation over the encoder's noise up to which an effect explains the axis
 BETTER = 3.0  # innovation without the effect over that with it, at least
+TELLING = 0.005  # dry friction over the rms voltage from which it is named
+
+Others = Sequence[tuple[str, tuple[float, ...]]]
 
 
-def one_step_fit(data: AxisData, base: GreyboxFit, effect: Effect) -> GreyboxFit:
-    """Base and effect by one-step prediction; excess is 0 where it explains the axis. Raises BadInput if it cannot."""
+def one_step_fit(data: AxisData, base: GreyboxFit, effect: Effect, new: Others = (), begin: Followed | None = None) -> GreyboxFit:
+    """An effect, and what ``base`` has beside it, by one-step prediction; excess is 0 where that explains the axis.
+
+    new: more effects beside it, with start values; begin: an earlier result without them. Raises BadInput if it cannot.
+    """
+    return followed(data, base, effect, new, begin)[0]
+
+
+def followed(data: AxisData, base: GreyboxFit, effect: Effect, new: Others = (), begin: Followed | None = None) -> tuple[GreyboxFit, Followed]:
+    """As ``one_step_fit``, with the filter's own result, from which a next fit can begin."""
     if effect.one_step is None:
         raise BadInput(f"effect {effect.name}", "no one-step prediction", "an effect that has one", "Fit it by simulation.")
-    count = count_size(data.position)
-    noise = min(data.floor.encoder, max(count / np.sqrt(12.0), 1e-12)) if count > 0.0 else data.floor.encoder
+    dry, others = beside(base.model, effect)
+    others += tuple(new)
+    first = data.training if any(_ages(base.model.library[name]) for name, _ in others) else data.first
+    stages = first, data.training, data.position.size - 1
     start = base.model.gain, base.model.delay, base.model.pole
-    dry = next((values[0] for name, values in base.model.effects if name == "coulomb_friction"), 0.0)
-    found = effect.one_step(data.sampling_rate, data.voltage, data.position, start, noise, data.first, data.training, dry)
+    found = effect.one_step.fit(data.sampling_rate, start, noise_of(data), stages, as_beside(data, base.model.library, others), dry, begin)
+    return _result(data, base.model.library, effect, [name for name, _ in others], found), found
+
+
+def _ages(effect: Effect) -> bool:
+    """True if the law knows the time: the first stage is too short to see it."""
+    return any("t" in arguments(function) for function in effect.functions.values())
+
+
+def beside(model: AxisModel, effect: Effect) -> tuple[float, tuple[tuple[str, tuple[float, ...]], ...]]:
+    """Coulomb friction (V) of a model and its effects that can be taken out of a recording; raises BadInput for others."""
+    for name, _ in model.effects:
+        model = model.taken_apart(name)
+    dry, others = 0.0, []
+    for name, values in model.effects:
+        if name == "coulomb_friction":
+            dry = values[0]
+        elif undoable(model.library[name]):
+            others.append((name, values))
+        elif name != effect.name:
+            raise BadInput(
+                "effects", f"{effect.name} with {name}", f"{effect.name} with Coulomb friction or what does not heed speed", "Leave it out."
+            )
+    return dry, tuple(others)
+
+
+def noise_of(data: AxisData) -> float:
+    """Standard deviation of the encoder, m."""
+    count = count_size(data.position)
+    return min(data.floor.encoder, max(count / np.sqrt(12.0), 1e-12)) if count > 0.0 else data.floor.encoder
+
+
+def as_beside(data: AxisData, library: Library, others: Others) -> Beside:
+    """Effects with start values, ready to be fitted and taken out of the recording."""
+    names = [name for name, _ in others]
+    items = [item for name in names for item in library[name].parameters]
+    return Beside(
+        np.array([value for name, values in others for value in bounded(library[name], values)]),
+        np.array([item.low for item in items]),
+        np.array([item.high for item in items]),
+        np.array([unit_of(item) for item in items]),
+        np.array([item.positive for item in items], dtype=np.bool_),
+        undoer(library, names, data.sampling_rate, data.voltage, data.position),
+    )
+
+
+def _result(data: AxisData, library: Library, effect: Effect, names: Sequence[str], found: Followed) -> GreyboxFit:
     error = found.innovation * data.sampling_rate
     settled = min(int(0.5 * data.sampling_rate), data.training // 4)
     held = float(np.sqrt(np.mean(error[data.training :] ** 2)))
     noise_floor = found.noise * data.sampling_rate
     far = max(held / (AT_NOISE * noise_floor), BETTER * held / max(found.without * data.sampling_rate, 1e-9 * held))
+    rows: list[tuple[str, tuple[float, ...], tuple[float, ...]]] = [(effect.name, bounded(effect, found.values), found.spread)]
+    level, doubt = found.dry
+    if level > TELLING * float(np.std(data.voltage)) and level > 5.0 * doubt:
+        rows.append(("coulomb_friction", (level,), (doubt,)))
+    values, spread = iter(found.beside[0]), iter(found.beside[1])
+    rows += [(name, tuple(next(values) for _ in library[name].names), tuple(next(spread) for _ in library[name].names)) for name in names]
+    rows = _joined(library, rows)
     gain, delay, pole = found.base
-    model = AxisModel(gain, max(delay, 0.0), pole, library=base.model.library).with_effect(effect.name, bounded(effect, found.values))
-    names = ["gain", "delay", "pole", *(f"{effect.name}.{item.name}" for item in effect.parameters)]
-    units = ["m/s/V", "s", "rad/s", *(item.unit for item in effect.parameters)]
-    values, spread = [*found.base, *found.values], [*found.base_spread, *found.spread]
-    for name, own, errors in found.others:
-        other = base.model.library[name]
-        model = model.with_effect(name, bounded(other, own))
-        names += [f"{name}.{item.name}" for item in other.parameters]
-        units += [item.unit for item in other.parameters]
-        values, spread = [*values, *own], [*spread, *errors]
+    model = AxisModel(gain, max(delay, 0.0), pole, library=library)
+    estimates = [
+        Estimate(key, value, unit, value - Z95 * s, value + Z95 * s)
+        for key, unit, value, s in zip(("gain", "delay", "pole"), ("m/s/V", "s", "rad/s"), found.base, found.base_spread, strict=True)
+    ]
+    for name, own, errors in rows:
+        model = model.with_effect(name, bounded(library[name], own))
+        estimates += [
+            Estimate(f"{name}.{item.name}", value, item.unit, value - Z95 * s, value + Z95 * s)
+            for item, value, s in zip(library[name].parameters, own, errors, strict=True)
+        ]
     return GreyboxFit(
         model,
-        tuple(Estimate(n, v, u, v - Z95 * s, v + Z95 * s) for n, v, u, s in zip(names, values, units, spread, strict=True)),
+        tuple(estimates),
         float(np.sqrt(np.mean(error[settled : data.training] ** 2))),
         held,
         noise_floor,
@@ -56,3 +127,25 @@ def one_step_fit(data: AxisData, base: GreyboxFit, effect: Effect) -> GreyboxFit
         found.runs,
         True,
     )
+
+
+def _joined(library: Library, rows: list[tuple[str, tuple[float, ...], tuple[float, ...]]]) -> list[tuple[str, tuple[float, ...], tuple[float, ...]]]:
+    """One effect for several of which it is the sum, with the spread that theirs give it."""
+    own = {name: (values, spread) for name, values, spread in rows}
+    for effect in library.acting:
+        whole = effect.sum_of
+        if whole is None or any(part not in own for part in whole.parts):
+            continue
+        parts = [own[part][0] for part in whole.parts]
+        joined = whole.joined(parts)
+        if any(not item.low <= value <= item.high for item, value in zip(effect.parameters, joined, strict=True)):
+            continue
+        variance = np.zeros(len(joined))
+        for k, part in enumerate(whole.parts):
+            for j, s in enumerate(own[part][1]):
+                moved = [list(values) for values in parts]
+                moved[k][j] += 1e-3 * s
+                variance += ((np.array(whole.joined(moved)) - np.array(joined)) / 1e-3) ** 2
+        kept = [row for row in rows if row[0] not in whole.parts]
+        return [*kept, (effect.name, joined, tuple(np.sqrt(variance).tolist()))]
+    return rows

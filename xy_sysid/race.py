@@ -13,7 +13,7 @@ import numpy as np
 from xy_sysid.axis_model import STANDARD, Library
 from xy_sysid.effects import Effect
 from xy_sysid.greybox import AxisData, GreyboxFit, finish, fit_instead, fit_with, look
-from xy_sysid.one_step import one_step_fit
+from xy_sysid.one_step_race import grown
 
 # Tuned on development draws of the simulated machine only (blind/cases.py).
 AT_FLOOR = 0.15  # excess below which nothing is left to explain; clean axes stay below 0.02
@@ -82,20 +82,24 @@ def choose(now: GreyboxFit, tried: tuple[Candidate, ...], library: Library = STA
     return min(good, key=lambda item: (_more(now, library, item.effect), item.fit.excess if item.fit else np.inf))
 
 
-def suspected(data: AxisData, now: GreyboxFit, tried: tuple[Candidate, ...], library: Library) -> tuple[Candidate, ...]:
-    """Effects that only one-step prediction can judge, where no other explains the error and a look-alike left its trace."""
+def suspected(
+    data: AxisData, base: GreyboxFit, tried: tuple[Candidate, ...], library: Library, patient: bool = False
+) -> list[tuple[str, GreyboxFit]]:
+    """Rungs of an effect that only one-step prediction can judge, where no other explains the error and a look-alike left its trace.
+
+    Empty if they do not explain the axis. patient: more is tried beside an effect that does not explain it alone
+    """
     if any(item.fit is not None and item.fit.excess < AT_FLOOR for item in tried):
-        return ()
+        return []
     shares = {item.effect: item.share for item in tried}
-    found = []
     for effect in library.acting:
         share = max((shares.get(name, 0.0) for name in effect.look_alikes), default=0.0)
         if effect.one_step is not None and share >= SUSPICIOUS:
             rubbing = [item.fit for item in tried if item.effect == "coulomb_friction" and item.fit is not None and item.share >= SUSPICIOUS]
-            fitted = one_step_fit(data, rubbing[0] if rubbing else now, effect)
-            if fitted.excess < AT_FLOOR:
-                found.append(Candidate(effect.name, share, fitted))
-    return tuple(found)
+            rungs = grown(data, rubbing[0] if rubbing else base, effect, library, patient)
+            if rungs[-1][1].excess < AT_FLOOR:
+                return rungs
+    return []
 
 
 def together(data: AxisData, now: GreyboxFit, tried: tuple[Candidate, ...], library: Library, bar: float) -> tuple[Candidate, Candidate] | None:

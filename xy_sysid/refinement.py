@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from xy_sysid.axis_model import STANDARD, AxisModel, Library
-from xy_sysid.errors import BadInput
 from xy_sysid.greybox import EPSILON, AxisData, GreyboxFit, finish, fit, fit_base, fit_with
 from xy_sysid.one_step import one_step_fit
+from xy_sysid.one_step_race import put_beside
 from xy_sysid.race import AT_FLOOR, HOPELESS, NEAR, PART_LEFT, SURE, Candidate, candidates, choose, plausible, polished, suspected, together
 
 LEAST_GAIN = 0.1  # excess that an addition must win, and
@@ -63,36 +63,55 @@ def refine(data: AxisData, library: Library = STANDARD, most: int = MOST_EFFECTS
         if move.paired:
             paired.add(len(steps) - 1)
         if not move.steps:
-            better = _another_way(data, steps, len(kept), paired, library) if now.excess >= AT_FLOOR else None
+            better = _another_way(data, steps, move, len(kept), paired, library) if now.excess >= AT_FLOOR else None
             if better is None:
                 rejected = move.tried
                 break
             steps = better
         steps += move.steps
         now = steps[-1].fit
+        if any(library[name].one_step is not None for name, _ in now.model.effects):
+            break
     while now.excess >= AT_FLOOR and len(steps) > 1 + len(kept) and not _worth(steps[-2].fit, now):  # hope that did not come true
         rejected, now = steps[-1].tried, steps[-2].fit
         del steps[-1]
-    settled = settle(data, now, kept) if len(steps) > 2 else now
+    alone = any(library[name].one_step is not None for name, _ in now.model.effects)
+    settled = settle(data, now, kept) if len(steps) > 2 and not alone else now
     names = tuple(name for name, _ in settled.model.effects)
     if any(name not in {step.added for step in steps} for name in names) and not any(library[name].one_step for name in names):
         steps = _again(data, steps, names, library)
     return Ladder(tuple(steps), rejected, settled, names)
 
 
-def _another_way(data: AxisData, steps: list[Step], given: int, paired: set[int], library: Library) -> list[Step] | None:
-    """Where one at a time has led astray: two at once from an earlier rung, if that leads further down than all since."""
+def _another_way(data: AxisData, steps: list[Step], last: Move, given: int, paired: set[int], library: Library) -> list[Step] | None:
+    """Where one at a time has led astray, if that leads further down than all since.
+
+    Two at once from an earlier rung; or, from the base, an effect that only one-step prediction can judge and what is beside it.
+    """
+    if data.floor.epsilon > EPSILON:
+        return None
     now = steps[-1].fit
     for rung in range(len(steps) - 2, given - 1, -1):
         here, tried = steps[rung].fit, steps[rung + 1].tried
-        if rung in paired or not tried or data.floor.epsilon > EPSILON:
+        if rung in paired or not tried:
             continue
         paired.add(rung)
         others = tuple(item for item in tried if item.effect != steps[rung + 1].added)
         pair = together(data, here, others, library, WEAK * now.excess + NEAR)
         if pair is not None and pair[0].fit and pair[1].fit and pair[1].fit.excess < WEAK * now.excess:
             return [*steps[: rung + 1], Step(pair[0].effect, pair[0].fit, tried), Step(pair[1].effect, pair[1].fit, ())]
-    return None
+    if given:
+        return None
+    tried = steps[1].tried if len(steps) > 1 else last.tried
+    rungs = suspected(data, steps[0].fit, tried, library, patient=True)
+    return [steps[0], *_as_steps(rungs, tried)] if rungs else None
+
+
+def _as_steps(rungs: list[tuple[str, GreyboxFit]], tried: tuple[Candidate, ...]) -> tuple[Step, ...]:
+    """Rungs of one-step prediction; the first shows what else was tried."""
+    shares = {item.effect: item.share for item in tried}
+    first = Candidate(rungs[0][0], shares.get(rungs[0][0], 0.0), rungs[0][1])
+    return tuple(Step(name, fit, (first, *tried) if k == 0 else ()) for k, (name, fit) in enumerate(rungs))
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +134,9 @@ def advance(data: AxisData, now: GreyboxFit, library: Library = STANDARD, pairs:
     strict = data.floor.epsilon <= EPSILON
     tried = candidates(data, now, library)
     if strict and not now.model.effects:
-        tried = (*suspected(data, now, tried, library), *tried)
+        rungs = suspected(data, now, tried, library)
+        if rungs:
+            return Move(_as_steps(rungs, tried), tried)
     taken = choose(now, tried, library)
     found = taken.fit if taken is not None else None
     paired = strict and pairs and (found is None or found.excess > WEAK * now.excess)
@@ -155,14 +176,12 @@ def _worth(now: GreyboxFit, then: GreyboxFit) -> bool:
 
 
 def added(data: AxisData, now: GreyboxFit, name: str) -> GreyboxFit:
-    """A fit with one more effect, by whatever can judge it. Raises BadInput where one-step prediction stands alone."""
-    effect = now.model.library[name]
-    if effect.one_step is None and not any(now.model.library[own].one_step for own, _ in now.model.effects):
-        return fit_with(data, now, [name])
-    if effect.one_step is None or now.model.effects:
-        single = name if effect.one_step is not None else next(own for own, _ in now.model.effects if now.model.library[own].one_step)
-        raise BadInput("effects", f"{name} with {', '.join(own for own, _ in now.model.effects)}", f"{single} alone", "Fit them one at a time.")
-    return one_step_fit(data, now, effect)
+    """A fit with one more effect, by whatever can judge it. Raises BadInput where one-step prediction cannot have it beside."""
+    library = now.model.library
+    alone = next((library[own] for own, _ in now.model.effects if library[own].one_step is not None), None)
+    if library[name].one_step is not None:
+        return one_step_fit(data, now, library[name])
+    return fit_with(data, now, [name]) if alone is None else put_beside(data, now, alone, library[name])
 
 
 def settle(data: AxisData, now: GreyboxFit, keep: tuple[str, ...] = ()) -> GreyboxFit:

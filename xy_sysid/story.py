@@ -238,7 +238,9 @@ def _simulated(data: AxisData, step: Rung, base: Rung, library: Library) -> Grey
     """The fit of a step again: by one simulation, or as it was made where free simulation cannot judge it."""
     alone = next((library[name] for name in step.effects if library[name].one_step is not None), None)
     if alone is not None:
-        return one_step_fit(data, _simulated(data, base, base, library), alone)
+        rigid = _simulated(data, base, base, library)
+        others = tuple((name, values) for name, values in step.values if name != alone.name)
+        return one_step_fit(data, replace(rigid, model=replace(rigid.model, effects=others)), alone)
     model = AxisModel(step.gain, step.delay, step.pole, step.values, library)
     simulated = simulate(model, data.sampling_rate, data.voltage, data.position)
     errors = step.train_error, step.held_out_error, step.noise_floor, step.excess

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from xy_sysid.effects.contact import follow
+from xy_sysid.effects.contact import Contact
 from xy_sysid.effects.contract import Effect, Parameter, law
 from xy_sysid.effects.scene import Guess, Scene, columns
 
@@ -71,5 +71,5 @@ EFFECT = Effect(
     states=("apart", "table"),
     order=100,
     simulable=False,
-    one_step=follow,
+    one_step=Contact(),
 )

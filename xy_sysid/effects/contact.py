@@ -18,7 +18,7 @@ import scipy.optimize
 from numpy.typing import NDArray
 
 from xy_sysid.compiled import compiled
-from xy_sysid.effects.contract import Followed
+from xy_sysid.effects.contract import Beside, Followed
 from xy_sysid.stream import FloatArray
 
 NAMES = ("gain", "delay", "pole", "gap", "share", "rate", "damping", "loss", "guide", "coulomb")
@@ -31,93 +31,117 @@ PROMISING = 10.0  # the same on the whole first stage; on the way to it twice th
 DEAF = 12.0  # the filter is told this much more encoder noise on the way: a smoother valley
 SLOW = 1e-3  # m/s at which the smoothed friction reaches its level
 DRIFT = 0.3  # process noise per rms speed, 1/sqrt(s): the filter forgives this much acceleration
-TELLING = 0.005  # dry friction over the rms voltage from which it is named
 SETTLED = 0.5  # s until the filter is judged
 
 
-def follow(
-    sampling_rate: float,
-    voltage: FloatArray,
-    position: FloatArray,
-    base: tuple[float, float, float],
-    noise: float,
-    first: int,
-    training: int,
-    dry: float = 0.0,
-) -> Followed:
-    """Fit gap, masses and contact by the innovations of the first samples; judge on those after ``training``.
+class Contact:
+    """Gap, masses and contact from the innovations of the first samples, judged on those after the training."""
 
-    voltage, position: (n,) V and m; base: gain m/s/V, delay s, pole rad/s to begin with; noise: of the encoder, m (rms);
-    dry: Coulomb friction to begin with, V
-    """
-    fit = _Fit(sampling_rate, voltage, position, base, noise)
-    brief = min(first, int(6.0 * sampling_rate))
-    fit.deaf = DEAF
-    start = fit.inner(np.array([*base, GAPS[0], 0.4, 1500.0, 0.2, 5.0, 0.03, dry]))
-    starts = []
-    for gap in GAPS:
-        start[3] = np.log(gap)
-        starts.append((float(np.mean(fit.innovation(start, brief, 2.0, 2) ** 2)), start.copy()))
-    best = min(starts, key=lambda item: item[0])[1]
-    every = np.arange(len(NAMES))
-    best = fit.solve(best, every, brief, 2.0, 2, 15)
-    if fit.size(best, brief, 2.0, 2) < WORTH_A_LOOK:
-        best = fit.solve(best, every, brief, 1.0, 2, 40)
-    if fit.size(best, brief, 1.0, 2) < 2.0 * PROMISING:
-        best = fit.solve(best, every, first, 1.0, 4, 8)
-    fit.deaf = 1.0
-    fixed = np.delete(every, 3)
-    without = np.empty(0)
-    if fit.size(best, first, 1.0, 4) < PROMISING and np.exp(best[3]) > SEEN * noise:  # else it is no gap, whatever the rest may be
-        fit.deaf, fit.low[5] = DEAF, np.log(10.0)  # without a gap, any spring will do
-        rigid = fit.inner(np.array([*base, 1e-10, 0.4, 1500.0, 0.1, 0.0, 0.03, dry]))
+    def fit(
+        self,
+        sampling_rate: float,
+        base: tuple[float, float, float],
+        noise: float,
+        stages: tuple[int, int, int],
+        beside: Beside,
+        dry: float = 0.0,
+        begin: Followed | None = None,
+    ) -> Followed:
+        """See ``OneStep``."""
+        first, training, n = stages
+        fit = _Fit(sampling_rate, base, noise, beside, n)
+        brief = min(first, int(6.0 * sampling_rate))
+        fit.deaf = DEAF
+        best = self._searched(fit, base, dry, brief) if begin is None else self._from(fit, begin, brief)
+        if fit.size(best, brief, 1.0, 2) < 2.0 * PROMISING:
+            best = fit.solve(best, fit.every, first, 1.0, 4, 8)
+        fit.deaf = 1.0
+        without = np.empty(0)
+        if fit.size(best, first, 1.0, 4) < PROMISING and np.exp(best[3]) > SEEN * noise:  # else it is no gap, whatever the rest may be
+            without = self._without(fit, best, base, dry, brief, n)[training:] * noise
+        values, spread = fit.outer(best), fit.spread(best, first)
+        return Followed(
+            (float(values[0]), float(values[1]), float(values[2])),
+            tuple(float(value) for value in values[3:9]),
+            (float(spread[0]), float(spread[1]), float(spread[2])),
+            tuple(float(value) for value in spread[3:9]),
+            (float(values[9]), float(spread[9])),
+            (tuple(values[10:].tolist()), tuple(spread[10:].tolist())),
+            fit.innovation(best, n, 1.0, 4) * noise,
+            float(np.sqrt(np.mean(without**2))) if without.size else 0.0,
+            noise,
+            fit.runs,
+        )
+
+    def innovation(self, sampling_rate: float, found: Followed, beside: Beside, samples: int) -> FloatArray:
+        """See ``OneStep``."""
+        fit = _Fit(sampling_rate, found.base, found.noise, beside, samples)
+        return fit.innovation(fit.inner(np.array([*found.base, *found.values, found.dry[0], *beside.start])), samples, 1.0, 2)
+
+    @staticmethod
+    def _searched(fit: _Fit, base: tuple[float, float, float], dry: float, brief: int) -> FloatArray:
+        starts = []
+        for gap in GAPS:
+            start = fit.inner(np.array([*base, gap, 0.4, 1500.0, 0.2, 5.0, 0.03, dry, *fit.beside.start]))
+            starts.append((float(np.mean(fit.innovation(start, brief, 2.0, 2) ** 2)), start))
+        best = min(starts, key=lambda item: item[0])[1]
+        best = fit.solve(best, fit.every, brief, 2.0, 2, 15)
+        return fit.solve(best, fit.every, brief, 1.0, 2, 40) if fit.size(best, brief, 2.0, 2) < WORTH_A_LOOK else best
+
+    @staticmethod
+    def _from(fit: _Fit, begin: Followed, brief: int) -> FloatArray:
+        start = fit.inner(np.array([*begin.base, *begin.values, begin.dry[0], *fit.beside.start]))
+        best = fit.solve(start, fit.every, brief, 2.0, 2, 15)
+        return fit.solve(best, fit.every, brief, 1.0, 2, 30)
+
+    @staticmethod
+    def _without(fit: _Fit, best: FloatArray, base: tuple[float, float, float], dry: float, brief: int, n: int) -> FloatArray:
+        """Innovations over the noise without a gap; any spring will do then."""
+        fit.deaf, fit.low[5] = DEAF, np.log(10.0)
+        rigid = fit.inner(np.array([*base, 1e-10, 0.4, 1500.0, 0.1, 0.0, 0.03, dry, *fit.outer(best)[10:]]))
+        fixed = np.delete(fit.every, 3)
         rigid = fit.solve(rigid, fixed, brief, 2.0, 2, 15)
         rigid = fit.solve(rigid, fixed, brief, 1.0, 2, 20)
         rigid = fit.solve(rigid, fixed, brief, 1.0, 4, 6)
         fit.deaf = 1.0
-        without = fit.innovation(rigid, position.size - 1, 1.0, 4)[training:] * noise
-    n = position.size - 1
-    values, spread = fit.outer(best), fit.spread(best, every, first)
-    rubs = float(values[9])
-    friction = (("coulomb_friction", (rubs,), (float(spread[9]),)),) if rubs > TELLING * float(np.std(voltage)) and rubs > 5.0 * spread[9] else ()
-    return Followed(
-        (float(values[0]), float(values[1]), float(values[2])),
-        tuple(float(value) for value in values[3:9]),
-        (float(spread[0]), float(spread[1]), float(spread[2])),
-        tuple(float(value) for value in spread[3:9]),
-        friction,
-        fit.innovation(best, n, 1.0, 4) * noise,
-        float(np.sqrt(np.mean(without**2))) if without.size else 0.0,
-        noise,
-        fit.runs,
-    )
+        return fit.innovation(rigid, n, 1.0, 4)
 
 
 class _Fit:
     """Least squares on the innovations over the noise."""
 
-    def __init__(self, sampling_rate: float, voltage: FloatArray, position: FloatArray, base: tuple[float, float, float], noise: float) -> None:
-        self.fs, self.u, self.y, self.noise, self.runs = sampling_rate, voltage, position - position[0], noise, 0
-        self.deaf = 1.0
+    def __init__(self, sampling_rate: float, base: tuple[float, float, float], noise: float, beside: Beside, samples: int) -> None:
+        self.fs, self.noise, self.beside, self.runs, self.deaf = sampling_rate, noise, beside, 0, 1.0
+        _, position, _, _ = beside.undo(np.array([*base, *beside.start]), samples)
         self.speed = float(np.std(np.diff(position))) * sampling_rate
-        self.unit = np.array([0.02 * abs(base[0]), 0.1 / sampling_rate, 0.05, 0.1, 0.05, 0.1, 0.05, 2.0, 0.02, 0.01])
         longest = max(20.0 / sampling_rate, 2.0 * base[1])
-        self.low = np.array([-np.inf, 0.0, np.log(1e-2), np.log(1e-10), 0.02, np.log(STIFF), 0.0, 0.0, 0.0, 0.0])
-        self.high = np.array([np.inf, longest, np.log(1e5), np.log(1e-2), 0.98, np.log(max(5.0 * sampling_rate, 2.0 * STIFF)), 2.0, 500.0, 0.9, 5.0])
+        low = [-np.inf, 0.0, np.log(1e-2), np.log(1e-10), 0.02, np.log(STIFF), 0.0, 0.0, 0.0, 0.0]
+        high = [np.inf, longest, np.log(1e5), np.log(1e-2), 0.98, np.log(max(5.0 * sampling_rate, 2.0 * STIFF)), 2.0, 500.0, 0.9, 5.0]
+        unit = [0.02 * abs(base[0]), 0.1 / sampling_rate, 0.05, 0.1, 0.05, 0.1, 0.05, 2.0, 0.02, 0.01]
+        self.log = np.concatenate((LOG, beside.positive))
+        self.unit = np.concatenate((unit, np.where(beside.positive, 0.05, 0.05 * beside.unit)))
+        self.low, self.high = (
+            np.concatenate((own, np.where(beside.positive, np.log(np.maximum(other, 1e-300)), other)))
+            for own, other in ((low, beside.low), (high, beside.high))
+        )
+        self.every = np.arange(self.unit.size)
 
     def inner(self, values: FloatArray) -> FloatArray:
-        return np.where(LOG, np.log(np.where(LOG, values, 1.0)), values)
+        return np.where(self.log, np.log(np.where(self.log, np.maximum(values, 1e-300), 1.0)), values)
 
     def outer(self, inner: FloatArray) -> FloatArray:
-        return np.where(LOG, np.exp(np.where(LOG, inner, 0.0)), inner)
+        return np.where(self.log, np.exp(np.where(self.log, inner, 0.0)), inner)
 
     def innovation(self, inner: FloatArray, samples: int, looseness: float, cuts: int) -> FloatArray:
         """(samples,) over the noise."""
         self.runs += 1
         out = np.empty(samples)
         drift = (looseness * DRIFT * self.speed) ** 2
-        innovations(self.u, self.y, self.outer(np.clip(inner, self.low, self.high)), self.fs, (self.deaf * self.noise) ** 2, drift, cuts, out)
-        return np.clip(np.nan_to_num(out / self.noise, nan=1e6), -1e6, 1e6)
+        values = self.outer(np.clip(inner, self.low, self.high))
+        voltage, position, against, through = self.beside.undo(np.concatenate((values[:3], values[10:])), samples)
+        noise = self.noise / through
+        innovations(voltage, position - position[0], against, values[:10], self.fs, (self.deaf * noise) ** 2, drift, cuts, out)
+        return np.clip(np.nan_to_num(out / noise, nan=1e6), -1e6, 1e6)
 
     def size(self, inner: FloatArray, samples: int, looseness: float, cuts: int) -> float:
         """rms of the innovations over the noise."""
@@ -153,9 +177,9 @@ class _Fit:
 
         return slopes
 
-    def spread(self, inner: FloatArray, free: NDArray[np.int64], samples: int) -> FloatArray:
-        """(10,) standard errors of the parameters, from the innovations' slopes."""
-        part = inner[free] / self.unit[free]
+    def spread(self, inner: FloatArray, samples: int) -> FloatArray:
+        """(10 + k,) standard errors of the parameters, from the innovations' slopes."""
+        part = inner / self.unit
 
         def left(part: FloatArray) -> FloatArray:
             return self.innovation(part * self.unit, samples, 1.0, 4)
@@ -166,7 +190,7 @@ class _Fit:
         size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
         covariance = np.linalg.pinv(normal / np.outer(size, size), rcond=1e-10, hermitian=True) / np.outer(size, size)
         inner_spread = np.sqrt(np.maximum(np.diag(covariance), 0.0) * variance) * self.unit
-        return np.asarray(np.where(LOG, inner_spread * self.outer(inner), inner_spread))
+        return np.asarray(np.where(self.log, inner_spread * self.outer(inner), inner_spread))
 
 
 @compiled
@@ -186,10 +210,12 @@ def _push(depth_of: float, rate: float, half: float, k: float, c: float, loss: f
 
 
 @compiled
-def innovations(u: FloatArray, y: FloatArray, values: FloatArray, fs: float, noise: float, drift: float, cuts: int, out: FloatArray) -> None:
+def innovations(
+    u: FloatArray, y: FloatArray, against: FloatArray, values: FloatArray, fs: float, noise: float, drift: float, cuts: int, out: FloatArray
+) -> None:
     """One pass of the filter: (n,) measured minus predicted position, m.
 
-    u, y: (n + 1 or more,) V and m; values: by ``NAMES``; noise: variance of the encoder, m^2; drift: of the speeds, m^2/s^3
+    u, against: (n,) V, against without delay; y: (n + 1,) m; values: by ``NAMES``; noise: variance of the encoder, m^2; drift: of the speeds, m^2/s^3
     """
     gain, delay, pole, gap, share = values[0], values[1], values[2], values[3], values[4]
     reduced = share * (1.0 - share)
@@ -211,7 +237,7 @@ def innovations(u: FloatArray, y: FloatArray, values: FloatArray, fs: float, noi
             if h <= 0.0:
                 continue
             at = i - whole - 1 + piece
-            push = pole * gain * u[at] if at >= 0 else 0.0
+            push = pole * gain * ((u[at] if at >= 0 else 0.0) - against[i])
             for _ in range(cuts):
                 force, _by_d, _by_w = _push(d, w, half, k, c, loss)
                 rub = pole * abs(gain) * dry * np.tanh(v / SLOW) if dry > 0.0 else 0.0

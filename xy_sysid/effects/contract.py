@@ -22,7 +22,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, ParamSpec, Protocol, TypeVar
 
+import numpy as np
 from numba.extending import register_jitable
+from numpy.typing import NDArray
 
 from xy_sysid.effects.scene import Guess, Scene
 from xy_sysid.errors import BadInput
@@ -35,22 +37,41 @@ Category = Literal["base", "input", "state", "force", "friction", "bristle", "mo
 Law = Callable[..., Any]
 
 
+@dataclass(frozen=True, slots=True)
+class Beside:
+    """What acts beside an effect that one-step prediction judges, and how to take it out of a recording.
+
+    start, low, high, unit: (k,) of its numbers, SI (unit: size of 1); positive: (k,) fitted as a logarithm
+    undo: gain, delay, pole and the k numbers, and n -> voltage (n,), V; position (n + 1,), m; force against the drive (n,), V;
+          how much of a sudden change of that position the encoder shows at once
+    """
+
+    start: FloatArray
+    low: FloatArray
+    high: FloatArray
+    unit: FloatArray
+    positive: NDArray[np.bool_]
+    undo: Callable[[FloatArray, int], tuple[FloatArray, FloatArray, FloatArray, float]]
+
+
 class OneStep(Protocol):
     """Fits base and effect together by one-step prediction."""
 
-    def __call__(
+    def fit(
         self,
         sampling_rate: float,
-        voltage: FloatArray,
-        position: FloatArray,
         base: tuple[float, float, float],
         noise: float,
-        first: int,
-        training: int,
+        stages: tuple[int, int, int],
+        beside: Beside,
         dry: float = 0.0,
+        begin: Followed | None = None,
     ) -> Followed:
-        """voltage, position: (n,) V, m; base: gain, delay, pole; noise: of the encoder, m; samples of the two stages;
-        dry: Coulomb friction to begin with, V."""
+        """base: gain, delay, pole; noise: of the encoder, m; stages: samples of the first stage, of training, of all;
+        dry: Coulomb friction to begin with, V; begin: an earlier result without what is new beside."""
+
+    def innovation(self, sampling_rate: float, found: Followed, beside: Beside, samples: int) -> FloatArray:
+        """(samples,) measured minus predicted position over the noise, with the numbers of an earlier result; ``beside.start`` is beside."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,9 +79,10 @@ class Followed:
     """What one-step prediction found.
 
     base, values: gain, delay, pole, and the effect's parameters, SI; base_spread, spread: their standard errors
-    others:       effects that came out beside it: (name, values, standard errors)
-    innovation:   (n - 1,) measured minus predicted position, one step ahead, m
-    without:      rms of the held-out innovation with the effect taken out and all else refitted, m
+    dry:          Coulomb friction that came out beside it, V, and its standard error
+    beside:       (k,) numbers of ``Beside``, and their standard errors
+    innovation:   (n,) measured minus predicted position, one step ahead, m
+    without:      rms of the held-out innovation with the effect taken out and all else refitted, m; 0 if that was not worth while
     noise:        standard deviation of the encoder, m; runs: how often the filter ran
     """
 
@@ -68,7 +90,8 @@ class Followed:
     values: tuple[float, ...]
     base_spread: tuple[float, float, float]
     spread: tuple[float, ...]
-    others: tuple[tuple[str, tuple[float, ...], tuple[float, ...]], ...]
+    dry: tuple[float, float]
+    beside: tuple[tuple[float, ...], tuple[float, ...]]
     innovation: FloatArray
     without: float
     noise: float
@@ -156,7 +179,7 @@ class Effect:
     order:       place among the effects of its category, in the direction of the signal
     simulable:   False if free simulation cannot judge it
     plausible:   False for values that no machine has, though each is within its bounds
-    one_step:    then this does: fits the effect by one-step prediction (see ``contact.follow``)
+    one_step:    then this does: fits the effect by one-step prediction (see ``contact.Contact``)
     sum_of:      other effects that together are the very same law, if there are
     """
 

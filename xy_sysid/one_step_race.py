@@ -1,0 +1,167 @@
+"""What acts beside an effect that only one-step prediction can judge: found by its trace in the innovations, added while they fall.
+
+The filter is run with a little of each trace put in; what changes, to first order, is what the effect would explain (the
+score test of ``traces``, on innovations).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+import scipy.signal
+
+from xy_sysid.axis_model import AxisModel, Library
+from xy_sysid.base_start import mean_velocity_filter
+from xy_sysid.effect_code import undoable
+from xy_sysid.effects import Effect, Guess, Scene
+from xy_sysid.effects.contract import Beside, Followed
+from xy_sysid.greybox import AxisData, GreyboxFit
+from xy_sysid.one_step import as_beside, beside, followed
+from xy_sysid.stream import FloatArray
+from xy_sysid.traces import Trace, bounded
+
+# Tuned on development draws of the simulated machine only (blind/cases.py).
+SMALL = 0.02  # of the rms voltage or velocity: how much of a trace is put in to see what it does
+TRIED = 2  # effects that are fitted beside at each rung, by their share of the innovations
+LEAST_SHARE = 0.005  # of the innovations that an effect's trace must explain to be tried
+TELLING = 0.02  # the same where the axis is explained already
+MIMIC = 0.15  # the same for a lag or a resonance, which take part of the contact's own error
+LESS, MUCH_LESS = 0.97, 0.93  # of the held-out innovation that one more effect must leave at most, where it is explained and else
+AGAIN, LOST = 2.5, 40.0  # innovations over noise between which a first fit is begun again from where it ended
+MOST = 3  # effects beside
+
+
+def grown(data: AxisData, base: GreyboxFit, effect: Effect, library: Library, patient: bool = True) -> list[tuple[str, GreyboxFit]]:
+    """Rungs: the effect with what the base has beside it, then one more beside it at each; name and fit.
+
+    patient: else nothing is tried beside an effect that does not explain the axis alone
+    """
+    fit, found = _settled(data, effect, *followed(data, base, effect))
+    rungs = [(effect.name, fit)]
+    while len(rungs) <= MOST and (patient or fit.excess == 0.0):
+        explains = fit.excess == 0.0
+        known = {name for name, _ in beside(fit.model, effect)[1]} | {name for name, _ in fit.model.effects}
+        open_to = [e for e in library.acting if undoable(e) and e.simulable and e.name not in known and not _stands_in(e, effect)]
+        seen = traces(data, fit.model, effect, found, open_to)
+        wanted = [trace for trace in seen if trace.share >= _least(library[trace.effect], effect, explains)][:TRIED]
+        tried = [(trace.effect, *followed(data, fit, effect, [(trace.effect, trace.values)], found)) for trace in wanted]
+        if not tried:
+            break
+        name, better, its = min(tried, key=lambda item: item[1].held_out_error)
+        if not better.held_out_error < (LESS if explains else MUCH_LESS) * fit.held_out_error:
+            break
+        new = [own for own, _ in better.model.effects if own not in fit.model]
+        fit, found = _settled(data, effect, better, its)
+        rungs.append((name if name in fit.model else new[-1] if new else name, fit))
+    return rungs
+
+
+def put_beside(data: AxisData, now: GreyboxFit, effect: Effect, other: Effect) -> GreyboxFit:
+    """One more beside an effect that the fit has already. Raises BadInput if it cannot be taken out of a recording."""
+    without = replace(now, model=now.model.without(effect.name))
+    beside(without.model.with_effect(other.name), effect)
+    if not undoable(other):
+        return followed(data, replace(now, model=without.model.with_effect(other.name)), effect)[0]
+    _, found = followed(data, without, effect)
+    values = traces(data, without.model, effect, found, [other])[0].values
+    return followed(data, without, effect, [(other.name, values)], found)[0]
+
+
+def _settled(data: AxisData, effect: Effect, fit: GreyboxFit, found: Followed) -> tuple[GreyboxFit, Followed]:
+    """Once more from where a fit ended, if it may have ended too soon."""
+    if AGAIN * fit.noise_floor < fit.held_out_error < LOST * fit.noise_floor:
+        again, its = followed(data, fit, effect, (), found)
+        if again.held_out_error < fit.held_out_error:
+            return again, its
+    return fit, found
+
+
+def _least(other: Effect, effect: Effect, explains: bool) -> float:
+    """Share of the innovations from which an effect is tried: more of what the contact's own imperfections look like."""
+    if other.category == "motion" or other.name in effect.look_alikes:
+        return MIMIC
+    return TELLING if explains else LEAST_SHARE
+
+
+def _stands_in(other: Effect, effect: Effect) -> bool:
+    """A resonance of the same two masses is what the effect is taken for, not something beside it."""
+    return other.category == "motion" and other.name in effect.look_alikes
+
+
+def traces(data: AxisData, model: AxisModel, effect: Effect, found: Followed, effects: Iterable[Effect]) -> list[Trace]:
+    """How much of the innovations' power each effect beside would explain, to first order, best first, with start values."""
+    assert effect.one_step is not None
+    library, fs, n = model.library, data.sampling_rate, data.first
+    names = [name for name, _ in beside(model.without("coulomb_friction"), effect)[1]]
+    pairs = (
+        zip(names, np.split(np.array(found.beside[0]), np.cumsum([len(library[name].names) for name in names])[:-1]), strict=True) if names else ()
+    )
+    own = as_beside(data, library, [(name, tuple(values)) for name, values in pairs])
+    numbers = np.array([*found.base, *found.beside[0]])
+    voltage, position, against, through = own.undo(numbers, n)
+    still = np.zeros(0)
+
+    def seen(by: Beside, what: Followed = found) -> FloatArray:
+        assert effect.one_step is not None
+        return effect.one_step.innovation(fs, what, by, n)
+
+    def recording(u: FloatArray, y: FloatArray, f: FloatArray) -> Beside:
+        return Beside(still, still, still, still, still.astype(np.bool_), lambda _, samples: (u[:samples], y[: samples + 1], f[:samples], through))
+
+    here = seen(recording(voltage, position, against))
+    skip = min(int(0.5 * fs), n // 4)
+    error = _missing_velocity(data, found, here)
+    scene = Scene(
+        fs, found.base[0], found.base[2], _late(voltage, found.base[1] * fs), data.velocity[:n], 0.5 * (position[1:] + position[:-1]), error
+    )
+
+    def change(guess: Guess, column: FloatArray) -> FloatArray:
+        size = SMALL * float(np.std(data.velocity if guess.at_encoder else voltage)) / (float(np.std(column)) + abs(float(np.mean(column))) + 1e-300)
+        put = size * column
+        other = recording(voltage, position - np.concatenate(([0.0], np.cumsum(put))) / fs, against) if guess.at_encoder else None
+        return (seen(other or recording(voltage, position, against + put)) - here)[skip:] / size
+
+    nuisance = np.stack(
+        [(seen(recording(*own.undo(moved, n)[:3]), replace(found, base=tuple(moved[:3]))) - here)[skip:] for moved in _moved(numbers)]
+    )
+    basis = np.linalg.qr(nuisance.T)[0]
+    target = here[skip:] - basis @ (basis.T @ here[skip:])
+    best: list[Trace] = []
+    for item in effects:
+        trace = Trace(item.name, 0.0, item.typical)
+        for guess in item.guesses(scene) if item.guesses is not None else ():
+            columns = np.stack([change(guess, column[:n]) for column in guess.columns])
+            columns = columns - (columns @ basis) @ basis.T
+            size = np.linalg.norm(columns, axis=1) + 1e-300
+            unit = columns / size[:, None]
+            inside = unit @ target
+            coefficients = np.linalg.pinv(unit @ unit.T, rcond=1e-10, hermitian=True) @ inside
+            share = float(inside @ coefficients) / float(target @ target + 1e-300)
+            if share > trace.share:
+                trace = Trace(item.name, share, bounded(item, guess.read(-coefficients / size)))
+        best.append(trace)
+    return sorted(best, key=lambda trace: -trace.share)
+
+
+def _moved(numbers: FloatArray) -> list[FloatArray]:
+    found = []
+    for k in range(3):
+        moved = numbers.copy()
+        moved[k] *= 1.001
+        found.append(moved)
+    return found
+
+
+def _missing_velocity(data: AxisData, found: Followed, innovation: FloatArray) -> FloatArray:
+    """(n,) m/s: what the forces that the innovations tell of would do to the base. Right but for its size and a short delay."""
+    gain, _, pole = found.base
+    b, a = mean_velocity_filter(gain, pole, data.sampling_rate)
+    force = innovation * found.noise * data.sampling_rate**2 / (gain * pole)
+    return np.asarray(scipy.signal.lfilter(b, a, force))
+
+
+def _late(voltage: FloatArray, samples: float) -> FloatArray:
+    whole = int(samples + 0.5)
+    return np.concatenate((np.zeros(whole), voltage))[: voltage.size]
