@@ -19,7 +19,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from xy_sysid import swing
+from xy_sysid import between, swing
 from xy_sysid.compiled import compiled
 from xy_sysid.effect_code import called, text, undoable, undoing
 from xy_sysid.effects import modes
@@ -50,7 +50,11 @@ class _Text(importlib.abc.InspectLoader):
 def fingerprint(source: str, effects: Sequence[Effect]) -> str:
     """Check sum of a loop and of every module that has a part in it."""
     functions = [item for effect in effects for item in effect.functions.values()]
-    parts = {inspect.getsource(inspect.getmodule(item) or item) for item in functions} | {inspect.getsource(modes), inspect.getsource(swing)}
+    parts = {inspect.getsource(inspect.getmodule(item) or item) for item in functions} | {
+        inspect.getsource(modes),
+        inspect.getsource(swing),
+        inspect.getsource(between),
+    }
     total = hashlib.sha256(source.encode())
     for part in sorted(parts):
         total.update(part.encode())
@@ -71,7 +75,7 @@ def _compiled(source: Callable[[str, Sequence[Effect]], str], effects: Sequence[
     name = f"run_{fingerprint(source('loop', effects), effects)}"
     laws: dict[str, object] = {called(effect, function): item for effect in effects for function, item in effect.functions.items()}
     loader = _Text(
-        source(name, effects), {"math": math, "np": np, "__name__": __name__, **swing.LOOP, **laws}
+        source(name, effects), {"math": math, "np": np, "__name__": __name__, **swing.LOOP, "along": between.along, **laws}
     )  # numba's cache comes back by this name
     spec = importlib.util.spec_from_loader(f"{__name__}_{name}", loader)
     assert spec is not None

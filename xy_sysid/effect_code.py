@@ -13,6 +13,7 @@ from xy_sysid.effects.contract import Effect, arguments
 from xy_sysid.swing import CUTS, FINE, STIFF, TERMS
 
 BASE = ("gain", "delay", "pole")
+GAUSS = 3.0**-0.5  # of half a piece: where its two places are
 PLACED = 2  # iterations: an error that changes by 1 per cent of the motion is known to 1e-4 of itself after them
 
 
@@ -38,6 +39,7 @@ def text(name: str, effects: Sequence[Effect]) -> str:
         stiff=f"{STIFF:.2f}",
         most=f"{CUTS}",
         terms=f"{TERMS}",
+        gauss=f"{GAUSS:.12f}",
         unpack=_unpack(effects),
         flags=_flags(effects),
         places=_places(effects),
@@ -68,6 +70,7 @@ def undoing(name: str, effects: Sequence[Effect]) -> str:
     """
     return UNDOING.substitute(
         name=name,
+        gauss=f"{GAUSS:.12f}",
         unpack=_unpack(effects),
         flags=_flags(effects),
         places=_places(effects),
@@ -158,11 +161,18 @@ def _states(effects: Sequence[Effect]) -> str:
 
 
 def _pulls(effects: Sequence[Effect], depth: int = 5) -> str:
+    """Mean of each force over the piece: at its middle in time, at two places if the law asks where (Gauss's rule)."""
     words = {"x": "place", "t": "time", "u": "volts", "gain": "gain", "pole": "pole"}
     lines = []
     for effect in _of(effects, "force"):
-        if not needs_speed(effect):
-            lines += [f"if has_{effect.name}:", f"    pull += {_call(effect, 'force', words)}"]
+        if needs_speed(effect):
+            continue
+        lines.append(f"if has_{effect.name}:")
+        if "x" in arguments(effect.functions["force"]):
+            pair = [_call(effect, "force", {**words, "x": place}) for place in ("near", "far")]
+            lines.append(f"    pull += 0.5 * ({pair[0]} + {pair[1]})")
+        else:
+            lines.append(f"    pull += {_call(effect, 'force', words)}")
     return _lines(depth, lines)
 
 
@@ -231,7 +241,7 @@ def _hang(effects: Sequence[Effect]) -> str:
             f"        hung = inside_{effect.name} = True",
             "        top, bottom = times(top, np.array([z0, z1, 1.0])), times(bottom, np.array([p0, p1, 1.0]))",
         ]
-    return _lines(2, lines)
+    return _lines(1, lines)
 
 
 def _motions(effects: Sequence[Effect]) -> str:

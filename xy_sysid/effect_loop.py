@@ -1,7 +1,7 @@
 """The frame of the loop, into which ``effect_code`` writes the laws of the effects.
 
 Three ways through it: forces that are constant between switching instants, exactly; laws that bend with speed, in
-sub-steps; and laws that heed speed on an axis with resonances, in sub-steps with the resonances inside (``swing``).
+sub-steps; and an axis with resonances, with these inside (``swing``): exactly, and in sub-steps where laws heed the speed.
 The second frame takes effects out of a recording, for those that only one-step prediction can judge.
 """
 
@@ -32,7 +32,6 @@ $states
     v = 0.0
     hung = False
     top, bottom = np.ones(1), np.ones(1)
-    if heeded:
 $hang
     if hung:
         generator_moving = generator(gain, pole, top, bottom, fs)
@@ -40,7 +39,7 @@ $hang
         stiff = math.ceil(fastest(pole, bottom, fs) / ($stiff * fs))
         lighter = generator_moving[1, top.size + 1] / (gain * pole)  # without what hangs on it: sooner does it follow the friction
         wanted = fine * lighter if curved else fine
-        cuts = min(max(math.ceil(wanted / fs), stiff), $most)
+        cuts = min(max(math.ceil(wanted / fs), stiff), $most) if heeded or curved else 1
         h_old, h_new = part / fs / cuts, (1.0 - part) / fs / cuts
         moving_old, moving_new = exponential(generator_moving, h_old), exponential(generator_moving, h_new)
         still_old, still_new = exponential(generator_still, h_old), exponential(generator_still, h_new)
@@ -58,7 +57,8 @@ $hang
                 k = i - whole - 1 + piece
                 volts = held[k] if k >= 0 else 0.0
                 time = (i + middle_of) / fs
-                place = x[i] + middle_of * (x[i + 1] - x[i])
+                aside = $gauss * (middle_of if piece == 0 else 1.0 - middle_of)
+                place, near, far = along(x, i, middle_of), along(x, i, middle_of - aside), along(x, i, middle_of + aside)
                 pull = 0.0
                 if any_pull:
 $pulls
@@ -122,7 +122,8 @@ $level_middle
                 push = volts
                 if any_pull:
                     time = (i + middle_of) / fs
-                    place = x[i] + middle_of * (x[i + 1] - x[i])
+                    aside = $gauss * (middle_of if piece == 0 else 1.0 - middle_of)
+                    place, near, far = along(x, i, middle_of), along(x, i, middle_of - aside), along(x, i, middle_of + aside)
                     pull = 0.0
 $pulls
                     push = volts - pull
@@ -175,7 +176,8 @@ $pulls
                 k = i - whole - 1 + piece
                 volts = held[k] if k >= 0 else 0.0
                 time = (i + middle_of) / fs
-                place = x[i] + middle_of * (x[i + 1] - x[i])
+                aside = $gauss * (middle_of if piece == 0 else 1.0 - middle_of)
+                place, near, far = along(x, i, middle_of), along(x, i, middle_of - aside), along(x, i, middle_of + aside)
                 pull = 0.0
                 if any_pull:
 $pulls
@@ -257,7 +259,8 @@ $states
 $advance
         held[i] = drive
     for i in range(n):
-        volts, pull, time, place = held[max(i - late, 0)], 0.0, (i + 0.5) / fs, 0.5 * (x[i] + x[i + 1])
+        volts, pull, time = held[max(i - late, 0)], 0.0, (i + 0.5) / fs
+        near, far = along(x, i, 0.5 * (1.0 - $gauss)), along(x, i, 0.5 * (1.0 + $gauss))
 $pulls
         against[i] = pull
     return through
