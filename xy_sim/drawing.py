@@ -35,8 +35,9 @@ def with_drawn(spec: Spec, seed: int, effects: Effects, scale: float) -> Spec:
 
 
 def sizes(part: Part, random: np.random.Generator, scale: float = 1.0) -> dict[str, float]:
-    """Every parameter of a part, drawn from its range; only the size (the first) is scaled."""
-    return {item.name: _size(item, random, scale if place == 0 else 1.0) for place, item in enumerate(part.parameters)}
+    """Every parameter of a part, drawn from its range; scale: of the effect's size, by each parameter's ``power``."""
+    powers = [(1.0 if place == 0 else 0.0) if item.power is None else item.power for place, item in enumerate(part.parameters)]
+    return {item.name: _size(item, random, scale**power) for item, power in zip(part.parameters, powers, strict=True)}
 
 
 def _size(parameter: Parameter, random: np.random.Generator, scale: float) -> float:

@@ -15,8 +15,8 @@ PART = Part(
     meaning="machine frame on its feet or its bolts; the encoder, fixed to it, sees antiresonance before resonance",
     source="the paper, sec. 2 (47 Hz); Preumont, Vibration Control of Active Structures, 3rd ed., sec. 2.4",
     parameters=(
-        Parameter("frequency", "Hz", 46.2, 25.0, 80.0, "base and table together with the screw locked: the antiresonance", 1.0, 2000.0),
-        Parameter("mass", "kg", 120.0, 80.0, 200.0, "mass of the base", 0.1, 1e6),
+        Parameter("frequency", "Hz", 46.2, 25.0, 80.0, "base and table together with the screw locked: the antiresonance", 1.0, 2000.0, power=0.0),
+        Parameter("mass", "kg", 120.0, 80.0, 200.0, "mass of the base", 0.1, 1e6, power=-1.0),
         Parameter("damping", "", 0.015, 0.01, 0.03, "damping ratio of that oscillation", 0.0, 2.0),
     ),
     family="resonance",

@@ -17,7 +17,9 @@ Group = Literal["base", "effect", "outside", "event"]
 class Parameter:
     """One number of a part: ``low..high`` is drawn from, ``minimum..maximum`` is allowed.
 
-    signed: drawn with either sign; whole: drawn as a whole number.
+    signed: drawn with either sign; whole: drawn as a whole number
+    power:  how it goes with the size of the effect: 1 for the first parameter of a part and 0 for the others unless given;
+            negative where the effect shrinks while the number grows
     """
 
     name: str
@@ -30,6 +32,7 @@ class Parameter:
     maximum: float = float("inf")
     signed: bool = False
     whole: bool = False
+    power: float | None = None
 
     def checked(self, value: object, where: str) -> float:
         """The value as a number; raises BadInput outside the allowed range."""

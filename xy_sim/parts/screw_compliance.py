@@ -14,7 +14,7 @@ PART = Part(
     meaning="axial and torsional give of screw, nut and bearing",
     source="Varanasi & Nayfeh, The dynamics of lead-screw drives, J. Dyn. Sys. Meas. Control 126 (2004)",
     parameters=(
-        Parameter("frequency", "Hz", 110.0, 95.0, 150.0, "table on the screw, motor locked: the antiresonance", 1.0, 2000.0),
+        Parameter("frequency", "Hz", 110.0, 95.0, 150.0, "table on the screw, motor locked: the antiresonance", 1.0, 2000.0, power=-0.5),
         Parameter("damping", "", 0.02, 0.01, 0.04, "damping ratio of that oscillation", 0.0, 2.0),
     ),
     family="resonance",
