@@ -23,6 +23,7 @@ TRIED = 5  # effects that are fitted at each step, by their share of the error
 LEAST_SHARE = 5e-4  # of the error that an effect's trace must explain to be tried
 HOPELESS = 1.5  # excess behind the best so far at which a candidate is given up after its first round
 HELPS = 0.05  # excess that a candidate must win on the first stage to run the whole distance
+FAR = 1.0  # excess on the first stage above which only the candidate that would be chosen runs the whole distance
 NEAR = 0.3  # excess on the first stage within which candidates run the whole distance
 WIDE = 3  # candidates that run the whole distance, and first effects of the pairs that are tried
 PART_LEFT = 0.4  # of the excess that an effect found between SURE and AT_FLOOR may leave
@@ -62,14 +63,22 @@ def candidates(data: AxisData, now: GreyboxFit, library: Library = STANDARD) -> 
             if fitted.excess < SIMPLER:
                 enough = _more(now, library, name)
         found.append(Candidate(name, shares.get(name, 0.0), fitted))
-    least = min((item.fit.excess for item in found if item.fit), default=np.inf)
-    enough = min(least + NEAR, now.excess - HELPS)
-    near = [item for item in found if item.fit and AT_FLOOR <= item.fit.excess <= enough]
-    for item in sorted(near, key=lambda item: item.fit.excess if item.fit else np.inf)[:WIDE]:
+    for item in _finalists(now, found, library):
         assert item.fit is not None
         found[found.index(item)] = replace(item, fit=finish(data, item.fit.model, item.fit.runs))
     rest = [Candidate(trace.effect, trace.share, None) for trace in traces[TRIED:] if trace.effect not in names]
     return tuple(sorted(found, key=lambda item: item.fit.excess if item.fit else np.inf)) + tuple(rest)
+
+
+def _finalists(now: GreyboxFit, found: list[Candidate], library: Library) -> list[Candidate]:
+    """Those that run the whole distance: all near the best, but far from the floor only the one that would be chosen."""
+    least = min((item.fit.excess for item in found if item.fit), default=np.inf)
+    bar = min(least + NEAR, now.excess - HELPS)
+    near = [item for item in found if item.fit and AT_FLOOR <= item.fit.excess <= bar]
+    best = choose(now, tuple(near), library)
+    if best is not None and best.fit is not None and best.fit.excess > FAR:
+        return [best]
+    return sorted(near, key=lambda item: item.fit.excess if item.fit else np.inf)[:WIDE]
 
 
 def choose(now: GreyboxFit, tried: tuple[Candidate, ...], library: Library = STANDARD) -> Candidate | None:

@@ -21,6 +21,7 @@ LEAST_GAIN = 0.1  # excess that an addition must win, and
 PART_GAIN = 0.11  # the part of the excess that it must win; or
 MUCH = 0.75  # of the held-out error that it may leave at most
 WEAK = 0.8  # of the excess that a single effect must leave at most; else two at once are tried
+PAIR_GAIN = 0.3  # excess that two at once must win where no single effect wins anything
 NEEDED = 0.05  # excess that taking an effect out again must cost, or it goes
 MOST_EFFECTS = 4
 
@@ -141,9 +142,10 @@ def advance(data: AxisData, now: GreyboxFit, library: Library = STANDARD, pairs:
     found = taken.fit if taken is not None else None
     paired = strict and pairs and (found is None or found.excess > WEAK * now.excess)
     if paired:
-        bar = WEAK * (now.excess if found is None else min(found.excess, now.excess))
+        single = now.excess if found is None else min(found.excess, now.excess)
+        bar = WEAK * single if now.excess - single >= LEAST_GAIN else max(WEAK * single, now.excess - PAIR_GAIN)
         pair = together(data, now, tried, library, bar + NEAR)
-        if pair is not None and pair[0].fit and pair[1].fit and (found is None or pair[1].fit.excess < WEAK * found.excess):
+        if pair is not None and pair[0].fit and pair[1].fit and pair[1].fit.excess < bar:
             return Move((Step(pair[0].effect, pair[0].fit, tried), Step(pair[1].effect, pair[1].fit, ())), tried, paired)
     hope = strict and found is not None and now.excess - found.excess >= LEAST_GAIN
     if taken is None or found is None or not (_worth(now, found) or hope):
