@@ -16,9 +16,9 @@ from xy_sysid.axis_model import STANDARD, AxisModel, simulate
 from xy_sysid.cli.simulate import drive
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox import AxisData, GreyboxFit, fit_base, fit_with, look, prepare
+from xy_sysid.one_step import one_step_fit
 from xy_sysid.settings import AxisExcitation, ExcitationSettings, build
 from xy_sysid.spectral_cost import count_size, encoder_noise
-from xy_sysid.one_step import one_step_fit
 from xy_sysid.stream import FloatArray
 
 RATE = 2000.0
