@@ -141,7 +141,7 @@ class _Fit:
         voltage, position, against, through = self.beside.undo(np.concatenate((values[:3], values[10:])), samples)
         noise = self.noise / through
         innovations(voltage, position - position[0], against, values[:10], self.fs, (self.deaf * noise) ** 2, drift, cuts, out)
-        return np.clip(np.nan_to_num(out / noise, nan=1e6), -1e6, 1e6)
+        return np.clip(np.nan_to_num(out, nan=1e6 * noise), -1e6 * noise, 1e6 * noise) / noise
 
     def size(self, inner: FloatArray, samples: int, looseness: float, cuts: int) -> float:
         """rms of the innovations over the noise."""

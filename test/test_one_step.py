@@ -1,0 +1,126 @@
+"""Backlash and what acts beside it: effects taken out of a recording, judged one sample ahead."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from xy_sim.effect_text import with_effects
+from xy_sim.machine import Machine
+from xy_sysid.axis_model import STANDARD, AxisModel, simulate, undoer
+from xy_sysid.cli.simulate import drive
+from xy_sysid.effects import EFFECTS
+from xy_sysid.errors import BadInput
+from xy_sysid.greybox import AxisData, GreyboxFit, fit_base, fit_with, prepare
+from xy_sysid.one_step import one_step_fit
+from xy_sysid.one_step_race import grown
+from xy_sysid.refinement import added
+from xy_sysid.settings import AxisExcitation, ExcitationSettings, build
+from xy_sysid.stream import FloatArray
+
+RATE = 2000.0
+BASE = (0.097, 1.29e-3, 246.0)
+
+
+def noise(samples: int = 4001) -> FloatArray:
+    return np.random.default_rng(1).standard_normal(samples)
+
+
+def undone(name: str, values: tuple[float, ...], voltage: FloatArray, position: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+    undo = undoer(STANDARD, [name], RATE, voltage, position)
+    return undo(np.array([*BASE, *values]), voltage.size - 1)
+
+
+def test_a_dead_zone_is_taken_out_of_the_voltage() -> None:
+    """What is left is what comes out of the zone; position and forces stay as they are."""
+    u, x = noise(), np.cumsum(noise()) * 1e-5
+    held, where, against, through = undone("dead_zone", (0.3,), u, x)
+    assert held == pytest.approx(np.where(np.abs(u) > 0.3, u - 0.3 * np.sign(u), 0.0)[:-1])
+    assert where == pytest.approx(x)
+    assert not against.any()
+    assert through == 1.0
+
+
+def test_a_scale_s_error_is_taken_out_of_the_position() -> None:
+    """The place found, shown by the same scale, is what was shown: to a hundredth of the error's own hundredth."""
+    x = np.linspace(-0.02, 0.03, 4001)
+    _, where, _, _ = undone("lead_error", (8e-6, 0.005, 0.4), noise(), x)
+    shown = where + 8e-6 * (np.sin(2.0 * np.pi * where / 0.005 + 0.4) - np.sin(0.4))
+    assert np.max(np.abs(shown - x)) < 1e-9
+    assert np.max(np.abs(where - x)) > 5e-6
+
+
+def test_a_resonance_is_taken_out_of_the_motion_and_put_back() -> None:
+    """Section and its inverse; what a jump shows at once is the section's first coefficient."""
+    values = (0.16, 46.2, 0.02, 0.03)
+    x = np.cumsum(noise()) * 1e-5
+    _, where, _, through = undone("base_resonance", values, noise(), x)
+    b0, b1, b2, a1, a2 = EFFECTS["base_resonance"].functions["section"](*values, RATE)
+    again = lfilter([b0, b1, b2], [1.0, a1, a2], np.diff(where))
+    assert again == pytest.approx(np.diff(x), abs=1e-12)
+    assert through == pytest.approx(b0)
+
+
+def test_cogging_and_a_load_are_forces_against_the_drive() -> None:
+    """At a place, in volts."""
+    x = np.full(4001, 0.00125)
+    assert undone("constant_load", (0.2,), noise(), x)[2] == pytest.approx(0.2)
+    assert undone("cogging", (0.3, 0.005, 0.1), noise(), x)[2] == pytest.approx(0.3 * np.sin(2.0 * np.pi / 4.0 + 0.1))
+
+
+def test_asymmetric_friction_is_coulomb_friction_under_a_load() -> None:
+    """The same motion to rounding, and the way back gives the same numbers."""
+    whole = AxisModel(*BASE).with_effect("asymmetric_friction", (0.2, 0.4))
+    parts = whole.taken_apart("asymmetric_friction")
+    assert dict(parts.effects) == {"coulomb_friction": (0.2,), "constant_load": (pytest.approx(0.08),)}
+    u = noise()
+    assert simulate(whole, RATE, u, np.zeros_like(u)) == pytest.approx(simulate(parts, RATE, u, np.zeros_like(u)), abs=1e-12)
+    assert parts.joined().effects == (("asymmetric_friction", (0.2, pytest.approx(0.4))),)
+
+
+def test_a_load_larger_than_the_friction_is_not_called_asymmetric_friction() -> None:
+    """There is no such friction: both stay."""
+    model = AxisModel(*BASE).with_effect("coulomb_friction", (0.1,)).with_effect("constant_load", (0.3,))
+    assert model.joined() is model
+
+
+@cache
+def machine(*effects: str) -> tuple[AxisData, GreyboxFit]:
+    own = build(AxisExcitation, {"seed": 5})
+    settings = build(ExcitationSettings, {"rate": RATE, "lockstep": True, "speed": 0.0, "axes": {"x": own, "y": build(AxisExcitation, {"seed": 6})}})
+    recording = drive(with_effects(Machine.from_file("rigid.yaml", 11), effects), settings, 30.0, lambda _: None)
+    data = prepare(RATE, *recording.axis("x"))
+    return data, fit_base(data)
+
+
+def test_friction_that_differs_between_directions_is_found_beside_backlash() -> None:
+    """Coulomb friction is in the filter already: what is added is a load at the motor, and with it friction is asymmetric."""
+    data, base = machine("backlash=30e-6", "asymmetric_friction=0.3,coulomb=0.2")
+    start = fit_with(data, base, ["coulomb_friction"], brief=True)
+    rungs = grown(data, start, EFFECTS["backlash"], STANDARD)
+    name, last = rungs[-1]
+    assert [rungs[0][0], name, len(rungs)] == ["backlash", "asymmetric_friction", 2]
+    assert last.excess == 0.0
+    assert last.parameter("backlash.gap").value == pytest.approx(30e-6, rel=0.02)
+    assert last.parameter("asymmetric_friction.coulomb").value == pytest.approx(0.2, rel=0.03)
+    assert last.parameter("asymmetric_friction.asymmetry").value == pytest.approx(0.3, rel=0.05)
+
+
+def test_nothing_is_put_beside_backlash_that_stands_alone() -> None:
+    """One rung."""
+    data, base = machine("backlash=30e-6")
+    assert [name for name, _ in grown(data, base, EFFECTS["backlash"], STANDARD)] == ["backlash"]
+
+
+def test_a_dead_zone_can_be_added_to_backlash_by_name() -> None:
+    """The gap stays, the dead zone gets its width; what heeds the speed cannot be taken out, and that is said."""
+    data, base = machine("backlash=30e-6", "dead_zone=0.15")
+    alone = one_step_fit(data, base, EFFECTS["backlash"])
+    both = added(data, alone, "dead_zone")
+    assert both.held_out_error < 0.5 * alone.held_out_error
+    assert both.parameter("dead_zone.width").value == pytest.approx(0.15, rel=0.05)
+    with pytest.raises(BadInput, match="stribeck_friction"):
+        added(data, alone, "stribeck_friction")
