@@ -31,6 +31,8 @@ PROMISING = 10.0  # the same on the whole first stage; on the way to it twice th
 DEAF = 12.0  # the filter is told this much more encoder noise on the way: a smoother valley
 SLOW = 1e-3  # m/s at which the smoothed friction reaches its level
 DRIFT = 0.3  # process noise per rms speed, 1/sqrt(s): the filter forgives this much acceleration
+STEP = 1e-2  # of a parameter's unit
+TRUSTED = 0.5  # part of a step's change that the derivatives may have missed
 SETTLED = 0.5  # s until the filter is judged
 
 
@@ -161,21 +163,8 @@ class _Fit:
 
         bounds = (self.low[free] / self.unit[free], self.high[free] / self.unit[free])
         begin = np.clip(start[free] / self.unit[free], bounds[0] + 1e-9, bounds[1] - 1e-9)
-        found = scipy.optimize.least_squares(left, begin, self._slopes(left), bounds, ftol=1e-4, xtol=1e-5, max_nfev=most)
+        found = scipy.optimize.least_squares(left, begin, _Slopes(left), bounds, ftol=1e-4, xtol=1e-5, max_nfev=most)
         return whole(found.x)
-
-    @staticmethod
-    def _slopes(left: Callable[[FloatArray], FloatArray]) -> Callable[[FloatArray], FloatArray]:
-        def slopes(part: FloatArray) -> FloatArray:
-            here = left(part)
-            columns = np.empty((here.size, part.size))
-            for k in range(part.size):
-                moved = part.copy()
-                moved[k] += 1e-2
-                columns[:, k] = (left(moved) - here) / 1e-2
-            return columns
-
-        return slopes
 
     def spread(self, inner: FloatArray, samples: int) -> FloatArray:
         """(10 + k,) standard errors of the parameters, from the innovations' slopes."""
@@ -184,13 +173,44 @@ class _Fit:
         def left(part: FloatArray) -> FloatArray:
             return self.innovation(part * self.unit, samples, 1.0, 4)
 
-        slopes = self._slopes(left)(part)
+        slopes = _Slopes(left)(part)
         variance = float(np.mean(left(part) ** 2))
         normal = slopes.T @ slopes
         size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
         covariance = np.linalg.pinv(normal / np.outer(size, size), rcond=1e-10, hermitian=True) / np.outer(size, size)
         inner_spread = np.sqrt(np.maximum(np.diag(covariance), 0.0) * variance) * self.unit
         return np.asarray(np.where(self.log, inner_spread * self.outer(inner), inner_spread))
+
+
+class _Slopes:
+    """Derivatives by differences; brought up to date with a step that went as they said, else taken anew (Broyden 1965)."""
+
+    def __init__(self, left: Callable[[FloatArray], FloatArray]) -> None:
+        self.left = left
+        self.last: tuple[FloatArray, FloatArray, FloatArray] | None = None
+
+    def __call__(self, part: FloatArray) -> FloatArray:
+        """(samples, k) at ``part`` (k,)."""
+        here = self.left(part)
+        columns = self._updated(part, here)
+        if columns is None:
+            columns = np.empty((here.size, part.size))
+            for k in range(part.size):
+                moved = part.copy()
+                moved[k] += STEP
+                columns[:, k] = (self.left(moved) - here) / STEP
+        self.last = part.copy(), here, columns
+        return columns
+
+    def _updated(self, part: FloatArray, here: FloatArray) -> FloatArray | None:
+        if self.last is None:
+            return None
+        before, then, columns = self.last
+        step, change = part - before, here - then
+        missing = change - columns @ step
+        if not float(step @ step) > 0.0 or float(missing @ missing) > TRUSTED**2 * float(change @ change):
+            return None
+        return np.asarray(columns + np.outer(missing, step / float(step @ step)))
 
 
 @compiled
