@@ -15,7 +15,7 @@ from xy_sysid.axis_model import STANDARD, AxisModel, Library
 from xy_sysid.greybox import EPSILON, AxisData, GreyboxFit, finish, fit, fit_base, fit_with
 from xy_sysid.one_step import one_step_fit
 from xy_sysid.one_step_race import put_beside
-from xy_sysid.race import AT_FLOOR, HOPELESS, NEAR, PART_LEFT, SURE, Candidate, candidates, choose, plausible, polished, suspected, together
+from xy_sysid.race import AT_FLOOR, HOPELESS, NEAR, PART_LEFT, SURE, Candidate, candidates, choose, faint, plausible, polished, suspected, together
 
 LEAST_GAIN = 0.1  # excess that an addition must win, and
 PART_GAIN = 0.11  # the part of the excess that it must win; or
@@ -131,6 +131,8 @@ def advance(data: AxisData, now: GreyboxFit, library: Library = STANDARD, pairs:
     """One move down from a fit; pairs: two effects may be tried at once where one alone helps little."""
     if now.excess < AT_FLOOR:
         last = polished(data, now, library) if now.excess >= SURE else None
+        if last is None and not now.model.effects and data.floor.epsilon <= EPSILON:
+            last = faint(data, now, library)
         return Move(() if last is None or last.fit is None else (Step(last.effect, last.fit, ()),), ())
     strict = data.floor.epsilon <= EPSILON
     tried = candidates(data, now, library)
