@@ -27,8 +27,8 @@ FAR = 1.0  # excess on the first stage above which only the candidate that would
 NEAR = 0.3  # excess on the first stage within which candidates run the whole distance
 WIDE = 3  # candidates that run the whole distance, and first effects of the pairs that are tried
 PART_LEFT = 0.4  # of the excess that an effect found between SURE and AT_FLOOR may leave
-FAINT_TRACE = 1.5e-3  # share from which an effect is looked for in the noise; of clean axes the largest is 9e-4,
-LINEAR_TRACE = 1e-2  # but 2.4e-3 for lags and resonances, which a last thousandth of the base's response looks like
+FAINT_TRACE = 0.06  # share, times seconds of training, from which an effect is looked for in the noise: of clean axes the largest is 0.036,
+LINEAR_TRACE = 0.4  # but 0.1 for lags and resonances, which a last thousandth of the base's response looks like
 WELL_KNOWN = 2.0  # width of the 95 % interval over the size: it is not zero
 SUSPICIOUS = 0.1  # share of a look-alike from which an effect that free simulation cannot judge is tried
 UNSEEN = ("constant_load",)  # effects with next to no trace in the error's spectrum: always tried as the second of a pair
@@ -158,9 +158,10 @@ def faint(data: AxisData, now: GreyboxFit, library: Library) -> Candidate | None
 
     The mean over the bands does not see an effect that moves two or three of them.
     """
+    seconds = data.training / data.sampling_rate
     for trace in look(data, now, _open(now, library))[:2]:
         effect = library[trace.effect]
-        if trace.share < (LINEAR_TRACE if effect.category in ("motion", "state") else FAINT_TRACE):
+        if trace.share * seconds < (LINEAR_TRACE if effect.category in ("motion", "state") else FAINT_TRACE):
             continue
         found = _tried(data, now, trace.effect)
         if found is None:
