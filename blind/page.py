@@ -36,7 +36,9 @@ def text(results: dict[str, list[Judged]], draws: str, command: str, facts: str)
         f"Made by `{command}`: machines of `xy_sim` with hidden effects and hidden base parameters, {draws} draws. {facts}",
         "",
         "Development draws (another random stream) were used for tuning; reporting draws never were. A name counts as wrong with "
-        f"confidence when it comes first, is not in the truth, and has confidence {CONFIDENT:g} or more. Seconds are of one core's time.",
+        f"confidence when it comes first, is not in the truth, and has confidence {CONFIDENT:g} or more. Of several effects, "
+        "asymmetric friction counts as Coulomb friction with a constant load, and the other way round: it is one law. "
+        "Seconds are of one core's time.",
         "",
     ]
     parts = [*head]

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 import scipy.signal
 
-from xy_sysid.axis_model import STANDARD, Library
+from xy_sysid.axis_model import STANDARD, Library, simulate
 from xy_sysid.comparison import Comparison, compare_velocity
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox import AxisData, GreyboxFit, excess_of, loosened, prepare
@@ -117,8 +117,7 @@ def _judged(data: AxisData, ladder: Ladder, library: Library, tolerance: float, 
     if base.excess < AT_FLOOR and not ladder.effects:
         text = f"Nothing is missing: the rigid model with delay leaves {_mm(base.held_out_error)} mm/s, the floor is {_mm(base.noise_floor)} mm/s."
         return Diagnosis("nothing_missing", (), certainty, tolerance, text, ladder, tried, where, "None is needed.")
-    # the pruned model keeps the order of importance in which effects were added
-    names = _ordered(ladder, library)
+    names = _ordered(data, ladder, library)
     gone = 1.0 - final.excess / base.excess
     fall = f"the held-out error falls from {_mm(base.held_out_error)} to {_mm(final.held_out_error)} mm/s (floor {_mm(final.noise_floor)})"
     if names and ladder.explained:
@@ -136,12 +135,23 @@ def _judged(data: AxisData, ladder: Ladder, library: Library, tolerance: float, 
     return Diagnosis("not_in_library", (), certainty * (1.0 - max(gone, 0.0)), tolerance, sentence, ladder, tried, where, _UNKNOWN)
 
 
-def _ordered(ladder: Ladder, library: Library) -> tuple[str, ...]:
-    """The effects that remain, in the order in which they (or a relative that they replaced) were added."""
-    order = [library[step.added] for step in ladder.steps if step.added is not None]
-    place = {effect.name: k for k, effect in reversed(list(enumerate(order)))}
-    of_family = {effect.family: k for k, effect in reversed(list(enumerate(order))) if effect.family}
-    return tuple(sorted(ladder.effects, key=lambda name: place.get(name, of_family.get(library[name].family, len(order)))))
+def _ordered(data: AxisData, ladder: Ladder, library: Library) -> tuple[str, ...]:
+    """The effects that remain, first the one whose absence would change the motion most, all else as it is.
+
+    What one-step prediction judges comes in the order in which it was added: free simulation says nothing about it.
+    """
+    final = ladder.final
+    if len(ladder.effects) < 2:
+        return ladder.effects
+    if any(library[name].one_step is not None for name in ladder.effects):
+        order = [step.added for step in ladder.steps]
+        return tuple(sorted(ladder.effects, key=lambda name: order.index(name) if name in order else len(order)))
+
+    def change(name: str) -> float:
+        without = simulate(final.model.without(name), data.sampling_rate, data.voltage, data.position)
+        return float(np.sum(data.layout.power(data.layout.spectrum(without - final.simulated))))
+
+    return tuple(sorted(ladder.effects, key=change, reverse=True))
 
 
 _UNKNOWN = "Look at where the model fails, then excite only there: half and double the amplitude, another part of the travel, one direction."
