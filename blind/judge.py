@@ -67,8 +67,8 @@ def run(case: Case) -> Judged:
 
 def _laws(names: tuple[str, ...]) -> set[str]:
     """Names, with those that are the sum of others taken apart: no data can tell these from the others together."""
-    sums = {name: STANDARD[name].sum_of for name in names if name in STANDARD.effects}
-    return {part for name in names for part in (sums[name].parts if sums.get(name) else (name,))}
+    sums = {name: whole.parts for name in names if name in STANDARD.effects and (whole := STANDARD[name].sum_of)}
+    return {part for name in names for part in sums.get(name, (name,))}
 
 
 def _parts(machine: Machine) -> set[str]:

@@ -27,7 +27,7 @@ SMALL = 0.02  # of the rms voltage or velocity: how much of a trace is put in to
 TRIED = 2  # effects that are fitted beside at each rung, by their share of the innovations
 LEAST_SHARE = 0.005  # of the innovations that an effect's trace must explain to be tried
 TELLING = 0.02  # the same where the axis is explained already
-MIMIC = 0.15  # the same for a lag or a resonance, which take part of the contact's own error
+MIMIC = 0.15  # the same for a look-alike, which takes part of the contact's own error
 LESS, MUCH_LESS = 0.97, 0.93  # of the held-out innovation that one more effect must leave at most, where it is explained and else
 AGAIN, LOST = 2.5, 40.0  # innovations over noise between which a first fit is begun again from where it ended
 MOST = 3  # effects beside
@@ -43,7 +43,8 @@ def grown(data: AxisData, base: GreyboxFit, effect: Effect, library: Library, pa
     while len(rungs) <= MOST and (patient or fit.excess == 0.0):
         explains = fit.excess == 0.0
         known = {name for name, _ in beside(fit.model, effect)[1]} | {name for name, _ in fit.model.effects}
-        open_to = [e for e in library.acting if undoable(e) and e.simulable and e.name not in known and not _stands_in(e, effect)]
+        # a resonance is not tried: together with a gap it explains too much (cogging at small amplitude, friction that bends)
+        open_to = [e for e in library.acting if undoable(e) and e.simulable and e.name not in known and e.category != "motion"]
         seen = traces(data, fit.model, effect, found, open_to)
         wanted = [trace for trace in seen if trace.share >= _least(library[trace.effect], effect, explains)][:TRIED]
         tried = [(trace.effect, *followed(data, fit, effect, [(trace.effect, trace.values)], found)) for trace in wanted]
@@ -80,14 +81,9 @@ def _settled(data: AxisData, effect: Effect, fit: GreyboxFit, found: Followed) -
 
 def _least(other: Effect, effect: Effect, explains: bool) -> float:
     """Share of the innovations from which an effect is tried: more of what the contact's own imperfections look like."""
-    if other.category == "motion" or other.name in effect.look_alikes:
+    if other.name in effect.look_alikes:
         return MIMIC
     return TELLING if explains else LEAST_SHARE
-
-
-def _stands_in(other: Effect, effect: Effect) -> bool:
-    """A resonance of the same two masses is what the effect is taken for, not something beside it."""
-    return other.category == "motion" and other.name in effect.look_alikes
 
 
 def traces(data: AxisData, model: AxisModel, effect: Effect, found: Followed, effects: Iterable[Effect]) -> list[Trace]:
