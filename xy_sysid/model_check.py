@@ -65,7 +65,8 @@ def check(tf: TransferFunction, frf: FrequencyResponse, u: FloatArray, y: FloatA
         raise BadInput("number of trusted lines", 0, "1 or more", "Record longer, excite more, or widen the band.")
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         predicted = through_window(tf, lines, hold)
-    if not bool(np.all(np.isfinite(predicted))):
+        usable = bool(np.isfinite(np.sum(np.abs(predicted / lines.response) ** 2)))  # a square that overflows is no number either
+    if not usable:
         raise BadInput("response of the model", "not finite", "finite in the band of the recording", "Check the coefficients of the model.")
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # an unstable model runs away, and the figure says so
