@@ -103,7 +103,7 @@ def test_friction_that_differs_between_directions_is_found_beside_backlash() -> 
     """Coulomb friction is in the filter already: what is added is a load at the motor, and with it friction is asymmetric."""
     data, base = machine("backlash=30e-6", "asymmetric_friction=0.3,coulomb=0.2")
     start = fit_with(data, base, ["coulomb_friction"], brief=True)
-    rungs = grown(data, start, EFFECTS["backlash"], STANDARD)
+    rungs = grown(data, start, EFFECTS["backlash"], STANDARD).rungs
     name, last = rungs[-1]
     assert [rungs[0][0], name, len(rungs)] == ["backlash", "asymmetric_friction", 2]
     assert last.excess == 0.0
@@ -115,7 +115,7 @@ def test_friction_that_differs_between_directions_is_found_beside_backlash() -> 
 def test_nothing_is_put_beside_backlash_that_stands_alone() -> None:
     """One rung."""
     data, base = machine("backlash=30e-6")
-    assert [name for name, _ in grown(data, base, EFFECTS["backlash"], STANDARD)] == ["backlash"]
+    assert [name for name, _ in grown(data, base, EFFECTS["backlash"], STANDARD).rungs] == ["backlash"]
 
 
 def test_a_dead_zone_can_be_added_to_backlash_by_name() -> None:

@@ -7,7 +7,7 @@ score test of ``traces``, on innovations).
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.signal
@@ -28,25 +28,37 @@ TRIED = 2  # effects that are fitted beside at each rung, by their share of the 
 LEAST_SHARE = 0.005  # of the innovations that an effect's trace must explain to be tried
 TELLING = 0.02  # the same where the axis is explained already
 MIMIC = 0.15  # the same for a look-alike, which takes part of the contact's own error
-LESS, MUCH_LESS = 0.97, 0.93  # of the held-out innovation that one more effect must leave at most, where it is explained and else
+LOUD = 0.08  # share from which an effect is tried beside one that does not explain the axis alone, without being asked for patience
+LESS, MUCH_LESS = 0.97, 0.8  # of the held-out innovation that one more effect must leave at most, where it is explained and else
 AGAIN, LOST = 2.5, 40.0  # innovations over noise between which a first fit is begun again from where it ended
 MOST = 3  # effects beside
 
 
-def grown(data: AxisData, base: GreyboxFit, effect: Effect, library: Library, patient: bool = True) -> list[tuple[str, GreyboxFit]]:
-    """Rungs: the effect with what the base has beside it, then one more beside it at each; name and fit.
+@dataclass(frozen=True, slots=True)
+class Grown:
+    """Rungs, name and fit, and the filter's own result for the last."""
 
-    patient: else nothing is tried beside an effect that does not explain the axis alone
+    rungs: tuple[tuple[str, GreyboxFit], ...]
+    found: Followed
+
+
+def grown(data: AxisData, base: GreyboxFit, effect: Effect, library: Library, patient: bool = True, begun: Grown | None = None) -> Grown:
+    """Rungs: the effect with what the base has beside it, then one more beside it at each.
+
+    patient: else only an effect with a loud trace is tried beside one that does not explain the axis alone; begun: go on from there
     """
-    fit, found = _settled(data, effect, *followed(data, base, effect))
-    rungs = [(effect.name, fit)]
-    while len(rungs) <= MOST and (patient or fit.excess == 0.0):
+    if begun is None:
+        fit, found = _settled(data, effect, *followed(data, base, effect))
+        begun = Grown(((effect.name, fit),), found)
+    rungs, found = list(begun.rungs), begun.found
+    while len(rungs) <= MOST:
+        fit = rungs[-1][1]
         explains = fit.excess == 0.0
         known = {name for name, _ in beside(fit.model, effect)[1]} | {name for name, _ in fit.model.effects}
         # a resonance is not tried: together with a gap it explains too much (cogging at small amplitude, friction that bends)
         open_to = [e for e in library.acting if undoable(e) and e.simulable and e.name not in known and e.category != "motion"]
         seen = traces(data, fit.model, effect, found, open_to)
-        wanted = [trace for trace in seen if trace.share >= _least(library[trace.effect], effect, explains)][:TRIED]
+        wanted = [trace for trace in seen if trace.share >= _least(library[trace.effect], effect, explains, patient)][:TRIED]
         tried = [(trace.effect, *followed(data, fit, effect, [(trace.effect, trace.values)], found)) for trace in wanted]
         if not tried:
             break
@@ -54,9 +66,9 @@ def grown(data: AxisData, base: GreyboxFit, effect: Effect, library: Library, pa
         if not better.held_out_error < (LESS if explains else MUCH_LESS) * fit.held_out_error:
             break
         new = [own for own, _ in better.model.effects if own not in fit.model]
-        fit, found = _settled(data, effect, better, its)
-        rungs.append((name if name in fit.model else new[-1] if new else name, fit))
-    return rungs
+        better, found = _settled(data, effect, better, its)
+        rungs.append((name if name in better.model else new[-1] if new else name, better))
+    return Grown(tuple(rungs), found)
 
 
 def put_beside(data: AxisData, now: GreyboxFit, effect: Effect, other: Effect) -> GreyboxFit:
@@ -79,11 +91,10 @@ def _settled(data: AxisData, effect: Effect, fit: GreyboxFit, found: Followed) -
     return fit, found
 
 
-def _least(other: Effect, effect: Effect, explains: bool) -> float:
+def _least(other: Effect, effect: Effect, explains: bool, patient: bool) -> float:
     """Share of the innovations from which an effect is tried: more of what the contact's own imperfections look like."""
-    if other.name in effect.look_alikes:
-        return MIMIC
-    return TELLING if explains else LEAST_SHARE
+    least = TELLING if explains else LEAST_SHARE if patient else LOUD
+    return max(least, MIMIC) if other.name in effect.look_alikes else least
 
 
 def traces(data: AxisData, model: AxisModel, effect: Effect, found: Followed, effects: Iterable[Effect]) -> list[Trace]:

@@ -6,6 +6,7 @@ only one-step prediction can judge.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +14,7 @@ import numpy as np
 from xy_sysid.axis_model import STANDARD, Library
 from xy_sysid.effects import Effect
 from xy_sysid.greybox import AxisData, GreyboxFit, finish, fit_instead, fit_with, look
-from xy_sysid.one_step_race import grown
+from xy_sysid.one_step_race import Grown, grown
 
 # Tuned on development draws of the simulated machine only (blind/cases.py).
 AT_FLOOR = 0.15  # excess below which nothing is left to explain; clean axes stay below 0.02
@@ -26,6 +27,7 @@ HELPS = 0.05  # excess that a candidate must win on the first stage to run the w
 FAR = 1.0  # excess on the first stage above which only the candidate that would be chosen runs the whole distance
 NEAR = 0.3  # excess on the first stage within which candidates run the whole distance
 WIDE = 3  # candidates that run the whole distance, and first effects of the pairs that are tried
+IDLE = 0.02  # excess that one more effect must win in its first round, far from the floor
 PART_LEFT = 0.4  # of the excess that an effect found between SURE and AT_FLOOR may leave
 FAINT_TRACE = 0.06  # share, times seconds of training, from which an effect is looked for in the noise: of clean axes the largest is 0.036,
 LINEAR_TRACE = 0.4  # but 0.1 for lags and resonances, which a last thousandth of the base's response looks like
@@ -60,7 +62,7 @@ def candidates(data: AxisData, now: GreyboxFit, library: Library = STANDARD) -> 
             found.append(Candidate(name, shares.get(name, 0.0), None))
             continue
         least = min((item.fit.excess for item in found if item.fit), default=np.inf)
-        fitted = _tried(data, now, name, least + HOPELESS)
+        fitted = _tried(data, now, name, min(least + HOPELESS, now.excess - IDLE if now.model.effects and now.excess > FAR else np.inf))
         if fitted is not None and fitted.excess < AT_FLOOR:
             fitted = finish(data, fitted.model, fitted.runs)
             if fitted.excess < SIMPLER:
@@ -95,23 +97,30 @@ def choose(now: GreyboxFit, tried: tuple[Candidate, ...], library: Library = STA
 
 
 def suspected(
-    data: AxisData, base: GreyboxFit, tried: tuple[Candidate, ...], library: Library, patient: bool = False
-) -> list[tuple[str, GreyboxFit]]:
-    """Rungs of an effect that only one-step prediction can judge, where no other explains the error and a look-alike left its trace.
+    data: AxisData, base: GreyboxFit, tried: tuple[Candidate, ...], library: Library, patient: bool = False, begun: Mapping[str, Grown] | None = None
+) -> dict[str, Grown]:
+    """Effects that only one-step prediction can judge, where no other explains the error and a look-alike left its trace.
 
-    Empty if they do not explain the axis. patient: more is tried beside an effect that does not explain it alone
+    The last of them explains the axis, or none does. patient, begun: see ``grown``
     """
+    found: dict[str, Grown] = {}
     if any(item.fit is not None and item.fit.excess < AT_FLOOR for item in tried):
-        return []
+        return found
     shares = {item.effect: item.share for item in tried}
     for effect in library.acting:
         share = max((shares.get(name, 0.0) for name in effect.look_alikes), default=0.0)
         if effect.one_step is not None and share >= SUSPICIOUS:
             rubbing = [item.fit for item in tried if item.effect == "coulomb_friction" and item.fit is not None and item.share >= SUSPICIOUS]
-            rungs = grown(data, rubbing[0] if rubbing else base, effect, library, patient)
-            if rungs[-1][1].excess < AT_FLOOR:
-                return rungs
-    return []
+            found[effect.name] = grown(data, rubbing[0] if rubbing else base, effect, library, patient, (begun or {}).get(effect.name))
+            if explaining(found):
+                return found
+    return found
+
+
+def explaining(found: Mapping[str, Grown]) -> tuple[tuple[str, GreyboxFit], ...]:
+    """The rungs of the last of what was suspected, if they explain the axis, else none."""
+    rungs = list(found.values())[-1].rungs if found else ()
+    return rungs if rungs and rungs[-1][1].excess < AT_FLOOR else ()
 
 
 def together(data: AxisData, now: GreyboxFit, tried: tuple[Candidate, ...], library: Library, bar: float) -> tuple[Candidate, Candidate] | None:

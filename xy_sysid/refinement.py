@@ -6,16 +6,31 @@ out again, and a simpler relative takes the place of a richer one that does no b
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from xy_sysid.axis_model import STANDARD, AxisModel, Library
 from xy_sysid.greybox import EPSILON, AxisData, GreyboxFit, finish, fit, fit_base, fit_with
 from xy_sysid.one_step import one_step_fit
-from xy_sysid.one_step_race import put_beside
-from xy_sysid.race import AT_FLOOR, HOPELESS, NEAR, PART_LEFT, SURE, Candidate, candidates, choose, faint, plausible, polished, suspected, together
+from xy_sysid.one_step_race import Grown, put_beside
+from xy_sysid.race import (
+    AT_FLOOR,
+    HOPELESS,
+    NEAR,
+    PART_LEFT,
+    SURE,
+    Candidate,
+    candidates,
+    choose,
+    explaining,
+    faint,
+    plausible,
+    polished,
+    suspected,
+    together,
+)
 
 LEAST_GAIN = 0.1  # excess that an addition must win, and
 PART_GAIN = 0.11  # the part of the excess that it must win; or
@@ -59,12 +74,14 @@ def refine(data: AxisData, library: Library = STANDARD, most: int = MOST_EFFECTS
         steps.append(Step(name, now, ()))
     rejected: tuple[Candidate, ...] = ()
     paired: set[int] = set()  # rungs from which pairs were tried
+    begun: dict[str, Grown] = {}
     while len(steps) <= most:
         move = advance(data, now, library, pairs=len(steps) < most)
         if move.paired:
             paired.add(len(steps) - 1)
+        begun |= move.begun
         if not move.steps:
-            better = _another_way(data, steps, move, len(kept), paired, library) if now.excess >= AT_FLOOR else None
+            better = _another_way(data, steps, move, len(kept), paired, library, begun) if now.excess >= AT_FLOOR else None
             if better is None:
                 rejected = move.tried
                 break
@@ -84,7 +101,9 @@ def refine(data: AxisData, library: Library = STANDARD, most: int = MOST_EFFECTS
     return Ladder(tuple(steps), rejected, settled, names)
 
 
-def _another_way(data: AxisData, steps: list[Step], last: Move, given: int, paired: set[int], library: Library) -> list[Step] | None:
+def _another_way(
+    data: AxisData, steps: list[Step], last: Move, given: int, paired: set[int], library: Library, begun: Mapping[str, Grown]
+) -> list[Step] | None:
     """Where one at a time has led astray, if that leads further down than all since.
 
     Two at once from an earlier rung; or, from the base, an effect that only one-step prediction can judge and what is beside it.
@@ -104,11 +123,11 @@ def _another_way(data: AxisData, steps: list[Step], last: Move, given: int, pair
     if given:
         return None
     tried = steps[1].tried if len(steps) > 1 else last.tried
-    rungs = suspected(data, steps[0].fit, tried, library, patient=True)
+    rungs = explaining(suspected(data, steps[0].fit, tried, library, patient=True, begun=begun))
     return [steps[0], *_as_steps(rungs, tried)] if rungs else None
 
 
-def _as_steps(rungs: list[tuple[str, GreyboxFit]], tried: tuple[Candidate, ...]) -> tuple[Step, ...]:
+def _as_steps(rungs: Sequence[tuple[str, GreyboxFit]], tried: tuple[Candidate, ...]) -> tuple[Step, ...]:
     """Rungs of one-step prediction; the first shows what else was tried."""
     shares = {item.effect: item.share for item in tried}
     first = Candidate(rungs[0][0], shares.get(rungs[0][0], 0.0), rungs[0][1])
@@ -119,12 +138,13 @@ def _as_steps(rungs: list[tuple[str, GreyboxFit]], tried: tuple[Candidate, ...])
 class Move:
     """The next rungs: one, two that were found together, or none, if the floor is reached or nothing helps.
 
-    tried: the candidates; paired: were pairs tried, too
+    tried: the candidates; paired: were pairs tried, too; begun: what one-step prediction did not explain yet
     """
 
     steps: tuple[Step, ...]
     tried: tuple[Candidate, ...]
     paired: bool = False
+    begun: Mapping[str, Grown] = field(default_factory=dict)
 
 
 def advance(data: AxisData, now: GreyboxFit, library: Library = STANDARD, pairs: bool = True) -> Move:
@@ -135,9 +155,11 @@ def advance(data: AxisData, now: GreyboxFit, library: Library = STANDARD, pairs:
             last = faint(data, now, library)
         return Move(() if last is None or last.fit is None else (Step(last.effect, last.fit, ()),), ())
     strict = data.floor.epsilon <= EPSILON
+    begun: dict[str, Grown] = {}
     tried = candidates(data, now, library)
     if strict and not now.model.effects:
-        rungs = suspected(data, now, tried, library)
+        begun = suspected(data, now, tried, library)
+        rungs = explaining(begun)
         if rungs:
             return Move(_as_steps(rungs, tried), tried)
     taken = choose(now, tried, library)
@@ -148,11 +170,11 @@ def advance(data: AxisData, now: GreyboxFit, library: Library = STANDARD, pairs:
         bar = WEAK * single if now.excess - single >= LEAST_GAIN else max(WEAK * single, now.excess - PAIR_GAIN)
         pair = together(data, now, tried, library, bar + NEAR)
         if pair is not None and pair[0].fit and pair[1].fit and pair[1].fit.excess < bar:
-            return Move((Step(pair[0].effect, pair[0].fit, tried), Step(pair[1].effect, pair[1].fit, ())), tried, paired)
+            return Move((Step(pair[0].effect, pair[0].fit, tried), Step(pair[1].effect, pair[1].fit, ())), tried, paired, begun)
     hope = strict and found is not None and now.excess - found.excess >= LEAST_GAIN
     if taken is None or found is None or not (_worth(now, found) or hope):
-        return Move((), tried, paired)
-    return Move((Step(taken.effect, found, tried),), tried, paired)
+        return Move((), tried, paired, begun)
+    return Move((Step(taken.effect, found, tried),), tried, paired, begun)
 
 
 def _again(data: AxisData, steps: list[Step], names: tuple[str, ...], library: Library) -> list[Step]:
