@@ -31,6 +31,7 @@ IDLE = 0.02  # excess that one more effect must win in its first round, far from
 PART_LEFT = 0.4  # of the excess that an effect found between SURE and AT_FLOOR may leave
 FAINT_TRACE = 0.06  # share, times seconds of training, from which an effect is looked for in the noise: of clean axes the largest is 0.036,
 LINEAR_TRACE = 0.4  # but 0.1 for lags and resonances, which a last thousandth of the base's response looks like
+RELATIVE_TRACE = 0.2  # the same for a richer relative of what is in the model: where nothing asks for it, the largest is 0.05
 WELL_KNOWN = 2.0  # width of the 95 % interval over the size: it is not zero
 SUSPICIOUS = 0.1  # share of a look-alike from which an effect that free simulation cannot judge is tried
 UNSEEN = ("constant_load",)  # effects with next to no trace in the error's spectrum: always tried as the second of a pair
@@ -163,14 +164,18 @@ def polished(data: AxisData, now: GreyboxFit, library: Library) -> Candidate | N
 
 
 def faint(data: AxisData, now: GreyboxFit, library: Library) -> Candidate | None:
-    """One effect that hides in the noise of a base at the floor: its trace is larger than chance makes it, and its size well known.
+    """One effect that hides in the noise of a model at the floor: its trace is larger than chance makes it, and its size well known.
 
-    The mean over the bands does not see an effect that moves two or three of them.
+    The mean over the bands does not see an effect that moves two or three of them. Beside another effect only richer
+    relatives are looked for, which take its place.
     """
     seconds = data.training / data.sampling_rate
-    for trace in look(data, now, _open(now, library))[:2]:
+    richer = _richer(now, library) if now.model.effects else {}
+    open_to = [library[name] for name in richer] if now.model.effects else _open(now, library)
+    for trace in look(data, now, open_to)[:2] if open_to else ():
         effect = library[trace.effect]
-        if trace.share * seconds < (LINEAR_TRACE if effect.category in ("motion", "state") else FAINT_TRACE):
+        least = RELATIVE_TRACE if richer else LINEAR_TRACE if effect.category in ("motion", "state") else FAINT_TRACE
+        if trace.share * seconds < least:
             continue
         found = _tried(data, now, trace.effect)
         if found is None:

@@ -75,11 +75,13 @@ def refine(data: AxisData, library: Library = STANDARD, most: int = MOST_EFFECTS
     rejected: tuple[Candidate, ...] = ()
     paired: set[int] = set()  # rungs from which pairs were tried
     begun: dict[str, Grown] = {}
+    stays = kept
     while len(steps) <= most:
         move = advance(data, now, library, pairs=len(steps) < most)
         if move.paired:
             paired.add(len(steps) - 1)
         begun |= move.begun
+        stays = (*stays, move.stays) if move.stays else stays
         if not move.steps:
             better = _another_way(data, steps, move, len(kept), paired, library, begun) if now.excess >= AT_FLOOR else None
             if better is None:
@@ -94,7 +96,7 @@ def refine(data: AxisData, library: Library = STANDARD, most: int = MOST_EFFECTS
         rejected, now = steps[-1].tried, steps[-2].fit
         del steps[-1]
     alone = any(library[name].one_step is not None for name, _ in now.model.effects)
-    settled = settle(data, now, kept) if len(steps) > 2 and not alone else now
+    settled = settle(data, now, stays) if len(steps) > 2 and not alone else now
     names = tuple(name for name, _ in settled.model.effects)
     if any(name not in {step.added for step in steps} for name in names) and not any(library[name].one_step for name in names):
         steps = _again(data, steps, names, library)
@@ -139,21 +141,26 @@ class Move:
     """The next rungs: one, two that were found together, or none, if the floor is reached or nothing helps.
 
     tried: the candidates; paired: were pairs tried, too; begun: what one-step prediction did not explain yet
+    stays: an effect that was found in the noise, where the mean over the bands does not miss it
     """
 
     steps: tuple[Step, ...]
     tried: tuple[Candidate, ...]
     paired: bool = False
     begun: Mapping[str, Grown] = field(default_factory=dict)
+    stays: str = ""
 
 
 def advance(data: AxisData, now: GreyboxFit, library: Library = STANDARD, pairs: bool = True) -> Move:
     """One move down from a fit; pairs: two effects may be tried at once where one alone helps little."""
     if now.excess < AT_FLOOR:
+        if any(library[name].one_step is not None for name, _ in now.model.effects):
+            return Move((), ())
         last = polished(data, now, library) if now.excess >= SURE else None
-        if last is None and not now.model.effects and data.floor.epsilon <= EPSILON:
-            last = faint(data, now, library)
-        return Move(() if last is None or last.fit is None else (Step(last.effect, last.fit, ()),), ())
+        hidden = faint(data, now, library) if last is None and data.floor.epsilon <= EPSILON else None
+        last = last or hidden
+        stays = "" if hidden is None else hidden.effect
+        return Move(() if last is None or last.fit is None else (Step(last.effect, last.fit, ()),), (), stays=stays)
     strict = data.floor.epsilon <= EPSILON
     begun: dict[str, Grown] = {}
     tried = candidates(data, now, library)
