@@ -78,15 +78,18 @@ def _show(name: str, item: Diagnosis, units: tuple[str, str]) -> None:
         places = "; ".join(place.sentence for place in item.where.places[:3])
         people.print(f"  the rigid model fails: {text_in(places, units)}", markup=False)
     if item.ladder is not None and item.verdict != "nothing_missing":
-        rows = [
-            (c.effect, f"{1e3 * c.fit.held_out_error:.4g}", f"{c.fit.excess:.2f}", f"{100 * c.share:.2g} %")
-            for c in item.candidates
-            if c.fit is not None
-        ]
+        rows = [(*error_cells(c.effect, c.fit), f"{100 * c.share:.2g} %") for c in item.candidates if c.fit is not None]
         if rows:
-            table("candidates", ("effect", f"held-out error m{units[1]}/s", "excess", "share of error"), rows)
+            table("candidates", ("effect", f"held-out error m{units[1]}/s", "times floor", "share of error"), rows)
         parameter_table(item.ladder.final, units)
     people.print(f"  Next experiment: {item.next_experiment}\n", markup=False)
+
+
+def error_cells(name: str, fit: GreyboxFit) -> tuple[str, str, str]:
+    """Name, held-out error and what that is over the noise floor; where free simulation cannot judge, the name says what was judged."""
+    ahead = any(fit.model.library[own].one_step is not None for own, _ in fit.model.effects)
+    label = f"{name} (error one sample ahead)" if ahead else name
+    return label, f"{1e3 * fit.held_out_error:.4g}", f"{fit.held_out_error / max(fit.noise_floor, 1e-300):.2f}"
 
 
 def parameter_table(fit: GreyboxFit, units: tuple[str, str]) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from xy_sysid.cli import options as o
-from xy_sysid.cli.diagnose import Own, parameter_table, samples
+from xy_sysid.cli.diagnose import Own, error_cells, parameter_table, samples
 from xy_sysid.cli.output import emit, people, progress, table
 from xy_sysid.cli.provenance import provenance
 from xy_sysid.cli.reading import chosen, each, read
@@ -91,14 +91,13 @@ def refine(
         return
     for name, ladder in found.items():
         rows = [
-            (
-                step.added or "rigid, with delay",
-                *(f"{1e3 * value:.4g}" for value in (step.fit.training_error, step.fit.held_out_error)),
-                f"{step.fit.excess:.3f}",
-            )
+            (label, f"{1e3 * step.fit.training_error:.4g}", held_out, over)
             for step in ladder.steps
+            for label, held_out, over in [error_cells(step.added or "rigid, with delay", step.fit)]
         ]
-        table(f"axis {name}: m{unit}, floor {1e3 * ladder.final.noise_floor:.4g}", ("added", "training error", "held-out error", "excess"), rows)
+        table(
+            f"axis {name}: m{unit}, floor {1e3 * ladder.final.noise_floor:.4g}", ("added", "training error", "held-out error", "times floor"), rows
+        )
         people.print(f"  {_words(ladder)}", markup=False)
         parameter_table(ladder.final, units)
         if name in alone:
