@@ -78,6 +78,11 @@ EXAMPLES = (
         "whenever the axis moves to and fro.",
     ),
     Example(
+        "asymmetric_viscous_friction",
+        (FREQUENCY, SPEED, TIME),
+        "The mean error against velocity bends like a V: of one sign at both ends, and growing with speed. A load is of one sign, too, but flat.",
+    ),
+    Example(
         "constant_load",
         (FREQUENCY, SPEED, TIME),
         "The same mean error at every velocity and every time, and nothing by frequency (a constant has none): weight, a spring at the end of its "

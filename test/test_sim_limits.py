@@ -227,6 +227,12 @@ def test_amplifier_lag_and_delay_each_cost_gain_times_their_time() -> None:
     assert (y.size - 1) / 2000.0 - y[-1] / GAIN == pytest.approx(0.00129 + 1e-3 + 1 / 246.0, rel=1e-9)
 
 
+@pytest.mark.parametrize(("voltage", "over_mean"), [(1.0, 1.2), (-1.0, 0.8)])
+def test_drag_that_differs_by_direction_divides_the_steady_speed(voltage: float, over_mean: float) -> None:
+    """Forth at 1 / 1.2 of the mean's speed, back at 1 / 0.8."""
+    assert speed(rigid(asymmetric_viscous_friction=0.2), voltage) == pytest.approx(voltage * GAIN / over_mean, rel=1e-9)
+
+
 def test_quadratic_drag_solves_its_quadratic() -> None:
     """V = v / gain + coefficient v^2."""
     v = speed(rigid(quadratic_drag=40.0), 1.0)

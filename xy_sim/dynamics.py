@@ -11,6 +11,7 @@ from xy_sim.layout import BASE, BASE_SPEED, BRISTLE, HEAT, MOTOR, MOTOR_SPEED, R
 from xy_sim.parts import (
     amplifier_lag,
     asymmetric_friction,
+    asymmetric_viscous_friction,
     base_loosening,
     base_resonance,
     cogging,
@@ -42,6 +43,7 @@ _HEAT_DEPTH, _HEAT_TIME, _HEAT_SPEED = slot("thermal_viscosity.depth"), slot("th
 _VISCOUS, _QUADRATIC = slot("viscous_friction.coefficient"), slot("quadratic_drag.coefficient")
 _COULOMB = slot("coulomb_friction.coulomb")
 _STRIBECK, _STRIBECK_COULOMB, _STRIBECK_V = slot("stribeck_friction.excess"), slot("stribeck_friction.coulomb"), slot("stribeck_friction.velocity")
+_SIDED = slot("asymmetric_viscous_friction.asymmetry")
 _ASYM, _ASYM_COULOMB = slot("asymmetric_friction.asymmetry"), slot("asymmetric_friction.coulomb")
 _PRE, _PRE_LENGTH, _PRE_DAMPING = slot("presliding_hysteresis.coulomb"), slot("presliding_hysteresis.length"), slot("presliding_hysteresis.damping")
 _COG, _COG_PHASE = slot("cogging.amplitude"), slot("cogging.phase")
@@ -120,10 +122,12 @@ def rates(p: FloatArray, y: FloatArray, i: int, t: float, volts: float, mode: in
         y[o, HEAT] = thermal_viscosity.rate(p[_HEAT_TIME], p[_HEAT_SPEED], v, y[i, HEAT])
     y[o, WORK] = k * volts * v
 
-    on_motor = k * (volts - viscous_friction.force(p[_VISCOUS], v) - quadratic_drag.force(p[_QUADRATIC], v)) - (1.0 - p[_GUIDE]) * drag * v
+    on_motor = k * (volts - viscous_friction.force(p[_VISCOUS], v) - quadratic_drag.force(p[_QUADRATIC], v))
+    on_motor -= (1.0 - p[_GUIDE]) * drag * asymmetric_viscous_friction.factor(p[_SIDED], v) * v
     if p[_COG] != 0.0:
         on_motor -= k * cogging.force(p[_COG], p[_COG_WAVE], p[_COG_PHASE], q)
-    on_table = k * (constant_load.force(p[_LOAD]) + hardening_stiffness.force(p[_CUBIC], p[_LINEAR], x)) - p[_GUIDE] * drag * xv
+    on_table = k * (constant_load.force(p[_LOAD]) + hardening_stiffness.force(p[_CUBIC], p[_LINEAR], x))
+    on_table -= p[_GUIDE] * drag * asymmetric_viscous_friction.factor(p[_SIDED], xv) * xv
     on_table -= contact.force(x, xv, p[_TRAVEL], p[_STOP_K], p[_STOP_C])
     on_loose = 0.0
     if p[_LOOSE_MASS] > 0.0:
