@@ -1,4 +1,4 @@
-"""python -m blind [SET ...] [--draws development|reporting] [--part N] [--jobs N] [-o FILE]: hidden effects, judged.
+"""python -m blind [SET ...] [--draws development|reporting] [--part N] [--jobs N] [--keep FILE] [-o FILE]: hidden effects, judged.
 
 Sets: standard, hard, 10 s, half, 5 um, quarter, tenth, 5 s, 2 effects, 3 effects, multisine, sweep, prbs, 1 kHz, 5 kHz.
 """
@@ -23,12 +23,14 @@ def main() -> int:
     from blind.cases import sets
     from blind.judge import Judged, run
     from blind.page import text
+    from blind.store import add, load
 
     parser = argparse.ArgumentParser(prog="blind", description="hidden effects on simulated machines, and how often the diagnosis is right")
     parser.add_argument("sets", nargs="*", help="which; without a name all")
     parser.add_argument("--draws", choices=("development", "reporting"), default="reporting", help="tune on development draws only")
     parser.add_argument("--part", type=int, default=1, metavar="N", help="every Nth case of each set but the standard one")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="cases at a time, one core each")
+    parser.add_argument("--keep", type=Path, metavar="FILE", help="what came of each case; those in it already are not run again")
     parser.add_argument("-o", type=Path, default=PAGE, metavar="FILE", help="page to write (docs/blind.md)")
     asked = parser.parse_args()
     known = sets(asked.draws)
@@ -36,14 +38,18 @@ def main() -> int:
         if name not in known:
             parser.error(f"{name!r} is not a set; there are {', '.join(known)}")
     results: dict[str, list[Judged]] = {}
+    known_already = load(asked.keep) if asked.keep else {}
     command = " ".join(["python -m blind", *(repr(name) for name in asked.sets), *([f"--part {asked.part}"] if asked.part > 1 else [])])
     facts = f"{platform.machine()}, Python {platform.python_version()}."
     try:
         for name in asked.sets or known:
             cases = known[name] if name == "standard" else known[name][:: asked.part]
-            results[name] = []
-            for item in joblib.Parallel(asked.jobs, return_as="generator")(joblib.delayed(run)(case) for case in cases):
+            results[name] = [known_already[case] for case in cases if case in known_already]
+            left = [case for case in cases if case not in known_already]
+            for item in joblib.Parallel(asked.jobs, return_as="generator")(joblib.delayed(run)(case) for case in left):
                 results[name].append(item)
+                if asked.keep:
+                    add(asked.keep, item)
                 said = " + ".join(item.effects) or item.verdict
                 good = "right" if item.right else "first" if item.first else "WRONG" if item.wrong else "missed"
                 sys.stderr.write(f"{good:6} {item.case.name}: {said} ({item.confidence:.2f}), {item.seconds:.1f} s\n")

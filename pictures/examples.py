@@ -80,7 +80,7 @@ EXAMPLES = (
     Example(
         "asymmetric_viscous_friction",
         (FREQUENCY, SPEED, TIME),
-        "The mean error against velocity is a V upside down: of one sign at both ends, and the more the faster. A load is of one sign, too, but flat.",
+        "The mean error against velocity is a V upside down: of one sign at both ends, and larger the faster. A load is of one sign too, but flat.",
     ),
     Example(
         "constant_load",

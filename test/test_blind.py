@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import pytest
 
 from blind.cases import EFFECTS, OUTSIDE, Case, sets
 from blind.judge import Judged, run
 from blind.page import text
+from blind.store import add, load
 
 SHORT = 20.0
 
@@ -81,3 +83,14 @@ def test_the_page_tells_hits_misses_and_goals() -> None:
     assert "| dead_zone | 0 of 1 |" in page
     assert "false alarms on clean axes: 0 of 1" in page
     assert "test/dead_zone/1: missing_effect coulomb_friction" in page
+
+
+def test_a_campaign_can_be_stopped_and_gone_on_with(tmp_path: Path) -> None:
+    """What was judged is read back the same; a line that a kill cut off is left out."""
+    items = [judged("coulomb_friction"), judged()]
+    for item in items:
+        add(tmp_path / "kept", item)
+    with (tmp_path / "kept").open("a") as file:
+        file.write('{"case": {"gro')
+    assert load(tmp_path / "kept") == {item.case: item for item in items}
+    assert load(tmp_path / "none") == {}

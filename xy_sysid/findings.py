@@ -131,8 +131,12 @@ def findings(item: Diagnosis, library: Library) -> Findings:
 
 
 def _tried(item: Candidate, fit: GreyboxFit, before: float) -> Tried:
+    ahead = any(fit.model.library[name].one_step is not None for name, _ in fit.model.effects)
     evidence = (
-        f"its trace explains {100 * item.share:.3g} % of the error; with it the held-out error is "
+        f"judged one sample ahead, as no free simulation can tell: with it {1e3 * fit.held_out_error:.3g} mm/s are left, "
+        f"the encoder's noise alone is {1e3 * fit.noise_floor:.3g}"
+        if ahead
+        else f"its trace explains {100 * item.share:.3g} % of the error; with it the held-out error is "
         f"{1e3 * fit.held_out_error:.3g} mm/s instead of {1e3 * before:.3g}"
     )
     ratio = fit.held_out_error / before if before > 0 else None

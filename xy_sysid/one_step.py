@@ -21,7 +21,8 @@ from xy_sysid.spectral_cost import count_size
 from xy_sysid.traces import bounded
 
 AT_NOISE = 3.5  # held-out innovation over the encoder's noise up to which an effect explains the axis
-BETTER = 2.0  # innovation without the effect over that with it, at least
+BETTER = 2.0  # innovation without the effect over that with it, at least; and where nearly nothing but noise is left
+CLEAN, LITTLE_BETTER = 1.6, 1.25  # (over the noise), that
 TELLING = 0.005  # dry friction over the rms voltage from which it is named
 
 Others = Sequence[tuple[str, tuple[float, ...]]]
@@ -96,7 +97,8 @@ def _result(data: AxisData, library: Library, effect: Effect, names: Sequence[st
     held = float(np.sqrt(np.mean(error[data.training :] ** 2)))
     noise_floor = found.noise * data.sampling_rate
     worse = found.without * data.sampling_rate or held  # not known where the effect explains too little, or is too small to be one
-    far = max(held / (AT_NOISE * noise_floor), BETTER * held / worse)
+    least = LITTLE_BETTER if held < CLEAN * noise_floor else BETTER
+    far = max(held / (AT_NOISE * noise_floor), least * held / worse)
     rows: list[tuple[str, tuple[float, ...], tuple[float, ...]]] = [(effect.name, bounded(effect, found.values), found.spread)]
     level, doubt = found.dry
     if level > TELLING * float(np.std(data.voltage)) and level > 5.0 * doubt:

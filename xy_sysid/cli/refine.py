@@ -95,9 +95,7 @@ def refine(
             for step in ladder.steps
             for label, held_out, over in [error_cells(step.added or "rigid, with delay", step.fit)]
         ]
-        table(
-            f"axis {name}: m{unit}, floor {1e3 * ladder.final.noise_floor:.4g}", ("added", "training error", "held-out error", "times floor"), rows
-        )
+        table(f"axis {name}: m{unit}, floor {1e3 * ladder.final.noise_floor:.4g}", ("added", "training error", "held-out error", "times floor"), rows)
         people.print(f"  {_words(ladder)}", markup=False)
         parameter_table(ladder.final, units)
         if name in alone:
