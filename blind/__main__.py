@@ -22,7 +22,7 @@ def main() -> int:
 
     from blind.cases import sets
     from blind.judge import Judged, run
-    from blind.page import text
+    from blind.page import text, with_remarks
     from blind.store import add, load
 
     parser = argparse.ArgumentParser(prog="blind", description="hidden effects on simulated machines, and how often the diagnosis is right")
@@ -53,7 +53,8 @@ def main() -> int:
                 said = " + ".join(item.effects) or item.verdict
                 good = "right" if item.right else "first" if item.first else "WRONG" if item.wrong else "missed"
                 sys.stderr.write(f"{good:6} {item.case.name}: {said} ({item.confidence:.2f}), {item.seconds:.1f} s\n")
-            asked.o.write_text(text(results, asked.draws, command, facts), encoding="utf-8")
+            before = asked.o.read_text(encoding="utf-8") if asked.o.exists() else ""
+            asked.o.write_text(with_remarks(text(results, asked.draws, command, facts), before), encoding="utf-8")
     except KeyboardInterrupt:
         return 130
     sys.stderr.write(f"{asked.o} written\n")

@@ -25,6 +25,7 @@ WORDS = {
     "5 kHz": "5 kHz",
     **SMALL,
 }
+REMARKS = "\n## Remarks\n"  # from here on people write, and the command leaves it
 GOALS = {"hard": 95, "10 s": 95, "half": 95, "5 um": 95, "2 effects": 90, "3 effects": 75}
 
 
@@ -49,6 +50,12 @@ def text(results: dict[str, list[Judged]], draws: str, command: str, facts: str)
         parts += _others(results, others)
     parts += _misses(results)
     return "\n".join(parts) + "\n"
+
+
+def with_remarks(made: str, old: str) -> str:
+    """The page, with the remarks that people wrote at the end of the old one."""
+    _, mark, remarks = old.partition(REMARKS)
+    return f"{made}\n{mark.lstrip()}{remarks}" if mark else made
 
 
 def _standard(items: Sequence[Judged]) -> list[str]:

@@ -10,7 +10,7 @@ import pytest
 
 from blind.cases import EFFECTS, OUTSIDE, Case, sets
 from blind.judge import Judged, run
-from blind.page import text
+from blind.page import text, with_remarks
 from blind.store import add, load
 
 SHORT = 20.0
@@ -94,3 +94,10 @@ def test_a_campaign_can_be_stopped_and_gone_on_with(tmp_path: Path) -> None:
         file.write('{"case": {"gro')
     assert load(tmp_path / "kept") == {item.case: item for item in items}
     assert load(tmp_path / "none") == {}
+
+
+def test_remarks_outlive_the_next_campaign() -> None:
+    """What people wrote below the last heading stays."""
+    old = "# Blind\n\nold\n\n## Remarks\n\nwritten\n"
+    assert with_remarks("# Blind\n\nnew\n", old) == "# Blind\n\nnew\n\n## Remarks\n\nwritten\n"
+    assert with_remarks("new\n", "old\n") == "new\n"
