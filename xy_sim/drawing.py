@@ -64,7 +64,7 @@ def _choose(axis: Axis, group: str, count: int, random: np.random.Generator) -> 
     """So many parts that the axis does not have, none that stands for another of its family."""
     chosen: list[Part] = []
     taken = {PARTS[name].family for name in axis.parts}
-    for name in random.permutation(sorted(PARTS)):
+    for name in random.permutation(sorted(name for name, part in PARTS.items() if part.drawn)):
         part = PARTS[str(name)]
         free = part.name not in axis.parts and (not part.family or part.family not in taken)
         if len(chosen) < count and part.group == group and free:

@@ -13,6 +13,7 @@ PART = Part(
     meaning="seals and wipers whose lip drags more one way than the other",
     source="Janot, Gautier & Brunot, Data set and reference models of EMPS, Nonlinear System Identification Benchmarks 2019",
     parameters=(Parameter("asymmetry", "", 0.2, 0.1, 0.4, "part by which the drag forth is above and back below the mean", -1.0, 1.0, True),),
+    drawn=False,
 )
 
 

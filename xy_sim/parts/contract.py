@@ -56,6 +56,7 @@ class Part:
     parameters: the first one is its size, the number of ``--effect NAME=SIZE``
     kind:       where it acts; group: who may suspect it ("outside": no hypothesis knows it; "event": happens meanwhile)
     family:     parts of one family replace one another when effects are drawn
+    drawn:      False for a part that came later: seeds keep the machines that they have always drawn
     """
 
     name: str
@@ -66,6 +67,7 @@ class Part:
     source: str
     parameters: tuple[Parameter, ...]
     family: str = ""
+    drawn: bool = True
 
     def values(self, given: object, where: str) -> dict[str, float]:
         """Every parameter from what a user gave: nothing (defaults), one number (the size), or names and numbers."""
