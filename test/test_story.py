@@ -129,6 +129,7 @@ def test_backlash_is_told_one_sample_ahead() -> None:
     story = tell("x", RATE, *recorded("x:backlash", seconds=20.0).axis("x"))
     last = story.steps[-1]
     assert (last.rung.added, last.rung.explained) == ("backlash", True)
+    assert story.steps[0].pictures.failing and not last.pictures.failing  # explained is not drawn as failing
     assert "one sample ahead" in last.rung.label
     assert len(last.pictures.failing) < len(story.steps[0].pictures.failing)
     error = np.std(last.pictures.zoom_velocity - (story.measured.zoom_velocity if story.measured else 0.0))

@@ -6,7 +6,7 @@ simulated motion through the same windows as the measured one, so that friction 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from xy_sysid.estimate import frequency_response, main_lobe
 from xy_sysid.frf import ComplexArray, FrequencyResponse
 from xy_sysid.greybox import Z95, AxisData, GreyboxFit
 from xy_sysid.linear_part import linear_part
+from xy_sysid.one_step import AT_NOISE
 from xy_sysid.stream import FloatArray
 from xy_sysid.transfer_function import TransferFunction
 from xy_sysid.windows import WindowShape
@@ -161,11 +162,16 @@ def pictures(data: AxisData, fitted: GreyboxFit, shown: Measured) -> Pictures:
 
 
 def _compared(data: AxisData, fitted: GreyboxFit) -> Comparison:
-    """On the samples that no fit saw; on all of them if those are few, and by bands alone if all are few."""
+    """On the samples that no fit saw; on all of them if those are few, and by bands alone if all are few.
+
+    A model that is judged one sample ahead fails where it is above what counts as explained there.
+    """
+    ahead = any(fitted.model.library[name].one_step is not None for name, _ in fitted.model.effects)
     for first in (data.training, 0):
         try:
             held = fitted.simulated[first:], data.voltage[first:], data.position[first:]
-            return compare_velocity(*held, data.sampling_rate, begins=first / data.sampling_rate)
+            found = compare_velocity(*held, data.sampling_rate, begins=first / data.sampling_rate)
+            return replace(found, places=tuple(place for place in found.places if not ahead or place.error_over_floor > AT_NOISE))
         except BadInput:
             continue
     edges = data.layout.edges()
