@@ -46,13 +46,14 @@ def main() -> int:
             cases = known[name] if name == "standard" else known[name][:: asked.part]
             results[name] = [known_already[case] for case in cases if case in known_already]
             left = [case for case in cases if case not in known_already]
-            for item in joblib.Parallel(asked.jobs, return_as="generator")(joblib.delayed(run)(case) for case in left):
+            for item in joblib.Parallel(asked.jobs, return_as="generator_unordered")(joblib.delayed(run)(case) for case in left):
                 results[name].append(item)
                 if asked.keep:
                     add(asked.keep, item)
                 said = " + ".join(item.effects) or item.verdict
                 good = "right" if item.right else "first" if item.first else "WRONG" if item.wrong else "missed"
                 sys.stderr.write(f"{good:6} {item.case.name}: {said} ({item.confidence:.2f}), {item.seconds:.1f} s\n")
+            results[name].sort(key=lambda item: cases.index(item.case))
             before = asked.o.read_text(encoding="utf-8") if asked.o.exists() else ""
             asked.o.write_text(with_remarks(text(results, asked.draws, command, facts), before), encoding="utf-8")
     except KeyboardInterrupt:
