@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +13,15 @@ import yaml
 from xy_sim.effect_text import with_effects
 from xy_sim.machine import Machine
 from xy_sim.parts import PARTS
+from xy_sysid.axis_model import STANDARD
 from xy_sysid.cli import run
 from xy_sysid.cli.simulate import drive
-from xy_sysid.diagnosis import diagnose
+from xy_sysid.diagnosis import _judged, diagnose
+from xy_sysid.greybox import prepare
 from xy_sysid.imports import save
+from xy_sysid.race import AT_FLOOR
 from xy_sysid.recording import Recording
+from xy_sysid.refinement import refine
 from xy_sysid.settings import AxisExcitation, ExcitationSettings
 
 
@@ -46,6 +51,25 @@ def test_two_effects_are_both_named() -> None:
     found = diagnose(2000.0, u, y)
     assert found.verdict == "missing_effect"
     assert set(found.effects) == {"coulomb_friction", "cogging"}
+
+
+@pytest.mark.parametrize("effect", ["coulomb_friction=0.001", "dead_zone=0.002"])
+def test_an_effect_in_the_noise_is_named_without_confidence(effect: str) -> None:
+    """The base is at the floor, the name is the simplest that its trace asks for, and it is no certainty."""
+    found = diagnose(2000.0, *recorded(effect).axis("x"))
+    assert found.ladder is not None and found.ladder.steps[0].fit.excess < AT_FLOOR
+    assert found.effects == (effect.partition("=")[0],)
+    assert found.ladder.faint == found.effects
+    assert found.confidence < 0.5
+
+
+def test_an_effect_in_the_noise_of_a_base_without_any_excess_is_no_division_by_zero() -> None:
+    """Excess of the base exactly 0."""
+    u, y = recorded("dead_zone=0.002").axis("x")
+    ladder = refine(data := prepare(2000.0, u, y))
+    first = replace(ladder.steps[0], fit=replace(ladder.steps[0].fit, excess=0.0))
+    found = _judged(data, replace(ladder, steps=(first, *ladder.steps[1:])), STANDARD, 1e-3, 1.0)
+    assert found.verdict == "missing_effect" and found.effects == ("dead_zone",)
 
 
 def test_a_clean_axis_misses_nothing() -> None:

@@ -23,6 +23,7 @@ TOLERANCES = (1e-3, 1e-2, 3e-2)  # of the signal that a model may leave: real ma
 CERTAINTY = (1.0, 0.6, 0.4)  # most confidence at each tolerance: a looser floor is reached by wrong models too
 TELLING = 1.0  # excess that the base must have at a looser tolerance, for a name that reaches it to mean anything
 HOPELESS = 0.6  # excess that the strict ladder's end may have at a looser tolerance for a ladder of its own to be worth its time
+FAINT = 0.4  # part of the confidence in an effect that was found in the noise: there many look like one another
 CLEAR = 0.3  # excess by which a runner-up must be behind for the confidence to reach 63 % of its most
 EXPLAINS = 0.6  # part of the excess that must be gone for a name with a rest left over
 FOLLOWS = 0.15  # coherence of input and velocity, mean over an octave: of unrelated signals it is below 0.08
@@ -118,11 +119,12 @@ def _judged(data: AxisData, ladder: Ladder, library: Library, tolerance: float, 
         text = f"Nothing is missing: the rigid model with delay leaves {_mm(base.held_out_error)} mm/s, the floor is {_mm(base.noise_floor)} mm/s."
         return Diagnosis("nothing_missing", (), certainty, tolerance, text, ladder, tried, where, "None is needed.")
     names = _ordered(data, ladder, library)
-    gone = 1.0 - final.excess / base.excess
+    gone = 1.0 - final.excess / base.excess if base.excess > 0.0 else 0.0  # an effect may be found in the noise of a base at the floor
     fall = f"the held-out error falls from {_mm(base.held_out_error)} to {_mm(final.held_out_error)} mm/s (floor {_mm(final.noise_floor)})"
     if names and ladder.explained:
         runner = _runner_up(tried, names, library)
         confidence = certainty * (1.0 - math.exp(-max(_gap(ladder, runner), 0.0) / CLEAR))
+        confidence *= FAINT if ladder.faint else 1.0
         down_to = "" if tolerance == TOLERANCES[0] else f", which explains it down to {100 * tolerance:.2g} %"
         sentence = f"Missing: {' and '.join(names)}{down_to}; {fall}."
         if runner is not None and runner.fit is not None:

@@ -15,6 +15,7 @@ from xy_sysid.axis_model import STANDARD, Library
 from xy_sysid.effects import Effect
 from xy_sysid.greybox import AxisData, GreyboxFit, finish, fit_instead, fit_with, look
 from xy_sysid.one_step_race import Grown, grown
+from xy_sysid.traces import Trace
 
 # Tuned on development draws of the simulated machine only (blind/cases.py).
 AT_FLOOR = 0.15  # excess below which nothing is left to explain; clean axes stay below 0.02
@@ -32,6 +33,7 @@ PART_LEFT = 0.4  # of the excess that an effect found between SURE and AT_FLOOR 
 FAINT_TRACE = 0.06  # share, times seconds of training, from which an effect is looked for in the noise: of clean axes the largest is 0.036,
 LINEAR_TRACE = 0.4  # but 0.1 for lags and resonances, which a last thousandth of the base's response looks like
 RELATIVE_TRACE = 0.2  # the same for a richer relative of what is in the model: where nothing asks for it, the largest is 0.05
+AS_LARGE = 0.9  # part of a relative's trace that a simpler one must have to be tried in its place
 WELL_KNOWN = 2.0  # width of the 95 % interval over the size: it is not zero
 SUSPICIOUS = 0.1  # share of a look-alike from which an effect that free simulation cannot judge is tried
 UNSEEN = ("constant_load",)  # effects with next to no trace in the error's spectrum: always tried as the second of a pair
@@ -172,7 +174,8 @@ def faint(data: AxisData, now: GreyboxFit, library: Library) -> Candidate | None
     seconds = data.training / data.sampling_rate
     richer = _richer(now, library) if now.model.effects else {}
     open_to = [library[name] for name in richer] if now.model.effects else _open(now, library)
-    for trace in look(data, now, open_to)[:2] if open_to else ():
+    traces = look(data, now, open_to) if open_to else []
+    for trace in dict.fromkeys(_simplest(trace, traces, library) for trace in traces[:2]):
         effect = library[trace.effect]
         least = RELATIVE_TRACE if richer else LINEAR_TRACE if effect.category in ("motion", "state") else FAINT_TRACE
         if trace.share * seconds < least:
@@ -186,6 +189,13 @@ def faint(data: AxisData, now: GreyboxFit, library: Library) -> Candidate | None
         if known and plausible(found) and found.held_out_error < now.held_out_error and found.excess <= now.excess + SURE:
             return Candidate(trace.effect, trace.share, found)
     return None
+
+
+def _simplest(trace: Trace, traces: list[Trace], library: Library) -> Trace:
+    """The relative with the fewest parameters of those whose traces are as large: in the noise nothing asks for more."""
+    family = library[trace.effect].family
+    alike = [other for other in traces if family and library[other.effect].family == family and other.share > AS_LARGE * trace.share]
+    return min(alike, key=lambda other: len(library[other.effect].parameters), default=trace)
 
 
 def plausible(found: GreyboxFit) -> bool:

@@ -52,12 +52,16 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Ladder:
-    """The rungs from the base down; ``rejected`` is what was tried last and not taken; ``effects`` what remains after pruning."""
+    """The rungs from the base down.
+
+    rejected: what was tried last and not taken; effects: what remains after pruning; faint: those of them that were found in the noise
+    """
 
     steps: tuple[Step, ...]
     rejected: tuple[Candidate, ...]
     final: GreyboxFit
     effects: tuple[str, ...]
+    faint: tuple[str, ...] = ()
 
     @property
     def explained(self) -> bool:
@@ -100,7 +104,7 @@ def refine(data: AxisData, library: Library = STANDARD, most: int = MOST_EFFECTS
     names = tuple(name for name, _ in settled.model.effects)
     if any(name not in {step.added for step in steps} for name in names) and not any(library[name].one_step for name in names):
         steps = _again(data, steps, names, library)
-    return Ladder(tuple(steps), rejected, settled, names)
+    return Ladder(tuple(steps), rejected, settled, names, tuple(name for name in names if name in stays and name not in kept))
 
 
 def _another_way(
