@@ -160,7 +160,7 @@ def polished(data: AxisData, now: GreyboxFit, library: Library) -> Candidate | N
         found = _tried(data, now, trace.effect)
         if found is not None and found.excess < now.excess:
             found = finish(data, found.model, found.runs)
-            if found.excess < PART_LEFT * now.excess:
+            if found.excess < PART_LEFT * now.excess and (now.model.effects or _known(found, library[trace.effect])):
                 return Candidate(trace.effect, trace.share, found)
     return None
 
@@ -184,11 +184,15 @@ def faint(data: AxisData, now: GreyboxFit, library: Library) -> Candidate | None
         if found is None:
             continue
         found = finish(data, found.model, found.runs)
-        size = found.parameter(f"{trace.effect}.{effect.names[0]}")
-        known = size.high - size.low < WELL_KNOWN * abs(size.value)
-        if known and plausible(found) and found.held_out_error < now.held_out_error and found.excess <= now.excess + SURE:
+        if _known(found, effect) and plausible(found) and found.held_out_error < now.held_out_error and found.excess <= now.excess + SURE:
             return Candidate(trace.effect, trace.share, found)
     return None
+
+
+def _known(found: GreyboxFit, effect: Effect) -> bool:
+    """The size of an effect, its first parameter, is well known."""
+    size = found.parameter(f"{effect.name}.{effect.names[0]}")
+    return size.high - size.low < WELL_KNOWN * abs(size.value)
 
 
 def _simplest(trace: Trace, traces: list[Trace], library: Library) -> Trace:

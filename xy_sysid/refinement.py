@@ -54,7 +54,7 @@ class Step:
 class Ladder:
     """The rungs from the base down.
 
-    rejected: what was tried last and not taken; effects: what remains after pruning; faint: those of them that were found in the noise
+    rejected: what was tried last and not taken; effects: what remains after pruning; faint: those of them found below the floor
     """
 
     steps: tuple[Step, ...]
@@ -145,7 +145,7 @@ class Move:
     """The next rungs: one, two that were found together, or none, if the floor is reached or nothing helps.
 
     tried: the candidates; paired: were pairs tried, too; begun: what one-step prediction did not explain yet
-    stays: an effect that was found in the noise, where the mean over the bands does not miss it
+    stays: an effect that was found below the floor's threshold, where the mean over the bands hardly misses it
     """
 
     steps: tuple[Step, ...]
@@ -163,7 +163,7 @@ def advance(data: AxisData, now: GreyboxFit, library: Library = STANDARD, pairs:
         last = polished(data, now, library) if now.excess >= SURE else None
         hidden = faint(data, now, library) if last is None and data.floor.epsilon <= EPSILON else None
         last = last or hidden
-        stays = "" if hidden is None else hidden.effect
+        stays = "" if last is None or (hidden is None and now.model.effects) else last.effect
         return Move(() if last is None or last.fit is None else (Step(last.effect, last.fit, ()),), (), stays=stays)
     strict = data.floor.epsilon <= EPSILON
     begun: dict[str, Grown] = {}
