@@ -13,6 +13,8 @@ from xy_sim.machine import Machine
 from xy_sysid.axis_model import STANDARD, AxisModel, simulate, undoer
 from xy_sysid.cli.simulate import drive
 from xy_sysid.effects import EFFECTS
+from xy_sysid.effects.contact import OWN, _Fit, innovations
+from xy_sysid.effects.contract import Beside, DryFriction
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox import AxisData, GreyboxFit, fit_base, fit_with, prepare
 from xy_sysid.one_step import one_step_fit
@@ -125,5 +127,49 @@ def test_a_dead_zone_can_be_added_to_backlash_by_name() -> None:
     both = added(data, alone, "dead_zone")
     assert both.held_out_error < 0.5 * alone.held_out_error
     assert both.parameter("dead_zone.width").value == pytest.approx(0.15, rel=0.05)
-    with pytest.raises(BadInput, match="stribeck_friction"):
-        added(data, alone, "stribeck_friction")
+    with pytest.raises(BadInput, match="asymmetric_viscous_friction"):
+        added(data, alone, "asymmetric_viscous_friction")
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [("coulomb_friction", (0.2,)), ("stribeck_friction", (0.12, 0.15, 0.01)), ("presliding_hysteresis", (0.2, 12e-6, 1.5))],
+)
+def test_friction_inside_the_filter_is_the_law_of_its_effect(name: str, values: tuple[float, ...]) -> None:
+    """Without a gap and told next to nothing by the encoder, the filter moves as the simulation does; dry friction is smoothed near rest."""
+    u = 3.0 * lfilter([0.3], [1.0, -0.7], noise())
+    velocity = simulate(AxisModel(*BASE).with_effect(name, values), RATE, u, np.zeros_like(u))
+    position = np.concatenate(([0.0], np.cumsum(velocity))) / RATE
+    fit = _Fit(RATE, BASE, 1.0, as_beside_nothing(u), u.size - 1, name)
+    numbers = fit.outer(fit.start(BASE, (1e-10, 0.4, 30e3, 0.5, 0.0, 0.0), DryFriction(name, values, (0.0,) * len(values))))
+    out = np.empty(u.size - 1)
+    innovations(u[:-1], position, np.zeros(u.size - 1), numbers[:OWN], name == "presliding_hysteresis", RATE, 1e12, 0.0, 400, out)
+    bent = name == "presliding_hysteresis"
+    assert float(np.std(np.diff(out))) * RATE < (0.002 if bent else 0.01) * float(np.std(velocity))
+
+
+def as_beside_nothing(voltage: FloatArray) -> Beside:
+    none = np.zeros(0)
+    zero = np.zeros(voltage.size)
+    return Beside(none, none, none, none, none.astype(np.bool_), lambda _, n: (voltage[:n], zero[: n + 1], zero[:n], 1.0))
+
+
+@pytest.mark.parametrize(
+    ("effect", "name", "values", "within"),
+    [
+        ("stribeck_friction=0.15,coulomb=0.12,velocity=0.01", "stribeck_friction", (0.12, 0.15, 0.01), 0.35),
+        ("presliding_hysteresis=0.2,length=12e-6,damping=1.5", "presliding_hysteresis", (0.2, 12e-6, 1.5), 0.05),
+    ],
+)
+def test_friction_that_bends_or_sticks_is_told_from_coulomb_friction_beside_a_gap(
+    effect: str, name: str, values: tuple[float, ...], within: float
+) -> None:
+    """It takes the place of Coulomb friction in the filter, and the innovations fall; Stribeck's numbers stay vague, for sticking is smoothed."""
+    data, base = machine("backlash=5e-6", effect)
+    alone = one_step_fit(data, fit_with(data, base, ["coulomb_friction"], brief=True), EFFECTS["backlash"])
+    both = added(data, alone, name)
+    assert name in both.model
+    assert "coulomb_friction" not in both.model
+    assert both.held_out_error < 0.7 * alone.held_out_error
+    assert dict(both.model.effects)[name][:2] == pytest.approx(values[:2], rel=within)
+    assert both.parameter("backlash.gap").value == pytest.approx(5e-6, rel=0.1)

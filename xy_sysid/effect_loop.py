@@ -39,7 +39,7 @@ $hang
         stiff = math.ceil(fastest(pole, bottom, fs) / ($stiff * fs))
         lighter = generator_moving[1, top.size + 1] / (gain * pole)  # without what hangs on it: sooner does it follow the friction
         wanted = fine * lighter if curved else fine
-        cuts = min(max(math.ceil(wanted / fs), stiff), $most) if heeded or curved else 1
+        cuts = min(max(math.ceil(wanted / fs), stiff), math.ceil($most * fine)) if heeded or curved else 1
         h_old, h_new = part / fs / cuts, (1.0 - part) / fs / cuts
         moving_old, moving_new = exponential(generator_moving, h_old), exponential(generator_moving, h_new)
         still_old, still_new = exponential(generator_still, h_old), exponential(generator_still, h_new)

@@ -14,7 +14,7 @@ import numpy as np
 from xy_sysid.axis_model import AxisModel, Library, undoer
 from xy_sysid.effect_code import undoable
 from xy_sysid.effects import Effect
-from xy_sysid.effects.contract import Beside, Followed, arguments
+from xy_sysid.effects.contract import NO_FRICTION, Beside, DryFriction, Followed, arguments
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox import Z95, AxisData, Estimate, GreyboxFit, unit_of
 from xy_sysid.spectral_cost import count_size
@@ -41,7 +41,9 @@ def followed(data: AxisData, base: GreyboxFit, effect: Effect, new: Others = (),
     if effect.one_step is None:
         raise BadInput(f"effect {effect.name}", "no one-step prediction", "an effect that has one", "Fit it by simulation.")
     dry, others = beside(base.model, effect)
-    others += tuple(new)
+    rubbing = [DryFriction(name, values, (0.0,) * len(values)) for name, values in new if name in effect.one_step.frictions]
+    dry = rubbing[-1] if rubbing else dry
+    others += tuple((name, values) for name, values in new if name not in effect.one_step.frictions)
     first = data.training if any(_ages(base.model.library[name]) for name, _ in others) else data.first
     stages = first, data.training, data.position.size - 1
     start = base.model.gain, base.model.delay, base.model.pole
@@ -54,20 +56,20 @@ def _ages(effect: Effect) -> bool:
     return any("t" in arguments(function) for function in effect.functions.values())
 
 
-def beside(model: AxisModel, effect: Effect) -> tuple[float, tuple[tuple[str, tuple[float, ...]], ...]]:
-    """Coulomb friction (V) of a model and its effects that can be taken out of a recording; raises BadInput for others."""
+def beside(model: AxisModel, effect: Effect) -> tuple[DryFriction, tuple[tuple[str, tuple[float, ...]], ...]]:
+    """Dry friction of a model and its effects that can be taken out of a recording; raises BadInput for others."""
+    assert effect.one_step is not None
     for name, _ in model.effects:
         model = model.taken_apart(name)
-    dry, others = 0.0, []
+    dry, others = NO_FRICTION, []
     for name, values in model.effects:
-        if name == "coulomb_friction":
-            dry = values[0]
+        if name in effect.one_step.frictions:
+            dry = DryFriction(name, values, (0.0,) * len(values))
         elif undoable(model.library[name]):
             others.append((name, values))
         elif name != effect.name:
-            raise BadInput(
-                "effects", f"{effect.name} with {name}", f"{effect.name} with Coulomb friction or what does not heed speed", "Leave it out."
-            )
+            known = ", ".join(effect.one_step.frictions)
+            raise BadInput("effects", f"{effect.name} with {name}", f"{effect.name} with {known}, or what does not heed speed", "Leave it out.")
     return dry, tuple(others)
 
 
@@ -100,9 +102,9 @@ def _result(data: AxisData, library: Library, effect: Effect, names: Sequence[st
     least = LITTLE_BETTER if held < CLEAN * noise_floor else BETTER
     far = max(held / (AT_NOISE * noise_floor), least * held / worse)
     rows: list[tuple[str, tuple[float, ...], tuple[float, ...]]] = [(effect.name, bounded(effect, found.values), found.spread)]
-    level, doubt = found.dry
-    if level > TELLING * float(np.std(data.voltage)) and level > 5.0 * doubt:
-        rows.append(("coulomb_friction", (level,), (doubt,)))
+    dry = found.dry
+    if dry.values[0] > TELLING * float(np.std(data.voltage)) and dry.values[0] > 5.0 * dry.spread[0]:
+        rows.append((dry.effect, bounded(library[dry.effect], dry.values), dry.spread))
     values, spread = iter(found.beside[0]), iter(found.beside[1])
     rows += [(name, tuple(next(values) for _ in library[name].names), tuple(next(spread) for _ in library[name].names)) for name in names]
     rows = _joined(library, rows)

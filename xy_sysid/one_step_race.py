@@ -18,7 +18,7 @@ from xy_sysid.effect_code import undoable
 from xy_sysid.effects import Effect, Guess, Scene
 from xy_sysid.effects.contract import Beside, Followed
 from xy_sysid.greybox import AxisData, GreyboxFit
-from xy_sysid.one_step import as_beside, beside, followed
+from xy_sysid.one_step import CLEAN, as_beside, beside, followed
 from xy_sysid.stream import FloatArray
 from xy_sysid.traces import Trace, bounded
 
@@ -29,7 +29,10 @@ LEAST_SHARE = 0.005  # of the innovations that an effect's trace must explain to
 TELLING = 0.02  # the same where the axis is explained already
 MIMIC = 0.15  # the same for a look-alike, which takes part of the contact's own error
 LOUD = 0.08  # share from which an effect is tried beside one that does not explain the axis alone, without being asked for patience
-LESS, MUCH_LESS = 0.97, 0.8  # of the held-out innovation that one more effect must leave at most, where it is explained and else
+LITTLE_LESS, LESS, MUCH_LESS = 0.97, 0.85, 0.8  # of the held-out innovation that one more effect must leave at most: where next to
+# nothing but noise is left, where it is explained, and else
+RUBS = 0.05  # Coulomb friction over the rms voltage from which richer laws of it are tried
+NEARLY = 10.0  # innovation over the noise up to which they are
 AGAIN, LOST = 2.5, 40.0  # innovations over noise between which a first fit is begun again from where it ended
 MOST = 3  # effects beside
 
@@ -57,13 +60,18 @@ def grown(data: AxisData, base: GreyboxFit, effect: Effect, library: Library, pa
         known = {name for name, _ in beside(fit.model, effect)[1]} | {name for name, _ in fit.model.effects}
         # a resonance is not tried: together with a gap it explains too much (cogging at small amplitude, friction that bends)
         open_to = [e for e in library.acting if undoable(e) and e.simulable and e.name not in known and e.category != "motion"]
-        seen = traces(data, fit.model, effect, found, open_to)
-        wanted = [trace for trace in seen if trace.share >= _least(library[trace.effect], effect, explains, patient)][:TRIED]
-        tried = [(trace.effect, *followed(data, fit, effect, [(trace.effect, trace.values)], found)) for trace in wanted]
+        rubbing = [] if explains else _rubbing(data, fit, effect, library, found)
+        wanted = traces(data, fit.model, effect, found, rubbing) if rubbing else []
+        tried = [(trace.effect, *followed(data, fit, effect, [_start(trace, effect, found)], found)) for trace in wanted]
+        if not any(item[1].excess == 0.0 for item in tried):
+            seen = traces(data, fit.model, effect, found, open_to)
+            wanted = [trace for trace in seen if trace.share >= _least(library[trace.effect], effect, explains, patient)][:TRIED]
+            tried += [(trace.effect, *followed(data, fit, effect, [(trace.effect, trace.values)], found)) for trace in wanted]
         if not tried:
             break
         name, better, its = min(tried, key=lambda item: item[1].held_out_error)
-        if not better.held_out_error < (LESS if explains else MUCH_LESS) * fit.held_out_error:
+        most = MUCH_LESS if not explains else LITTLE_LESS if fit.held_out_error < CLEAN * fit.noise_floor else LESS
+        if not better.held_out_error < most * fit.held_out_error:
             break
         new = [own for own, _ in better.model.effects if own not in fit.model]
         better, found = _settled(data, effect, better, its)
@@ -72,19 +80,47 @@ def grown(data: AxisData, base: GreyboxFit, effect: Effect, library: Library, pa
 
 
 def put_beside(data: AxisData, now: GreyboxFit, effect: Effect, other: Effect) -> GreyboxFit:
-    """One more beside an effect that the fit has already. Raises BadInput if it cannot be taken out of a recording."""
-    without = replace(now, model=now.model.without(effect.name))
-    beside(without.model.with_effect(other.name), effect)
-    if not undoable(other):
-        return followed(data, replace(now, model=without.model.with_effect(other.name)), effect)[0]
+    """One more beside an effect that the fit has already, in the place of its relatives. Raises BadInput if the filter cannot have it."""
+    assert effect.one_step is not None
+    library, model = now.model.library, now.model.without(effect.name)
+    for name, _ in model.effects:
+        if other.family and library[name].family == other.family:
+            model = model.without(name)
+    beside(model.with_effect(other.name), effect)
+    rubs = other.name in effect.one_step.frictions[1:]
+    if not (undoable(other) or rubs):
+        return followed(data, replace(now, model=model.with_effect(other.name)), effect)[0]
+    without = replace(now, model=now.model.without(effect.name) if rubs else model)
     _, found = followed(data, without, effect)
-    values = traces(data, without.model, effect, found, [other])[0].values
-    return followed(data, without, effect, [(other.name, values)], found)[0]
+    trace = traces(data, without.model, effect, found, [other])[0]
+    return followed(data, without, effect, [_start(trace, effect, found)], found)[0]
+
+
+def _rubbing(data: AxisData, fit: GreyboxFit, effect: Effect, library: Library, found: Followed) -> list[Effect]:
+    """Laws of dry friction that say more than the one that the filter has now, where it is large and the fit is near its end.
+
+    Their traces do not tell: friction that bends or sticks changes what the filter believes of the gap.
+    """
+    assert effect.one_step is not None
+    if found.dry.values[0] < RUBS * float(np.std(data.voltage)) or fit.held_out_error > NEARLY * fit.noise_floor:
+        return []
+    own = len(library[found.dry.effect].parameters)
+    return [library[name] for name in effect.one_step.frictions if name in library.effects and len(library[name].parameters) > own]
+
+
+def _start(trace: Trace, effect: Effect, found: Followed) -> tuple[str, tuple[float, ...]]:
+    """Name and values to begin with: friction at the level that it has already."""
+    assert effect.one_step is not None
+    if trace.effect not in effect.one_step.frictions:
+        return trace.effect, trace.values
+    return trace.effect, (max(found.dry.values[0], 1e-3), *trace.values[1:])
 
 
 def _settled(data: AxisData, effect: Effect, fit: GreyboxFit, found: Followed) -> tuple[GreyboxFit, Followed]:
-    """Once more from where a fit ended, if it may have ended too soon."""
-    if AGAIN * fit.noise_floor < fit.held_out_error < LOST * fit.noise_floor:
+    """Once more from where a fit ended, if it may have ended too soon: richer friction moves slowly."""
+    assert effect.one_step is not None
+    least = AGAIN if found.dry.effect == effect.one_step.frictions[0] else CLEAN
+    if least * fit.noise_floor < fit.held_out_error < LOST * fit.noise_floor:
         again, its = followed(data, fit, effect, (), found)
         if again.held_out_error < fit.held_out_error:
             return again, its
@@ -101,7 +137,7 @@ def traces(data: AxisData, model: AxisModel, effect: Effect, found: Followed, ef
     """How much of the innovations' power each effect beside would explain, to first order, best first, with start values."""
     assert effect.one_step is not None
     library, fs, n = model.library, data.sampling_rate, data.first
-    names = [name for name, _ in beside(model.without("coulomb_friction"), effect)[1]]
+    names = [name for name, _ in beside(model, effect)[1]]
     pairs = (
         zip(names, np.split(np.array(found.beside[0]), np.cumsum([len(library[name].names) for name in names])[:-1]), strict=True) if names else ()
     )

@@ -54,8 +54,24 @@ class Beside:
     undo: Callable[[FloatArray, int], tuple[FloatArray, FloatArray, FloatArray, float]]
 
 
+@dataclass(frozen=True, slots=True)
+class DryFriction:
+    """Dry friction beside an effect that one-step prediction judges: whose law it is, its parameters, SI, and their standard errors."""
+
+    effect: str = "coulomb_friction"
+    values: tuple[float, ...] = (0.0,)
+    spread: tuple[float, ...] = (0.0,)
+
+
+NO_FRICTION = DryFriction()
+
+
 class OneStep(Protocol):
     """Fits base and effect together by one-step prediction."""
+
+    @property
+    def frictions(self) -> tuple[str, ...]:
+        """Effects whose law of dry friction it has inside; the first is what it begins with."""
 
     def fit(
         self,
@@ -64,11 +80,11 @@ class OneStep(Protocol):
         noise: float,
         stages: tuple[int, int, int],
         beside: Beside,
-        dry: float = 0.0,
+        dry: DryFriction = NO_FRICTION,
         begin: Followed | None = None,
     ) -> Followed:
         """base: gain, delay, pole; noise: of the encoder, m; stages: samples of the first stage, of training, of all;
-        dry: Coulomb friction to begin with, V; begin: an earlier result without what is new beside."""
+        dry: friction to begin with; begin: an earlier result without what is new beside."""
 
     def innovation(self, sampling_rate: float, found: Followed, beside: Beside, samples: int) -> FloatArray:
         """(samples,) measured minus predicted position over the noise, with the numbers of an earlier result; ``beside.start`` is beside."""
@@ -79,7 +95,7 @@ class Followed:
     """What one-step prediction found.
 
     base, values: gain, delay, pole, and the effect's parameters, SI; base_spread, spread: their standard errors
-    dry:          Coulomb friction that came out beside it, V, and its standard error
+    dry:          friction that came out beside it
     beside:       (k,) numbers of ``Beside``, and their standard errors
     innovation:   (n,) measured minus predicted position, one step ahead, m
     without:      rms of the held-out innovation with the effect taken out and all else refitted, m; 0 if that was not worth while
@@ -90,7 +106,7 @@ class Followed:
     values: tuple[float, ...]
     base_spread: tuple[float, float, float]
     spread: tuple[float, ...]
-    dry: tuple[float, float]
+    dry: DryFriction
     beside: tuple[tuple[float, ...], tuple[float, ...]]
     innovation: FloatArray
     without: float
