@@ -32,7 +32,7 @@ LOUD = 0.08  # share from which an effect is tried beside one that does not expl
 LITTLE_LESS, LESS, MUCH_LESS = 0.97, 0.85, 0.8  # of the held-out innovation that one more effect must leave at most: where next to
 # nothing but noise is left, where it is explained, and else
 RUBS = 0.05  # Coulomb friction over the rms voltage from which richer laws of it are tried
-NEARLY = 10.0  # innovation over the noise up to which they are
+NEARLY = 30.0  # innovation over the noise up to which they are
 AGAIN, LOST = 2.5, 40.0  # innovations over noise between which a first fit is begun again from where it ended
 MOST = 3  # effects beside
 

@@ -35,7 +35,7 @@ R = TypeVar("R")
 FINE = 1e5  # Hz at which a section is asked for its roots: far above any resonance, so that none is folded back
 TERMS = 10  # of power series within a sub-step; as STIFF is 0.5, the first that is left out is below 1e-10
 STIFF = 0.5  # longest sub-step times the fastest rate
-CUTS = 0.004  # most sub-steps of a piece, times 1 Hz of those that are asked for, however stiff a fit's trial is: a first round must not last minutes
+CUTS = 0.004  # s: most sub-steps of a piece over the rate asked for, Hz, however stiff a trial is: a first round must not last minutes
 
 
 def inner(function: Callable[P, R]) -> Callable[P, R]:

@@ -36,7 +36,9 @@ WORTH_A_LOOK = 60.0  # innovation over noise after the first few steps above whi
 PROMISING = 10.0  # the same on the whole first stage; on the way to it twice that
 DEAF = 12.0  # the filter is told this much more encoder noise on the way: a smoother valley
 SLOW = 1e-3  # m/s at which the smoothed friction reaches its level
+FAST = 18.0 * SLOW  # m/s above which nothing of that is left
 DRIFT = 0.3  # process noise per rms speed, 1/sqrt(s): the filter forgives this much acceleration
+SANE = 0.5  # rad/s of the pole over the sampling rate, Hz, to begin with: a base that was led astray would make the filter unstable
 STEP = 1e-2  # of a parameter's unit
 TRUSTED = 0.5  # part of a step's change that the derivatives may have missed
 SETTLED = 0.5  # s until the filter is judged
@@ -141,7 +143,8 @@ class _Fit:
 
     def start(self, base: tuple[float, float, float], values: Sequence[float], dry: DryFriction) -> FloatArray:
         """All coordinates."""
-        numbers = np.array([*base, *values, *USUAL, *self.beside.start])
+        gain, delay, pole = base
+        numbers = np.array([gain, delay, min(pole, SANE * self.fs), *values, *USUAL, *self.beside.start])
         numbers[list(RUBBING[dry.effect])] = dry.values
         return self.inner(numbers)
 
@@ -256,9 +259,10 @@ def _rub(v: float, z: float, dry: float, excess: float, velocity: float, length:
     if bristles:
         still = 1.0 - (z if v > 0.0 else -z) / length
         return dry * z / length + damping * v * still, damping * still, dry / length * still
-    bend = np.tanh(v / SLOW)
+    steep = math.exp(-2.0 * abs(v) / SLOW) if abs(v) < FAST else 0.0
+    bend = math.copysign((1.0 - steep) / (1.0 + steep), v)  # tanh(v / SLOW), in a third of its time
     ratio = v / velocity
-    near = excess * np.exp(-ratio * ratio) if excess > 0.0 else 0.0
+    near = excess * math.exp(-ratio * ratio) if excess > 0.0 else 0.0
     return (dry + near) * bend, (dry + near) * (1.0 - bend * bend) / SLOW - 2.0 * ratio / velocity * near * bend, 0.0
 
 
