@@ -28,11 +28,12 @@ ROWS, BYTES = 4096, 1 << 20  # messages given on at once, and where they may end
 
 
 @compiled
-def messages(data: Bytes, at: int, rows: Indices) -> tuple[int, int]:
+def messages(data: Bytes, at: int, topics: Indices, rows: Indices) -> tuple[int, int]:
     """Walk over records from ``at`` while they are messages.
 
-    rows: out, one per message: channel, log time, start, length. Returns how many, and where the walk stopped:
-    at another record, at an incomplete one, after BYTES, or because ``rows`` is full.
+    topics: index of the topic by channel, -1 where it is not wanted, as those after the last
+    rows:   out, one per message that is wanted: topic, log time, start, length
+    Returns how many, and where the walk stopped: at another record, at an incomplete one, after BYTES, or because ``rows`` is full.
     """
     found, size, enough = 0, data.shape[0], at + BYTES
     while at + 9 <= size and at < enough and data[at] == 5 and found < rows.shape[0]:
@@ -41,14 +42,13 @@ def messages(data: Bytes, at: int, rows: Indices) -> tuple[int, int]:
             length |= np.int64(data[at + 1 + index]) << (8 * index)
         if length < 22 or length > size - at - 9:
             break
-        time = np.int64(0)
-        for index in range(8):
-            time |= np.int64(data[at + 15 + index]) << (8 * index)
-        rows[found, 0] = np.int64(data[at + 9]) | np.int64(data[at + 10]) << 8
-        rows[found, 1] = time
-        rows[found, 2] = at + 31
-        rows[found, 3] = length - 22
-        found += 1
+        channel = np.int64(data[at + 9]) | np.int64(data[at + 10]) << 8
+        if channel < topics.shape[0] and topics[channel] >= 0:
+            time = np.int64(0)
+            for index in range(8):
+                time |= np.int64(data[at + 15 + index]) << (8 * index)
+            rows[found, 0], rows[found, 1], rows[found, 2], rows[found, 3] = topics[channel], time, at + 31, length - 22
+            found += 1
         at += 9 + int(length)
     return found, at
 
@@ -187,16 +187,15 @@ class McapFile:
         """Yield the messages from ``at`` on; the value of the generator is how many bytes they take."""
         rows = np.empty((ROWS, 4), np.int64)
         start = at
-        lookup = np.full(max([*self.channels, 0]) + 2, -1, np.int64)
+        topics = np.full(max([*self.channels, 0]) + 1, -1, np.int64)
         for number, (name, _) in self.channels.items():
             if name in wanted:
-                lookup[number] = wanted.index(name)
-        while True:
-            found, at = messages(data, at, rows)
-            if found and wanted:
-                topic = lookup[np.minimum(rows[:found, 0], len(lookup) - 1)]
-                kept = rows[:found][topic >= 0]
-                if len(kept):
-                    yield Batch(topic[topic >= 0], kept[:, 1], kept[:, 2], kept[:, 3], data), min(1.0, place / self.size)
-            if not found:
-                return at - start
+                topics[number] = wanted.index(name)
+        before = -1
+        while before != at:
+            before = at
+            found, at = messages(data, at, topics, rows)
+            if found:
+                kept = rows[:found]
+                yield Batch(kept[:, 0], kept[:, 1], kept[:, 2], kept[:, 3], data), min(1.0, place / self.size)
+        return at - start

@@ -120,12 +120,15 @@ def integer(data: Bytes, at: int, kind: int) -> np.int64:
 
 
 @compiled
-def leaf_cells(buffer: Bytes, first: int, filled: int, numbers: Indices, size: int, usable: int, spill: int, rows: Indices) -> tuple[int, int, int]:
+def leaf_cells(
+    buffer: Bytes, first: int, filled: int, numbers: Indices, size: int, usable: int, spill: int, topics: Indices, rows: Indices
+) -> tuple[int, int, int]:
     """Find the messages (id, topic_id, timestamp, data) of some leaf pages.
 
     buffer:  pages ``first``, ``first + 1``, ... up to byte ``filled``, then free space from ``spill`` for chained data
     numbers: the leaf pages to look at
-    rows:    out, one per message: row id, topic id, log time, start in buffer (-1: not within reach), length
+    topics:  index of the topic by topic id, -1 where it is not wanted, as those after the last
+    rows:    out, one per message that is wanted: row id, topic, log time, start in buffer (-1: not within reach), length
     Returns how many messages, how many damaged pages, and the end of the chained data (over the buffer: too small).
     """
     found, damaged = 0, 0
@@ -173,9 +176,11 @@ def leaf_cells(buffer: Bytes, first: int, filled: int, numbers: Indices, size: i
             if body - record + length != payload or body - record > local:
                 broken = True
                 continue
+            if topic < 0 or topic >= topics.shape[0] or topics[topic] < 0:
+                continue
             if found >= rows.shape[0]:
                 return -1, damaged, spill
-            rows[found, 0], rows[found, 1], rows[found, 2], rows[found, 4] = row_id, topic, time, length
+            rows[found, 0], rows[found, 1], rows[found, 2], rows[found, 4] = row_id, topics[topic], time, length
             rows[found, 3] = body
             if local < payload:
                 here = record + local - body
@@ -204,8 +209,8 @@ def leaf_cells(buffer: Bytes, first: int, filled: int, numbers: Indices, size: i
     return found, damaged, spill
 
 
-def scan(file: PageFile, root: int) -> Iterator[Cells]:
-    """All messages, span by span of pages; the buffer is reused."""
+def scan(file: PageFile, root: int, topics: Indices) -> Iterator[Cells]:
+    """The messages of ``topics`` (see ``leaf_cells``), span by span of pages; the buffer is reused."""
     buffer = np.empty(0, np.uint8)
     rows = np.empty((SPAN * 16, 5), np.int64)
     before = -SPAN - 1
@@ -227,7 +232,7 @@ def scan(file: PageFile, root: int) -> Iterator[Cells]:
                 buffer = np.empty(2 * max(span, SPAN * file.size), np.uint8)
             filled = os.preadv(file.handle, [buffer[:span].data], (low - 1) * file.size)
             while True:
-                found, damaged, spill = leaf_cells(buffer, low, filled, numbers[at:end], file.size, file.usable, filled, rows)
+                found, damaged, spill = leaf_cells(buffer, low, filled, numbers[at:end], file.size, file.usable, filled, topics, rows)
                 if found >= 0:
                     break
                 if spill > buffer.size:

@@ -93,21 +93,18 @@ class SqliteFile:
         try:
             file = pages.open_pages(handle)
             damaged = 0
-            table = np.full(max([*lookup, 0]) + 2, -1, np.int64)
+            topics = np.full(max([*lookup, 0]) + 1, -1, np.int64)
             for identity, index in lookup.items():
-                table[identity] = index
-            for cells in pages.scan(file, root):
+                topics[identity] = index
+            for cells in pages.scan(file, root, topics):
                 damaged += cells.damaged
                 rows = cells.rows
-                topic = table[np.minimum(np.maximum(rows[:, 1], -1), len(table) - 1)]  # -1 and unknown topics: the last entry
-                if topic.size and topic.min() < 0:
-                    rows, topic = rows[topic >= 0], topic[topic >= 0]
-                if not topic.size:
+                if not len(rows):
                     continue
                 if rows[:, 3].min() < 0:
                     yield self._by_id(rows[:, 0], lookup), cells.position
                     continue
-                yield Batch(topic, rows[:, 2], rows[:, 3], rows[:, 4], cells.buffer), cells.position
+                yield Batch(rows[:, 1], rows[:, 2], rows[:, 3], rows[:, 4], cells.buffer), cells.position
         finally:
             os.close(handle)
         if damaged:

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from xy_sysid.bags.cdr import ARRAY_TYPE, JOINT_TYPE, Layout, array_layout, joint_layout
 from xy_sysid.bags.reading import Bag
@@ -192,22 +191,34 @@ class _Decoder:
 
 
 @compiled
-def _alone(seq: FloatArray, rows: int, before: float) -> NDArray[np.bool_]:
-    """(messages,) whether a message must not be joined to the one before it: where the counter does not go on upwards.
+def _highest(level: Indices, samples: Indices) -> None:
+    """Raise each ``level[i]`` to the sum of the samples before it."""
+    before = 0
+    for message in range(level.shape[0]):
+        level[message] = max(level[message], before)
+        before += samples[message]
 
-    Such messages come one by one, as they came live: what is odd about one must not be laid at the door of others.
+
+@compiled
+def _starts(seq: FloatArray, rows: int, before: float, group: Indices) -> Indices:
+    """Messages that begin a piece: where the group changes, and where the counter does not go on upwards.
+
+    Those come one by one, as they came live: what is odd about one must not be laid at the door of others.
     before: the counter before the first
     """
-    size = seq.shape[0] // rows
-    alone = np.zeros(size, dtype=np.bool_)
-    for message in range(size):
+    found = np.empty(group.shape[0], np.int64)
+    count, alone = 0, 0
+    for message in range(group.shape[0]):
         odd = False
         for i in range(message * rows, (message + 1) * rows):
             odd |= not seq[i] > before
             before = seq[i]
         if odd:
-            alone[message : message + 1 + AFTER_ODD] = True
-    return alone
+            alone = message + 1 + AFTER_ODD
+        if message < alone or message == 0 or group[message] != group[message - 1]:
+            found[count] = message
+            count += 1
+    return found[:count]
 
 
 def _cut(parts: list[_Part], most: int, newest: dict[Kind, float]) -> Iterator[tuple[Kind, Block]]:
@@ -217,22 +228,22 @@ def _cut(parts: list[_Part], most: int, newest: dict[Kind, float]) -> Iterator[t
     last = 1 + max(int(part.message[-1]) for part in parts)
     level = np.zeros(last, np.int64)
     for kind in {part.kind for part in parts}:
-        filled = np.zeros(last, np.int64)
+        samples = np.zeros(last, np.int64)
         for part in parts:
             if part.kind == kind:
-                filled[part.message] = part.rows
-        np.maximum(level, np.cumsum(filled) - filled, out=level)
-    group = level // most
+                samples[part.message] = part.rows
+        _highest(level, samples)
+    level //= most
     pieces: list[tuple[int, int, int, int, int]] = []  # group, first message, part, first and last sample
     for index, part in enumerate(parts):
-        number = group[part.message]
-        alone = _alone(part.block.seq, part.rows, newest.get(part.kind, -np.inf))
+        group = level[part.message]
+        starts = _starts(part.block.seq, part.rows, newest.get(part.kind, -np.inf), group)
         newest[part.kind] = float(part.block.seq[-1])
-        edges = [0, *(np.flatnonzero((number[1:] != number[:-1]) | alone[1:]) + 1).tolist(), len(number)]
-        pieces += [(number[a], part.message[a], index, a * part.rows, b * part.rows) for a, b in itertools.pairwise(edges)]
+        edges = [*(starts * part.rows).tolist(), len(part.block)]
+        pieces += zip(group[starts].tolist(), part.message[starts].tolist(), itertools.repeat(index), edges, edges[1:], strict=False)
     pieces.sort()
-    for _, _, index, first, last in pieces:
-        yield parts[index].kind, parts[index].block.rows(first, last)
+    for _, _, index, first, final in pieces:
+        yield parts[index].kind, parts[index].block.rows(first, final)
 
 
 def _period(bag: Bag, source: Source) -> float:
