@@ -147,7 +147,7 @@ def test_a_reload_in_the_middle_loses_nothing_and_a_fit_can_be_left(usual: Tab) 
     assert "Left as it was" in one.notices() and len(one.ladder()) == 1
     one.press("diagnose")
     one.page.reload()
-    turn(one, "y")
+    one.until(lambda: one.page.locator(".plot[aria-label^='The error ladder of axis y']").count() == 1, 30, "another axis after a reload")
     one.until(lambda: busy.is_visible() or "coulomb" in one.verdict(), 10)
     one.until(lambda: "Missing: coulomb friction" in one.verdict() and free.is_enabled(), 60)
     one.press("auto")

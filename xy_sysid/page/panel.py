@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import MutableMapping
 from typing import Any
 
-from nicegui import ui
+from nicegui import app, ui
 
 from xy_sysid.page.control import Control
 from xy_sysid.page.facts import seconds_text
@@ -53,7 +54,8 @@ class Panel:
         axes = source.axes()
         if axes != self._axes:
             self._axes = axes
-            self._axis = self._axis if self._axis in axes else next(iter(axes), "")
+            wanted = (self._axis, self._tab().get(self._source.key, ""), *axes)
+            self._axis = next((axis for axis in wanted if axis in axes), "")
             self._choice.set_options({axis: f"axis {axis}" if len(axis) <= SHORT else axis for axis in axes}, value=self._axis or None)
         if self._control is not None:
             self._control.refresh(self._axes)
@@ -84,3 +86,8 @@ class Panel:
     def _turn(self, axis: str) -> None:
         if axis in self._axes:
             self._axis = axis
+            self._tab()[self._source.key] = axis
+
+    def _tab(self) -> MutableMapping[str, Any]:
+        """What this tab of the browser keeps over a reload: which axis it shows of each source."""
+        return app.storage.tab if ui.context.client.has_socket_connection else {}
