@@ -59,7 +59,7 @@ def run(case: Case) -> Judged:
     else:
         right = set(named) == set(case.truth) if one else set(case.truth) <= set(named) or _laws(case.truth) <= _laws(named)
     first = bool(named) and (named[0] in case.truth or (not one and _laws(named[:1]) <= _laws(case.truth)))
-    stray = bool(named) and not first and not (case.nuisance and _laws(named[:1]) <= _laws(_parts(machine)))
+    stray = bool(named) and not first and not (case.nuisance and named[0] in _parts(machine))
     wrong = stray and found.confidence >= CONFIDENT
     ratio, errors, inside = _measured(case, machine, recording.sampling_rate, u, y, found) if right and one and case.known else (None, {}, {})
     return Judged(case, found.verdict, found.effects, found.confidence, seconds, right, first, wrong, ratio, errors, inside)
@@ -71,8 +71,8 @@ def _laws(names: tuple[str, ...]) -> set[str]:
     return {part for name in names for part in sums.get(name, (name,))}
 
 
-def _parts(machine: Machine) -> tuple[str, ...]:
-    return tuple(machine.spec.axes[0].parts)
+def _parts(machine: Machine) -> set[str]:
+    return set(machine.spec.axes[0].parts)
 
 
 def true_values(case: Case, machine: Machine) -> dict[str, float]:

@@ -85,13 +85,13 @@ def test_the_page_tells_hits_misses_and_goals() -> None:
     assert "test/dead_zone/1: missing_effect coulomb_friction" in page
 
 
-def test_of_the_hard_set_the_truth_may_come_after_what_else_is_there() -> None:
-    """Named second is named; the other column tells how often it came first."""
+def test_a_truth_that_is_named_second_is_not_right_in_the_hard_set() -> None:
+    """It is counted beside: named, but not first."""
     hit = judged("coulomb_friction")
     second = replace(hit, case=replace(hit.case, group="hard"), effects=("backlash", "coulomb_friction"), right=True, first=False)
     page = text({"hard": [second, hit]}, "development", "python -m blind", "")
-    assert "| 2 of 2 (100 %) | >= 95 % | 1 |" in page
-    assert "None." in page
+    assert "| 1 of 2 (50 %) | >= 95 % | 1 | 2 |" in page
+    assert "hard/coulomb_friction/1: missing_effect backlash + coulomb_friction" in page
 
 
 def test_a_campaign_can_be_stopped_and_gone_on_with(tmp_path: Path) -> None:
