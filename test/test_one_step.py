@@ -141,7 +141,7 @@ def test_friction_inside_the_filter_is_the_law_of_its_effect(name: str, values: 
     velocity = simulate(AxisModel(*BASE).with_effect(name, values), RATE, u, np.zeros_like(u))
     position = np.concatenate(([0.0], np.cumsum(velocity))) / RATE
     fit = _Fit(RATE, BASE, 1.0, as_beside_nothing(u), u.size - 1, name)
-    numbers = fit.outer(fit.start(BASE, (1e-10, 0.4, 30e3, 0.5, 0.0, 0.0), DryFriction(name, values, (0.0,) * len(values))))
+    numbers = fit.outer(fit.start(BASE, (1e-10, 0.4, 30e3, 0.5, 0.0, 0.0), DryFriction(name, values)))
     out = np.empty(u.size - 1)
     innovations(u[:-1], position, np.zeros(u.size - 1), numbers[:OWN], name == "presliding_hysteresis", RATE, 1e12, 0.0, 400, out)
     bent = name == "presliding_hysteresis"

@@ -21,8 +21,9 @@ from xy_sysid.spectral_cost import count_size
 from xy_sysid.traces import bounded
 
 AT_NOISE = 3.5  # held-out innovation over the encoder's noise up to which an effect explains the axis
-BETTER = 2.0  # innovation without the effect over that with it, at least; and where nearly nothing but noise is left
-CLEAN, LITTLE_BETTER = 1.6, 1.25  # (over the noise), that
+BETTER = 2.0  # innovation without the effect over that with it, at least
+CLEAN = 1.6  # innovation over the noise up to which next to nothing else is left in it,
+LITTLE_BETTER = 1.25  # and what is enough there in the place of BETTER
 TELLING = 0.005  # dry friction over the rms voltage from which it is named
 
 Others = Sequence[tuple[str, tuple[float, ...]]]
@@ -41,7 +42,7 @@ def followed(data: AxisData, base: GreyboxFit, effect: Effect, new: Others = (),
     if effect.one_step is None:
         raise BadInput(f"effect {effect.name}", "no one-step prediction", "an effect that has one", "Fit it by simulation.")
     dry, others = beside(base.model, effect)
-    rubbing = [DryFriction(name, values, (0.0,) * len(values)) for name, values in new if name in effect.one_step.frictions]
+    rubbing = [DryFriction(name, values) for name, values in new if name in effect.one_step.frictions]
     dry = rubbing[-1] if rubbing else dry
     others += tuple((name, values) for name, values in new if name not in effect.one_step.frictions)
     first = data.training if any(_ages(base.model.library[name]) for name, _ in others) else data.first
@@ -64,7 +65,7 @@ def beside(model: AxisModel, effect: Effect) -> tuple[DryFriction, tuple[tuple[s
     dry, others = NO_FRICTION, []
     for name, values in model.effects:
         if name in effect.one_step.frictions:
-            dry = DryFriction(name, values, (0.0,) * len(values))
+            dry = DryFriction(name, values)
         elif undoable(model.library[name]):
             others.append((name, values))
         elif name != effect.name:

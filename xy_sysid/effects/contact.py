@@ -5,10 +5,9 @@ by how well it predicts the next sample from what was measured up to now (one-st
 Identification, 2nd ed., sec. 3.2; the filter: Jazwinski, Stochastic Processes and Filtering Theory, 1970, sec. 8.3).
 
 State: motor position and speed, motor minus table, its rate. Flanks push as k depth (1 + loss speed) + c speed and never
-pull (Hunt & Crossley, J. Appl. Mech. 42, 1975, eq. 8). The motor rubs: Coulomb friction; more of it near rest
-(Armstrong-Helouvry et al., Automatica 30, 1994, eq. 6); or bristles (Canudas de Wit et al., IEEE TAC 40, 1995, eq. 1-3),
-whose deflection follows the motor's position and is corrected with it. Integrated by the explicit midpoint rule within each of a sample's
-two pieces of constant voltage.
+pull (Hunt & Crossley, J. Appl. Mech. 42, 1975, eq. 8). The motor rubs by the laws of
+Coulomb friction, Stribeck friction or presliding hysteresis; the deflection of the bristles follows the motor's position
+and is corrected with it. Integrated by the explicit midpoint rule within each of a sample's two pieces of constant voltage.
 """
 
 from __future__ import annotations
@@ -22,6 +21,9 @@ from numpy.typing import NDArray
 
 from xy_sysid.compiled import compiled
 from xy_sysid.effects.contract import NO_FRICTION, Beside, DryFriction, Followed
+from xy_sysid.effects.presliding_hysteresis import bend
+from xy_sysid.effects.presliding_hysteresis import force as bristle_force
+from xy_sysid.effects.stribeck_friction import level
 from xy_sysid.stream import FloatArray
 
 NAMES = ("gain", "delay", "pole", "gap", "share", "rate", "damping", "loss", "guide", "coulomb", "excess", "velocity", "length", "bristle_damping")
@@ -258,19 +260,11 @@ def _rub(v: float, z: float, dry: float, excess: float, velocity: float, length:
     """Friction in V, and its derivatives by speed and by position (bristles of deflection ``z`` follow it)."""
     if bristles:
         still = 1.0 - (z if v > 0.0 else -z) / length
-        return dry * z / length + damping * v * still, damping * still, dry / length * still
+        return bristle_force(dry, length, damping, z, v, 0.0), damping * still, dry / length * still
     steep = math.exp(-2.0 * abs(v) / SLOW) if abs(v) < FAST else 0.0
-    bend = math.copysign((1.0 - steep) / (1.0 + steep), v)  # tanh(v / SLOW), in a third of its time
-    ratio = v / velocity
-    near = excess * math.exp(-ratio * ratio) if excess > 0.0 else 0.0
-    return (dry + near) * bend, (dry + near) * (1.0 - bend * bend) / SLOW - 2.0 * ratio / velocity * near * bend, 0.0
-
-
-@compiled
-def _bent(v: float, z: float, length: float, h: float) -> float:
-    """Deflection of the bristles after ``h`` s at the speed ``v``."""
-    end = length if v > 0.0 else -length
-    return end + (z - end) * math.exp(-abs(v) * h / length)
+    smooth = math.copysign((1.0 - steep) / (1.0 + steep), v)  # tanh(v / SLOW), in a third of its time
+    size = level(excess, dry, velocity, v) if excess > 0.0 else dry
+    return size * smooth, size * (1.0 - smooth * smooth) / SLOW - 2.0 * v / (velocity * velocity) * (size - dry) * smooth, 0.0
 
 
 @compiled
@@ -324,8 +318,8 @@ def innovations(
                 force, by_d, by_w = _push(dm, wm, half, k, c, loss)
                 if rubs:
                     if bristles:
-                        zm = _bent(vm, z, length, 0.5 * h)
-                        z = _bent(vm, zm, length, 0.5 * h)
+                        zm = bend(dry, length, z, vm, 0.5 * h, 0.0)
+                        z = bend(dry, length, zm, vm, 0.5 * h, 0.0)
                     rub, slip, spring = _rub(vm, zm, dry, excess, velocity, length, bristle, bristles)
                     rub, slip, spring = per_volt * rub, per_volt * slip, per_volt * spring
                 a = (push - rub - drag_motor * vm - force) * per_motor

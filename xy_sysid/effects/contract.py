@@ -56,11 +56,11 @@ class Beside:
 
 @dataclass(frozen=True, slots=True)
 class DryFriction:
-    """Dry friction beside an effect that one-step prediction judges: whose law it is, its parameters, SI, and their standard errors."""
+    """Dry friction beside an effect that one-step prediction judges: whose law it is, its parameters, SI, and their standard errors if known."""
 
     effect: str = "coulomb_friction"
     values: tuple[float, ...] = (0.0,)
-    spread: tuple[float, ...] = (0.0,)
+    spread: tuple[float, ...] = ()
 
 
 NO_FRICTION = DryFriction()
