@@ -145,7 +145,7 @@ def _ordered(data: AxisData, ladder: Ladder, library: Library) -> tuple[str, ...
     final = ladder.final
     if len(ladder.effects) < 2:
         return ladder.effects
-    if any(library[name].one_step is not None for name in ladder.effects):
+    if final.model.ahead:
         order = [step.added for step in ladder.steps]
         return tuple(sorted(ladder.effects, key=lambda name: order.index(name) if name in order else len(order)))
 

@@ -52,7 +52,7 @@ def rung(fit: GreyboxFit, added: str | None = None, removed: str | None = None) 
     else:
         label = "rigid, with delay" if removed is None else f"without {removed}"
     model = fit.model
-    if any(model.library[name].one_step is not None for name, _ in model.effects):
+    if model.ahead:
         label += " (error one sample ahead)"  # free simulation cannot judge these; see ``one_step``
     errors = fit.training_error, fit.held_out_error, fit.noise_floor, fit.excess
     return Rung(label, added, removed, model.gain, model.delay, model.pole, model.effects, fit.parameters, *errors, fit.excess < AT_FLOOR)
@@ -131,11 +131,10 @@ def findings(item: Diagnosis, library: Library) -> Findings:
 
 
 def _tried(item: Candidate, fit: GreyboxFit, before: float) -> Tried:
-    ahead = any(fit.model.library[name].one_step is not None for name, _ in fit.model.effects)
     evidence = (
         f"judged one sample ahead, as no free simulation can tell: with it {1e3 * fit.held_out_error:.3g} mm/s are left, "
         f"the encoder's noise alone is {1e3 * fit.noise_floor:.3g}"
-        if ahead
+        if fit.model.ahead
         else f"its trace explains {100 * item.share:.3g} % of the error; with it the held-out error is "
         f"{1e3 * fit.held_out_error:.3g} mm/s instead of {1e3 * before:.3g}"
     )

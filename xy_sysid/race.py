@@ -131,7 +131,7 @@ def together(data: AxisData, now: GreyboxFit, tried: tuple[Candidate, ...], libr
 
     bar: excess above which a pair is not worth the whole distance
     """
-    if any(library[name].one_step for name, _ in now.model.effects):
+    if now.model.ahead:
         return None
     fitted = _one_of_each_family([item for item in tried if item.fit is not None and library[item.effect].one_step is None], now, library)
     best: tuple[Candidate, Candidate] | None = None

@@ -94,15 +94,14 @@ def refine(data: AxisData, library: Library = STANDARD, most: int = MOST_EFFECTS
             steps = better
         steps += move.steps
         now = steps[-1].fit
-        if any(library[name].one_step is not None for name, _ in now.model.effects):
+        if now.model.ahead:
             break
     while now.excess >= AT_FLOOR and len(steps) > 1 + len(kept) and not _worth(steps[-2].fit, now):  # hope that did not come true
         rejected, now = steps[-1].tried, steps[-2].fit
         del steps[-1]
-    alone = any(library[name].one_step is not None for name, _ in now.model.effects)
-    settled = settle(data, now, stays) if len(steps) > 2 and not alone else now
+    settled = settle(data, now, stays) if len(steps) > 2 and not now.model.ahead else now
     names = tuple(name for name, _ in settled.model.effects)
-    if any(name not in {step.added for step in steps} for name in names) and not any(library[name].one_step for name in names):
+    if any(name not in {step.added for step in steps} for name in names) and not settled.model.ahead:
         steps = _again(data, steps, names, library)
     return Ladder(tuple(steps), rejected, settled, names, tuple(name for name in names if name in stays and name not in kept))
 
@@ -158,7 +157,7 @@ class Move:
 def advance(data: AxisData, now: GreyboxFit, library: Library = STANDARD, pairs: bool = True) -> Move:
     """One move down from a fit; pairs: two effects may be tried at once where one alone helps little."""
     if now.excess < AT_FLOOR:
-        if any(library[name].one_step is not None for name, _ in now.model.effects):
+        if now.model.ahead:
             return Move((), ())
         last = polished(data, now, library) if now.excess >= SURE else None
         hidden = faint(data, now, library) if last is None and data.floor.epsilon <= EPSILON else None
@@ -215,10 +214,10 @@ def _worth(now: GreyboxFit, then: GreyboxFit) -> bool:
 def added(data: AxisData, now: GreyboxFit, name: str) -> GreyboxFit:
     """A fit with one more effect, by whatever can judge it. Raises BadInput where one-step prediction cannot have it beside."""
     library = now.model.library
-    alone = next((library[own] for own, _ in now.model.effects if library[own].one_step is not None), None)
+    ahead = now.model.ahead
     if library[name].one_step is not None:
         return one_step_fit(data, now, library[name])
-    return fit_with(data, now, [name]) if alone is None else put_beside(data, now, alone, library[name])
+    return fit_with(data, now, [name]) if ahead is None else put_beside(data, now, ahead, library[name])
 
 
 def settle(data: AxisData, now: GreyboxFit, keep: tuple[str, ...] = ()) -> GreyboxFit:

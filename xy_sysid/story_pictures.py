@@ -166,12 +166,11 @@ def _compared(data: AxisData, fitted: GreyboxFit) -> Comparison:
 
     A model that is judged one sample ahead fails where it is above what counts as explained there.
     """
-    ahead = any(fitted.model.library[name].one_step is not None for name, _ in fitted.model.effects)
     for first in (data.training, 0):
         try:
             held = fitted.simulated[first:], data.voltage[first:], data.position[first:]
             found = compare_velocity(*held, data.sampling_rate, begins=first / data.sampling_rate)
-            return replace(found, places=tuple(place for place in found.places if not ahead or place.error_over_floor > AT_NOISE))
+            return replace(found, places=tuple(place for place in found.places if not fitted.model.ahead or place.error_over_floor > AT_NOISE))
         except BadInput:
             continue
     edges = data.layout.edges()

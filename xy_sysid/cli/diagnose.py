@@ -87,8 +87,7 @@ def _show(name: str, item: Diagnosis, units: tuple[str, str]) -> None:
 
 def error_cells(name: str, fit: GreyboxFit) -> tuple[str, str, str]:
     """Name, held-out error and what that is over the noise floor; where free simulation cannot judge, the name says what was judged."""
-    ahead = any(fit.model.library[own].one_step is not None for own, _ in fit.model.effects)
-    label = f"{name} (error one sample ahead)" if ahead else name
+    label = f"{name} (error one sample ahead)" if fit.model.ahead else name
     return label, f"{1e3 * fit.held_out_error:.4g}", f"{fit.held_out_error / max(fit.noise_floor, 1e-300):.2f}"
 
 

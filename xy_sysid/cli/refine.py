@@ -70,7 +70,7 @@ def refine(
             u, y = samples(recording, name)
             data = prepare(recording.sampling_rate, u, y, tolerance)
             found = logic(data, known, given=tuple(add or ()), most=len(add or ()) + 4 if auto else 0)
-            if not any(known[own].one_step for own in found.effects):  # free simulation says nothing about those
+            if not found.final.model.ahead:  # free simulation says nothing about those
                 found = replace(found, final=settled(data, found.final)) if simulate_alone else found
                 alone[name] = open_loop(recording.sampling_rate, y, found.final.simulated)
             bar.advance(task)
