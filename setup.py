@@ -6,6 +6,7 @@ from setuptools import find_packages, setup
 
 NAME = "xy_sysid"
 ROS_WHEELS = "sys_platform == 'linux' and platform_machine == 'x86_64'"
+ISAL = "isal; platform_machine in 'x86_64 AMD64 aarch64 arm64'"  # fast checksums; elsewhere zlib's will do
 
 
 def files(*patterns: str) -> list[str]:
@@ -33,7 +34,7 @@ setup(
         (f"share/{NAME}/launch", files("launch/*.py")),
     ],
     zip_safe=False,
-    install_requires=["numpy", "scipy", "numba", "rosbags", "pydantic>=2", "typer", "rich", "plotly", "joblib", "pyyaml"],
+    install_requires=["numpy", "scipy", "numba", "rosbags", "pydantic>=2", "typer", "rich", "plotly", "joblib", "pyyaml", ISAL],
     extras_require={
         "ros": [
             f"ros-jazzy-rclpy[fastrtps]==7.1.6; {ROS_WHEELS}",

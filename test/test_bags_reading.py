@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import shutil
+import sqlite3
+import zlib
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -16,6 +19,7 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader
 
 from xy_sysid.bags import Bag, BagWriter, stream_blocks
 from xy_sysid.bags.cdr import ARRAY_TYPE, encode_array
+from xy_sysid.bags.checksum import crc32
 from xy_sysid.bags.writing import Storage
 from xy_sysid.stream import Block, FloatArray, columns, pack
 
@@ -24,6 +28,13 @@ STORAGES = pytest.mark.parametrize("storage", ["sqlite3", "mcap"])
 
 def joined(blocks: Sequence[tuple[str, Block]], kind: str) -> FloatArray:
     return np.concatenate([np.column_stack((b.seq, b.time, b.values)) for k, b in blocks if k == kind])
+
+
+def test_checksums_are_those_of_zlib_whoever_computes_them() -> None:
+    """The check value of CRC-32, and some bytes."""
+    content = bytes(range(256)) * 97
+    assert crc32(b"123456789") == 0xCBF43926
+    assert crc32(memoryview(content)) == zlib.crc32(content)
 
 
 def written_by_rosbags(path: Path, storage: str, mode: CompressionMode = CompressionMode.NONE, count: int = 300) -> Path:
@@ -42,6 +53,21 @@ def test_blocks_come_back_number_for_number(tmp_path: Path, storage: str, rows: 
     """Blocks of any size, also those that fill many pages of a database, are read exactly and in log order."""
     messages = both(range(0, 12_000, rows), rows)
     found = list(stream_blocks(a_bag(tmp_path / "bag", messages, storage=storage)))
+    for kind in ("voltage", "position"):
+        np.testing.assert_array_equal(joined(found, kind), joined(messages, kind))
+
+
+@pytest.mark.parametrize("size", [512, 4096, 65_536])
+def test_a_database_with_pages_of_any_size_is_read(tmp_path: Path, size: int) -> None:
+    """``ros2 bag`` writes pages of 4096 bytes, our recorder larger ones."""
+    messages = both(range(0, 12_000, 20), 20)
+    bag = a_bag(tmp_path / "bag", messages, storage="sqlite3")
+    file = next(bag.glob("*.db3"))
+    with contextlib.closing(sqlite3.connect(file, isolation_level=None)) as database:
+        database.execute(f"PRAGMA page_size={size}")
+        database.execute("VACUUM")
+        assert database.execute("PRAGMA page_size").fetchone() == (size,)
+    found = list(stream_blocks(bag))
     for kind in ("voltage", "position"):
         np.testing.assert_array_equal(joined(found, kind), joined(messages, kind))
 

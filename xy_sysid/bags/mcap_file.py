@@ -10,11 +10,11 @@ import os
 import struct
 from collections.abc import Callable, Generator, Iterator, Sequence
 from pathlib import Path
-from zlib import crc32
 
 import numpy as np
 
 from xy_sysid.bags.cdr import Bytes
+from xy_sysid.bags.checksum import crc32
 from xy_sysid.bags.compression import Damaged, decompressor
 from xy_sysid.bags.stride import Batch, Indices
 from xy_sysid.compiled import compiled

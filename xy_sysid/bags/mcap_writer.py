@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import struct
 from pathlib import Path
-from zlib import crc32
 
+from xy_sysid.bags.checksum import crc32
 from xy_sysid.bags.mcap_file import CHANNEL, CHUNK, DATA_END, FOOTER, MAGIC, MESSAGE, SCHEMA
 from xy_sysid.errors import BadRecording
 

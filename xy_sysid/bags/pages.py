@@ -18,11 +18,12 @@ from xy_sysid.bags.stride import Indices
 from xy_sysid.compiled import compiled
 
 INTERIOR, LEAF = 5, 13
-SPAN = 256  # pages read at once: stays in the cache of the processor
+SPAN = 1 << 20  # bytes read at once: stays in the cache of the processor
 WIDTHS = np.array([0, 1, 2, 3, 4, 6, 8, 0, 0, 0])  # bytes of an integer column, by serial type
 GROUP = 4096  # leaf pages listed at once
+ROWS = 4096  # messages found at once; more where they are small
 DEEPEST = 20  # levels; a B-tree of pages that is deeper is damaged
-WIDEST = 16_384  # pages; one leaf with longer chains of overflow than this is read by SQL
+WIDEST = 1 << 26  # bytes; one leaf with longer chains of overflow than this is read by SQL
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,24 +213,25 @@ def leaf_cells(
 def scan(file: PageFile, root: int, topics: Indices) -> Iterator[Cells]:
     """The messages of ``topics`` (see ``leaf_cells``), span by span of pages; the buffer is reused."""
     buffer = np.empty(0, np.uint8)
-    rows = np.empty((SPAN * 16, 5), np.int64)
-    before = -SPAN - 1
+    rows = np.empty((ROWS, 5), np.int64)
+    wide, widest = max(1, SPAN // file.size), max(1, WIDEST // file.size)
+    before = -wide - 1
     for group in leaves(file, root):
         numbers = group[(group >= 1) & (group <= file.pages)]
         if len(numbers) < len(group):
             yield Cells(rows[:0], buffer, len(group) - len(numbers), 0.0)
         at, total = 0, len(numbers)
         while at < total:
-            low = before + 1 if 0 <= numbers[at] - before <= SPAN else int(numbers[at])
-            near = numbers[at : at + SPAN]
-            outside = np.flatnonzero((near < low) | (near >= low + SPAN))
+            low = before + 1 if 0 <= numbers[at] - before <= wide else int(numbers[at])
+            near = numbers[at : at + wide]
+            outside = np.flatnonzero((near < low) | (near >= low + wide))
             end = max(at + 1, at + (int(outside[0]) if outside.size else len(near)))
             top = int(numbers[at:end].max())
-            following = int(numbers[end]) if end < total else min(top + SPAN, file.pages + 1)
-            high = following if top < following <= top + WIDEST else top + 1
+            following = int(numbers[end]) if end < total else min(top + wide, file.pages + 1)
+            high = following if top < following <= top + widest else top + 1
             span = (high - low) * file.size
             if buffer.size < 2 * span:
-                buffer = np.empty(2 * max(span, SPAN * file.size), np.uint8)
+                buffer = np.empty(2 * max(span, SPAN), np.uint8)
             filled = os.preadv(file.handle, [buffer[:span].data], (low - 1) * file.size)
             while True:
                 found, damaged, spill = leaf_cells(buffer, low, filled, numbers[at:end], file.size, file.usable, filled, topics, rows)
