@@ -13,7 +13,8 @@ from xy_sim.machine import Machine
 from xy_sysid.axis_model import STANDARD, AxisModel, simulate, undoer
 from xy_sysid.cli.simulate import drive
 from xy_sysid.effects import EFFECTS
-from xy_sysid.effects.contact import OWN, _Fit, innovations
+from xy_sysid.effects.contact import OWN, _Fit
+from xy_sysid.effects.contact_filter import innovations
 from xy_sysid.effects.contract import Beside, DryFriction
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox import AxisData, GreyboxFit, fit_base, fit_with, prepare

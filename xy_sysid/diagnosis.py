@@ -13,6 +13,7 @@ from xy_sysid.axis_model import STANDARD, Library, simulate
 from xy_sysid.comparison import Comparison, compare_velocity
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox import AxisData, GreyboxFit, excess_of, loosened, prepare
+from xy_sysid.one_step import change_without
 from xy_sysid.race import AT_FLOOR, Candidate
 from xy_sysid.refinement import Ladder, refine
 from xy_sysid.stream import FloatArray
@@ -118,7 +119,7 @@ def _judged(data: AxisData, ladder: Ladder, library: Library, tolerance: float, 
     if base.excess < AT_FLOOR and not ladder.effects:
         text = f"Nothing is missing: the rigid model with delay leaves {_mm(base.held_out_error)} mm/s, the floor is {_mm(base.noise_floor)} mm/s."
         return Diagnosis("nothing_missing", (), certainty, tolerance, text, ladder, tried, where, "None is needed.")
-    names = _ordered(data, ladder, library)
+    names = _ordered(data, ladder)
     gone = 1.0 - final.excess / base.excess if base.excess > 0.0 else 0.0  # an effect may be found in the noise of a base at the floor
     fall = f"the held-out error falls from {_mm(base.held_out_error)} to {_mm(final.held_out_error)} mm/s (floor {_mm(final.noise_floor)})"
     if names and ladder.explained:
@@ -137,19 +138,18 @@ def _judged(data: AxisData, ladder: Ladder, library: Library, tolerance: float, 
     return Diagnosis("not_in_library", (), certainty * (1.0 - max(gone, 0.0)), tolerance, sentence, ladder, tried, where, _UNKNOWN)
 
 
-def _ordered(data: AxisData, ladder: Ladder, library: Library) -> tuple[str, ...]:
+def _ordered(data: AxisData, ladder: Ladder) -> tuple[str, ...]:
     """The effects that remain, first the one whose absence would change the motion most, all else as it is.
 
-    What one-step prediction judges comes in the order in which it was added: free simulation says nothing about it.
+    Where only one-step prediction can judge the model: change the prediction most.
     """
     final = ladder.final
     if len(ladder.effects) < 2:
         return ladder.effects
-    if final.model.ahead:
-        order = [step.added for step in ladder.steps]
-        return tuple(sorted(ladder.effects, key=lambda name: order.index(name) if name in order else len(order)))
 
     def change(name: str) -> float:
+        if final.model.ahead:
+            return change_without(data, final.model, name)
         without = simulate(final.model.without(name), data.sampling_rate, data.voltage, data.position)
         return float(np.sum(data.layout.power(data.layout.spectrum(without - final.simulated))))
 

@@ -18,6 +18,7 @@ from xy_sysid.effects.contract import NO_FRICTION, Beside, DryFriction, Followed
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox import Z95, AxisData, Estimate, GreyboxFit, unit_of
 from xy_sysid.spectral_cost import count_size
+from xy_sysid.stream import FloatArray
 from xy_sysid.traces import bounded
 
 AT_NOISE = 3.5  # held-out innovation over the encoder's noise up to which an effect explains the axis
@@ -72,6 +73,26 @@ def beside(model: AxisModel, effect: Effect) -> tuple[DryFriction, tuple[tuple[s
             known = ", ".join(effect.one_step.frictions)
             raise BadInput("effects", f"{effect.name} with {name}", f"{effect.name} with {known}, or what does not heed speed", "Leave it out.")
     return dry, tuple(others)
+
+
+def change_without(data: AxisData, model: AxisModel, name: str) -> float:
+    """Mean square of what the innovations would change by, were one effect of a model absent and all else as it is, m^2."""
+    effect = model.ahead
+    assert effect is not None
+    least = (effect.parameters[0].low, *dict(model.effects)[effect.name][1:])
+    nothing = model.with_effect(name, least) if name == effect.name else model.without(name)
+    return float(np.mean((_innovation(data, nothing, effect) - _innovation(data, model, effect)) ** 2))
+
+
+def _innovation(data: AxisData, model: AxisModel, effect: Effect) -> FloatArray:
+    """(n,) measured minus predicted position, m, of a model as it is."""
+    assert effect.one_step is not None
+    dry, others = beside(model, effect)
+    values = dict(model.effects)[effect.name]
+    found = Followed(
+        (model.gain, model.delay, model.pole), values, (0.0, 0.0, 0.0), (0.0,) * len(values), dry, ((), ()), np.empty(0), 0.0, noise_of(data), 0
+    )
+    return effect.one_step.innovation(data.sampling_rate, found, as_beside(data, model.library, others), data.position.size - 1)
 
 
 def noise_of(data: AxisData) -> float:

@@ -8,7 +8,7 @@ import pkgutil
 from xy_sysid.effects.contract import Effect, Parameter, law
 from xy_sysid.effects.scene import Guess, Scene, columns
 
-TOOLS = ("contract", "scene", "modes", "contact")
+TOOLS = ("contract", "scene", "modes", "contact", "contact_filter")
 
 
 def _found() -> dict[str, Effect]:

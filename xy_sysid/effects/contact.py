@@ -1,32 +1,22 @@
-"""Two masses that touch across a gap, followed sample by sample: an extended Kalman filter on the motor's position.
+"""Gap, masses and contact of an axis with backlash, from one-step prediction.
 
 Contact is chaotic: free simulations of the same gap part within milliseconds, so a model with backlash can only be judged
 by how well it predicts the next sample from what was measured up to now (one-step prediction; Ljung, System
-Identification, 2nd ed., sec. 3.2; the filter: Jazwinski, Stochastic Processes and Filtering Theory, 1970, sec. 8.3).
-
-State: motor position and speed, motor minus table, its rate. Flanks push as k depth (1 + loss speed) + c speed and never
-pull (Hunt & Crossley, J. Appl. Mech. 42, 1975, eq. 8). The motor rubs by the laws of
-Coulomb friction, Stribeck friction or presliding hysteresis; the deflection of the bristles follows the motor's position
-and is corrected with it. Integrated by the explicit midpoint rule within each of a sample's two pieces of constant voltage.
+Identification, 2nd ed., sec. 3.2). The filter that predicts is in ``contact_filter``.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
 import scipy.optimize
 from numpy.typing import NDArray
 
-from xy_sysid.compiled import compiled
+from xy_sysid.effects.contact_filter import NAMES, innovations
 from xy_sysid.effects.contract import NO_FRICTION, Beside, DryFriction, Followed
-from xy_sysid.effects.presliding_hysteresis import bend
-from xy_sysid.effects.presliding_hysteresis import force as bristle_force
-from xy_sysid.effects.stribeck_friction import level
 from xy_sysid.stream import FloatArray
 
-NAMES = ("gain", "delay", "pole", "gap", "share", "rate", "damping", "loss", "guide", "coulomb", "excess", "velocity", "length", "bristle_damping")
 LOG = np.array([name in ("pole", "gap", "rate", "velocity", "length", "bristle_damping") for name in NAMES])
 RUBBING = {"coulomb_friction": (9,), "stribeck_friction": (9, 10, 11), "presliding_hysteresis": (9, 12, 13)}  # places of their parameters
 RUBBED, OWN = 9, len(NAMES)  # coordinates before those of friction, and before those of what is beside
@@ -37,8 +27,6 @@ SEEN = 2.5  # encoder noises that a gap must have to be one
 WORTH_A_LOOK = 60.0  # innovation over noise after the first few steps above which the fit is given up
 PROMISING = 10.0  # the same on the whole first stage; on the way to it twice that
 DEAF = 12.0  # the filter is told this much more encoder noise on the way: a smoother valley
-SLOW = 1e-3  # m/s at which the smoothed friction reaches its level
-FAST = 18.0 * SLOW  # m/s above which nothing of that is left
 DRIFT = 0.3  # process noise per rms speed, 1/sqrt(s): the filter forgives this much acceleration
 SANE = 0.5  # rad/s of the pole over the sampling rate, Hz, to begin with: a base that was led astray would make the filter unstable
 STEP = 1e-2  # of a parameter's unit
@@ -237,122 +225,3 @@ class _Slopes:
         if not float(step @ step) > 0.0 or float(missing @ missing) > TRUSTED**2 * float(change @ change):
             return None
         return np.asarray(columns + np.outer(missing, step / float(step @ step)))
-
-
-@compiled
-def _push(depth_of: float, rate: float, half: float, k: float, c: float, loss: float) -> tuple[float, float, float]:
-    """Force of the contact, and its derivatives by distance and by its rate."""
-    if depth_of > half:
-        depth = depth_of - half
-        force = k * depth * (1.0 + loss * rate) + c * rate
-        if force > 0.0:
-            return force, k * (1.0 + loss * rate), k * depth * loss + c
-    elif depth_of < -half:
-        depth = depth_of + half
-        force = k * depth * (1.0 - loss * rate) + c * rate
-        if force < 0.0:
-            return force, k * (1.0 - loss * rate), -k * depth * loss + c
-    return 0.0, 0.0, 0.0
-
-
-@compiled
-def _rub(v: float, z: float, dry: float, excess: float, velocity: float, length: float, damping: float, bristles: bool) -> tuple[float, float, float]:
-    """Friction in V, and its derivatives by speed and by position (bristles of deflection ``z`` follow it)."""
-    if bristles:
-        still = 1.0 - (z if v > 0.0 else -z) / length
-        return bristle_force(dry, length, damping, z, v, 0.0), damping * still, dry / length * still
-    steep = math.exp(-2.0 * abs(v) / SLOW) if abs(v) < FAST else 0.0
-    smooth = math.copysign((1.0 - steep) / (1.0 + steep), v)  # tanh(v / SLOW), in a third of its time
-    size = level(excess, dry, velocity, v) if excess > 0.0 else dry
-    return size * smooth, size * (1.0 - smooth * smooth) / SLOW - 2.0 * v / (velocity * velocity) * (size - dry) * smooth, 0.0
-
-
-@compiled
-def innovations(
-    u: FloatArray,
-    y: FloatArray,
-    against: FloatArray,
-    values: FloatArray,
-    bristles: bool,
-    fs: float,
-    noise: float,
-    drift: float,
-    cuts: int,
-    out: FloatArray,
-) -> None:
-    """One pass of the filter: (n,) measured minus predicted position, m.
-
-    u, against: (n,) V, against without delay; y: (n + 1,) m; values: by ``NAMES``; bristles: is friction theirs?
-    noise: variance of the encoder, m^2; drift: of the speeds, m^2/s^3
-    """
-    gain, delay, pole, gap, share = values[0], values[1], values[2], values[3], values[4]
-    reduced = share * (1.0 - share)
-    k, c, loss = reduced * values[5] ** 2, 2.0 * reduced * values[6] * values[5], values[7]
-    guide, dry, excess, velocity, length, bristle = values[8], values[9], values[10], values[11], values[12], values[13]
-    per_volt, rubs = pole * abs(gain), dry + excess > 0.0
-    drag_motor, drag_table = pole * (1.0 - guide), pole * guide
-    per_motor, per_table = 1.0 / share, 1.0 / (1.0 - share)
-    half = 0.5 * gap
-    late = delay * fs
-    whole = int(late)
-    part = late - whole
-    p = np.zeros((4, 4))
-    b = np.zeros((4, 4))
-    p[0, 0], p[1, 1], p[2, 2], p[3, 3] = noise, 1e-8, half * half + 1e-14, 1e-8
-    x, v, d, w, z, zm = y[0], 0.0, 0.0, 0.0, 0.0, 0.0
-    rub, slip, spring = 0.0, 0.0, 0.0
-    for i in range(out.shape[0]):
-        for piece in range(2):
-            h = (part if piece == 0 else 1.0 - part) / fs / cuts
-            if h <= 0.0:
-                continue
-            at = i - whole - 1 + piece
-            push = pole * gain * ((u[at] if at >= 0 else 0.0) - against[i])
-            for _ in range(cuts):
-                force, _by_d, _by_w = _push(d, w, half, k, c, loss)
-                if rubs:
-                    rub = per_volt * _rub(v, z, dry, excess, velocity, length, bristle, bristles)[0]
-                a = (push - rub - drag_motor * v - force) * per_motor
-                r = a - (force - drag_table * (v - w)) * per_table
-                vm, dm, wm = v + 0.5 * h * a, d + 0.5 * h * w, w + 0.5 * h * r
-                force, by_d, by_w = _push(dm, wm, half, k, c, loss)
-                if rubs:
-                    if bristles:
-                        zm = bend(dry, length, z, vm, 0.5 * h, 0.0)
-                        z = bend(dry, length, zm, vm, 0.5 * h, 0.0)
-                    rub, slip, spring = _rub(vm, zm, dry, excess, velocity, length, bristle, bristles)
-                    rub, slip, spring = per_volt * rub, per_volt * slip, per_volt * spring
-                a = (push - rub - drag_motor * vm - force) * per_motor
-                r = a - (force - drag_table * (vm - wm)) * per_table
-                x, v, d, w = x + h * vm, v + h * a, d + h * wm, w + h * r
-                v_x = -spring * per_motor
-                v_v, v_d, v_w = -(drag_motor + slip) * per_motor, -by_d * per_motor, -by_w * per_motor
-                w_v, w_d, w_w = v_v + drag_table * per_table, v_d - by_d * per_table, v_w - (by_w + drag_table) * per_table
-                for q in range(4):
-                    b[0, q] = p[0, q] + h * p[1, q]
-                    b[1, q] = p[1, q] + h * (v_x * p[0, q] + v_v * p[1, q] + v_d * p[2, q] + v_w * p[3, q])
-                    b[2, q] = p[2, q] + h * p[3, q]
-                    b[3, q] = p[3, q] + h * (v_x * p[0, q] + w_v * p[1, q] + w_d * p[2, q] + w_w * p[3, q])
-                for q in range(4):
-                    p[q, 0] = b[q, 0] + h * b[q, 1]
-                    p[q, 1] = b[q, 1] + h * (v_x * b[q, 0] + v_v * b[q, 1] + v_d * b[q, 2] + v_w * b[q, 3])
-                    p[q, 2] = b[q, 2] + h * b[q, 3]
-                    p[q, 3] = b[q, 3] + h * (v_x * b[q, 0] + w_v * b[q, 1] + w_d * b[q, 2] + w_w * b[q, 3])
-                p[1, 1] += drift * h
-                p[1, 3] += drift * h
-                p[3, 1] += drift * h
-                p[3, 3] += 2.0 * drift * h
-        seen = p[0, 0] + noise
-        error = y[i + 1] - x
-        out[i] = error
-        k0, k1, k2, k3 = p[0, 0] / seen, p[1, 0] / seen, p[2, 0] / seen, p[3, 0] / seen
-        if bristles:
-            z += k0 * error * (1.0 - (z if v > 0.0 else -z) / length)
-        x, v, d, w = x + k0 * error, v + k1 * error, d + k2 * error, w + k3 * error
-        for q in range(4):
-            b[0, q] = p[0, q]
-        for q in range(4):
-            p[0, q] -= k0 * b[0, q]
-            p[1, q] -= k1 * b[0, q]
-            p[2, q] -= k2 * b[0, q]
-            p[3, q] -= k3 * b[0, q]
