@@ -68,10 +68,10 @@ def test_a_resonance_is_taken_out_of_the_motion_and_put_back() -> None:
 
 
 def test_cogging_and_a_load_are_forces_against_the_drive() -> None:
-    """At a place, in volts."""
+    """At a place, in volts: the one at the motor, the other on the table."""
     x = np.full(4001, 0.00125)
-    assert undone("constant_load", (0.2,), noise(), x)[2] == pytest.approx(0.2)
-    assert undone("cogging", (0.3, 0.005, 0.1), noise(), x)[2] == pytest.approx(0.3 * np.sin(2.0 * np.pi / 4.0 + 0.1))
+    assert undone("constant_load", (0.2,), noise(), x)[2][1] == pytest.approx(0.2)
+    assert undone("cogging", (0.3, 0.005, 0.1), noise(), x)[2][0] == pytest.approx(0.3 * np.sin(2.0 * np.pi / 4.0 + 0.1))
 
 
 def test_asymmetric_friction_is_coulomb_friction_under_a_load() -> None:
@@ -103,7 +103,7 @@ def machine(*effects: str) -> tuple[AxisData, GreyboxFit]:
 
 
 def test_friction_that_differs_between_directions_is_found_beside_backlash() -> None:
-    """Coulomb friction is in the filter already: what is added is a load at the motor, and with it friction is asymmetric."""
+    """Coulomb friction is in the filter already; a law with two levels takes its place, no load on the table."""
     data, base = machine("backlash=30e-6", "asymmetric_friction=0.3,coulomb=0.2")
     start = fit_with(data, base, ["coulomb_friction"], brief=True)
     rungs = grown(data, start, EFFECTS["backlash"], STANDARD).rungs
@@ -134,7 +134,12 @@ def test_a_dead_zone_can_be_added_to_backlash_by_name() -> None:
 
 @pytest.mark.parametrize(
     ("name", "values"),
-    [("coulomb_friction", (0.2,)), ("stribeck_friction", (0.12, 0.15, 0.01)), ("presliding_hysteresis", (0.2, 12e-6, 1.5))],
+    [
+        ("coulomb_friction", (0.2,)),
+        ("asymmetric_friction", (0.2, 0.4)),
+        ("stribeck_friction", (0.12, 0.15, 0.01)),
+        ("presliding_hysteresis", (0.2, 12e-6, 1.5)),
+    ],
 )
 def test_friction_inside_the_filter_is_the_law_of_its_effect(name: str, values: tuple[float, ...]) -> None:
     """Without a gap and told next to nothing by the encoder, the filter moves as the simulation does; dry friction is smoothed near rest."""
@@ -144,7 +149,7 @@ def test_friction_inside_the_filter_is_the_law_of_its_effect(name: str, values: 
     fit = _Fit(RATE, BASE, 1.0, as_beside_nothing(u), u.size - 1, name)
     numbers = fit.outer(fit.start(BASE, (1e-10, 0.4, 30e3, 0.5, 0.0, 0.0), DryFriction(name, values)))
     out = np.empty(u.size - 1)
-    innovations(u[:-1], position, np.zeros(u.size - 1), numbers[:OWN], name == "presliding_hysteresis", RATE, 1e12, 0.0, 400, out)
+    innovations(u[:-1], position, np.zeros((2, u.size - 1)), numbers[:OWN], name == "presliding_hysteresis", RATE, 1e12, 0.0, 400, out)
     bent = name == "presliding_hysteresis"
     assert float(np.std(np.diff(out))) * RATE < (0.002 if bent else 0.01) * float(np.std(velocity))
 
@@ -152,7 +157,7 @@ def test_friction_inside_the_filter_is_the_law_of_its_effect(name: str, values: 
 def as_beside_nothing(voltage: FloatArray) -> Beside:
     none = np.zeros(0)
     zero = np.zeros(voltage.size)
-    return Beside(none, none, none, none, none.astype(np.bool_), lambda _, n: (voltage[:n], zero[: n + 1], zero[:n], 1.0))
+    return Beside(none, none, none, none, none.astype(np.bool_), lambda _, n: (voltage[:n], zero[: n + 1], np.zeros((2, n)), 1.0))
 
 
 @pytest.mark.parametrize(

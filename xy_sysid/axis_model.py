@@ -171,8 +171,8 @@ def undoer(
     """A function that takes effects (of ``undoable``) out of the first samples of a recording.
 
     Its arguments are a row as of ``simulator``, and n; it returns the voltage behind the amplifier (n,), V, the position before
-    resonances and the scale's errors (n + 1,), m, the forces against the drive (n,), V, and how much of a sudden change of that
-    position the encoder shows at once.
+    resonances and the scale's errors (n + 1,), m, the forces against the drive (2, n), at the motor and on the table, V, and how
+    much of a sudden change of that position the encoder shows at once.
     """
     members = [effect for effect in library.acting if undoable(effect)]
     places, names = slots(members), [effect.name for effect in members]
@@ -185,7 +185,7 @@ def undoer(
 
     def undo(parameters: FloatArray, samples: int) -> tuple[FloatArray, FloatArray, FloatArray, float]:
         row[where] = parameters
-        held, place, against = np.empty(samples), np.empty(samples + 1), np.empty(samples)
+        held, place, against = np.empty(samples), np.empty(samples + 1), np.empty((2, samples))
         through = kernel(u[:samples], x[: samples + 1], row, on, float(sampling_rate), held, place, against)
         return held, place, against, through
 

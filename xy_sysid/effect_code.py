@@ -65,8 +65,8 @@ def undoing(name: str, effects: Sequence[Effect]) -> str:
     """Source of ``name(u, x, p, on, fs, held, where, against)``: a recording as it were without some effects.
 
     u, x, p, on, fs: as in ``text``; held: (n,) receives the voltage behind the amplifier, V; where: (n + 1,) the position of the
-    axis before resonances and the scale's errors, m; against: (n,) forces against the drive, V; returns how much of
-    a sudden change of ``where`` the encoder shows at once. Only effects of ``undoable``.
+    axis before resonances and the scale's errors, m; against: (2, n) forces against the drive, at the motor and on the table, V;
+    returns how much of a sudden change of ``where`` the encoder shows at once. Only effects of ``undoable``.
     """
     return UNDOING.substitute(
         name=name,
@@ -77,7 +77,8 @@ def undoing(name: str, effects: Sequence[Effect]) -> str:
         inputs=_inputs(effects),
         states=_states(effects),
         advance=_advance([effect for effect in effects if not heeds_speed(effect)], 2),
-        pulls=_pulls(effects, 2),
+        pulls=_pulls([effect for effect in effects if not effect.on_table], 2),
+        loads=_pulls([effect for effect in effects if effect.on_table], 2),
         motions=_motions_taken_back(effects),
     )
 

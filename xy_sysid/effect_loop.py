@@ -262,6 +262,8 @@ $advance
         volts, pull, time = held[max(i - late, 0)], 0.0, (i + 0.5) / fs
         near, far = along(x, i, 0.5 * (1.0 - $gauss)), along(x, i, 0.5 * (1.0 + $gauss))
 $pulls
-        against[i] = pull
+        against[0, i], pull = pull, 0.0
+$loads
+        against[1, i] = pull
     return through
 """)

@@ -61,8 +61,6 @@ def _ages(effect: Effect) -> bool:
 def beside(model: AxisModel, effect: Effect) -> tuple[DryFriction, tuple[tuple[str, tuple[float, ...]], ...]]:
     """Dry friction of a model and its effects that can be taken out of a recording; raises BadInput for others."""
     assert effect.one_step is not None
-    for name, _ in model.effects:
-        model = model.taken_apart(name)
     dry, others = NO_FRICTION, []
     for name, values in model.effects:
         if name in effect.one_step.frictions:
@@ -129,7 +127,6 @@ def _result(data: AxisData, library: Library, effect: Effect, names: Sequence[st
         rows.append((dry.effect, bounded(library[dry.effect], dry.values), dry.spread))
     values, spread = iter(found.beside[0]), iter(found.beside[1])
     rows += [(name, tuple(next(values) for _ in library[name].names), tuple(next(spread) for _ in library[name].names)) for name in names]
-    rows = _joined(library, rows)
     gain, delay, pole = found.base
     model = AxisModel(gain, max(delay, 0.0), pole, library=library)
     estimates = [
@@ -154,25 +151,3 @@ def _result(data: AxisData, library: Library, effect: Effect, names: Sequence[st
         found.runs,
         True,
     )
-
-
-def _joined(library: Library, rows: list[tuple[str, tuple[float, ...], tuple[float, ...]]]) -> list[tuple[str, tuple[float, ...], tuple[float, ...]]]:
-    """One effect for several of which it is the sum, with the spread that theirs give it."""
-    own = {name: (values, spread) for name, values, spread in rows}
-    for effect in library.acting:
-        whole = effect.sum_of
-        if whole is None or any(part not in own for part in whole.parts):
-            continue
-        parts = [own[part][0] for part in whole.parts]
-        joined = whole.joined(parts)
-        if any(not item.low <= value <= item.high for item, value in zip(effect.parameters, joined, strict=True)):
-            continue
-        variance = np.zeros(len(joined))
-        for k, part in enumerate(whole.parts):
-            for j, s in enumerate(own[part][1]):
-                moved = [list(values) for values in parts]
-                moved[k][j] += 1e-3 * s
-                variance += ((np.array(whole.joined(moved)) - np.array(joined)) / 1e-3) ** 2
-        kept = [row for row in rows if row[0] not in whole.parts]
-        return [*kept, (effect.name, joined, tuple(np.sqrt(variance).tolist()))]
-    return rows

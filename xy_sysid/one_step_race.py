@@ -62,11 +62,11 @@ def grown(data: AxisData, base: GreyboxFit, effect: Effect, library: Library, pa
         open_to = [e for e in library.acting if undoable(e) and e.simulable and e.name not in known and e.category != "motion"]
         rubbing = [] if explains else _rubbing(data, fit, effect, library, found)
         wanted = traces(data, fit.model, effect, found, rubbing) if rubbing else []
-        tried = [(trace.effect, *followed(data, fit, effect, [_start(trace, effect, found)], found)) for trace in wanted]
+        tried = [(trace.effect, *followed(data, fit, effect, [_start(trace, effect, library, found)], found)) for trace in wanted]
         if not any(item[1].excess == 0.0 for item in tried):
-            seen = traces(data, fit.model, effect, found, open_to)
+            seen = traces(data, fit.model, effect, found, [*open_to, *_uneven(effect, library, found)])
             wanted = [trace for trace in seen if trace.share >= _least(library[trace.effect], effect, explains, patient)][:TRIED]
-            tried += [(trace.effect, *followed(data, fit, effect, [(trace.effect, trace.values)], found)) for trace in wanted]
+            tried += [(trace.effect, *followed(data, fit, effect, [_start(trace, effect, library, found)], found)) for trace in wanted]
         if not tried:
             break
         name, better, its = min(tried, key=lambda item: item[1].held_out_error)
@@ -93,7 +93,7 @@ def put_beside(data: AxisData, now: GreyboxFit, effect: Effect, other: Effect) -
     without = replace(now, model=now.model.without(effect.name) if rubs else model)
     _, found = followed(data, without, effect)
     trace = traces(data, without.model, effect, found, [other])[0]
-    return followed(data, without, effect, [_start(trace, effect, found)], found)[0]
+    return followed(data, without, effect, [_start(trace, effect, library, found)], found)[0]
 
 
 def _rubbing(data: AxisData, fit: GreyboxFit, effect: Effect, library: Library, found: Followed) -> list[Effect]:
@@ -105,15 +105,25 @@ def _rubbing(data: AxisData, fit: GreyboxFit, effect: Effect, library: Library, 
     if found.dry.values[0] < RUBS * float(np.std(data.voltage)) or fit.held_out_error > NEARLY * fit.noise_floor:
         return []
     own = len(library[found.dry.effect].parameters)
-    return [library[name] for name in effect.one_step.frictions if name in library.effects and len(library[name].parameters) > own]
+    laws = [library[name] for name in effect.one_step.frictions if name in library.effects]
+    return [law for law in laws if len(law.parameters) > own and law.sum_of is None]
 
 
-def _start(trace: Trace, effect: Effect, found: Followed) -> tuple[str, tuple[float, ...]]:
+def _uneven(effect: Effect, library: Library, found: Followed) -> list[Effect]:
+    """Friction that is Coulomb's and a load at the motor: its trace does tell."""
+    assert effect.one_step is not None
+    if found.dry.effect != effect.one_step.frictions[0]:
+        return []
+    return [library[name] for name in effect.one_step.frictions if name in library.effects and library[name].sum_of is not None]
+
+
+def _start(trace: Trace, effect: Effect, library: Library, found: Followed) -> tuple[str, tuple[float, ...]]:
     """Name and values to begin with: friction at the level that it has already."""
     assert effect.one_step is not None
     if trace.effect not in effect.one_step.frictions:
         return trace.effect, trace.values
-    return trace.effect, (max(found.dry.values[0], 1e-3), *trace.values[1:])
+    rest = trace.values[1:] if library[trace.effect].sum_of is None else (0.0,) * (len(trace.values) - 1)
+    return trace.effect, (max(found.dry.values[0], 1e-3), *rest)
 
 
 def _settled(data: AxisData, effect: Effect, fit: GreyboxFit, found: Followed) -> tuple[GreyboxFit, Followed]:
@@ -160,11 +170,13 @@ def traces(data: AxisData, model: AxisModel, effect: Effect, found: Followed, ef
         fs, found.base[0], found.base[2], _late(voltage, found.base[1] * fs), data.velocity[:n], 0.5 * (position[1:] + position[:-1]), error
     )
 
-    def change(guess: Guess, column: FloatArray) -> FloatArray:
+    def change(guess: Guess, column: FloatArray, side: int) -> FloatArray:
         size = SMALL * float(np.std(data.velocity if guess.at_encoder else voltage)) / (float(np.std(column)) + abs(float(np.mean(column))) + 1e-300)
         put = size * column
         other = recording(voltage, position - np.concatenate(([0.0], np.cumsum(put))) / fs, against) if guess.at_encoder else None
-        return (seen(other or recording(voltage, position, against + put)) - here)[skip:] / size
+        both = against.copy()
+        both[side] += put
+        return (seen(other or recording(voltage, position, both)) - here)[skip:] / size
 
     nuisance = np.stack(
         [(seen(recording(*own.undo(moved, n)[:3]), replace(found, base=tuple(moved[:3]))) - here)[skip:] for moved in _moved(numbers)]
@@ -175,7 +187,7 @@ def traces(data: AxisData, model: AxisModel, effect: Effect, found: Followed, ef
     for item in effects:
         trace = Trace(item.name, 0.0, item.typical)
         for guess in item.guesses(scene) if item.guesses is not None else ():
-            columns = np.stack([change(guess, column[:n]) for column in guess.columns])
+            columns = np.stack([change(guess, column[:n], int(item.on_table)) for column in guess.columns])
             columns = columns - (columns @ basis) @ basis.T
             size = np.linalg.norm(columns, axis=1) + 1e-300
             unit = columns / size[:, None]

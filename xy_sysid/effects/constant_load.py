@@ -34,4 +34,5 @@ EFFECT = Effect(
     experiment="constant speed both ways, and rest under small voltages of both signs",
     functions={"force": force},
     guesses=guesses,
+    on_table=True,
 )

@@ -18,9 +18,9 @@ from xy_sysid.effects.contract import NO_FRICTION, Beside, DryFriction, Followed
 from xy_sysid.stream import FloatArray
 
 LOG = np.array([name in ("pole", "gap", "rate", "velocity", "length", "bristle_damping") for name in NAMES])
-RUBBING = {"coulomb_friction": (9,), "stribeck_friction": (9, 10, 11), "presliding_hysteresis": (9, 12, 13)}  # places of their parameters
+RUBBING = {"coulomb_friction": (9,), "stribeck_friction": (9, 10, 11), "presliding_hysteresis": (9, 12, 13), "asymmetric_friction": (9, 14)}  # places
 RUBBED, OWN = 9, len(NAMES)  # coordinates before those of friction, and before those of what is beside
-USUAL = (0.0, 0.0, 0.01, 10e-6, 2.0)  # of these parameters, where they are not in use
+USUAL = (0.0, 0.0, 0.01, 10e-6, 2.0, 0.0)  # of these parameters, where they are not in use
 GAPS = np.geomspace(2e-6, 150e-6, 10)  # m, tried first
 STIFF = 2.0 * np.pi * 180.0  # rad/s of the contact at least: flanks of steel; a softer one is a loosely held mass, not play in the drive
 SEEN = 2.5  # encoder noises that a gap must have to be one
@@ -120,8 +120,9 @@ class _Fit:
         longest = max(20.0 / sampling_rate, 2.0 * base[1])
         low = [-np.inf, 0.0, np.log(1e-2), np.log(1e-10), 0.02, np.log(STIFF), 0.0, 0.0, 0.0, 0.0, 0.0, *np.log((1e-5, 5e-7, 1e-3))]
         high = [np.inf, longest, np.log(1e5), np.log(1e-2), 0.98, np.log(max(5.0 * sampling_rate, 2.0 * STIFF)), 2.0, 500.0, 0.9, 5.0, 5.0]
-        high += np.log((1.0, 1e-2, 1e3)).tolist()
-        unit = [0.02 * abs(base[0]), 0.1 / sampling_rate, 0.05, 0.1, 0.05, 0.1, 0.05, 2.0, 0.02, 0.01, 0.01, 0.1, 0.1, 0.1]
+        low.append(-0.99)
+        high += [*np.log((1.0, 1e-2, 1e3)).tolist(), 0.99]
+        unit = [0.02 * abs(base[0]), 0.1 / sampling_rate, 0.05, 0.1, 0.05, 0.1, 0.05, 2.0, 0.02, 0.01, 0.01, 0.1, 0.1, 0.1, 0.05]
         self.log = np.concatenate((LOG, beside.positive))
         self.unit = np.concatenate((unit, np.where(beside.positive, 0.05, 0.05 * beside.unit)))
         self.low, self.high = (
@@ -178,7 +179,7 @@ class _Fit:
         return whole(found.x)
 
     def spread(self, inner: FloatArray, samples: int) -> FloatArray:
-        """(14 + k,) standard errors of the parameters, from the innovations' slopes; 0 for those that are not in use."""
+        """(15 + k,) standard errors of the parameters, from the innovations' slopes; 0 for those that are not in use."""
         part = inner[self.every] / self.unit[self.every]
 
         def left(part: FloatArray) -> FloatArray:

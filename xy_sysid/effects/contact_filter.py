@@ -2,9 +2,10 @@
 
 State: motor position (x) and speed (v), motor minus table (d), its rate (w). Flanks push as k depth (1 + loss speed) + c speed
 and never pull (Hunt & Crossley, J. Appl. Mech. 42, 1975, eq. 8). The motor rubs by the laws of Coulomb friction, Stribeck
-friction or presliding hysteresis; the deflection of the bristles follows the motor's position and is corrected with it.
-Integrated by the explicit midpoint rule within each of a sample's two pieces of constant voltage (the filter: Jazwinski,
-Stochastic Processes and Filtering Theory, 1970, sec. 8.3).
+friction, presliding hysteresis or friction that differs between the directions; the deflection of the bristles follows the
+motor's position and is corrected with it. Forces of effects that are ``on_table`` act on the table. Integrated by the explicit
+midpoint rule within each of a sample's two pieces of constant voltage (the filter: Jazwinski, Stochastic Processes and
+Filtering Theory, 1970, sec. 8.3).
 """
 
 from __future__ import annotations
@@ -17,7 +18,23 @@ from xy_sysid.effects.presliding_hysteresis import force as bristle_force
 from xy_sysid.effects.stribeck_friction import level
 from xy_sysid.stream import FloatArray
 
-NAMES = ("gain", "delay", "pole", "gap", "share", "rate", "damping", "loss", "guide", "coulomb", "excess", "velocity", "length", "bristle_damping")
+NAMES = (
+    "gain",
+    "delay",
+    "pole",
+    "gap",
+    "share",
+    "rate",
+    "damping",
+    "loss",
+    "guide",
+    "coulomb",
+    "excess",
+    "velocity",
+    "length",
+    "bristle_damping",
+    "asymmetry",
+)
 SLOW = 1e-3  # m/s at which the smoothed friction reaches its level
 FAST = 18.0 * SLOW  # m/s above which nothing of that is left
 
@@ -111,16 +128,17 @@ def innovations(
 ) -> None:
     """One pass of the filter: (n,) measured minus predicted position, m.
 
-    u, against: (n,) V, against without delay; y: (n + 1,) m; values: by ``NAMES``; bristles: is friction theirs?
-    noise: variance of the encoder, m^2; drift: of the speeds, m^2/s^3
+    u: (n,) V; against: (2, n) V, forces at the motor and on the table, without delay; y: (n + 1,) m; values: by ``NAMES``
+    bristles: is friction theirs? noise: variance of the encoder, m^2; drift: of the speeds, m^2/s^3
     """
     gain, delay, pole, gap, share = values[0], values[1], values[2], values[3], values[4]
     reduced = share * (1.0 - share)
     k, c, loss = reduced * values[5] ** 2, 2.0 * reduced * values[6] * values[5], values[7]
-    guide, dry, excess, velocity, length, bristle = values[8], values[9], values[10], values[11], values[12], values[13]
+    guide, dry, excess, velocity, length, bristle, asymmetry = values[8], values[9], values[10], values[11], values[12], values[13], values[14]
     per_volt, rubs = pole * abs(gain), dry + excess > 0.0
     drag_motor, drag_table = pole * (1.0 - guide), pole * guide
     per_motor, per_table = 1.0 / share, 1.0 / (1.0 - share)
+    steady = per_volt * asymmetry * dry  # beside friction that is the same both ways
     half = 0.5 * gap
     late = delay * fs
     whole = int(late)
@@ -134,13 +152,14 @@ def innovations(
             if h <= 0.0:
                 continue
             at = i - whole - 1 + piece
-            push = pole * gain * ((u[at] if at >= 0 else 0.0) - against[i])
+            push = pole * gain * ((u[at] if at >= 0 else 0.0) - against[0, i]) - steady
+            hold = pole * gain * against[1, i]
             for _ in range(cuts):
                 force, _by_d, _by_w = _push(d, w, half, k, c, loss)
                 if rubs:
                     rub = per_volt * _rub(v, z, dry, excess, velocity, length, bristle, bristles)[0]
                 a = (push - rub - drag_motor * v - force) * per_motor
-                r = a - (force - drag_table * (v - w)) * per_table
+                r = a - (force - drag_table * (v - w) - hold) * per_table
                 vm, dm, wm = v + 0.5 * h * a, d + 0.5 * h * w, w + 0.5 * h * r
                 force, by_d, by_w = _push(dm, wm, half, k, c, loss)
                 if rubs:
@@ -150,7 +169,7 @@ def innovations(
                     rub, slip, spring = _rub(vm, zm, dry, excess, velocity, length, bristle, bristles)
                     rub, slip, spring = per_volt * rub, per_volt * slip, per_volt * spring
                 a = (push - rub - drag_motor * vm - force) * per_motor
-                r = a - (force - drag_table * (vm - wm)) * per_table
+                r = a - (force - drag_table * (vm - wm) - hold) * per_table
                 x, v, d, w = x + h * vm, v + h * a, d + h * wm, w + h * r
                 v_x = -spring * per_motor
                 v_v, v_d, v_w = -(drag_motor + slip) * per_motor, -by_d * per_motor, -by_w * per_motor

@@ -42,7 +42,8 @@ class Beside:
     """What acts beside an effect that one-step prediction judges, and how to take it out of a recording.
 
     start, low, high, unit: (k,) of its numbers, SI (unit: size of 1); positive: (k,) fitted as a logarithm
-    undo: gain, delay, pole and the k numbers, and n -> voltage (n,), V; position (n + 1,), m; force against the drive (n,), V;
+    undo: gain, delay, pole and the k numbers, and n -> voltage (n,), V; position (n + 1,), m; forces against the drive (2, n), V, at the
+          motor and on the table;
           how much of a sudden change of that position the encoder shows at once
     """
 
@@ -196,7 +197,8 @@ class Effect:
     simulable:   False if free simulation cannot judge it
     plausible:   False for values that no machine has, though each is within its bounds
     one_step:    then this does: fits the effect by one-step prediction (see ``contact.Contact``)
-    sum_of:      other effects that together are the very same law, if there are
+    sum_of:      other effects that together are the very same law, if there are and motor and table are one
+    on_table:    True for a force that acts on the table: across a gap the motor does not feel it
     """
 
     name: str
@@ -219,6 +221,7 @@ class Effect:
     one_step: OneStep | None = None
     plausible: Callable[[Sequence[float]], bool] | None = None
     sum_of: Sum | None = None
+    on_table: bool = False
 
     def __post_init__(self) -> None:
         """Raises BadInput if the functions do not fit the category or ask for words that nobody knows."""

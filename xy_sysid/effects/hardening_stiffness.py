@@ -36,4 +36,5 @@ EFFECT = Effect(
     experiment="hold still at several places: the voltage needed is the law",
     functions={"force": force},
     guesses=guesses,
+    on_table=True,
 )
