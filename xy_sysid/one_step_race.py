@@ -17,8 +17,9 @@ from xy_sysid.base_start import mean_velocity_filter
 from xy_sysid.effect_code import undoable
 from xy_sysid.effects import Effect, Guess, Scene
 from xy_sysid.effects.contract import Beside, Followed
+from xy_sysid.errors import BadInput
 from xy_sysid.greybox import AxisData, GreyboxFit
-from xy_sysid.one_step import CLEAN, as_beside, beside, followed
+from xy_sysid.one_step import CLEAN, as_beside, beside, change_without, followed
 from xy_sysid.stream import FloatArray
 from xy_sysid.traces import Trace, bounded
 
@@ -35,6 +36,7 @@ RUBS = 0.05  # Coulomb friction over the rms voltage from which richer laws of i
 NEARLY = 30.0  # innovation over the noise up to which they are
 AGAIN, LOST = 2.5, 40.0  # innovations over noise between which a first fit is begun again from where it ended
 MOST = 3  # effects beside
+NEEDLESS = 0.01  # part of the innovations' power that they change by without an effect that is not needed
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +79,27 @@ def grown(data: AxisData, base: GreyboxFit, effect: Effect, library: Library, pa
         better, found = _settled(data, effect, better, its)
         rungs.append((name if name in better.model else new[-1] if new else name, better))
     return Grown(tuple(rungs), found)
+
+
+def in_its_place(data: AxisData, now: GreyboxFit, effect: Effect, stand_in: str) -> Grown | None:
+    """An effect instead of a look-alike of it, with what else a fit by simulation has beside it; None if the filter cannot have that.
+
+    What the prediction does not need is left out.
+    """
+    library = now.model.library
+    start = replace(now, model=now.model.without(stand_in))
+    try:
+        found = grown(data, start, effect, library, patient=False)
+    except BadInput:
+        return None
+    fit = found.rungs[-1][1]
+    enough = NEEDLESS * (fit.held_out_error / data.sampling_rate) ** 2
+    needless = [name for name, _ in fit.model.effects if name in start.model and change_without(data, fit.model, name) < enough]
+    if fit.excess > 0.0 or not needless:
+        return found
+    for name in needless:
+        start = replace(start, model=start.model.without(name))
+    return grown(data, start, effect, library, patient=False)
 
 
 def put_beside(data: AxisData, now: GreyboxFit, effect: Effect, other: Effect) -> GreyboxFit:

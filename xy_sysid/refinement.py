@@ -14,7 +14,7 @@ import numpy as np
 from xy_sysid.axis_model import STANDARD, AxisModel, Library
 from xy_sysid.greybox import EPSILON, AxisData, GreyboxFit, finish, fit, fit_base, fit_with
 from xy_sysid.one_step import one_step_fit
-from xy_sysid.one_step_race import Grown, put_beside
+from xy_sysid.one_step_race import Grown, in_its_place, put_beside
 from xy_sysid.race import (
     AT_FLOOR,
     HOPELESS,
@@ -39,6 +39,7 @@ WEAK = 0.8  # of the excess that a single effect must leave at most; else two at
 PAIR_GAIN = 0.3  # excess that two at once must win where no single effect wins anything
 NEEDED = 0.05  # excess that taking an effect out again must cost, or it goes
 MOST_EFFECTS = 4
+LED_ON = 0.7  # of the base's excess that a ladder may end with for a look-alike in it to stand for another effect
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,11 +112,16 @@ def _another_way(
 ) -> list[Step] | None:
     """Where one at a time has led astray, if that leads further down than all since.
 
-    Two at once from an earlier rung; or, from the base, an effect that only one-step prediction can judge and what is beside it.
+    An effect that only one-step prediction can judge in the place of a look-alike; two at once from an earlier rung; or, from the
+    base, an effect that only one-step prediction can judge and what is beside it.
     """
     if data.floor.epsilon > EPSILON:
         return None
     now = steps[-1].fit
+    if not given and now.excess < LED_ON * steps[0].fit.excess:
+        swapped = _without_stand_in(data, steps, library)
+        if swapped is not None:
+            return swapped
     for rung in range(len(steps) - 2, given - 1, -1):
         here, tried = steps[rung].fit, steps[rung + 1].tried
         if rung in paired or not tried:
@@ -130,6 +136,24 @@ def _another_way(
     tried = steps[1].tried if len(steps) > 1 else last.tried
     rungs = explaining(suspected(data, steps[0].fit, tried, library, patient=True, begun=begun))
     return [steps[0], *_as_steps(rungs, tried)] if rungs else None
+
+
+def _without_stand_in(data: AxisData, steps: list[Step], library: Library) -> list[Step] | None:
+    """The look-alike that was added last gives way to the effect that only one-step prediction can judge, if that explains the axis."""
+    now = steps[-1].fit
+    for effect in library.acting:
+        alike = [name for name, _ in now.model.effects if name in effect.look_alikes]
+        instead = in_its_place(data, now, effect, alike[-1]) if effect.one_step is not None and alike else None
+        if instead is None or instead.rungs[-1][1].excess >= AT_FLOOR:
+            continue
+        own = [name for name, _ in instead.rungs]
+        found, fit = steps[:1], steps[0].fit
+        for name, _ in instead.rungs[-1][1].model.effects:
+            if name in now.model and name not in own:
+                fit = fit_with(data, fit, [name])
+                found.append(Step(name, fit, steps[1].tried if len(found) == 1 else ()))
+        return [*found, *_as_steps(instead.rungs, steps[1].tried if len(found) == 1 else ())]
+    return None
 
 
 def _as_steps(rungs: Sequence[tuple[str, GreyboxFit]], tried: tuple[Candidate, ...]) -> tuple[Step, ...]:
