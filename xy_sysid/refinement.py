@@ -82,13 +82,13 @@ def refine(data: AxisData, library: Library = STANDARD, most: int = MOST_EFFECTS
     begun: dict[str, Grown] = {}
     stays = kept
     while len(steps) <= most:
-        move = advance(data, now, library, pairs=len(steps) < most)
+        move = advance(data, now, library, pairs=len(steps) == 1 + len(kept) < most)
         if move.paired:
             paired.add(len(steps) - 1)
         begun |= move.begun
         stays = (*stays, move.stays) if move.stays else stays
         if not move.steps:
-            better = _another_way(data, steps, move, len(kept), paired, library, begun) if now.excess >= AT_FLOOR else None
+            better = _another_way(data, steps, move, most, len(kept), paired, library, begun) if now.excess >= AT_FLOOR else None
             if better is None:
                 rejected = move.tried
                 break
@@ -108,12 +108,13 @@ def refine(data: AxisData, library: Library = STANDARD, most: int = MOST_EFFECTS
 
 
 def _another_way(
-    data: AxisData, steps: list[Step], last: Move, given: int, paired: set[int], library: Library, begun: Mapping[str, Grown]
+    data: AxisData, steps: list[Step], last: Move, most: int, given: int, paired: set[int], library: Library, begun: Mapping[str, Grown]
 ) -> list[Step] | None:
     """Where one at a time has led astray, if that leads further down than all since.
 
-    An effect that only one-step prediction can judge in the place of a look-alike; two at once from an earlier rung; or, from the
-    base, an effect that only one-step prediction can judge and what is beside it.
+    An effect that only one-step prediction can judge in the place of a look-alike; two at once, from the first rung on, because the
+    first choices were made with least knowledge and the first rungs simulate fastest; or, from the base, an effect that only
+    one-step prediction can judge and what is beside it.
     """
     if data.floor.epsilon > EPSILON:
         return None
@@ -122,15 +123,19 @@ def _another_way(
         swapped = _without_stand_in(data, steps, library)
         if swapped is not None:
             return swapped
-    for rung in range(len(steps) - 2, given - 1, -1):
-        here, tried = steps[rung].fit, steps[rung + 1].tried
-        if rung in paired or not tried:
+    for rung in range(given, len(steps)):
+        here, top = steps[rung].fit, rung == len(steps) - 1
+        tried = last.tried if top else steps[rung + 1].tried
+        if rung in paired or not tried or (top and len(steps) >= most):
             continue
         paired.add(rung)
-        others = tuple(item for item in tried if item.effect != steps[rung + 1].added)
-        pair = together(data, here, others, library, WEAK * now.excess + NEAR)
-        if pair is not None and pair[0].fit and pair[1].fit and pair[1].fit.excess < WEAK * now.excess:
-            return [*steps[: rung + 1], Step(pair[0].effect, pair[0].fit, tried), Step(pair[1].effect, pair[1].fit, ())]
+        if top:
+            two = _two_at_once(data, here, tried, library)
+        else:
+            others = tuple(item for item in tried if item.effect != steps[rung + 1].added)
+            two = _as_pair(together(data, here, others, library, WEAK * now.excess + NEAR), tried, WEAK * now.excess)
+        if two:
+            return [*steps[: rung + 1], *two]
     if given:
         return None
     tried = steps[1].tried if len(steps) > 1 else last.tried
@@ -199,16 +204,28 @@ def advance(data: AxisData, now: GreyboxFit, library: Library = STANDARD, pairs:
     taken = choose(now, tried, library)
     found = taken.fit if taken is not None else None
     paired = strict and pairs and (found is None or found.excess > WEAK * now.excess)
-    if paired:
-        single = now.excess if found is None else min(found.excess, now.excess)
-        bar = WEAK * single if now.excess - single >= LEAST_GAIN else max(WEAK * single, now.excess - PAIR_GAIN)
-        pair = together(data, now, tried, library, bar + NEAR)
-        if pair is not None and pair[0].fit and pair[1].fit and pair[1].fit.excess < bar:
-            return Move((Step(pair[0].effect, pair[0].fit, tried), Step(pair[1].effect, pair[1].fit, ())), tried, paired, begun)
+    two = _two_at_once(data, now, tried, library) if paired else ()
+    if two:
+        return Move(two, tried, paired, begun)
     hope = strict and found is not None and now.excess - found.excess >= LEAST_GAIN
     if taken is None or found is None or not (_worth(now, found) or hope):
         return Move((), tried, paired, begun)
     return Move((Step(taken.effect, found, tried),), tried, paired, begun)
+
+
+def _two_at_once(data: AxisData, now: GreyboxFit, tried: tuple[Candidate, ...], library: Library) -> tuple[Step, ...]:
+    """Two rungs that lead clearly further down than the best single effect; none if there are no such two."""
+    taken = choose(now, tried, library)
+    single = now.excess if taken is None or taken.fit is None else min(taken.fit.excess, now.excess)
+    bar = WEAK * single if now.excess - single >= LEAST_GAIN else max(WEAK * single, now.excess - PAIR_GAIN)
+    return _as_pair(together(data, now, tried, library, bar + NEAR), tried, bar)
+
+
+def _as_pair(pair: tuple[Candidate, Candidate] | None, tried: tuple[Candidate, ...], bar: float) -> tuple[Step, ...]:
+    """Two rungs, if they leave less excess than ``bar``."""
+    if pair is None or pair[0].fit is None or pair[1].fit is None or not pair[1].fit.excess < bar:
+        return ()
+    return Step(pair[0].effect, pair[0].fit, tried), Step(pair[1].effect, pair[1].fit, ())
 
 
 def _again(data: AxisData, steps: list[Step], names: tuple[str, ...], library: Library) -> list[Step]:
