@@ -18,8 +18,8 @@ from xy_sysid.effects.contact_filter import innovations
 from xy_sysid.effects.contract import Beside, DryFriction
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox import AxisData, GreyboxFit, fit_base, fit_with, prepare
-from xy_sysid.one_step import one_step_fit
-from xy_sysid.one_step_race import grown
+from xy_sysid.one_step import change_without, one_step_fit
+from xy_sysid.one_step_race import grown, in_its_place
 from xy_sysid.refinement import added
 from xy_sysid.settings import AxisExcitation, ExcitationSettings, build
 from xy_sysid.stream import FloatArray
@@ -113,6 +113,44 @@ def test_friction_that_differs_between_directions_is_found_beside_backlash() -> 
     assert last.parameter("backlash.gap").value == pytest.approx(30e-6, rel=0.02)
     assert last.parameter("asymmetric_friction.coulomb").value == pytest.approx(0.2, rel=0.03)
     assert last.parameter("asymmetric_friction.asymmetry").value == pytest.approx(0.3, rel=0.05)
+
+
+def test_a_load_on_the_table_is_told_from_friction_that_differs_between_directions() -> None:
+    """Across a gap the motor feels the one and not the other; both numbers are right."""
+    data, base = machine("backlash=30e-6", "constant_load=0.15", "coulomb_friction=0.2")
+    start = fit_with(data, base, ["coulomb_friction"], brief=True)
+    rungs = grown(data, start, EFFECTS["backlash"], STANDARD).rungs
+    assert [name for name, _ in rungs] == ["backlash", "constant_load"]
+    last = rungs[-1][1]
+    assert last.excess == 0.0
+    assert last.parameter("constant_load.load").value == pytest.approx(0.15, rel=0.01)
+    assert last.parameter("coulomb_friction.coulomb").value == pytest.approx(0.2, rel=0.03)
+    assert last.parameter("backlash.gap").value == pytest.approx(30e-6, rel=0.02)
+
+
+def test_backlash_takes_the_place_of_a_screw_that_stood_for_it() -> None:
+    """What simulation found beside the look-alike is right enough to begin with; what nothing needs is left out."""
+    data, base = machine("backlash=26e-6", "constant_load=-0.23", "saturation=1.7")
+    astray = fit_with(data, base, ["saturation", "screw_compliance", "constant_load", "gain_drift"])
+    assert astray.excess > 1.0
+    found = in_its_place(data, astray, EFFECTS["backlash"], "screw_compliance")
+    assert found is not None
+    last = found.rungs[-1][1]
+    assert last.excess == 0.0
+    assert {name for name, _ in last.model.effects} == {"backlash", "constant_load", "saturation"}
+    assert last.parameter("backlash.gap").value == pytest.approx(26e-6, rel=0.02)
+    assert last.parameter("constant_load.load").value == pytest.approx(-0.23, rel=0.01)
+    order = sorted(dict(last.model.effects), key=lambda name: -change_without(data, last.model, name))
+    assert order[0] == "backlash"
+    tiny = last.model.with_effect("constant_load", (1e-9,))
+    assert change_without(data, tiny, "constant_load") < 1e-6 * change_without(data, last.model, "constant_load")
+
+
+def test_what_the_filter_cannot_have_beside_it_is_said_by_none() -> None:
+    """Drag that differs between directions heeds the speed: no attempt is made."""
+    data, base = machine("backlash=30e-6")
+    both = fit_with(data, base, ["screw_compliance", "asymmetric_viscous_friction"], brief=True)
+    assert in_its_place(data, both, EFFECTS["backlash"], "screw_compliance") is None
 
 
 def test_nothing_is_put_beside_backlash_that_stands_alone() -> None:

@@ -46,7 +46,7 @@ def _section(e: Effect) -> str:
 
 {table}
 
-- Valid for: {e.validity}
+- Valid for: {e.validity}{"; acts on the table: across a gap the motor does not feel it" if e.on_table else ""}
 - Shows as: {e.shows}
 - Taken for: {", ".join(e.look_alikes)}
 - Told apart by: {e.experiment}

@@ -74,7 +74,7 @@ def beside(model: AxisModel, effect: Effect) -> tuple[DryFriction, tuple[tuple[s
 
 
 def change_without(data: AxisData, model: AxisModel, name: str) -> float:
-    """Mean square of what the innovations would change by, were one effect of a model absent and all else as it is, m^2."""
+    """Mean square of what the innovations over the noise would change by, were one effect of a model absent and all else as it is."""
     effect = model.ahead
     assert effect is not None
     least = (effect.parameters[0].low, *dict(model.effects)[effect.name][1:])
@@ -83,7 +83,7 @@ def change_without(data: AxisData, model: AxisModel, name: str) -> float:
 
 
 def _innovation(data: AxisData, model: AxisModel, effect: Effect) -> FloatArray:
-    """(n,) measured minus predicted position, m, of a model as it is."""
+    """(n,) innovations over the noise of a model as it is."""
     assert effect.one_step is not None
     dry, others = beside(model, effect)
     values = dict(model.effects)[effect.name]

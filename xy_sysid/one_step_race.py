@@ -93,7 +93,7 @@ def in_its_place(data: AxisData, now: GreyboxFit, effect: Effect, stand_in: str)
     except BadInput:
         return None
     fit = found.rungs[-1][1]
-    enough = NEEDLESS * (fit.held_out_error / data.sampling_rate) ** 2
+    enough = NEEDLESS * (fit.held_out_error / fit.noise_floor) ** 2
     needless = [name for name, _ in fit.model.effects if name in start.model and change_without(data, fit.model, name) < enough]
     if fit.excess > 0.0 or not needless:
         return found
