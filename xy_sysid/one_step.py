@@ -24,7 +24,7 @@ from xy_sysid.traces import bounded
 AT_NOISE = 3.5  # held-out innovation over the encoder's noise up to which an effect explains the axis
 BETTER = 2.0  # innovation without the effect over that with it, at least
 CLEAN = 1.6  # innovation over the noise up to which next to nothing else is left in it,
-LITTLE_BETTER = 1.25  # and what is enough there in the place of BETTER
+LITTLE_BETTER = 1.03  # and what is enough there in the place of BETTER: a gap of one encoder count makes 1.04 to 1.07
 TELLING = 0.005  # dry friction over the rms voltage from which it is named
 
 Others = Sequence[tuple[str, tuple[float, ...]]]
@@ -119,8 +119,8 @@ def _result(data: AxisData, library: Library, effect: Effect, names: Sequence[st
     held = float(np.sqrt(np.mean(error[data.training :] ** 2)))
     noise_floor = found.noise * data.sampling_rate
     worse = found.without * data.sampling_rate or held  # not known where the effect explains too little, or is too small to be one
-    least = LITTLE_BETTER if held < CLEAN * noise_floor else BETTER
-    far = max(held / (AT_NOISE * noise_floor), least * held / worse)
+    told = held < CLEAN * noise_floor and worse > LITTLE_BETTER * held
+    far = max(held / (AT_NOISE * noise_floor), 0.0 if told else BETTER * held / worse)
     rows: list[tuple[str, tuple[float, ...], tuple[float, ...]]] = [(effect.name, bounded(effect, found.values), found.spread)]
     dry = found.dry
     if dry.values[0] > TELLING * float(np.std(data.voltage)) and dry.values[0] > 5.0 * dry.spread[0]:

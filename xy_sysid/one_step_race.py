@@ -19,7 +19,7 @@ from xy_sysid.effects import Effect, Guess, Scene
 from xy_sysid.effects.contract import Beside, Followed
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox import AxisData, GreyboxFit
-from xy_sysid.one_step import CLEAN, as_beside, beside, change_without, followed
+from xy_sysid.one_step import AT_NOISE, CLEAN, as_beside, beside, change_without, followed
 from xy_sysid.stream import FloatArray
 from xy_sysid.traces import Trace, bounded
 
@@ -33,7 +33,7 @@ LOUD = 0.08  # share from which an effect is tried beside one that does not expl
 LITTLE_LESS, LESS, MUCH_LESS = 0.97, 0.85, 0.8  # of the held-out innovation that one more effect must leave at most: where next to
 # nothing but noise is left, where it is explained, and else
 RUBS = 0.05  # Coulomb friction over the rms voltage from which richer laws of it are tried
-NEARLY = 30.0  # innovation over the noise up to which they are
+NEARLY = 30.0  # innovation over the noise up to which they are, and what is not loud is tried, too
 AGAIN, LOST = 2.5, 40.0  # innovations over noise between which a first fit is begun again from where it ended
 MOST = 3  # effects beside
 NEEDLESS = 0.01  # part of the innovations' power that they change by without an effect that is not needed
@@ -50,7 +50,7 @@ class Grown:
 def grown(data: AxisData, base: GreyboxFit, effect: Effect, library: Library, patient: bool = True, begun: Grown | None = None) -> Grown:
     """Rungs: the effect with what the base has beside it, then one more beside it at each.
 
-    patient: else only an effect with a loud trace is tried beside one that does not explain the axis alone; begun: go on from there
+    patient: else only an effect with a loud trace is tried beside one that is far from explaining the axis; begun: go on from there
     """
     if begun is None:
         fit, found = _settled(data, effect, *followed(data, base, effect))
@@ -59,6 +59,8 @@ def grown(data: AxisData, base: GreyboxFit, effect: Effect, library: Library, pa
     while len(rungs) <= MOST:
         fit = rungs[-1][1]
         explains = fit.excess == 0.0
+        if found.without == 0.0 and fit.held_out_error < AT_NOISE * fit.noise_floor:
+            break  # it is no such effect: without it the same filter explains the axis
         known = {name for name, _ in beside(fit.model, effect)[1]} | {name for name, _ in fit.model.effects}
         # a resonance is not tried: together with a gap it explains too much (cogging at small amplitude, friction that bends)
         open_to = [e for e in library.acting if undoable(e) and e.simulable and e.name not in known and e.category != "motion"]
@@ -67,7 +69,8 @@ def grown(data: AxisData, base: GreyboxFit, effect: Effect, library: Library, pa
         tried = [(trace.effect, *followed(data, fit, effect, [_start(trace, effect, library, found)], found)) for trace in wanted]
         if not any(item[1].excess == 0.0 for item in tried):
             seen = traces(data, fit.model, effect, found, [*open_to, *_uneven(effect, library, found)])
-            wanted = [trace for trace in seen if trace.share >= _least(library[trace.effect], effect, explains, patient)][:TRIED]
+            careful = patient or fit.held_out_error < NEARLY * fit.noise_floor
+            wanted = [trace for trace in seen if trace.share >= _least(library[trace.effect], effect, explains, careful)][:TRIED]
             tried += [(trace.effect, *followed(data, fit, effect, [_start(trace, effect, library, found)], found)) for trace in wanted]
         if not tried:
             break

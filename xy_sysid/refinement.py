@@ -13,10 +13,11 @@ import numpy as np
 
 from xy_sysid.axis_model import STANDARD, AxisModel, Library
 from xy_sysid.greybox import EPSILON, AxisData, GreyboxFit, finish, fit, fit_base, fit_with
-from xy_sysid.one_step import one_step_fit
+from xy_sysid.one_step import AT_NOISE, one_step_fit
 from xy_sysid.one_step_race import Grown, in_its_place, put_beside
 from xy_sysid.race import (
     AT_FLOOR,
+    FAR,
     HOPELESS,
     NEAR,
     PART_LEFT,
@@ -35,7 +36,7 @@ from xy_sysid.race import (
 LEAST_GAIN = 0.1  # excess that an addition must win, and
 PART_GAIN = 0.11  # the part of the excess that it must win; or
 MUCH = 0.75  # of the held-out error that it may leave at most
-WEAK = 0.8  # of the excess that a single effect must leave at most; else two at once are tried
+WEAK = 0.8  # of the excess that a single effect must leave at most, and less than FAR; else two at once are tried
 PAIR_GAIN = 0.3  # excess that two at once must win where no single effect wins anything
 NEEDED = 0.05  # excess that taking an effect out again must cost, or it goes
 MOST_EFFECTS = 4
@@ -144,12 +145,14 @@ def _another_way(
 
 
 def _without_stand_in(data: AxisData, steps: list[Step], library: Library) -> list[Step] | None:
-    """The look-alike that was added last gives way to the effect that only one-step prediction can judge, if that explains the axis."""
+    """A look-alike in the model gives way to the effect that only one-step prediction can judge, if that explains the axis."""
     now = steps[-1].fit
     for effect in library.acting:
-        alike = [name for name, _ in now.model.effects if name in effect.look_alikes]
-        instead = in_its_place(data, now, effect, alike[-1]) if effect.one_step is not None and alike else None
-        if instead is None or instead.rungs[-1][1].excess >= AT_FLOOR:
+        alike = [name for name in effect.look_alikes if name in now.model] if effect.one_step is not None else []
+        alike = [name for name in alike if not any(library[own].category == "motion" for own, _ in now.model.without(name).effects)]
+        all_tried = (in_its_place(data, now, effect, name) for name in alike)
+        instead = next((found for found in all_tried if found is not None and found.rungs[-1][1].excess < AT_FLOOR), None)
+        if instead is None:
             continue
         own = [name for name, _ in instead.rungs]
         found, fit = steps[:1], steps[0].fit
@@ -159,6 +162,32 @@ def _without_stand_in(data: AxisData, steps: list[Step], library: Library) -> li
                 found.append(Step(name, fit, steps[1].tried if len(found) == 1 else ()))
         return [*found, *_as_steps(instead.rungs, steps[1].tried if len(found) == 1 else ())]
     return None
+
+
+def _spring_instead(data: AxisData, base: GreyboxFit, begun: Mapping[str, Grown], tried: tuple[Candidate, ...]) -> tuple[Step, ...]:
+    """A resonance that looks like what one-step prediction tried, with what it found beside it, where it explains the axis but for a gap.
+
+    The filter then has found a spring; alone, neither that nor the friction beside it need help much.
+    """
+    library = base.model.library
+    for name, item in begun.items():
+        predicted = next((fit for _, fit in item.rungs if fit.held_out_error < AT_NOISE * fit.noise_floor), base)
+        others = [own for own, _ in predicted.model.effects if own != name]
+        springs = [own for own in library[name].look_alikes if library[own].category == "motion"]
+        if not springs or not others:
+            continue
+        try:
+            found = fit_with(data, base, [*others, springs[0]], dict(predicted.model.effects), brief=True)
+        except np.linalg.LinAlgError:
+            continue
+        if not (found.excess < AT_FLOOR and plausible(found)):
+            continue
+        steps: list[Step] = []
+        for own in others:
+            fit = fit_with(data, steps[-1].fit if steps else base, [own])
+            steps.append(Step(own, fit, () if steps else tried))
+        return (*steps, Step(springs[0], finish(data, found.model, found.runs), ()))
+    return ()
 
 
 def _as_steps(rungs: Sequence[tuple[str, GreyboxFit]], tried: tuple[Candidate, ...]) -> tuple[Step, ...]:
@@ -201,9 +230,13 @@ def advance(data: AxisData, now: GreyboxFit, library: Library = STANDARD, pairs:
         rungs = explaining(begun)
         if rungs:
             return Move(_as_steps(rungs, tried), tried)
+        if pairs:
+            closed = _spring_instead(data, now, begun, tried)
+            if closed:
+                return Move(closed, tried, False, begun)
     taken = choose(now, tried, library)
     found = taken.fit if taken is not None else None
-    paired = strict and pairs and (found is None or found.excess > WEAK * now.excess)
+    paired = strict and pairs and (found is None or found.excess > min(WEAK * now.excess, FAR))
     two = _two_at_once(data, now, tried, library) if paired else ()
     if two:
         return Move(two, tried, paired, begun)
