@@ -26,7 +26,7 @@ simulation reduction
 windows window_check period friction_hint spectra batch estimate
 fitting orders validation model_check tracking
 noise_floor effects swing between effect_loop effect_code axis_kernel axis_model spectral_cost base_start velocity_fit traces inverse_start
-own_units greybox open_loop one_step one_step_race comparison race refinement diagnosis
+own_units greybox open_loop one_step one_step_race comparison race ladder detours refinement diagnosis
 ring pairing joints identifier messages live_fit replay offline
 linear_part paired distortion findings story_pictures story story_document
 hearing live_story diagnoser

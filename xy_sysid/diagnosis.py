@@ -13,9 +13,10 @@ from xy_sysid.axis_model import STANDARD, Library, simulate
 from xy_sysid.comparison import Comparison, compare_velocity
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox import AxisData, GreyboxFit, excess_of, loosened, prepare
+from xy_sysid.ladder import Ladder
 from xy_sysid.one_step import change_without
 from xy_sysid.race import AT_FLOOR, Candidate
-from xy_sysid.refinement import Ladder, refine
+from xy_sysid.refinement import refine
 from xy_sysid.stream import FloatArray
 
 Kind = Literal["missing_effect", "nothing_missing", "not_in_library", "not_enough_data"]

@@ -15,8 +15,8 @@ from xy_sysid.cli.provenance import provenance
 from xy_sysid.cli.reading import chosen, each, read
 
 if TYPE_CHECKING:
+    from xy_sysid.ladder import Ladder
     from xy_sysid.open_loop import OpenLoop
-    from xy_sysid.refinement import Ladder
 
 
 PARTLY = 0.7  # of the excess, or of the held-out error, that may be left if effects are to count as a part of the truth
