@@ -36,6 +36,7 @@ RUBS = 0.05  # Coulomb friction over the rms voltage from which richer laws of i
 NEARLY = 30.0  # innovation over the noise up to which they are, and what is not loud is tried, too
 AGAIN, LOST = 2.5, 40.0  # innovations over noise between which a first fit is begun again from where it ended
 MOST = 3  # effects beside
+CLOSED = 2.0  # encoder noises below which a gap is none
 NEEDLESS = 0.01  # part of the innovations' power that they change by without an effect that is not needed
 
 
@@ -59,7 +60,7 @@ def grown(data: AxisData, base: GreyboxFit, effect: Effect, library: Library, pa
     while len(rungs) <= MOST:
         fit = rungs[-1][1]
         explains = fit.excess == 0.0
-        if found.without == 0.0 and fit.held_out_error < AT_NOISE * fit.noise_floor:
+        if found.values[0] < CLOSED * found.noise and fit.held_out_error < AT_NOISE * fit.noise_floor:
             break  # it is no such effect: without it the same filter explains the axis
         known = {name for name, _ in beside(fit.model, effect)[1]} | {name for name, _ in fit.model.effects}
         # a resonance is not tried: together with a gap it explains too much (cogging at small amplitude, friction that bends)

@@ -23,7 +23,7 @@ RUBBED, OWN = 9, len(NAMES)  # coordinates before those of friction, and before 
 USUAL = (0.0, 0.0, 0.01, 10e-6, 2.0, 0.0)  # of these parameters, where they are not in use
 GAPS = np.geomspace(2e-6, 150e-6, 10)  # m, tried first
 STIFF = 2.0 * np.pi * 180.0  # rad/s of the contact at least: flanks of steel; a softer one is a loosely held mass, not play in the drive
-SEEN = 2.5  # encoder noises that a gap must have to be one
+SEEN, LEFT = 2.5, 1.5  # encoder noises, and innovations, that a gap must have to be one
 WORTH_A_LOOK = 60.0  # innovation over noise after the first few steps above which the fit is given up
 PROMISING = 10.0  # the same on the whole first stage; on the way to it twice that
 DEAF = 12.0  # the filter is told this much more encoder noise on the way: a smoother valley
@@ -59,7 +59,8 @@ class Contact:
             best = fit.solve(best, fit.every, first, 1.0, 4, 8)
         fit.deaf = 1.0
         without = np.empty(0)
-        if fit.size(best, first, 1.0, 4) < PROMISING and np.exp(best[3]) > SEEN * noise:  # else it is no gap, whatever the rest may be
+        size = fit.size(best, first, 1.0, 4)
+        if size < PROMISING and np.exp(best[3]) > max(SEEN, LEFT * size) * noise:  # else it is no gap, whatever the rest may be
             without = self._without(fit, best, base, dry, brief, n)[training:] * noise
         values, spread = fit.outer(best), fit.spread(best, first)
         return Followed(
