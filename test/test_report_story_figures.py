@@ -84,6 +84,15 @@ def test_the_ladder_falls_to_the_floor() -> None:
     assert "coulomb" in figure.layout.xaxis.ticktext[-1]
 
 
+def test_no_label_of_a_step_is_wider_than_its_step() -> None:
+    """A label that runs over the edge is not drawn at all, so long ones take several lines."""
+    changed = copy.deepcopy(story())
+    changed["ladder"][-1]["label"] = "with backlash (error one sample ahead)"
+    lines = [line for text in story_figures.ladder(changed).layout.xaxis.ticktext for line in text.split("<br>")]
+    assert "+ backlash" in lines
+    assert max(len(line) for line in lines) <= 14
+
+
 def test_failing_bands_are_shaded_and_named() -> None:
     """The base fails over a band of frequency: its shade lies there, its words give the size; the last step has no shade."""
     figure = story_figures.residual(story(), 0)

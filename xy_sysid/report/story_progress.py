@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping
 from typing import Any
 
@@ -12,6 +13,8 @@ from xy_sysid.report.parts import frequency_axis, plain, positive
 from xy_sysid.report.story_parts import Document, drawing, floor_line, nothing, pictured, ratio_axis, row, speed_unit, words
 from xy_sysid.report.theme import AFTER, BEFORE, FLOOR, MODEL, UNTRUSTED, fade
 from xy_sysid.report.words import number, quantity
+
+WIDE = 14  # letters of a line below a step of the ladder; one that runs over the edge is not drawn at all
 
 
 def ladder(document: Document, mode: str = "light") -> go.Figure:
@@ -58,7 +61,7 @@ def ladder(document: Document, mode: str = "light") -> go.Figure:
         tickformat="~g", row=1, col=1,
     )  # fmt: skip
     figure.update_xaxes(
-        tickvals=list(range(count)), ticktext=[_two_lines(item) for item in rungs], tickangle=0, range=[-0.55, count - 0.45], row=1, col=1
+        tickvals=list(range(count)), ticktext=[_in_lines(item) for item in rungs], tickangle=0, range=[-0.55, count - 0.45], row=1, col=1
     )
     return figure
 
@@ -137,11 +140,10 @@ def candidates(document: Document, mode: str = "light", most: int = 8) -> go.Fig
     return figure
 
 
-def _two_lines(item: Mapping[str, Any]) -> str:
+def _in_lines(item: Mapping[str, Any]) -> str:
     label = words(str(item["label"]))
     first, *rest = (label.replace("with ", "+ ", 1) if item["added"] else label).split(" instead of ")
-    parts = first.rsplit(" ", 1) if len(first) > 14 else [first]
-    return "<br>".join([*parts, *(f"for {other}" for other in rest)])
+    return "<br>".join([*textwrap.wrap(first, WIDE), *(f"for {other}" for other in rest)])
 
 
 def _place(item: Mapping[str, Any], chosen: list[str], runner: str | None) -> str:
