@@ -12,6 +12,7 @@ from xy_sim.effect_text import with_effects
 from xy_sim.machine import Machine
 from xy_sysid.axis_model import STANDARD, AxisModel, simulate, undoer
 from xy_sysid.cli.simulate import drive
+from xy_sysid.detours import spring_instead
 from xy_sysid.effects import EFFECTS
 from xy_sysid.effects.contact import OWN, _Fit
 from xy_sysid.effects.contact_filter import innovations
@@ -144,6 +145,19 @@ def test_backlash_takes_the_place_of_a_screw_that_stood_for_it() -> None:
     assert order[0] == "backlash"
     tiny = last.model.with_effect("constant_load", (1e-9,))
     assert change_without(data, tiny, "constant_load") < 1e-6 * change_without(data, last.model, "constant_load")
+
+
+def test_a_gap_that_closes_is_a_spring_with_the_friction_that_the_filter_found() -> None:
+    """Neither screw nor friction alone explains the axis; both begin from what prediction found, and simulation judges them."""
+    data, base = machine("screw_compliance=350", "coulomb_friction=0.15")
+    start = fit_with(data, base, ["coulomb_friction"], brief=True)
+    closed = grown(data, start, EFFECTS["backlash"], STANDARD, patient=False)
+    assert closed.rungs[-1][1].excess > 0.15
+    steps = spring_instead(data, base, {"backlash": closed}, ())
+    assert [step.added for step in steps] == ["coulomb_friction", "screw_compliance"]
+    last = steps[-1].fit
+    assert last.excess < 0.15
+    assert last.parameter("coulomb_friction.coulomb").value == pytest.approx(0.15, rel=0.01)
 
 
 def test_what_the_filter_cannot_have_beside_it_is_said_by_none() -> None:

@@ -85,12 +85,9 @@ def _without_stand_in(data: AxisData, steps: list[Step], library: Library) -> li
         if instead is None:
             continue
         own = [name for name, _ in instead.rungs]
-        found, fit = steps[:1], steps[0].fit
-        for name, _ in instead.rungs[-1][1].model.effects:
-            if name in now.model and name not in own:
-                fit = fit_with(data, fit, [name])
-                found.append(Step(name, fit, steps[1].tried if len(found) == 1 else ()))
-        return [*found, *as_steps(instead.rungs, steps[1].tried if len(found) == 1 else ())]
+        rest = [name for name, _ in instead.rungs[-1][1].model.effects if name in now.model and name not in own]
+        tried = steps[1].tried
+        return [steps[0], *_one_by_one(data, steps[0].fit, rest, tried), *as_steps(instead.rungs, () if rest else tried)]
     return None
 
 
@@ -112,12 +109,16 @@ def spring_instead(data: AxisData, base: GreyboxFit, begun: Mapping[str, Grown],
             continue
         if not (found.excess < AT_FLOOR and plausible(found)):
             continue
-        steps: list[Step] = []
-        for own in others:
-            fit = fit_with(data, steps[-1].fit if steps else base, [own])
-            steps.append(Step(own, fit, () if steps else tried))
-        return (*steps, Step(springs[0], finish(data, found.model, found.runs), ()))
+        return (*_one_by_one(data, base, others, tried), Step(springs[0], finish(data, found.model, found.runs), ()))
     return ()
+
+
+def _one_by_one(data: AxisData, base: GreyboxFit, names: Sequence[str], tried: tuple[Candidate, ...]) -> list[Step]:
+    """Rungs of simulation, one effect more at each; the first shows what else was tried."""
+    steps: list[Step] = []
+    for name in names:
+        steps.append(Step(name, fit_with(data, steps[-1].fit if steps else base, [name]), () if steps else tried))
+    return steps
 
 
 def as_steps(rungs: Sequence[tuple[str, GreyboxFit]], tried: tuple[Candidate, ...]) -> tuple[Step, ...]:
