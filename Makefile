@@ -3,30 +3,32 @@
 
 PYTHON ?=
 ARGS ?=
+JOBS ?= 2
 VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
+PYTEST = $(BIN)/python -m pytest -n $(JOBS) --dist loadfile
 PIP := $(BIN)/python -m pip --disable-pip-version-check -qq install --no-compile -c constraints.txt
-FITS := import ensurepip, sys, venv; sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 13))
+FITS := import ensurepip, sys, venv; sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 14))
 
 .DEFAULT_GOAL := help
-.PHONY: help install demo test lint types unit bench blind pictures clean
+.PHONY: help install demo test faults soak test-busy lint types unit docs bench blind pictures clean
 
 help: ## this text
-	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 18
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 18
 
 install: $(INSTALLED) ## make .venv with the ROS 2 wheels and the test tools
 
 $(INSTALLED): constraints.txt setup.py
-	@found=; for python in $(PYTHON) $(if $(PYTHON),,python3.12 python3.11 python3); do \
+	@found=; for python in $(PYTHON) $(if $(PYTHON),,python3.12 python3.11 python3.13 python3); do \
 	  if "$$python" -c '$(FITS)' >/dev/null 2>&1; then found=$$python; break; fi; done; \
 	if [ -z "$$found" ]; then \
-	  echo "make: no Python 3.11 or 3.12 with venv and ensurepip found$(if $(PYTHON), as PYTHON=$(PYTHON))." \
+	  echo "make: no Python 3.11, 3.12 or 3.13 with venv and ensurepip found$(if $(PYTHON), as PYTHON=$(PYTHON))." \
 	    "Install one (on Debian and Ubuntu: python3 python3-venv), or say where it is: make install PYTHON=PATH" >&2; exit 1; fi; \
 	echo "making $(VENV) with $$("$$found" --version); this takes about a minute"; \
 	"$$found" -m venv --clear $(VENV)
 	@$(PIP) setuptools
-	@$(PIP) --no-build-isolation --editable '.[ros,page,test]'
+	@$(PIP) --no-build-isolation --config-settings editable_mode=compat --editable '.[ros,page,test]'
 	-@$(BIN)/python -m compileall -q -j 0 -x '/(plotly|matplotlib|fontTools|pip|docutils)/' $(VENV)/lib
 	@touch $@
 
@@ -42,8 +44,16 @@ lint: $(INSTALLED) ## style
 types: $(INSTALLED) ## types
 	@$(BIN)/mypy
 
-unit: $(INSTALLED) ## every test (ARGS="-k words" for some)
-	@$(BIN)/python -m pytest $(ARGS)
+unit: $(INSTALLED) ## every test (ARGS="-k words" for some), two files at a time (JOBS=0: one after the other)
+	@$(PYTEST) $(ARGS)
+
+docs: $(VENV)/.docs ## the documentation site in build/site (index.html); a broken link is an error
+	@$(BIN)/python -m xy_sysid.files.architecture_doc --write
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict $(ARGS)
+	@echo "build/site/index.html"
+
+test-busy: $(INSTALLED) ## every test with eight busy processes beside them (ARGS="-k words" for some)
+	@PYTHONPATH=test $(BIN)/python -m helpers.busy 8 $(PYTEST) $(ARGS)
 
 bench: $(VENV)/.bench ## measure against other software, and write the table (ARGS names one)
 	@$(BIN)/python -m bench $(ARGS)
@@ -51,8 +61,18 @@ bench: $(VENV)/.bench ## measure against other software, and write the table (AR
 blind: $(INSTALLED) ## name hidden effects on machines never tuned on, and write docs/blind.md (ARGS="--part 3" for a third)
 	@$(BIN)/python -m blind $(ARGS)
 
+faults: $(INSTALLED) ## attack everything with fixed seeds, and write docs/faults.md; a hole is an error (ARGS names groups)
+	@$(BIN)/python -m faults $(ARGS)
+
+soak: $(INSTALLED) ## a day of data through all nodes and the page, with memory and descriptors of each (ARGS="--minutes 20")
+	@$(BIN)/python -m faults soak $(ARGS)
+
+$(VENV)/.docs: $(INSTALLED)
+	@$(PIP) --no-build-isolation --config-settings editable_mode=compat --editable '.[docs]'
+	@touch $@
+
 $(VENV)/.bench: $(INSTALLED)
-	@$(PIP) --no-build-isolation --editable '.[bench]'
+	@$(PIP) --no-build-isolation --config-settings editable_mode=compat --editable '.[bench]'
 	@touch $@
 
 pictures: $(INSTALLED) ## make the pictures and the text of docs/reading-pictures.md (needs chromium; ARGS names some)

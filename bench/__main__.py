@@ -1,6 +1,7 @@
 """python -m bench [name ...]: run the benchmarks and write docs/benchmarks.md.
 
-h1, fit, replay, bags, live and intervals run without a name; long_bag (a day of data, gigabytes on disk) and axis_model only by name.
+h1, fit, replay, bags, live and intervals run without a name; only by name: long_bag (a day of data, gigabytes on disk), axis_model, and
+real_fits (recordings of real machines in $XY_SYSID_DATA).
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from pathlib import Path
 from bench.tables import Table
 
 TABLES = ("h1", "fit", "replay", "bags", "live", "intervals")
-SCRIPTS = ("long_bag", "axis_model")
+SCRIPTS = ("long_bag", "axis_model", "real_fits")
 PAGE = Path(__file__).parents[1] / "docs" / "benchmarks.md"
 
 

@@ -17,10 +17,10 @@ from functools import partial
 import numpy as np
 from scipy.signal import butter, sosfilt
 
-from xy_sysid.axis_model import STANDARD, AxisModel, simulator
-from xy_sysid.compiled import compiled
-from xy_sysid.greybox import fit_base, fit_with, look, prepare
-from xy_sysid.stream import FloatArray
+from xy_sysid.axis.model import STANDARD, AxisModel, simulator
+from xy_sysid.greybox.free_run import fit_base, fit_with, look, prepare
+from xy_sysid.jit import compiled
+from xy_sysid.samples.block import FloatArray
 
 RATE, SECONDS = 2000.0, 60.0
 BASE = AxisModel(0.097, 1.29e-3, 246.0)
@@ -28,7 +28,7 @@ FIRST_CALL = """
 import time
 start = time.perf_counter()
 import numpy as np
-from xy_sysid.axis_model import AxisModel, simulate
+from xy_sysid.axis.model import AxisModel, simulate
 loaded = time.perf_counter()
 simulate(AxisModel(0.1, 0.0, 200.0), 2000.0, np.ones(100), np.zeros(100))
 print(loaded - start, time.perf_counter() - loaded)

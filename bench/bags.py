@@ -22,7 +22,7 @@ from bench.tables import Table, at_least
 from xy_sysid.bags import BagWriter, stream_blocks
 from xy_sysid.bags.cdr import JOINT_TYPE
 from xy_sysid.imports import load
-from xy_sysid.stream import Block
+from xy_sysid.samples.block import Block
 
 RATE, ROWS, REPEATS = 2000, 20, 3
 MINUTES = 5.0

@@ -20,10 +20,10 @@ from bench.tables import Table, at_least, at_most, medians
 from xy_sysid.fitting import FitOptions, Structure, identify
 from xy_sysid.fitting.prediction import predict
 from xy_sysid.fitting.problem import from_transfer_function, model, problem
-from xy_sysid.frf import ComplexArray, FrequencyResponse
-from xy_sysid.simulation import held_response
-from xy_sysid.stream import FloatArray
-from xy_sysid.transfer_function import TransferFunction
+from xy_sysid.linear.simulate import held_response
+from xy_sysid.linear.transfer_function import TransferFunction
+from xy_sysid.response.frf import ComplexArray, FrequencyResponse
+from xy_sysid.samples.block import FloatArray
 
 LINES, REPEATS = 612, 15
 

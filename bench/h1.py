@@ -18,17 +18,17 @@ from scipy import fft
 
 from bench.intervals import RATE, SHAPE
 from bench.tables import Table, at_least, at_most, medians
-from xy_sysid.batch import batch_spectra
-from xy_sysid.estimate import frequency_response
-from xy_sysid.frf import FrequencyResponse
-from xy_sysid.stream import FloatArray
+from xy_sysid.response.batch_spectra import batch_spectra
+from xy_sysid.response.frf import FrequencyResponse
+from xy_sysid.response.h1 import H1Options, frequency_response
+from xy_sysid.samples.block import FloatArray
 
 SAMPLES, REPEATS = 600_000, 21
 
 
 def ours(u: FloatArray, y: FloatArray) -> FrequencyResponse:
     """The plain variant, which is the paper's."""
-    return frequency_response(batch_spectra([(0, u, y)], SHAPE, False), SHAPE, RATE, differenced=False)
+    return frequency_response(batch_spectra([(0, u, y)], SHAPE, False), SHAPE, RATE, H1Options(differenced=False))
 
 
 def scipys(u: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -15,17 +15,17 @@ from collections.abc import Callable
 import numpy as np
 
 from bench.tables import Check, Table
-from xy_sysid.batch import batch_spectra
-from xy_sysid.estimate import frequency_response
 from xy_sysid.excitation import signal
 from xy_sysid.fitting import Fit, Structure, identify
-from xy_sysid.fitting.result import Estimate
-from xy_sysid.frf import FrequencyResponse
+from xy_sysid.fitting.result import Interval
+from xy_sysid.linear.simulate import simulate
+from xy_sysid.linear.transfer_function import TransferFunction
+from xy_sysid.response.batch_spectra import batch_spectra
+from xy_sysid.response.frf import Z95, FrequencyResponse
+from xy_sysid.response.h1 import H1Options, frequency_response
+from xy_sysid.response.windows import WindowShape
+from xy_sysid.samples.block import FloatArray
 from xy_sysid.settings import AxisExcitation
-from xy_sysid.simulation import simulate
-from xy_sysid.stream import FloatArray
-from xy_sysid.transfer_function import TransferFunction
-from xy_sysid.windows import WindowShape
 
 RATE = 2000.0
 SHAPE = WindowShape.of("hann", 4096, 0.5)
@@ -54,7 +54,7 @@ def recorded(tf: TransferFunction, seconds: float, noise: float, seed: int) -> t
 def response(u: FloatArray, y: FloatArray) -> FrequencyResponse:
     """H1 as the offline commands estimate it."""
     spectra = batch_spectra([(0, u, y)], SHAPE, True)
-    return frequency_response(spectra, SHAPE, RATE, differenced=True, band=(0.5, 300.0))
+    return frequency_response(spectra, SHAPE, RATE, H1Options(differenced=True, band=(0.5, 300.0)))
 
 
 def truths(tf: TransferFunction, fit: Fit) -> dict[str, float]:
@@ -74,10 +74,10 @@ def truths(tf: TransferFunction, fit: Fit) -> dict[str, float]:
     return exact
 
 
-def trials(runs: int, seconds: float, noise: float, report: Callable[[str], None] = lambda _: None) -> tuple[dict[str, list[Estimate]], list[Fit]]:
+def trials(runs: int, seconds: float, noise: float, report: Callable[[str], None] = lambda _: None) -> tuple[dict[str, list[Interval]], list[Fit]]:
     """Estimates by name over so many recordings, and the fits."""
     tf = machine()
-    found: dict[str, list[Estimate]] = {}
+    found: dict[str, list[Interval]] = {}
     fits: list[Fit] = []
     for seed in range(1, runs + 1):
         fit = identify(response(*recorded(tf, seconds, noise, seed)), Structure())
@@ -106,7 +106,7 @@ def run(report: Callable[[str], None], runs: int = 400) -> Table:
             inside_all.append(inside)
         excess = float(np.mean([fit.cost / fit.expected_cost for fit in fits]))
         rows["cost / expected cost"] = (*rows.get("cost / expected cost", ("cost / expected cost",)), "", f"{excess:.3f}", "")
-        doubt = 100.0 * 1.96 * math.sqrt(0.05 * 0.95 / runs)
+        doubt = 100.0 * Z95 * math.sqrt(0.05 * 0.95 / runs)
         mean = float(np.mean(inside_all))
         worst = max(inside_all, key=lambda value: abs(value - 95.0))
         chance = f"worst {worst:.1f} %; chance alone is +-{doubt:.1f} %"

@@ -21,7 +21,7 @@ import numpy as np
 
 from xy_sysid.bags import BagWriter
 from xy_sysid.bags.cdr import ARRAY_TYPE, encode_array
-from xy_sysid.stream import Block, columns, pack
+from xy_sysid.samples.block import Block, columns, pack
 
 RATE = 2000
 ALLOWED = 400.0  # MB

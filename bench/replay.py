@@ -13,10 +13,10 @@ from pathlib import Path
 from bench.tables import Table, at_least
 from xy_sim.machine import Machine
 from xy_sysid.bags import stream_blocks
-from xy_sysid.cli.simulate import drive
+from xy_sysid.excitation.lockstep import drive
 from xy_sysid.imports import save
-from xy_sysid.live_fit import warm_up
-from xy_sysid.replay import replay
+from xy_sysid.live.fitter import warm_up
+from xy_sysid.live.replay import replay
 from xy_sysid.settings import AxisExcitation, ExcitationSettings, IdentifierSettings
 
 SECONDS = 300.0

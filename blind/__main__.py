@@ -1,6 +1,7 @@
-"""python -m blind [SET ...] [--draws development|reporting] [--part N] [--jobs N] [--keep FILE] [-o FILE]: hidden effects, judged.
+"""python -m blind [SET ...] [--draws development|reporting] [--part N] [--jobs N] [--keep FILE] [--recordings DIR] [-o FILE]: hidden effects, judged.
 
-Sets: standard, hard, 10 s, half, 5 um, quarter, tenth, 5 s, 2 effects, 3 effects, multisine, sweep, prbs, 1 kHz, 5 kHz.
+Sets: exact, imperfect 0.2 %, imperfect 1 %, imperfect 3 %, clean dirt, outside, hard, two effects, three effects, first order,
+1 % two effects, 10 s, half, 5 um, quarter, tenth, 5 s, multisine, sweep, prbs, 1 kHz, 5 kHz.
 """
 
 from __future__ import annotations
@@ -28,9 +29,10 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="blind", description="hidden effects on simulated machines, and how often the diagnosis is right")
     parser.add_argument("sets", nargs="*", help="which; without a name all")
     parser.add_argument("--draws", choices=("development", "reporting"), default="reporting", help="tune on development draws only")
-    parser.add_argument("--part", type=int, default=1, metavar="N", help="every Nth case of each set but the standard one")
+    parser.add_argument("--part", type=int, default=1, metavar="N", help="every Nth case of each set")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="cases at a time, one core each")
     parser.add_argument("--keep", type=Path, metavar="FILE", help="what came of each case; those in it already are not run again")
+    parser.add_argument("--recordings", type=Path, metavar="DIR", help="keep what was simulated there, and take it from there the next time")
     parser.add_argument("-o", type=Path, default=PAGE, metavar="FILE", help="page to write (docs/blind.md)")
     asked = parser.parse_args()
     known = sets(asked.draws)
@@ -43,15 +45,16 @@ def main() -> int:
     facts = f"{platform.machine()}, Python {platform.python_version()}."
     try:
         for name in asked.sets or known:
-            cases = known[name] if name == "standard" else known[name][:: asked.part]
+            cases = known[name][:: asked.part]
             results[name] = [known_already[case] for case in cases if case in known_already]
             left = [case for case in cases if case not in known_already]
-            for item in joblib.Parallel(asked.jobs, return_as="generator_unordered")(joblib.delayed(run)(case) for case in left):
+            for item in joblib.Parallel(asked.jobs, return_as="generator_unordered")(joblib.delayed(run)(case, asked.recordings) for case in left):
                 results[name].append(item)
                 if asked.keep:
                     add(asked.keep, item)
                 said = " + ".join(item.effects) or item.verdict
                 good = "right" if item.right else "first" if item.first else "WRONG" if item.wrong else "missed"
+                good += f" PHANTOM {'+'.join(item.phantoms)}" if item.phantom else ""
                 sys.stderr.write(f"{good:6} {item.case.name}: {said} ({item.confidence:.2f}), {item.seconds:.1f} s\n")
             results[name].sort(key=lambda item: cases.index(item.case))
             before = asked.o.read_text(encoding="utf-8") if asked.o.exists() else ""

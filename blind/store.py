@@ -21,7 +21,7 @@ def load(path: Path) -> dict[Case, Judged]:
         except ValueError:  # the last line of a run that was killed
             continue
         case = Case(**row.pop("case") | {"truth": tuple(row.pop("truth"))})
-        found[case] = Judged(case, **row | {"effects": tuple(row.pop("effects"))})
+        found[case] = Judged(case, **row | {name: tuple(row[name]) for name in ("effects", "phantoms", "kinds") if name in row})
     return found
 
 

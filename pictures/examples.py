@@ -11,26 +11,31 @@ import plotly.graph_objects as go
 
 from xy_sim.effect_text import with_effects
 from xy_sim.machine import Machine
-from xy_sysid.cli.simulate import drive
+from xy_sysid.excitation.lockstep import drive
 from xy_sysid.report import story_figures as f
-from xy_sysid.settings import AxisExcitation, ExcitationSettings
-from xy_sysid.story import begin, tell
-from xy_sysid.story_document import document
+from xy_sysid.samples.recording import Run
+from xy_sysid.settings import AxisExcitation, ExcitationSettings, build
+from xy_sysid.story.document import document
+from xy_sysid.story.story import begin, tell
 
 SECONDS = 40.0
-RATE = 2000.0
 
 Picture = Callable[..., go.Figure]
 
 
 @dataclass(frozen=True, slots=True)
 class Example:
-    """An effect in the making: its pictures, and what to look at in them. size: of the effect, empty for the usual one."""
+    """An effect in the making: its pictures, and what to look at in them.
+
+    size: of the effect, empty for the usual one; machine: that has it; excite: how that is driven, else as usual
+    """
 
     effect: str
     pictures: tuple[Picture, ...]
     look: str
     size: str = ""
+    machine: str = "rigid.yaml"
+    excite: tuple[tuple[str, float], ...] = ()
 
     @property
     def name(self) -> str:
@@ -148,6 +153,36 @@ EXAMPLES = (
         "1e6",
     ),
     Example(
+        "return_spring",
+        (FREQUENCY, PLACE, SPEED),
+        "The mean error is a straight line against position, as of a force towards one place, and grows towards low frequencies, where the motion is "
+        "wide. Against velocity its mean stays near zero.",
+    ),
+    Example(
+        "gravity",
+        (FREQUENCY, PLACE, SPEED),
+        "A joint that turns; 1000 mm stand for 1 rad. The mean error is a piece of a sine: steep where the arm hangs, flat where it is level. "
+        "Over a tenth of a turn a spring with a load looks the same.",
+        machine="joint.yaml",
+        excite=(
+            ("rms", 6.0),
+            ("limit", 30.0),
+            ("low", 0.05),
+            ("high", 100.0),
+            ("centring", 0.0),
+            ("travel_min", -2.9),
+            ("travel_max", 2.9),
+            ("brake", 0.1),
+        ),
+    ),
+    Example(
+        "position_dependent_drag",
+        (FREQUENCY, PLACE, SPEED),
+        "The size of the error depends on the place: the model is right in the middle, too fast at the end that drags more, too slow at the other. "
+        "The mean is nearly zero because the error has the sign of the motion.",
+        "6",
+    ),
+    Example(
         "gain_drift",
         (FREQUENCY, SPEED, TIME),
         "A V against time: the fit is right in the middle of the data that it saw, and errs to both sides, most in the part that was held out.",
@@ -157,19 +192,17 @@ EXAMPLES = (
 
 def rigid_model(example: Example) -> dict[str, Any]:
     """The story of axis x of that machine, at its rigid model."""
-    u, y = _recorded((f"x:{example.typed}",) if example.effect else ())
-    return document(begin("x", RATE, u, y))
+    return document(begin(_recorded((f"x:{example.typed}",) if example.effect else (), example.machine, example.excite)))
 
 
 def whole_story() -> dict[str, Any]:
     """A machine with cogging and Coulomb friction, from the rigid model to the noise floor."""
-    u, y = _recorded(("x:cogging", "x:coulomb_friction"))
-    return document(tell("x", RATE, u, y))
+    return document(tell(_recorded(("x:cogging", "x:coulomb_friction"))))
 
 
 @functools.cache
-def _recorded(effects: tuple[str, ...]) -> Any:
-    axes = {axis: AxisExcitation(seed=seed) for seed, axis in enumerate("xy", start=1)}
-    settings = ExcitationSettings(rate=RATE, lockstep=True, speed=0.0, axes=axes)
-    table = with_effects(Machine.from_file("rigid.yaml", None, False), list(effects))
-    return drive(table, settings, SECONDS, lambda seconds: None).axis("x")
+def _recorded(effects: tuple[str, ...], machine: str = "rigid.yaml", excite: tuple[tuple[str, float], ...] = ()) -> Run:
+    table = with_effects(Machine.from_file(machine, None, False), list(effects))
+    axes = {axis: build(AxisExcitation, {"seed": seed, **dict(excite)}) for seed, axis in enumerate(table.axes, start=1)}
+    settings = ExcitationSettings(rate=table.rate, lockstep=True, speed=0.0, axes=axes)
+    return drive(table, settings, SECONDS, lambda seconds: None).run("x")

@@ -16,7 +16,7 @@ from pictures.shots import browser
 
 WIDTH, HEIGHT = 1360, 1000  # px
 EFFECTS = ("x:cogging", "x:coulomb_friction")
-PATIENCE = 120_000  # ms
+PATIENCE = 300_000  # ms
 
 
 def shoot_page(path: Path) -> None:
@@ -31,7 +31,7 @@ def shoot_page(path: Path) -> None:
         with _served(Path(name), recording) as address, sync_playwright() as play:
             made = play.chromium.launch(executable_path=browser(), args=["--no-sandbox", "--disable-gpu"])
             page = made.new_page(viewport={"width": WIDTH, "height": HEIGHT})
-            page.goto(address)
+            page.goto(address, timeout=PATIENCE)
             for act, words in (("diagnose", "Missing"), ("auto", "at the noise floor")):
                 _press(page, act)
                 page.wait_for_function(

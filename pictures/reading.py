@@ -13,9 +13,8 @@ The page, the report and this text show the same pictures. Everything here is of
 **Blue** is measured, **orange** is the model, **green** is the noise floor, **red** marks where the model fails, **grey** is not trusted.
 Where two models lie over each other, blue is before and orange after.
 Errors are those of velocity: the model is driven with the measured voltage alone and simulated from rest, so small errors cannot hide in a
-correction. *Held out* is the last third of the recording, which no fit has seen. The *noise floor* is what a perfect model would
-still be off by: encoder noise, and 0.1 % of the signal, because no machine repeats itself better (1 % or 3 % where a real machine needs it;
-the verdict then says "down to 3 %").
+correction. *Held out* are parts of the recording, spread over it, that no fit has seen (its last third for backlash, whose filter must run
+through). The *noise floor* is what a perfect model would still be off by: the encoder's noise.
 
 ## The ladder
 
@@ -70,7 +69,9 @@ def _section(example: Example) -> str:
         effect = EFFECTS[example.effect]
         lines.append(f"- What it is: {effect.meaning}. Law: `{effect.law}`")
         lines.append(f"- Taken for: {', '.join(effect.look_alikes)}. Told apart by: {effect.experiment}.")
-        lines.append(f"- See it: `xy-sysid simulate rec --machine rigid.yaml --effect x:{example.typed}`, `xy-sysid report rec -o report.html`\n")
+        driven = "".join(f" --excite {name}={value:g}" for name, value in example.excite)
+        made = f"xy-sysid simulate rec --machine {example.machine} --effect x:{example.typed}{driven}"
+        lines.append(f"- See it: `{made}`, `xy-sysid report rec -o report.html`\n")
     return "\n".join(lines)
 
 

@@ -4,9 +4,47 @@ from __future__ import annotations
 
 import os
 import signal
+from pathlib import Path
+
+import pytest
 
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):  # as commands and nodes set it: bit for bit, and quicker
     os.environ.setdefault(_name, "1")
 
+os.environ.setdefault("COLUMNS", "400")  # commands break lines at a terminal's width; a test finds a sentence in one line
+
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # started in the background: children would inherit deafness for Ctrl-C
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+LIVE = (  # files that wait for nodes and browsers most of their time, the longest first
+    "page/test_page_live.py",
+    "nodes/test_node_commands.py",
+    "page/test_page_browser.py",
+    "nodes/test_node_identifier.py",
+    "cli/test_cli_live.py",
+    "nodes/test_node_diagnoser.py",
+    "page/test_page_stop.py",
+    "nodes/test_node_safety.py",
+    "nodes/test_node_excitation.py",
+    "page/test_page_demo.py",
+)
+COMPUTING = (  # files that compute, the longest first
+    "test_readme.py",
+    "real/test_real_data_search.py",
+    "greybox/test_one_step.py",
+    "files/test_effect_file_errors.py",
+    "live/test_identifier.py",
+    "test_examples.py",
+    "processes/test_story_worker.py",
+    "real/test_real_data_effects.py",
+    "cli/test_cli_processes.py",
+    "effects/test_effects_contract.py",
+)
+LONG = [name for pair in zip(LIVE, COMPUTING, strict=True) for name in pair]
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Long files first, one that waits and one that computes in turn: two workers end at the same time, and neither starves the other."""
+    root = Path(__file__).parent
+    place = {name: number for number, name in enumerate(LONG)}
+    items.sort(key=lambda item: place.get(item.path.relative_to(root).as_posix(), len(place)))

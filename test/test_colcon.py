@@ -13,10 +13,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from helpers import ROOT
+from helpers.ros_tools import new_domain
 
-ROOT = Path(__file__).parents[1]
 EXECUTABLES = {"xy-sysid", "excitation", "identifier", "diagnoser", "recorder", "ballscrew"}
-DOMAIN = "87"
 
 pytestmark = [
     pytest.mark.skipif(importlib.util.find_spec("colcon_ros") is None, reason="colcon comes with the extra [test]"),
@@ -62,7 +62,7 @@ def in_workspace(workspace: Path, command: str) -> subprocess.Popen[str]:
     return subprocess.Popen(
         ["bash", "-c", f". install/local_setup.bash && exec {command}"],
         cwd=workspace,
-        env={**clean_environment(), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_DOMAIN_ID": DOMAIN, "PYTHONUNBUFFERED": "1"},
+        env={**clean_environment(), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_DOMAIN_ID": str(new_domain()), "PYTHONUNBUFFERED": "1"},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
@@ -95,7 +95,7 @@ def test_share_has_configuration_machines_and_launch_files(workspace: Path) -> N
 
 def test_the_installed_package_finds_its_files(workspace: Path) -> None:
     """From the install space, configuration comes from share and not from the source tree."""
-    code = "from xy_sysid.shipped import find; print(find('demo'))"
+    code = "from xy_sysid.files.package_files import find; print(find('demo'))"
     found = in_workspace(workspace, f'{sys.executable} -c "{code}"').communicate(timeout=60)[0].strip()
     assert Path(found).resolve() == (workspace / "install" / "xy_sysid" / "share" / "xy_sysid" / "config" / "demo.yaml").resolve()
 

@@ -2,25 +2,50 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 from pathlib import Path
 
 import pytest
+from helpers import ROOT
 
 from xy_sysid.cli.app import app
-from xy_sysid.live_story import LADDER_COLUMNS
-from xy_sysid.messages import COMPARISON_COLUMNS, FRF_COLUMNS
-from xy_sysid.pairing import REASONS as STREAM_REASONS
-from xy_sysid.settings_doc import document
-from xy_sysid.window_check import REASONS as WINDOW_REASONS
+from xy_sysid.files.architecture_doc import picture, reduced
+from xy_sysid.files.settings_doc import document
+from xy_sysid.live.messages import COMPARISON_COLUMNS, FRF_COLUMNS, LADDER_COLUMNS
+from xy_sysid.response.window_check import REASONS as WINDOW_REASONS
+from xy_sysid.samples.pairing import REASONS as STREAM_REASONS
 
-ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), ROOT / "config" / "README.md"]
 
 
 def test_the_settings_page_is_made_from_the_settings() -> None:
-    """python -m xy_sysid.settings_doc > docs/settings.md"""
+    """python -m xy_sysid.files.settings_doc > docs/settings.md"""
     assert (ROOT / "docs" / "settings.md").read_text(encoding="utf-8") == document()
+
+
+def test_the_picture_of_the_packages_is_made_from_the_imports() -> None:
+    """python -m xy_sysid.files.architecture_doc --write"""
+    assert picture(ROOT / "xy_sysid") in (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+
+
+def test_the_picture_leaves_out_what_a_longer_way_says_already() -> None:
+    """a -> b -> c: that a is imported by c too is not drawn."""
+    assert reduced({("b", "a"): 1, ("c", "b"): 1, ("c", "a"): 1}) == [("a", "b"), ("b", "c")]
+
+
+def test_the_architecture_names_files_that_are_there() -> None:
+    """Where do I change what: every file and module of the page exists."""
+    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    table = page.split("## Where do I change what")[1]
+    for name in re.findall(r"`((?:[a-z]+/)[a-z_*]*(?:\.py)?)`", table):
+        base = ROOT if name.startswith("config/") else ROOT / "xy_sysid"
+        assert list(base.glob(name)), name
+    for name in re.findall(r"`([a-z_]+\.[a-z_0-9]+)(?:\.\w+)*`", page):
+        package, module = name.split(".")
+        if (ROOT / "xy_sysid" / package).is_dir():
+            home = importlib.import_module(f"xy_sysid.{package}")
+            assert hasattr(home, module) or (ROOT / "xy_sysid" / package / f"{module}.py").is_file(), name
 
 
 def test_the_readme_lists_every_command() -> None:

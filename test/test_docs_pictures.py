@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 import pytest
+from helpers import ROOT
 
 from pictures.examples import EXAMPLES, Example, rigid_model
 from pictures.reading import page, picture
 from xy_sim.parts import PARTS
-from xy_sysid.axis_model import STANDARD
+from xy_sysid.axis.model import STANDARD
 from xy_sysid.effects import EFFECTS
 
-DOCS = Path(__file__).parents[1] / "docs"
+DOCS = ROOT / "docs"
 
 
 def test_the_page_is_made_by_its_command() -> None:

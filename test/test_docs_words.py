@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 import yaml
-from cli_tools import cli
+from helpers import ROOT
+from helpers.cli_tools import cli
 
-from xy_sysid.drive import Drive
-from xy_sysid.parameter_file import NODES
+from xy_sysid.excitation.drive import Drive
+from xy_sysid.files.ros_parameters import NODES
 from xy_sysid.settings import AxisExcitation, ExcitationSettings, build, knobs
 
-ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 WORDS = (DOCS / "faq.md", DOCS / "real-machine-safely.md", DOCS / "quick-start.md")
 
@@ -38,15 +38,14 @@ def test_four_commands_lead_from_a_hidden_effect_to_the_noise_floor(tmp_path: Pa
     assert [one.code for one in said] == [0, 0, 0, 0], said
     for axis in ("x", "y"):
         assert re.search(rf"axis {axis}: the error is [\d.]+ times the noise floor", said[1].out)
-    shown = re.findall(
-        r"^    (axis \w+: Missing: \w+); the held-out error falls from ([\d.]+) to ([\d.]+) mm/s \(floor ([\d.]+)\)", part, re.MULTILINE
-    )
+    left = r"\. It explains 100 % of the error's power \(([\d.]+) -> ([\d.]+) mm/s\)\. What is left is the encoder's noise \(([\d.]+) mm/s\)"
+    shown = re.findall(r"^    (axis \w+: Missing: \w+)" + left, part, re.MULTILINE)
     assert len(shown) == 2
     for sentence, *figures in shown:
-        found = re.search(rf"{re.escape(sentence)}; the held-out error falls from ([\d.]+) to ([\d.]+) mm/s \(floor ([\d.]+)\)", said[2].out)
+        found = re.search(re.escape(sentence) + left, said[2].out)
         assert found is not None, said[2].out
         assert [float(value) for value in found.groups()] == pytest.approx([float(value) for value in figures], rel=0.05)
-    model = yaml.safe_load((tmp_path / "model.yaml").read_text(encoding="utf-8"))
+    model = yaml.safe_load((tmp_path / "axes.yaml").read_text(encoding="utf-8"))
     for axis in ("x", "y"):
         assert model["axes"][axis]["held_out_error"] < 1.05 * model["axes"][axis]["noise_floor"]
     assert said[3].out.count("the held-out error is at the noise floor") == 2
@@ -104,8 +103,8 @@ def test_every_topic_of_the_nodes_is_in_the_table_of_topics() -> None:
     """What a node publishes or hears under a fixed name stands in docs/topics.md."""
     page = text(DOCS / "topics.md")
     sources = "\n".join(text(path) for package in ("xy_sysid/nodes", "xy_sim") for path in (ROOT / package).rglob("*.py"))
-    named = set(re.findall(r'create_(?:publisher|subscription)\(\w+, f?"([^"]+)"', sources))
-    assert {"voltage", "position", "metrics", "joint_states"} <= named
+    named = set(re.findall(r'(?:create_publisher|create_subscription|Ear)\((?:[\w.]+, )?\w+, f?"([^"]+)"', sources))
+    assert {"voltage", "position", "metrics", "reference"} <= named
     for name in named:
         assert f"`{name.replace('{axis}', '<axis>')}`" in page, name
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import ast
+import os
 import re
 import runpy
+import subprocess
 import sys
 import types
 import xml.etree.ElementTree as ElementTree
@@ -14,8 +16,8 @@ from unittest import mock
 
 import pytest
 import yaml
-
-ROOT = Path(__file__).parents[1]
+from helpers import ROOT
+from helpers.busy import busy
 
 
 @pytest.fixture(scope="module")
@@ -113,6 +115,35 @@ def test_hooks_and_the_check_script_use_what_make_installs() -> None:
     assert "make test" in script.read_text(encoding="utf-8")
 
 
+def test_the_check_script_tests_as_a_fresh_machine_would(tmp_path: Path) -> None:
+    """What changes Python's behaviour is gone before make test: unbuffered output has hidden a fault for long."""
+    for name in ("make", "chromium"):
+        (tmp_path / name).write_text("#!/bin/sh\necho $0 $@\nenv\n", encoding="utf-8")
+        (tmp_path / name).chmod(0o755)
+    odd = {"PYTHONUNBUFFERED": "1", "PYTHONDONTWRITEBYTECODE": "1", "LANG": "de_DE.UTF-8", "LC_ALL": "C", "KEPT": "yes"}
+    around = {**os.environ, **odd, "PATH": f"{tmp_path}{os.pathsep}{os.environ['PATH']}"}
+    said = subprocess.run([ROOT / ".ci" / "run"], env=around, capture_output=True, text=True, check=True, timeout=60).stdout.splitlines()
+    assert said[0] == f"{tmp_path / 'make'} test"
+    seen = {line.partition("=")[0] for line in said[1:]}
+    assert "KEPT" in seen and not {name for name in seen if name.startswith(("PYTHON", "LC_")) or name == "LANG"}
+
+
+def test_the_pythons_that_are_promised_are_the_same_everywhere(setup_arguments: dict[str, Any]) -> None:
+    """setup.py, the Makefile and the docs name 3.11, 3.12 and 3.13."""
+    assert setup_arguments["python_requires"] == ">=3.11,<3.14"
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    assert "(3, 11) <= sys.version_info[:2] < (3, 14)" in makefile and "no Python 3.11, 3.12 or 3.13 with venv" in makefile
+    for name in ("README.md", "docs/quick-start.md"):
+        assert "Python 3.11, 3.12 or 3.13" in (ROOT / name).read_text(encoding="utf-8"), name
+
+
+def test_a_busy_machine_can_be_made_and_ends_with_the_test() -> None:
+    """make test-busy runs the tests beside processes that work, and leaves none behind."""
+    with busy(3) as numbers:
+        assert len(numbers) == 3 and all(Path(f"/proc/{number}").exists() for number in numbers)
+    assert not any(Path(f"/proc/{number}").exists() for number in numbers)
+
+
 def test_the_launch_file_starts_the_executables_and_moves_nothing_unasked(setup_arguments: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
     """With stand-ins for launch: each node is an executable of the package, and activation depends on an argument that is off."""
     made: list[tuple[str, dict[str, Any]]] = []
@@ -140,5 +171,17 @@ def test_the_launch_file_starts_the_executables_and_moves_nothing_unasked(setup_
     assert all(node["package"] == "xy_sysid" for node in nodes)
     declared = {keywords["arguments"][0]: keywords["default_value"] for kind, keywords in made if kind == "DeclareLaunchArgument"}
     assert declared["activate"] == declared["simulate"] == declared["record"] == "false"
-    (drive,) = [keywords for kind, keywords in made if kind == "RegisterEventHandler"]
-    assert drive["condition"][1]["arguments"][0][1]["arguments"] == ("activate",)
+    (driven,) = [keywords["parameters"][-1] for keywords in nodes if keywords["executable"] == "excitation"]
+    assert set(driven) == {"autostart"} and driven["autostart"][1]["arguments"] == ("activate",)
+    assert not any("autostart" in item for keywords in nodes if keywords["executable"] != "excitation" for item in keywords.get("parameters", []))
+    (asked,) = [keywords for kind, keywords in made if kind == "EmitEvent"]
+    assert asked["event"][1]["transition_id"] == 1 and asked["condition"][0] == "UnlessCondition"  # configure, and never activate
+
+
+def test_the_package_and_not_its_clone_is_imported_beside_the_clone(tmp_path: Path) -> None:
+    """Whoever starts Python in the folder above a clone that is called xy_sysid gets the front door, not an empty namespace."""
+    (tmp_path / "xy_sysid").symlink_to(ROOT)
+    words = "import xy_sysid; print(xy_sysid.__version__)"
+    said = subprocess.run([sys.executable, "-c", words], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert said.returncode == 0, said.stderr
+    assert said.stdout.strip()

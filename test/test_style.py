@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import ast
+import functools
 import graphlib
 import re
 import subprocess
 from pathlib import Path
 
 import pytest
-
-ROOT = Path(__file__).parents[1]
+from helpers import ROOT
 
 
 def names(text: str) -> list[str]:
@@ -18,36 +18,30 @@ def names(text: str) -> list[str]:
     return text.split()
 
 
-# Upstream first: a file imports only from names to its left or above it, or from its own folder.
+# Upstream first, in the order of the data: a file imports from its own package and from what stands before it.
 CORE = names("""
-errors compiled stream hold settings recording frf transfer_function
-excitation travel drive pacing
-simulation reduction
-windows window_check period friction_hint spectra batch estimate
-fitting orders validation model_check tracking
-noise_floor effects swing between effect_loop effect_code axis_kernel axis_model spectral_cost base_start velocity_fit traces inverse_start
-own_units greybox open_loop one_step one_step_race comparison race ladder detours refinement diagnosis
-ring pairing joints identifier messages live_fit replay offline
-linear_part paired distortion findings story_pictures story story_document
-hearing live_story diagnoser
+errors units settings jit
+samples excitation
+response linear fitting
+effects axis greybox comparison search
+story live
 """)
 EDGE = names("""
-shipped parameter_file settings_doc effects_doc tool_layouts user_effects run_plan starter
-bags imports exports saved_models state_file work_queue story_worker
-nodes
-report page
-cli __main__
+bags imports files processes
+nodes report page cli
 """)
 ORDER = [*CORE, *EDGE]
+ALONE = {"__init__", "__main__", "errors", "settings", "units", "jit"}  # files that stand beside the packages
 
 NOT_IN_CORE = names("""
 rclpy std_msgs sensor_msgs diagnostic_msgs rosbags typer rich plotly yaml
 pathlib os io sys shutil tempfile subprocess socket logging time datetime threading multiprocessing asyncio random
 """)
 NOT_CALLED_IN_CORE = {"print", "open", "input", "exec", "eval"}
-SHARED_WITH_THE_MACHINE = {"compiled", "errors", "stream", "settings"}
+SHARED_WITH_THE_MACHINE = {"xy_sysid.jit", "xy_sysid.errors", "xy_sysid.samples.block", "xy_sysid.settings"}
 
 
+@functools.cache
 def sources(package: str) -> list[Path]:
     return sorted(path for path in (ROOT / package).rglob("*.py") if "__pycache__" not in path.parts)
 
@@ -57,10 +51,12 @@ def module_of(path: Path) -> str:
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
+@functools.cache
 def tree_of(path: Path) -> ast.Module:
     return ast.parse(path.read_text(encoding="utf-8"), str(path))
 
 
+@functools.cache
 def imported(path: Path) -> set[str]:
     """Full names of all that a file imports, wherever in the file it does, save for type checking only."""
     found: set[str] = set()
@@ -85,15 +81,23 @@ def place_of(module: str) -> str:
 def test_a_file_imports_only_from_upstream(path: Path) -> None:
     """Reading order = data order = import order."""
     place = place_of(module_of(path))
-    if not place:
-        assert not {name for name in imported(path) if name.startswith("xy_")}
-        return
-    assert place in ORDER, f"{path.name} has no place in the order yet: add {place!r} to CORE or EDGE in this test"
+    if place in ("", "__main__"):
+        return  # the doors: they open on everything
+    assert place in ORDER, f"a new package, {place!r}: say in this test what stands before it"
     for name in imported(path):
         if name.split(".")[0] == "xy_sysid" and place_of(name) not in ("", place):
             assert ORDER.index(place_of(name)) < ORDER.index(place), f"{module_of(path)} imports {name}, which is downstream"
         if name.split(".")[0] == "xy_sim":
             assert place in ("cli", "nodes"), f"{module_of(path)} imports {name}: hypotheses must not know the machine"
+
+
+def test_only_what_everybody_knows_stands_beside_the_packages() -> None:
+    """Everything else is in a package; a package is a folder with a docstring that says what is in it."""
+    assert {path.stem for path in (ROOT / "xy_sysid").glob("*.py")} == ALONE
+    packages = {path.parent.name: ast.get_docstring(tree_of(path)) for path in (ROOT / "xy_sysid").glob("*/__init__.py")}
+    assert sorted([*packages, *ALONE]) == sorted({*ORDER, *ALONE})
+    for name in packages:
+        assert packages[name], f"xy_sysid/{name}/__init__.py says nothing"
 
 
 @pytest.mark.parametrize(
@@ -110,9 +114,9 @@ def test_the_core_knows_no_ros_no_files_no_clock_and_does_not_print(path: Path) 
 @pytest.mark.parametrize("path", sources("xy_sim"), ids=lambda path: str(path.relative_to(ROOT)))
 def test_the_simulated_machine_shares_no_physics_with_the_identification(path: Path) -> None:
     """Never mark your own homework: apart from its node, xy_sim takes only tools from xy_sysid."""
-    if path.name in ("node.py", "ballscrew_node.py"):
+    if path.name in ("node.py", "ballscrew_node.py", "controller_node.py"):
         return
-    taken = {place_of(name) for name in imported(path) if name.split(".")[0] == "xy_sysid"}
+    taken = {name for name in imported(path) if name.split(".")[0] == "xy_sysid"}
     assert taken <= SHARED_WITH_THE_MACHINE
 
 
@@ -126,10 +130,86 @@ def test_no_import_goes_in_a_circle() -> None:
     assert set(graph) <= set(order)
 
 
-def test_nothing_catches_every_exception_or_silences_the_type_checker() -> None:
-    """No bare except, no except Exception, no type: ignore."""
-    for path in [*sources("xy_sysid"), *sources("xy_sim")]:
+def _classes(path: Path) -> list[str]:
+    """Public names of a file that say what something is: classes, and types with a name."""
+    found = [node.name for node in tree_of(path).body if isinstance(node, ast.ClassDef)]
+    for node in tree_of(path).body:
+        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
+            found.append(node.targets[0].id)
+    return [name for name in found if name[0].isupper() and not name.isupper() and "_" not in name]
+
+
+def test_no_public_class_name_stands_for_two_things_in_the_core() -> None:
+    """One name, one thing: who reads ``Quantity`` need not ask whose."""
+    where: dict[str, list[str]] = {}
+    for path in sources("xy_sysid"):
+        if place_of(module_of(path)) in CORE:
+            for name in _classes(path):
+                where.setdefault(name, []).append(module_of(path))
+    twice = {name: homes for name, homes in where.items() if len(homes) > 1}
+    assert not twice
+
+
+def _fields(path: Path) -> dict[str, int]:
+    """How many fields each dataclass of a file has."""
+    found = {}
+    for node in ast.walk(tree_of(path)):
+        if isinstance(node, ast.ClassDef) and any("dataclass" in ast.unparse(item) for item in node.decorator_list):
+            found[node.name] = sum(isinstance(item, ast.AnnAssign) for item in node.body)
+    return found
+
+
+LARGE = {name for path in sources("xy_sysid") for name, fields in _fields(path).items() if fields > 4} - {"Parameter"}  # effects write tables of them
+
+
+@pytest.mark.parametrize("path", sources("xy_sysid"), ids=lambda path: str(path.relative_to(ROOT)))
+def test_what_has_more_than_four_fields_is_built_by_keyword(path: Path) -> None:
+    """Four values may stand in their order; of more, each says what it is."""
+    for node in ast.walk(tree_of(path)):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in LARGE:
+            unnamed = len(node.args) + sum(isinstance(item, ast.Starred) for item in node.args)
+            assert unnamed <= 4, f"{path.name}:{node.lineno}: {node.func.id} of {unnamed} unnamed values"
+
+
+def _parameters(node: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+    every = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
+    return sum(item.arg not in ("self", "cls") for item in every)
+
+
+@pytest.mark.parametrize("path", [*sources("xy_sysid"), *sources("xy_sim")], ids=lambda path: str(path.relative_to(ROOT)))
+def test_a_function_has_at_most_six_parameters(path: Path) -> None:
+    """Kernels take numbers one by one; a command's parameters are its options."""
+    if module_of(path).startswith("xy_sysid.cli."):
+        return
+    for node in ast.walk(tree_of(path)):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and not any(_kernel(item) for item in node.decorator_list):
+            assert _parameters(node) <= 6, f"{path.name}:{node.lineno}: {node.name} has {_parameters(node)} parameters"
+
+
+def _kernel(decorator: ast.expr) -> bool:
+    return isinstance(decorator, ast.Name) and decorator.id in ("compiled", "law", "inner", "inlined")
+
+
+def test_tests_share_helpers_and_never_each_other() -> None:
+    """A test can be read, moved and run alone; what several need is in test/helpers."""
+    for path in sources("test"):
+        taken = {name.split(".")[0] for name in imported(path)}
+        assert not [name for name in taken if name.startswith("test_")], path
+
+
+EVERYWHERE = ("xy_sysid", "xy_sim", "faults", "blind", "bench", "pictures", "test")
+
+
+@pytest.mark.parametrize("place", EVERYWHERE)
+def test_nothing_silences_the_type_checker(place: str) -> None:
+    """A wrong type is mended, not hushed."""
+    for path in sources(place):
         assert "type: " + "ignore" not in path.read_text(encoding="utf-8"), path
+
+
+def test_nothing_catches_every_exception() -> None:
+    """No bare except, no except Exception."""
+    for path in [*sources("xy_sysid"), *sources("xy_sim")]:
         for node in ast.walk(tree_of(path)):
             if isinstance(node, ast.ExceptHandler):
                 assert node.type is not None, f"{path}:{node.lineno}"

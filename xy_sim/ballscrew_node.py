@@ -1,7 +1,8 @@
 """The adapter around ``machine.Machine``: answers every voltage block with the positions at its samples' instants.
 
 It steps when a block comes, so it runs in lockstep with whoever sends them, in real time or many times faster. When the
-voltage stops for a while, the amplifier is off: the table coasts at 0 V, and its encoder goes on reporting.
+voltage stops, time stands still, unless ``realtime`` is on: then the drive holds the last voltage until its ``watchdog``
+takes it away (or for ever, without one), the table moves on, and the encoder goes on reporting.
 """
 
 from __future__ import annotations
@@ -9,37 +10,46 @@ from __future__ import annotations
 import time
 
 import numpy as np
-from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.node import Node
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
 from std_msgs.msg import Float64MultiArray
 
 from xy_sim.machine import Machine
 from xy_sysid.errors import BadInput
-from xy_sysid.nodes.common import DATA_QOS, NAMESPACE, Ending, declare, from_message, status, to_message
+from xy_sysid.nodes.common import DATA_QOS, WalledNode, declare, from_message, status, to_message
+from xy_sysid.nodes.diagnostics import Diagnostics
+from xy_sysid.samples.block import Block
 from xy_sysid.settings import BallscrewSettings
-from xy_sysid.stream import Block
 
+GO_ON = 0.005  # s between two looks whether the table must move on by itself
+LATE = 0.02  # s that a block may be late before it does
 IDLE = 0.1  # s without voltage after which the encoder reports by itself, the motors off
 
 
-class BallscrewNode(Node, Ending):
+class BallscrewNode(WalledNode):
     """Voltage in, position out."""
 
     def __init__(self) -> None:
-        super().__init__("ballscrew", namespace=NAMESPACE, automatically_declare_parameters_from_overrides=True)
-        self._own = declare(self, BallscrewSettings(), self._accept)
+        super().__init__("ballscrew")
+        self._own = declare(self, BallscrewSettings(), self._accept, fixed=None)
         settings = self._own.settings
         self._machine = Machine.from_file(settings.machine, settings.seed or None, settings.clean)
         self._machine.step(np.zeros((1, len(self._machine.axes))))  # compile before anybody waits
         self._machine.reset()
         self._next: int | None = None
+        self._until = 0.0  # when the last block is over, s by the steady clock
         self._heard = time.monotonic()
+        self._epoch = 0.0  # s, time of the sample with counter 0, as the voltage has it
         self._faults: dict[str, int] = {}
         self._said = "waiting for voltage"
         self._position = self.create_publisher(Float64MultiArray, "position", DATA_QOS)
-        self._metrics = self.create_publisher(DiagnosticArray, "metrics", 10)
+        self._metrics = Diagnostics(self)
         self.create_subscription(Float64MultiArray, "voltage", self._on_voltage, DATA_QOS)
-        self.create_timer(0.5, self._report)
+        self._held = np.zeros(len(self._machine.axes))  # the last voltage
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(0.5, self._report, clock=steady)
+        if settings.realtime:
+            self.create_timer(GO_ON, self._go_on, clock=steady)
         self.get_logger().info(f"simulating {self._machine.spec.description or settings.machine}: axes {', '.join(self._machine.axes)}")
 
     def _accept(self, settings: BallscrewSettings) -> None:
@@ -61,6 +71,10 @@ class BallscrewNode(Node, Ending):
         self._answer(block)
 
     def _answer(self, block: Block) -> None:
+        if self._own.settings.realtime and self._next is not None and block.seq[0] < self._next <= block.seq[-1]:
+            late = int(self._next - block.seq[0])  # the table has moved on meanwhile
+            self._fault("late", f"{late} samples of voltage came after their time")
+            block = Block(block.axes, block.seq[late:], block.time[late:], block.values[late:])
         first = int(block.seq[0])
         if self._next is not None and first < self._next:
             if first != 0:
@@ -71,10 +85,27 @@ class BallscrewNode(Node, Ending):
             missing = first - self._next
             self._fault("lost", f"{missing} samples of voltage from counter {self._next} on never came; the motors were off")
             self._machine.step(np.zeros((min(missing, round(self._machine.rate)), len(self._machine.axes))))
-        self._next = int(block.seq[-1]) + 1
+        self._next, self._until = int(block.seq[-1]) + 1, time.monotonic() + len(block) / self._machine.rate
         columns = [block.axes.index(axis) for axis in self._machine.axes]
+        self._held, self._epoch = block.values[-1, columns].copy(), float(block.time[-1] - block.seq[-1] / self._machine.rate)
         positions = self._machine.step(np.ascontiguousarray(block.values[:, columns]))
         self._position.publish(to_message(Block(self._machine.axes, block.seq, block.time, positions)))
+
+    def _go_on(self) -> None:
+        """The time since the last block is over and no other came: hold the voltage, or 0 V once the watchdog has seen it."""
+        now, rate = time.monotonic(), self._machine.rate
+        if self._next is None or now < self._until + LATE:
+            return
+        samples = min(round((now - self._until) * rate), round(rate))
+        watchdog = self._own.settings.watchdog
+        if watchdog > 0 and now - self._heard > watchdog:
+            if self._held.any():
+                self._fault("watchdog", f"no voltage for {watchdog * 1000:g} ms: the drive went to 0 V")
+            self._held = np.zeros(len(self._held))
+        positions = self._machine.step(np.tile(self._held, (samples, 1)))
+        seq = np.arange(self._next, self._next + samples, dtype=np.float64)
+        self._next, self._until = self._next + samples, self._until + samples / rate
+        self._position.publish(to_message(Block(self._machine.axes, seq, self._epoch + seq / rate, positions)))
 
     def _fault(self, what: str, text: str) -> None:
         self._faults[what] = self._faults.get(what, 0) + 1
@@ -92,6 +123,4 @@ class BallscrewNode(Node, Ending):
             "listeners": listeners,
             **{f"voltage {what}": str(number) for what, number in self._faults.items()},
         }
-        stamped = DiagnosticArray(status=[status("ballscrew", level, self._said if self._faults else message, values)])
-        stamped.header.stamp = self.get_clock().now().to_msg()
-        self._metrics.publish(stamped)
+        self._metrics.publish([status("ballscrew", level, self._said if self._faults else message, values)])

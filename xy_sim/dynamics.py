@@ -6,6 +6,7 @@ parts give in volts of the drive are turned to newtons by ``force_per_volt``.
 
 from __future__ import annotations
 
+from xy_sim import imperfections
 from xy_sim.inlined import inlined
 from xy_sim.layout import BASE, BASE_SPEED, BRISTLE, HEAT, MOTOR, MOTOR_SPEED, RATTLE, RATTLE_SPEED, TABLE, TABLE_SPEED, VOLTS, WORK, slot
 from xy_sim.parts import (
@@ -19,16 +20,19 @@ from xy_sim.parts import (
     contact,
     coulomb_friction,
     gain_drift,
+    gravity,
     hardening_stiffness,
     loose_mode,
+    position_dependent_drag,
     position_dependent_gain,
     presliding_hysteresis,
     quadratic_drag,
+    return_spring,
     stribeck_friction,
     thermal_viscosity,
     viscous_friction,
 )
-from xy_sysid.stream import FloatArray
+from xy_sysid.samples.block import FloatArray
 
 FREE = 2  # friction mode: no dry friction to switch; otherwise the direction of sliding, and 0 sticks
 
@@ -48,6 +52,9 @@ _ASYM, _ASYM_COULOMB = slot("asymmetric_friction.asymmetry"), slot("asymmetric_f
 _PRE, _PRE_LENGTH, _PRE_DAMPING = slot("presliding_hysteresis.coulomb"), slot("presliding_hysteresis.length"), slot("presliding_hysteresis.damping")
 _COG, _COG_PHASE = slot("cogging.amplitude"), slot("cogging.phase")
 _LOAD, _CUBIC, _LINEAR = slot("constant_load.load"), slot("hardening_stiffness.cubic"), slot("hardening_stiffness.linear")
+_WEIGHT, _WEIGHT_PHASE = slot("gravity.amplitude"), slot("gravity.phase")
+_RETURN, _REST, _SOFTENING = slot("return_spring.stiffness"), slot("return_spring.rest"), slot("return_spring.softening")
+_DRAG_SLOPE = slot("position_dependent_drag.slope")
 _GAP, _GAP_C = slot("backlash.gap"), slot("backlash.damping")
 _LOOSE_MASS, _LOOSE_F = slot("loose_mode.mass"), slot("loose_mode.frequency")
 _LOOSE_GAP, _LOOSE_C = slot("loose_mode.gap"), slot("loose_mode.damping")
@@ -60,6 +67,15 @@ def dry_level(p: FloatArray, v: float, direction: float) -> float:
     """Size of all dry friction at speed ``v``, sliding in ``direction`` (+1 or -1), V."""
     level: float = coulomb_friction.level(p[_COULOMB]) + asymmetric_friction.level(p[_ASYM], p[_ASYM_COULOMB], direction)
     level += stribeck_friction.level(p[_STRIBECK], p[_STRIBECK_COULOMB], p[_STRIBECK_V], v) + p[_PRE]
+    return level
+
+
+@inlined
+def breakaway(p: FloatArray, t: float, direction: float, dirt: FloatArray | None) -> float:
+    """Friction that must be overcome to start in ``direction`` at ``t`` (s), N."""
+    level: float = p[_FORCE] * dry_level(p, 0.0, direction)
+    if dirt is not None:
+        level *= imperfections.friction(dirt, t)
     return level
 
 
@@ -93,10 +109,11 @@ def regime(p: FloatArray, y: FloatArray, i: int) -> int:
 
 
 @inlined
-def rates(p: FloatArray, y: FloatArray, i: int, t: float, volts: float, mode: int, o: int) -> float:
+def rates(p: FloatArray, y: FloatArray, i: int, t: float, volts: float, mode: int, o: int, dirt: FloatArray | None = None) -> float:
     """Writes the derivative of row ``i`` of ``y`` into its row ``o``; returns the force (N) that keeps the motor where it is.
 
     p: parameters (layout.numbers); y: (rows, layout.STATES), SI; t: time, s; volts: what arrives at the amplifier, V;
+    dirt: p again if there is dirt, else None: what is only for dirt is then not even compiled;
     mode: FREE, or the direction of sliding (-1, +1), or 0 when the motor sticks. Friction that can hold the returned
     force keeps a resting motor at rest.
     """
@@ -117,6 +134,14 @@ def rates(p: FloatArray, y: FloatArray, i: int, t: float, volts: float, mode: in
         factor = position_dependent_gain.factor(p[_GAIN_DEPTH], p[_GAIN_WAVE], q)
         volts *= factor
         drag *= factor * factor
+    rub = 1.0
+    if dirt is not None:
+        stronger, slower = imperfections.gain_and_drag(dirt, t, q)
+        rub = imperfections.friction(dirt, t)
+        volts = volts * stronger + imperfections.hum(dirt, t)
+        drag *= slower * rub
+    if p[_DRAG_SLOPE] != 0.0:
+        drag *= position_dependent_drag.factor(p[_DRAG_SLOPE], q)
     if p[_HEAT_DEPTH] != 0.0:
         drag *= thermal_viscosity.factor(p[_HEAT_DEPTH], y[i, HEAT])
         y[o, HEAT] = thermal_viscosity.rate(p[_HEAT_TIME], p[_HEAT_SPEED], v, y[i, HEAT])
@@ -127,6 +152,10 @@ def rates(p: FloatArray, y: FloatArray, i: int, t: float, volts: float, mode: in
     if p[_COG] != 0.0:
         on_motor -= k * cogging.force(p[_COG], p[_COG_WAVE], p[_COG_PHASE], q)
     on_table = k * (constant_load.force(p[_LOAD]) + hardening_stiffness.force(p[_CUBIC], p[_LINEAR], x))
+    if p[_WEIGHT] != 0.0:
+        on_table += k * gravity.force(p[_WEIGHT], p[_WEIGHT_PHASE], x)
+    if p[_RETURN] != 0.0:
+        on_table += k * return_spring.force(p[_RETURN], p[_REST], p[_SOFTENING], x)
     on_table -= p[_GUIDE] * drag * asymmetric_viscous_friction.factor(p[_SIDED], xv) * xv
     on_table -= contact.force(x, xv, p[_TRAVEL], p[_STOP_K], p[_STOP_C])
     on_loose = 0.0
@@ -134,6 +163,10 @@ def rates(p: FloatArray, y: FloatArray, i: int, t: float, volts: float, mode: in
         stiffness = loose_mode.stiffness(p[_LOOSE_MASS], p[_LOOSE_F])
         on_loose = contact.force(x - y[i, RATTLE], xv - y[i, RATTLE_SPEED], 0.5 * p[_LOOSE_GAP], stiffness, p[_LOOSE_C])
         on_table -= on_loose
+    weak = 0.0
+    if dirt is not None:
+        weak = imperfections.modes(dirt, y, i, x, xv, o)
+        on_table += k * imperfections.cable(dirt, y, i, x, xv, o) - weak
     if coupled:
         if p[_GAP] > 0.0:
             link = contact.force(q - x, v - xv, 0.5 * p[_GAP], p[_COUPLING_K], p[_GAP_C])
@@ -144,25 +177,34 @@ def rates(p: FloatArray, y: FloatArray, i: int, t: float, volts: float, mode: in
 
     if p[_PRE] > 0.0:
         y[o, BRISTLE] = presliding_hysteresis.rate(y[i, BRISTLE], v, slide_length(p, v))
-        on_motor -= k * (p[_PRE] / p[_PRE_LENGTH] * y[i, BRISTLE] + p[_PRE_DAMPING] * y[o, BRISTLE])
+        on_motor -= k * rub * (p[_PRE] / p[_PRE_LENGTH] * y[i, BRISTLE] + p[_PRE_DAMPING] * y[o, BRISTLE])
     elif mode == 1 or mode == -1:
-        on_motor -= mode * k * dry_level(p, v, float(mode))
+        on_motor -= mode * k * dry_level(p, v, float(mode)) * rub
 
     on_base = 0.0
     base = p[_BASE_MASS]
     if base > 0.0:
         moving, frequency = base + p[_TABLE], p[_BASE_F]
-        on_base = -base_resonance.dashpot(moving, frequency, p[_BASE_D]) * y[i, BASE_SPEED] - on_loose
+        on_base = -base_resonance.dashpot(moving, frequency, p[_BASE_D]) * y[i, BASE_SPEED] - on_loose - weak
         if p[_DROP] != 0.0:
             frequency = base_loosening.frequency(frequency, p[_DROP], p[_DROP_START], p[_DROP_RATE], t)
         on_base -= base_resonance.stiffness(moving, frequency) * y[i, BASE]
 
-    return _accelerations(p, y, i, o, mode, on_motor, on_table, on_base, on_loose)
+    return _accelerations(p, y, i, o, mode, on_motor, on_table, on_base, on_loose, dirt)
 
 
 @inlined
 def _accelerations(
-    p: FloatArray, y: FloatArray, i: int, o: int, mode: int, on_motor: float, on_table: float, on_base: float, on_loose: float
+    p: FloatArray,
+    y: FloatArray,
+    i: int,
+    o: int,
+    mode: int,
+    on_motor: float,
+    on_table: float,
+    on_base: float,
+    on_loose: float,
+    dirt: FloatArray | None,
 ) -> float:
     """Solves the masses for their accelerations; the base feels the reaction of whatever slides on it."""
     rotor, table, base = p[_ROTOR], p[_TABLE], p[_BASE_MASS]
@@ -190,4 +232,6 @@ def _accelerations(
     y[o, BASE], y[o, BASE_SPEED] = y[i, BASE_SPEED], of_base
     if p[_LOOSE_MASS] > 0.0:
         y[o, RATTLE], y[o, RATTLE_SPEED] = y[i, RATTLE_SPEED], on_loose / p[_LOOSE_MASS] - of_base
+    if dirt is not None:
+        imperfections.on_a_moving_base(dirt, y, o, of_base)
     return needed

@@ -1,4 +1,4 @@
-"""Functions that are compiled into whatever compiled code calls them.
+"""Functions that are compiled together with whatever compiled code calls them.
 
 They keep no cache of their own, so the one cache that counts, the kernel's, can be keyed on the text of them all.
 """
@@ -17,4 +17,10 @@ R = TypeVar("R")
 def inlined(function: Callable[P, R]) -> Callable[P, R]:
     """The same function, callable from Python and from compiled code; inlining by force makes the kernel a quarter faster."""
     compilable: Callable[P, R] = register_jitable(forceinline=True)(function)
+    return compilable
+
+
+def called(function: Callable[P, R]) -> Callable[P, R]:
+    """The same, but compiled once and called: for what most machines do not need, so that it makes the kernel no slower."""
+    compilable: Callable[P, R] = register_jitable(function)
     return compilable

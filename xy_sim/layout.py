@@ -11,20 +11,30 @@ from collections.abc import Mapping
 import numpy as np
 
 from xy_sim.drive import Drive
-from xy_sim.parts import PARTS
+from xy_sim.parts import PARTS, curve
 from xy_sim.parts import screw_compliance as screw
-from xy_sysid.stream import FloatArray
+from xy_sysid.samples.block import FloatArray
 
-STATES = ("motor", "motor_speed", "base", "base_speed", "work", "volts", "bristle", "heat", "table", "table_speed", "rattle", "rattle_speed")
-MOTOR, MOTOR_SPEED, BASE, BASE_SPEED, WORK, VOLTS, BRISTLE, HEAT, TABLE, TABLE_SPEED, RATTLE, RATTLE_SPEED = range(len(STATES))
+STATES = (
+    *("motor", "motor_speed", "base", "base_speed", "work", "volts", "bristle", "heat", "table", "table_speed", "rattle", "rattle_speed"),
+    *("cable", "weak", "weak_speed", "second_weak", "second_weak_speed"),
+)
+MOTOR, MOTOR_SPEED, BASE, BASE_SPEED, WORK, VOLTS, BRISTLE, HEAT, TABLE, TABLE_SPEED, RATTLE, RATTLE_SPEED = range(12)
+CABLE, WEAK, WEAK_SPEED, SECOND_WEAK, SECOND_WEAK_SPEED = range(12, len(STATES))
 _OWN = {"amplifier_lag": VOLTS, "presliding_hysteresis": BRISTLE, "thermal_viscosity": HEAT, "loose_mode": RATTLE_SPEED}
-_OWN |= {"backlash": TABLE_SPEED, "screw_compliance": TABLE_SPEED}  # the last state that a part needs
+_OWN |= {"backlash": TABLE_SPEED, "screw_compliance": TABLE_SPEED}
+_OWN |= {"cable_pull": CABLE, "weak_modes": SECOND_WEAK_SPEED}  # the last state that a part needs
 
 _DRIVE = (
     *("force_per_volt", "drag", "guide_share", "rotor_mass", "table_mass", "travel", "stop_stiffness", "stop_damping", "encoder_on_table"),
     *("coupled", "coupling_stiffness", "coupling_dashpot", "lead_error_wavenumber", "cogging_wavenumber", "gain_wavenumber", "dry", "states"),
 )
-_NAMES = (*_DRIVE, *(f"{part.name}.{parameter.name}" for part in PARTS.values() for parameter in part.parameters))
+_CURVED = ("uneven_drag", "uneven_gain", "gain_wander", "friction_wander", "cable_pull", "uneven_lines")  # parts with a random curve
+_NAMES = (
+    *_DRIVE,
+    *(f"{part.name}.{parameter.name}" for part in PARTS.values() for parameter in part.parameters),
+    *(f"{name}.curve.{k}" for name in _CURVED for k in range(curve.KNOTS)),
+)
 _SLOTS = {name: place for place, name in enumerate(_NAMES)}
 
 
@@ -47,6 +57,9 @@ def numbers(drive: Drive, parts: Mapping[str, Mapping[str, float]]) -> FloatArra
         row["gain_wavenumber"] = 2.0 * math.pi / parts["position_dependent_gain"]["period"]
     dry = any(name in parts for name in ("coulomb_friction", "stribeck_friction", "asymmetric_friction"))
     row["dry"] = float(dry and "presliding_hysteresis" not in parts)
+    for name in _CURVED:
+        if name in parts:
+            row |= {f"{name}.curve.{k}": height for k, height in enumerate(curve.heights(int(parts[name]["seed"])).tolist())}
     row["states"] = 1.0 + max([WORK, *(last for part, last in _OWN.items() if part in parts)])
     return np.array([row.get(name, 0.0) for name in _NAMES], dtype=np.float64)
 

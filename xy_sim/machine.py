@@ -15,7 +15,7 @@ from xy_sim.layout import STATES, numbers
 from xy_sim.machine_file import Axis, Spec, fitting, parts_from, read
 from xy_sim.parts import PARTS
 from xy_sysid.errors import BadInput
-from xy_sysid.stream import FloatArray
+from xy_sysid.samples.block import FloatArray
 
 _RESOLVED = 1.5  # rad in one inner step: the method of order 4 is stable to 2.6, and exact far below
 
@@ -25,6 +25,7 @@ class _Moving:
 
     def __init__(self, axis: Axis, rate: float, seed: int, number: int) -> None:
         self.parameters = numbers(axis.drive, axis.parts)
+        self.dirty = any(PARTS[name].group == "imperfection" for name in axis.parts)
         delay = axis.parts.get("time_delay", {}).get("delay", 0.0)
         self.states = np.zeros((kernel.ROWS, len(STATES)))
         self.past = np.zeros(int(delay * rate) + 3)
@@ -44,9 +45,9 @@ class Machine:
         self.seed = spec.seed if seed is None else seed
         self.clean = clean
         for axis in spec.axes:
-            least = truth.fastest(axis) / _RESOLVED
-            if spec.inner_rate < least:
-                raise BadInput(f"axis {axis.name}: inner_rate", f"{spec.inner_rate:g}", f"at least {least:.3g} Hz", "Raise it, or soften the parts.")
+            least, inner = truth.fastest(axis) / _RESOLVED, self._inner(axis)
+            if inner < least:
+                raise BadInput(f"axis {axis.name}: inner_rate", f"{inner:g}", f"at least {least:.3g} Hz", "Raise it, or soften the parts.")
         self.reset()
 
     @classmethod
@@ -95,10 +96,16 @@ class Machine:
                 np.ascontiguousarray(given[:, column]),
                 seen,
                 self.spec.rate,
-                self.spec.inner_rate,
+                self._inner(axis),
+                moving.parameters if moving.dirty else None,
             )
             out[:, column] = seen if self.clean else self._encoder(axis, moving, seen)
         return out
+
+    def _inner(self, axis: Axis) -> float:
+        """Fewest inner steps per second, Hz."""
+        steps = axis.parts.get("first_order_steps")
+        return self.spec.inner_rate if steps is None else 1.0 / steps["step"]
 
     @staticmethod
     def _encoder(axis: Axis, moving: _Moving, seen: FloatArray) -> FloatArray:

@@ -17,7 +17,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.settings import build, unknown_name
 
 Parts = Mapping[str, Mapping[str, float]]
-_TOP = ("description", "base", "rate", "inner_rate", "seed", "axes", "hidden")
+_TOP = ("description", "base", "rate", "inner_rate", "seed", "unit", "axes", "hidden")
 _HIDDEN = ("seed", "effects", "scale")
 
 
@@ -35,6 +35,7 @@ class Spec:
     """A whole machine, before it moves.
 
     rate: samples per second, Hz; inner_rate: fewest inner steps per second, Hz; seed: of the encoder noise;
+    unit: of positions, m or rad; masses are inertias then
     hidden: what ``xy_sim.drawing`` shall draw (keys seed, effects, scale), or empty.
     """
 
@@ -44,6 +45,7 @@ class Spec:
     seed: int = 0
     description: str = ""
     hidden: Mapping[str, Any] | None = None
+    unit: str = "m"
 
 
 def _folders() -> list[Path]:
@@ -170,4 +172,7 @@ def read(name: str | Path) -> Spec:
     rate = _number(table.get("rate", default.rate), f"{file}: rate", 10.0, 1e5)
     inner = _number(table.get("inner_rate", max(default.inner_rate, rate)), f"{file}: inner_rate", rate, 1e7)
     seed = int(_number(table.get("seed", default.seed), f"{file}: seed", 0, 2**31 - 1))
-    return Spec(axes, rate, inner, seed, str(table.get("description", "")), hidden)
+    unit = str(table.get("unit", default.unit))
+    if unit not in ("m", "rad"):
+        raise BadInput(f"{file}: unit", repr(unit), "m, rad", "Choose one of these.")
+    return Spec(axes, rate, inner, seed, str(table.get("description", "")), hidden, unit)

@@ -16,6 +16,7 @@ _GROUPS: dict[Group, str] = {
     "effect": "hidden effects that a diagnosis should name",
     "outside": "what no hypothesis knows",
     "event": "what happens meanwhile",
+    "imperfection": "dirt, of which every real machine has a little",
 }
 
 

@@ -14,8 +14,20 @@ from numpy.typing import NDArray
 
 from xy_sim.layout import BASE, BASE_SPEED, BRISTLE, MOTOR, MOTOR_SPEED, RATTLE, RATTLE_SPEED, TABLE, TABLE_SPEED, coupling, slot
 from xy_sim.machine_file import Axis
-from xy_sim.parts import PARTS, base_loosening, base_resonance, cogging, contact, gain_drift, hardening_stiffness, loose_mode
-from xy_sysid.stream import FloatArray
+from xy_sim.parts import (
+    PARTS,
+    base_loosening,
+    base_resonance,
+    cogging,
+    contact,
+    gain_drift,
+    gravity,
+    hardening_stiffness,
+    loose_mode,
+    return_spring,
+    weak_modes,
+)
+from xy_sysid.samples.block import FloatArray
 
 _Poly = FloatArray
 
@@ -41,37 +53,50 @@ def _trim(poly: _Poly, scale: float) -> _Poly:
 
 
 def _matrices(axis: Axis, time: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Mass, damping, stiffness over the coordinates that move at small signal, and the map from all four to them.
+    """Mass, damping, stiffness over the coordinates that move at small signal, and the map from all six to them.
 
-    All four: motor and table relative to the base, base in space, rattling mass relative to the base.
+    All six: motor and table relative to the base, base in space, rattling mass and the two weak modes relative to the base.
     """
     drive, parts = axis.drive, axis.parts
     drag = drive.force_per_volt * parts.get("viscous_friction", {}).get("coefficient", 0.0)
-    mass, damping, stiff = np.zeros((4, 4)), np.zeros((4, 4)), np.zeros((4, 4))
+    mass, damping, stiff = np.zeros((6, 6)), np.zeros((6, 6)), np.zeros((6, 6))
     mass[0, 0] = drive.rotor_mass
-    over = np.array([0.0, 1.0, 1.0, 0.0])  # the table's speed in space is its own plus the base's
+    over = np.array([0.0, 1.0, 1.0, 0.0, 0.0, 0.0])  # the table's speed in space is its own plus the base's
     mass += drive.table_mass * np.outer(over, over)
     damping[0, 0] = (1.0 - drive.guide_share) * drive.drag + drag
     damping[1, 1] = drive.guide_share * drive.drag
     stiff[1, 1] = drive.force_per_volt * parts.get("hardening_stiffness", {}).get("linear", 0.0)
+    if "gravity" in parts:
+        stiff[1, 1] += drive.force_per_volt * gravity.stiffness(**parts["gravity"])
+    if "return_spring" in parts:
+        stiff[1, 1] += drive.force_per_volt * return_spring.slope(**parts["return_spring"])
     spring, dashpot = coupling(drive, parts)
-    link = np.array([1.0, -1.0, 0.0, 0.0])
+    link = np.array([1.0, -1.0, 0.0, 0.0, 0.0, 0.0])
     stiff += spring * np.outer(link, link)
     damping += dashpot * np.outer(link, link)
-    columns = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]] if spring > 0.0 else [[1.0, 1.0, 0.0, 0.0]]
+    unit = np.eye(6)
+    columns = [unit[0], unit[1]] if spring > 0.0 else [unit[0] + unit[1]]
     if "base_resonance" in parts:
         base = parts["base_resonance"]
         moving = base["mass"] + drive.table_mass
         mass[2, 2] += base["mass"]
         damping[2, 2] += base_resonance.dashpot(moving, base["frequency"], base["damping"])
         stiff[2, 2] += base_resonance.stiffness(moving, _base_frequency(axis, time))
-        columns.append([0.0, 0.0, 1.0, 0.0])
+        columns.append(unit[2])
     loose = parts.get("loose_mode")
     if loose is not None and loose["gap"] == 0.0:
-        of_mass, rattle = np.array([0.0, 0.0, 1.0, 1.0]), np.array([0.0, 1.0, 0.0, -1.0])
+        of_mass, rattle = unit[2] + unit[3], unit[1] - unit[3]
         mass += loose["mass"] * np.outer(of_mass, of_mass)
         stiff += loose_mode.stiffness(loose["mass"], loose["frequency"]) * np.outer(rattle, rattle)
-        columns.append([0.0, 0.0, 0.0, 1.0])
+        columns.append(unit[3])
+    weak = parts.get("weak_modes", {})
+    for place, which in ((4, ""), (5, "second_")):
+        if weak.get(f"{which}mass", 0.0) > 0.0:
+            of_mass, swing, small = unit[2] + unit[place], unit[1] - unit[place], weak[f"{which}mass"]
+            mass += small * np.outer(of_mass, of_mass)
+            stiff += weak_modes.force(small, weak[f"{which}frequency"], weak["damping"], 1.0, 0.0) * np.outer(swing, swing)
+            damping += weak_modes.force(small, weak[f"{which}frequency"], weak["damping"], 0.0, 1.0) * np.outer(swing, swing)
+            columns.append(unit[place])
     chosen = np.array(columns).T
     return chosen.T @ mass @ chosen, chosen.T @ damping @ chosen, chosen.T @ stiff @ chosen, chosen
 
@@ -175,6 +200,8 @@ def energy(p: FloatArray, y: FloatArray, time: float) -> float:
         total += contact.energy(y[MOTOR] - x, 0.5 * get("backlash.gap"), get("coupling_stiffness"))
     total += contact.energy(x, get("travel"), get("stop_stiffness"))
     total += volt * hardening_stiffness.energy(get("hardening_stiffness.cubic"), get("hardening_stiffness.linear"), x)
+    total += volt * gravity.energy(get("gravity.amplitude"), get("gravity.phase"), x)
+    total += volt * return_spring.energy(get("return_spring.stiffness"), get("return_spring.rest"), get("return_spring.softening"), x)
     total += volt * get("constant_load.load") * x
     total += volt * cogging.energy(get("cogging.amplitude"), get("cogging_wavenumber"), get("cogging.phase"), y[MOTOR])
     if get("presliding_hysteresis.coulomb") > 0.0:

@@ -1,0 +1,145 @@
+"""Identification of machine axes: live over ROS 2, and the same from a recording.
+
+In a notebook::
+
+    import xy_sysid as xy
+
+    run = xy.load("rec").run("x")            # the longest stretch of an axis without a gap
+    frf = xy.frf(run)                        # H1 with coherence and sigma
+    model = xy.fit(frf)                      # transfer function with delay; model.verdicts
+    fails = xy.compare(run, model)           # where it fails
+    found = xy.diagnose(run)                 # which effect is missing; found.sentence, found.runner_up
+    for step in xy.refine(run):
+        print(step.added, step.held_out_error)
+    xy.save(step.model, "axis.yaml")
+
+Packages in the order of the data; each imports only from those before it.
+
+    samples, excitation:       what arrives, and what drives the machine
+    response, linear, fitting: windows and spectra to a frequency response, transfer functions, their fits and verdicts
+    effects, axis, greybox:    physical effects, an axis with them in time, its fit
+    comparison, search:        where a model fails, and which effect is missing
+    story, live:               what people are shown, and the online logic
+    bags, imports, files, processes: reading, writing, other processes
+    nodes, report, page, cli:  what people meet
+
+What everybody knows stands beside them: ``errors``, ``settings``, ``units``, ``jit``. The names of ``__all__`` are for everybody, each made
+when it is first used; all other modules may change.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from xy_sysid.axis.model import AxisModel
+    from xy_sysid.cli.simulated_recording import simulate
+    from xy_sysid.comparison.of_run import better, compare, validate
+    from xy_sysid.comparison.physical_model import PhysicalModel
+    from xy_sysid.errors import BadInput, BadRecording, MissingExtra, XySysidError
+    from xy_sysid.files.effects import library
+    from xy_sysid.files.models import load_model, save
+    from xy_sysid.fitting.of_run import LinearModel, fit, frf
+    from xy_sysid.imports import load
+    from xy_sysid.linear.reduction import balanced_truncation
+    from xy_sysid.linear.to_others import to_control, to_scipy
+    from xy_sysid.linear.transfer_function import TransferFunction
+    from xy_sysid.report import plots as plot
+    from xy_sysid.response.frf import FrequencyResponse
+    from xy_sysid.samples.recording import Recording, Run
+    from xy_sysid.search.of_run import diagnose, refine
+
+    __version__: str
+
+__all__ = [
+    "AxisModel",
+    "BadInput",
+    "BadRecording",
+    "FrequencyResponse",
+    "LinearModel",
+    "MissingExtra",
+    "PhysicalModel",
+    "Recording",
+    "Run",
+    "TransferFunction",
+    "XySysidError",
+    "__version__",
+    "balanced_truncation",
+    "better",
+    "compare",
+    "diagnose",
+    "fit",
+    "frf",
+    "library",
+    "load",
+    "load_model",
+    "plot",
+    "refine",
+    "save",
+    "simulate",
+    "to_control",
+    "to_scipy",
+    "validate",
+]
+
+_HOMES = {
+    "samples.recording": ("Recording", "Run"),
+    "response.frf": ("FrequencyResponse",),
+    "linear.transfer_function": ("TransferFunction",),
+    "linear.reduction": ("balanced_truncation",),
+    "linear.to_others": ("to_control", "to_scipy"),
+    "fitting.of_run": ("LinearModel", "fit", "frf"),
+    "axis.model": ("AxisModel",),
+    "files.effects": ("library",),
+    "comparison.physical_model": ("PhysicalModel",),
+    "comparison.of_run": ("better", "compare", "validate"),
+    "search.of_run": ("diagnose", "refine"),
+    "imports": ("load",),
+    "files.models": ("load_model", "save"),
+    "cli.simulated_recording": ("simulate",),
+    "errors": ("BadInput", "BadRecording", "MissingExtra", "XySysidError"),
+}
+_HOME = {name: home for home, names in _HOMES.items() for name in names}
+_PICTURES = {"FrequencyResponse": "bode", "Comparison": "residual", "Diagnosed": "ladder", "Refinement": "ladder"}  # of xy.plot, in a notebook
+
+
+def __getattr__(name: str) -> Any:
+    """A public name, from its own package, when it is first used."""
+    if name == "__version__":
+        value: Any = _version()
+    elif name == "plot":
+        value = importlib.import_module("xy_sysid.report.plots")
+    elif name in _HOME:
+        home = importlib.import_module(f"xy_sysid.{_HOME[name]}")
+        _show_as_pictures(home)
+        value = getattr(home, name)
+    else:
+        raise AttributeError(f"module 'xy_sysid' has no attribute {name!r}; it has {', '.join(__all__)}")
+    globals()[name] = value
+    return value
+
+
+def _show_as_pictures(home: Any) -> None:
+    """The results of this package draw themselves in a notebook; plotly comes when the first one does."""
+    for kind in (getattr(home, name) for name in _PICTURES if hasattr(home, name)):
+        kind._repr_html_ = _html
+
+
+def _html(result: Any) -> str | None:
+    """For the notebook: the line that ``repr`` gives, and the picture; None if there is nothing to draw."""
+    html: str | None = importlib.import_module("xy_sysid.report.notebook").html(result, _PICTURES[type(result).__name__])
+    return html
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)
+
+
+def _version() -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("xy_sysid")
+    except PackageNotFoundError:
+        return "0+source"

@@ -6,18 +6,20 @@ ROS parameters, CLI options, YAML files, the page and docs/settings.md are made 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from xy_sysid.errors import BadInput
+from xy_sysid.units import Units
 
 Names = Annotated[list[str], BeforeValidator(lambda value: value.split(",") if isinstance(value, str) else value)]
-Scalar = bool | int | float | str
+CHOICE = re.compile(r"'([^']*)'")
 SIGNS = {"ge": ">= ", "gt": "> ", "le": "<= ", "lt": "< ", "expected": ""}  # how a limit that was broken is told
-Model = TypeVar("Model", bound="Settings")
+AnySettings = TypeVar("AnySettings", bound="Settings")
 
 
 def knob(default: Any, meaning: str, unit: str = "", **limits: Any) -> Any:
@@ -29,6 +31,10 @@ class Settings(BaseModel):
     """A group of settings that nobody changes in place; an unknown name is an error."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+# what people type for a kind of signal
+ALSO = {"chirp": "sweep", "sine": "stepped_sine", "sines": "multisine", "random": "noise", "white": "noise", "binary": "prbs", "pulse": "impulse"}
 
 
 class AxisExcitation(Settings):
@@ -50,6 +56,15 @@ class AxisExcitation(Settings):
     travel_max: float = knob(0.14, "soft limit of travel, upper", "m", ge=-1000.0, le=1000.0)
     brake: float = knob(0.02, "length of the zone before a soft limit in which outward voltage is faded to inward braking", "m", gt=0.0, le=100.0)
     brake_voltage: float = knob(1.0, "inward voltage at and beyond a soft limit", "V", ge=0.0, le=100.0)
+    slow: float = knob(0.0, "amplitude of a slow sine added to the signal, which takes a joint through its range", "V", ge=0.0, le=1000.0)
+    slow_period: float = knob(10.0, "period of that sine", "s", gt=0.0, le=3600.0)
+    velocity_gain: float = knob(0.0, "steady speed per volt as the first run found it, for the guards; 0 is not known", "m/s/V", ge=0.0, le=1000.0)
+    breakaway: float = knob(0.0, "voltage that may leave it at rest (friction), for the guards; 0 is 0.5 V or limit / 20", "V", ge=0.0, le=1000.0)
+
+    @field_validator("kind", mode="before")
+    @classmethod
+    def _called(cls, value: object) -> object:
+        return ALSO.get(value, value) if isinstance(value, str) else value
 
     @model_validator(mode="after")
     def _ordered(self) -> AxisExcitation:
@@ -74,6 +89,16 @@ class ExcitationSettings(Settings):
     abort_ramp: float = knob(0.02, "time to fade out when a guard trips, and on deactivate", "s", ge=0.0, le=10.0)
     patience: float = knob(10.0, "how long to wait for the first position, at 0 V, and with lockstep for any answer", "s", gt=0.0, le=3600.0)
     autostart: bool = knob(False, "configure and activate without being told, once a machine is there")
+    output: Literal["blocks", "commands"] = knob("blocks", "blocks of voltage for a driver, or commands for a controller of ros2_control")
+    interface: Literal["effort", "velocity", "position"] = knob(
+        "effort", "with commands: the controller's command interface; rms, limit, offset and all others in V are in its unit"
+    )
+    unit: Literal["m", "rad"] = knob("m", "of positions: m, or rad of a joint that turns")
+    command_topic: str = knob("/forward_command_controller/commands", "with commands: topic of the controller")
+    controller_joints: Names = knob([""], "with commands: all joints of the controller, in its order; empty is those of the axes")
+    joint_topic: str = knob("joint_states", "with commands: topic of the joint states; that of ros2_control is /joint_states")
+    joints: Names = knob([""], 'with commands: the joint of an axis, as "x=shoulder_pan_joint"; an axis without one is the name of its joint')
+    renamed: bool = knob(False, "with blocks: whoever hears them under another name than voltage expects blocks, and no commands")
     axes: dict[str, AxisExcitation] = Field(
         default_factory=lambda: {"x": AxisExcitation(seed=1), "y": AxisExcitation(seed=2)}, description="one group per axis"
     )
@@ -84,7 +109,38 @@ class ExcitationSettings(Settings):
             raise ValueError("speed is 0 without lockstep; allowed: above 0, or lockstep with a simulated machine")
         if not self.axes:
             raise ValueError("axes is empty; allowed: at least one axis")
+        if self.output == "commands":
+            self._as_commands()
         return self
+
+    def _as_commands(self) -> None:
+        if self.lockstep or self.speed != 1.0:
+            raise ValueError("output is commands with lockstep or a speed; allowed: the controller's own time, lockstep false and speed 1")
+        for name, axis in self.axes.items():
+            unit = self.units[0]
+            if axis.rms > axis.limit:
+                raise ValueError(f"{name}.rms is {axis.rms:g} {unit}; allowed: up to limit = {axis.limit:g} {unit}")
+            room = (axis.travel_max - axis.travel_min) / 2
+            if self.interface == "position" and axis.limit > room:
+                raise ValueError(f"{name}.limit is {axis.limit:g} {unit} of reference; allowed: up to half the travel, {room:g} {unit}")
+
+    @property
+    def units(self) -> Units:
+        """Of what is sent and of position."""
+        if self.output == "blocks":
+            return Units("V", self.unit)
+        sent = {"effort": {"m": "N", "rad": "N m"}[self.unit], "velocity": f"{self.unit}/s", "position": self.unit}
+        return Units(sent[self.interface], self.unit)
+
+    @property
+    def step(self) -> int:
+        """Samples that are sent at a time."""
+        return 1 if self.output == "commands" else self.block
+
+    @property
+    def holds(self) -> bool:
+        """Whether positions are sent, so that what is safe is where the machine is, and not zero."""
+        return self.output == "commands" and self.interface == "position"
 
 
 class IdentifierSettings(Settings):
@@ -93,14 +149,19 @@ class IdentifierSettings(Settings):
     window: Literal["hann", "hamming", "blackman", "blackmanharris", "flattop", "boxcar"] = knob("hann", "window of the spectra")
     length: int = knob(4096, "samples in a window", "", ge=16, le=2**22)
     overlap: float = knob(0.5, "part of a window shared with the next", "", ge=0.0, le=0.95)
+    response: Literal["h1", "joint_input_output"] = knob(
+        "h1", "output over input (h1), or in closed loop, with the reference as instrument: what it does to output over what it does to input"
+    )
     differenced: bool = knob(True, "put the window on the position's difference (no leakage of the integrator); off is the paper's plain variant")
     memory: float = knob(0.0, "forget exponentially with this time constant; 0 remembers everything", "s", ge=0.0, le=1e9)
     sliding: int = knob(0, "keep only so many of the newest windows; 0 keeps all", "", ge=0, le=100_000)
     band_low: float = knob(0.5, "lowest frequency used in a fit", "Hz", ge=0.0, le=1e6)
     band_high: float = knob(300.0, "highest frequency used in a fit", "Hz", gt=0.0, le=1e6)
     min_coherence: float = knob(0.3, "lines below this coherence are not trusted", "", ge=0.0, le=1.0)
-    numerator_order: int = knob(2, "order of the transfer function's numerator", "", ge=0, le=12)
-    denominator_order: int = knob(4, "order of its denominator, integrators included", "", ge=1, le=12)
+    numerator_order: int = knob(-1, "order of the transfer function's numerator; -1: see denominator_order", "", ge=-1, le=12)
+    denominator_order: int = knob(
+        0, "order of its denominator, integrators included; 0 with numerator_order -1: both are chosen from the data, else 4 and 2", "", ge=0, le=12
+    )
     integrators: int = knob(1, "poles fixed at zero", "", ge=0, le=2)
     delay: bool = knob(True, "estimate a delay")
     hold: Literal["zoh", "none"] = knob("zoh", "how the voltage behaves between samples: held (zoh) or band-limited (none)")
@@ -111,6 +172,13 @@ class IdentifierSettings(Settings):
     alarm_sigma: float = knob(4.0, "a resonance has moved when it is so many standard errors away", "", ge=1.0, le=100.0)
     source: Literal["blocks", "joint_state"] = knob("blocks", "type of the position topic")
     effort_as_voltage: bool = knob(False, "with joint_state: take the input from `effort` instead of the voltage topic")
+    joints: Names = knob([""], 'with joint_state: the joint of an axis, as "x=shoulder_pan_joint"; an axis without one is the name of its joint')
+    joint_topic: str = knob("joint_states", "with joint_state: their topic; that of ros2_control is /joint_states")
+    effort_lag: int = knob(
+        0, "samples by which effort in joint states is older than its stamp; 1 where it is that of the cycle before", "", ge=0, le=100
+    )
+    input_unit: str = knob("V", "unit of the input, as N m of an effort; it stands in every answer")
+    output_unit: str = knob("m", "unit of the position, m or rad")
     state_file: str = knob("", "file that keeps the spectra over a restart; empty is none")
     save_every: float = knob(10.0, "seconds between two savings of the state", "s", gt=0.0, le=3600.0)
 
@@ -118,11 +186,28 @@ class IdentifierSettings(Settings):
     def _ordered(self) -> IdentifierSettings:
         if self.band_low >= self.band_high:
             raise ValueError(f"band_low is {self.band_low} Hz; allowed: below band_high = {self.band_high} Hz")
-        if self.numerator_order > self.denominator_order:
-            raise ValueError(f"numerator_order is {self.numerator_order}; allowed: up to denominator_order = {self.denominator_order}")
-        if self.integrators > self.denominator_order:
-            raise ValueError(f"integrators is {self.integrators}; allowed: up to denominator_order = {self.denominator_order}")
+        numerator, denominator = self.orders
+        if numerator > denominator:
+            raise ValueError(f"numerator_order is {numerator}; allowed: up to denominator_order = {denominator}")
+        if self.integrators > denominator:
+            raise ValueError(f"integrators is {self.integrators}; allowed: up to denominator_order = {denominator}")
         return self
+
+    @property
+    def units(self) -> Units:
+        """Of input and output."""
+        return Units(self.input_unit, self.output_unit)
+
+    @property
+    def orders(self) -> tuple[int, int]:
+        """Of numerator and denominator: those asked for, or those of a rigid body with one resonance."""
+        asked = self.numerator_order if self.numerator_order >= 0 else min(2, self.denominator_order or 2)
+        return asked, self.denominator_order or 4
+
+    @property
+    def orders_from_data(self) -> bool:
+        """Nobody asked for orders."""
+        return self.numerator_order < 0 and self.denominator_order == 0
 
 
 class DiagnoserSettings(Settings):
@@ -135,15 +220,46 @@ class DiagnoserSettings(Settings):
     reorder: float = knob(0.5, "how late a block may come before its samples count as lost", "s", gt=0.0, le=60.0)
     source: Literal["blocks", "joint_state"] = knob("blocks", "type of the position topic")
     effort_as_voltage: bool = knob(False, "with joint_state: take the input from `effort` instead of the voltage topic")
+    joints: Names = knob([""], 'with joint_state: the joint of an axis, as "x=shoulder_pan_joint"; an axis without one is the name of its joint')
+    joint_topic: str = knob("joint_states", "with joint_state: their topic; that of ros2_control is /joint_states")
+    effort_lag: int = knob(
+        0, "samples by which effort in joint states is older than its stamp; 1 where it is that of the cycle before", "", ge=0, le=100
+    )
+    input_unit: str = knob("V", "unit of the input, as N m of an effort; it stands in every answer")
+    output_unit: str = knob("m", "unit of the position, m or rad")
     effect_files: Names = knob([""], "Python files with effects of your own; they are run")
     effects: dict[str, Names] = Field(
         default_factory=lambda: {"x": [""], "y": [""]},
         description="effects in the model of this axis: setting them adds or removes them and fits again; an empty name is none",
     )
 
+    @property
+    def units(self) -> Units:
+        """Of input and output."""
+        return Units(self.input_unit, self.output_unit)
+
     def chosen(self, axis: str) -> tuple[str, ...]:
         """The effects that the model of an axis is to have."""
         return given(self.effects.get(axis, []))
+
+
+AXES = ("x", "y")  # as long as nobody names others
+
+
+def for_axes(cls: type[AnySettings], axes: Sequence[str]) -> AnySettings:
+    """The defaults of a node for these axes."""
+    groups: dict[str, Any] = {}
+    if cls is ExcitationSettings:
+        groups["axes"] = {axis: AxisExcitation(seed=number) for number, axis in enumerate(axes, start=1)}
+    if cls is DiagnoserSettings:
+        groups["effects"] = {axis: [""] for axis in axes}
+    return cls(**groups)
+
+
+def of_other_axes(cls: type[Settings], names: Iterable[str], axes: Sequence[str]) -> set[str]:
+    """Those of the names that set axis x or y, which default.yaml always does, where the axes are others."""
+    unused = {item.name for item in knobs(for_axes(cls, [axis for axis in AXES if axis not in axes]))} if set(AXES) - set(axes) else set()
+    return (set(names) & unused) - {item.name for item in knobs(for_axes(cls, axes))}
 
 
 def given(names: list[str]) -> tuple[str, ...]:
@@ -157,6 +273,10 @@ class BallscrewSettings(Settings):
     machine: str = knob("paper.yaml", "machine file: a path, or a name in config/machines")
     seed: int = knob(0, "seed of noise and hidden effects; 0 is what the machine file says", "", ge=0, le=2**31 - 1)
     clean: bool = knob(False, "without encoder noise and quantization")
+    realtime: bool = knob(False, "go on by the clock when no voltage comes, as a real machine does; off: time stands still until the next block")
+    watchdog: float = knob(
+        0.05, "with realtime: 0 V so long after the last block, as a real drive has it; 0 is none: the last voltage stays", "s", ge=0.0, le=10.0
+    )
 
 
 class RecorderSettings(Settings):
@@ -168,7 +288,9 @@ class RecorderSettings(Settings):
         default_factory=lambda: [
             "voltage",
             "position",
+            "reference",
             "joint_states",
+            "/joint_states",
             "frf/.*",
             "transfer_function/.*",
             "metrics",
@@ -214,19 +336,28 @@ def knobs(settings: Settings, prefix: str = "") -> Iterator[Knob]:
                 if isinstance(group, Settings):
                     yield from knobs(group, f"{prefix}{axis}.")
                 else:
-                    yield Knob(f"{prefix}{name}.{axis}", group, [""], "", info.description or "", None, None, ())
+                    yield Knob(
+                        name=f"{prefix}{name}.{axis}",
+                        value=group,
+                        default=[""],
+                        unit="",
+                        meaning=info.description or "",
+                        low=None,
+                        high=None,
+                        choices=(),
+                    )
             continue
         extra = info.json_schema_extra if isinstance(info.json_schema_extra, dict) else {}
         choices = tuple(getattr(info.annotation, "__args__", ())) if "Literal" in str(info.annotation) else ()
         yield Knob(
-            prefix + name,
-            value,
-            info.get_default(call_default_factory=True),
-            str(extra.get("unit", "")),
-            info.description or "",
-            _limit(info.metadata, "ge", "gt"),
-            _limit(info.metadata, "le", "lt"),
-            choices,
+            name=prefix + name,
+            value=value,
+            default=info.get_default(call_default_factory=True),
+            unit=str(extra.get("unit", "")),
+            meaning=info.description or "",
+            low=_limit(info.metadata, "ge", "gt"),
+            high=_limit(info.metadata, "le", "lt"),
+            choices=choices,
         )
 
 
@@ -245,7 +376,7 @@ def _nested(cls: type[Settings], flat: Mapping[str, Any]) -> dict[str, Any]:
     return nested
 
 
-def build(cls: type[Model], values: Mapping[str, Any], where: str = "settings") -> Model:
+def build(cls: type[AnySettings], values: Mapping[str, Any], where: str = "settings") -> AnySettings:
     """Settings from nested or flat (``x.rms``) values.
 
     Raises BadInput that names the value, what is allowed, and for an unknown key the nearest spelling.
@@ -256,7 +387,7 @@ def build(cls: type[Model], values: Mapping[str, Any], where: str = "settings") 
         raise _explain(cls, error, where) from None
 
 
-def changed(settings: Model, values: Mapping[str, Any]) -> Model:
+def changed(settings: AnySettings, values: Mapping[str, Any]) -> AnySettings:
     """The same settings with some flat names changed; raises BadInput like ``build``."""
     flat = {item.name: item.value for item in knobs(settings)}
     unknown = [name for name in values if name not in flat]
@@ -282,4 +413,5 @@ def _explain(cls: type[Settings], error: ValidationError, where: str) -> BadInpu
     allowed = ", ".join(f"{SIGNS[key]}{value}" for key, value in context.items() if key in SIGNS) or first["msg"].removeprefix("Input should be ")
     if "error" in context:
         return BadInput(f"{where}", name or "not consistent", str(context["error"]), "Change one of them.")
-    return BadInput(f"{where}: {name}", repr(first["input"]), allowed, "Change it and try again.")
+    near = difflib.get_close_matches(str(first["input"]), CHOICE.findall(allowed), n=1) if first["type"] == "literal_error" else []
+    return BadInput(f"{where}: {name}", repr(first["input"]), allowed, f"Did you mean {near[0]!r}?" if near else "Change it and try again.")

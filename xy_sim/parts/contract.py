@@ -9,8 +9,8 @@ from typing import Literal
 from xy_sysid.errors import BadInput
 from xy_sysid.settings import unknown_name
 
-Kind = Literal["input", "drive", "friction", "force", "structure", "encoder"]
-Group = Literal["base", "effect", "outside", "event"]
+Kind = Literal["input", "drive", "friction", "force", "structure", "encoder", "integrator"]
+Group = Literal["base", "effect", "outside", "event", "imperfection"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,8 @@ class Part:
     meaning:    what it is on a real table
     source:     where the law comes from
     parameters: the first one is its size, the number of ``--effect NAME=SIZE``
-    kind:       where it acts; group: who may suspect it ("outside": no hypothesis knows it; "event": happens meanwhile)
+    kind:       where it acts; group: who may suspect it ("outside": no hypothesis knows it; "event": happens meanwhile;
+                "imperfection": dirt that every real machine has a little of, and that has no law to be found)
     family:     parts of one family replace one another when effects are drawn
     drawn:      False for a part that came later: seeds keep the machines that they have always drawn
     """

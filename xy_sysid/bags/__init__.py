@@ -1,4 +1,15 @@
-"""rosbag2 in and out: messages --> proof of layout --> blocks, and blocks --> a bag that survives its recorder."""
+"""rosbag2 in and out: messages --> proof of layout --> blocks, and blocks --> a bag that survives its recorder.
+
+reading:                               a recording as a whole: its files, topics, messages
+sqlite_file, pages:                    a .db3, by SQL or straight from its pages
+mcap_file, compression, checksum:      an .mcap and its chunks
+sums:                                  check sums for what has none of its own
+atomic:                                files that are written whole or not at all
+cdr, stride:                           proof of layout, then arrays without deserializing each
+streaming:                             blocks of voltage and position in log order
+writing:                               a bag that is complete at any moment
+sqlite_writer, mcap_writer, typestore: its files and the definitions that they carry
+"""
 
 from xy_sysid.bags.reading import Bag, Topic
 from xy_sysid.bags.streaming import POSITION, REFERENCE, VOLTAGE, stream_blocks

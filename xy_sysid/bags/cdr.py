@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from xy_sysid.stream import FloatArray
+from xy_sysid.samples.block import FloatArray
 
 Bytes = NDArray[np.uint8]
 ARRAY_TYPE = "std_msgs/msg/Float64MultiArray"
@@ -96,7 +96,16 @@ class _Cursor:
         if len(self.message) - self.at > 8:  # a few bytes of padding at the end are common
             raise Unreadable("the message is longer than its content")
         template = np.frombuffer(self.message, np.uint8)
-        return Layout(len(self.message), template, self.fixed, self.order, tuple(names), tuple(shape), stamp, tuple(parts))
+        return Layout(
+            size=len(self.message),
+            template=template,
+            fixed=self.fixed,
+            order=self.order,
+            names=tuple(names),
+            shape=tuple(shape),
+            stamp=stamp,
+            parts=tuple(parts),
+        )
 
 
 def array_layout(message: bytes) -> Layout:

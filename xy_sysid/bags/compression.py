@@ -1,15 +1,25 @@
-"""zstd and lz4, as bags use them; both libraries come with rosbags."""
+"""zstd and lz4, as bags use them; both libraries come with rosbags. Nothing is unpacked further than it may become."""
 
 from __future__ import annotations
 
 import contextlib
 import importlib
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
+import numpy as np
+
+from xy_sysid.bags.stride import Batch
 from xy_sysid.errors import BadRecording
+
+MESSAGE = 1 << 26  # bytes; no message of a bag is longer
+SWOLLEN = 200  # times its size; no file of samples shrinks further
+LEAST = 1 << 26  # bytes that any file may become
+PIECE = 1 << 20  # bytes written at once
+FREE = 0.5  # of the space that is left for temporary files
 
 
 class Damaged(ValueError):
@@ -32,24 +42,71 @@ def _errors(module: ModuleType) -> tuple[type[Exception], ...]:
     return (RuntimeError, ValueError, EOFError, OSError, getattr(module, "ZstdError", EOFError))
 
 
-def decompressor(method: str, path: Path) -> Callable[[bytes], bytes]:
-    """The function that undoes ``method`` ("zstd" or "lz4") and raises Damaged; raises BadRecording for another one."""
+def decompressor(method: str, path: Path) -> Callable[[bytes, int], bytes]:
+    """The function that undoes ``method`` ("zstd" or "lz4") up to a number of bytes, or raises Damaged; raises BadRecording for another one."""
     module = _module(method, path)
+    begin: Callable[[], Any] = module.LZ4FrameDecompressor if method == "lz4" else module.ZstdDecompressor
 
-    def undo(data: bytes) -> bytes:
+    def undo(data: bytes, most: int) -> bytes:
+        found = b""
         try:
-            return bytes(module.decompress(data))
+            while data:
+                one = begin()
+                found += one.decompress(data, max_length=most + 1 - len(found))
+                if len(found) > most:
+                    raise Damaged(f"it becomes more than {most} bytes")
+                if not one.eof:
+                    raise Damaged("it ends early")
+                data = one.unused_data
         except _errors(module) as error:
             raise Damaged(str(error)) from None
+        return found
 
     return undo
 
 
+def unpacked(batch: Batch, undo: Callable[[bytes, int], bytes]) -> tuple[Batch, int]:
+    """Messages that were compressed one by one, without those that are damaged, and how many these are."""
+    found: list[bytes] = []
+    kept: list[int] = []
+    for place, (start, length) in enumerate(zip(batch.start.tolist(), batch.length.tolist(), strict=True)):
+        try:
+            found.append(undo(batch.buffer[start : start + length].tobytes(), MESSAGE))
+        except Damaged:
+            continue
+        kept.append(place)
+    sizes = np.array([len(one) for one in found], np.int64)
+    buffer = np.frombuffer(b"".join(found), np.uint8)
+    whole = Batch(topic=batch.topic[kept], log_time=batch.log_time[kept], start=np.cumsum(sizes) - sizes, length=sizes, buffer=buffer)
+    return whole, len(batch.start) - len(kept)
+
+
+def whole_ones(
+    batches: Iterator[tuple[Batch, float]], undo: Callable[[bytes, int], bytes] | None, name: str, notes: list[str]
+) -> Iterator[tuple[Batch, float]]:
+    """The batches of a file, unpacked where its messages are compressed; a note says how many were damaged."""
+    bad = 0
+    for batch, part in batches:
+        if undo is not None:
+            batch, damaged = unpacked(batch, undo)
+            bad += damaged
+        yield batch, part
+    if bad:
+        notes.append(f"{name}: {bad} compressed messages are damaged; they are left out")
+
+
 def expand(source: Path, target: Path, method: str) -> None:
-    """Write a compressed file out; raises BadRecording."""
+    """Write a compressed file out; raises BadRecording, too if it becomes larger than any recording."""
     module = _module(method, source)
+    most = min(max(SWOLLEN * source.stat().st_size, LEAST), int(FREE * shutil.disk_usage(target.parent).free))
+    size = 0
     try:
         with module.open(source, "rb") as packed, target.open("wb") as out:
-            shutil.copyfileobj(packed, out)
+            while piece := packed.read(PIECE):
+                size += len(piece)
+                if size > most:
+                    problem = f"becomes more than {most / 1e6:.0f} MB, {most / max(source.stat().st_size, 1):.0f} times its size"
+                    raise BadRecording(source, problem, "Unpack it yourself, if it is a recording and there is space.")
+                out.write(piece)
     except _errors(module) as error:
         raise BadRecording(source, f"does not decompress ({error})", "Take another copy of the bag.") from None

@@ -15,15 +15,16 @@ import numpy as np
 
 from xy_sysid.bags.cdr import Bytes
 from xy_sysid.bags.checksum import crc32
-from xy_sysid.bags.compression import Damaged, decompressor
+from xy_sysid.bags.compression import Damaged, decompressor, whole_ones
 from xy_sysid.bags.stride import Batch, Indices
-from xy_sysid.compiled import compiled
 from xy_sysid.errors import BadRecording
+from xy_sysid.jit import compiled
 
 MAGIC = b"\x89MCAP0\r\n"
 FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, DATA_END = 2, 3, 4, 5, 6, 15
 WINDOW = 1 << 20  # bytes read at once where messages are not in chunks
 LARGEST = 1 << 31  # bytes; a record that claims to be longer is damage
+BECOMES = 1 << 28  # bytes; a chunk that becomes longer is damage, or made to fill the memory
 ROWS, BYTES = 4096, 1 << 20  # messages given on at once, and where they may end: they stay in the cache of the processor
 
 
@@ -70,6 +71,7 @@ class McapFile:
         self.handle = os.open(path, os.O_RDONLY)
         self.size = os.fstat(self.handle).st_size
         self.damage = ""
+        self.chunks: dict[str, int] = {}
         self._memory = np.empty(0, np.uint8)
         try:
             if os.pread(self.handle, 8, 0) != MAGIC:
@@ -116,9 +118,12 @@ class McapFile:
         except struct.error:
             self.damage = "a record is damaged"
 
-    def batches(self, wanted: Sequence[str], unpack: Callable[[bytes], bytes] | None) -> Iterator[tuple[Batch, float]]:
+    def batches(self, wanted: Sequence[str], unpack: Callable[[bytes, int], bytes] | None) -> Iterator[tuple[Batch, float]]:
         """Messages of these topics in log order, with the part of the file that has been read."""
-        yield from self._chunks(wanted)
+        self.chunks = {}
+        yield from whole_ones(self._chunks(wanted), unpack, self.path.name, self.notes)
+        for why, count in self.chunks.items():
+            self.notes.append(f"{self.path.name}: {why}; {f'{count} chunks are' if count > 1 else 'the chunk is'} left out")
         if self.damage:
             self.notes.append(f"{self.path.name}: {self.damage}; what could be read is read")
 
@@ -150,6 +155,7 @@ class McapFile:
 
     def _read(self, length: int, at: int) -> memoryview:
         """Bytes of the file, in memory that the next call uses again: fresh memory for each chunk costs as much as reading it."""
+        length = max(0, min(length, self.size - at))
         if self._memory.size < length:
             self._memory = np.empty(length, np.uint8)
         return self._memory.data[: os.preadv(self.handle, [self._memory[:length].data], at)]
@@ -159,14 +165,17 @@ class McapFile:
             _, _, full, checksum = struct.unpack_from("<QQQI", record)
             method, at = _text(record, 28)
             raw = record[at + 8 :]
-            if full > LARGEST:
-                raise Damaged("its size is not possible")
-            data = raw if not method else decompressor(method, self.path)(bytes(raw))
+            if full > BECOMES:
+                raise Damaged(f"it says it becomes {full / 1e9:.3g} GB")
+            data = raw if not method else decompressor(method, self.path)(bytes(raw), full)
         except (struct.error, Damaged) as error:
-            self.damage = "cut short" if len(record) < length else f"a chunk is damaged ({error})"
+            if len(record) < length:
+                self.damage = "cut short"
+            else:
+                self._lost(f"a chunk is damaged ({error})")
             return
         if len(record) == length and (len(data) != full or (checksum and crc32(data) != checksum)):
-            self.damage = "the checksum of a chunk does not match; the chunk is left out"
+            self._lost("the checksum of a chunk does not match")
             return
         array, at = np.frombuffer(data, np.uint8), 0
         while at < len(array):
@@ -183,6 +192,9 @@ class McapFile:
             if used == 0 or kind != MESSAGE:
                 at += 9 + size
 
+    def _lost(self, why: str) -> None:
+        self.chunks[why] = self.chunks.get(why, 0) + 1
+
     def _walk(self, data: Bytes, at: int, wanted: Sequence[str], place: int) -> Generator[tuple[Batch, float], None, int]:
         """Yield the messages from ``at`` on; the value of the generator is how many bytes they take."""
         rows = np.empty((ROWS, 4), np.int64)
@@ -197,5 +209,5 @@ class McapFile:
             found, at = messages(data, at, topics, rows)
             if found:
                 kept = rows[:found]
-                yield Batch(kept[:, 0], kept[:, 1], kept[:, 2], kept[:, 3], data), min(1.0, place / self.size)
+                yield Batch(topic=kept[:, 0], log_time=kept[:, 1], start=kept[:, 2], length=kept[:, 3], buffer=data), min(1.0, place / self.size)
         return at - start

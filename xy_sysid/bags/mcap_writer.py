@@ -5,6 +5,7 @@ Source: mcap.dev/spec. The index at the end is written on close; without it a re
 
 from __future__ import annotations
 
+import os
 import struct
 from pathlib import Path
 
@@ -94,6 +95,7 @@ class McapWriter:
             )
         )
         self._put(chunk + indices)
+        self._sync()
 
     def close(self, metadata: str) -> None:
         self.flush()
@@ -112,6 +114,13 @@ class McapWriter:
         """Append before the end mark."""
         self._write(data + END + record(FOOTER, struct.pack("<QQI", 0, 0, 0)) + MAGIC)
         self.at += len(data)
+
+    def _sync(self) -> None:
+        """Wait for the disk: what was flushed outlives a lost supply, and not a killed recorder alone."""
+        try:
+            os.fdatasync(self.file.fileno())
+        except OSError as error:
+            raise BadRecording(self.path, f"cannot be written ({error.strerror})", "Make room on the disk, or record elsewhere.") from None
 
     def _write(self, data: bytes) -> None:
         try:

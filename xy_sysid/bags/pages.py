@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from xy_sysid.bags.cdr import Bytes
 from xy_sysid.bags.stride import Indices
-from xy_sysid.compiled import compiled
+from xy_sysid.jit import compiled
 
 INTERIOR, LEAF = 5, 13
 SPAN = 1 << 20  # bytes read at once: stays in the cache of the processor

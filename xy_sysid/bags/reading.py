@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import stat
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,11 +18,15 @@ from xy_sysid.bags.compression import decompressor, expand
 from xy_sysid.bags.mcap_file import McapFile
 from xy_sysid.bags.sqlite_file import SqliteFile
 from xy_sysid.bags.stride import Batch
+from xy_sysid.bags.sums import check_sums
 from xy_sysid.errors import BadRecording
 
 STORAGES: Mapping[str, type[SqliteFile] | type[McapFile]] = {".db3": SqliteFile, ".mcap": McapFile}
 ANOTHER_COPY = "Take another copy of the bag."
-LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # the compiled one where there is one
+LOADER = getattr(yaml, "CBaseLoader", yaml.BaseLoader)  # the compiled one where there is one; every value stays text
+METADATA = 1 << 21  # bytes; no bag has longer metadata
+DEEPEST, WORDS = 30, 100_000  # levels and parts of metadata; more is no description of a bag
+DIGITS = 20  # of a number of messages
 KNOWN = "a rosbag2 folder, .db3, .mcap"
 
 
@@ -50,6 +55,8 @@ class Bag:
         with contextlib.ExitStack() as undo:
             undo.callback(self._closed.close)
             self.files = [self._open(file) for file in self._find()]
+            if check_sums(self.path) == "damaged":
+                self.notes.append("its check sums cannot be added up for the damage: numbers that are read may be others than were recorded")
             undo.pop_all()
         self.topics = list(dict.fromkeys(Topic(name, kind) for file in self.files for name, kind in file.topics))
 
@@ -76,7 +83,7 @@ class Bag:
 
     def batches(self, wanted: Sequence[str]) -> Iterator[tuple[Batch, float]]:
         """Messages of these topics in log order, with the part of the recording that has been read (0..1)."""
-        unpack: Callable[[bytes], bytes] | None = decompressor(self._compressed, self.path) if self._compressed else None
+        unpack: Callable[[bytes, int], bytes] | None = decompressor(self._compressed, self.path) if self._compressed else None
         self.counts = dict.fromkeys(wanted, 0)
         for index, file in enumerate(self.files):
             for batch, part in file.batches(wanted, unpack):
@@ -94,6 +101,7 @@ class Bag:
 
     def _open(self, path: Path) -> SqliteFile | McapFile:
         try:
+            _plain(path)
             with path.open("rb") as content:
                 if not content.read(1):
                     raise BadRecording(path, "the file is empty (0 bytes)", ANOTHER_COPY)
@@ -133,10 +141,13 @@ class Bag:
 
     def _metadata(self, path: Path) -> dict[str, Any] | None:
         file = path / "metadata.yaml"
-        if not file.exists():
-            return None
         try:
-            content = yaml.load(file.read_text("utf-8"), Loader=LOADER)
+            if not file.exists():
+                return None
+            _plain(file)
+            if file.stat().st_size > METADATA:
+                raise BadRecording(file, f"metadata.yaml of {file.stat().st_size / 1e6:.3g} MB, which no bag has", ANOTHER_COPY)
+            content = _yaml(file, file.read_text("utf-8"))
         except OSError as error:
             raise BadRecording(file, f"cannot be read ({error.strerror})", "Check the permissions.") from None
         except (yaml.YAMLError, UnicodeDecodeError):
@@ -148,15 +159,15 @@ class Bag:
         return information
 
     def _named(self, metadata: dict[str, Any], present: list[Path]) -> list[Path]:
-        named = [self.path / PurePath(name).name for name in metadata["relative_file_paths"]]
-        mode = str(metadata.get("compression_mode") or "").lower()
-        method = str(metadata.get("compression_format") or "zstd")
+        named = [self.path / PurePath(name.replace("\0", "?")).name for name in metadata["relative_file_paths"]]
+        mode = _word(metadata.get("compression_mode")).lower()
+        method = _word(metadata.get("compression_format")) or "zstd"
         if mode == "message":
             self._compressed = method
         custom = metadata.get("custom_data")
         self.custom = {str(key): str(value) for key, value in custom.items()} if isinstance(custom, dict) else {}
-        found = [file for file in named if file.exists()]
-        missing = [file.name for file in named if not file.exists()]
+        found = [file for file in dict.fromkeys(named) if file.is_file()]
+        missing = [file.name for file in named if not file.is_file()]
         if missing:
             others = [file for file in present if file not in named]
             self.notes.append(
@@ -176,7 +187,8 @@ class Bag:
 
     def _expect(self, metadata: dict[str, Any]) -> None:
         with contextlib.suppress(KeyError, TypeError, ValueError):
-            self._expected = {str(item["topic_metadata"]["name"]): int(item["message_count"]) for item in metadata["topics_with_message_count"]}
+            counted = metadata["topics_with_message_count"]
+            self._expected = {str(item["topic_metadata"]["name"]): int(item["message_count"][:DIGITS]) for item in counted}
 
     def _expand(self, file: Path, method: str) -> Path:
         """A file compressed as a whole, written out beside nothing of the user's."""
@@ -184,3 +196,24 @@ class Bag:
         target = self._checked(folder / file.stem)
         expand(file, target, method)
         return target
+
+
+def _plain(path: Path) -> None:
+    """Raises BadRecording for a pipe or a device, which may never end."""
+    if not stat.S_ISREG(path.stat().st_mode):
+        raise BadRecording(path, "not a file but a pipe, a device or a folder", "Copy its content into a file first.")
+
+
+def _yaml(path: Path, text: str) -> Any:
+    """The content, all values as text; raises BadRecording for what is crafted rather than written by a recorder."""
+    depth = 0
+    for count, event in enumerate(yaml.parse(text, Loader=LOADER)):
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if isinstance(event, yaml.AliasEvent) or depth > DEEPEST or count > WORDS:
+            raise BadRecording(path, "metadata.yaml is nested, repeated or long as no recorder writes it", ANOTHER_COPY)
+    return yaml.load(text, Loader=LOADER)
+
+
+def _word(value: object) -> str:
+    """Text, empty for YAML's ways to say nothing."""
+    return value if isinstance(value, str) and value not in ("null", "~") else ""

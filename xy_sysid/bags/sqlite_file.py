@@ -11,11 +11,13 @@ from pathlib import Path
 import numpy as np
 
 from xy_sysid.bags import pages
+from xy_sysid.bags.compression import whole_ones
 from xy_sysid.bags.stride import Batch, Indices
 from xy_sysid.errors import BadRecording
 
 COLUMNS = ["id", "topic_id", "timestamp", "data"]
 ROWS = 1024  # rows fetched at once on the slow way
+TOPICS = 1 << 16  # topic ids from 0 up to here are looked up in a table; others are read by SQL
 
 
 def _unsaved(path: Path) -> list[Path]:
@@ -80,13 +82,15 @@ class SqliteFile:
     def close(self) -> None:
         self._closed.close()
 
-    def batches(self, wanted: Sequence[str], unpack: Callable[[bytes], bytes] | None) -> Iterator[tuple[Batch, float]]:
+    def batches(self, wanted: Sequence[str], unpack: Callable[[bytes, int], bytes] | None) -> Iterator[tuple[Batch, float]]:
         """Messages of these topics in log order, with the part of the file that has been read."""
         lookup = {identity: wanted.index(name) for identity, name, _ in self.ids if name in wanted}
         info = [str(row[1]) for row in self.database.execute("PRAGMA table_info(messages)")]
         root = self.database.execute("SELECT rootpage FROM sqlite_master WHERE name='messages' AND type='table'").fetchone()
-        plain = info == COLUMNS and root is not None and not _unsaved(self.path) and unpack is None
-        yield from self._walk(int(root[0]), lookup) if plain else self._rows(lookup, unpack)
+        plain = info == COLUMNS and root is not None and not _unsaved(self.path)
+        plain = plain and all(0 <= identity < TOPICS for identity in lookup)
+        found = self._walk(int(root[0]), lookup) if plain else self._rows(lookup)
+        yield from whole_ones(found, unpack, self.path.name, self.notes)
 
     def _walk(self, root: int, lookup: dict[int, int]) -> Iterator[tuple[Batch, float]]:
         handle = os.open(self.path, os.O_RDONLY)
@@ -104,7 +108,7 @@ class SqliteFile:
                 if rows[:, 3].min() < 0:
                     yield self._by_id(rows[:, 0], lookup), cells.position
                     continue
-                yield Batch(rows[:, 1], rows[:, 2], rows[:, 3], rows[:, 4], cells.buffer), cells.position
+                yield Batch(topic=rows[:, 1], log_time=rows[:, 2], start=rows[:, 3], length=rows[:, 4], buffer=cells.buffer), cells.position
         finally:
             os.close(handle)
         if damaged:
@@ -120,9 +124,9 @@ class SqliteFile:
                 note = f"{self.path.name}: some messages are damaged or missing; they are left out"
                 if note not in self.notes:
                     self.notes.append(note)
-        return _batch(found, lookup, None)
+        return _batch(found, lookup)
 
-    def _rows(self, lookup: dict[int, int], unpack: Callable[[bytes], bytes] | None) -> Iterator[tuple[Batch, float]]:
+    def _rows(self, lookup: dict[int, int]) -> Iterator[tuple[Batch, float]]:
         wanted = ",".join(str(identity) for identity in lookup)
         read = 0
         try:
@@ -130,14 +134,20 @@ class SqliteFile:
             cursor = self.database.execute(f"SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN ({wanted}) ORDER BY rowid")
             while rows := cursor.fetchmany(ROWS):
                 read += len(rows)
-                yield _batch(rows, lookup, unpack), min(1.0, read / max(1, total or 1))
+                yield _batch(rows, lookup), min(1.0, read / max(1, total or 1))
         except sqlite3.DatabaseError as error:
             self.notes.append(f"{self.path.name}: damaged ({error}); the {read} messages before that are read")
 
 
-def _batch(rows: Sequence[tuple[int, int, bytes]], lookup: dict[int, int], unpack: Callable[[bytes], bytes] | None) -> Batch:
-    rows = [row for row in rows if isinstance(row[2], bytes)]
-    data = [row[2] if unpack is None else unpack(row[2]) for row in rows]
+def _batch(rows: Sequence[tuple[int, int, bytes]], lookup: dict[int, int]) -> Batch:
+    rows = [row for row in rows if isinstance(row[2], bytes) and isinstance(row[1], int) and row[0] in lookup]
+    data = [row[2] for row in rows]
     length = np.array([len(item) for item in data], np.int64)
     topic = np.array([lookup[row[0]] for row in rows], np.int64)
-    return Batch(topic, np.array([row[1] for row in rows], np.int64), np.cumsum(length) - length, length, np.frombuffer(b"".join(data), np.uint8))
+    return Batch(
+        topic=topic,
+        log_time=np.array([row[1] for row in rows], np.int64),
+        start=np.cumsum(length) - length,
+        length=length,
+        buffer=np.frombuffer(b"".join(data), np.uint8),
+    )

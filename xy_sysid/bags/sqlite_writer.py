@@ -30,7 +30,7 @@ class SqliteWriter:
         self.rows: list[tuple[int, int, bytes]] = []
         self.database = sqlite3.connect(path, check_same_thread=False)
         self.database.execute(f"PRAGMA page_size={PAGE}")
-        self.database.execute("PRAGMA synchronous=NORMAL")
+        self.database.execute("PRAGMA synchronous=FULL")
         self.database.executescript(SCHEMA)
         self.types: set[str] = set()
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
@@ -13,17 +13,38 @@ import numpy as np
 from xy_sysid.bags.cdr import ARRAY_TYPE, JOINT_TYPE, Layout, array_layout, joint_layout
 from xy_sysid.bags.reading import Bag
 from xy_sysid.bags.stride import Batch, Indices, Reader, Stretch, doubles, stamps
-from xy_sysid.compiled import compiled
 from xy_sysid.errors import BadInput
-from xy_sysid.stream import Block, FloatArray, unpack
+from xy_sysid.jit import compiled
+from xy_sysid.samples.block import Block, FloatArray, unpack
+from xy_sysid.samples.joint_states import JointCounter, joints_of
+from xy_sysid.units import Units
 
-Kind = Literal["voltage", "position", "reference"]
+StreamName = Literal["voltage", "position", "reference"]
 VOLTAGE, POSITION, REFERENCE = "/xy/voltage", "/xy/position", "/xy/reference"
 PIECE = 2000  # samples; the rings that pair them hold sixteen times as many
 AFTER_ODD = 2  # messages after one whose counter went back that come one by one, until the pairer has decided what that meant
 CLOCK_SAMPLES = 2000  # stamps from which the period of a joint state stream is learnt
-EFFORT_UNITS = ("effort", "position")  # joint states name no unit: N m or N, rad or m
+EFFORT_UNITS = Units("effort", "position")  # joint states name no unit: N m or N, rad or m
 OTHERS = "Name others with --topic voltage=NAME, position=NAME or joints=NAME."
+
+
+@dataclass(frozen=True, slots=True)
+class Topics:
+    """What to read of a bag: block topics of input and output, the JointState topic (found if there is one only), and its effort as the input.
+
+    joints: the joint of each axis, as x=shoulder_pan_joint; none: every joint is an axis of its name
+    effort_lag: samples by which effort is older than its stamp
+    """
+
+    voltage_topic: str = VOLTAGE
+    position_topic: str = POSITION
+    joint_topic: str | None = None
+    effort_as_voltage: bool = False
+    joints: tuple[str, ...] = ()
+    effort_lag: int = 0
+
+
+USUAL = Topics()
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,18 +53,22 @@ class Source:
 
     topics: (name, kind) of the block topics; joints: the JointState topic or None; effort: input is its effort;
     said:   whether effort was asked for, rather than found as the only input there is
+    axes:   axis of each joint that is read; empty is all, under their own names; lag: samples by which effort is older
     """
 
-    topics: tuple[tuple[str, Kind], ...]
+    topics: tuple[tuple[str, StreamName], ...]
     joints: str | None
     effort: bool
     said: bool
+    axes: Mapping[str, str] = field(default_factory=dict)
+    lag: int = 0
 
 
-def choose(bag: Bag, voltage_topic: str, position_topic: str, joint_topic: str | None, effort_as_voltage: bool) -> Source:
+def choose(bag: Bag, topics: Topics) -> Source:
     """Decide which topics to read; raises BadRecording that names the topics there are."""
+    voltage_topic, position_topic, effort_as_voltage = topics.voltage_topic, topics.position_topic, topics.effort_as_voltage
     blocks = [name for name in (voltage_topic, position_topic) if bag.kind(name) == ARRAY_TYPE]
-    joints = joint_topic
+    joints = topics.joint_topic
     if joints is None and bag.kind(position_topic) == JOINT_TYPE:
         joints = position_topic
     elif joints is None and (position_topic not in blocks or effort_as_voltage):
@@ -51,23 +76,26 @@ def choose(bag: Bag, voltage_topic: str, position_topic: str, joint_topic: str |
         if len(found) > 1:
             raise bag.bad(f"has several JointState topics: {', '.join(found)}", "Choose one with --topic joints=NAME.")
         joints = found[0] if found else None
+    extra: tuple[tuple[str, StreamName], ...] = ((REFERENCE, "reference"),) if bag.kind(REFERENCE) == ARRAY_TYPE else ()
     if joints is not None:
         if bag.kind(joints) != JOINT_TYPE:
             raise bag.bad(f"has no JointState topic {joints}; it has {bag.listing()}", OTHERS)
         effort = effort_as_voltage or voltage_topic not in blocks
-        return Source(() if effort else ((voltage_topic, "voltage"),), joints, effort, effort_as_voltage)
+        inputs: tuple[tuple[str, StreamName], ...] = () if effort else ((voltage_topic, "voltage"),)
+        names = tuple(pair.partition("=")[0].strip() for pair in topics.joints)
+        axes = {joint: axis for axis, joint in joints_of(names, topics.joints).items()}
+        return Source(topics=(*inputs, *extra), joints=joints, effort=effort, said=effort_as_voltage, axes=axes, lag=topics.effort_lag)
     if len(blocks) < 2:
         missing = " and ".join(dict.fromkeys(name for name in (voltage_topic, position_topic) if name not in blocks))
         raise bag.bad(f"no block topic {missing}; it has {bag.listing()}", OTHERS)
-    extra: tuple[tuple[str, Kind], ...] = ((REFERENCE, "reference"),) if bag.kind(REFERENCE) == ARRAY_TYPE else ()
     return Source(((voltage_topic, "voltage"), (position_topic, "position"), *extra), None, False, False)
 
 
-def units(bag: Bag, source: Source) -> tuple[str, str]:
+def units(bag: Bag, source: Source) -> Units:
     """Of input and output, as the bag tells them."""
     if source.effort and not source.said:
         return EFFORT_UNITS
-    return bag.custom.get("input_unit", "V"), bag.custom.get("output_unit", "m")
+    return Units(bag.custom.get("input_unit", "V"), bag.custom.get("output_unit", "m"))
 
 
 class _Clock:
@@ -107,7 +135,7 @@ class _Clock:
 class _Part:
     """Decoded messages of one kind: ``message`` is the place in the batch of each, ``rows`` its number of samples."""
 
-    kind: Kind
+    kind: StreamName
     message: Indices
     rows: int
     block: Block
@@ -116,12 +144,15 @@ class _Part:
 class _Decoder:
     """Turns batches of raw messages into blocks, and counts what could not be read."""
 
-    def __init__(self, bag: Bag, source: Source) -> None:
-        self.bag, self.source = bag, source
+    def __init__(self, bag: Bag, source: Source, live: bool = False) -> None:
+        """live: joint states with effort are numbered one by one as the nodes do, and not by all that is known of them."""
+        self.bag, self.source, self.live = bag, source, live
+        self.counter: JointCounter | None = None
         self.names = [name for name, _ in source.topics] + ([source.joints] if source.joints else [])
         self.readers = [Reader(array_layout) for _ in source.topics] + [Reader(joint_layout)]
         self.unreadable: dict[str, int] = {}
         self.example: dict[str, str] = {}
+        self.repeated: dict[str, tuple[str, ...]] = {}
         self.joints: tuple[str, ...] = ()
         self.from_log: bool | None = None
         self.clock: _Clock | None = None
@@ -134,7 +165,13 @@ class _Decoder:
             message = np.flatnonzero(batch.topic == index)
             if not message.size:
                 continue
-            mine = Batch(batch.topic[message], batch.log_time[message], batch.start[message], batch.length[message], batch.buffer)
+            mine = Batch(
+                topic=batch.topic[message],
+                log_time=batch.log_time[message],
+                start=batch.start[message],
+                length=batch.length[message],
+                buffer=batch.buffer,
+            )
             for stretch in self.readers[index].stretches(mine):
                 places = message[stretch.first : stretch.last]
                 if stretch.layout is None:
@@ -149,27 +186,49 @@ class _Decoder:
         self.unreadable[name] = self.unreadable.get(name, 0) + count
         self.example.setdefault(name, why)
 
-    def blocks(self, name: str, kind: Kind, batch: Batch, stretch: Stretch, layout: Layout, places: Indices) -> list[_Part]:
+    def blocks(self, name: str, kind: StreamName, batch: Batch, stretch: Stretch, layout: Layout, places: Indices) -> list[_Part]:
         table = doubles(batch, stretch, 0)
         try:
             if len(layout.names) != 2:
                 raise BadInput("dimensions", len(layout.names), "2", "Name the columns in layout.dim[1].label.")
-            unpack(layout.names[1], layout.shape[0], layout.shape[1], table[0])
+            label, rows, width = layout.names[1], layout.shape[0], layout.shape[1]
+            label, width, table = self.once(name, label, rows, width, table)
+            unpack(label, rows, width, table[0])
         except BadInput as error:
             self.skip(name, len(places), str(error))
             return []
-        block = unpack(layout.names[1], len(table) * layout.shape[0], layout.shape[1], table.ravel())
+        block = unpack(label, len(table) * rows, width, table.ravel())
         if not len(block):
             return []
         if self.clock is not None and kind == "voltage":
             self.clock.anchor(block)
         return [_Part(kind, places, layout.shape[0], block)]
 
+    def once(self, name: str, label: str, rows: int, width: int, table: FloatArray) -> tuple[str, int, FloatArray]:
+        """Label, width and numbers without the columns whose names are there twice: nobody knows which is meant."""
+        names = [word.strip() for word in label.split(",")]
+        kept = [place for place, word in enumerate(names) if names.count(word) == 1]
+        if len(kept) == len(names) or len(names) != width or rows * width != table.shape[1] or names[:2] != ["seq", "time"]:
+            return label, width, table
+        self.repeated.setdefault(name, tuple(dict.fromkeys(word for word in names if names.count(word) > 1)))
+        left = table.reshape(len(table), rows, width)[:, :, kept]
+        return ",".join(names[place] for place in kept), len(kept), left.reshape(len(table), -1)
+
     def joint_states(self, name: str, batch: Batch, stretch: Stretch, layout: Layout, places: Indices) -> list[_Part]:
-        self.joints = self.joints or layout.names
+        single = tuple(joint for joint in layout.names if layout.names.count(joint) == 1)
+        if len(single) < len(layout.names):
+            self.repeated.setdefault(name, tuple(dict.fromkeys(joint for joint in layout.names if joint not in single)))
+        wanted = self.source.axes
+        lacking = [joint for joint in wanted if joint not in single]
+        if lacking:
+            self.skip(name, len(places), f"no joint {', '.join(lacking)} among {', '.join(layout.names)}")
+            return []
+        if wanted:
+            single = tuple(wanted)
+        self.joints = self.joints or single
         position, effort = layout.parts[0][1], layout.parts[2][1]
         width = len(layout.names)
-        if position != width or width == 0 or set(layout.names) != set(self.joints) or (self.source.effort and effort != width):
+        if position != width or not single or set(single) != set(self.joints) or (self.source.effort and effort != width):
             self.skip(name, len(places), f"{width} names with {position} positions and {effort} efforts, joints {', '.join(layout.names)}")
             return []
         stamp = stamps(batch, stretch)
@@ -177,15 +236,37 @@ class _Decoder:
             self.from_log = not bool(np.any(stamp))
         time = (batch.log_time[stretch.first : stretch.last] if self.from_log else stamp).astype(np.float64) * 1e-9
         order = [layout.names.index(joint) for joint in self.joints]
+        axes = tuple(wanted[joint] for joint in self.joints) if wanted else self.joints
+        if self.live and self.source.effort:
+            return self.counted(axes, places, time, np.hstack((doubles(batch, stretch, 0)[:, order], doubles(batch, stretch, 2)[:, order])))
         seq = np.zeros(len(time)) if self.clock is None else self.clock.follow(time) if self.source.effort else self.clock.near(time)
-        parts = [_Part("position", places, 1, Block(self.joints, seq, time, doubles(batch, stretch, 0)[:, order]))]
+        parts = [_Part("position", places, 1, Block(axes, seq, time, doubles(batch, stretch, 0)[:, order]))]
         if self.source.effort:
-            parts.insert(0, _Part("voltage", places, 1, Block(self.joints, seq, time, doubles(batch, stretch, 2)[:, order])))
-        return parts
+            lag = self.source.lag if self.clock is not None else 0  # while the clock is learnt, counters say nothing
+            known, since = seq >= lag, lag * self.clock.period if self.clock is not None else 0.0
+            efforts = Block(axes, seq[known] - lag, time[known] - since, doubles(batch, stretch, 2)[known][:, order])
+            parts.insert(0, _Part("voltage", places[known], 1, efforts))
+        return [part for part in parts if len(part.block)]
+
+    def counted(self, axes: tuple[str, ...], places: Indices, time: FloatArray, rows: FloatArray) -> list[_Part]:
+        """Positions and efforts with the numbers that they had live; a sample that was decided late stands where that was."""
+        self.counter = self.counter or JointCounter(axes, with_voltage=False)
+        found = [(place, self.counter.add(float(at), row)) for place, at, row in zip(places.tolist(), time, rows, strict=True)]
+        blocks = [(place, block) for place, block in found if block is not None]
+        if not blocks:
+            return []
+        message = np.repeat([place for place, _ in blocks], [len(block) for _, block in blocks])
+        seq, even, values = (np.concatenate([getattr(block, name) for _, block in blocks]) for name in ("seq", "time", "values"))
+        known, lag, width = seq >= self.source.lag, self.source.lag, len(axes)
+        efforts = Block(axes, seq[known] - lag, even[known], values[known, width:])
+        parts = [_Part("position", message, 1, Block(axes, seq, even, values[:, :width])), _Part("voltage", message[known], 1, efforts)]
+        return [part for part in parts if len(part.block)]
 
     def finish(self) -> None:
         for name, count in self.unreadable.items():
             self.bag.notes.append(f"{count} messages on {name} are left out: {self.example[name]}")
+        for name, words in self.repeated.items():
+            self.bag.notes.append(f"{name} has {', '.join(words)} twice; nobody knows which is meant, and they are left out")
         if self.from_log:
             self.bag.notes.append("the stamps of the joint states are zero; the time of recording is used")
 
@@ -221,7 +302,7 @@ def _starts(seq: FloatArray, rows: int, before: float, group: Indices) -> Indice
     return found[:count]
 
 
-def _cut(parts: list[_Part], most: int, newest: dict[Kind, float]) -> Iterator[tuple[Kind, Block]]:
+def _cut(parts: list[_Part], most: int, newest: dict[StreamName, float]) -> Iterator[tuple[StreamName, Block]]:
     """Blocks of about ``most`` samples, those of all kinds side by side, in log order. newest: last counter of each kind so far."""
     if not parts:
         return
@@ -273,14 +354,17 @@ def _period(bag: Bag, source: Source) -> float:
     return float(np.median(steps[usable] / counts[usable]))
 
 
-def pieces(bag: Bag, source: Source, most: int, progress: Callable[[float], None] | None) -> Iterator[tuple[Kind, Block]]:
-    """The blocks of an open bag; notes on what was left out are added to ``bag.notes`` at the end."""
-    decoder = _Decoder(bag, source)
-    if source.joints is not None:
+def pieces(bag: Bag, source: Source, most: int, progress: Callable[[float], None] | None, live: bool = False) -> Iterator[tuple[StreamName, Block]]:
+    """The blocks of an open bag; notes on what was left out are added to ``bag.notes`` at the end.
+
+    live: joint states are numbered as a node would have, without knowing what comes later
+    """
+    decoder = _Decoder(bag, source, live)
+    if source.joints is not None and not (live and source.effort):
         before = len(bag.notes)
         decoder.clock = _Clock(_period(bag, source))
         del bag.notes[before:]
-    newest: dict[Kind, float] = {}
+    newest: dict[StreamName, float] = {}
     for batch, part in bag.batches(decoder.names):
         yield from _cut(decoder.parts(batch), most, newest)
         if progress is not None:
@@ -290,16 +374,13 @@ def pieces(bag: Bag, source: Source, most: int, progress: Callable[[float], None
 
 def stream_blocks(
     path: Path | str,
+    topics: Topics = USUAL,
     *,
-    voltage_topic: str = VOLTAGE,
-    position_topic: str = POSITION,
-    joint_topic: str | None = None,
-    effort_as_voltage: bool = False,
     chunk_samples: int = PIECE,
     notes: list[str] | None = None,
     progress: Callable[[float], None] | None = None,
-    about: Callable[[tuple[str, str]], None] | None = None,
-) -> Iterator[tuple[Kind, Block]]:
+    about: Callable[[Units], None] | None = None,
+) -> Iterator[tuple[StreamName, Block]]:
     """("voltage" | "position" | "reference", Block) in log order, in flat memory.
 
     chunk_samples: about how many samples of one kind come in one block, so also how far the kinds are apart
@@ -310,10 +391,10 @@ def stream_blocks(
     """
     with Bag(path) as bag:
         try:
-            source = choose(bag, voltage_topic, position_topic, joint_topic, effort_as_voltage)
+            source = choose(bag, topics)
             if about is not None:
                 about(units(bag, source))
-            yield from pieces(bag, source, chunk_samples, progress)
+            yield from pieces(bag, source, chunk_samples, progress, live=True)
         finally:
             if notes is not None:
                 notes.extend(bag.notes)

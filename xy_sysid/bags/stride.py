@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xy_sysid.bags.cdr import Bytes, Layout, Unreadable
-from xy_sysid.compiled import compiled
-from xy_sysid.stream import FloatArray
+from xy_sysid.jit import compiled
+from xy_sysid.samples.block import FloatArray
 
 Indices = NDArray[np.int64]
 

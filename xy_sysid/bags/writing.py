@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,9 +14,10 @@ from typing import Literal, Protocol
 from xy_sysid.bags.cdr import ARRAY_TYPE, encode_array
 from xy_sysid.bags.mcap_writer import McapWriter
 from xy_sysid.bags.sqlite_writer import SqliteWriter
+from xy_sysid.bags.sums import Sums
 from xy_sysid.bags.typestore import definition
 from xy_sysid.errors import BadInput, BadRecording
-from xy_sysid.stream import Block, FloatArray, columns, pack
+from xy_sysid.samples.block import Block, FloatArray, columns, pack
 
 Storage = Literal["sqlite3", "mcap"]
 EVERY = 1.0  # seconds between two commits
@@ -67,6 +69,7 @@ class BagWriter:
             raise BadRecording(self.path, "a bare file has no place for units", "Save to a folder (a name without an ending).")
         self.custom = custom or {}
         self.topics: dict[str, Written] = {}
+        self._sums = Sums() if self.storage == "sqlite3" and not bare else None  # mcap has sums of its own
         self.first, self.last = 0, 0
         self._waiting, self._flushed = 0, time.monotonic()
         try:
@@ -107,6 +110,8 @@ class BagWriter:
         self.first = log_time_ns if self.count == 0 else min(self.first, log_time_ns)
         self.last = max(self.last, log_time_ns)
         self.writer.write(written.number, log_time_ns, cdr_bytes)
+        if self._sums is not None:
+            self._sums.add(topic, cdr_bytes)
         written.count += 1
         self._waiting += len(cdr_bytes)
         if self._waiting >= MOST or time.monotonic() - self._flushed >= EVERY:
@@ -136,7 +141,10 @@ class BagWriter:
         if self.metadata is None:
             return
         half = self.metadata.with_suffix(".yaml.tmp")
-        half.write_text(json.dumps({"rosbag2_bagfile_information": self._information()}, indent=1) + "\n", "utf-8")
+        with half.open("w", encoding="utf-8") as file:
+            file.write(json.dumps({"rosbag2_bagfile_information": self._information()}, indent=1) + "\n")
+            file.flush()
+            os.fsync(file.fileno())
         half.replace(self.metadata)
 
     def _information(self) -> dict[str, object]:
@@ -163,7 +171,7 @@ class BagWriter:
             "compression_format": "",
             "compression_mode": "",
             "files": [{"path": self.file.name, **span, "message_count": self.count}],
-            "custom_data": self.custom or None,
+            "custom_data": {**self.custom, **(self._sums.text() if self._sums else {})} or None,
             "ros_distro": "jazzy",
         }
 

@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
+import atexit
 import io
 import os
 import sys
 from collections.abc import Sequence
 from typing import TextIO
 
+from xy_sysid.cli.interrupt import Interrupts, deaf
+
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")  # results repeat bit for bit with one thread, and small matrices gain nothing from two
 
-INTERRUPTED, WRONG = 130, 2
+INTERRUPTED, TERMINATED, WRONG = 130, 143, 2
+_interrupts = Interrupts()
 LONGEST = 800  # characters of a refusal; somebody may give a whole file as a value
 
 
 def run(arguments: Sequence[str]) -> int:
-    """Run one command; 0 is an answer, 2 wrong use or bad input, 130 Ctrl-C."""
+    """Run one command; 0 is an answer, 1 a model that does not hold, 2 wrong use or bad input, 130 Ctrl-C, 143 SIGTERM."""
     from xy_sysid.errors import ReaderGone, XySysidError
+    from xy_sysid.files.blame import blamed
 
     try:
-        return _command(arguments)
+        with blamed():
+            return _command(arguments)
     except XySysidError as problem:
         return _refuse(str(problem))
     except KeyboardInterrupt:
@@ -32,6 +38,10 @@ def run(arguments: Sequence[str]) -> int:
         return _refuse(f"{place}{problem.strerror or problem}. Check the path, the permissions and the space that is left.")
     except MemoryError:
         return _refuse("There is not enough memory for this. Give a shorter part with --span, or a shorter window with --set length=.")
+    except Exception:
+        if _interrupts.came:  # imports of compiled modules, and of classes with descriptors, make errors of their own of an interrupt
+            return _stopped()
+        raise
 
 
 def _command(arguments: Sequence[str]) -> int:
@@ -48,33 +58,69 @@ def _command(arguments: Sequence[str]) -> int:
     except typer.Abort:
         return _stopped()
     except typer.Exit as end:
-        return int(end.exit_code)
+        return _unless_terminated(end.exit_code)
     except TyperException as problem:
         text = problem.format_message() if hasattr(problem, "format_message") else str(problem)
         return _refuse(f"{text}{'' if text.endswith(('?', '.')) else '.'} See xy-sysid {known} --help.")
     if not arguments:
         return _refuse("Give a command, for example xy-sysid demo.")
     sys.stdout.flush()
-    return int(code) if isinstance(code, int) else 0
+    return _unless_terminated(code)
 
 
 def _refuse(text: str) -> int:
     line = " ".join(text.split())
     if len(line) > LONGEST:
         line = f"{line[: LONGEST // 2]} ... {line[-LONGEST // 2 :]}"
-    sys.stderr.write(f"xy-sysid: {line}\n")
+    _say(f"xy-sysid: {line}\n")
     return WRONG
 
 
 def _stopped() -> int:
-    sys.stderr.write("xy-sysid: stopped.\n")
-    return INTERRUPTED
+    _say("xy-sysid: stopped.\n")
+    return TERMINATED if _interrupts.terminated else INTERRUPTED
+
+
+def _unless_terminated(code: object) -> int:
+    """The exit code of a command; typer makes 130 of whatever interrupts one."""
+    found = code if isinstance(code, int) else 0
+    return TERMINATED if found == INTERRUPTED and _interrupts.terminated else found
+
+
+def _say(line: str) -> None:
+    """A line on stderr; where even that has no room, the exit code tells."""
+    try:
+        sys.stderr.write(line)
+        sys.stderr.flush()
+    except OSError:
+        _discard(sys.stderr)
 
 
 def _nobody_reads() -> int:
     """The reader of a pipe went away: nothing more to say to it."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    _discard(sys.stdout)
     return 0
+
+
+def _discard(stream: TextIO) -> None:
+    """What the stream still holds goes nowhere, and so does all that follows."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, stream.fileno())
+    os.close(nowhere)
+
+
+def _ended(code: int) -> int:
+    """The exit code once all that was said has left: output that cannot leave is judged here, not by the interpreter's last flush."""
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        _discard(sys.stdout)
+    except OSError as problem:
+        _discard(sys.stdout)
+        if code == 0:
+            code = _refuse(f"The answer cannot be written: {problem.strerror}. Make room, or send it elsewhere.")
+    _say("")
+    return code
 
 
 def _nowhere() -> TextIO:
@@ -84,9 +130,12 @@ def _nowhere() -> TextIO:
 
 def main() -> None:
     """Entry point of the console script."""
+    atexit.register(deaf)  # the first is the last to be called: then the exit code stands
     sys.stdout = sys.stdout or _nowhere()
     sys.stderr = sys.stderr or _nowhere()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # a file's name may hold what the terminal cannot show
-    sys.exit(run(sys.argv[1:]))
+    with _interrupts:
+        code = run(sys.argv[1:])
+    sys.exit(_ended(code))

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import typer
 
+from xy_sysid.cli.columns import columns
 from xy_sysid.cli.compare import compare
 from xy_sysid.cli.demo import demo
 from xy_sysid.cli.diagnose import diagnose
 from xy_sysid.cli.effects import effects
+from xy_sysid.cli.figures import figures
 from xy_sysid.cli.fit import fit
 from xy_sysid.cli.frf import frf
 from xy_sysid.cli.page import page
@@ -28,5 +30,5 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (demo, page, run, record, replay, simulate, frf, fit, validate, compare, diagnose, refine, effects, study, report):
+for command in (demo, page, run, record, replay, simulate, columns, frf, fit, validate, compare, diagnose, refine, effects, study, report, figures):
     app.command(name=command.__name__)(command)

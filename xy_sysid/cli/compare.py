@@ -2,179 +2,124 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from xy_sysid.cli import options as o
-from xy_sysid.cli.checking import checked, longest
 from xy_sysid.cli.diagnose import Own
-from xy_sysid.cli.output import aside, emit, people, quantity, table
-from xy_sysid.cli.provenance import fingerprint
-from xy_sysid.cli.reading import chosen, each, read
+from xy_sysid.cli.output import aside, emit, say, table
+from xy_sysid.cli.reading import chosen, each, read, reads
+from xy_sysid.units import moved, told
 
 if TYPE_CHECKING:
-    from xy_sysid.comparison import Comparison
-    from xy_sysid.distortion import Distortion
-    from xy_sysid.model_check import ModelCheck
-    from xy_sysid.paired import Paired
-    from xy_sysid.recording import Recording
-    from xy_sysid.saved_models import Saved
+    from xy_sysid.comparison.of_run import Judgement
+    from xy_sysid.comparison.which_is_better import Paired
+    from xy_sysid.imports.reading import Reading
+    from xy_sysid.response.distortion import Distortion
 
-HELD_OUT = 1.0 / 3.0  # of the recording, when a model was fitted to it
+KINDS = ("", ".db3", ".mcap", ".csv", ".txt", ".tsv", ".npz", ".mat")  # endings of recordings
 
 
+Inputs = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="REC [MODEL]",
+        help="recordings; then a file of fit --model or refine --model (.yaml): without one, a linear model is fitted to the first two thirds",
+    ),
+]
 Other = Annotated[
     Path | None, typer.Option(metavar="MODEL", help="compare two models in pairs on the same unseen data: the one before, and the one after")
 ]
 
 
+@reads
 def compare(
-    rec: o.Rec,
-    model: Annotated[
-        Path | None,
-        typer.Argument(
-            metavar="[MODEL]", help="file of fit --model or refine --model; without one, a linear model is fitted to the first two thirds"
-        ),
-    ] = None,
+    recs: Inputs,
+    reading: Reading,
     before: Other = None,
     after: Other = None,
-    axis: o.Axes = None,
     set_: o.Set = None,
     params: o.Params = None,
-    topic: o.Topics = None,
-    effort: o.Effort = False,
-    span: o.Span = "",
     effect_file: Own = None,
     json: o.Json = False,
 ) -> None:
     """Where a model fails on data it has not seen: by frequency, speed, direction, position, amplitude and time; or which of two is better."""
+    from xy_sysid.comparison.of_run import better, distorted, frequency_sentence, judge
     from xy_sysid.errors import BadInput
-    from xy_sysid.saved_models import read_models
-    from xy_sysid.user_effects import library
+    from xy_sysid.files.effects import library
+    from xy_sysid.files.models import read_models
 
+    recs, model = _model_last(recs)
     if (before is None) != (after is None) or (model is not None and before is not None):
         raise BadInput("compare", "a mixture of models", "one MODEL, none, or --before MODEL --after MODEL", "Give one of these.")
     settings = o.settings_from(params, set_)
     known = library(effect_file or [])
     files = [path for path in (model, before, after) if path is not None]
     models = [read_models(path, known) for path in files]
-    recording = read(rec, axis, topic, effort, span, json)
-    names = chosen(recording, axis)
+    recording = read(recs, reading, json)
+    names = chosen(recording, reading.axes)
     for path, held in zip(files, models, strict=True):
         for name in names:
             if name not in held:
                 raise BadInput(f"model of axis {name}", f"not in {path}", ", ".join(held), "Choose axes with --axis.")
     if before is not None:
-        pairs, refused = each(names, lambda name: _pair(recording, name, models[0][name], models[1][name]))
+        pairs, refused = each(names, lambda name: better(recording.run(name), models[0][name], models[1][name]))
         if json:
             emit({"before": str(before), "after": str(after), "axes": {name: _paired(item) for name, item in pairs.items()}, "refused": refused})
             return
         for name, pair in pairs.items():
             for held in models:
                 if held[name].doubt:
-                    aside.print(f"axis {name}: {held[name].doubt}")
-            people.print(f"axis {name}: {pair.sentence}", markup=False)
+                    say(f"axis {name}: {held[name].doubt}", aside)
+            say(f"axis {name}: {pair.sentence}")
         for name, text in refused.items():
-            people.print(f"axis {name}: {text}", markup=False)
+            say(f"axis {name}: {text}")
         return
-    found: dict[str, Comparison] = {}
-    lines: dict[str, ModelCheck | None] = {}
+    found: dict[str, Judgement] = {}
     splits: dict[str, Distortion | None] = {}
     for name in names:
-        found[name], lines[name] = _compared(recording, name, models[0][name] if models else None, settings, quiet=json)
-        splits[name] = _split(recording, name)
+        found[name] = judge(recording, name, models[0][name] if models else None, settings)
+        splits[name] = distorted(recording.run(name))
+        for note in () if json else found[name].notes:
+            say(f"axis {name}: {note}", aside)
     if json:
         emit(
-            {"model": None if model is None else str(model), "axes": {name: _answer(item, lines[name], splits[name]) for name, item in found.items()}}
+            {
+                "model": None if model is None else str(model),
+                "notes": recording.notes,
+                "axes": {name: _answer(item, splits[name]) for name, item in found.items()},
+            }
         )
         return
-    for name, item in found.items():
-        people.print(f"axis {name}: {item.sentence}", markup=False)
-        figures = [
-            ("error", quantity(item.error, item.unit)),
-            ("noise floor", quantity(item.noise_floor, item.unit)),
-            ("up to", f"{item.band_end:.4g} Hz"),
-        ]
-        people.print("  " + ", ".join(f"{label} {text}" for label, text in figures))
-        line, split = lines[name], splits[name]
+    for name, judged in found.items():
+        item, line, split = judged.where, judged.check, splits[name]
+        size = f"{moved(item.error, item.unit, 4)}, noise floor {moved(item.noise_floor, item.unit, 4)}, up to {item.band_end:.4g} Hz"
+        times = item.error / max(item.noise_floor, 1e-300)
+        say(
+            f"axis {name}: the error is {times:.3g} times the noise floor ({size})." if item.places else f"axis {name}: {item.sentence} Error {size}."
+        )
         if line is not None:
-            people.print(f"  {_in_frequency(line, item)}")
+            say(f"  {frequency_sentence(line, item)}")
         if split is not None:
-            people.print(f"  {split.sentence}")
+            say(f"  {split.sentence}")
         if item.places:
-            rows = [(place.kind, f"{place.error_over_floor:.3g}", place.sentence) for place in item.places]
+            rows = [(place.kind, told(place.error_over_floor), place.sentence) for place in item.places]
             table("", ("where", "over floor", "in words"), rows)
 
 
-def _compared(recording: Recording, name: str, saved: Saved | None, settings: Any, quiet: bool) -> tuple[Comparison, ModelCheck | None]:
-    """On the whole recording for a model of another one; else on its last third, with a model fitted to the rest if there is none."""
-    from xy_sysid.comparison import compare_velocity
-    from xy_sysid.errors import BadInput
-    from xy_sysid.offline import estimate, fitted, split
-    from xy_sysid.own_units import text_in, unit_in
-    from xy_sysid.saved_models import Saved
-
-    seen = saved is not None and saved.data == fingerprint(recording, name)
-    training, unseen = split(recording, HELD_OUT if saved is None else 0.0)
-    if saved is None:
-        saved = Saved(fitted(estimate(training, name, settings).frf, settings).tf, None, "zoh", "")
-        data = unseen
-    else:
-        data = recording
-    if saved.doubt and not quiet:
-        aside.print(f"axis {name}: {saved.doubt}")
-    if seen and not quiet:
-        aside.print(f"axis {name}: the model was fitted to this very recording; only its last third is looked at")
-    u, y = longest(data, name)
-    velocity = saved.velocity(data.sampling_rate, u, y)
-    first = _held(len(y)) if seen else 0
-    compared = compare_velocity(velocity[first:], u[first:], y[first:], data.sampling_rate, f"{data.output_unit}/s", data.output_unit)
-    units = data.input_unit, data.output_unit
-    places = (replace(place, sentence=text_in(place.sentence, units), unit=unit_in(place.unit, units)) for place in compared.places)
-    compared = replace(compared, places=tuple(places))
-    try:
-        return compared, checked(data, name, saved, settings)[0]
-    except BadInput:  # too short for a window, or nothing coherent: time alone must do
-        return compared, None
+def _model_last(given: list[Path]) -> tuple[list[Path], Path | None]:
+    """Recordings, and the model after them: a last argument that no recording is called like."""
+    *first, last = given
+    is_model = bool(first) and last.suffix.lower() not in KINDS and not last.is_dir()
+    return (first, last) if is_model else (given, None)
 
 
-def _in_frequency(line: ModelCheck, compared: Comparison) -> str:
-    from xy_sysid.comparison import TWICE
-    from xy_sysid.model_check import AT_THE_FLOOR
+def _answer(judged: Judgement, split: Distortion | None) -> dict[str, Any]:
+    from xy_sysid.comparison.of_run import frequency_sentence
 
-    text = f"in frequency: residual {line.rms_sigma:.3g} sigma rms, at worst {line.worst_sigma:.3g} at {line.worst_hz:.4g} Hz"
-    hidden = line.rms_sigma <= AT_THE_FLOOR and compared.error > TWICE * compared.noise_floor
-    return text + (": what fails does not repeat with the input, so a frequency response takes it for noise (friction does that)." if hidden else ".")
-
-
-def _pair(recording: Recording, name: str, before: Saved, after: Saved) -> Paired:
-    from xy_sysid.paired import paired
-
-    u, y = longest(recording, name)
-    first = _held(len(y)) if fingerprint(recording, name) in (before.data, after.data) else 0
-    old, new = (saved.velocity(recording.sampling_rate, u, y)[first:] for saved in (before, after))
-    return paired(old, new, y[first:], recording.sampling_rate)
-
-
-def _held(samples: int) -> int:
-    """The first sample that no fit to this recording has used."""
-    return int((1.0 - HELD_OUT) * samples)
-
-
-def _split(recording: Recording, name: str) -> Distortion | None:
-    """Even and odd distortion of a recording with an odd multisine."""
-    from xy_sysid.distortion import distortion
-    from xy_sysid.period import find_period
-
-    u, y = longest(recording, name)
-    period = find_period(u)
-    return distortion(recording.sampling_rate, u, y, period) if period else None
-
-
-def _answer(item: Comparison, line: ModelCheck | None, split: Distortion | None) -> dict[str, Any]:
+    item, line = judged.where, judged.check
     return {
         "sentence": item.sentence,
         "error": {"unit": item.unit, "now": item.error, "noise_floor": item.noise_floor, "held_out": item.error},
@@ -186,7 +131,7 @@ def _answer(item: Comparison, line: ModelCheck | None, split: Distortion | None)
         "error_over_floor": item.error_over_floor,
         "lines": None
         if line is None
-        else {"sentence": _in_frequency(line, item), "frequency": line.frequency, "residual_sigma": line.sigmas, "rms_sigma": line.rms_sigma},
+        else {"sentence": frequency_sentence(line, item), "frequency": line.frequency, "residual_sigma": line.sigmas, "rms_sigma": line.rms_sigma},
         "distortion": None if split is None else {"sentence": split.sentence, "period": split.period, "even": split.even, "odd": split.odd},
     }
 
@@ -196,7 +141,7 @@ def _paired(item: Paired) -> dict[str, Any]:
     return {
         "sentence": item.sentence,
         "better": item.better,
-        "error": {"unit": "m/s", "before": item.before, "after": item.after, "noise_floor": item.noise_floor},
+        "error": {"unit": item.unit, "before": item.before, "after": item.after, "noise_floor": item.noise_floor},
         "ratio": {"value": item.ratio, "ci95": [item.low, item.high]},
         "t": item.t,
         "p": item.p,

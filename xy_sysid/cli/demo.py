@@ -41,7 +41,7 @@ def demo(
     machine = machine or ("surprise.yaml" if with_page else "paper.yaml")
     table = Machine.from_file(machine)
     if with_page:
-        raise typer.Exit(watch_page(_specs(table, machine, seconds or 0.0, speed, seed), table.axes))
+        raise typer.Exit(watch_page(_specs(table, machine, seconds or 0.0, speed, seed), table.axes, speed))
     seconds = seconds or 60.0
     aside.print("starting the nodes: a simulated table, an excitation and an identifier, over ROS 2 ...")
     code, monitor, lines, wall = _watch(_specs(table, machine, seconds, speed, seed), table.axes, seconds, plain=json)
@@ -55,7 +55,7 @@ def demo(
         for line in _summary(answer):
             people.print(line)
         people.print(f"{seconds:g} s of data in {wall:.0f} s. Next: xy-sysid simulate rec && xy-sysid fit rec")
-    if code not in (0, 130):
+    if code not in (0, 130, 143):
         for line in lines[-20:]:
             aside.print(line, markup=False)
     raise typer.Exit(code)
@@ -65,18 +65,20 @@ def _specs(table: Machine, machine: str, seconds: float, speed: float, seed: int
     from json import dumps
     from pathlib import Path
 
-    from xy_sysid.run_plan import plan
+    from xy_sysid.processes.run_plan import plan
 
     excite: dict[str, Any] = {"lockstep": True, "speed": float(speed), "duration": float(seconds)}
+    unit = {"output_unit": table.spec.unit}
+    excite |= {"unit": table.spec.unit}
     excite |= {axis: {"seed": seed + k} for k, axis in enumerate(table.axes)}
     rigid = all(table.truth(axis)["resonance_hz"] is None for axis in table.axes)
-    orders = {"numerator_order": 0, "denominator_order": 2} if rigid else {}
+    orders = {"numerator_order": 0, "denominator_order": 2} if rigid else {"numerator_order": 2, "denominator_order": 4}
     document = {
         "env": {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"},
         "nodes": [
             {"executable": "ballscrew", "parameters": {"machine": machine}},
-            {"executable": "identifier", "parameters": orders},
-            {"executable": "diagnoser"},
+            {"executable": "identifier", "parameters": {**orders, **unit}},
+            {"executable": "diagnoser", "parameters": unit},
             {"executable": "excitation", "parameters": excite},
         ],
     }
@@ -92,7 +94,7 @@ def _watch(specs: list[Any], axes: tuple[str, ...], seconds: float, plain: bool)
 
     from xy_sysid.cli.monitor import Monitor, refuse_others
     from xy_sysid.cli.output import aside
-    from xy_sysid.starter import run
+    from xy_sysid.processes.starter import run
 
     monitor = Monitor(axes)
     refuse_others(monitor)
@@ -138,12 +140,13 @@ def _panel(monitor: Monitor, axes: tuple[str, ...], seconds: float) -> Renderabl
     from rich.text import Text
 
     from xy_sysid.cli.drawing import curve
+    from xy_sysid.live.messages import topic_of
 
     panels = []
     for axis in axes:
         level, sentence, values = monitor.statuses.get(f"axis {axis}", (1, "waiting for data", {}))
         parts: list[RenderableType] = []
-        message = monitor.arrays.get(f"comparison/{axis}")
+        message = monitor.arrays.get(topic_of("comparison", axis))
         if message is not None:
             rows = message.data.reshape(message.sizes)
             low, high = float(np.min(rows[:, 1])), float(np.max(rows[:, 1]))
@@ -164,6 +167,7 @@ def figures(values: dict[str, str]) -> list[tuple[str, str]]:
     for key, label, scale, unit, digits in (
         ("delay (s)", "delay", 1e3, "ms", 4),
         ("gain (m/s/V)", "velocity gain", 1e3, "mm/s/V", 3),
+        ("gain (rad/s/V)", "velocity gain", 1.0, "rad/s/V", 4),
         ("antiresonance_1.frequency (Hz)", "antiresonance", 1.0, "Hz", 3),
         ("resonance_1.frequency (Hz)", "resonance", 1.0, "Hz", 3),
         ("relative error (1)", "relative error", 100.0, "%", 2),
@@ -182,7 +186,7 @@ def result(monitor: Monitor, axis: str, truth: dict[str, Any]) -> dict[str, Any]
     values = monitor.statuses.get(f"axis {axis}", (0, "", {}))[2]
     wanted = {
         "delay": ("delay (s)", truth["delay"], DELAY_WITHIN),
-        "velocity_gain": ("gain (m/s/V)", truth["velocity_gain"], 0.01 * truth["velocity_gain"]),
+        "velocity_gain": ("gain (rad/s/V)" if "gain (rad/s/V)" in values else "gain (m/s/V)", truth["velocity_gain"], 0.01 * truth["velocity_gain"]),
         "antiresonance": ("antiresonance_1.frequency (Hz)", truth["antiresonance_hz"], RESONANCE_WITHIN),
         "resonance": ("resonance_1.frequency (Hz)", truth["resonance_hz"], RESONANCE_WITHIN),
     }
@@ -200,13 +204,13 @@ def result(monitor: Monitor, axis: str, truth: dict[str, Any]) -> dict[str, Any]
 
 def function_text(monitor: Monitor, axis: str) -> str:
     """The transfer function that was published, in a line of mathematics."""
-    from xy_sysid.messages import read_transfer_function
+    from xy_sysid.live.messages import read_transfer_function, topic_of
 
-    message = monitor.arrays.get(f"transfer_function/{axis}")
+    message = monitor.arrays.get(topic_of("transfer_function", axis))
     if message is None:
         return f"axis {axis}: no transfer function was published"
-    tf = read_transfer_function(message)
-    return f"H_{axis}(s) = ({polynomial(tf.numerator)}) / ({polynomial(tf.denominator)}) exp(-{tf.delay:.4g} s)  [m/V]"
+    tf, values = read_transfer_function(message), monitor.statuses.get(f"axis {axis}", (0, "", {}))[2]
+    return f"H_{axis}(s) = ({polynomial(tf.numerator)}) / ({polynomial(tf.denominator)}) exp(-{tf.delay:.4g} s)  [{values.get('output unit', 'm')}/V]"
 
 
 def polynomial(coefficients: Any) -> str:

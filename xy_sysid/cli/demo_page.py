@@ -26,14 +26,14 @@ def wished(page: bool | None, json: bool) -> bool:
     return page
 
 
-def watch_page(specs: list[Any], axes: tuple[str, ...]) -> int:
-    """Run the nodes and the page until Ctrl-C or until the page ends; the exit code."""
+def watch_page(specs: list[Any], axes: tuple[str, ...], speed: float) -> int:
+    """Run the nodes and the page until Ctrl-C or until the page ends; the exit code. speed: times real time, 0 as fast as it goes."""
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     from xy_sysid.cli.monitor import Monitor, refuse_others
-    from xy_sysid.cli.output import aside, people
+    from xy_sysid.cli.output import aside, people, say
     from xy_sysid.cli.page import display
-    from xy_sysid.run_plan import ProcessSpec
-    from xy_sysid.starter import run
+    from xy_sysid.processes.run_plan import ProcessSpec
+    from xy_sysid.processes.starter import run
 
     aside.print("starting the nodes and the page: a simulated table with something hidden in each axis, over ROS 2 ...")
     monitor = Monitor(axes)
@@ -45,7 +45,8 @@ def watch_page(specs: list[Any], axes: tuple[str, ...]) -> int:
     def heard(name: str, line: str) -> None:
         if name == "page" and line.startswith("http"):
             people.print(f"the page is at {line}")
-            people.print("Watch the curves converge, press Diagnose, then Find the next. Ctrl-C ends everything.")
+            pace = f"{speed:g} times faster than real time" if speed else "as fast as it goes"
+            say(f"The table is simulated, {pace}. See where the rigid model fails, press Diagnose, then Add. Ctrl-C ends everything.")
             if display():
                 webbrowser.open(line)
 

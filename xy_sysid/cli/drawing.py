@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from xy_sysid.stream import FloatArray
+from xy_sysid.samples.block import FloatArray
 
 DOTS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))  # bit of each dot in a braille cell, by row and column
 

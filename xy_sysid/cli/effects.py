@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from xy_sysid.cli import options as o
-from xy_sysid.cli.output import emit, people, table
+from xy_sysid.cli.output import emit, say, table
 
 if TYPE_CHECKING:
     from xy_sysid.effects import Effect
@@ -20,7 +20,7 @@ def effects(
     json: o.Json = False,
 ) -> None:
     """List the physical effects: law, parameters, how each shows itself, look-alikes and source."""
-    from xy_sysid.user_effects import library
+    from xy_sysid.files.effects import library
 
     known = library(effect_file or [])
     chosen = [known[name]] if name else sorted(known.effects.values(), key=lambda effect: (effect.category != "base", effect.name))
@@ -32,7 +32,7 @@ def effects(
         return
     for effect in chosen:
         _list(effect)
-    people.print("F: force against the drive, in volts of the drive. One effect in full: xy-sysid effects NAME")
+    say("F: force against the drive, in volts of the drive. One effect in full: xy-sysid effects NAME")
 
 
 def _answer(effect: Effect) -> dict[str, Any]:
@@ -47,19 +47,19 @@ def _answer(effect: Effect) -> dict[str, Any]:
 
 def _list(effect: Effect) -> None:
     sizes = ", ".join(f"{item.name} [{item.unit or '1'}]" for item in effect.parameters)
-    people.print(f"{effect.name}: {effect.law}")
+    say(f"{effect.name}: {effect.law}")
     for label, text in (("parameters", sizes), ("shows as", effect.shows), ("taken for", ", ".join(effect.look_alikes))):
-        people.print(f"    {label}: {text}")
+        say(f"    {label}: {text}")
 
 
 def _show(effect: Effect) -> None:
-    from xy_sysid.effects_doc import bounds
+    from xy_sysid.files.effects_doc import bounds
 
-    people.print(f"{effect.name}: {effect.meaning}\n\n    {effect.law}\n")
+    say(f"{effect.name}: {effect.meaning}\n\n    {effect.law}\n")
     rows = [(item.name, item.unit or "1", bounds(item), f"{item.typical:g}", item.meaning) for item in effect.parameters]
     table("parameters", ("name", "unit", "allowed", "usual", "meaning"), rows)
     told = {"valid for": effect.validity, "shows as": effect.shows, "taken for": ", ".join(effect.look_alikes)}
     told |= {"told apart by": effect.experiment, "source": effect.source}
-    people.print()
+    say()
     for label, text in told.items():
-        people.print(f"{label}: {text}")
+        say(f"{label}: {text}")

@@ -8,49 +8,48 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from xy_sysid.cli import options as o
-from xy_sysid.cli.output import aside, emit, estimates, people
+from xy_sysid.cli.output import aside, emit, estimates, say
 from xy_sysid.cli.provenance import provenance
-from xy_sysid.cli.reading import chosen, each, read
+from xy_sysid.cli.reading import chosen, each, named, read, reads
 
 if TYPE_CHECKING:
     from xy_sysid.fitting import Fit, Structure
-    from xy_sysid.offline import AxisEstimate
-    from xy_sysid.recording import Recording
-    from xy_sysid.validation import Validation
+    from xy_sysid.fitting.of_recording import AxisEstimate
+    from xy_sysid.fitting.verdicts import Validation
+    from xy_sysid.imports.reading import Reading
 
 
+@reads
 def fit(
-    rec: o.Rec,
-    axis: o.Axes = None,
+    recs: o.Recs,
+    reading: Reading,
     set_: o.Set = None,
     params: o.Params = None,
-    topic: o.Topics = None,
-    effort: o.Effort = False,
     period: o.Period = "auto",
-    span: o.Span = "",
     method: Annotated[str, typer.Option(help="best (maximum likelihood), lls, iwls, nlls, ml, or nllsfdi (the paper's own path)")] = "best",
     weighting: Annotated[str, typer.Option(help="of a line's error: sigma, relative (1/|FRF|, the paper's) or uniform")] = "sigma",
     domain: Annotated[str, typer.Option(help="s (continuous) or z (discrete)")] = "s",
     held_out: Annotated[float, typer.Option(help="last part of the recording that no fit sees, for the check in time")] = 0.2,
     model: Annotated[Path | None, typer.Option("--model", metavar="FILE", help="write the model as YAML")] = None,
     mat: Annotated[Path | None, typer.Option("--mat", metavar="FILE", help="write the model for MATLAB's tf()")] = None,
+    force: o.Force = False,
     json: o.Json = False,
 ) -> None:
     """Transfer function with delay of each axis, 95 % intervals, and whether it can be trusted."""
     import numpy as np
 
-    from xy_sysid import exports
     from xy_sysid.errors import BadInput
-    from xy_sysid.offline import estimate, judged, split
-    from xy_sysid.validation import validate
+    from xy_sysid.files import linear_models
+    from xy_sysid.fitting.of_recording import FIXED, estimate, judged, split, with_orders
+    from xy_sysid.fitting.verdicts import validate
 
     settings = o.settings_from(params, set_)
-    for option, file in (("--model", model), ("--mat", mat)):
-        o.output_file(option, file)
+    o.model_file(model, force)
+    o.output_file("--mat", mat)
     samples = o.period_from(period)
-    structure = _structure(settings, weighting, domain)
+    _structure(settings, weighting, domain)  # refuses what makes no sense, before any work is done
     estimator = _estimator(method)
-    recording = read(rec, axis, topic, effort, span, json)
+    recording = read(recs, reading, json)
     training, unseen = split(recording, held_out)
 
     def work(name: str) -> tuple[AxisEstimate, Fit, Validation]:
@@ -58,18 +57,22 @@ def fit(
         judged(found.frf)
         try:
             with np.errstate(all="ignore"):  # what overflows ends in a figure that the verdicts judge
-                result = estimator(found.frf, structure)
-                return found, result, validate(result, found.frf, _unseen(unseen, name))
+                ours, choice = with_orders(found.frf, settings) if domain == "s" and method not in FIXED else (settings, None)
+                if choice is not None and (method, weighting) == ("best", "sigma"):
+                    result = choice.fit
+                else:
+                    result = estimator(found.frf, _structure(ours, weighting, domain))
+                return found, result, validate(result, found.frf, unseen.run(name).signals if len(unseen) else None, choice=choice)
         except (np.linalg.LinAlgError, ZeroDivisionError):
             raise BadInput("fit", "beyond what numbers can hold", "orders that the data determine", "Lower them or widen the band.") from None
 
-    done, problems = each(chosen(recording, axis), work)
+    done, problems = each(chosen(recording, reading.axes), work)
     fits = {name: result for name, (_, result, _) in done.items()}
-    origin = provenance(rec, recording)
+    origin = provenance(named(recs), recording)
     if model is not None:
-        exports.write_model(model, fits, origin)
+        linear_models.write_model(model, fits, origin)
     if mat is not None:
-        exports.write_mat(mat, fits)
+        linear_models.write_mat(mat, fits)
     if json:
         answers = {name: answer(*parts) for name, parts in done.items()} | {name: {"problem": text} for name, text in problems.items()}
         emit({"recording": origin, "axes": answers})
@@ -77,7 +80,7 @@ def fit(
     for parts in done.values():
         _show(*parts)
     for name, text in problems.items():
-        people.print(f"axis {name}: no model. {text}")
+        say(f"axis {name}: no model. {text}")
 
 
 def _structure(settings: Any, weighting: str, domain: str) -> Structure:
@@ -85,8 +88,7 @@ def _structure(settings: Any, weighting: str, domain: str) -> Structure:
     from typing import get_args
 
     from xy_sysid.errors import BadInput
-    from xy_sysid.fitting.structure import Weighting
-    from xy_sysid.live_fit import structure_from
+    from xy_sysid.fitting.structure import Weighting, structure_from
 
     values: dict[str, Any] = {"weighting": weighting, "domain": domain}
     for name, allowed in (("weighting", get_args(Weighting)), ("domain", ("s", "z"))):
@@ -103,16 +105,6 @@ def _estimator(method: str) -> Any:
     if method not in known:
         raise BadInput("--method", repr(method), ", ".join(known), "Choose one of these.")
     return known[method]
-
-
-def _unseen(recording: Recording, axis: str) -> Any:
-    """(input, output, sampling rate) of the longest gap-free run that no fit saw, or None."""
-    runs = recording.runs()
-    if not runs:
-        return None
-    run = max(runs, key=lambda part: part.stop - part.start)
-    u, y = recording.axis(axis)
-    return u[run], y[run], recording.sampling_rate
 
 
 def answer(found: AxisEstimate, result: Fit, verdicts: Validation) -> dict[str, Any]:
@@ -133,7 +125,12 @@ def answer(found: AxisEstimate, result: Fit, verdicts: Validation) -> dict[str, 
         },
         "poles": result.poles,
         "zeros": result.zeros,
-        "estimates": {item.name: {"value": item.value, "ci95": [item.low, item.high], "unit": item.unit} for item in result.intervals},
+        "estimates": {
+            item.name: {"value": item.value, "ci95": [item.low, item.high], "unit": item.unit, "ci95_with_misfit": [wide.low, wide.high]}
+            for item, wide in zip(result.intervals, result.intervals_with_misfit, strict=True)
+        },
+        "misfit": result.misfit,
+        "trustworthy": verdicts.trustworthy,
         "relative_error": result.relative_error,
         "paper": {"error_cost": result.error_cost, "confidence": result.confidence},
         "cost": result.cost,
@@ -148,18 +145,26 @@ def answer(found: AxisEstimate, result: Fit, verdicts: Validation) -> dict[str, 
     }
 
 
+def _error(result: Fit) -> str:
+    if not result.error_cost < 1e6:
+        return "it describes nothing of the response"
+    return f"relative error {result.error_cost:.2g} % (paper: error cost {result.error_cost:.2f}, confidence {result.confidence:.2f})"
+
+
 def _show(found: AxisEstimate, result: Fit, verdicts: Validation) -> None:
     f = result.frequency
-    people.print(
-        f"axis {found.axis}: {result.method}, {len(f)} lines from {f[0]:.3g} to {f[-1]:.4g} Hz, {found.windows} windows; "
-        f"relative error {100 * result.relative_error:.2g} % (paper: error cost {result.error_cost:.2f}, confidence {result.confidence:.2f})",
+    say(
+        f"axis {found.axis}: {result.method}, {len(f)} lines from {f[0]:.3g} to {f[-1]:.4g} Hz, {found.windows} windows; {_error(result)}",
         style="bold",
     )
     if not result.converged:
-        people.print(f"The fit did not converge: {result.reason}", style="bold")
-    estimates("", result.intervals)
+        say(f"The fit did not converge: {result.reason}", style="bold")
+    estimates("", result.intervals_with_misfit)
+    if result.misfit > 1.0:
+        left = f"the intervals are {result.misfit:.3g} times those of noise alone, for what the model leaves"
+        say(f"  {left}." if verdicts.trustworthy else f"  NOT TRUSTWORTHY: {left}; take them as orders of magnitude.")
     for check in verdicts.verdicts:
-        people.print(f"  {'ok  ' if check.ok else 'WARN'} {check.sentence}")
+        say(f"  {'ok  ' if check.ok else 'WARN'} {check.sentence}")
     for note in found.notes:  # the warnings of the fit are among the verdicts
-        aside.print(f"axis {found.axis}: {note}")
-    people.print()
+        say(f"axis {found.axis}: {note}", aside)
+    say()

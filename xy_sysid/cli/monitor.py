@@ -16,9 +16,10 @@ from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Float64MultiArray
 
 from xy_sysid.errors import BadInput
-from xy_sysid.messages import ArrayMessage
+from xy_sysid.live.messages import ArrayMessage, topic_of
 from xy_sysid.nodes.common import LATCHED_QOS, NAMESPACE
 from xy_sysid.nodes.convert import array_from_ros
+from xy_sysid.nodes.wall import Wall
 
 LISTENERS = 3  # voltage is heard by the machine, position by the excitation, and both by identifier and diagnoser
 QUIET = 1.0  # s without a new result after which the last one has been heard
@@ -37,10 +38,11 @@ class Monitor:
         self._node = rclpy.create_node("demo", namespace=NAMESPACE, context=self._context)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
+        self._wall = Wall(lambda words: self._node.get_logger().error(words))
         for axis in axes:
-            for topic in (f"frf/{axis}", f"transfer_function/{axis}", f"comparison/{axis}"):
-                self._listen(topic)
-        self._node.create_subscription(DiagnosticArray, "metrics", self._on_statuses, 100)
+            for kind in ("frf", "transfer_function", "comparison"):
+                self._listen(topic_of(kind, axis))
+        self._node.create_subscription(DiagnosticArray, "metrics", self._wall.around(self._on_statuses), 100)
         self._client = self._node.create_client(ChangeState, "excitation/change_state")
         self._wanted = [Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE]
         self._call: Any = None
@@ -52,7 +54,7 @@ class Monitor:
             self.arrays[topic] = array_from_ros(topic, message)
             self.changed = time.monotonic()
 
-        self._node.create_subscription(Float64MultiArray, topic, heard, quality)
+        self._node.create_subscription(Float64MultiArray, topic, self._wall.around(heard), quality)
 
     def _on_statuses(self, message: DiagnosticArray) -> None:
         for status in message.status:

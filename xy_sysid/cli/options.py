@@ -12,6 +12,10 @@ from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.settings import IdentifierSettings, Settings, changed, unknown_name
 
 Rec = Annotated[Path, typer.Argument(metavar="REC", help="recording: a rosbag2 folder or file (.db3, .mcap), .csv, .mat or .npz")]
+Recs = Annotated[
+    list[Path],
+    typer.Argument(metavar="REC", help="recordings of one machine: each a rosbag2 folder or file (.db3, .mcap), .csv, .mat or .npz"),
+]
 Axes = Annotated[list[str] | None, typer.Option("--axis", "-a", help="only this axis (may be repeated)")]
 Set = Annotated[
     list[str] | None, typer.Option("--set", "-s", metavar="NAME=VALUE", help="change a setting, for example length=2048 (see docs/settings.md)")
@@ -21,10 +25,18 @@ Topics = Annotated[
     list[str] | None,
     typer.Option("--topic", metavar="WHAT=NAME", help="topic names in a bag: voltage=..., position=... or joints=... (may be repeated)"),
 ]
-Effort = Annotated[bool, typer.Option("--effort", help="take the input from the effort of a JointState, which then holds volts")]
+Effort = Annotated[bool, typer.Option("--effort", help="take the input from the effort of a JointState; its unit is V, or as --unit says")]
+Joints = Annotated[
+    list[str] | None,
+    typer.Option("--joint", metavar="AXIS=JOINT", help="the joint of an axis in a bag's joint states, as x=shoulder_pan_joint (may be repeated)"),
+]
+EffortLag = Annotated[
+    int, typer.Option(metavar="N", min=0, max=100, help="samples by which effort in joint states is older than its stamp; 1 under ros2_control")
+]
 Period = Annotated[str, typer.Option(help="samples of the input's period: auto, none or a number")]
 Span = Annotated[str, typer.Option("--span", metavar="FROM:TO", help="only this part, in seconds from the start, for example 10:70")]
 LARGEST_DOMAIN = 232
+Force = Annotated[bool, typer.Option("--force", help="replace a model file that is there already")]
 Json = Annotated[bool, typer.Option("--json", help="one JSON document on stdout")]
 
 
@@ -32,10 +44,20 @@ def settings_from(params: Path | None, pairs: list[str] | None) -> IdentifierSet
     """The identifier's settings from a parameter file and NAME=VALUE pairs."""
     settings = IdentifierSettings()
     if params is not None:
-        from xy_sysid.parameter_file import parameters
-
-        settings = changed(settings, parameters(read_text(params), str(params)).get("identifier", {}))
+        settings = changed(settings, {name: value for name, value in _of_identifier(params).items() if name != "axes"})
     return changed(settings, values_from(pairs, "--set", "length=2048", IdentifierSettings))
+
+
+def axes_from(params: Path | None) -> tuple[str, ...]:
+    """The axes that a parameter file gives the identifier; none if it does not."""
+    found = _of_identifier(params).get("axes", []) if params is not None else []
+    return tuple(map(str, found)) if isinstance(found, list) else ()
+
+
+def _of_identifier(params: Path) -> dict[str, Any]:
+    from xy_sysid.files.ros_parameters import parameters
+
+    return dict(parameters(read_text(params), str(params)).get("identifier", {}))
 
 
 def values_from(pairs: list[str] | None, option: str, example: str, cls: type[Settings]) -> dict[str, Any]:
@@ -72,6 +94,15 @@ def output_file(option: str, path: Path | None) -> None:
         raise BadInput(option, str(path), "a name that the file system takes", f"{problem.strerror}.") from None
     if not os.access(path if path.exists() else folder, os.W_OK):
         raise BadInput(option, str(path), "a file that you may write", "Choose another place.")
+
+
+def model_file(path: Path | None, force: bool) -> None:
+    """Raises BadInput, before any work is done, when a model cannot be written, or would replace a file and nobody said --force."""
+    output_file("--model", path)
+    if path is not None:
+        from xy_sysid.files.unasked import free
+
+        free("--model", path, force, "add --force")
 
 
 def read_text(path: Path) -> str:
@@ -123,3 +154,8 @@ def topics_from(pairs: list[str] | None) -> dict[str, str]:
             raise BadInput("--topic", repr(pair), "voltage=NAME, position=NAME or joints=NAME", "Change it.")
         found[known[what]] = name
     return found
+
+
+Budget = Annotated[
+    float, typer.Option("--budget", metavar="S", min=0.1, help="seconds of processor time for each axis, after which the best so far is said")
+]

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import sys
+import textwrap
 from collections.abc import Iterable, Mapping
 from dataclasses import fields, is_dataclass
 from typing import TYPE_CHECKING, Any
@@ -15,9 +17,16 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from rich.table import Table
 
 from xy_sysid.errors import ReaderGone
+from xy_sysid.units import readable
 
 if TYPE_CHECKING:
-    from xy_sysid.fitting.result import Estimate
+    from xy_sysid.fitting.result import Interval
+
+
+PLAIN = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+POWER = re.compile("^·10")
+NARROW = 40  # columns below which nothing is broken
+TEXT = ("unit", "in words")  # columns
 
 
 class Terminal(Console):
@@ -62,24 +71,42 @@ def emit(document: Mapping[str, Any]) -> None:
         raise ReaderGone from None
 
 
+def say(text: str = "", to: Terminal = people, style: str | None = None) -> None:
+    """Words for people, broken between words at the terminal's width; what goes on is set in below where it began."""
+    for line in text.split("\n"):
+        inset = " " * (len(line) - len(line.lstrip()) + 2)
+        broken = textwrap.wrap(line, max(to.width, NARROW), subsequent_indent=inset, break_long_words=False, break_on_hyphens=False)
+        for part in broken or [""]:
+            to.print(part, style=style)
+
+
 def table(title: str, columns: Iterable[str], rows: Iterable[Iterable[str]]) -> None:
-    """A table on stdout; the first column and one called unit are text, the others are figures."""
+    """A table on stdout; the first column and those of TEXT are text, the others are figures."""
     made = Table(title=title, title_justify="left", title_style="bold", header_style="bold", box=None, pad_edge=False)
     for number, name in enumerate(columns):
-        made.add_column(name, justify="left" if number == 0 or name == "unit" else "right", overflow="fold", no_wrap=number == 0)
+        made.add_column(name, justify="left" if number == 0 or name in TEXT else "right", overflow="fold", no_wrap=number == 0)
     for row in rows:
         made.add_row(*row)
     people.print(made)
 
 
-def estimates(title: str, items: Iterable[Estimate]) -> None:
+def estimates(title: str, items: Iterable[Interval]) -> None:
     """Figures with their 95 % intervals, in the units that people read."""
-    rows = []
-    for item in items:
-        scale, unit = readable(item.unit)
-        figures = (f"{value * scale:.6g}" if math.isfinite(value) else "-" for value in (item.value, item.low, item.high))
-        rows.append((item.name, *figures, unit))
-    table(title, ("parameter", "value", "95 % low", "95 % high", "unit"), rows)
+    rows = [estimate(item.name, (item.value, item.low, item.high), item.unit) for item in items]
+    table(title, ("parameter", "value", "95 % interval", "unit"), rows)
+
+
+def estimate(name: str, figures: tuple[float, float, float], unit: str) -> tuple[str, str, str, str]:
+    """Name, value, interval and unit of one parameter, with as many figures as the interval is worth; figures: value and both ends."""
+    from xy_sysid.report.words import interval_parts, possible
+
+    scale, shown = readable(unit)
+    value, low, high = (each * scale for each in possible(name, figures))
+    if not (math.isfinite(low) and math.isfinite(high)):
+        return name, f"{value:.5g}" if math.isfinite(value) else "-", "-", shown
+    middle, first, last, power = (part.replace("−", "-") for part in interval_parts(value, low, high))
+    power = f"e{exponent}" if power and (exponent := POWER.sub("", power.translate(PLAIN))) else ""
+    return name, middle + power, f"{first}{power} .. {last}{power}", shown
 
 
 def progress() -> Progress:
@@ -94,8 +121,3 @@ def quantity(value: float, unit: str, digits: int = 4) -> str:
         return "-"
     scale, shown = readable(unit)
     return f"{value * scale:.{digits}g} {shown}".rstrip()
-
-
-def readable(unit: str) -> tuple[float, str]:
-    """Factor and unit as people read it: times and lengths are small."""
-    return (1e3, f"m{unit}") if unit in ("s", "m", "m/s", "m/V", "m/s/V", "m/s^2/V") else (1.0, unit)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,9 +11,10 @@ import typer
 
 from xy_sysid.cli import options as o
 from xy_sysid.cli.diagnose import Own
+from xy_sysid.cli.reading import Map, Rate, Scales, Units
 
 if TYPE_CHECKING:
-    from xy_sysid.page.wishes import Reading
+    from xy_sysid.page.orders import Reading
 
 Recs = Annotated[
     list[Path] | None, typer.Argument(metavar="[REC]...", help="recordings to open side by side; without one the page is live, over ROS 2")
@@ -29,6 +31,10 @@ def page(
     ] = None,
     topic: o.Topics = None,
     effort: o.Effort = False,
+    map_: Map = None,
+    unit: Units = None,
+    scale: Scales = None,
+    rate: Rate = None,
     effect_file: Own = None,
     namespace: Annotated[str, typer.Option(help="ROS namespace of the machine")] = "/xy",
     browse: Annotated[bool, typer.Option("--browse/--no-browse", help="open a browser where there is a display")] = True,
@@ -68,7 +74,9 @@ def page(
         else:
             people.print(address)
 
-    session = Session(Shelf(folder), with_machine, namespace, reading(topic, effort, effect_file))
+    said = {"--map": map_ or [], "--unit": unit or [], "--scale": scale or [], "--rate": [] if rate is None else [f"{rate:g}"]}
+    how = reading(topic, effort, effect_file, said)
+    session = Session(Shelf(folder), with_machine, namespace, how)
     try:
         for path in rec or []:
             session.open(path)
@@ -78,14 +86,21 @@ def page(
     aside.print("the page has ended")
 
 
-def reading(topics: list[str] | None, effort: bool, effect_files: list[Path] | None) -> Reading:
-    """How recordings are read, for the page and for the reports that it makes; raises BadInput."""
-    from xy_sysid.page.wishes import Reading
-    from xy_sysid.user_effects import library
+def reading(topics: list[str] | None, effort: bool, effect_files: list[Path] | None, tables: Mapping[str, list[str]] | None = None) -> Reading:
+    """How recordings are read, for the page and for the reports that it makes; tables: options of tables as they were given. Raises BadInput."""
+    from xy_sysid.files.effects import library
+    from xy_sysid.imports.reading import numbers, pairs
+    from xy_sysid.page.orders import Reading
 
     library(effect_files or [])  # whatever is wrong with them is said here
+    given = {option: texts for option, texts in (tables or {}).items() if texts}
     load: dict[str, Any] = {**o.topics_from(topics), **({"effort_as_voltage": True} if effort else {})}
+    for option, name in (("--map", "columns"), ("--unit", "units")):
+        load |= {name: pairs(given[option], option)} if option in given else {}
+    load |= {"scales": numbers(given["--scale"], "--scale")} if "--scale" in given else {}
+    load |= {"rate": float(given["--rate"][0])} if "--rate" in given else {}
     words = [word for topic in topics or [] for word in ("--topic", topic)] + ["--effort"] * effort
+    words += [word for option, texts in given.items() for text in texts for word in (option, text)]
     words += [word for file in effect_files or [] for word in ("--effect-file", str(file))]
     return Reading(load, tuple(words), tuple(effect_files or ()))
 

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import hashlib
 import platform
 import sys
-from pathlib import Path
 from typing import Any
 
-from xy_sysid.recording import Recording
+from xy_sysid.samples.recording import Recording
 
 
 def fingerprint(recording: Recording, axis: str) -> str:
-    """SHA-256 of the samples of an axis."""
-    return hashlib.sha256(b"".join(values.tobytes() for values in recording.axis(axis))).hexdigest()
+    """SHA-256 of the samples of an axis, of the longest stretch without a gap; empty if there is none."""
+    return recording.run(axis).digest if len(recording) else ""
 
 
-def provenance(path: Path, recording: Recording) -> dict[str, Any]:
+def provenance(source: str, recording: Recording) -> dict[str, Any]:
     """Plain values for a model file or report."""
     from importlib.metadata import PackageNotFoundError, version
 
@@ -27,11 +25,12 @@ def provenance(path: Path, recording: Recording) -> dict[str, Any]:
         except PackageNotFoundError:
             versions[name] = "from source"
     return {
-        "source": _printable(str(path)),
+        "source": _printable(source),
         "command": _printable(" ".join(["xy-sysid", *sys.argv[1:]])),
         "samples": len(recording),
         "sampling_rate_hz": float(recording.sampling_rate),
         "units": {"input": recording.input_unit, "output": recording.output_unit},
+        "measured": recording.measured,
         "data_sha256": {axis: fingerprint(recording, axis) for axis in recording.axes},
         "versions": versions,
         "notes": list(recording.notes),

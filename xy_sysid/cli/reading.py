@@ -1,45 +1,125 @@
-"""Read the recording that a command was given, with progress."""
+"""How a command is told to read recordings, and how it reads them, with progress."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import functools
+import inspect
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_type_hints
 
-from xy_sysid.cli.options import span_from, topics_from
+import typer
+
+from xy_sysid.cli import options as o
 from xy_sysid.cli.output import aside, progress
 from xy_sysid.errors import BadInput
-from xy_sysid.recording import Recording
+from xy_sysid.samples.recording import Recording, Run
+
+if TYPE_CHECKING:
+    from xy_sysid.imports.reading import Reading
 
 Found = TypeVar("Found")
-TABLES = (".csv", ".txt", ".tsv", ".npz", ".mat")
+Command = Callable[..., None]
+Map = Annotated[
+    list[str] | None,
+    typer.Option("--map", metavar="WHAT=COLUMN", help='which column is what: time=Zeit,x.input="Motor Voltage",x.output=Pos (see xy-sysid columns)'),
+]
+Units = Annotated[
+    list[str] | None, typer.Option("--unit", metavar="WHAT=UNIT", help="unit of a column: x.output=mm, output=rad/s (a velocity), time=ms")
+]
+Scales = Annotated[
+    list[str] | None, typer.Option("--scale", metavar="WHAT=FACTOR", help="factor to SI, or to the unit given: x.output=0.5e-6 for counts of 0.5 um")
+]
+Rate = Annotated[float | None, typer.Option(metavar="HZ", help="sampling rate of a table without a time, or whose time is wrong")]
 
 
-def read(path: Path, axes: list[str] | None, topics: list[str] | None, effort: bool, span: str, quiet: bool) -> Recording:
-    """The recording; its notes go to stderr unless ``quiet``."""
-    from xy_sysid.imports import load
+def reading_from(
+    axis: o.Axes = None,
+    topic: o.Topics = None,
+    effort: o.Effort = False,
+    span: o.Span = "",
+    map_: Map = None,
+    unit: Units = None,
+    scale: Scales = None,
+    rate: Rate = None,
+    joint: o.Joints = None,
+    effort_lag: o.EffortLag = 0,
+) -> Reading:
+    """What the options of reading say; they are these parameters."""
+    from xy_sysid.imports.reading import Reading, numbers, pairs
 
-    start, stop = span_from(span)
-    if (topics or effort) and path.suffix.lower() in TABLES:
-        raise BadInput("--topic or --effort", f"for {path}", "for a bag", "A table has columns: leave it out.")
+    start, stop = o.span_from(span)
+    return Reading(
+        columns=pairs(map_ or [], "--map"),
+        units=pairs(unit or [], "--unit"),
+        scales=numbers(scale or [], "--scale"),
+        rate=rate,
+        axes=tuple(axis) if axis else None,
+        start=start,
+        stop=stop,
+        effort_as_voltage=effort,
+        joints=tuple(joint or ()),
+        effort_lag=effort_lag,
+        **o.topics_from(topic),
+    )
+
+
+def reads(command: Command) -> Command:
+    """Give a command the options of reading, in the place of its parameter ``reading``."""
+    own, options = inspect.signature(command), inspect.signature(reading_from)
+    hints: dict[str, Any] = {}
+    for function in (command, reading_from):
+        hints |= get_type_hints(function, {**function.__globals__, "Reading": Any}, include_extras=True)
+
+    @functools.wraps(command)
+    def run(**values: Any) -> None:
+        said = {name: values.pop(name) for name in options.parameters}
+        command(**values, reading=reading_from(**said))
+
+    parameters: list[inspect.Parameter] = []
+    for name, parameter in own.parameters.items():
+        parameters += options.parameters.values() if name == "reading" else [parameter]
+    typed = [parameter.replace(annotation=hints[parameter.name]) for parameter in parameters]
+    typed.sort(key=lambda parameter: parameter.default is not parameter.empty)
+    vars(run)["__signature__"] = own.replace(parameters=typed)
+    run.__annotations__ = {parameter.name: parameter.annotation for parameter in typed}
+    return run
+
+
+def read_each(paths: Sequence[Path], reading: Reading, quiet: bool) -> tuple[Recording, ...]:
+    """The recordings; their notes go to stderr unless ``quiet``."""
+    from xy_sysid.imports.several import read_all
+
     with progress() as bar:
-        task = bar.add_task(f"reading {path.name}", total=1.0)
-        recording = load(
-            path,
-            axes=tuple(axes) if axes else None,
-            effort_as_voltage=effort,
-            start=start,
-            stop=stop,
-            progress=lambda part: bar.update(task, completed=part),
-            **topics_from(topics),
-        )
+        task = bar.add_task(f"reading {', '.join(path.name for path in paths)}", total=1.0)
+        found = read_all(paths, reading, lambda part: bar.update(task, completed=part))
     if not quiet:
-        for note in recording.notes:
-            aside.print(f"note: {note}")
-    return recording
+        for recording in found:
+            for note in recording.notes:
+                aside.print(f"note: {note}")
+    return found
 
 
-def chosen(recording: Recording, axes: list[str] | None) -> tuple[str, ...]:
+def read(paths: Sequence[Path], reading: Reading, quiet: bool) -> Recording:
+    """The recordings as one, with a gap between each and the next."""
+    from xy_sysid.imports.several import joined
+
+    return joined(read_each(paths, reading, quiet))
+
+
+def runs_of(recordings: Sequence[Recording], axis: str) -> tuple[Run, ...]:
+    """The longest run of an axis in each recording. Raises BadInput where these do not belong together."""
+    from xy_sysid.search.of_run import runs_together
+
+    return runs_together([recording.run(axis) for recording in recordings])
+
+
+def named(paths: Sequence[Path]) -> str:
+    """The recordings in a word."""
+    return ", ".join(map(str, paths))
+
+
+def chosen(recording: Recording, axes: Sequence[str] | None) -> tuple[str, ...]:
     """The axes asked for; raises BadInput for one that is not there."""
     for name in axes or []:
         if name not in recording.axes:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -9,27 +10,24 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from xy_sysid.cli import options as o
-from xy_sysid.cli.diagnose import Own, error_cells, parameter_table, samples
-from xy_sysid.cli.output import emit, people, progress, table
+from xy_sysid.cli.diagnose import Own, error_cells, parameter_table
+from xy_sysid.cli.output import emit, progress, say, table
 from xy_sysid.cli.provenance import provenance
-from xy_sysid.cli.reading import chosen, each, read
+from xy_sysid.cli.reading import chosen, each, named, read_each, reads, runs_of
+from xy_sysid.units import bare, motion, moved
 
 if TYPE_CHECKING:
-    from xy_sysid.ladder import Ladder
-    from xy_sysid.open_loop import OpenLoop
+    from xy_sysid.greybox.open_loop import OpenLoop
+    from xy_sysid.imports.reading import Reading
+    from xy_sysid.search.ladder import Ladder
 
 
-PARTLY = 0.7  # of the excess, or of the held-out error, that may be left if effects are to count as a part of the truth
-
-
+@reads
 def refine(
-    rec: o.Rec,
+    recs: o.Recs,
+    reading: Reading,
     add: Annotated[list[str] | None, typer.Option("--add", metavar="NAME", help="add this effect (may be repeated, in this order)")] = None,
     auto: Annotated[bool, typer.Option("--auto", help="go on by itself until the noise floor is reached or nothing helps")] = False,
-    axis: o.Axes = None,
-    topic: o.Topics = None,
-    effort: o.Effort = False,
-    span: o.Span = "",
     effect_file: Own = None,
     tolerance: Annotated[
         float, typer.Option(help="part of the signal that the model may leave; real machines need 0.01 or more", min=1e-6, max=0.5)
@@ -42,16 +40,18 @@ def refine(
     ] = False,
     model: Annotated[Path | None, typer.Option("--model", metavar="FILE", help="write the model with its physical parameters as YAML")] = None,
     mat: Annotated[Path | None, typer.Option("--mat", metavar="FILE", help="write the linear part and all parameters for MATLAB")] = None,
+    force: o.Force = False,
+    budget: o.Budget = 10.0,
     json: o.Json = False,
 ) -> None:
     """Add physical effects to the rigid model, refit everything together, and print the ladder of falling errors."""
     from xy_sysid.errors import BadInput
-    from xy_sysid.greybox import prepare
-    from xy_sysid.open_loop import open_loop, settled
-    from xy_sysid.own_units import in_units
-    from xy_sysid.refinement import refine as logic
-    from xy_sysid.saved_models import write_axis_mat, write_axis_models
-    from xy_sysid.user_effects import library
+    from xy_sysid.files.effects import library
+    from xy_sysid.files.models import write_axis_mat, write_axis_models
+    from xy_sysid.greybox.axis_data import prepare_all
+    from xy_sysid.greybox.open_loop import open_loop, settled
+    from xy_sysid.search.refine import MOST_EFFECTS, Effort
+    from xy_sysid.search.refine import refine as logic
 
     if not add and not auto:
         raise BadInput("refine", "without --add and --auto", "--add NAME, or --auto", "Say what to do.")
@@ -59,72 +59,79 @@ def refine(
     for name in add or []:
         if known[name].category == "base":
             raise BadInput("--add", name, "an effect that is not in every model already", "See xy-sysid effects.")
-    recording = read(rec, axis, topic, effort, span, json)
-    names = chosen(recording, axis)
+    o.model_file(model, force)
+    recordings = read_each(recs, reading, json)
+    recording = recordings[0]
+    names = chosen(recording, reading.axes)
     alone: dict[str, OpenLoop] = {}
     with progress() as bar:
         task = bar.add_task("refining", total=len(names))
 
         def work(name: str) -> Ladder:
             bar.update(task, description=f"refining axis {name}")
-            u, y = samples(recording, name)
-            data = prepare(recording.sampling_rate, u, y, tolerance)
-            found = logic(data, known, given=tuple(add or ()), most=len(add or ()) + 4 if auto else 0)
-            if not found.final.model.ahead:  # free simulation says nothing about those
+            runs = runs_of(recordings, name)
+            run = runs[0]
+            data = prepare_all(run.sampling_rate, [(one.voltage, one.position) for one in runs], tolerance, run.units)
+            found = logic(data, known, tuple(add or ()), Effort(MOST_EFFECTS if auto else 0, budget, time.process_time))
+            if not found.final.model.ahead and len(runs) == 1:  # free simulation says nothing about those
                 found = replace(found, final=settled(data, found.final)) if simulate_alone else found
-                alone[name] = open_loop(recording.sampling_rate, y, found.final.simulated)
+                alone[name] = open_loop(run.sampling_rate, run.position, found.final.simulated)
             bar.advance(task)
             return found
 
         found, refused = each(names, work)
-    origin = provenance(rec, recording)
+    origin = provenance(named(recs), recording)
     if model is not None:
         write_axis_models(model, {name: ladder.final for name, ladder in found.items()}, origin)
     if mat is not None:
         write_axis_mat(mat, {name: ladder.final for name, ladder in found.items()})
-    units, unit = (recording.input_unit, recording.output_unit), f"{recording.output_unit}/s"
     if json:
-        answers: dict[str, Any] = {
-            name: in_units(_answer(ladder, unit) | _alone(alone.get(name), recording.output_unit), units) for name, ladder in found.items()
-        }
+        answers: dict[str, Any] = {name: _answer(ladder) | _alone(alone.get(name), recording.output_unit) for name, ladder in found.items()}
         emit({"recording": origin, "axes": answers, "refused": refused})
         return
+    scale, unit = motion(recording.units.speed)
     for name, ladder in found.items():
         rows = [
-            (label, f"{1e3 * step.fit.training_error:.4g}", held_out, over)
+            (label, f"{scale * step.fit.training_error:.4g}", held_out, over)
             for step in ladder.steps
             for label, held_out, over in [error_cells(step.added or "rigid, with delay", step.fit)]
         ]
-        table(f"axis {name}: m{unit}, floor {1e3 * ladder.final.noise_floor:.4g}", ("added", "training error", "held-out error", "times floor"), rows)
-        people.print(f"  {_words(ladder)}", markup=False)
-        parameter_table(ladder.final, units)
+        table(
+            f"axis {name}: {unit}, floor {scale * ladder.final.noise_floor:.4g}", ("added", "training error", "held-out error", "times floor"), rows
+        )
+        say(f"  {_words(ladder)}")
+        parameter_table(ladder.final)
         if name in alone:
-            people.print(f"  {_alone_in_words(alone[name], recording.output_unit)}", markup=False)
-        people.print()
+            say(f"  {_alone_in_words(alone[name], recording.output_unit)}")
+        say()
     for name, text in refused.items():
-        people.print(f"axis {name}: {text}", markup=False)
+        say(f"axis {name}: {text}")
 
 
 def verdict(ladder: Ladder) -> str:
     """The contract's word."""
-    if ladder.explained:
+    from xy_sysid.search.criteria import AT_FLOOR
+    from xy_sysid.story.standing import nearer
+
+    if ladder.final.excess < AT_FLOOR:
         return "explained"
-    first, last = ladder.steps[0].fit, ladder.final
-    gone = last.excess < PARTLY * first.excess or last.held_out_error < PARTLY * first.held_out_error
-    return "partly" if ladder.effects and gone else "not_in_library"
+    first, last = ((fit.excess, fit.held_out_error) for fit in (ladder.steps[0].fit, ladder.final))
+    return "partly" if ladder.effects and nearer(first, last) else "not_in_library"
 
 
 def _words(ladder: Ladder) -> str:
     names = ", ".join(ladder.effects) or "nothing"
-    return {
+    left = f"what is left beyond the noise is {moved(ladder.discrepancy, ladder.final.units.speed)}"
+    said = {
         "explained": f"Explained by the base and {names}: the held-out error is at the noise floor.",
-        "partly": f"{names} explain a part; the rest is not at the floor.",
+        "partly": f"{names} explain {100 * ladder.explained:.3g} % of the error's power; {left}.",
         "not_in_library": "No effect of the library brings the error down.",
     }[verdict(ladder)]
+    return f"{said} The search was stopped when its time was up." if ladder.stopped else said
 
 
 def _alone_in_words(found: OpenLoop, unit: str) -> str:
-    where = f"{1e3 * found.rms:.3g} m{unit} rms, {1e3 * found.worst:.3g} at worst ({100 * found.share:.2g} % of the measured spread)"
+    where = f"{moved(found.rms, unit)} rms, {bare(found.worst, unit)} at worst ({100 * found.share:.2g} % of the measured spread)"
     return f"Open loop, the position of the whole record simulated from the input alone: off by {where}."
 
 
@@ -134,8 +141,8 @@ def _alone(found: OpenLoop | None, unit: str) -> dict[str, Any]:
     return {"open_loop": {"rms": found.rms, "worst": found.worst, "share": found.share, "unit": unit}}
 
 
-def _answer(ladder: Ladder, unit: str) -> dict[str, Any]:
-    from xy_sysid.findings import parameters
+def _answer(ladder: Ladder) -> dict[str, Any]:
+    from xy_sysid.search.findings import parameters
 
     rungs = [
         {
@@ -149,8 +156,13 @@ def _answer(ladder: Ladder, unit: str) -> dict[str, Any]:
     ]
     return {
         "ladder": rungs,
-        "unit": unit,
+        "unit": ladder.final.units.speed,
         "verdict": verdict(ladder),
         "effects": ladder.effects,
+        "explained": ladder.explained,
+        "noise": ladder.noise,
+        "discrepancy": ladder.discrepancy,
+        "stopped": "budget" if ladder.stopped else None,
+        "refused": [{"effect": " and ".join(names), "reason": reason} for names, reason in ladder.refused],
         "model": {"parameters": parameters(ladder.final.parameters)},
     }

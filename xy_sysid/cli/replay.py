@@ -10,11 +10,12 @@ import typer
 
 from xy_sysid.cli import options as o
 from xy_sysid.cli.diagnose import Own
-from xy_sysid.cli.output import aside, emit, estimates, people, progress, table
+from xy_sysid.cli.output import aside, emit, estimates, progress, say, table
 
 if TYPE_CHECKING:
-    from xy_sysid.findings import Rung
-    from xy_sysid.live_fit import Update
+    from xy_sysid.live.fitter import Update
+    from xy_sysid.search.findings import Rung
+    from xy_sysid.units import Units
 
 
 def replay(
@@ -24,6 +25,8 @@ def replay(
     params: o.Params = None,
     topic: o.Topics = None,
     effort: o.Effort = False,
+    joint: o.Joints = None,
+    effort_lag: o.EffortLag = 0,
     diagnose: Annotated[bool, typer.Option("--diagnose", help="then name what is missing and add it, as the node diagnoser does")] = False,
     effect_file: Own = None,
     out: Annotated[Path | None, typer.Option("--out", metavar="BAG", help="write what the node would have published")] = None,
@@ -34,16 +37,18 @@ def replay(
     from contextlib import ExitStack
 
     from xy_sysid.bags import BagWriter
-    from xy_sysid.bags.streaming import stream_blocks
-    from xy_sysid.diagnoser import Diagnoser, all_at_once
+    from xy_sysid.bags.atomic import whole
+    from xy_sysid.bags.streaming import Topics, stream_blocks
     from xy_sysid.errors import BadInput, BadRecording
-    from xy_sysid.identifier import Identifier
-    from xy_sysid.live_story import sentence as words
-    from xy_sysid.pairing import KINDS
-    from xy_sysid.replay import replay as logic
-    from xy_sysid.settings import DiagnoserSettings
-    from xy_sysid.story_document import document
-    from xy_sysid.user_effects import library
+    from xy_sysid.files.effects import library
+    from xy_sysid.live.diagnoser import Diagnoser, all_at_once
+    from xy_sysid.live.identifier import Identifier
+    from xy_sysid.live.replay import replay as logic
+    from xy_sysid.samples.pairing import QUANTITIES
+    from xy_sysid.settings import DiagnoserSettings, given
+    from xy_sysid.story.acts import sentence as words
+    from xy_sysid.story.document import document
+    from xy_sysid.units import USUAL, motion
 
     settings = o.settings_from(params, set_)
     if out is not None and out.exists():
@@ -56,19 +61,26 @@ def replay(
         bar = stack.enter_context(progress())
         task = bar.add_task(f"replaying {bag.name}", total=None)
         names: dict[str, Any] = dict(o.topics_from(topic))
-        units: list[tuple[str, str]] = []
+        units: list[Units] = []
         notes: list[str] = []
-        heard = stream_blocks(bag, effort_as_voltage=effort, notes=notes, about=units.append, **names)
-        blocks = (item for item in heard if item[0] in KINDS)
+        if settings.source == "joint_state":
+            names.setdefault("joint_topic", settings.joint_topic if settings.joint_topic.startswith("/") else f"/xy/{settings.joint_topic}")
+        joints, lag = tuple(joint or given(settings.joints)), effort_lag or settings.effort_lag
+        wanted = Topics(effort_as_voltage=effort or settings.effort_as_voltage, joints=joints, effort_lag=lag, **names)
+        heard = stream_blocks(bag, wanted, notes=notes, about=units.append)
+        blocks = (item for item in heard if item[0] in QUANTITIES)
         kind, first = next(blocks, (None, None))
         if kind is None or first is None:
             raise BadRecording(bag, "holds no samples", "Give a bag with voltage and position.")
-        for name in axis or []:
+        wished = tuple(axis or (name for name in o.axes_from(params) if name in first.axes)) or first.axes
+        for name in wished:
             if name not in first.axes:
                 raise BadInput("--axis", repr(name), ", ".join(first.axes), "Choose one of these.")
-        identifier = Identifier(settings, tuple(axis) if axis else first.axes, units[0])
+        if settings.units != USUAL:
+            units[0] = settings.units
+        identifier = Identifier(settings, wished, units[0])
 
-        diagnoser = Diagnoser(DiagnoserSettings(reorder=settings.reorder), identifier.axes)
+        diagnoser = Diagnoser(DiagnoserSettings(reorder=settings.reorder, input_unit=units[0].input, output_unit=units[0].output), identifier.axes)
 
         def all_blocks() -> Any:
             for name, block in itertools.chain([(kind, first)], blocks):
@@ -83,7 +95,7 @@ def replay(
                 if part.track.alarm and name not in alarms:
                     alarms[name] = f"after {update.request.seconds:.1f} s of data: {_alarm(name, part)}"
             if out is not None:
-                writer = writer or stack.enter_context(BagWriter(out))
+                writer = writer or stack.enter_context(BagWriter(stack.enter_context(whole(out))))
                 stamp = round(update.request.seq / update.request.sampling_rate * 1e9)
                 for message in update.arrays():
                     writer.write_array(f"/xy/{message.topic}", message.labels, message.sizes, message.data, stamp)
@@ -110,22 +122,23 @@ def replay(
             }
         )
         return
-    people.print(f"{bag}: {seconds_heard:.1f} s of data in {seconds:.2f} s ({seconds_heard / seconds:.0f} times real time), {updates} fits")
+    say(f"{bag}: {seconds_heard:.1f} s of data in {seconds:.2f} s ({seconds_heard / seconds:.0f} times real time), {updates} fits")
     for note in notes:
-        aside.print(f"note: {note}")
+        say(f"note: {note}", aside)
     for reason, sentence in identifier.sentences.items():
-        aside.print(f"{reason}: {sentence}")
+        say(f"{reason}: {sentence}", aside)
     for sentence in alarms.values():
-        people.print(f"ALARM {sentence}", style="bold")
+        say(f"ALARM {sentence}", style="bold")
     for name, part in last.axes.items():
         if part.fit is None:
-            people.print(f"axis {name}: {part.problem}")
+            say(f"axis {name}: {part.problem}")
             continue
-        estimates(f"axis {name}: relative error {100 * part.fit.relative_error:.2g} %", part.fit.intervals)
+        estimates(f"axis {name}: relative error {100 * part.fit.relative_error:.2g} %", part.fit.intervals_with_misfit)
     for name, story in stories.items():
-        people.print(words(story), markup=False)
-        rows = [(step.rung.label, *(f"{1e3 * value:.4g}" for value in errors(step.rung))) for step in story.steps]
-        table(f"axis {name}: mm/s", ("step", "training error", "held-out error", "noise floor"), rows)
+        say(words(story))
+        scale, unit = motion(story.units.speed)
+        rows = [(step.rung.label, *(f"{scale * value:.4g}" for value in errors(step.rung))) for step in story.steps]
+        table(f"axis {name}: {unit}", ("step", "training error", "held-out error", "noise floor"), rows)
 
 
 def errors(rung: Rung) -> tuple[float, float, float]:
@@ -134,6 +147,6 @@ def errors(rung: Rung) -> tuple[float, float, float]:
 
 
 def _alarm(name: str, part: Any) -> str:
-    from xy_sysid.tracking import alarm_sentence
+    from xy_sysid.live.resonance_watch import alarm_sentence
 
     return alarm_sentence(name, part.track)

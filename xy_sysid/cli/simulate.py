@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import json as _json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from xy_sysid.cli import options as o
-from xy_sysid.cli.output import emit, people, plain, progress
-
-if TYPE_CHECKING:
-    from xy_sim.machine import Machine
-    from xy_sysid.recording import Recording
-    from xy_sysid.settings import ExcitationSettings
+from xy_sysid.cli.output import emit, plain, progress, say
+from xy_sysid.units import motion
 
 
 def simulate(
@@ -37,19 +33,23 @@ def simulate(
     json: o.Json = False,
 ) -> None:
     """Simulate the XY table and write a recording."""
+    from xy_sysid.bags.atomic import write_text
+    from xy_sysid.cli.simulated_recording import excitation, table_of
+    from xy_sysid.excitation.lockstep import drive
     from xy_sysid.imports import save
+    from xy_sysid.settings import AxisExcitation
 
     _free(out)
     o.output_file("--truth", truth)
-    table = _machine(machine, effect, hidden, seed, clean)
-    settings = _excitation(table, excite, seed)
+    table = table_of(machine, effect or [], hidden, seed, clean)
+    settings = excitation(table, o.values_from(excite, "--excite", "rms=0.5", AxisExcitation), seed)
     with progress() as bar:
         task = bar.add_task("simulating", total=duration)
         recording = drive(table, settings, duration, lambda seconds: bar.update(task, completed=seconds))
     save(recording, out)
     told = {"machine": table.spec.description or machine, "axes": {axis: table.truth(axis) for axis in table.axes}}
     if truth is not None:
-        truth.write_text(_json.dumps(plain(told), indent=1) + "\n", encoding="utf-8")
+        write_text(truth, _json.dumps(plain(told), indent=1) + "\n")
     travel = {axis: [float(recording.position[:, k].min()), float(recording.position[:, k].max())] for k, axis in enumerate(recording.axes)}
     answer: dict[str, Any] = {"output": str(out), "samples": len(recording), "sampling_rate": recording.sampling_rate, "travel": travel}
     if hidden is None:
@@ -57,31 +57,10 @@ def simulate(
     if json:
         emit(answer)
         return
-    people.print(f"{out}: {len(recording)} samples of {', '.join(recording.axes)} at {recording.sampling_rate:g} Hz")
+    say(f"{out}: {len(recording)} samples of {', '.join(recording.axes)} at {recording.sampling_rate:g} Hz")
+    scale, unit = motion(recording.output_unit)
     for axis, (low, high) in travel.items():
-        people.print(f"axis {axis}: travel {low * 1e3:.2f} .. {high * 1e3:.2f} mm")
-
-
-def _machine(name: str, effects: list[str] | None, hidden: int | None, seed: int, clean: bool) -> Machine:
-    from xy_sim.effect_text import with_effects
-    from xy_sim.hidden import draw
-    from xy_sim.machine import Machine
-    from xy_sysid.errors import BadInput
-
-    if hidden is not None and effects:
-        raise BadInput("--hidden", f"{hidden} together with --effect", "one of them", "Leave one out.")
-    if hidden is not None:
-        base = "rigid.yaml" if name == "paper.yaml" else name
-        return draw(hidden, 1, base, clean=clean)
-    return with_effects(Machine.from_file(name, seed or None, clean), effects or [])
-
-
-def _excitation(table: Machine, pairs: list[str] | None, seed: int) -> ExcitationSettings:
-    from xy_sysid.settings import AxisExcitation, ExcitationSettings, build
-
-    values = o.values_from(pairs, "--excite", "rms=0.5", AxisExcitation)
-    axes = {axis: build(AxisExcitation, {"seed": seed + 1 + k, **values}, "--excite") for k, axis in enumerate(table.axes)}
-    return build(ExcitationSettings, {"rate": table.rate, "lockstep": True, "speed": 0.0, "axes": axes})
+        say(f"axis {axis}: travel {low * scale:.2f} .. {high * scale:.2f} {unit}")
 
 
 def _free(out: Path) -> None:
@@ -92,33 +71,3 @@ def _free(out: Path) -> None:
     if out.exists():
         raise BadInput("output", str(out), "a name that is not there yet", "Choose another name or remove it first.")
     writer_of(out)
-
-
-def drive(table: Machine, settings: ExcitationSettings, duration: float, tell: Any) -> Recording:
-    """Excitation and machine in lockstep, without ROS: block k is made with the positions of block k - ahead."""
-    import numpy as np
-
-    from xy_sysid.drive import Drive
-    from xy_sysid.recording import Recording
-    from xy_sysid.stream import Block
-
-    driver = Drive(settings)
-    total = round(duration * settings.rate)
-    voltage, position = np.empty((2, total, len(table.axes)))
-    zero = Block(table.axes, np.zeros(1), np.zeros(1), np.zeros((1, len(table.axes))))
-    driver.start()
-    driver.see(zero)
-    answers: list[Block] = []
-    done = 0
-    while done < total:
-        if len(answers) >= settings.ahead:
-            driver.see(answers.pop(0))
-        block = driver.next(min(settings.block, total - done))
-        answer = table.step(block.values)
-        answers.append(Block(table.axes, block.seq, block.time, answer))
-        voltage[done : done + len(block)], position[done : done + len(block)] = block.values, answer
-        done += len(block)
-        if done % (200 * settings.block) == 0:
-            tell(done / settings.rate)
-    seq = np.arange(total)
-    return Recording(settings.rate, table.axes, seq, seq / settings.rate, voltage, position, source="simulated")

@@ -2,48 +2,50 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from xy_sysid.cli import options as o
-from xy_sysid.cli.output import aside, emit, people, progress
+from xy_sysid.cli.output import aside, emit, progress, say
 from xy_sysid.cli.provenance import provenance
-from xy_sysid.cli.reading import chosen, read
+from xy_sysid.cli.reading import chosen, read, reads
 
 if TYPE_CHECKING:
-    from xy_sysid.recording import Recording
+    from xy_sysid.imports.reading import Reading
     from xy_sysid.report.study import AxisStudy
+    from xy_sysid.samples.recording import Recording
 
 
+@reads
 def study(
     rec: o.Rec,
+    reading: Reading,
     out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="the page to write")] = Path("study.html"),
     loose: Annotated[
         Path | None, typer.Option("--loose", metavar="REC2", help="the same machine afterwards (bolts loosened): how far did the resonance move?")
     ] = None,
     loose_span: Annotated[str, typer.Option("--loose-span", metavar="FROM:TO", help="only this part of REC2, in seconds from its start")] = "",
-    axis: o.Axes = None,
     set_: o.Set = None,
     params: o.Params = None,
-    topic: o.Topics = None,
-    effort: o.Effort = False,
     period: o.Period = "auto",
-    span: o.Span = "",
     json: o.Json = False,
 ) -> None:
     """The paper's study (figures 2-7, tables 1-2) of any recording, as one HTML page that opens offline."""
+    from xy_sysid.bags.atomic import write_text
     from xy_sysid.report.captions import summary
-    from xy_sysid.report.page import study_page
     from xy_sysid.report.study import study_axis
+    from xy_sysid.report.study_page import study_page
 
     settings = o.settings_from(params, set_)
     samples = o.period_from(period)
     _writable(out, loose, loose_span)
-    recording = read(rec, axis, topic, effort, span, json)
-    names = chosen(recording, axis)
-    second = read(loose, axis, topic, effort, loose_span, json) if loose is not None else None
+    start, stop = o.span_from(loose_span)
+    recording = read([rec], reading, json)
+    names = chosen(recording, reading.axes)
+    second = read([loose], replace(reading, start=start, stop=stop), json) if loose is not None else None
     if second is not None:
         _same_machine(recording, second, names)
     studies: dict[str, AxisStudy] = {}
@@ -53,21 +55,21 @@ def study(
             studies[name] = study_axis(recording, name, settings, samples, second)
             bar.advance(task)
     _any(studies)
-    origins: dict[str, dict[str, Any]] = {"Recording": provenance(rec, recording)}
+    origins: dict[str, dict[str, Any]] = {"Recording": provenance(str(rec), recording)}
     if loose is not None and second is not None:
-        origins["Second recording (after)"] = provenance(loose, second)
-    units = (recording.input_unit, recording.output_unit)
+        origins["Second recording (after)"] = provenance(str(loose), second)
+    units = recording.units
     page = study_page(rec.name, studies, units, settings.min_coherence, origins, recording.notes)
-    write_page(out, page)
+    write_text(out, page)
     if json:
         emit({"page": str(out), "bytes": len(page.encode()), "recordings": origins, "axes": {name: answer(one) for name, one in studies.items()}})
         return
     for one in studies.values():
-        people.print(summary(one))
+        say(summary(one))
     for one in studies.values():
         for note in one.estimate.notes if one.estimate else ():
-            aside.print(f"axis {one.axis}: {note}")
-    people.print(f"wrote {out}, {len(page.encode()) / 1e6:.1f} MB")
+            say(f"axis {one.axis}: {note}", aside)
+    say(f"wrote {out}, {len(page.encode()) / 1e6:.1f} MB")
 
 
 def answer(one: AxisStudy) -> dict[str, Any]:
@@ -127,13 +129,3 @@ def _any(studies: dict[str, AxisStudy]) -> None:
     if all(one.frf is None for one in studies.values()):
         first = next(iter(studies.values()))
         raise BadInput("recording", "without a response on any axis", "one that moves and is excited", first.problem)
-
-
-def write_page(out: Path, page: str) -> None:
-    """Raises BadInput, in one line, when the file cannot be written."""
-    from xy_sysid.errors import BadInput
-
-    try:
-        out.write_text(page, encoding="utf-8")
-    except OSError as problem:
-        raise BadInput("--out", f"{out} ({problem.strerror})", "a file that can be written", "Choose another place.") from None

@@ -8,9 +8,9 @@ from collections.abc import Iterator
 import numpy as np
 import scipy.signal
 
-from xy_sysid.effects.contract import Effect, Parameter, law
-from xy_sysid.effects.scene import Guess, Scene, columns
-from xy_sysid.stream import FloatArray
+from xy_sysid.effects._contract import Effect, Parameter, law
+from xy_sysid.effects._scene import Guess, Scene, columns
+from xy_sysid.samples.block import FloatArray
 
 
 @law

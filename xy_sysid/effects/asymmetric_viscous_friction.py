@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from xy_sysid.effects.contract import Effect, Parameter, law
-from xy_sysid.effects.scene import Guess, Scene, columns
+from xy_sysid.effects._contract import Effect, Parameter, law
+from xy_sysid.effects._scene import Guess, Scene, columns
 
 
 @law
@@ -30,7 +30,7 @@ EFFECT = Effect(
     parameters=(Parameter("asymmetry", "", -0.95, 0.95, 0.3, "part by which the drag forth is above and back below the mean", positive=False),),
     shows="error of one sign that grows with speed, forth and back; even harmonics",
     look_alikes=("asymmetric_friction", "constant_load"),
-    experiment="constant speeds both ways, slow and fast: this difference between the two voltages grows with speed, that of a load stays",
+    experiment="constant speeds both ways, slow and fast: this difference between the two inputs grows with speed, that of a load stays",
     functions={"force": force},
     guesses=guesses,
 )

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from xy_sysid.effects.contract import Effect, Parameter, law
-from xy_sysid.effects.scene import Guess, Scene, columns
-from xy_sysid.stream import FloatArray
+from xy_sysid.effects._contract import Effect, Parameter, law
+from xy_sysid.effects._scene import Guess, Scene, columns
+from xy_sysid.samples.block import FloatArray
 
 
 @law
@@ -44,7 +44,7 @@ EFFECT = Effect(
     source="Hanselman, Brushless Permanent Magnet Motor Design, 2nd ed., 2003, ch. 5",
     category="force",
     parameters=(
-        Parameter("amplitude", "V", 1e-6, 100.0, 0.15, "drive voltage that overcomes it"),
+        Parameter("amplitude", "V", 1e-6, 100.0, 0.15, "input that overcomes it"),
         Parameter("period", "m", 1e-5, 10.0, 2.5e-3, "length of one period"),
         Parameter("phase", "rad", -100.0, 100.0, 0.0, "phase at x = 0", positive=False),
     ),

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from xy_sysid.effects.contract import Effect, Parameter, law
-from xy_sysid.effects.scene import Guess, Scene, columns
+from xy_sysid.effects._contract import Effect, Parameter, law
+from xy_sysid.effects._scene import Guess, Scene, columns
 
 
 @law
@@ -28,10 +28,10 @@ EFFECT = Effect(
     validity="the same at every place, speed and time",
     source="Janot, Gautier & Brunot, Data set and reference models of EMPS, 2019 (offset in the inverse model); Newton's second law",
     category="force",
-    parameters=(Parameter("load", "V", -100.0, 100.0, 0.15, "drive voltage that holds it", positive=False),),
+    parameters=(Parameter("load", "V", -100.0, 100.0, 0.15, "input that holds it", positive=False),),
     shows="the mean velocity differs from the model's; it drifts to one side",
     look_alikes=("asymmetric_friction", "hardening_stiffness"),
-    experiment="constant speed both ways, and rest under small voltages of both signs",
+    experiment="constant speed both ways, and rest under small inputs of both signs",
     functions={"force": force},
     guesses=guesses,
     on_table=True,

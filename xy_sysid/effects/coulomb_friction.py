@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from xy_sysid.effects.contract import Effect, Parameter, law
-from xy_sysid.effects.scene import Guess, Scene, columns
+from xy_sysid.effects._contract import Effect, Parameter, law
+from xy_sysid.effects._scene import Guess, Scene, columns
 
 
 @law
@@ -23,13 +23,13 @@ EFFECT = Effect(
     name="coulomb_friction",
     law="F = coulomb sign(v); at rest it holds up to coulomb",
     meaning="preloaded nut, guide seals and bearings",
-    validity="speeds well above breakaway, motion well above micrometres",
+    validity="speeds well above breakaway, motion well above the bending of asperities",
     source="Olsson et al., Friction models and friction compensation, Eur. J. Control 4 (1998), eq. 1",
     category="friction",
-    parameters=(Parameter("coulomb", "V", 1e-6, 100.0, 0.2, "drive voltage that it eats, moving or not"),),
+    parameters=(Parameter("coulomb", "V", 1e-6, 100.0, 0.2, "input that it eats, moving or not"),),
     shows="error follows the direction of motion; the gain looks smaller at small amplitude; odd harmonics",
     look_alikes=("stribeck_friction", "presliding_hysteresis", "dead_zone"),
-    experiment="slow reversals show breakaway and micrometre loops; constant speed shows that the level stays",
+    experiment="slow reversals show breakaway and tiny loops; constant speed shows that the level stays",
     functions={"level": level},
     guesses=guesses,
     family="dry_friction",

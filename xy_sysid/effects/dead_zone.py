@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from xy_sysid.effects.contract import Effect, Parameter, law
-from xy_sysid.effects.scene import Guess, Scene, columns
-from xy_sysid.stream import FloatArray
+from xy_sysid.effects._contract import Effect, Parameter, law
+from xy_sysid.effects._scene import Guess, Scene, columns
+from xy_sysid.samples.block import FloatArray
 
 
 @law
@@ -42,9 +42,9 @@ EFFECT = Effect(
     source="Tao & Kokotovic, Adaptive Control of Systems with Actuator Nonlinearities, Wiley 1996, sec. 2.1",
     category="input",
     parameters=(Parameter("width", "V", 1e-6, 100.0, 0.15, "half of the zone"),),
-    shows="error follows the sign of the voltage, not of the motion",
+    shows="error follows the sign of the input, not of the motion",
     look_alikes=("coulomb_friction",),
-    experiment="fast excitation parts the sign of voltage from the sign of velocity; at constant voltage they look the same",
+    experiment="fast excitation parts the sign of the input from the sign of velocity; at constant input they look the same",
     functions={"output": output},
     guesses=guesses,
 )

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from xy_sysid.effects.contract import Effect, Parameter, law
-from xy_sysid.effects.scene import Guess, Scene, columns
+from xy_sysid.effects._contract import Effect, Parameter, law
+from xy_sysid.effects._scene import Guess, Scene, columns
 
 LIMIT = 0.9  # largest change: a drive neither stops nor doubles by warming up
 
@@ -29,7 +29,7 @@ EFFECT = Effect(
     source="Krishnan, Permanent Magnet Synchronous and Brushless DC Motor Drives, CRC 2010, sec. 1.3 (remanence -0.1 %/K)",
     category="input",
     parameters=(Parameter("rate", "1/s", -1.0, 1.0, -0.002, "change of the gain per second, as a part of it", positive=False),),
-    shows="error grows towards both ends of the recording, in proportion to the voltage",
+    shows="error grows towards both ends of the recording, in proportion to the input",
     look_alikes=("saturation",),
     experiment="record again, warm from the start: the drift is gone or smaller",
     functions={"output": output},

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from xy_sysid.effects.contract import Effect, Parameter, law
-from xy_sysid.effects.scene import Guess, Scene, columns
+from xy_sysid.effects._contract import Effect, Parameter, law
+from xy_sysid.effects._scene import Guess, Scene, columns
 
 
 @law
@@ -28,13 +28,14 @@ EFFECT = Effect(
     source="Worden & Tomlinson, Nonlinearity in Structural Dynamics, 2001, sec. 2.2.1 (Duffing)",
     category="force",
     parameters=(
-        Parameter("cubic", "V/m3", 1e-6, 1e12, 3000.0, "drive voltage that holds it, per cube of the distance"),
+        Parameter("cubic", "V/m3", 1e-6, 1e12, 3000.0, "input that holds it, per cube of the distance"),
         Parameter("linear", "V/m", -1e6, 1e6, 0.0, "the same, per distance", positive=False),
     ),
     shows="error grows towards both ends of the travel, with the sign of the position",
-    look_alikes=("constant_load",),
-    experiment="hold still at several places: the voltage needed is the law",
+    look_alikes=("return_spring", "constant_load"),
+    experiment="hold still at several places: the input needed is the law",
     functions={"force": force},
     guesses=guesses,
+    family="spring",
     on_table=True,
 )

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from xy_sysid.effects.contract import Effect, Parameter, law
-from xy_sysid.effects.scene import Guess, Scene, columns
-from xy_sysid.stream import FloatArray
+from xy_sysid.effects._contract import Effect, Parameter, law
+from xy_sysid.effects._scene import Guess, Scene, columns
+from xy_sysid.samples.block import FloatArray
 
 
 @law
@@ -50,9 +50,9 @@ EFFECT = Effect(
         Parameter("period", "m", 1e-4, 10.0, 0.03, "length of one period"),
         Parameter("phase", "rad", -100.0, 100.0, 0.0, "phase at x = 0", positive=False),
     ),
-    shows="error repeats along the travel, in proportion to the voltage",
+    shows="error repeats along the travel, in proportion to the input",
     look_alikes=("cogging", "lead_error"),
-    experiment="a slow traverse at no load: cogging stays, a change of the gain needs voltage",
+    experiment="a slow traverse at no load: cogging stays, a change of the gain needs more input",
     functions={"force": force},
     guesses=guesses,
 )

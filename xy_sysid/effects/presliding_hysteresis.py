@@ -7,10 +7,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from xy_sysid.compiled import compiled
-from xy_sysid.effects.contract import Effect, Parameter, law
-from xy_sysid.effects.scene import Guess, Scene, columns
-from xy_sysid.stream import FloatArray
+from xy_sysid.effects._contract import Effect, Parameter, law
+from xy_sysid.effects._scene import Guess, Scene, columns
+from xy_sysid.jit import compiled
+from xy_sysid.samples.block import FloatArray
 
 LENGTHS = (3e-6, 10e-6, 30e-6, 100e-6)  # m
 
@@ -63,7 +63,7 @@ def _deflection(v: FloatArray, period: float, length: float) -> FloatArray:
 EFFECT = Effect(
     name="presliding_hysteresis",
     law="z' = v - |v| z / length; F = coulomb z / length + damping z'",
-    meaning="asperities bend before they break: micrometre loops around each reversal; all dry friction goes through them",
+    meaning="asperities bend before they break: tiny loops around each reversal; all dry friction goes through them",
     validity="loops that do not drift; other dry friction in the model scales the sliding level",
     source="C. Canudas de Wit et al., A new model for control of systems with friction, IEEE TAC 40 (1995), eq. 1-3",
     category="bristle",
@@ -72,7 +72,7 @@ EFFECT = Effect(
         Parameter("length", "m", 5e-7, 1e-2, 10e-6, "deflection at which the bristles slide"),
         Parameter("damping", "V/(m/s)", 1e-3, 1e3, 2.0, "damping of the bristles"),
     ),
-    shows="as Coulomb friction, with a spring around each reversal: loops over micrometres, a resonance at small amplitude",
+    shows="as Coulomb friction, with a spring around each reversal: tiny loops, a resonance at small amplitude",
     look_alikes=("coulomb_friction", "stribeck_friction"),
     experiment="small amplitudes that never slide: force against position is a spring, not a step",
     functions={"bend": bend, "force": force},

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from xy_sysid.effects.contract import Effect, Parameter, law
-from xy_sysid.effects.scene import Guess, Scene, columns
-from xy_sysid.stream import FloatArray
+from xy_sysid.effects._contract import Effect, Parameter, law
+from xy_sysid.effects._scene import Guess, Scene, columns
+from xy_sysid.samples.block import FloatArray
 
 
 @law
@@ -42,8 +42,8 @@ EFFECT = Effect(
     validity="the same limit on both sides, without memory; limit 0 means none",
     source="Khalil, Nonlinear Systems, 3rd ed., sec. 1.2.7",
     category="input",
-    parameters=(Parameter("limit", "V", 1e-3, 1e6, 1.5, "largest voltage that comes out"),),
-    shows="error only where the voltage is large, against its sign",
+    parameters=(Parameter("limit", "V", 1e-3, 1e6, 1.5, "largest input that comes out"),),
+    shows="error only where the input is large, against its sign",
     look_alikes=("gain_drift",),
     experiment="louder excitation: what never reaches the limit cannot show it",
     functions={"output": output},

@@ -4,25 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from xy_sysid.effects import modes
-from xy_sysid.effects.contract import Effect, Parameter, law
-from xy_sysid.effects.scene import Guess, Scene
+from xy_sysid.effects import _pole_zero_pair
+from xy_sysid.effects._contract import Effect, Parameter, law
+from xy_sysid.effects._scene import Guess, Scene
 
 
 @law
 def section(split: float, frequency: float, damping: float, pole_damping: float, fs: float) -> tuple[float, float, float, float, float]:
     """The pole-zero pair."""
-    return modes.pair(frequency, damping, frequency * (1.0 + split), pole_damping, fs)
+    return _pole_zero_pair.pair(frequency, damping, frequency * (1.0 + split), pole_damping, fs)
 
 
 def guesses(scene: Scene) -> Iterable[Guess]:
     """Pairs above 90 Hz."""
-    return modes.guesses(scene, 90.0, 600.0)
+    return _pole_zero_pair.guesses(scene, 90.0, 600.0)
 
 
 def joint(scene: Scene) -> Iterable[tuple[float, float, float, tuple[float, ...]]]:
     """Base and pair from the frequency response."""
-    return modes.joint(scene, 90.0, 600.0)
+    return _pole_zero_pair.joint(scene, 90.0, 600.0)
 
 
 EFFECT = Effect(
@@ -45,4 +45,5 @@ EFFECT = Effect(
     guesses=guesses,
     joint=joint,
     family="resonance",
+    mode_frequency="frequency",
 )

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from xy_sysid.effects.contract import Effect, Parameter, law
-from xy_sysid.effects.scene import Guess, Scene, columns
-from xy_sysid.stream import FloatArray
+from xy_sysid.effects._contract import Effect, Parameter, law
+from xy_sysid.effects._scene import Guess, Scene, columns
+from xy_sysid.samples.block import FloatArray
 
 
 @law
@@ -50,7 +50,7 @@ EFFECT = Effect(
         Parameter("excess", "V", 1e-6, 100.0, 0.2, "breakaway above the Coulomb level"),
         Parameter("velocity", "m/s", 1e-5, 1.0, 0.01, "speed at which the excess has fallen to 1/e"),
     ),
-    shows="as Coulomb friction, with more error below a few mm/s than above",
+    shows="as Coulomb friction, with more error at a crawl than above",
     look_alikes=("coulomb_friction", "presliding_hysteresis"),
     experiment="slow reversals and constant crawling speeds: the force falls while speed rises",
     functions={"level": level},

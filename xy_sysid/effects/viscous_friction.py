@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from xy_sysid.effects.contract import Effect, Parameter
+from xy_sysid.effects._contract import Effect, Parameter
 
 EFFECT = Effect(
     name="viscous_friction",
@@ -11,8 +11,8 @@ EFFECT = Effect(
     validity="always in the model; one drag coefficient at every speed and temperature",
     source="Olsson et al., Friction models and friction compensation, Eur. J. Control 4 (1998), eq. 2",
     category="base",
-    parameters=(Parameter("pole", "rad/s", 1e-2, 1e5, 250.0, "rate at which speed follows voltage: drag over mass"),),
-    shows="velocity per volt falls with one slope above pole / (2 pi) Hz",
+    parameters=(Parameter("pole", "rad/s", 1e-2, 1e5, 250.0, "rate at which speed follows the input: drag over mass"),),
+    shows="velocity per input falls with one slope above pole / (2 pi) Hz",
     look_alikes=("amplifier_lag",),
     experiment="measure the motor current: the lag lies before it, the pole behind it",
 )

@@ -1,6 +1,14 @@
 """Excitation signals: a pure stream of voltage samples for one axis.
 
 ``signal(settings, rate).next(n)`` gives the following samples; any chunking gives the same stream, bit for bit.
+
+    contract:                                      what every signal is
+    multisine, sweep, stepped, noise, prbs, pulse: one kind of signal a file
+    drive:                                         from a signal to the voltage that is really applied: ramps, centring, limits
+    motion_check:                                  does each axis do what its voltage can do?
+    travel_limits:                                 the guard of the ends of travel
+    pacing:                                        when the next block is due
+    lockstep:                                      a machine driven without a clock: recordings for tests and simulations
 """
 
 from __future__ import annotations

@@ -9,8 +9,8 @@ from typing import Protocol
 import numpy as np
 
 from xy_sysid.errors import BadInput
+from xy_sysid.samples.block import FloatArray
 from xy_sysid.settings import AxisExcitation
-from xy_sysid.stream import FloatArray
 
 MAX_TABLE = 2**24  # samples of one period kept in memory (128 MB); 2.3 hours at 2 kHz
 

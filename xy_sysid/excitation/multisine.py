@@ -79,4 +79,4 @@ def multisine(settings: AxisExcitation, rate: float) -> Multisine:
     amplitude = settings.rms * np.sqrt(2 / excited.size)
     spectrum[excited] = period / 2 * amplitude * np.exp(2j * np.pi * random.random(excited.size))
     table = np.fft.irfft(spectrum, period)
-    return Multisine(table, plan=MultisineLines(period, excited, even, odd, crest(table)))
+    return Multisine(table, plan=MultisineLines(period=period, excited=excited, even=even, odd=odd, crest=crest(table)))

@@ -17,8 +17,8 @@ from scipy.signal import ellip, sosfilt, sosfreqz
 
 from xy_sysid.errors import BadInput
 from xy_sysid.excitation.contract import Parts, below_nyquist
+from xy_sysid.samples.block import FloatArray
 from xy_sysid.settings import AxisExcitation
-from xy_sysid.stream import FloatArray
 
 ORDER, RIPPLE_DB, STOP_DB = 10, 0.02, 60.0
 LOWEST = 1e-6  # of the rate: at a tenth of it rounding quadruples the ripple (measured)

@@ -11,8 +11,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from xy_sysid.excitation.contract import Parts, samples
+from xy_sysid.samples.block import FloatArray
 from xy_sysid.settings import AxisExcitation
-from xy_sysid.stream import FloatArray
 
 PIECE = 4096  # samples made at a time, so that a long period takes no memory
 

@@ -15,8 +15,8 @@ import numpy as np
 
 from xy_sysid.errors import BadInput
 from xy_sysid.excitation.contract import Parts, below_nyquist, samples
+from xy_sysid.samples.block import FloatArray
 from xy_sysid.settings import AxisExcitation
-from xy_sysid.stream import FloatArray
 
 
 @dataclass(frozen=True, slots=True)

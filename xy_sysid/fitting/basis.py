@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from xy_sysid.compiled import compiled
-from xy_sysid.frf import ComplexArray
-from xy_sysid.stream import FloatArray
+from xy_sysid.jit import compiled
+from xy_sysid.response.frf import ComplexArray
+from xy_sysid.samples.block import FloatArray
 
 
 @dataclass(frozen=True, slots=True)

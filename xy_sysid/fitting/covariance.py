@@ -12,18 +12,18 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from xy_sysid.compiled import compiled
-from xy_sysid.estimate import smoothed
 from xy_sysid.fitting.damped import triangle
 from xy_sysid.fitting.leakage import leakage
 from xy_sysid.fitting.prediction import unblurred
 from xy_sysid.fitting.problem import Point, Problem, model
-from xy_sysid.frf import ComplexArray, FrequencyResponse
-from xy_sysid.stream import FloatArray
+from xy_sysid.jit import compiled
+from xy_sysid.response.frf import ComplexArray, FrequencyResponse
+from xy_sysid.response.h1 import smoothed
+from xy_sysid.samples.block import FloatArray
 
 BLOCK = 32  # lines whose median noise stands for a line that leakage hides
 DOUBT = 3.0  # noise is seen on its own line when it is so many standard deviations of sigma^2 above the leakage
-RANK = 1e-13  # a direction seen less than this part of the best one is not estimated
+RANK = 1e-11  # a direction seen less than this part of the best one is not estimated: its variance is of that size at least
 
 
 def covariance(task: Problem, at: Point, table: FloatArray) -> tuple[FloatArray, float, float]:
@@ -38,18 +38,20 @@ def covariance(task: Problem, at: Point, table: FloatArray) -> tuple[FloatArray,
     scale = np.sqrt(np.sum(upper**2, axis=0))
     scale[~(scale > 0)] = 1.0
     _, values, right = np.linalg.svd(upper / scale)
-    keep = values > RANK * values[0]
-    bread = (right[keep].T / values[keep] ** 2) @ right[keep]
+    seen = values > RANK * values[0]
+    back = right.T / np.maximum(values, RANK * values[0])  # from unit directions of the error to parameters
     place = _places(task)
     straight, folded = error_covariance(task, at, task.sigma, place)
-    meat = _meat(np.ascontiguousarray(table[:-1] / scale[:, None]), straight, folded, place)
-    expected = 0.5 * (float(np.sum(straight[0].real)) - float(np.trace(bread @ meat)))
+    meat = _meat(np.ascontiguousarray(back.T @ (table[:-1] / scale[:, None])), straight, folded, place)
+    meat[~seen], meat[:, ~seen] = 0.0, 0.0
+    meat[~seen, ~seen] = 1.0
+    expected = 0.5 * (float(np.sum(straight[0].real)) - float(np.sum(np.diag(meat)[seen])))
     spread = 2.0 * _square(straight) + 2.0 * _square(folded) - _square(straight[0]) - _square(folded[0])
     freedom = _freedom(task.frf)
     if task.structure.weighting == "sigma" and freedom > 4.5:  # sigma is itself estimated: |error|^2 / sigma^2 is F(2, freedom)
         expected *= freedom / (freedom - 2.0)
         spread *= freedom**3 / ((freedom - 2.0) ** 2 * (freedom - 4.0))
-    return (bread @ meat @ bread) / np.outer(scale, scale), expected, 0.5 * float(np.sqrt(spread))
+    return (back @ meat @ back.T) / np.outer(scale, scale), expected, 0.5 * float(np.sqrt(spread))
 
 
 def _square(values: ComplexArray) -> float:

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
-from xy_sysid.compiled import compiled
 from xy_sysid.fitting.prediction import Model, table
 from xy_sysid.fitting.problem import Point, Problem, model, moved
 from xy_sysid.fitting.structure import FitOptions
-from xy_sysid.stream import FloatArray
+from xy_sysid.jit import compiled
+from xy_sysid.samples.block import FloatArray
 
 LARGEST_DAMPING = 1e12
 ROUNDING = 1e-26  # a cost below this part of the data's own is zero in double precision
@@ -50,14 +50,16 @@ def minimise(task: Problem, start: Point, options: FitOptions) -> Minimum:
     damped = options.method == "levenberg_marquardt"
     damping = options.damping if damped else 0.0
     if not np.isfinite(value):
-        return Minimum(point, float("inf"), 0, False, "The start gives no finite prediction.", rows)
+        return Minimum(point=point, cost=float("inf"), iterations=0, converged=False, reason="The start gives no finite prediction.", table=rows)
     for iteration in range(options.max_iterations + 1):
         if value <= ROUNDING * size:
-            return Minimum(point, value, iteration, True, "The model reproduces the data to rounding.", rows)
+            return Minimum(
+                point=point, cost=value, iterations=iteration, converged=True, reason="The model reproduces the data to rounding.", table=rows
+            )
         upper, scale = _factor(task, rows, point)
         _, predicted = _step(upper, 0.0)
         if predicted <= options.relative_change * value:
-            return Minimum(point, value, iteration, True, "No step lowers the cost: a minimum.", rows)
+            return Minimum(point=point, cost=value, iterations=iteration, converged=True, reason="No step lowers the cost: a minimum.", table=rows)
         if iteration == options.max_iterations:
             break
         while True:
@@ -70,13 +72,20 @@ def minimise(task: Problem, start: Point, options: FitOptions) -> Minimum:
             if damping > LARGEST_DAMPING:
                 rounding = value <= NEAR_ROUNDING * size
                 reason = "The model reproduces the data to rounding." if rounding else "No step lowers the cost, though its slope is not zero."
-                return Minimum(point, value, iteration + 1, rounding, reason, rows)
+                return Minimum(point=point, cost=value, iterations=iteration + 1, converged=rounding, reason=reason, table=rows)
         change = (value - trial_value) / value
         point, rows, value = trial, trial_rows, trial_value
         damping = damping * 0.5 if damped else 0.0
         if change <= options.relative_change:
-            return Minimum(point, value, iteration + 1, True, "The cost changes no more.", rows)
-    return Minimum(point, value, options.max_iterations, False, f"No convergence in {options.max_iterations} iterations.", rows)
+            return Minimum(point=point, cost=value, iterations=iteration + 1, converged=True, reason="The cost changes no more.", table=rows)
+    return Minimum(
+        point=point,
+        cost=value,
+        iterations=options.max_iterations,
+        converged=False,
+        reason=f"No convergence in {options.max_iterations} iterations.",
+        table=rows,
+    )
 
 
 def _table(task: Problem, here: Model, at: Point) -> FloatArray:

@@ -6,17 +6,17 @@ import numpy as np
 
 from xy_sysid.fitting.covariance import covariance
 from xy_sysid.fitting.damped import weighted
-from xy_sysid.fitting.intervals import coefficient_estimates, gain_estimate, root_estimates
+from xy_sysid.fitting.intervals import coefficient_estimates, gain_estimate, root_estimates, with_rate
 from xy_sysid.fitting.problem import Point, Problem
-from xy_sysid.fitting.result import Fit
-from xy_sysid.frf import ComplexArray
-from xy_sysid.stream import FloatArray
-from xy_sysid.transfer_function import TransferFunction
+from xy_sysid.fitting.result import Ended, Fit
+from xy_sysid.linear.transfer_function import TransferFunction
+from xy_sysid.response.frf import ComplexArray
+from xy_sysid.samples.block import FloatArray
 
 CONSISTENT = 3.0  # standard deviations
 
 
-def finish(task: Problem, at: Point, method: str, iterations: int, converged: bool, reason: str, start: str, table: FloatArray | None = None) -> Fit:
+def finish(task: Problem, at: Point, method: str, end: Ended, start: str, table: FloatArray | None = None) -> Fit:
     """Work out everything that a Fit says; table: ``damped.weighted`` at the point, if it is there already."""
     structure, plan, frf = task.structure, task.plan, task.frf
     table = weighted(task, at) if table is None else table
@@ -24,7 +24,7 @@ def finish(task: Problem, at: Point, method: str, iterations: int, converged: bo
     predicted = frf.response - (error[0] + 1j * error[1])
     value = 0.5 * float(table[-1] @ table[-1])
     if not np.all(np.isfinite(table)):
-        return _failed(task, at, method, iterations, reason, start)
+        return _failed(task, at, method, end, start)
     inner, expected, deviation = covariance(task, at, table)
     to_numerator, to_denominator = _to_coefficients(task, at)
     numerator = (at.b @ to_numerator)[::-1]
@@ -33,7 +33,14 @@ def finish(task: Problem, at: Point, method: str, iterations: int, converged: bo
         denominator = denominator[: structure.free_order + 1]
         for _ in range(structure.integrators):
             denominator = np.convolve(denominator, [1.0, -1.0])
-    tf = TransferFunction(numerator, denominator, at.delay, None if structure.domain == "s" else plan.period, frf.input_unit, frf.output_unit)
+    tf = TransferFunction(
+        numerator=numerator,
+        denominator=denominator,
+        delay=at.delay,
+        sampling_time=None if structure.domain == "s" else plan.period,
+        input_unit=frf.input_unit,
+        output_unit=frf.output_unit,
+    )
     map_all = _parameter_map(task, to_numerator, to_denominator)
     names = _names(task)
     reported = map_all @ inner @ map_all.T
@@ -45,12 +52,13 @@ def finish(task: Problem, at: Point, method: str, iterations: int, converged: bo
     values = np.concatenate((tf.numerator, (at.a @ to_denominator)[:-1][::-1], [at.delay] if structure.free_delay else []))
     coefficients = coefficient_estimates(names, values, reported)
     gain = gain_estimate(task, at, inner)
+    roots = *root_estimates(task, at, poles, inner, "pole"), *root_estimates(task, at, zeros, inner, "zero")
     warnings: list[str] = []
     if not np.isfinite(expected):
         consistent = None
     else:
         consistent = bool(value <= expected + CONSISTENT * deviation)
-        if not consistent and converged:
+        if not consistent and end.converged:
             warnings.append(f"The cost {value:.4g} is above the {expected:.4g} that noise explains: the model misses something that the data show.")
     unstable = poles[(poles.real > 0) if structure.domain == "s" else (np.abs(poles) > 1)]
     if unstable.size:
@@ -76,21 +84,16 @@ def finish(task: Problem, at: Point, method: str, iterations: int, converged: bo
         jacobian=jacobian,
         poles=np.concatenate((_ordered(poles) * plan.scale, rest)),
         zeros=_ordered(zeros) * plan.scale,
-        intervals=(
-            *coefficients,
-            gain,
-            *root_estimates(task, poles, at.denominator, at.a, inner, at.b.size, "pole"),
-            *root_estimates(task, zeros, at.numerator, at.b, inner, 0, "zero"),
-        ),
-        iterations=iterations,
-        converged=converged,
-        reason=reason,
+        intervals=with_rate((*coefficients, gain, *roots), frf.rate_error, structure),
+        iterations=end.iterations,
+        converged=end.converged,
+        reason=end.reason,
         warnings=tuple(warnings),
         start=start,
     )
 
 
-def _failed(task: Problem, at: Point, method: str, iterations: int, reason: str, start: str) -> Fit:
+def _failed(task: Problem, at: Point, method: str, end: Ended, start: str) -> Fit:
     """Nothing could be estimated: numbers ran out of range. Everything that is not known is NaN."""
     structure, frf, nan = task.structure, task.frf, float("nan")
     lines, names = np.full(len(frf), np.nan), _names(task)
@@ -98,7 +101,14 @@ def _failed(task: Problem, at: Point, method: str, iterations: int, reason: str,
     bottom[0] = 1.0
     period = None if structure.domain == "s" else task.plan.period
     return Fit(
-        tf=TransferFunction(np.full(structure.numerator_order + 1, np.nan), bottom, at.delay, period, frf.input_unit, frf.output_unit),
+        tf=TransferFunction(
+            numerator=np.full(structure.numerator_order + 1, np.nan),
+            denominator=bottom,
+            delay=at.delay,
+            sampling_time=period,
+            input_unit=frf.input_unit,
+            output_unit=frf.output_unit,
+        ),
         structure=structure,
         method=method,
         frequency=frf.frequency,
@@ -116,9 +126,9 @@ def _failed(task: Problem, at: Point, method: str, iterations: int, reason: str,
         poles=np.zeros(0, dtype=np.complex128),
         zeros=np.zeros(0, dtype=np.complex128),
         intervals=(),
-        iterations=iterations,
+        iterations=end.iterations,
         converged=False,
-        reason=f"{reason} The numbers ran out of range.",
+        reason=f"{end.reason} The numbers ran out of range.",
         warnings=("The fit failed: its numbers ran out of range. Scale the data or lower the orders.",),
         start=start,
     )

@@ -9,8 +9,8 @@ from xy_sysid.fitting.nlls import cold, finished
 from xy_sysid.fitting.problem import from_transfer_function, problem
 from xy_sysid.fitting.result import Fit
 from xy_sysid.fitting.structure import FitOptions, Structure
-from xy_sysid.frf import FrequencyResponse
-from xy_sysid.transfer_function import TransferFunction
+from xy_sysid.linear.transfer_function import TransferFunction
+from xy_sysid.response.frf import FrequencyResponse
 
 DEFAULTS = FitOptions()
 WARM_DAMPING = 1e-6  # part of the usual damping that a warm start begins with: it is near, so that Gauss-Newton steps are right

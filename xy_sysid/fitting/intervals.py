@@ -2,24 +2,57 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Literal
+
 import numpy as np
 
-from xy_sysid.fitting.basis import Basis
 from xy_sysid.fitting.problem import Point, Problem
-from xy_sysid.fitting.result import Estimate
-from xy_sysid.frf import ComplexArray
-from xy_sysid.stream import FloatArray
+from xy_sysid.fitting.result import Interval
+from xy_sysid.fitting.structure import Structure
+from xy_sysid.response.frf import Z95, ComplexArray
+from xy_sysid.samples.block import FloatArray
+from xy_sysid.units import over
 
-QUANTILE = 1.959963984540054  # 97.5 % of the normal distribution
+BEYOND = 1e3  # standard error over the value from which an interval says nothing: it is told as unlimited
 PAIRS = {"pole": "resonance", "zero": "antiresonance"}
 
 
-def _estimate(name: str, value: float, variance: float, unit: str) -> Estimate:
+def _estimate(name: str, value: float, variance: float, unit: str) -> Interval:
     sigma = float(np.sqrt(variance)) if variance >= 0 else float("nan")
-    return Estimate(name, float(value), sigma, float(value) - QUANTILE * sigma, float(value) + QUANTILE * sigma, unit)
+    if not sigma <= BEYOND * abs(value) and value != 0.0:
+        sigma = float("inf")
+    return Interval(name=name, value=float(value), sigma=sigma, low=float(value) - Z95 * sigma, high=float(value) + Z95 * sigma, unit=unit)
 
 
-def coefficient_estimates(names: tuple[str, ...], values: FloatArray, covariance: FloatArray) -> tuple[Estimate, ...]:
+def with_rate(items: Iterable[Interval], error: float, structure: Structure) -> tuple[Interval, ...]:
+    """The intervals with what the sampling rate may be off by (``error``, relative): every time and frequency goes with it.
+
+    A model of s that is fitted to lines of a rate c times too high has b_k and a_k c^(n - k) times too large, n the order.
+    """
+
+    def widened(item: Interval) -> Interval:
+        sigma = math.hypot(item.sigma, _power(item.name, structure) * error * item.value)
+        return replace(item, sigma=sigma, low=item.value - Z95 * sigma, high=item.value + Z95 * sigma)
+
+    return tuple(widened(item) for item in items) if error > 0.0 else tuple(items)
+
+
+def _power(name: str, structure: Structure) -> int:
+    """Of the sampling rate that an estimate goes with."""
+    kind, _, rest = name.partition("_")
+    if kind == "delay" or (kind in PAIRS.values() and rest.endswith("frequency")):
+        return 1
+    if kind == "gain":
+        return structure.integrators
+    if structure.domain == "z" or kind in PAIRS.values():
+        return 0
+    return 1 if kind in PAIRS else structure.denominator_order - int(rest)
+
+
+def coefficient_estimates(names: tuple[str, ...], values: FloatArray, covariance: FloatArray) -> tuple[Interval, ...]:
     """The reported parameters, in their order."""
     return tuple(
         _estimate(name, float(value), float(variance), "s" if name == "delay" else "")
@@ -27,7 +60,7 @@ def coefficient_estimates(names: tuple[str, ...], values: FloatArray, covariance
     )
 
 
-def gain_estimate(task: Problem, at: Point, inner: FloatArray) -> Estimate:
+def gain_estimate(task: Problem, at: Point, inner: FloatArray) -> Interval:
     """Of s^integrators H at s = 0: the static gain, with one integrator the velocity gain."""
     structure, frf = task.structure, task.frf
     where = np.array([0.0 + 0.0j if structure.domain == "s" else 1.0 + 0.0j])
@@ -39,23 +72,22 @@ def gain_estimate(task: Problem, at: Point, inner: FloatArray) -> Estimate:
     slope[: at.b.size] = up / bottom
     slope[at.b.size : at.b.size + at.a.size - 1] = -value * down[:-1] / bottom
     per = ("", "/s", "/s^2")[structure.integrators]
-    return _estimate("gain", value * scale, float(slope @ inner @ slope) * scale**2, f"{frf.output_unit}{per}/{frf.input_unit}")
+    return _estimate("gain", value * scale, float(slope @ inner @ slope) * scale**2, over(f"{frf.output_unit}{per}", frf.input_unit))
 
 
-def root_estimates(
-    task: Problem, roots: ComplexArray, part: Basis, coefficients: FloatArray, inner: FloatArray, first: int, name: str
-) -> list[Estimate]:
+def root_estimates(task: Problem, at: Point, roots: ComplexArray, inner: FloatArray, name: Literal["pole", "zero"]) -> list[Interval]:
     """Roots of sum_k c_k p_k, conjugates once: d root / d c_k = -p_k(root) / derivative(root).
 
-    first: where c_0 stands among the parameters; name: "pole" or "zero".
+    roots: of the denominator ("pole") or the numerator ("zero") at the point; inner: covariance of its parameters
     Gives <name>_i, or <name>_i.real and .imag, and frequency and damping of each oscillating pair.
     """
+    part, coefficients, first = (at.denominator, at.a, at.b.size) if name == "pole" else (at.numerator, at.b, 0)  # c_0 stands at first
     discrete = task.structure.domain == "z"
     scale, unit = (1.0, "") if discrete else (task.plan.scale, "rad/s")
     size = coefficients.size - int(name == "pole")
     lead = coefficients[-1] * part.powers()[-1, -1]
     values = part.values(roots)
-    out: list[Estimate] = []
+    out: list[Interval] = []
     chosen = [i for i in np.argsort(np.abs(roots)) if roots[i].imag >= 0]
     pairs = 0
     for number, i in enumerate(chosen, start=1):

@@ -5,10 +5,10 @@ from __future__ import annotations
 from xy_sysid.fitting.finish import finish
 from xy_sysid.fitting.linear import searched
 from xy_sysid.fitting.problem import problem
-from xy_sysid.fitting.result import Fit
+from xy_sysid.fitting.result import Ended, Fit
 from xy_sysid.fitting.structure import FitOptions, Structure
-from xy_sysid.frf import FrequencyResponse
-from xy_sysid.transfer_function import TransferFunction
+from xy_sysid.linear.transfer_function import TransferFunction
+from xy_sysid.response.frf import FrequencyResponse
 
 DEFAULTS = FitOptions()
 
@@ -18,4 +18,4 @@ def fit(frf: FrequencyResponse, structure: Structure, start: TransferFunction | 
     del start
     task = problem(frf, structure)
     point, _, steps = searched(task, options.reweightings, options)
-    return finish(task, point, "iwls", steps, True, "The best of the re-weighted linear steps.", "scan over delays")
+    return finish(task, point, "iwls", Ended(steps, True, "The best of the re-weighted linear steps."), "scan over delays")

@@ -13,9 +13,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from xy_sysid.compiled import compiled
-from xy_sysid.frf import ComplexArray, FrequencyResponse
-from xy_sysid.stream import FloatArray
+from xy_sysid.jit import compiled
+from xy_sysid.response.frf import ComplexArray, FrequencyResponse
+from xy_sysid.samples.block import FloatArray
 
 NEGLIGIBLE = 1e-6  # products of window amplitudes below this part of the largest are left out
 

@@ -11,8 +11,8 @@ import numpy as np
 from xy_sysid.fitting.basis import basis
 from xy_sysid.fitting.problem import Point, Problem, cost, rational, response
 from xy_sysid.fitting.structure import FitOptions
-from xy_sysid.frf import ComplexArray
-from xy_sysid.stream import FloatArray
+from xy_sysid.response.frf import ComplexArray
+from xy_sysid.samples.block import FloatArray
 
 SCAN_STEPS = 4  # re-weightings at each delay of the scan: enough to rank delays
 
@@ -40,7 +40,7 @@ def linear_step(task: Problem, delay: float, last: Point | None, correct: bool) 
         upper = np.zeros_like(upper)  # nothing can be solved: a point of cost infinity or worse than any other
     solution: FloatArray = np.asarray(np.linalg.lstsq(upper[:size, :size], upper[:size, size], rcond=1e-14)[0], dtype=np.float64)
     split = structure.numerator_order + 1
-    return Point(numerator, denominator, solution[:split], np.append(solution[split:], 1.0), delay)
+    return Point(numerator=numerator, denominator=denominator, b=solution[:split], a=np.append(solution[split:], 1.0), delay=delay)
 
 
 def reweighted(task: Problem, delay: float, steps: int, start: Point | None = None) -> tuple[Point, float, int]:

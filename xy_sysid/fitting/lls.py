@@ -7,10 +7,10 @@ from dataclasses import replace
 from xy_sysid.fitting.finish import finish
 from xy_sysid.fitting.linear import searched
 from xy_sysid.fitting.problem import problem
-from xy_sysid.fitting.result import Fit
+from xy_sysid.fitting.result import Ended, Fit
 from xy_sysid.fitting.structure import FitOptions, Structure
-from xy_sysid.frf import FrequencyResponse
-from xy_sysid.transfer_function import TransferFunction
+from xy_sysid.linear.transfer_function import TransferFunction
+from xy_sysid.response.frf import FrequencyResponse
 
 DEFAULTS = FitOptions()
 FINER = 10  # the scan over delays: one linear step is only right close to the delay (measured on the paper's machine)
@@ -24,4 +24,4 @@ def fit(frf: FrequencyResponse, structure: Structure, start: TransferFunction | 
     del start
     task = problem(frf, structure)
     point, _, steps = searched(task, 1, replace(options, delay_step=options.delay_step / FINER))
-    return finish(task, point, "lls", steps, True, "Linear: solved at once for each delay tried.", "none needed")
+    return finish(task, point, "lls", Ended(steps, True, "Linear: solved at once for each delay tried."), "none needed")

@@ -11,8 +11,8 @@ from xy_sysid.fitting.nlls import solve
 from xy_sysid.fitting.problem import problem
 from xy_sysid.fitting.result import Fit
 from xy_sysid.fitting.structure import FitOptions, Structure
-from xy_sysid.frf import FrequencyResponse
-from xy_sysid.transfer_function import TransferFunction
+from xy_sysid.linear.transfer_function import TransferFunction
+from xy_sysid.response.frf import FrequencyResponse
 
 DEFAULTS = FitOptions()
 

@@ -7,15 +7,15 @@ from xy_sysid.fitting.damped import minimise
 from xy_sysid.fitting.identify import warm
 from xy_sysid.fitting.intervals import root_estimates
 from xy_sysid.fitting.problem import from_transfer_function, problem
-from xy_sysid.fitting.result import Estimate
+from xy_sysid.fitting.result import Interval
 from xy_sysid.fitting.structure import FitOptions, Structure
-from xy_sysid.frf import FrequencyResponse
-from xy_sysid.transfer_function import TransferFunction
+from xy_sysid.linear.transfer_function import TransferFunction
+from xy_sysid.response.frf import FrequencyResponse
 
 DEFAULTS = FitOptions()
 
 
-def pole_estimates(frf: FrequencyResponse, structure: Structure, start: TransferFunction, options: FitOptions = DEFAULTS) -> tuple[Estimate, ...]:
+def pole_estimates(frf: FrequencyResponse, structure: Structure, start: TransferFunction, options: FitOptions = DEFAULTS) -> tuple[Interval, ...]:
     """Poles and resonances with intervals, as ``identify`` gives them from this start; empty if it leads nowhere.
 
     Raises BadInput for too few trusted lines.
@@ -27,4 +27,4 @@ def pole_estimates(frf: FrequencyResponse, structure: Structure, start: Transfer
         return ()
     at = found.point
     inner, _, _ = covariance(task, at, found.table)
-    return tuple(root_estimates(task, at.denominator.roots(at.a), at.denominator, at.a, inner, at.b.size, "pole"))
+    return tuple(root_estimates(task, at, at.denominator.roots(at.a), inner, "pole"))

@@ -10,10 +10,10 @@ from xy_sysid.fitting.damped import Minimum, minimise
 from xy_sysid.fitting.finish import finish
 from xy_sysid.fitting.linear import linear_step, reweighted, scan
 from xy_sysid.fitting.problem import Point, Problem, from_transfer_function, in_bases, problem, rational, rebased
-from xy_sysid.fitting.result import Fit
+from xy_sysid.fitting.result import Ended, Fit
 from xy_sysid.fitting.structure import FitOptions, Structure
-from xy_sysid.frf import FrequencyResponse
-from xy_sysid.transfer_function import TransferFunction
+from xy_sysid.linear.transfer_function import TransferFunction
+from xy_sysid.response.frf import FrequencyResponse
 
 DEFAULTS = FitOptions()
 MOST_STARTS = 4  # delays of the scan that are followed to their minimum when nothing is as good as noise allows
@@ -94,4 +94,4 @@ def _grown(task: Problem, options: FitOptions) -> Minimum:
 
 def finished(task: Problem, found: Minimum, name: str, start: str) -> Fit:
     """A minimum as a result."""
-    return finish(task, found.point, name, found.iterations, found.converged, found.reason, start, found.table)
+    return finish(task, found.point, name, Ended(found.iterations, found.converged, found.reason), start, found.table)

@@ -16,11 +16,11 @@ import numpy as np
 from xy_sysid.errors import BadInput
 from xy_sysid.fitting.finish import finish
 from xy_sysid.fitting.problem import in_bases, problem
-from xy_sysid.fitting.result import Fit
+from xy_sysid.fitting.result import Ended, Fit
 from xy_sysid.fitting.structure import FitOptions, Structure
-from xy_sysid.frf import ComplexArray, FrequencyResponse
-from xy_sysid.stream import FloatArray
-from xy_sysid.transfer_function import TransferFunction
+from xy_sysid.linear.transfer_function import TransferFunction
+from xy_sysid.response.frf import ComplexArray, FrequencyResponse
+from xy_sysid.samples.block import FloatArray
 
 DEFAULTS = FitOptions()
 
@@ -45,14 +45,14 @@ def fit(frf: FrequencyResponse, structure: Structure, start: TransferFunction | 
     literal = replace(structure, integrators=0, delay=0.0, hold="none", weighting="relative")
     bare = replace(frf, kernel_offset=np.zeros(1), kernel_weight=np.ones(1), kernel_amplitude=np.zeros(0), differenced=False)
     task = problem(bare, literal)
-    data = _Data(task.plan.line, task.frf.response, task.weight, literal.denominator_order, literal.numerator_order)
+    data = _Data(s=task.plan.line, response=task.frf.response, weight=task.weight, n=literal.denominator_order, m=literal.numerator_order)
     first = _linear(data, data.weight)
     theta = _linear(data, data.weight / np.abs(_split(data, first)[1]))
     theta, iterations, converged = _iterate(data, theta, options)
     up, down = _split(data, theta)
     point = in_bases(task, up, down, 0.0, data.weight / np.abs(down))
     reason = "The cost changes no more." if converged else f"No convergence in {iterations} iterations."
-    return finish(task, point, "nllsfdi", iterations, converged, reason, "two linear least squares")
+    return finish(task, point, "nllsfdi", Ended(iterations, converged, reason), "two linear least squares")
 
 
 def _split(data: _Data, theta: FloatArray) -> tuple[ComplexArray, ComplexArray]:

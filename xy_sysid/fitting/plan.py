@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from xy_sysid.errors import BadInput
 from xy_sysid.fitting.structure import Structure
-from xy_sysid.frf import ComplexArray, FrequencyResponse
-from xy_sysid.hold import ALIASES, TAIL_POINTS, interpolation, nodes_for
-from xy_sysid.stream import FloatArray
+from xy_sysid.linear.hold import ALIASES, TAIL_POINTS, interpolation, nodes_for
+from xy_sysid.response.frf import ComplexArray, FrequencyResponse
+from xy_sysid.samples.block import FloatArray
 
 NO_WEIGHT = 1e-15  # weights of the window below this share of the largest are rounding
 
@@ -67,46 +67,54 @@ class Plan:
 def plan_for(frf: FrequencyResponse, structure: Structure) -> Plan:
     """The plan for the lines of a response; kept from the last few calls with the same lines."""
     return _plan(
-        frf.frequency.tobytes(),
-        frf.kernel_offset.tobytes(),
-        frf.kernel_weight.tobytes(),
-        frf.sampling_rate,
-        frf.resolution,
-        frf.differenced,
-        structure.integrators,
-        structure.hold if structure.domain == "s" else "none",
-        structure.domain,
+        _Lines(
+            frequency=frf.frequency.tobytes(),
+            kernel_offset=frf.kernel_offset.tobytes(),
+            kernel_weight=frf.kernel_weight.tobytes(),
+            rate=frf.sampling_rate,
+            resolution=frf.resolution,
+            differenced=frf.differenced,
+            integrators=structure.integrators,
+            held=structure.hold == "zoh" and structure.domain == "s",
+            domain=structure.domain,
+        )
     )
 
 
+@dataclass(frozen=True, slots=True)
+class _Lines:
+    """All that a plan depends on, in a form that can be looked up; rate, resolution: Hz."""
+
+    frequency: bytes
+    kernel_offset: bytes
+    kernel_weight: bytes
+    rate: float
+    resolution: float
+    differenced: bool
+    integrators: int
+    held: bool
+    domain: str
+
+
 @lru_cache(maxsize=32)
-def _plan(
-    frequency_bytes: bytes,
-    offset_bytes: bytes,
-    weight_bytes: bytes,
-    rate: float,
-    resolution: float,
-    differenced: bool,
-    integrators: int,
-    hold: str,
-    domain: str,
-) -> Plan:
-    frequency, offset, weight = (np.frombuffer(b, dtype=np.float64) for b in (frequency_bytes, offset_bytes, weight_bytes))
+def _plan(lines: _Lines) -> Plan:
+    frequency, offset, weight = (np.frombuffer(b, dtype=np.float64) for b in (lines.frequency, lines.kernel_offset, lines.kernel_weight))
+    rate, differenced, integrators, held, domain = lines.rate, lines.differenced, lines.integrators, lines.held, lines.domain
     seen = np.abs(weight) > NO_WEIGHT * np.max(np.abs(weight))
     offset, weight = offset[seen], weight[seen]
     if not bool(np.all(frequency > 0)):
         raise BadInput("lowest frequency", f"{np.min(frequency):g} Hz", "> 0 Hz", "Leave out the line at 0 Hz.")
-    period, held = 1.0 / rate, hold == "zoh"
+    period = 1.0 / rate
     scale = float(np.median(2 * np.pi * frequency)) if domain == "s" else 1.0
     wanted = frequency[:, None] + offset[None, :]
-    step = max(resolution, 1e-6 * float(np.max(frequency))) * 1e-5
+    step = max(lines.resolution, 1e-6 * float(np.max(frequency))) * 1e-5
     _, first, inverse = np.unique(np.rint(wanted / step).astype(np.int64), return_index=True, return_inverse=True)
     grid_frequency = wanted.ravel()[first]
     grid_frequency[np.abs(grid_frequency) < step] = 0.0
     omega, line_omega = 2 * np.pi * grid_frequency, 2 * np.pi * frequency
-    main, fold = _factors(omega, period, scale, integrators, differenced, held, domain)
+    main, fold = _factors(omega, scale, differenced, lines)
     after = 1.0 / np.expm1(1j * line_omega * period) if differenced else np.ones(frequency.size, dtype=np.complex128)
-    line_main, _ = _factors(line_omega, period, scale, integrators, False, held, domain)
+    line_main, _ = _factors(line_omega, scale, False, lines)
     nodes = nodes_for(float(np.max(grid_frequency)) * period)
     k = np.concatenate((np.arange(-ALIASES, 0), np.arange(1, ALIASES + 1))).astype(np.float64)
     if not held:
@@ -142,18 +150,17 @@ def _variable(omega: FloatArray, period: float, scale: float, domain: str) -> Co
     return np.asarray(1j * omega / scale, dtype=np.complex128)
 
 
-def _factors(
-    omega: FloatArray, period: float, scale: float, integrators: int, differenced: bool, held: bool, domain: str
-) -> tuple[ComplexArray, ComplexArray]:
+def _factors(omega: FloatArray, scale: float, differenced: bool, lines: _Lines) -> tuple[ComplexArray, ComplexArray]:
     """(main, fold) at each frequency; at 0 Hz the limit, or 0 where it is infinite (the data have no DC there)."""
+    period, integrators = 1.0 / lines.rate, lines.integrators
     zero = omega == 0
     s = 1j * np.where(zero, 1.0, omega)
     difference = np.expm1(s * period) if differenced else np.ones_like(s)
-    if domain == "z":
+    if lines.domain == "z":
         main = difference / np.expm1(s * period) ** integrators
         limit = 1.0 if int(differenced) == integrators else 0.0
         return np.where(zero, limit, main), np.zeros_like(s)
     hold = -np.expm1(-s * period) / period
-    main = difference / (s / scale) ** integrators * (hold / s if held else 1.0)
+    main = difference / (s / scale) ** integrators * (hold / s if lines.held else 1.0)
     limit = (period * scale) ** integrators if int(differenced) == integrators else 0.0
     return np.where(zero, limit, main), np.where(zero, 0.0, difference * hold)

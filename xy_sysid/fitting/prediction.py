@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from xy_sysid.compiled import compiled
 from xy_sysid.fitting.basis import Basis
 from xy_sysid.fitting.plan import Plan
-from xy_sysid.frf import ComplexArray
-from xy_sysid.hold import ALIASES, SERIES, TAIL_POINTS, tail_sums
-from xy_sysid.stream import FloatArray
+from xy_sysid.jit import compiled
+from xy_sysid.linear.hold import ALIASES, SERIES, TAIL_POINTS, tail_sums
+from xy_sysid.response.frf import ComplexArray
+from xy_sysid.samples.block import FloatArray
 
 TAIL_REACH = 0.5  # the series in 1 / s is used while every pole is within this part of the last alias
 
@@ -44,16 +44,16 @@ class Model:
 def model_for(plan: Plan, integrators: int, numerator: Basis, denominator: Basis) -> Model:
     """Evaluate two bases wherever the plan needs them."""
     return Model(
-        plan,
-        integrators,
-        numerator,
-        denominator,
-        numerator.parts(plan.grid),
-        denominator.parts(plan.grid),
-        numerator.parts(plan.alias),
-        denominator.parts(plan.alias),
-        _top(numerator),
-        _top(denominator),
+        plan=plan,
+        integrators=integrators,
+        numerator=numerator,
+        denominator=denominator,
+        numerator_grid=numerator.parts(plan.grid),
+        denominator_grid=denominator.parts(plan.grid),
+        numerator_alias=numerator.parts(plan.alias),
+        denominator_alias=denominator.parts(plan.alias),
+        numerator_top=_top(numerator),
+        denominator_top=_top(denominator),
     )
 
 

@@ -11,9 +11,9 @@ from xy_sysid.fitting.basis import Basis, basis
 from xy_sysid.fitting.plan import Plan, plan_for
 from xy_sysid.fitting.prediction import Model, model_for, predict
 from xy_sysid.fitting.structure import Structure
-from xy_sysid.frf import ComplexArray, FrequencyResponse
-from xy_sysid.stream import FloatArray
-from xy_sysid.transfer_function import TransferFunction
+from xy_sysid.linear.transfer_function import TransferFunction
+from xy_sysid.response.frf import ComplexArray, FrequencyResponse
+from xy_sysid.samples.block import FloatArray
 
 SMALLEST, LARGEST = 1e-100, 1e100  # of |FRF|: squares of more or less leave the range of numbers
 SMALLEST_SIGMA = 1e-13  # of |FRF|: below this the response is exact in double precision
@@ -69,7 +69,7 @@ def problem(frf: FrequencyResponse, structure: Structure) -> Problem:
         samples = structure.delay * chosen.sampling_rate
         if abs(samples - round(samples)) > 1e-6:
             raise BadInput("delay of a discrete model", f"{samples:.6g} samples", "a whole number of samples", "Round it, or use domain 's'.")
-    return Problem(chosen, structure, plan_for(chosen, structure), weight, sigma)
+    return Problem(frf=chosen, structure=structure, plan=plan_for(chosen, structure), weight=weight, sigma=sigma)
 
 
 def model(task: Problem, at: Point) -> Model:
@@ -110,7 +110,7 @@ def in_bases(task: Problem, n_values: ComplexArray, d_values: ComplexArray, dela
     b, a = _project(numerator.values(line), n_values, factor), _project(denominator.values(line), d_values, own)
     if a[-1] == 0.0:
         a[-1] = 1e-300
-    return Point(numerator, denominator, b / a[-1], a / a[-1], delay)
+    return Point(numerator=numerator, denominator=denominator, b=b / a[-1], a=a / a[-1], delay=delay)
 
 
 def _project(values: ComplexArray, target: ComplexArray, weight: FloatArray) -> FloatArray:

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 from xy_sysid.errors import BadInput
 from xy_sysid.fitting.structure import Structure
-from xy_sysid.frf import ComplexArray
-from xy_sysid.stream import FloatArray
-from xy_sysid.transfer_function import TransferFunction
+from xy_sysid.linear.transfer_function import TransferFunction
+from xy_sysid.response.frf import ComplexArray
+from xy_sysid.samples.block import FloatArray
 
 
 @dataclass(frozen=True, slots=True)
-class Estimate:
+class Interval:
     """One number with its 95 % interval [low, high] and standard error, all in ``unit``."""
 
     name: str
@@ -21,6 +22,15 @@ class Estimate:
     low: float
     high: float
     unit: str
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """How an estimator came to its end, and whether that is a minimum to trust."""
+
+    iterations: int
+    converged: bool
+    reason: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +48,8 @@ class Fit:
     parameters:      names of the free coefficients and the delay, and their (p, p) covariance
     jacobian:        (2 m, p) weighted derivatives of the real and imaginary parts of the prediction to the parameters
     poles, zeros:    rad/s (z in the z domain), integrators included
-    intervals:       95 % intervals of coefficients, delay, gain, poles, zeros, resonances and antiresonances
+    intervals:       95 % intervals of coefficients, delay, gain, poles, zeros, resonances and antiresonances, as if noise were all
+                     that the model leaves; see ``intervals_with_misfit``
     converged, reason: False when no trustworthy minimum was found, and why
     warnings:        what a user should know, one sentence each
     start:           where it began
@@ -61,7 +72,7 @@ class Fit:
     jacobian: FloatArray
     poles: ComplexArray
     zeros: ComplexArray
-    intervals: tuple[Estimate, ...]
+    intervals: tuple[Interval, ...]
     iterations: int
     converged: bool
     reason: str
@@ -78,7 +89,32 @@ class Fit:
         """Per cent."""
         return 100.0 - self.error_cost
 
-    def interval(self, name: str) -> Estimate:
+    @property
+    def misfit(self) -> float:
+        """How many times too narrow the intervals of noise alone are: root of cost over expected cost (Birge, Phys. Rev. 40, 1932).
+
+        1 where noise explains the cost, NaN where that cannot be judged. A factor far from 1 means that the model fails: even the
+        widened intervals are then an order of magnitude, since what a model leaves is no noise.
+        """
+        if self.consistent is None or not self.expected_cost > 0.0:
+            return float("nan")
+        return 1.0 if self.consistent else math.sqrt(max(self.cost / self.expected_cost, 1.0))
+
+    @property
+    def intervals_with_misfit(self) -> tuple[Interval, ...]:
+        """The intervals, widened by ``misfit``; NaN bounds where it is not known."""
+        factor = self.misfit
+        return tuple(
+            replace(
+                item,
+                sigma=factor * item.sigma,
+                low=item.value - factor * (item.value - item.low),
+                high=item.value + factor * (item.high - item.value),
+            )
+            for item in self.intervals
+        )
+
+    def interval(self, name: str) -> Interval:
         """The estimate of that name; raises BadInput if there is none."""
         for item in self.intervals:
             if item.name == name:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from xy_sysid.errors import BadInput
+from xy_sysid.settings import IdentifierSettings
 
 Weighting = Literal["sigma", "relative", "uniform"]
 LARGEST_ORDER = 12
@@ -62,6 +63,17 @@ class Structure:
     def parameters(self) -> int:
         """How many numbers are estimated."""
         return self.numerator_order + 1 + self.free_order + int(self.free_delay)
+
+
+def structure_from(settings: IdentifierSettings) -> Structure:
+    """The model family that the settings ask for; orders that are left to the data are 2/4 until ``choose_orders`` has seen them."""
+    return Structure(
+        numerator_order=settings.orders[0],
+        denominator_order=settings.orders[1],
+        integrators=settings.integrators,
+        delay="free" if settings.delay else 0.0,
+        hold=settings.hold,
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,87 +1,121 @@
-"""Recordings in and out, whatever the file: a rosbag2, CSV, NPZ or MAT."""
+"""Recordings in and out, whatever the file: a rosbag2, CSV, NPZ or MAT.
+
+reading:              how a file is to be read: which columns mean what
+bag, paired_streams:  two streams of a bag, paired by sample number
+csv, arrays, matlab:  files as sheets of columns; mat_child reads MATLAB files in a process of its own
+sheet, names, roles:  which column is what, by its name or as the user says
+sheet_table, table, even: columns in SI, numbered by their time, which may be uneven
+clock:                time against the sample counter
+foreign_units, given: units of foreign files
+motion:               velocity and acceleration become position
+plausible:            what looks wrong, in words
+several, listing:     several recordings as one; what is in a file
+limits:               how much a file may become
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import dataclasses
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from xy_sysid.bags import POSITION, REFERENCE, VOLTAGE, BagWriter
+from xy_sysid.bags.atomic import whole
 from xy_sysid.errors import BadInput, BadRecording
-from xy_sysid.imports import arrays, csv, table
+from xy_sysid.imports import arrays, csv, sheet_table, table
 from xy_sysid.imports.bag import load_bag
-from xy_sysid.recording import Recording
-from xy_sysid.stream import Block
+from xy_sysid.imports.limits import fits, plain_file
+from xy_sysid.imports.matlab import read_mat
+from xy_sysid.imports.motion import as_position
+from xy_sysid.imports.plausible import meaningful, remarks, without_dead_parts
+from xy_sysid.imports.reading import Reading
+from xy_sysid.imports.sheet import Sheet
+from xy_sysid.samples.block import Block
+from xy_sysid.samples.recording import Recording
 
 ROWS = 20  # samples in one message of a bag that is written here
 KINDS = "a rosbag2 folder, .db3, .mcap, .csv, .mat, .npz"
+TABLES = (".csv", ".txt", ".tsv", ".npz", ".mat")
+CSV_COPIES = 2  # bytes in memory for one in the file
 
-__all__ = ["blocks", "load", "save", "writer_of"]
+__all__ = ["Reading", "blocks", "kind_of", "load", "save", "sheet_of", "writer_of"]
 
 
-def load(
-    path: Path | str,
-    *,
-    voltage_topic: str = VOLTAGE,
-    position_topic: str = POSITION,
-    joint_topic: str | None = None,
-    axes: Sequence[str] | None = None,
-    effort_as_voltage: bool = False,
-    input_key: str | None = None,
-    output_key: str | None = None,
-    start: float = 0.0,
-    stop: float | None = None,
-    progress: Callable[[float], None] | None = None,
-) -> Recording:
+def load(path: Path | str, reading: Reading | None = None, *, progress: Callable[[float], None] | None = None, **options: Any) -> Recording:
     """A recording from a rosbag2 (folder or file), .csv, .npz or .mat, paired, checked and in SI.
 
-    voltage_topic, position_topic: block topics of a bag; joint_topic: its JointState topic, found if there is one only
-    axes:               which axes to take, and in which order; None is all
-    effort_as_voltage:  take the joints' effort as the input, even if there is a voltage topic
-    input_key, output_key: how the input and output of a table are called, where not voltage (u) and position (y)
-    start, stop:        s after the first sample; None is the end
-    progress:           called with the part that has been read, 0..1
+    reading:  which columns mean what, which part and which axes; see ``Reading``, whose fields may also be given by keyword
+    progress: called with the part that has been read, 0..1
     Raises BadRecording (the file) or BadInput (an argument), one line each. What was odd is in ``notes``.
     """
-    path = Path(path)
-    if not start >= 0 or (stop is not None and not stop > start):
-        raise BadInput("start and stop", f"{start}, {stop}", "0 <= start < stop, in s", "Choose another part.")
-    try:
-        kind = "" if path.is_dir() else path.suffix.lower()
-        path.stat()
-        if kind in ("", ".db3", ".mcap"):
-            return load_bag(path, voltage_topic, position_topic, joint_topic, axes, effort_as_voltage, start, stop, progress)
-        if kind not in (".csv", ".txt", ".tsv", ".npz", ".mat"):
-            raise BadRecording(path, f"a file of kind {path.suffix!r}, which is not a recording", f"Give {KINDS}.")
-        if path.stat().st_size == 0:
-            raise BadRecording(path, "the file is empty (0 bytes)", "Take another copy of the file.")
-        notes: list[str] = []
-        if kind in (".npz", ".mat"):
-            content = arrays.read_npz(path) if kind == ".npz" else arrays.read_mat(path)
-            found = arrays.table(path, content, input_key, output_key)
-        else:
-            found = csv.read(path, input_key, output_key, notes)
-        result = table.recording(path, found, axes, start, stop, notes)
-    except OSError as error:
-        raise BadRecording(path, f"cannot be read ({error.strerror or error})", "Check the path and the permissions.") from None
-    if progress is not None:
-        progress(1.0)
-    return result
+    path, reading = Path(path), dataclasses.replace(reading or Reading(), **options)
+    with np.errstate(all="ignore"):  # damaged numbers are left out or said, and numpy need not add a word to it
+        try:
+            kind = kind_of(path)
+            result = load_bag(path, reading, progress) if kind == "bag" else _from_table(path, kind, reading)
+        except OSError as error:
+            raise BadRecording(path, f"cannot be read ({error.strerror or error})", "Check the path and the permissions.") from None
+        if progress is not None:
+            progress(1.0)
+        result = without_dead_parts(meaningful(path, result))
+        output, moved = result.position, as_position(result)
+        return dataclasses.replace(moved, notes=(*moved.notes, *remarks(moved, output)))
+
+
+def kind_of(path: Path) -> str:
+    """bag, csv, npz or mat; raises BadRecording for what is none of them, OSError for what is not there."""
+    suffix = "" if path.is_dir() else path.suffix.lower()
+    path.stat()
+    if suffix in ("", ".db3", ".mcap"):
+        return "bag"
+    if suffix not in TABLES:
+        raise BadRecording(path, f"a file of kind {path.suffix!r}, which is not a recording", f"Give {KINDS}.")
+    plain_file(path)
+    if path.stat().st_size == 0:
+        raise BadRecording(path, "the file is empty (0 bytes)", "Take another copy of the file.")
+    return suffix[1:] if suffix in (".npz", ".mat") else "csv"
+
+
+def sheet_of(path: Path, kind: str) -> Sheet:
+    """The columns of a CSV, NPZ or MAT file."""
+    if kind == "csv":
+        fits(path, float(CSV_COPIES * path.stat().st_size), "as numbers")
+        return csv.sheet(path)
+    return arrays.sheet(path, arrays.read_npz(path) if kind == "npz" else arrays.group(path, read_mat(path)))
+
+
+def _from_table(path: Path, kind: str, reading: Reading) -> Recording:
+    topics = reading.voltage_topic, reading.position_topic, reading.joint_topic
+    if reading.effort_as_voltage or reading.joints or reading.effort_lag or topics != (VOLTAGE, POSITION, None):
+        raise BadInput("--topic, --effort or --joint", f"for {path}", "for a bag", "A table has columns: choose them with --map.")
+    notes: list[str] = []
+    if kind == "csv":
+        found = sheet_table.table(sheet_of(path, kind), reading, notes)
+    else:
+        leaves = arrays.read_npz(path) if kind == "npz" else read_mat(path)
+        inside = arrays.group(path, leaves)
+        found = arrays.table(path, inside, reading, notes) or sheet_table.table(arrays.sheet(path, inside), reading, notes)
+    return table.recording(path, found, reading.axes, reading.start, reading.stop, notes)
 
 
 def save(recording: Recording, path: Path | str) -> None:
-    """Write a recording so that ``load`` gives the same back: .csv, .npz, .mat, a bare .db3 or .mcap, or else a bag's folder.
+    """Write a recording so that ``load`` gives the same back: .csv, .npz, .mat, a bare .db3 or .mcap, or else a bag's folder; whole or not at all.
 
     Raises BadRecording if the path exists (bags) or cannot be written, BadInput for an ending that is not known.
     """
     path = Path(path)
     writer = writer_of(path)
+    if writer is _write_bag and path.exists():
+        raise BadRecording(path, "exists already", "Choose another name; nothing is overwritten.")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        writer(path, recording)
     except OSError as error:
         raise BadRecording(path, f"cannot be written ({error.strerror or error})", "Choose a folder that you may write to.") from None
+    with whole(path) as part:
+        writer(part, recording)
 
 
 def writer_of(path: Path) -> Callable[[Path, Recording], None]:

@@ -1,9 +1,11 @@
 """NPZ and MAT: ``t`` or ``time`` (s), ``u`` or ``voltage``, ``y`` or ``position``, ``fs`` (Hz), ``u_unit``, ``y_unit``,
-``r`` or ``reference``, ``axes``, ``seq``; two-dimensional u and y hold several axes."""
+``r`` or ``reference``, ``axes``, ``seq``; two-dimensional u and y hold several axes. Anything else is a sheet of columns."""
 
 from __future__ import annotations
 
+import re
 import struct
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -14,90 +16,214 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xy_sysid.errors import BadRecording
+from xy_sysid.imports.foreign_units import MOTIONS, Unit, to_si
+from xy_sysid.imports.limits import MOST_COLUMNS, fits
+from xy_sysid.imports.reading import Reading
+from xy_sysid.imports.sheet import Column, Sheet
+from xy_sysid.imports.sheet_table import in_seconds, scaled
 from xy_sysid.imports.table import Table, axis_names
-from xy_sysid.recording import Recording
-from xy_sysid.stream import FloatArray
+from xy_sysid.samples.block import FloatArray
+from xy_sysid.samples.recording import Recording
 
 Arrays = Mapping[str, NDArray[Any]]
 COPY = "Take another copy of the file."
-V73 = "Save it in MATLAB with save(name, '-v7')."
-DAMAGED = (OSError, ValueError, EOFError, KeyError, TypeError, IndexError, NotImplementedError, zipfile.BadZipFile, zlib.error, struct.error)
+DAMAGED = (
+    *(OSError, ValueError, EOFError, KeyError, TypeError, IndexError, NotImplementedError, SyntaxError),
+    *(tokenize.TokenError, zipfile.BadZipFile, zlib.error, struct.error),
+)
+INPUTS, OUTPUTS, REFERENCES = ("u", "voltage", "InputData"), ("y", "position", "OutputData"), ("r", "reference")
+TIMES = ("t", "time", "SamplingInstants")
+RATES = ("fs", "Fs", "sampling_rate", "sample_rate")
+PERIODS = ("Ts", "dt", "SamplingPeriod", "sample_time")
+QUOTED = re.compile(r'"([^"]*)"')
+DULL = re.compile(r"Model Root|(In|Out)\d+", re.IGNORECASE)  # parts of a block's path that tell nothing
+VALUES, LABELS, UNITS = ("Data", "data", "values", "Values"), ("Name", "name", "label", "Label"), ("Unit", "unit", "Units", "units")
 
 
 def read_npz(path: Path) -> Arrays:
-    """The arrays of an .npz file; raises BadRecording."""
+    """The arrays of an .npz file, none larger than it says and all together not larger than fits; raises BadRecording."""
     try:
         with path.open("rb") as raw:
-            file = np.load(raw, allow_pickle=False)
-            if not isinstance(file, np.lib.npyio.NpzFile):
+            if raw.read(6) == b"\x93NUMPY":
                 raise BadRecording(path, "one bare array, not an .npz", "Save named arrays with numpy.savez.")
-            return {name: file[name] for name in file.files}
+            raw.seek(0)
+            with zipfile.ZipFile(raw) as archive:
+                if len(archive.infolist()) > MOST_COLUMNS:
+                    raise BadRecording(path, f"{len(archive.infolist())} arrays, and {MOST_COLUMNS} are read at most", "Store the signals alone.")
+                fits(path, float(sum(member.file_size for member in archive.infolist())))
+                return {member.filename.removesuffix(".npy"): _member(path, archive, member) for member in archive.infolist()}
     except DAMAGED as error:
         raise BadRecording(path, f"not readable as .npz ({_line(error)})", COPY) from None
 
 
-def read_mat(path: Path) -> Arrays:
-    """The variables of a MATLAB file up to version 7; those of its only struct, if it has nothing else."""
-    import scipy.io
-
-    with path.open("rb") as file:
-        head = file.read(128)
-    if head.startswith((b"MATLAB 7.3", b"\x89HDF")):
-        raise BadRecording(path, "a MATLAB file of version 7.3 (HDF5), which is not read here", V73)
-    try:
-        content = scipy.io.loadmat(str(path), squeeze_me=True, struct_as_record=True)
-    except (*DAMAGED, scipy.io.matlab.MatReadError) as error:
-        raise BadRecording(path, f"not readable as .mat ({_line(error)})", COPY) from None
-    found = {name: np.asarray(value) for name, value in content.items() if not name.startswith("__")}
-    if len(found) == 1:
-        (only,) = found.values()
-        if only.dtype.names and only.size == 1:
-            return {name: np.asarray(only[name].item()) for name in only.dtype.names}
-    return found
+def _member(path: Path, archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> NDArray[Any]:
+    """One array; its header is read first, since memory is taken for what that says."""
+    form = np.lib.format
+    with archive.open(member) as file:
+        version = form.read_magic(file)
+        shape, _, kind = form.read_array_header_1_0(file) if version == (1, 0) else form.read_array_header_2_0(file)
+    if not kind.hasobject and float(np.prod([float(size) for size in shape])) * kind.itemsize > member.file_size:
+        raise BadRecording(path, f"{member.filename} says it holds {shape} numbers, and it holds fewer", COPY)
+    with archive.open(member) as file:
+        return np.asarray(form.read_array(file, allow_pickle=False))
 
 
 def _line(error: BaseException) -> str:
     return (str(error).splitlines() or [type(error).__name__])[0][:120]
 
 
-def table(path: Path, arrays: Arrays, input_key: str | None, output_key: str | None) -> Table:
-    """What the arrays say; raises BadRecording that names the arrays there are."""
-    has = f"it has {', '.join(arrays) or 'nothing'}"
-    chosen = []
-    for key, names in ((input_key, ("u", "voltage")), (output_key, ("y", "position"))):
-        name = next((name for name in ((key,) if key else names) if name in arrays), None)
-        if name is None:
-            option = "--input-key" if names[0] == "u" else "--output-key"
-            raise BadRecording(path, f"no array {key or ' or '.join(names)}; {has}", f"Name it with {option}.")
-        chosen.append(name)
-    time_name = next((name for name in ("t", "time") if name in arrays), None)
+def group(path: Path, leaves: Arrays) -> Arrays:
+    """The leaves of the one struct that holds a recording under the contract's names, without its own name; else all as they are."""
+    if _has(leaves):
+        return leaves
+    inside: dict[str, dict[str, NDArray[Any]]] = {}
+    for name, value in leaves.items():
+        place, _, last = name.rpartition(".")
+        inside.setdefault(place, {})[last] = value
+    found = [place for place, content in inside.items() if place and _has(content)]
+    if len(found) > 1:
+        raise BadRecording(path, f"several recordings: {', '.join(found)}", f"Choose with --map input={found[0]}.u,output={found[0]}.y")
+    if found:
+        return inside[found[0]]
+    places = {name.partition(".")[0] for name in leaves}
+    return {name.partition(".")[2]: value for name, value in leaves.items()} if len(places) == 1 and all("." in name for name in leaves) else leaves
+
+
+def _has(arrays: Arrays) -> bool:
+    return any(name in arrays for name in INPUTS) and any(name in arrays for name in OUTPUTS)
+
+
+def table(path: Path, arrays: Arrays, reading: Reading, notes: list[str]) -> Table | None:
+    """What arrays with the contract's names say; None if there are no such, or if others are to be taken."""
+    if not _has(arrays) or reading.columns:
+        return None
+    input_name, output_name = (next(name for name in names if name in arrays) for names in (INPUTS, OUTPUTS))
+    time_name = next((name for name in TIMES if name in arrays and (arrays[name].size or name != TIMES[-1])), None)
     time = None if time_name is None else _vector(path, time_name, arrays[time_name])
-    fs = _vector(path, "fs", arrays["fs"]) if "fs" in arrays else np.empty(0)
+    fs = _rate(path, arrays)
     rows = None if time is None else len(time)
-    inputs, outputs = (_matrix(path, name, arrays[name], rows) for name in chosen)
+    inputs, outputs = (_matrix(path, name, arrays[name], rows) for name in (input_name, output_name))
     if inputs.shape[1] != outputs.shape[1]:
-        raise BadRecording(path, f"{chosen[0]} has {inputs.shape[1]} axes and {chosen[1]} {outputs.shape[1]}", "Give one column per axis in both.")
-    reference_name = next((name for name in ("r", "reference") if name in arrays), None)
+        raise BadRecording(path, f"{input_name} has {inputs.shape[1]} axes and {output_name} {outputs.shape[1]}", "Give one column per axis in both.")
+    reference_name = next((name for name in REFERENCES if name in arrays), None)
     reference = None if reference_name is None else _matrix(path, reference_name, arrays[reference_name], rows)
     names = np.atleast_1d(arrays["axes"]).astype(str).tolist() if "axes" in arrays else []
     axes = tuple(name.strip() for name in names) if len(names) == inputs.shape[1] else axis_names(inputs.shape[1])
+    if time is None and fs is None and reading.rate is None:
+        said = next((f"fs ({arrays[name]})" for name in RATES if name in arrays), "fs")
+        raise BadRecording(path, f"neither a time column nor a usable {said}", "Add t in seconds or fs in Hz, or give --rate.")
+    if reading.rate is not None:
+        if time is not None:
+            notes.append(f"the samples are taken as they stand, {reading.rate:g} Hz; the time {time_name!r} is not used")
+        time, fs = None, reading.rate
+    elif time is not None:
+        unit_of_time = reading.unit("time") or _unit(arrays, "t", "t_unit", "s", "TimeUnit")
+        time = in_seconds(path, time * (reading.scale("time") or 1.0), unit_of_time, notes)
+    if str(arrays.get("InterSample", np.array("zoh")).ravel()[:1]).find("foh") >= 0:
+        notes.append("the file says that its input goes straight from sample to sample (foh): fit it with --set hold=none")
+    sides = []
+    for role, values, text in (
+        ("input", inputs, _unit(arrays, input_name, "u_unit", "V", "InputUnit")),
+        ("output", outputs, _unit(arrays, output_name, "y_unit", "m", "OutputUnit")),
+    ):
+        sides.append(_si((role, values, text), path, axes, reading, notes))
+    unit = sides[1][1]
+    if reference is not None and reference.shape == outputs.shape:
+        reference, _ = _si(("reference", reference, _unit(arrays, output_name, "y_unit", "m", "OutputUnit")), path, axes, reading, [])
     return Table(
         axes=axes,
         time=time,
-        fs=float(fs[0]) if fs.size else None,
-        seq=_vector(path, "seq", arrays["seq"]) if "seq" in arrays else None,
-        input=inputs,
-        output=outputs,
+        fs=fs,
+        seq=_vector(path, "seq", arrays["seq"]) if "seq" in arrays and reading.rate is None else None,
+        input=sides[0][0],
+        output=sides[1][0],
         reference=reference if reference is not None and reference.shape == outputs.shape else None,
-        input_unit=_unit(arrays, chosen[0], "u_unit", "V"),
-        output_unit=_unit(arrays, chosen[1], "y_unit", "m"),
+        input_unit=sides[0][1].name,
+        output_unit=unit.name,
+        measured=unit.quantity if unit.quantity in MOTIONS else "position",
     )
 
 
-def _unit(arrays: Arrays, name: str, usual_name: str, usual: str) -> str:
-    for key in (f"{name}_unit", usual_name):
-        if key in arrays and arrays[key].size == 1:
-            return str(arrays[key].item()).strip() or usual
+def _si(side: tuple[str, FloatArray, str], path: Path, axes: tuple[str, ...], reading: Reading, notes: list[str]) -> tuple[FloatArray, Unit]:
+    """(n, axes) in SI and the unit. side: role, values (n, axes), unit by the file."""
+    role, values, text = side
+    columns: list[FloatArray] = []
+    units: list[Unit] = []
+    said: list[str] = []
+    for place, axis in enumerate(axes):
+        one, own = scaled(values[:, place], reading.unit(role, axis) or text, reading.scale(role, axis), f"the {role} of {axis}", said)
+        one, unit = to_si(one, own, f"the {role}", said)
+        columns.append(one)
+        units.append(unit)
+    if len({unit.name for unit in units}) > 1:
+        given = ", ".join(sorted({unit.name for unit in units}))
+        raise BadRecording(path, f"axes in different units ({given})", "Give all axes of one kind the same unit.")
+    notes += dict.fromkeys(said)
+    return np.column_stack(columns), units[0]
+
+
+def _rate(path: Path, arrays: Arrays) -> float | None:
+    """Hz, from a rate or a period that the file says; None if it says none that can be."""
+    for names, invert in ((RATES, False), (PERIODS, True)):
+        for name in names:
+            values = arrays.get(name)
+            if values is not None and values.size == 1 and values.dtype.kind in "fiub":
+                value = float(values.ravel()[0])
+                if np.isfinite(value) and value > 0:
+                    return 1.0 / value if invert else value
+    return None
+
+
+def sheet(path: Path, arrays: Arrays) -> Sheet:
+    """Every vector, and every column of a matrix (``data:3`` is its third), as a column."""
+    columns: list[Column] = []
+    rates: Arrays = {name.rpartition(".")[2]: value for name, value in arrays.items()}
+    for name, value in arrays.items():
+        unit = _unit_beside(arrays, name)
+        shown = _label(arrays, name)
+        if value.dtype.kind not in "fiub" or value.ndim > 2 or value.size < 2:
+            continue
+        if value.ndim == 1 or 1 in value.shape:
+            columns.append(Column(shown, unit, np.asarray(value, np.float64).ravel()))
+            continue
+        turned = value.T if value.shape[1] > value.shape[0] else value
+        for place in range(min(turned.shape[1], 64)):
+            columns.append(Column(f"{shown}:{place + 1}", unit, np.asarray(turned[:, place], np.float64)))
+    return Sheet(path=path, columns=tuple(_short(columns)), kind="array", fs=_rate(path, rates))
+
+
+def _short(columns: list[Column]) -> list[Column]:
+    """Without the names of structs where that leaves no two alike."""
+    last = [column.name.rpartition(".")[2] for column in columns]
+    return [Column(short if last.count(short) == 1 else one.name, one.unit, one.values) for one, short in zip(columns, last, strict=True)]
+
+
+def _label(arrays: Arrays, name: str) -> str:
+    """What a struct with a name and values calls them: the part of the name that tells something, time for one called X."""
+    place, _, last = name.rpartition(".")
+    if last not in VALUES:
+        return name
+    said = next((str(arrays[f"{place}.{one}"].ravel()[0]) for one in LABELS if f"{place}.{one}" in arrays and arrays[f"{place}.{one}"].size), "")
+    parts = [part for part in QUOTED.findall(said) or said.split("/") if part and not DULL.fullmatch(part)]
+    if parts:
+        twice = sum(str(value.ravel()[0]) == said for key, value in arrays.items() if key.rpartition(".")[2] in LABELS and value.size)
+        return parts[-1].strip().replace(".", " ") if twice == 1 else name
+    if place.rpartition(".")[2] == "X":
+        return "time"
+    return name if place.endswith(")") else place or name
+
+
+def _unit_beside(arrays: Arrays, name: str) -> str:
+    place, _, last = name.rpartition(".")
+    beside = [f"{name}_unit", *(f"{place}.{one}" for one in UNITS if place and last in VALUES)]
+    beside += {"u": ["u_unit"], "y": ["y_unit"]}.get(name, [])
+    return next((str(arrays[one].ravel()[0]).strip() for one in beside if one in arrays and arrays[one].size), "")
+
+
+def _unit(arrays: Arrays, name: str, usual_name: str, usual: str, matlab: str = "") -> str:
+    for key in (f"{name}_unit", usual_name, matlab):
+        if key in arrays and arrays[key].size and arrays[key].dtype.kind in "US":
+            return str(arrays[key].ravel()[0]).strip() or usual
     return usual
 
 

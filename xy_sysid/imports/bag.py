@@ -9,11 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from xy_sysid.bags.reading import Bag
-from xy_sysid.bags.streaming import Kind, choose, pieces, units
+from xy_sysid.bags.streaming import StreamName, Topics, choose, pieces, units
 from xy_sysid.errors import BadInput
-from xy_sysid.imports.pairing import LATE, Stream, cut, gather, is_jitter, pair, steady
-from xy_sysid.recording import Recording
-from xy_sysid.stream import Block
+from xy_sysid.imports.given import in_units
+from xy_sysid.imports.paired_streams import LATE, Stream, cut, gather, hollow, is_jitter, pair, steady
+from xy_sysid.imports.reading import Reading
+from xy_sysid.samples.block import Block
+from xy_sysid.samples.recording import Recording
 
 WHOLE = 1 << 40  # samples; blocks as long as they come
 MARGIN = 1.0  # s kept around the part that was asked for, for samples that came late
@@ -21,31 +23,27 @@ COPIES = 4  # times the size of the samples that pairing needs while it works
 SHARE = 0.6  # of the machine's memory that a recording may take
 
 
-def load_bag(
-    path: Path,
-    voltage_topic: str,
-    position_topic: str,
-    joint_topic: str | None,
-    axes: Sequence[str] | None,
-    effort_as_voltage: bool,
-    start: float,
-    stop: float | None,
-    progress: Callable[[float], None] | None,
-) -> Recording:
+def load_bag(path: Path, reading: Reading, progress: Callable[[float], None] | None) -> Recording:
     """See ``xy_sysid.imports.load``."""
+    if reading.columns or reading.rate is not None:
+        raise BadInput("--map or --rate", f"for {path}", "for a table", "A bag has topics and stamps: choose topics with --topic, or leave it out.")
+    voltage_topic, position_topic, start, stop = reading.voltage_topic, reading.position_topic, reading.start, reading.stop
     with Bag(path) as bag:
-        source = choose(bag, voltage_topic, position_topic, joint_topic, effort_as_voltage)
+        source = choose(bag, topics(reading))
         kept, first = _collect(bag, pieces(bag, source, WHOLE, progress), start, stop)
         notes = bag.notes
-        named: dict[Kind, str] = {"voltage": "effort" if source.effort else voltage_topic, "position": source.joints or position_topic}
+        named: dict[StreamName, str] = {"voltage": "effort" if source.effort else voltage_topic, "position": source.joints or position_topic}
         for kind, name in named.items():
             if kind not in first:
                 raise bag.bad(f"no samples on {name} that can be read", "Record while the source publishes.")
             if not sum(map(len, kept.get(kind, []))):
                 raise BadInput("start", f"{start:g} s", "within the recording", "Begin earlier.")
-        same, common = _axes(bag, kept, axes, source.joints is not None, notes)
+        same, common = _axes(bag, kept, reading.axes, source.joints is not None, notes)
+        common = _with_numbers(bag, same, common, notes)
         streams: dict[str, Stream] = {kind: gather(kind, blocks, common, notes, bag.bad) for kind, blocks in same.items() if blocks}
         if source.effort:
+            if "reference" in streams:
+                streams["reference"] = _by_stamp(streams["reference"], streams["position"])
             streams = _in_order(streams, notes)
             if not source.said:
                 notes.append("there is no voltage topic; the joints' effort is the input")
@@ -53,17 +51,22 @@ def load_bag(
                 raise bag.bad(f"the effort on {source.joints} is zero throughout and there is no {voltage_topic}", "Record the voltage too.")
         if source.joints is not None and not source.effort:
             notes.append("joint states are paired with the voltage by their stamps")
+        if source.effort and source.said and not reading.units and "input_unit" not in bag.custom:
+            notes.append('joint states name no unit: effort is taken as V and position as m; else say for example --unit input="N m",output=rad')
         if source.effort and not source.said:
             notes.append("joint states name no unit; effort and position are carried as they are")
-        return cut(pair(streams, str(path), units(bag, source), notes, bag.bad), first["position"], start, stop)
+        paired = cut(pair(streams, str(path), units(bag, source), notes, bag.bad), first["position"], start, stop)
+        return in_units(paired, reading)
 
 
-def _collect(bag: Bag, blocks: Iterator[tuple[Kind, Block]], start: float, stop: float | None) -> tuple[dict[Kind, list[Block]], dict[Kind, float]]:
+def _collect(
+    bag: Bag, blocks: Iterator[tuple[StreamName, Block]], start: float, stop: float | None
+) -> tuple[dict[StreamName, list[Block]], dict[StreamName, float]]:
     """The blocks that touch the part asked for, and the first instant of each kind; never more than fits in memory."""
-    kept: dict[Kind, list[Block]] = {}
-    first: dict[Kind, float] = {}
-    latest: dict[Kind, float] = {}
-    over: set[Kind] = set()
+    kept: dict[StreamName, list[Block]] = {}
+    first: dict[StreamName, float] = {}
+    latest: dict[StreamName, float] = {}
+    over: set[StreamName] = set()
     restarted, size = False, 0
     room = SHARE * os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / COPIES
     for kind, block in blocks:
@@ -90,11 +93,11 @@ def _collect(bag: Bag, blocks: Iterator[tuple[Kind, Block]], start: float, stop:
 
 
 def _axes(
-    bag: Bag, kept: dict[Kind, list[Block]], wanted: Sequence[str] | None, joints: bool, notes: list[str]
-) -> tuple[dict[Kind, list[Block]], tuple[str, ...]]:
+    bag: Bag, kept: dict[StreamName, list[Block]], wanted: Sequence[str] | None, joints: bool, notes: list[str]
+) -> tuple[dict[StreamName, list[Block]], tuple[str, ...]]:
     """Blocks that have the axes to be read, and these axes; raises BadRecording if there are none in common."""
-    names: dict[Kind, tuple[str, ...]] = {kind: blocks[0].axes for kind, blocks in kept.items()}
-    same: dict[Kind, list[Block]] = {kind: [block for block in blocks if block.axes == names[kind]] for kind, blocks in kept.items()}
+    names: dict[StreamName, tuple[str, ...]] = {kind: _usual(blocks) for kind, blocks in kept.items()}
+    same: dict[StreamName, list[Block]] = {kind: [block for block in blocks if block.axes == names[kind]] for kind, blocks in kept.items()}
     for kind, blocks in kept.items():
         lost = sum(map(len, blocks)) - sum(map(len, same[kind]))
         if lost:
@@ -109,12 +112,62 @@ def _axes(
         raise bag.bad(f"no axis in common: voltage has {', '.join(inputs)}, position {', '.join(outputs)}", "Give both the same column names.")
     if set(inputs) != set(outputs):
         notes.append(f"voltage has the axes {', '.join(inputs)} and position {', '.join(outputs)}; {', '.join(common)} are read")
+    if not set(common) <= set(names.get("reference", common)):
+        notes.append(
+            f"the reference has {', '.join(names['reference'])} and the axes are {', '.join(common)}: say --joint AXIS=JOINT; it is left out"
+        )
+        del same["reference"]
     if wanted is None:
         return same, common
     unknown = [name for name in wanted if name not in common]
     if unknown:
         raise BadInput("axis", ", ".join(unknown), ", ".join(common), "Choose some of these.")
     return same, tuple(wanted)
+
+
+def _usual(blocks: Sequence[Block]) -> tuple[str, ...]:
+    """The columns that most samples have: one wrong message, were it the first, does not decide."""
+    counts: dict[tuple[str, ...], int] = {}
+    for block in blocks:
+        counts[block.axes] = counts.get(block.axes, 0) + len(block)
+    return max(counts, key=lambda axes: counts[axes])
+
+
+def _with_numbers(bag: Bag, blocks: dict[StreamName, list[Block]], axes: tuple[str, ...], notes: list[str]) -> tuple[str, ...]:
+    """The axes without those that have hardly any numbers, as long as others have."""
+    empty: set[str] = set()
+    for kind in ("voltage", "position"):
+        values = [block.values for block in blocks[kind]]
+        if all(np.isfinite(one).all() for one in values):
+            continue
+        empty |= {axis for axis, none in zip(blocks[kind][0].axes, hollow(np.concatenate(values)), strict=True) if none}
+    left = [axis for axis in axes if axis in empty]
+    if not left or len(left) == len(axes):
+        return axes
+    notes.append(f"axis {', '.join(left)} has hardly any numbers; it is left out")
+    return tuple(axis for axis in axes if axis not in empty)
+
+
+def _by_stamp(stream: Stream, by: Stream) -> Stream:
+    """Samples with the number of that sample of another stream which is next in time; a number is given once."""
+    order = np.argsort(by.time, kind="stable")
+    times, numbers = by.time[order], by.seq[order]
+    after = np.clip(np.searchsorted(times, stream.time), 1, len(times) - 1) if len(times) > 1 else np.zeros(len(stream.time), dtype=np.int64)
+    nearest = np.where(stream.time - times[after - 1] < times[after] - stream.time, after - 1, after) if len(times) > 1 else after
+    seq, first = np.unique(numbers[nearest], return_index=True)
+    return Stream(stream.axes, seq, times[nearest][first], stream.values[first])
+
+
+def topics(reading: Reading) -> Topics:
+    """What of a bag is to be read."""
+    return Topics(
+        voltage_topic=reading.voltage_topic,
+        position_topic=reading.position_topic,
+        joint_topic=reading.joint_topic,
+        effort_as_voltage=reading.effort_as_voltage,
+        joints=tuple(reading.joints),
+        effort_lag=reading.effort_lag,
+    )
 
 
 def _in_order(streams: dict[str, Stream], notes: list[str]) -> dict[str, Stream]:

@@ -1,150 +1,178 @@
-"""CSV: a first row that names ``time,x_voltage,x_position,...`` with the unit where it is not SI; then numbers.
+"""CSV --> columns, and a recording --> CSV.
 
-A unit stands in brackets: ``x_position[mm]`` or ``x_position (mm)``. One axis may be called ``voltage,position``.
+The first row names the columns, with the unit in brackets where it is not SI: ``x_position[mm]`` or ``x_position (mm)``.
 Columns are separated by comma, semicolon or tab; with the last two the decimal sign may be a comma.
 """
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
-from typing import NoReturn
 
 import numpy as np
 
 from xy_sysid.errors import BadRecording
-from xy_sysid.imports.table import Table
-from xy_sysid.imports.units import to_si
-from xy_sysid.recording import Recording, rate_from_time
-from xy_sysid.stream import FloatArray
+from xy_sysid.imports.foreign_units import unit_of
+from xy_sysid.imports.limits import MOST_COLUMNS
+from xy_sysid.imports.names import header
+from xy_sysid.imports.sheet import Column, Sheet
+from xy_sysid.samples.block import FloatArray
+from xy_sysid.samples.recording import Recording, rate_from_time
 
-HEADER = re.compile(r"^\s*(?P<name>[^\[\(]*?)\s*(?:[\[\(]\s*(?P<unit>[^\]\)]*?)\s*[\]\)])?\s*$")
-TIMES, NUMBERS = ("time", "t"), ("seq",)
-INPUTS, OUTPUTS, REFERENCES = ("voltage", "u", "input"), ("position", "y", "output"), ("reference", "r")
-MISSING = ("", "nan", "na", "n/a", "null", "none", "-")
+MISSING = ("", "nan", "na", "n/a", "null", "none", "-", "inf", "-inf")
 EXAMPLE = "Name the columns like time,x_voltage,x_position[mm] in the first row."
+LOOK = 200  # rows before the last one that show how its numbers are written
+Rows = list[tuple[int, str]]
+Names = list[tuple[str, str]]  # with their units
 
 
-def read(path: Path, input_key: str | None, output_key: str | None, notes: list[str]) -> Table:
-    """The columns of a file; input_key, output_key: how the columns are called instead of voltage and position.
-
-    Raises BadRecording that names the row for anything that is not a number.
-    """
-    try:
-        lines = path.read_text("utf-8-sig").splitlines()
-    except UnicodeDecodeError:
-        raise BadRecording(path, "not a text file", "Save it as CSV in UTF-8.") from None
-    rows = [(number, line) for number, line in enumerate(lines, 1) if line.strip() and not line.lstrip().startswith("#")]
+def sheet(path: Path) -> Sheet:
+    """The columns of a file; what is not a number is told when its column is used."""
+    text = _text(path)
+    notes: list[str] = []
+    rows = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip() and not line.lstrip().startswith("#")]
     if not rows:
         raise BadRecording(path, "the file holds no rows", EXAMPLE)
+    rows = _without_titles(rows, notes)
     head = rows[0][1]
-    separator = max(";\t,", key=head.count) if any(sign in head for sign in ";\t,") else ","
-    names, units = _header(path, head.split(separator))
-    table = _numbers(path, rows[1:], separator, names)
-    return _table(path, names, units, table, input_key, output_key, notes)
+    separator = _separator(head)
+    if head.count(separator) >= MOST_COLUMNS:
+        problem = f"its first row has {head.count(separator) + 1} cells, and {MOST_COLUMNS} columns are read at most"
+        raise BadRecording(path, problem, "Give a file with one column per signal.")
+    cells = _cells(head, separator)
+    while len(cells) > 1 and not cells[-1]:
+        cells.pop()
+    if all(_is_number(cell, separator) for cell in cells):
+        notes.append("the first row holds numbers and no names; the columns are called by their numbers from 1 on")
+        names = [(str(number), "") for number in range(1, len(cells) + 1)]
+    else:
+        names, rows = [header(cell) for cell in cells], rows[1:]
+        names, rows = _with_units(names, rows, separator)
+    if not text.endswith(("\n", "\r")):
+        rows = _whole(rows, separator, len(names), notes)
+    columns, bad = _columns(path, rows, separator, names)
+    return Sheet(path=path, columns=columns, notes=tuple(notes), bad=bad)
 
 
-def _header(path: Path, cells: list[str]) -> tuple[list[str], list[str]]:
-    names, units = [], []
-    for cell in cells:
-        found = HEADER.match(cell.strip().strip('"'))
-        if found is None:
-            raise BadRecording(path, f"row 1: column name {cell!r} is not understood", EXAMPLE)
-        names.append(found["name"].strip())
-        units.append(found["unit"] or "")
-    while len(names) > 1 and not names[-1]:
-        names.pop(), units.pop()
-    if len(set(names)) != len(names):
-        twice = next(name for name in names if names.count(name) > 1)
-        raise BadRecording(path, f"row 1: the column {twice!r} is there twice", "Give every column its own name.")
-    return names, units
+def _separator(line: str) -> str:
+    return max(";\t,", key=line.count) if any(sign in line for sign in ";\t,") else ","
 
 
-def _numbers(path: Path, rows: list[tuple[int, str]], separator: str, names: list[str]) -> FloatArray:
-    if not rows:
-        return np.empty((0, len(names)))
-    comma = separator != ","
-    try:
-        text = (line.replace(",", ".") if comma else line for _, line in rows)
-        table = np.loadtxt(text, delimiter=separator, ndmin=2, comments=None)
-        if table.shape == (len(rows), len(names)):
-            return table
-    except (ValueError, IndexError):
-        pass
-    return np.array([_row(path, number, line, separator, names) for number, line in rows]).reshape(len(rows), len(names))
+def _without_titles(rows: Rows, notes: list[str]) -> Rows:
+    """Without lines of one cell before a table of several columns: titles, dates, remarks."""
+    many = [len(_cells(line, _separator(line))) > 1 for _, line in rows[:LOOK]]
+    first = many.index(True) if any(many) else 0
+    if first:
+        notes.append(f"row {rows[0][0]} to {rows[first - 1][0]} are no columns ({rows[0][1][:40]!r}); they are left out")
+    return rows[first:]
 
 
-def _row(path: Path, number: int, line: str, separator: str, names: list[str]) -> list[float]:
-    cells = [cell.strip().strip('"') for cell in line.split(separator)]
-    if len(cells) < len(names) or any(cells[len(names) :]):
-        raise BadRecording(path, f"row {number} has {len(cells)} columns, the first row {len(names)}", "Give every row the same columns.")
-    values = []
-    for name, cell in zip(names, cells, strict=False):
+def _with_units(names: Names, rows: Rows, separator: str) -> tuple[Names, Rows]:
+    """Units from a row of their own below the names."""
+    cells = _cells(rows[0][1], separator)[: len(names)] if rows else []
+    if len(cells) < len(names) or any(_is_number(cell, separator) or unit_of(cell).quantity == "unknown" for cell in cells if cell) or not any(cells):
+        return names, rows
+    return [(name, unit or cell) for (name, unit), cell in zip(names, cells, strict=True)], rows[1:]
+
+
+def _text(path: Path) -> str:
+    """The file's text: UTF-8, UTF-16 if it begins so, or else as Windows writes it."""
+    raw = path.read_bytes()
+    for code in ("utf-16",) if raw.startswith((b"\xff\xfe", b"\xfe\xff")) else ("utf-8-sig", "cp1252"):
         try:
-            values.append(np.nan if cell.lower() in MISSING else float(cell.replace(",", ".") if separator != "," else cell))
-        except ValueError:
-            _not_a_number(path, number, name, cell)
-    return values
+            text = raw.decode(code)
+        except UnicodeDecodeError:
+            continue
+        if "\0" not in text:
+            return text
+    raise BadRecording(path, "not a text file", "Save it as CSV in UTF-8.")
 
 
-def _not_a_number(path: Path, number: int, name: str, cell: str) -> NoReturn:
-    raise BadRecording(path, f"row {number}, column {name!r}: {cell!r} is not a number", "Correct or delete that row.")
+def _cells(line: str, separator: str) -> list[str]:
+    """The cells of a row; a separator within quotes belongs to its cell."""
+    if '"' not in line:
+        return [cell.strip() for cell in line.split(separator)]
+    cells, part, quoted = [], "", False
+    for sign in line:
+        quoted ^= sign == '"'
+        if sign == separator and not quoted:
+            cells.append(part)
+            part = ""
+        elif sign != '"':
+            part += sign
+    return [cell.strip() for cell in (*cells, part)]
 
 
-def _columns(names: list[str], kinds: tuple[str, ...]) -> dict[str, int]:
-    """Axis name -> column, for the columns of one kind."""
-    found: dict[str, int] = {}
-    for kind in kinds:
-        for column, name in enumerate(names):
-            axis, _, ending = name.rpartition("_")
-            if ending == kind and (axis or name == kind):
-                found.setdefault(axis or "x", column)
-        if found:
-            break
-    return found
+def _number(cell: str, separator: str) -> float:
+    """Its number, not a number where it says so; raises ValueError."""
+    return np.nan if cell.lower() in MISSING else float(cell.replace(",", ".") if separator != "," else cell)
 
 
-def _table(
-    path: Path, names: list[str], units: list[str], table: FloatArray, input_key: str | None, output_key: str | None, notes: list[str]
-) -> Table:
-    has = f"it has {', '.join(names)}"
-    times = [names.index(name) for name in TIMES if name in names]
-    if not times:
-        raise BadRecording(path, f"no time column; {has}", EXAMPLE)
-    found: list[dict[str, int]] = []
-    for key, kinds in ((input_key, INPUTS), (output_key, OUTPUTS)):
-        columns = {"x": names.index(key)} if key in names else _columns(names, (key,) if key else kinds)
-        if not columns:
-            raise BadRecording(path, f"no {key or kinds[0]} column; {has}", EXAMPLE)
-        found.append(columns)
-    inputs, outputs = found
-    axes = tuple(axis for axis in inputs if axis in outputs)
-    if not axes:
-        raise BadRecording(path, f"no axis has both voltage and position; {has}", EXAMPLE)
-    if set(inputs) != set(outputs):
-        notes.append(f"only {', '.join(axes)} has both voltage and position; the others are left out")
-    references = _columns(names, REFERENCES)
-    time, _ = to_si(table[:, times[0]], units[times[0]], "time", notes)
-    numbers = [names.index(name) for name in NUMBERS if name in names]
-    input_unit, output_unit = (_unit(path, units, [columns[a] for a in axes], usual) for columns, usual in ((inputs, "V"), (outputs, "m")))
-    return Table(
-        axes=axes,
-        time=time,
-        fs=None,
-        seq=table[:, numbers[0]] if numbers else None,
-        input=table[:, [inputs[axis] for axis in axes]],
-        output=table[:, [outputs[axis] for axis in axes]],
-        reference=table[:, [references[axis] for axis in axes]] if all(axis in references for axis in axes) else None,
-        input_unit=input_unit,
-        output_unit=output_unit,
-    )
+def _is_number(cell: str, separator: str) -> bool:
+    try:
+        return bool(np.isfinite(_number(cell, separator)))
+    except ValueError:
+        return False
 
 
-def _unit(path: Path, units: list[str], columns: list[int], usual: str) -> str:
-    given = {units[column] or usual for column in columns}
-    if len(given) > 1:
-        raise BadRecording(path, f"axes in different units ({', '.join(sorted(given))})", "Give all axes of one kind the same unit.")
-    return given.pop()
+def _whole(rows: Rows, separator: str, width: int, notes: list[str]) -> Rows:
+    """The rows without the last, if the file ends inside it: too few cells, or a number shorter than the others are written."""
+    if not rows:
+        return rows
+    number, line = rows[-1]
+    cells = _cells(line, separator)
+    before = [_cells(text, separator) for _, text in rows[-1 - LOOK : -1]]
+    least = min((_digits(one[width - 1]) for one in before if len(one) >= width), default=0)
+    cut = len(cells) < width or (not _is_number(cells[width - 1], separator) and bool(before) and _is_number(before[-1][-1], separator))
+    if cut or _digits(cells[width - 1]) < least:
+        notes.append(f"the file ends inside row {number} ({line[-20:]!r}); that row is left out")
+        return rows[:-1]
+    notes.append("the file does not end with the end of a line; if it was cut short, its last number may be wrong")
+    return rows
+
+
+def _digits(cell: str) -> int:
+    """Signs after the decimal sign."""
+    return len(cell) - 1 - max(cell.find("."), cell.find(",")) if "." in cell or "," in cell else 0
+
+
+def _columns(path: Path, rows: Rows, separator: str, names: Names) -> tuple[tuple[Column, ...], dict[str, str]]:
+    """The columns, and what is wrong with those that hold something else than numbers."""
+    width = len(names)
+    table = _quick(rows, separator, width)
+    if table is not None:
+        return tuple(Column(name, unit, table[:, place]) for place, (name, unit) in enumerate(names)), {}
+    cells = [_cells(line, separator) for _, line in rows]
+    for (number, _), row in zip(rows, cells, strict=True):
+        if len(row) < width or any(row[width:]):
+            raise BadRecording(path, f"row {number} has {len(row)} columns, the first row {width}", "Give every row the same columns.")
+    columns: list[Column] = []
+    bad: dict[str, str] = {}
+    for place, (name, unit) in enumerate(names):
+        texts = [row[place] for row in cells]
+        first = next((text for text in texts if text.lower() not in MISSING), "")
+        values = np.full(len(texts), np.nan)
+        if first and not _is_number(first, separator):
+            columns.append(Column(name, unit, values, tuple(texts)))
+            continue
+        for at, text in enumerate(texts):
+            try:
+                values[at] = _number(text, separator)
+            except ValueError:
+                bad.setdefault(name, f"row {rows[at][0]}, column {name!r}: {text[:40]!r} is not a number")
+        columns.append(Column(name, unit, values))
+    return tuple(columns), bad
+
+
+def _quick(rows: Rows, separator: str, width: int) -> FloatArray | None:
+    """All cells at once, if all are numbers."""
+    if not rows:
+        return np.empty((0, width))
+    try:
+        text = (line.replace(",", ".") if separator != "," else line for _, line in rows)
+        table = np.loadtxt(text, delimiter=separator, ndmin=2, comments=None)
+    except (ValueError, IndexError):
+        return None
+    return np.asarray(table) if table.shape == (len(rows), width) else None
 
 
 def write(path: Path, recording: Recording) -> None:

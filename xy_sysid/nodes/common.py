@@ -16,16 +16,20 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout
 
 from xy_sysid.errors import BadInput
+from xy_sysid.nodes.quality import Overridable
 from xy_sysid.nodes.run import run_node
-from xy_sysid.settings import Knob, Settings, build, changed, knobs, unknown_name
-from xy_sysid.stream import Block, columns, pack, unpack
+from xy_sysid.nodes.wall import Wall
+from xy_sysid.samples.block import Block, columns, pack, unpack
+from xy_sysid.settings import AXES, Knob, Settings, build, changed, knobs, of_other_axes, unknown_name
 
 __all__ = [
     "DATA_QOS",
     "LATCHED_QOS",
     "NAMESPACE",
-    "Ending",
+    "STOP_HEARD",
+    "STOP_TOPIC",
     "Parameters",
+    "WalledNode",
     "declare",
     "from_message",
     "run_node",
@@ -35,19 +39,39 @@ __all__ = [
 ]
 
 NAMESPACE = "/xy"
-Model = TypeVar("Model", bound=Settings)
+AnySettings = TypeVar("AnySettings", bound=Settings)
 
 # Ten seconds of 20-row blocks at 2 kHz: reader queues overflow silently, so they are longer than any stall.
 DATA_QOS = QoSProfile(depth=1000, history=HistoryPolicy.KEEP_LAST, reliability=ReliabilityPolicy.RELIABLE)
 LATCHED_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
+STOP_TOPIC = "stop"  # std_msgs/Bool: true is zero volts now and no activate until false
+# Heard twice: what was latched before the node was there, and whoever publishes without latching or reliability.
+STOP_HEARD = (LATCHED_QOS, QoSProfile(depth=10, history=HistoryPolicy.KEEP_LAST, reliability=ReliabilityPolicy.BEST_EFFORT))
+
 OF_ROS = ("use_sim_time", "start_type_description_service", "qos_overrides.")  # parameters that rclpy has by itself
 
 
-class Ending:
-    """The end of a node that has nothing to do before it ends."""
+class WalledNode(Overridable):
+    """A node whose callbacks stand behind a wall, and which has nothing to do before it ends."""
 
     exit_code: int | None = None
+
+    def __init__(self, name: str) -> None:
+        self.wall = Wall(lambda words: self.get_logger().error(words))
+        super().__init__(name, namespace=NAMESPACE, automatically_declare_parameters_from_overrides=True)
+
+    def create_subscription(self, msg_type: Any, topic: str, callback: Callable[..., Any], *rest: Any, **more: Any) -> Any:
+        """As rclpy's; an error of the callback is told."""
+        return super().create_subscription(msg_type, topic, self.wall.around(callback), *rest, **more)
+
+    def create_service(self, srv_type: Any, srv_name: str, callback: Callable[..., Any], **more: Any) -> Any:
+        """As rclpy's; an error of the callback is told."""
+        return super().create_service(srv_type, srv_name, self.wall.around(callback), **more)
+
+    def create_timer(self, timer_period_sec: float, callback: Callable[..., Any], *rest: Any, **more: Any) -> Any:
+        """As rclpy's; an error of the callback is told."""
+        return super().create_timer(timer_period_sec, self.wall.around(callback), *rest, **more)
 
     def ask_to_stop(self, reason: str) -> None:
         """Nothing to begin."""
@@ -60,10 +84,10 @@ class Ending:
         """None."""
 
 
-class Parameters(Generic[Model]):
+class Parameters(Generic[AnySettings]):
     """The settings as the node's parameters have them now; ``accept`` may refuse a change by raising BadInput."""
 
-    def __init__(self, settings: Model, accept: Callable[[Model], None] | None) -> None:
+    def __init__(self, settings: AnySettings, accept: Callable[[AnySettings], None] | None) -> None:
         self.settings = settings
         self._accept = accept
 
@@ -87,19 +111,30 @@ def overrides(node: Node) -> dict[str, Any]:
     return {name: parameter.value for name, parameter in given.items() if not name.startswith(OF_ROS)}
 
 
-def settings_from_parameters(node: Node, cls: type[Model]) -> Model:
+def settings_from_parameters(node: Node, cls: type[AnySettings]) -> AnySettings:
     """The settings as the node's declared parameters have them now; raises BadInput if they do not fit together."""
     known = {item.name for item in knobs(cls())}
     return build(cls, {name: value for name, value in overrides(node).items() if name in known}, f"node {node.get_name()}")
 
 
-def declare(node: Node, defaults: Model, accept: Callable[[Model], None] | None = None, also: Collection[str] = ()) -> Parameters[Model]:
+def declare(
+    node: Node,
+    defaults: AnySettings,
+    accept: Callable[[AnySettings], None] | None = None,
+    also: Collection[str] = (),
+    fixed: Collection[str] | None = (),
+) -> Parameters[AnySettings]:
     """Declare every knob with its type, meaning, unit and limits; take what was given; keep up with changes.
 
-    The node must be made with automatically_declare_parameters_from_overrides. also: names that the node declares itself.
+    The node must be made with automatically_declare_parameters_from_overrides. also: names that the node declares itself;
+    fixed: those that never change while it runs, None for all of them.
     Raises BadInput for an unknown name (with the nearest spelling) and for a value that is not allowed.
     """
     given = {name: value for name, value in overrides(node).items() if name not in also}
+    axes = overrides(node).get("axes", list(AXES))
+    for name in of_other_axes(type(defaults), given, axes):
+        node.undeclare_parameter(name)
+        del given[name]
     known = {item.name: item.value for item in knobs(defaults)}
     for name in given:
         if name not in known:
@@ -108,16 +143,24 @@ def declare(node: Node, defaults: Model, accept: Callable[[Model], None] | None 
     for item in knobs(settings):
         if item.name in given:
             node.undeclare_parameter(item.name)
-        node.declare_parameter(item.name, item.value, describe(item), ignore_override=True)
+        node.declare_parameter(item.name, item.value, describe(item, fixed is None or item.name in fixed), ignore_override=True)
     parameters = Parameters(settings, accept)
     node.add_on_set_parameters_callback(parameters.on_change)
     return parameters
 
 
-def describe(item: Knob) -> ParameterDescriptor:
+def declare_fixed(node: Node, name: str, value: Any, meaning: str) -> None:
+    """A parameter that is given when the node starts and never changes."""
+    if node.has_parameter(name):
+        node.undeclare_parameter(name)
+    node.declare_parameter(name, value, ParameterDescriptor(read_only=True, description=meaning), ignore_override=True)
+
+
+def describe(item: Knob, fixed: bool = False) -> ParameterDescriptor:
     """Meaning, unit and limits in ROS' words."""
     unit = f" [{item.unit}]" if item.unit else ""
     descriptor = ParameterDescriptor(
+        read_only=fixed,
         dynamic_typing=isinstance(item.value, list),  # an empty list has no type of its own
         description=item.meaning + unit,
         additional_constraints=f"one of {', '.join(item.choices)}" if item.choices else "",

@@ -9,7 +9,7 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 
-from xy_sysid.messages import ArrayMessage, StatusMessage
+from xy_sysid.live.messages import ArrayMessage, StatusMessage
 
 
 def array_to_ros(message: ArrayMessage) -> Float64MultiArray:
@@ -34,11 +34,12 @@ def array_from_ros(topic: str, message: Float64MultiArray) -> ArrayMessage:
 
 def statuses_to_ros(statuses: list[StatusMessage], stamp: Any, hardware: str = "") -> DiagnosticArray:
     """One DiagnosticArray."""
-    out = DiagnosticArray()
+    out = DiagnosticArray(status=[status_to_ros(item, hardware) for item in statuses])
     out.header.stamp = stamp
-    for status in statuses:
-        values = [KeyValue(key=key, value=value) for key, value in status.values]
-        out.status.append(
-            DiagnosticStatus(level=bytes([status.level]), name=status.name, message=status.message, hardware_id=hardware, values=values)
-        )
     return out
+
+
+def status_to_ros(item: StatusMessage, hardware: str = "") -> DiagnosticStatus:
+    """One DiagnosticStatus."""
+    values = [KeyValue(key=key, value=value) for key, value in item.values]
+    return DiagnosticStatus(level=bytes([item.level]), name=item.name, message=item.message, hardware_id=hardware, values=values)

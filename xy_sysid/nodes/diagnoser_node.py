@@ -1,6 +1,6 @@
 """Voltage and position in; on request which effect is missing, and the error falling as effects are added.
 
-Thin: ``diagnoser.Diagnoser`` knows what is to be done when, ``story_worker`` does it in a process of its own.
+Thin: ``diagnoser.Diagnoser`` knows what is to be done when, ``story_process`` does it in a process of its own.
 """
 
 from __future__ import annotations
@@ -11,40 +11,41 @@ from pathlib import Path
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.node import Node
 from rclpy.parameter import Parameter
 from std_msgs.msg import Float64MultiArray, String
 from std_srvs.srv import Trigger
 
-from xy_sysid.diagnoser import Diagnoser
 from xy_sysid.errors import BadInput
-from xy_sysid.live_story import Act, diagnosis_status, ladder_message
-from xy_sysid.messages import OK, STALE, WARN, StatusMessage
-from xy_sysid.nodes.common import LATCHED_QOS, NAMESPACE, Ending, declare
-from xy_sysid.nodes.convert import array_to_ros, statuses_to_ros
+from xy_sysid.files.effects import library
+from xy_sysid.live.diagnoser import Diagnoser
+from xy_sysid.live.heard import verdict
+from xy_sysid.live.messages import OK, STALE, WARN, StatusMessage, diagnosis_status, ladder_message, topic_of
+from xy_sysid.nodes.common import LATCHED_QOS, WalledNode, declare
+from xy_sysid.nodes.convert import array_to_ros, status_to_ros, statuses_to_ros
+from xy_sysid.nodes.diagnostics import Diagnostics
 from xy_sysid.nodes.later import LaterTrigger
 from xy_sysid.nodes.streams import AXES, Streams, answered, declare_axes
+from xy_sysid.processes.story_process import StoryWorker
 from xy_sysid.settings import DiagnoserSettings, given
-from xy_sysid.story import Story, allowed
-from xy_sysid.story_document import document
-from xy_sysid.story_worker import StoryWorker
-from xy_sysid.user_effects import library
+from xy_sysid.story.acts import Act
+from xy_sysid.story.document import document
+from xy_sysid.story.story import Story, allowed
 
 LOOK = 0.1  # s between two looks for news
 HEARTBEAT = 1.0  # s between two statuses in metrics
-ACTS: tuple[Act, ...] = ("diagnose", "add_next", "auto")  # services
-FIXED = ("source", "effort_as_voltage", "effect_files")
+ACTS: tuple[Act, ...] = ("begin", "diagnose", "add_next", "auto")  # services
+FIXED = ("source", "effort_as_voltage", "joints", "joint_topic", "effort_lag", "input_unit", "output_unit", "effect_files")
 
 
-class DiagnoserNode(Node, Ending):
+class DiagnoserNode(WalledNode):
     """The adapter: topics, services and parameters around the pure logic and its worker."""
 
     def __init__(self) -> None:
-        super().__init__("diagnoser", namespace=NAMESPACE, automatically_declare_parameters_from_overrides=True)
+        super().__init__("diagnoser")
         self._axes = declare_axes(self)
         self._ready = False
         defaults = DiagnoserSettings(effects={axis: [""] for axis in self._axes})
-        self._own = declare(self, defaults, self._accept, also=[AXES])
+        self._own = declare(self, defaults, self._accept, also=[AXES], fixed=FIXED)
         settings = self._own.settings
         files = given(settings.effect_files)
         self._library = library([Path(file).expanduser() for file in files])
@@ -52,14 +53,14 @@ class DiagnoserNode(Node, Ending):
         self._diagnoser = Diagnoser(settings, self._axes)
         self._worker = StoryWorker(files)
         self._told: tuple[str, ...] = ()
-        self._metrics = self.create_publisher(DiagnosticArray, "metrics", 10)
+        self._metrics = Diagnostics(self)
         self._diagnosis = self.create_publisher(DiagnosticArray, "diagnosis", LATCHED_QOS)
-        self._ladders = {axis: self.create_publisher(Float64MultiArray, f"error_ladder/{axis}", LATCHED_QOS) for axis in self._axes}
-        self._stories = {axis: self.create_publisher(String, f"story/{axis}", LATCHED_QOS) for axis in self._axes}
+        self._ladders = {axis: self.create_publisher(Float64MultiArray, topic_of("error_ladder", axis), LATCHED_QOS) for axis in self._axes}
+        self._stories = {axis: self.create_publisher(String, topic_of("story", axis), LATCHED_QOS) for axis in self._axes}
         self._triggers = [LaterTrigger(self, f"~/{act}", functools.partial(self._diagnoser.ask, act)) for act in ACTS]
         for name, act in (("reset_model", self._reset_model), ("forget", self._forget), ("cancel", self._cancel)):
             self.create_service(Trigger, f"~/{name}", functools.partial(answered, act))
-        self._streams = Streams(self, self._axes, settings.source, settings.effort_as_voltage, self._diagnoser.feed)
+        self._streams = Streams(self, self._axes, settings, self._diagnoser.feed)
         self.create_timer(LOOK, self._look)
         self.create_timer(HEARTBEAT, self._beat)
         self._ready = True
@@ -110,22 +111,22 @@ class DiagnoserNode(Node, Ending):
 
     def _beat(self) -> None:
         """What is heard, once a second."""
-        hearing, silent = self._diagnoser.hearing, self._streams.silent()
-        level, text = OK, f"{hearing.seconds:.1f} s without a gap are kept"
-        if silent:
-            level, text = STALE, f"no {' and no '.join(silent)} heard for a second; {text}"
-        elif self._streams.refused:
-            level, text = WARN, self._streams.refused
+        hearing = self._diagnoser.hearing
+        level, text = verdict(self._streams.heard(hearing.total, hearing.sentences), "voltage and position are heard")
+        text = f"{text}; {hearing.seconds:.1f} s without a gap are kept"
+        if self.wall.told:
+            level, text = max(level, WARN), f"{text}; {self.wall.told}"
         values = {
             "seconds kept (s)": f"{hearing.seconds:.6g}",
             "samples paired": str(hearing.total),
             "sampling rate (Hz)": f"{hearing.sampling_rate or 0.0:.9g}",
             "messages refused": str(self._streams.refusals),
+            "errors of callbacks": str(self.wall.count),
             "progress": self._diagnoser.doing or "idle",
         }
         values |= {f"stream: {reason}": str(number) for reason, number in hearing.faults.items()}
         status = StatusMessage("diagnoser", level, text, tuple(values.items()))
-        self._metrics.publish(statuses_to_ros([status], self.get_clock().now().to_msg(), "diagnoser"))
+        self._metrics.publish([status_to_ros(status, "diagnoser")])
 
     # parameters and services
 

@@ -1,4 +1,4 @@
-"""Lifecycle node that drives the axes: publishes ``voltage``, reads ``position``.
+"""Lifecycle node that drives the axes: publishes ``voltage``, reads ``position``; or commands a controller and reads joint states.
 
 Nothing moves before ``activate``. Whatever ends it (deactivate, a guard, an error, Ctrl-C, SIGTERM), the last voltage
 published is zero, and it has arrived before the node goes. Pacing, guards and signals are pure and live elsewhere.
@@ -7,57 +7,89 @@ published is zero, and it has arrived before the node goes. Pacing, guards and s
 from __future__ import annotations
 
 import math
+import re
+import threading
 import time
 
-from diagnostic_msgs.msg import DiagnosticArray
+import numpy as np
+from rclpy.clock import Clock as RosClock
+from rclpy.clock_type import ClockType
 from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.timer import Timer
-from std_msgs.msg import Float64MultiArray
+from std_msgs.msg import Bool, Float64MultiArray
 
-from xy_sysid.drive import Drive
 from xy_sysid.errors import BadInput
-from xy_sysid.nodes.common import DATA_QOS, NAMESPACE, declare, from_message, overrides, status, to_message
-from xy_sysid.pacing import CATCH_UP, Answers, Clock
-from xy_sysid.settings import AxisExcitation, ExcitationSettings, knobs
-from xy_sysid.stream import Block
+from xy_sysid.excitation.drive import Drive
+from xy_sysid.excitation.pacing import CATCH_UP, Answers, Clock
+from xy_sysid.nodes.commands import Beat, Commands
+from xy_sysid.nodes.common import DATA_QOS, NAMESPACE, STOP_HEARD, STOP_TOPIC, declare, from_message, status, to_message
+from xy_sysid.nodes.diagnostics import Diagnostics
+from xy_sysid.nodes.hearing import Ear
+from xy_sysid.nodes.quality import AS_IT_IS, Overridable
+from xy_sysid.nodes.streams import AXES, declare_axes
+from xy_sysid.nodes.wall import Wall
+from xy_sysid.samples.block import Block, FloatArray
+from xy_sysid.settings import ExcitationSettings, for_axes, knobs
 
 ARRIVES = Duration(seconds=1.0)  # how long the last zero may take to be acknowledged
+SAME_EPOCH = 0.05  # s by which the ROS time of counter 0 may move over a pause before the stamps follow it
 SETTLED = 0.5  # s without a new listener before starting by itself: whoever was started together hears the first sample
 SAME_NODE = 2.0  # s to look for one node that reads voltage and writes position, before any two will do
-AXES = "axes"
+ALONE = 0.1  # s between two looks whether somebody else drives
+INTRODUCES = 0.5  # s in which a node that is seen becomes known by its name
+KILLED = "One that was killed is forgotten after 20 s."
+
+FIXED = ("output", "interface", "unit", "command_topic", "controller_joints", "joint_topic", "joints")  # when the node starts
+LAST = 5  # times that the last command is sent: a controller listens with best effort
+FOLLOW = 0.01  # part by which the stamps of commands follow the ROS clock with every one, so that two clocks do not drift apart
 
 
-class ExcitationNode(LifecycleNode):
+class ExcitationNode(Overridable, LifecycleNode):
     """The adapter: time, topics, parameters and lifecycle around a Drive."""
 
     exit_code: int | None = None
 
     def __init__(self) -> None:
         super().__init__("excitation", namespace=NAMESPACE, automatically_declare_parameters_from_overrides=True)
-        axes = overrides(self).get(AXES, ["x", "y"])
-        if not isinstance(axes, list) or not all(isinstance(axis, str) and axis.isidentifier() for axis in axes):
-            raise BadInput(f"node excitation: parameter {AXES}", axes, 'a list of names like ["x", "y"]', "Change it and try again.")
-        if not self.has_parameter(AXES):
-            self.declare_parameter(AXES, axes)
-        defaults = ExcitationSettings(axes={axis: AxisExcitation(seed=number) for number, axis in enumerate(axes, start=1)})
-        self._knobs = declare(self, defaults, self._accept, also=[AXES])
+        axes = declare_axes(self)
+        if any("." in axis for axis in axes):
+            raise BadInput(f"node excitation: parameter {AXES}", list(axes), "names without a dot", "Give joints short names.")
+        self._knobs = declare(self, for_axes(ExcitationSettings, axes), self._accept, also=[AXES], fixed=FIXED)
         self._drive: Drive | None = None
         self._pacer = Clock(0.0, 0.0)
         self._answers = Answers()
         self._blocks = 0  # sent since activation
         self._first = 0  # counter of the first sample since activation
+        self._epoch: float | None = None  # s, ROS time of the sample with counter 0
         self._until: float | None = None  # when the last block sent is over
         self._loud = False  # the last block published was not all zeros
         self._complaint = ""
+        self._unnamed = 0.0  # s since which another one is there without a name
+        self._refused = ""  # why the last activate was refused
+        self._held = False  # STOP was asked for on the topic, and not released
+        self._wall = Wall(self._complain)
+        for service in self._services:  # rclpy's own: a transition that the state does not have would end the node
+            service.callback = self._wall.around(service.callback)
+        self._steady = RosClock(clock_type=ClockType.STEADY_TIME)  # guards must not sleep when somebody stops or sets the clock
         self._voltage = self.create_publisher(Float64MultiArray, "voltage", DATA_QOS)
-        self._metrics = self.create_publisher(DiagnosticArray, "metrics", 10)
-        self._position = self.create_subscription(Float64MultiArray, "position", self._on_position, DATA_QOS)
+        self._metrics = Diagnostics(self)
+        self._reference = self.create_publisher(Float64MultiArray, "reference", DATA_QOS) if self._knobs.settings.interface != "effort" else None
+        self._hold = threading.RLock()  # of the drive, where a thread of its own sends commands
+        self._beat: Beat | None = None
+        self._rows: list[tuple[float, float, FloatArray]] = []  # seq, time and values of commands that no block holds yet
+        commanding = self._knobs.settings.output == "commands"
+        self._commands = Commands(self, self._knobs.settings, self._on_joints, self._complain) if commanding else None
+        self._position = self._commands.states if self._commands else Ear(self, Float64MultiArray, "position", self._on_position, DATA_QOS)
+        for quality in STOP_HEARD:
+            self.create_subscription(Bool, STOP_TOPIC, self._on_stop, quality, qos_overriding_options=AS_IT_IS)
         self._pace: Timer | None = None
-        self.create_timer(0.5, self._report)
-        self._waiting_since = time.monotonic()
-        self._readers, self._settled_at = 0, 0.0  # of the voltage, and when their number will have settled
-        self._autostart: Timer | None = self.create_timer(0.1, self._start_by_itself) if self._knobs.settings.autostart else None
+        self.create_timer(0.5, self._report, clock=self._steady)
+        self.create_timer(ALONE, self._look_for_another, clock=self._steady)
+        self._autostart: Timer | None = None
+        self._waiting_since, self._readers, self._settled_at = 0.0, 0, 0.0  # how many read the voltage, and when their number will have settled
+        if self._knobs.settings.autostart:
+            self._wait_for_machine()
         self.get_logger().info(
             "unconfigured: nothing moves before configure and activate" + (", which come by themselves" if self._autostart else "")
         )
@@ -74,7 +106,22 @@ class ExcitationNode(LifecycleNode):
         return super().on_configure(state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Begin, at 0 V until the first position."""
+        """Begin, at 0 V until the first position; refused while STOP is on."""
+        if self._held:
+            self.get_logger().error(self._why_held())
+            self._report()
+            return TransitionCallbackReturn.FAILURE
+        others = self._others()
+        if others:
+            self._refused = f"{' and '.join(others)} publishes {self._way}, too: no activate beside it. {KILLED}"
+            self.get_logger().error(self._refused)
+            self._report()
+            return TransitionCallbackReturn.FAILURE
+        self._refused = "" if self._commands else self._no_blocks()
+        if self._refused:
+            self.get_logger().error(self._refused)
+            self._report()
+            return TransitionCallbackReturn.FAILURE
         settings, now = self._knobs.settings, time.monotonic()
         if self._drive is not None and self._until is not None:
             self._first = self._drive.seq
@@ -85,11 +132,19 @@ class ExcitationNode(LifecycleNode):
         except BadInput as error:
             self.get_logger().error(str(error))
             return TransitionCallbackReturn.FAILURE
-        period = settings.block / settings.rate / settings.speed if settings.speed > 0 else 0.0
+        period = settings.step / settings.rate / settings.speed if settings.speed > 0 else 0.0
+        epoch = self.get_clock().now().nanoseconds * 1e-9 - self._first / settings.rate
+        if self._epoch is None or (not settings.lockstep and abs(epoch - self._epoch) > SAME_EPOCH):
+            self._epoch = epoch
         self._pacer, self._answers, self._blocks = Clock(period, now), Answers(self._first - 1), 0
         self._drive.start()
         wake = min(0.01, settings.watchdog / 4, period / 2 if period > 0 else 0.01)
-        self._pace = self.create_timer(max(wake, 0.001), self._on_time)
+        if self._commands is not None:
+            self._commands.forget()
+            self._rows.clear()
+            self._beat = Beat(period, self._on_beat)
+            self._pacer = self._beat.clock
+        self._pace = self.create_timer(max(wake, 0.001), self._on_time, clock=self._steady)
         return super().on_activate(state)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -111,12 +166,84 @@ class ExcitationNode(LifecycleNode):
         self.last_words()
         return super().on_error(state)
 
+    # STOP
+
+    def _on_stop(self, message: Bool) -> None:
+        """True: zero volts and inactive now, and no activate until false."""
+        if self._held == message.data:
+            return
+        self._held = message.data
+        if self._held and self._drive is not None and self._pace is not None:
+            with self._hold:
+                self._drive.stop("STOP", self._drive.settings.abort_ramp)
+            self.trigger_deactivate()
+        self.get_logger().warning(self._why_held() if self._held else "STOP is released: activate is allowed again")
+        self._report()
+
+    # another excitation
+
+    @property
+    def _way(self) -> str:
+        """The topic on which the machine is driven."""
+        return str(self._commands.publisher.topic_name if self._commands else self._voltage.topic_name)
+
+    def _no_blocks(self) -> str:
+        """Why no blocks may be sent: whoever takes them for commands would take a counter for an effort. Empty if all is well."""
+        topic = self._way
+        if self._knobs.settings.renamed:
+            return ""
+        if topic.rpartition("/")[2] != "voltage":
+            return (
+                f"blocks of voltage would go to {topic}, where a controller would take their counter for a command: no activate. "
+                "Set output to commands for a controller, or renamed to true if blocks are expected there."
+            )
+        infos = self.get_subscriptions_info_by_topic(topic)
+        strange = sorted(
+            {info.node_name for info in infos if info.topic_type != "std_msgs/msg/Float64MultiArray" or re.search("controller", info.node_name)}
+        )
+        if strange:
+            return (
+                f"{' and '.join(strange)} listens to {topic} and expects something else than blocks of voltage: no activate. "
+                "Set output to commands for a controller, or renamed to true if blocks are expected there."
+            )
+        return ""
+
+    def _others(self) -> list[str]:
+        """Who else drives the machine."""
+        topic = self._way
+        if self.count_publishers(topic) <= 1:
+            return []
+        names = [f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in self.get_publishers_info_by_topic(topic)]
+        me = self.get_fully_qualified_name()
+        if me in names:
+            names.remove(me)  # once: another one may have the same name
+        return sorted(set(names))
+
+    def _look_for_another(self) -> None:
+        drive = self._drive
+        if drive is None or drive.state != "active":
+            return
+        others = self._others()
+        unnamed = any("UNKNOWN" in name for name in others)
+        self._unnamed = self._unnamed + ALONE if unnamed else 0.0
+        if others and not 0 < self._unnamed < INTRODUCES:
+            drive.fault = True
+            drive.stop(f"{' and '.join(others)} publishes {self._way}, too: two must not drive one machine", drive.settings.abort_ramp)
+            self.get_logger().error(drive.reason)
+            self.trigger_deactivate()
+
+    def _why_held(self) -> str:
+        names = {info.node_name for info in self.get_publishers_info_by_topic(self.resolve_topic_name(STOP_TOPIC))}
+        who = sorted(name for name in names if "UNKNOWN" not in name)  # a message may come before its sender's name
+        return f"STOP is on (topic {STOP_TOPIC}{', from ' + ', '.join(who) if who else ''}): no activate before false is published there"
+
     # the end of the process
 
     def ask_to_stop(self, reason: str) -> None:
         """Fade out in order while positions are still read."""
         if self._drive is not None:
-            self._drive.stop(reason, self._drive.settings.ramp)
+            with self._hold:
+                self._drive.stop(reason, self._drive.settings.ramp)
 
     def has_stopped(self) -> bool:
         """The last block published is zeros."""
@@ -127,7 +254,7 @@ class ExcitationNode(LifecycleNode):
         try:
             self._finish("ended")
         finally:
-            if self._loud and self._drive is not None:
+            if self._loud and self._drive is not None and self._commands is None:
                 block = self._drive.zeros(self._drive.settings.block)
                 self._publish(block)
                 self._voltage.wait_for_all_acked(ARRIVES)
@@ -140,34 +267,110 @@ class ExcitationNode(LifecycleNode):
         drive = self._drive
         if drive is None:
             return
+        if self._beat is not None:
+            self._finish_commands(drive, self._beat, reason)
+            return
         was_running = drive.state in ("active", "stopping")
         drive.stop(reason, drive.settings.abort_ramp)
         while drive.state == "stopping":
             self._send(drive)
             time.sleep(0.0 if drive.settings.lockstep else self._pacer.period)
+        self._report()  # whoever waits for the end need not wait for the acknowledgements
         if was_running or self._loud:
             self._voltage.wait_for_all_acked(ARRIVES)
 
+    def _finish_commands(self, drive: Drive, beat: Beat, reason: str) -> None:
+        """The thread fades out; then what is safe, several times, and see it arrive."""
+        assert self._commands is not None
+        with self._hold:
+            drive.stop(reason, drive.settings.abort_ramp)
+        until = time.monotonic() + drive.settings.abort_ramp + ARRIVES.nanoseconds * 1e-9
+        while drive.state == "stopping" and beat.alive and time.monotonic() < until:
+            time.sleep(beat.clock.period)
+        beat.close()
+        self._beat = None
+        self._report()
+        for _ in range(LAST):
+            self._commands.send(drive.safe)
+            time.sleep(beat.clock.period)
+        self._publish_rows()
+        self._commands.publisher.wait_for_all_acked(ARRIVES)
+
     # the data path
+
+    def _on_joints(self, stamp: float, values: FloatArray) -> None:
+        """(axes,) positions at a ROS time, s."""
+        with self._hold:
+            drive = self._drive
+            if drive is None or self._beat is None or self._epoch is None:
+                return
+            seq = (stamp - self._epoch) * drive.settings.rate
+            if not drive.see(Block(drive.axes, np.array([seq]), np.array([stamp]), values[None, :])):
+                self._complain(f"joint states: not usable ({drive.unusable})")
+
+    def _on_beat(self, skipped: int) -> None:
+        """In the thread: one command, on time; after an error what is safe, and the end."""
+        drive, commands, before = self._drive, self._commands, self._wall.count
+        if drive is None or commands is None:
+            return
+        with self._wall, self._hold:
+            drive.tick(time.monotonic())
+            drive.skip(skipped)
+            block = drive.next(1)
+            if commands.send(block.values[0]):
+                self._blocks, self._until = self._blocks + 1, time.monotonic() + 1.0 / drive.settings.rate
+                self._rows.append((float(block.seq[0]), self._stamp(float(block.seq[0])), block.values[0]))
+            if len(self._rows) >= drive.settings.block:
+                self._publish_rows()
+        if self._wall.count > before:
+            for _ in range(LAST):
+                commands.send(drive.safe)
+            self.exit_code = 1
+            if self._beat is not None:
+                self._beat.close()
+
+    def _stamp(self, seq: float) -> float:
+        """ROS time of a command, s: even, and never far from the clock."""
+        assert self._drive is not None and self._epoch is not None
+        count = seq / self._drive.settings.rate
+        apart = self.get_clock().now().nanoseconds * 1e-9 - count - self._epoch
+        self._epoch += apart if abs(apart) > SAME_EPOCH else FOLLOW * apart
+        return self._epoch + count
+
+    def _publish_rows(self) -> None:
+        """What was commanded, as a block, for whoever identifies or records."""
+        if self._rows and self._drive is not None:
+            seq, time_, values = zip(*self._rows, strict=True)
+            message = to_message(Block(self._drive.axes, np.array(seq), np.array(time_), np.array(values)))
+            self._voltage.publish(message)
+            if self._reference is not None:
+                self._reference.publish(message)
+            self._rows.clear()
 
     def _on_position(self, message: Float64MultiArray) -> None:
         drive = self._drive
         if drive is None or self._pace is None:
             return
-        try:
-            block = from_message(message)
-        except BadInput as error:
-            self._complain(f"position: {error}")
+        block: Block | None = None
+        with self._wall:
+            try:
+                block = from_message(message)
+            except BadInput as error:
+                self._complain(f"position: {error}")
+        if block is None:
             return
         if drive.settings.lockstep:
             self._answers.add(block)
             self._in_lockstep(drive)
         elif not drive.see(block):
-            self._complain("position: not usable (not finite, absurdly far away, or not the axes of this node)")
+            self._complain(f"position: not usable ({drive.unusable})")
 
     def _on_time(self) -> None:
         drive = self._drive
         if drive is None:
+            return
+        if self._commands is not None:
+            self._after(drive)
             return
         now = time.monotonic()
         drive.tick(now)
@@ -189,7 +392,7 @@ class ExcitationNode(LifecycleNode):
                     self._pacer.slip(now)
                     break
                 if not drive.see(rows):
-                    self._complain("position: not usable (not finite, absurdly far away, or not the axes of this node)")
+                    self._complain(f"position: not usable ({drive.unusable})")
             self._send(drive)
         self._after(drive)
 
@@ -201,24 +404,37 @@ class ExcitationNode(LifecycleNode):
 
     def _publish(self, block: Block) -> None:
         self._loud = bool(block.values.any())
-        self._voltage.publish(to_message(block))
+        self._voltage.publish(to_message(Block(block.axes, block.seq, block.time + (self._epoch or 0.0), block.values)))
 
     def _after(self, drive: Drive) -> None:
         """Go inactive when the drive has come to its end by itself, and say why."""
         if drive.state == "stopped" and self._pace is not None:
-            (self.get_logger().error if drive.blind else self.get_logger().info)(f"inactive: {drive.reason}")
+            (self.get_logger().error if drive.fault else self.get_logger().info)(f"inactive: {drive.reason}")
             self.trigger_deactivate()
+            if self._knobs.settings.autostart and drive.fault and not drive.answered:
+                self.trigger_cleanup()
+                self._wait_for_machine()
+                self.get_logger().info("it begins anew as soon as a machine is there: nothing has moved yet")
 
     # parameters, diagnostics, start
 
     def _accept(self, settings: ExcitationSettings) -> None:
+        for name in FIXED:
+            before = getattr(self._knobs.settings, name)
+            if getattr(settings, name) != before:
+                raise BadInput(name, "not to be changed while the node runs", str(before), "Start the node again with it.")
+        with self._hold:
+            self._change(settings)
+
+    def _change(self, settings: ExcitationSettings) -> None:
         if self._drive is not None and self._drive.state in ("active", "stopping"):
             self._drive.change(settings)
 
     def _complain(self, text: str) -> None:
-        """The same complaint once."""
-        if text != self._complaint:
-            self._complaint = text
+        """The same complaint once, whatever its numbers."""
+        kind = re.sub(r"[\d.]+", "", text)
+        if kind != self._complaint:
+            self._complaint = kind
             self.get_logger().warning(text)
 
     def _report(self) -> None:
@@ -226,32 +442,43 @@ class ExcitationNode(LifecycleNode):
         if drive is None:
             message, level, values = "not configured", 0, {"state": "idle"}
         else:
-            report = drive.report()
-            level = 2 if drive.blind else 0
+            with self._hold:
+                report = drive.report()
+            level = 2 if drive.fault else 0
             message = report.reason or {"idle": "waiting for activate", "active": "driving"}.get(report.state, report.state)
             values = {"state": report.state, "reason": report.reason, "blocks": str(self._blocks), "blocks_late": str(self._pacer.late)}
             for number, axis in enumerate(drive.axes):
                 values[f"{axis}.rms"] = f"{report.rms[number]:.4g}"
                 values[f"{axis}.clipped"] = f"{report.clipped[number]:.0f}"
                 values[f"{axis}.braked"] = f"{report.braked[number]:.0f}"
-        values["listeners"] = str(self._voltage.get_subscription_count())
-        stamped = DiagnosticArray(status=[status("excitation", level, message, values)])
-        stamped.header.stamp = self.get_clock().now().to_msg()
-        self._metrics.publish(stamped)
+        if self._held or (self._refused and (drive is None or drive.state != "active")):
+            message, level = self._why_held() if self._held else self._refused, max(level, 1)
+        values["input unit"], values["output unit"] = self._knobs.settings.units
+        values["stop"] = "on" if self._held else "off"
+        values["listeners"] = str(self.count_subscribers(self._way))
+        self._metrics.publish([status("excitation", level, message, values)])
+
+    def _wait_for_machine(self) -> None:
+        self._waiting_since, self._readers = time.monotonic(), 0
+        self._autostart = self.create_timer(0.1, self._start_by_itself, clock=self._steady)
 
     def _start_by_itself(self) -> None:
         """Configure and activate once a machine is there: one node that reads voltage and writes position."""
-        if self._voltage.get_subscription_count() == 0 or self._position.get_publisher_count() == 0:
+        if self.count_subscribers(self._way) == 0 or self._position.get_publisher_count() == 0:
             if time.monotonic() - self._waiting_since > self._knobs.settings.patience:
-                self._complain(f"no machine yet: nobody reads {self._voltage.topic_name} and writes {self._position.topic_name}")
+                self._complain(f"no machine yet: nobody reads {self._way} and writes {self._position.topic_name}")
             return
-        readers = {(info.node_namespace, info.node_name) for info in self.get_subscriptions_info_by_topic(self._voltage.topic_name)}
+        readers = {(info.node_namespace, info.node_name) for info in self.get_subscriptions_info_by_topic(self._way)}
         writers = {(info.node_namespace, info.node_name) for info in self.get_publishers_info_by_topic(self._position.topic_name)}
         if not readers & writers and time.monotonic() - self._waiting_since < SAME_NODE:
             return
         if len(readers) != self._readers:
             self._readers, self._settled_at = len(readers), time.monotonic() + SETTLED
         if time.monotonic() < self._settled_at:
+            return
+        others = self._others()
+        if others or self._held:
+            self._complain(self._why_held() if self._held else f"{' and '.join(others)} publishes {self._way}, too: waiting. {KILLED}")
             return
         assert self._autostart is not None
         self.destroy_timer(self._autostart)

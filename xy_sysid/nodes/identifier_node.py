@@ -10,53 +10,52 @@ import functools
 from pathlib import Path
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.node import Node
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
 
 from xy_sysid.errors import BadInput, XySysidError
-from xy_sysid.identifier import Identifier
-from xy_sysid.live_fit import LiveFitter, Update, warm_up
-from xy_sysid.messages import OK, STALE, WARN, StatusMessage
-from xy_sysid.nodes.common import LATCHED_QOS, NAMESPACE, Ending, declare
-from xy_sysid.nodes.convert import array_to_ros, statuses_to_ros
+from xy_sysid.files.state import load_state, save_state, set_aside
+from xy_sysid.live.fitter import LiveFitter, Update, warm_up
+from xy_sysid.live.heard import verdict
+from xy_sysid.live.identifier import Identifier
+from xy_sysid.live.messages import WARN, StatusMessage, topic_of
+from xy_sysid.nodes.common import LATCHED_QOS, WalledNode, declare
+from xy_sysid.nodes.convert import array_to_ros, status_to_ros
+from xy_sysid.nodes.diagnostics import Diagnostics
 from xy_sysid.nodes.streams import AXES, Streams, answered, declare_axes
-from xy_sysid.pairing import Kind
+from xy_sysid.processes.fit_thread import FitWorker
+from xy_sysid.samples.block import Block
+from xy_sysid.samples.pairing import Quantity
 from xy_sysid.settings import IdentifierSettings
-from xy_sysid.state_file import load_state, save_state, set_aside
-from xy_sysid.stream import Block
-from xy_sysid.work_queue import FitWorker
 
 PUBLISH_PERIOD = 0.05  # s between two looks for finished fits
 HEARTBEAT = 1.0  # s between two statuses of the streams
 # Changing one of these starts the spectra anew; the topics' names and types are fixed when the node starts.
 SHAPES_SPECTRA = ("window", "length", "overlap", "differenced", "memory", "sliding", "alarm_windows", "reorder")
-FIXED = ("source", "effort_as_voltage", "state_file", "save_every")
+FIXED = ("source", "effort_as_voltage", "joints", "joint_topic", "effort_lag", "input_unit", "output_unit", "state_file", "save_every")
 
 
-class IdentifierNode(Node, Ending):
+class IdentifierNode(WalledNode):
     """The adapter: topics, services, parameters and the state file around the pure logic."""
 
     def __init__(self) -> None:
-        super().__init__("identifier", namespace=NAMESPACE, automatically_declare_parameters_from_overrides=True)
+        super().__init__("identifier")
         axes = declare_axes(self)
         self._ready = False
-        self._own = declare(self, IdentifierSettings(), self._accept, also=[AXES])
+        self._own = declare(self, IdentifierSettings(), self._accept, also=[AXES], fixed=FIXED)
         settings = self._own.settings
         self._axes = axes
-        self._identifier = Identifier(settings, self._axes)
+        self._identifier = Identifier(settings, self._axes, settings.units)
         self._worker = FitWorker(LiveFitter(settings))
         self._state_path = Path(settings.state_file).expanduser() if settings.state_file else None
-        self._metrics = self.create_publisher(DiagnosticArray, "metrics", 10)
+        self._metrics = Diagnostics(self)
         self._arrays: dict[str, Any] = {}
         for axis in self._axes:
-            self._publisher(f"frf/{axis}")
-            self._publisher(f"transfer_function/{axis}")
-            self._publisher(f"comparison/{axis}")
+            for kind in ("frf", "transfer_function", "comparison"):
+                self._publisher(topic_of(kind, axis))
         self._resume()
         warm_up(settings)  # before anything is subscribed to: compiling holds up the data path
-        self._streams = Streams(self, self._axes, settings.source, settings.effort_as_voltage, self._feed)
+        self._streams = Streams(self, self._axes, settings, self._feed)
         for name, act in (("reset", self._reset), ("save", self._save), ("load", self._load)):
             self.create_service(Trigger, f"~/{name}", functools.partial(answered, act))
         self.create_timer(PUBLISH_PERIOD, self._publish_done)
@@ -67,7 +66,7 @@ class IdentifierNode(Node, Ending):
 
     # data
 
-    def _feed(self, kind: Kind, block: Block) -> None:
+    def _feed(self, kind: Quantity, block: Block) -> None:
         for request in self._identifier.feed(kind, block):
             self._worker.ask(request)
 
@@ -86,32 +85,28 @@ class IdentifierNode(Node, Ending):
     def _publish(self, update: Update) -> None:
         for message in update.arrays():
             self._publisher(message.topic).publish(array_to_ros(message))
-        self._metrics.publish(statuses_to_ros(update.statuses(), self.get_clock().now().to_msg(), "identifier"))
+        self._metrics.publish(status_to_ros(item, "identifier") for item in update.statuses())
 
     def _beat(self) -> None:
         """What is heard of the streams, once a second, whether or not there is anything to fit."""
-        silent = self._streams.silent()
-        sentences = self._identifier.sentences
-        level, text = OK, "voltage and position are heard"
-        if silent:
-            level, text = STALE, f"no {' and no '.join(silent)} heard for a second"
-        elif self._streams.refused:
-            level, text = WARN, self._streams.refused
-        elif sentences:
-            level, text = WARN, "; ".join(sentences.values())
+        heard = self._streams.heard(self._identifier.samples, self._identifier.sentences)
+        level, text = verdict(heard, "voltage and position are heard")
+        if self.wall.told:
+            level, text = max(level, WARN), f"{text}; {self.wall.told}"
         if self._worker.skipped:
             level, text = max(level, WARN), f"{text}; {self._worker.skipped} fits were skipped, the machine is too slow for this rate"
         values = {
             "samples paired": str(self._identifier.samples),
             "sampling rate (Hz)": f"{self._identifier.sampling_rate or 0.0:.9g}",
             "messages refused": str(self._streams.refusals),
+            "errors of callbacks": str(self.wall.count),
             "skipped fits": str(self._worker.skipped),
         }
         values |= {f"newest {kind}": str(seq) for kind, seq in self._identifier.waiting.items()}
         values |= {f"windows {axis}": str(number) for axis, number in self._identifier.windows.items()}
         values |= {f"stream: {reason}": str(number) for reason, number in self._identifier.faults.items()}
         status = StatusMessage("streams", level, text, tuple(values.items()))
-        self._metrics.publish(statuses_to_ros([status], self.get_clock().now().to_msg(), "identifier"))
+        self._metrics.publish([status_to_ros(status, "identifier")])
 
     # parameters and services
 
@@ -123,7 +118,7 @@ class IdentifierNode(Node, Ending):
             if getattr(before, name) != getattr(settings, name):
                 raise BadInput(name, "not to be changed while the node runs", str(getattr(before, name)), "Start the node again with it.")
         if any(getattr(before, name) != getattr(settings, name) for name in SHAPES_SPECTRA):
-            self._identifier = Identifier(settings, self._axes)
+            self._identifier = Identifier(settings, self._axes, settings.units)
             self._worker.change(LiveFitter(settings))
             self.get_logger().info("the spectra start anew with the new settings")
         else:
@@ -170,7 +165,7 @@ class IdentifierNode(Node, Ending):
     def _save_quietly(self) -> None:
         try:
             self._save()
-        except OSError as problem:
+        except (OSError, XySysidError) as problem:
             self.get_logger().error(f"the state could not be saved: {problem}", throttle_duration_sec=60.0)
 
     def last_words(self) -> None:

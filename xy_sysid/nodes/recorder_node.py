@@ -10,12 +10,12 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 from xy_sysid.bags import BagWriter
+from xy_sysid.bags.atomic import flushed
 from xy_sysid.errors import BadInput, XySysidError
-from xy_sysid.nodes.common import NAMESPACE, Ending, declare
+from xy_sysid.nodes.common import WalledNode, declare
 from xy_sysid.settings import RecorderSettings
 
 LOOK = 0.2  # s between two looks for new topics
@@ -23,12 +23,12 @@ FLUSH = 1.0  # s between two commits
 DEPTH = 10_000  # messages that may wait while the disk is busy
 
 
-class RecorderNode(Node, Ending):
+class RecorderNode(WalledNode):
     """Subscribes to every topic that a pattern matches, as soon as somebody publishes it."""
 
     def __init__(self) -> None:
-        super().__init__("recorder", namespace=NAMESPACE, automatically_declare_parameters_from_overrides=True)
-        self._own = declare(self, RecorderSettings(), self._accept)
+        super().__init__("recorder")
+        self._own = declare(self, RecorderSettings(), self._accept, fixed=None)
         settings = self._own.settings
         try:
             self._patterns = [re.compile(pattern) for pattern in settings.topics]
@@ -109,5 +109,6 @@ class RecorderNode(Node, Ending):
     def last_words(self) -> None:
         """Finish the bag and say what is in it."""
         self._bag.close()
+        flushed(self._bag.path)
         numbers = ", ".join(f"{topic} {number}" for topic, number in sorted(self._heard.items())) or "nothing was published"
         self.get_logger().info(f"{self._bag.path}: {numbers}")

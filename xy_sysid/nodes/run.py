@@ -19,7 +19,7 @@ LONGEST_STOP = 3.0  # s an orderly end may take; then the last words are said wi
 
 
 class Runnable(Protocol):
-    """What a node class adds to rclpy's Node; ``Ending`` in common.py has it all at its simplest."""
+    """What a node class adds to rclpy's Node; ``WalledNode`` in common.py has it all at its simplest."""
 
     exit_code: int | None  # set it to end the process
 
@@ -36,6 +36,10 @@ class Runnable(Protocol):
         ...
 
     def destroy_node(self) -> None:
+        """rclpy's."""
+        ...
+
+    def get_logger(self) -> Any:
         """rclpy's."""
         ...
 
@@ -69,6 +73,7 @@ def run_node(factory: Callable[[], Runnable], args: Sequence[str] | None = None)
     except (XySysidError, ParameterException, rclpy_implementation.RCLError) as error:
         try_shutdown()
         return _refuse(error)
+    node.get_logger().info("ready")
     try:
         _spin(node, asked)
     finally:

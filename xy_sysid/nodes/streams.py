@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -12,10 +12,15 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
 from xy_sysid.errors import BadInput, XySysidError
-from xy_sysid.joints import JointCounter
-from xy_sysid.nodes.common import DATA_QOS, from_message, overrides
-from xy_sysid.pairing import KINDS, Kind
-from xy_sysid.stream import Block
+from xy_sysid.live.heard import Heard
+from xy_sysid.live.messages import topic_of
+from xy_sysid.nodes.common import DATA_QOS, declare_fixed, from_message, overrides
+from xy_sysid.nodes.hearing import Ear
+from xy_sysid.samples.block import Block
+from xy_sysid.samples.joint_states import JointCounter, joints_of
+from xy_sysid.samples.pairing import QUANTITIES, Quantity
+from xy_sysid.settings import DiagnoserSettings, IdentifierSettings, given
+from xy_sysid.units import USUAL
 
 JOINT_QOS = QoSProfile(depth=20_000, history=HistoryPolicy.KEEP_LAST)  # ten seconds of single samples at 2 kHz
 AXES = "axes"
@@ -26,8 +31,13 @@ def declare_axes(node: Node) -> tuple[str, ...]:
     axes = overrides(node).get(AXES, ["x", "y"])
     if not isinstance(axes, list) or not axes or not all(isinstance(axis, str) and axis for axis in axes):
         raise BadInput(f"node {node.get_name()}: parameter {AXES}", axes, 'a list of names like ["x", "y"]', "Change it and try again.")
-    if not node.has_parameter(AXES):
-        node.declare_parameter(AXES, axes)
+    topics = {topic_of("frf", axis) for axis in axes}
+    if any("," in axis or "=" in axis or axis.strip() != axis for axis in axes) or len(topics) < len(axes):
+        what = "names without , and = that differ in more than signs other than letters, digits and _"
+        raise BadInput(
+            f"node {node.get_name()}: parameter {AXES}", axes, what, 'Give joints short names, for example axes ["x"] and joints ["x=NAME"].'
+        )
+    declare_fixed(node, AXES, axes, "names of the axes")
     return tuple(axes)
 
 
@@ -37,26 +47,43 @@ class Streams:
     refused: why the last message was refused, empty if none was; refusals: how many were
     """
 
-    def __init__(self, node: Node, axes: tuple[str, ...], source: str, effort: bool, feed: Callable[[Kind, Block], None]) -> None:
-        """source: blocks or joint_state; effort: take the input from the joint states; feed: gets every block."""
+    def __init__(
+        self, node: Node, axes: tuple[str, ...], settings: IdentifierSettings | DiagnoserSettings, feed: Callable[[Quantity, Block], None]
+    ) -> None:
+        """settings: source, effort_as_voltage, joints; feed: gets every block. Raises BadInput for joints that name no axis."""
+        source, effort = settings.source, settings.effort_as_voltage
+        self._lag = settings.effort_lag
+        self._names = tuple(joints_of(axes, given(settings.joints)).values())
+        if effort and settings.units == USUAL:
+            words = "joint states name no unit: effort is taken as V and position as m; set input_unit and output_unit, for example to N m and rad"
+            node.get_logger().warning(words)
         self.refused, self.refusals = "", 0
         self._node, self._axes, self._effort, self._give = node, axes, effort, feed
         self._joints = JointCounter(axes, with_voltage=not effort)
-        self._heard = dict.fromkeys(KINDS, 0)
+        self._heard = dict.fromkeys(QUANTITIES, 0)
         self._before = dict(self._heard)
+        self._paired = 0  # samples, at the last look
         self._by_stamp = source == "joint_state"
         if self._by_stamp:
-            node.create_subscription(JointState, "joint_states", self._on_joints, JOINT_QOS)
+            Ear(node, JointState, settings.joint_topic, self._on_joints, JOINT_QOS)
         else:
-            node.create_subscription(Float64MultiArray, "position", self._on_position, DATA_QOS)
+            Ear(node, Float64MultiArray, "position", self._on_position, DATA_QOS)
         if source == "blocks" or not effort:
-            node.create_subscription(Float64MultiArray, "voltage", self._on_voltage, DATA_QOS)
+            Ear(node, Float64MultiArray, "voltage", self._on_voltage, DATA_QOS)
 
-    def silent(self) -> list[Kind]:
-        """The streams of which nothing was heard since the last call."""
-        found = [kind for kind in KINDS if self._heard[kind] == self._before[kind]]
+    def heard(self, samples: int, sentences: Mapping[str, str]) -> Heard:
+        """What came since the last call; samples: paired since the start; sentences: what the pairing says, by reason."""
+        silent = tuple(kind for kind in QUANTITIES if self._heard[kind] == self._before[kind])
+        paired, self._paired = samples - self._paired, samples
         self._before = dict(self._heard)
-        return found
+        return Heard(
+            silent=silent,
+            paired=max(paired, 0),
+            refused=self.refused,
+            refusals=self.refusals,
+            stamps=self._joints.wrong() if self._by_stamp and self._heard["position"] else "",
+            sentences=sentences,
+        )
 
     def _on_voltage(self, message: Float64MultiArray) -> None:
         self._on_block("voltage", message)
@@ -64,23 +91,29 @@ class Streams:
     def _on_position(self, message: Float64MultiArray) -> None:
         self._on_block("position", message)
 
-    def _on_block(self, kind: Kind, message: Float64MultiArray) -> None:
+    def _on_block(self, kind: Quantity, message: Float64MultiArray) -> None:
+        self._heard[kind] += 1
         try:
             block = from_message(message)
         except BadInput as problem:
             self._refuse(f"{kind}: {problem}")
             return
-        self._feed(kind, block)
+        self._give(kind, block)
         if kind == "voltage" and self._by_stamp:
             self._joints.see_voltage(block)
 
     def _on_joints(self, message: JointState) -> None:
-        missing = [axis for axis in self._axes if axis not in message.name]
-        places = [] if missing else [message.name.index(axis) for axis in self._axes]
+        self._heard["position"] += 1
+        if self._effort:
+            self._heard["voltage"] += 1
+        missing = [name for name in self._names if name not in message.name]
+        places = [] if missing else [message.name.index(name) for name in self._names]
         effort = self._effort
         if missing or len(message.position) != len(message.name) or (effort and len(message.effort) != len(message.name)):
             what = f"joints {', '.join(message.name)}" if missing else "a position" + (" and an effort" if effort else "") + " for some joints only"
-            self._refuse(f"joint_states: {what}; expected {', '.join(self._axes)}. Set the parameter axes to joint names.")
+            self._refuse(
+                f'joint_states: {what}; expected {", ".join(self._names)}. Set the parameter joints, for example to ["{self._axes[0]}=NAME"].'
+            )
             return
         time = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
         row = [message.position[k] for k in places] + ([message.effort[k] for k in places] if effort else [])
@@ -88,13 +121,10 @@ class Streams:
         if block is None:
             return
         number = len(self._axes)
-        self._feed("position", Block(self._axes, block.seq, block.time, block.values[:, :number]))
+        self._give("position", Block(self._axes, block.seq, block.time, block.values[:, :number]))
         if effort:
-            self._feed("voltage", Block(self._axes, block.seq, block.time, block.values[:, number:]))
-
-    def _feed(self, kind: Kind, block: Block) -> None:
-        self._heard[kind] += len(block)
-        self._give(kind, block)
+            known = block.seq >= self._lag
+            self._give("voltage", Block(self._axes, block.seq[known] - self._lag, block.time[known], block.values[known, number:]))
 
     def _refuse(self, text: str) -> None:
         if self.refused != text:

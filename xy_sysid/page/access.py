@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from http.cookies import CookieError, SimpleCookie
 from urllib.parse import parse_qs, urlsplit
 
+LARGEST = 1 << 20  # bytes of a request's body; the page itself sends next to nothing
 LOOPBACK = ("localhost", "127.0.0.1", "::1")
 COOKIE = "xy_sysid_token"
 HEADERS = {
@@ -72,6 +73,9 @@ def judge(access: Access, headers: Mapping[str, str], query: str) -> Answer:
         return Answer(403, f"Requests from {origin} are refused: this page takes orders from itself only.")
     if headers.get("sec-fetch-site", "none") == "cross-site" and headers.get("sec-fetch-mode") != "navigate":
         return Answer(403, "Requests from other sites are refused.")
+    length = headers.get("content-length", "0")
+    if not (length.isascii() and length.isdigit() and len(length) < 20 and int(length) <= LARGEST):
+        return Answer(413, f"Nothing of {length[:40]} bytes is taken here; {LARGEST} are the most.")
     if not access.token:
         return Answer()
     given = parse_qs(query).get("token", [""])[0]

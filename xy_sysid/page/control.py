@@ -27,13 +27,15 @@ class Control:
         self._session = session
         self._nodes_shown: object = None
         self._forms: dict[str, SettingsForm] = {}
-        with ui.element("section").classes("card").props('aria-label="machine"'):
+        self._speed = 0.0
+        self._filled: object = None
+        with ui.element("section").classes("card machine").props('aria-label="machine"'):
             ui.html("<h2>The machine</h2>", sanitize=False)
             self._nodes = ui.element("div").classes("stack").style("gap:.2rem").props("role=status aria-live=polite data-part=nodes")
             self._state = ui.label("").props("data-part=lifecycle")
             with ui.element("div").classes("buttons"):
                 self._configure = ui.button("Configure", on_click=lambda: self._go("configure")).props("outline dense no-caps data-act=configure")
-                self._activate = ui.button("Activate", on_click=self._ask_activate).props("unelevated dense no-caps data-act=activate")
+                self._activate = ui.button("Activate", on_click=self._ask_activate).props("outline dense no-caps data-act=activate")
                 self._reset = ui.button("Forget what was heard", on_click=self._forget).props("flat dense no-caps data-act=forget")
             self._windows = ui.element("div").classes("rows small").props("data-part=windows")
             with ui.expansion("Excitation").classes("w-full").props("dense data-part=excitation"):
@@ -41,8 +43,8 @@ class Control:
             with ui.expansion("Record to a bag").classes("w-full").props("dense data-part=record"):
                 self._bag()
 
-    def refresh(self, axes: tuple[str, ...]) -> None:
-        """Show what is now."""
+    def refresh(self, axes: tuple[str, ...], begun: bool) -> bool:
+        """Show what is now; whether a button here is the next to be pressed. begun: there is a story, which comes first."""
         session = self._session
         heard, now = session.heard, time.monotonic()
         nodes = tuple((node.name, node.level, node.words) for node in heard.nodes(now))
@@ -52,11 +54,17 @@ class Control:
             with self._nodes:
                 if not nodes:
                     ui.label("No node is heard yet. Start them with xy-sysid run, or see the demo: xy-sysid demo.").classes("warn")
-                for name, level, words in nodes:
+                with ui.element("div").classes("buttons"):
+                    for name, _, words in [node for node in nodes if not node[1]]:
+                        with ui.element("div").classes("buttons well").props(f'tabindex=0 role=group aria-label="{name}: {words}"'):
+                            ui.element("span").classes("dot l0").props("aria-hidden=true")
+                            ui.label(name)
+                            ui.tooltip(words)
+                for name, level, words in [node for node in nodes if node[1]]:
                     with ui.element("div").classes("buttons").style("flex-wrap:nowrap;align-items:baseline"):
                         ui.element("span").classes(f"dot l{level}").props("aria-hidden=true")
                         ui.label(name).style("font-weight:600")
-                        ui.label(words).classes("bad" if level > 1 else "warn" if level else "soft")
+                        ui.label(words).classes("bad" if level > 1 else "warn")
         state = heard.lifecycle
         self._state.set_text(f"Excitation: {STATES.get(state, state)}")
         self._configure.set_enabled(state == "unconfigured")
@@ -68,6 +76,28 @@ class Control:
                 with self._settings:
                     self._forms[axis] = SettingsForm(session, axis)
         self._recording()
+        if not self._speed and "excitation" in heard.present and session.link is not None:
+            self._speed = 1.0
+            session.link.get_parameters("excitation", ["speed"], self._paced, lambda done, words: None)
+        waits = not begun and state in ("unconfigured", "inactive")
+        if (waits, state) != self._filled:
+            self._filled = waits, state
+            for button, own in ((self._configure, "unconfigured"), (self._activate, "inactive")):
+                filled = waits and state == own
+                button.props(add="unelevated" if filled else "outline", remove="outline" if filled else "unelevated")
+        return waits
+
+    def pace(self) -> str:
+        """How much faster than a real machine the simulated one runs, in words; empty where it does not."""
+        if self._speed == 1.0 or not self._speed or "ballscrew" not in self._session.heard.present:
+            return ""
+        return f" · simulated, {self._speed:g} times faster than real time" if self._speed > 0 else " · simulated, as fast as it goes"
+
+    def _paced(self, values: dict[str, object]) -> None:
+        """Called in the link's thread; what is shown reads it later."""
+        speed = values.get("speed")
+        if isinstance(speed, float):
+            self._speed = speed if speed else -1.0
 
     def _heard(self, axes: tuple[str, ...]) -> None:
         heard = self._session.heard
@@ -89,9 +119,13 @@ class Control:
     def _go(self, label: str) -> None:
         session = self._session
         if session.link is not None:
-            session.link.transition(
-                label, lambda done, words: session.say(words or (f"{label}: done" if done else f"the excitation refused to {label}"), done)
-            )
+
+            def told(done: bool, words: str) -> None:
+                status = session.heard.statuses.get("excitation")
+                why = f": {status.message}" if status else ""
+                session.say(words or (f"{label}: done" if done else f"the excitation refused to {label}{why}"), done)
+
+            session.link.transition(label, told)
 
     def _ask_activate(self) -> None:
         """A real machine moves: ask once more. A simulated one may go at once."""

@@ -10,45 +10,50 @@ import yaml
 from nicegui import run, ui
 
 from xy_sysid.errors import XySysidError
-from xy_sysid.exports import Quoting
+from xy_sysid.files.linear_models import Quoting
+from xy_sysid.files.seal import sealed
+from xy_sysid.page.orders import Source
 from xy_sysid.page.session import Session
-from xy_sysid.page.wishes import Source
 
 
-def offer(session: Session, source: Source, axis: Callable[[], str]) -> None:
-    """The buttons."""
+class Downloads:
+    """The buttons, for one axis of one source in one browser."""
 
-    def take(kind: str) -> None:
+    def __init__(self, session: Session, source: Source, axis: Callable[[], str]) -> None:
+        self._session, self._source, self._axis = session, source, axis
+        with ui.element("div").classes("buttons"):
+            ui.button("Model (YAML)", on_click=lambda: self.take("model")).props("outline dense no-caps data-take=model")
+            ui.button("Story (JSON)", on_click=lambda: self.take("story")).props("outline dense no-caps data-take=story")
+            if not source.live:
+                ui.button("Report (HTML)", on_click=self._report).props("outline dense no-caps data-take=report")
+        ui.label("Figures and their numbers: the buttons SVG, PNG and CSV under each.").classes("soft small")
+
+    def take(self, kind: str) -> None:
+        """The newest models of all axes, or the story of the axis that is shown."""
+        source, axis = self._source, self._axis()
         documents = {name: source.document(name) for name in source.axes()}
         found = {name: document for name, document in documents.items() if document}
         if not found:
-            session.say("There is no story to download yet.")
+            self._session.say("There is no story to download yet.")
         elif kind == "model":
             ui.download.content(model_text(source.title, found), f"{plain_name(source.title)}.model.yaml")
         else:
-            ui.download.content(json.dumps(found.get(axis(), {}), allow_nan=False), f"{plain_name(source.title)}.{axis()}.story.json")
+            ui.download.content(json.dumps(found.get(axis, {}), allow_nan=False), f"{plain_name(source.title)}.{axis}.story.json")
 
-    async def report() -> None:
-        path = getattr(source, "path", None)
+    async def _report(self) -> None:
+        path = getattr(self._source, "path", None)
         if path is None:
-            session.say("Record a bag and open it: the report is made from a recording.")
+            self._session.say("Record a bag and open it: the report is made from a recording.")
             return
         waiting = ui.notification("The report is being written ...", spinner=True, timeout=None)
         try:
-            page = await run.io_bound(session.report, path)
+            page = await run.io_bound(self._session.report, path, getattr(self._source, "how", self._session.reading))
             if page:
-                ui.download.content(page, f"{plain_name(source.title)}.report.html")
+                ui.download.content(page, f"{plain_name(self._source.title)}.report.html")
         except XySysidError as problem:
-            session.say(str(problem))
+            self._session.say(str(problem))
         finally:
             waiting.dismiss()
-
-    with ui.element("div").classes("buttons"):
-        ui.button("Model (YAML)", on_click=lambda: take("model")).props("outline dense no-caps data-take=model")
-        ui.button("Story (JSON)", on_click=lambda: take("story")).props("outline dense no-caps data-take=story")
-        if not source.live:
-            ui.button("Report (HTML)", on_click=report).props("outline dense no-caps data-take=report")
-    ui.label("Figures: the buttons SVG and PNG under each.").classes("soft small")
 
 
 def model_text(source: str, documents: Mapping[str, Mapping[str, Any]]) -> str:
@@ -64,7 +69,7 @@ def model_text(source: str, documents: Mapping[str, Mapping[str, Any]]) -> str:
         if (model := document.get("model"))
     }
     made = {"format": "xy_sysid axis model 1", "provenance": {"source": source}, "axes": axes}
-    return str(yaml.dump(made, Dumper=Quoting, sort_keys=False, width=120, allow_unicode=True))
+    return sealed(str(yaml.dump(made, Dumper=Quoting, sort_keys=False, width=120, allow_unicode=True)))
 
 
 def plain_name(title: str) -> str:

@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from xy_sysid.messages import ArrayMessage
-from xy_sysid.page.heard import columns
-from xy_sysid.report.words import interval_text, number, quantity
-from xy_sysid.stream import FloatArray
+from xy_sysid.live.messages import ArrayMessage
+from xy_sysid.page.topics_state import columns
+from xy_sysid.report.story_parts import pictured, row
+from xy_sysid.report.words import interval_text, moved, number, quantity
+from xy_sysid.samples.block import FloatArray
 
 Values = Mapping[str, str]
 RAISED = "⁰¹²³⁴⁵⁶⁷⁸⁹"
@@ -24,32 +25,41 @@ GOOD_ERROR, POOR_ERROR = 0.02, 0.05
 
 @dataclass(frozen=True, slots=True)
 class Fact:
-    """One number: label, text with unit, what it means; good: True, False, or None where there is no good or bad."""
+    """One number: label, text with unit, what it means.
+
+    good: True, False, or None where there is no good or bad; sure: False where the model fails, so that its interval says nothing
+    """
 
     label: str
     text: str
     meaning: str
     good: bool | None = None
+    sure: bool = True
 
 
 MEANINGS = {
-    "delay": "Time from a voltage to the motion it causes. One or two milliseconds are usual; it limits how fast a loop can be.",
-    "gain": "Speed per volt at low frequency: the rigid machine's gain.",
+    "delay": "Time from an input to the motion it causes. One or two milliseconds are usual; it limits how fast a loop can be.",
+    "gain": "Speed for each unit of the input at low frequency: the rigid machine's gain.",
     "pole": "How fast the axis reaches its speed: 1/pole is the time constant of motor, mass and viscous friction.",
     "antiresonance": "Where the motor hardly moves because something else swings in its place. Comes in a pair with a resonance.",
     "resonance": "Where the machine swings most. Good is high and well damped; when it moves, something has become loose or heavier.",
     "relative error": "Distance between measured and modelled response, relative. Below 2 % is good; above 5 % something is missing.",
-    "coherence": "Part of the motion that the voltage explains, 0 to 1; the median of all lines. Above 0.9 is good.",
+    "worst coherence": "Part of the motion that the input explains, 0 to 1, where it is lowest. Low: too little of it there, noise, or something "
+    "not linear. Above 0.9 is good.",
+    "worst place": "Where the error is largest, in multiples of the noise floor. Below 2 is good.",
     "windows": "Stretches of signal in the estimate. More make the bands narrower; a dozen is the least for a trend.",
     "windows dropped": "Windows that were not used because samples were missing or broken. Good is none.",
-    "held-out error": "rms error of the simulated velocity on the last third of the data, which no fit has seen. Good is at the noise floor.",
+    "held-out error": "rms error of the simulated velocity on data held out, which no fit has seen. Good is at the noise floor.",
     "noise floor": "The least error that encoder noise and the tolerance allow. No model can be better.",
 }
+UNSURE = " The model fails: the interval counts noise only and is too narrow."
+NEIGHBOURS = 5  # lines of which the middle one counts, so that one line alone is not the worst
+WORTH = 2.0  # times the noise floor from which a model fails
 ESTIMATES = ("delay", "gain", "antiresonance_1.frequency", "resonance_1.frequency")
 
 
-def facts(values: Values, response: ArrayMessage | None = None) -> list[Fact]:
-    """What the identifier's status of an axis says; response: its ``frf`` message, for the coherence."""
+def facts(values: Values, response: ArrayMessage | None = None, fails: bool = False) -> list[Fact]:
+    """What the identifier's status of an axis says; response: its ``frf`` message, for the coherence; fails: its model does, somewhere."""
     found: list[Fact] = []
     for name in ESTIMATES:
         key = next((k for k in values if k.startswith(f"{name} (")), None)
@@ -57,15 +67,14 @@ def facts(values: Values, response: ArrayMessage | None = None) -> list[Fact]:
             continue
         unit, label = key.partition("(")[2].rstrip(")"), name.partition("_1")[0]
         value, low, high = _float(values, key), _float(values, f"{name} 95 % low"), _float(values, f"{name} 95 % high")
-        shown = interval_text(value, low, high, unit) if math.isfinite(low) and math.isfinite(high) else quantity(value, unit)
-        found.append(Fact(label, shown, MEANINGS[label]))
+        shown = interval_text(value, low, high, unit, name) if math.isfinite(low) and math.isfinite(high) else quantity(value, unit)
+        found.append(Fact(label, shown, MEANINGS[label] + (UNSURE if fails else ""), sure=not fails))
     error = _float(values, "relative error (1)")
     if math.isfinite(error):
         found.append(Fact("relative error", f"{number(100 * error, 3)} %", MEANINGS["relative error"], _within(error, GOOD_ERROR, POOR_ERROR)))
     rows = columns(response) if response is not None else {}
     if rows.get("coherence") is not None and rows["coherence"].size:
-        middle = float(np.median(rows["coherence"]))
-        found.append(Fact("coherence", number(middle, 3), MEANINGS["coherence"], _within(1 - middle, 0.1, 0.5)))
+        found.append(coherence_fact(rows["frequency"], rows["coherence"]))
     if "windows" in values:
         enough = values["windows"].isdigit() and int(values["windows"]) >= ENOUGH
         found.append(Fact("windows", values["windows"], MEANINGS["windows"], True if enough else None))
@@ -75,27 +84,60 @@ def facts(values: Values, response: ArrayMessage | None = None) -> list[Fact]:
     return found
 
 
-def story_facts(document: Mapping[str, Any]) -> list[Fact]:
-    """The numbers of a story's newest model: base, resonances of its linear part, effects, and how far it is from the floor."""
-    model, ladder = document["model"], document["ladder"]
+def story_facts(document: Mapping[str, Any], step: int | None = None) -> list[Fact]:
+    """The numbers of a step of a story (None: the newest): how far it is from the floor and where, then its parameters."""
+    last = document["ladder"][-1 if step is None else step]
     unit = str(document["error"]["unit"])
-    last = ladder[-1]
     held, floor = float(last["held_out_error"]), float(last["noise_floor"])
+    fails = held > WORTH * floor
     found = [
-        Fact("held-out error", quantity(held, unit, 3), MEANINGS["held-out error"], bool(last["explained"]) or (None if held < 2 * floor else False)),
-        Fact("noise floor", quantity(floor, unit, 3), MEANINGS["noise floor"]),
+        Fact("held-out error", moved(held, unit, 3), MEANINGS["held-out error"], bool(last["explained"]) or (False if fails else None)),
+        Fact("noise floor", moved(floor, unit, 3), MEANINGS["noise floor"]),
     ]
-    for name, text in parameter_rows(model["parameters"]):
+    pictures = (pictured(document, step) or {}).get("pictures")
+    if pictures is not None:
+        place = max(pictures["failing"], key=lambda item: float(item["error_over_floor"]), default=None)
+        text = "nowhere above 2 × floor" if place is None else f"{number(float(place['error_over_floor']), 3)} × floor, by {place['kind']}"
+        meaning = MEANINGS["worst place"] + ("" if place is None else f" Here: {place['sentence']}.")
+        found.append(Fact("worst place", text, meaning, place is None))
+    if document["measured"] is not None:
+        response = document["measured"]["frequency_response"]
+        trusted = np.array(response["trusted"], dtype=bool)
+        if bool(trusted.any()):
+            inside = slice(int(np.flatnonzero(trusted)[0]), int(np.flatnonzero(trusted)[-1]) + 1)
+            found.append(coherence_fact(row(response["frequency"])[inside], row(response["coherence"])[inside]))
+    for name, text in parameter_rows(last["parameters"]):
         effect, _, own = name.partition(".")
         label = name if not own else f"{effect.replace('_', ' ')}: {own.replace('_', ' ')}"
-        found.append(
-            Fact(label, text, MEANINGS.get(name, "A parameter of the effect, with its 95 % interval. An interval that holds 0 says: not needed."))
-        )
+        meaning = MEANINGS.get(name, "A parameter of the effect, with its 95 % interval. An interval that holds 0 says: not needed.")
+        found.append(Fact(label, text, meaning + (UNSURE if fails else ""), sure=not fails))
     for kind, label in (("zeros", "antiresonance"), ("poles", "resonance")):
-        for root in model["linear"][kind]:
+        for root in pictures["linear"][kind] if pictures is not None else ():
             if root["imag"] and root["frequency"] and root["damping"] is not None and root["damping"] < LIGHT:
-                found.append(Fact(label, f"{number(root['frequency'], 4)} Hz, damping {number(root['damping'], 2)}", MEANINGS[label]))
+                shown = f"{number(root['frequency'], 4)} Hz, damping {number(root['damping'], 2)}"
+                found.append(Fact(label, shown, MEANINGS[label], sure=not fails))
     return found
+
+
+def base_fails(document: Mapping[str, Any] | None) -> str:
+    """What the rigid model of a story leaves where it fails; empty where it does not, or nobody knows."""
+    if document is None or not document["ladder"]:
+        return ""
+    base = document["ladder"][0]
+    held, floor = float(base["held_out_error"]), float(base["noise_floor"])
+    if held <= WORTH * floor:
+        return ""
+    left = moved(held, str(document["error"]["unit"]), 3)
+    return f"In time a linear model fails: it leaves {left}, {number(held / floor, 2)} times the noise floor."
+
+
+def coherence_fact(frequency: FloatArray, coherence: FloatArray) -> Fact:
+    """The lowest coherence and where it is; of a few neighbours the middle one counts."""
+    around = np.lib.stride_tricks.sliding_window_view(coherence, min(NEIGHBOURS, coherence.size))
+    smooth = np.median(around, axis=1)
+    at = int(np.argmin(smooth))
+    lowest, where = float(smooth[at]), float(frequency[at + around.shape[1] // 2])
+    return Fact("worst coherence", f"{number(lowest, 2)} at {number(where, 3)} Hz", MEANINGS["worst coherence"], _within(1 - lowest, 0.1, 0.5))
 
 
 def dropped_words(values: Values) -> str:
@@ -144,14 +186,14 @@ def parameter_rows(parameters: Mapping[str, Mapping[str, Any]]) -> list[tuple[st
             continue
         low, high = span
         if isinstance(low, (int, float)) and isinstance(high, (int, float)):
-            rows.append((name, interval_text(value, low, high, unit)))
+            rows.append((name, interval_text(value, low, high, unit, name)))
         else:
             rows.append((name, quantity(value, unit)))
     return rows
 
 
 def transfer_function_html(numerator: FloatArray, denominator: FloatArray, delay: float) -> str:
-    """H(s) = N(s)/D(s) exp(-s delay) as HTML, D monic or not, in m/V."""
+    """H(s) = N(s)/D(s) exp(-s delay) as HTML, D monic or not, in units of output over input."""
     top, bottom = escape(polynomial(numerator)), escape(polynomial(denominator))
     late = f"<span>e<sup>−<i>s</i> · {escape(quantity(delay, 's', 4))}</sup></span>" if delay else ""
     whole = f'<span class="frac"><span>{top}</span><span>{bottom}</span></span>'

@@ -5,6 +5,8 @@ from __future__ import annotations
 from nicegui import run, ui
 
 from xy_sysid.errors import XySysidError
+from xy_sysid.imports import TABLES
+from xy_sysid.page.columns_dialog import columns_dialog
 from xy_sysid.page.session import Session
 
 
@@ -21,9 +23,18 @@ async def open_dialog(session: Session) -> None:
         with ui.element("div").classes("buttons"):
             if names:
                 ui.button("Open", on_click=lambda: _open(session, str(choice.value), dialog)).props("unelevated")
+                ui.button("Columns ...", on_click=lambda: _columns(session, str(choice.value), dialog)).props("outline").bind_visibility_from(
+                    choice, "value", backward=lambda name: str(name).lower().endswith(TABLES)
+                )
             ui.button("Cancel", on_click=dialog.close).props("flat")
     dialog.on("hide", dialog.delete)
     dialog.open()
+
+
+async def _columns(session: Session, name: str, dialog: ui.dialog) -> None:
+    with ui.context.client.content:  # beside this dialog, not in it: it goes when it is closed
+        dialog.close()
+        await columns_dialog(session, name)
 
 
 def _open(session: Session, name: str, dialog: ui.dialog) -> None:

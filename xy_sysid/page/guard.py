@@ -5,12 +5,15 @@ from __future__ import annotations
 from html import escape
 from typing import Any
 
+import engineio
+import socketio
 from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from xy_sysid.page.access import HEADERS, Access, Answer, judge, set_cookie
+from xy_sysid.page.access import HEADERS, LARGEST, Access, Answer, judge, set_cookie
 
 PAGE = "<!DOCTYPE html><html lang=en><meta charset=utf-8><title>xy_sysid</title><body style='font-family:sans-serif'><h1>xy_sysid</h1><p>{}</p>"
+NONSENSE = 1003  # close code for data that cannot be understood
 REFUSED = 4403  # close code of a WebSocket that is not let in
 
 
@@ -28,12 +31,48 @@ class Guard:
         headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]}
         answer = judge(self._access, headers, scope.get("query_string", b"").decode("latin-1"))
         if answer.status == 200:
-            await self._app(scope, receive, _careful(send))
+            await self._app(scope, (_bounded if scope["type"] == "http" else _understood)(receive), _careful(send))
         elif scope["type"] == "websocket":
             await receive()
             await send({"type": "websocket.close", "code": REFUSED, "reason": answer.words[:100]})
         else:
             await _answer(answer, send)
+
+
+def _bounded(receive: Receive) -> Receive:
+    """What comes without a length ends where it becomes too large, as if the other side had gone."""
+    size = 0
+
+    async def receiving() -> Message:
+        nonlocal size
+        message = await receive()
+        size += len(message.get("body", b""))
+        return {"type": "http.disconnect"} if size > LARGEST else message
+
+    return receiving
+
+
+def _understood(receive: Receive) -> Receive:
+    """A line that says what no page of ours says has gone: nobody behind it need be able to bear that."""
+
+    async def receiving() -> Message:
+        message = await receive()
+        if message["type"] == "websocket.receive" and not _packet(message.get("text") or ""):
+            return {"type": "websocket.disconnect", "code": NONSENSE}
+        return message
+
+    return receiving
+
+
+def _packet(said: str) -> bool:
+    """Whether it is a packet of Engine.IO, and of Socket.IO inside; a page of ours says nothing in bytes."""
+    try:
+        outer = engineio.packet.Packet(encoded_packet=said)
+        if outer.packet_type == engineio.packet.MESSAGE:
+            socketio.packet.Packet(encoded_packet=outer.data)
+    except (ValueError, TypeError, LookupError, AttributeError, RecursionError, OverflowError):
+        return False
+    return True
 
 
 def _careful(send: Send) -> Send:

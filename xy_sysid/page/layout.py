@@ -7,9 +7,10 @@ import time
 from nicegui import ui
 
 from xy_sysid.page.files_dialog import open_dialog
+from xy_sysid.page.orders import Source
 from xy_sysid.page.panel import Panel
 from xy_sysid.page.session import Session
-from xy_sysid.page.wishes import Source
+from xy_sysid.page.together_card import TogetherCard
 
 EVERY = 0.4  # s between two looks for what is new
 SHOWN = 4  # messages on the page at a time
@@ -26,7 +27,7 @@ class Page:
     """One browser's view of the session."""
 
     def __init__(self, session: Session) -> None:
-        self._session = session
+        self._session, self._client = session, ui.context.client
         self._panels: dict[str, Panel] = {}
         self._told: list[int] = []
         self._alarms: list[str] = []
@@ -37,12 +38,17 @@ class Page:
             self._empty = ui.element("div").classes("card")
             with self._empty:
                 ui.label("No recording is open. Open one of the folder in which the page was started.")
+                with ui.element("div").classes("buttons"):
+                    ui.button("Open a recording", on_click=lambda: open_dialog(session)).props("unelevated dense no-caps")
             self._grid = ui.element("div").classes("panels")
+            self._together = TogetherCard(session)
         ui.skip_link("to the pictures", target=main)
 
     async def refresh(self) -> None:
         """Draw what has changed."""
         session = self._session
+        if session.live is not None:
+            session.live.begin()
         sources = session.sources()
         for source in sources:
             if source.key not in self._panels:
@@ -53,7 +59,10 @@ class Page:
         self._empty.set_visibility(not sources)
         self._tell(sources)
         for panel in list(self._panels.values()):
-            await panel.refresh()
+            if not self._client.is_deleted:  # the browser may go while something is drawn
+                await panel.refresh()
+        if not self._client.is_deleted:
+            await self._together.refresh(sources)
 
     def _bar(self) -> None:
         session = self._session
@@ -96,7 +105,9 @@ def state_words(session: Session, sources: list[Source]) -> str:
     """The line in the bar."""
     parts = []
     if session.live is not None:
-        if session.stopping:
+        if session.link is not None and session.link.problem:
+            parts.append(session.link.problem)
+        elif session.stopping:
             parts.append("stopping ...")
         else:
             parts.append(

@@ -1,11 +1,17 @@
-"""The page's own ROS 2 node, in a thread of its own: it hears results and stories and passes orders on."""
+"""The page's own ROS 2 node: it hears results and stories and passes orders on. Should it die, it is begun anew.
+
+The node lives in a thread of its own (``_Line``). ``Link`` looks after it, and stands when it falls: STOP has a wire of its own
+and is published from the thread that asks for it, and every order goes to the node that is there then.
+"""
 
 from __future__ import annotations
 
+import math
 import queue
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import rclpy
@@ -17,76 +23,95 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.signals import SignalHandlerOptions
-from std_msgs.msg import Float64MultiArray, String
+from std_msgs.msg import Bool, Float64MultiArray, String
 from std_srvs.srv import Trigger
 
-from xy_sysid.messages import StatusMessage
-from xy_sysid.nodes.common import LATCHED_QOS, NAMESPACE
+from xy_sysid.live.messages import StatusMessage
+from xy_sysid.nodes.common import LATCHED_QOS, NAMESPACE, STOP_TOPIC
 from xy_sysid.nodes.convert import array_from_ros
-from xy_sysid.page.heard import Heard
+from xy_sysid.nodes.wall import Wall
+from xy_sysid.page.topics_state import TopicsState
 
-WATCHERS = ("page", "demo")  # nodes that only look on
+WATCHERS = ("page", "page_stop", "demo")  # nodes that only look on
 LOOK = 0.5  # s between two looks at the graph and the lifecycle
 PATIENCE = 5.0  # s for an answer of a node
 TABLES = ("frf", "transfer_function", "comparison")
-STOP_AGAIN = 1.0  # s after which STOP is sent again while nobody has confirmed it
+STOP_AGAIN = 0.5  # s after which STOP is sent again while nobody has confirmed it
+STOP_LOOK = 0.05  # s between two looks whether the excitation has said that it stands
 STOP_GIVES_UP = 6.0  # s
 AT_REST = ("inactive", "unconfigured", "finalized")
+WATCH = 0.2  # s between two looks whether the link's thread lives
+STUCK = 3.0  # s without a turn of its loop after which it counts as dead
 
 Told = Callable[[bool, str], None]  # whether an order was done, and the node's sentence
+
+
+@dataclass(frozen=True, slots=True)
+class _Question:
+    """A call of a service: its type and name, what is asked, and how the answer is read: whether it was done, and the node's sentence."""
+
+    kind: Any
+    service: str
+    request: Any
+    read: Callable[[Any], tuple[bool, str]]
 
 
 class Link:
     """Everything between the page and the nodes. Orders return at once; ``told`` is called later, in the link's thread."""
 
-    def __init__(self, heard: Heard, namespace: str = NAMESPACE) -> None:
+    def __init__(self, heard: TopicsState, namespace: str = NAMESPACE, say: Callable[[str], None] = lambda words: None) -> None:
+        """say: takes what people must know of the link itself."""
         self.heard = heard
-        self._orders: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        self.problem = ""  # why nothing is heard; empty while the link stands
+        self._namespace, self._say = namespace, say
+        self._orders: queue.SimpleQueue[Callable[[_Line], None]] = queue.SimpleQueue()
         self._ended = threading.Event()
-        self._context = Context()
-        rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
-        self._node: Any = rclpy.create_node("page", namespace=namespace, context=self._context)
-        self._executor = SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self._node)
-        self._clients: dict[str, Any] = {}
-        self._topics: set[str] = set()
-        self._waiting: list[tuple[float, Any, str, Told]] = []
-        self._node.create_subscription(DiagnosticArray, "metrics", self._on_statuses, 100)
-        self._node.create_subscription(DiagnosticArray, "diagnosis", self._on_diagnosis, LATCHED_QOS)
-        self._node.create_timer(LOOK, self._look)
-        self._thread = threading.Thread(target=self._spin, name="page link", daemon=True)
-        self._thread.start()
+        self._wire = _StopWire(namespace)
+        self._line = _Line(heard, namespace, self._orders, say)
+        self._watch = threading.Thread(target=self._look_after, name="page link watch", daemon=True)
+        self._watch.start()
 
     def close(self) -> None:
         """Leave the graph."""
         self._ended.set()
-        self._thread.join(3.0)
-        self._node.destroy_node()
-        self._context.try_shutdown()
+        self._watch.join(3.0)
+        self._line.close()
+        self._wire.close()
 
     # orders, from any thread
 
     def transition(self, label: str, told: Told) -> None:
-        """configure, activate, deactivate or cleanup the excitation."""
+        """configure, activate, deactivate or cleanup the excitation; activate releases a STOP."""
+        if label == "activate":
+            self._wire.put(False)
         request = ChangeState.Request(transition=Transition(label=label))
-        self._orders.put(lambda: self._call(ChangeState, "excitation/change_state", request, told, lambda a: (a.success, "")))
+
+        def ask(then: Told) -> None:
+            self._orders.put(lambda line: line.call(_Question(ChangeState, "excitation/change_state", request, lambda a: (a.success, "")), then))
+
+        def once_more(done: bool, words: str) -> None:  # the release may arrive after the request
+            told(done, words) if done or words or label != "activate" else _later(STOP_AGAIN, lambda: ask(told))
+
+        ask(once_more)
 
     def stop(self, told: Told) -> None:
-        """Deactivate the excitation and see that it is inactive; asked again until it is, told as failed if it never is."""
-        begun = time.monotonic()
-        self._orders.put(lambda: self._stop(begun, told))
+        """Zero volts by two ways, the topic and the service; told when the excitation's state confirms it, or that it never did."""
+        stop = _Stop(time.monotonic(), told)
+        self._wire.put(True)
+        self._orders.put(lambda line: line.stop(stop))
 
     def trigger(self, service: str, told: Told, patience: float = PATIENCE) -> None:
         """A service without arguments, such as identifier/reset; patience: s that it may take."""
-        self._orders.put(lambda: self._call(Trigger, service, Trigger.Request(), told, lambda a: (a.success, a.message), patience))
+        question = _Question(Trigger, service, Trigger.Request(), lambda a: (a.success, a.message))
+        self._orders.put(lambda line: line.call(question, told, patience))
 
     def set_parameters(self, node: str, values: dict[str, Any], told: Told) -> None:
         """Change parameters of a node; all or the sentence of the first that was refused."""
 
-        def order() -> None:
+        def order(line: _Line) -> None:
             kind: Any = Parameter
             request = SetParameters.Request(parameters=[kind(name, value=value).to_parameter_msg() for name, value in values.items()])
-            self._call(SetParameters, f"{node}/set_parameters", request, told, _all_set)
+            line.call(_Question(SetParameters, f"{node}/set_parameters", request, _all_set), told)
 
         self._orders.put(order)
 
@@ -97,77 +122,180 @@ class Link:
             give({name: parameter_value_to_python(value) for name, value in zip(names, answer.values, strict=False)})
             return True, ""
 
-        self._orders.put(lambda: self._call(GetParameters, f"{node}/get_parameters", GetParameters.Request(names=names), told, read))
+        question = _Question(GetParameters, f"{node}/get_parameters", GetParameters.Request(names=names), read)
+        self._orders.put(lambda line: line.call(question, told))
 
-    # in the link's thread
+    # the watch
 
-    def _spin(self) -> None:
-        while not self._ended.is_set():
-            self._executor.spin_once(timeout_sec=0.05)
-            while not self._orders.empty():
-                self._orders.get()()
-            now = time.monotonic()
-            for entry in [entry for entry in self._waiting if entry[0] < now]:
-                self._waiting.remove(entry)
-                entry[1].cancel()
-                entry[3](False, f"{entry[2].partition('/')[0]} did not answer in time")
+    def _look_after(self) -> None:
+        wall = Wall(self._say)
+        while not self._ended.wait(WATCH):
+            why = self._line.dead()
+            if why:
+                with wall:
+                    self._begin_anew(why)
 
-    def _client(self, kind: Any, service: str) -> Any:
-        if service not in self._clients:
-            self._clients[service] = self._node.create_client(kind, service)
-        return self._clients[service]
+    def _begin_anew(self, why: str) -> None:
+        if not self.problem:
+            self.problem = f"the link to the nodes was lost ({why}) and is begun anew"
+            self._say(self.problem)
+        self._line.abandon()
+        self._line = _Line(self.heard, self._namespace, self._orders, self._say)
+        self.problem = ""
+        self._say("the link to the nodes is there again")
 
-    def _call(
-        self,
-        kind: Any,
-        service: str,
-        request: Any,
-        told: Told,
-        read: Callable[[Any], tuple[bool, str]],
-        patience: float = PATIENCE,
-        since: float = 0.0,
-    ) -> None:
+
+class _StopWire:
+    """The topic of STOP: a node that only publishes, needs no thread, and shares nothing with the link that may die."""
+
+    def __init__(self, namespace: str) -> None:
+        self._context = Context()
+        rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
+        self._node: Any = rclpy.create_node("page_stop", namespace=namespace, context=self._context)
+        self._topic = self._node.create_publisher(Bool, STOP_TOPIC, LATCHED_QOS)
+
+    def put(self, on: bool) -> None:
+        """STOP, or its release; latched."""
+        self._topic.publish(Bool(data=on))
+
+    def close(self) -> None:
+        """Leave the graph."""
+        self._node.destroy_node()
+        self._context.try_shutdown()
+
+
+@dataclass
+class _Stop:
+    """A STOP under way. begun, asked: s, when it was wished and when the service was called last."""
+
+    begun: float
+    told: Told
+    asked: float = -math.inf
+    over: bool = False
+
+    def confirm(self, state: str) -> None:
+        """The excitation is at rest."""
+        if not self.over:
+            self.over = True
+            self.told(True, f"stopped: the excitation is {state}, the voltage is zero")
+
+
+class _Line:
+    """One node in one thread; it can die, and then another takes its place."""
+
+    def __init__(self, heard: TopicsState, namespace: str, orders: queue.SimpleQueue[Callable[[_Line], None]], say: Callable[[str], None]) -> None:
+        self.heard = heard
+        self.wall = Wall(say)
+        self.beat = time.monotonic()
+        self._orders, self._ended = orders, threading.Event()
+        self._context = Context()
+        rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
+        self._node: Any = rclpy.create_node("page", namespace=namespace, context=self._context)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+        self._clients: dict[str, Any] = {}
+        self._topics: set[str] = set()
+        self._waiting: list[tuple[float, Any, str, Told]] = []
+        around = self.wall.around
+        self._node.create_subscription(DiagnosticArray, "metrics", around(self._on_statuses), 100)
+        self._node.create_subscription(DiagnosticArray, "diagnosis", around(self._on_diagnosis), LATCHED_QOS)
+        self._node.create_timer(LOOK, around(self._look))
+        self._thread = threading.Thread(target=self._spin, name="page link", daemon=True)
+        self._thread.start()
+
+    def dead(self) -> str:
+        """Why it does not work any more; empty while it does."""
+        if not self._thread.is_alive():
+            return self.wall.told or "its thread has ended"
+        silent = time.monotonic() - self.beat
+        return f"it has stood still for {silent:.0f} s" if silent > STUCK else ""
+
+    def close(self) -> None:
+        """Leave the graph."""
+        self._ended.set()
+        self._thread.join(3.0)
+
+    def abandon(self) -> None:
+        """Give it up; whoever waits for an answer is told."""
+        self._ended.set()
+        for _, _, service, told in self._waiting:
+            told(False, f"{service.partition('/')[0]} could not be asked: the link to the nodes was lost")
+        self._waiting.clear()
+
+    def call(self, question: _Question, told: Told, patience: float = PATIENCE, since: float = 0.0) -> None:
         """Call a service, once it is there; told the answer, or that there is none."""
-        client, since = self._client(kind, service), since or time.monotonic()
+        client, since = self._client(question.kind, question.service), since or time.monotonic()
         if not client.service_is_ready():
             if time.monotonic() - since > 2.0:
-                told(False, f"{service.partition('/')[0]} is not there")
+                told(False, f"{question.service.partition('/')[0]} is not there")
             else:
-                _later(0.1, lambda: self._orders.put(lambda: self._call(kind, service, request, told, read, patience, since)))
+                _later(0.1, lambda: self._orders.put(lambda line: line.call(question, told, patience, since)))
             return
-        future = client.call_async(request)
-        entry = (time.monotonic() + patience, future, service, told)
+        future = client.call_async(question.request)
+        entry = (time.monotonic() + patience, future, question.service, told)
         self._waiting.append(entry)
 
         def done(answered: Any) -> None:
             if entry in self._waiting:
                 self._waiting.remove(entry)
-                told(*read(answered.result()))
+                told(*question.read(answered.result()))
 
-        future.add_done_callback(done)
+        future.add_done_callback(self.wall.around(done))
 
-    def _stop(self, begun: float, told: Told) -> None:
-        """Send it, look at the state, and again until it is seen to be inactive."""
-        if time.monotonic() - begun > STOP_GIVES_UP:
-            told(False, "STOP was not confirmed by the excitation: use the emergency stop of the machine")
+    def stop(self, stop: _Stop) -> None:
+        """Ask for deactivation, look at the state, and again until it is seen to be at rest."""
+        now = time.monotonic()
+        if self.heard.at_rest_since(stop.begun):  # what it says by itself, should its services not answer
+            stop.confirm("at rest")
+        if stop.over:
             return
-        change, states = self._client(ChangeState, "excitation/change_state"), self._client(GetState, "excitation/get_state")
-        answered = threading.Event()
+        if now - stop.begun > STOP_GIVES_UP:
+            stop.over = True
+            stop.told(False, "STOP was not confirmed by the excitation: use the emergency stop of the machine")
+            return
+        _later(STOP_LOOK, lambda: self._orders.put(lambda line: line.stop(stop)))
 
         def look(future: Any) -> None:
             self.heard.lifecycle = label = future.result().current_state.label
-            if label in AT_REST and not answered.is_set():
-                answered.set()
-                told(True, f"stopped: the excitation is {label}, the voltage is zero")
+            if label in AT_REST:
+                stop.confirm(label)
 
-        def again() -> None:
-            if not answered.is_set():
-                self._orders.put(lambda: self._stop(begun, told))
-
-        if change.service_is_ready() and states.service_is_ready():
+        change, states = self._client(ChangeState, "excitation/change_state"), self._client(GetState, "excitation/get_state")
+        if now - stop.asked > STOP_AGAIN and change.service_is_ready() and states.service_is_ready():
+            stop.asked = now
             request = ChangeState.Request(transition=Transition(label="deactivate"))
-            change.call_async(request).add_done_callback(lambda _: states.call_async(GetState.Request()).add_done_callback(look))
-        _later(STOP_AGAIN, again)
+            seen = self.wall.around(look)
+            ask = self.wall.around(lambda _: states.call_async(GetState.Request()).add_done_callback(seen))
+            change.call_async(request).add_done_callback(ask)
+
+    # in its thread
+
+    def _spin(self) -> None:
+        """Until it is to end; whatever ends it, the node leaves the graph in the thread that used it."""
+        try:
+            while not self._ended.is_set() and self._context.ok():
+                self._turn()
+        finally:
+            self._node.destroy_node()
+            self._context.try_shutdown()
+
+    def _turn(self) -> None:
+        self.beat = time.monotonic()
+        with self.wall:
+            self._executor.spin_once(timeout_sec=0.05)
+        while not self._orders.empty() and not self._ended.is_set():
+            with self.wall:
+                self._orders.get()(self)
+        now = time.monotonic()
+        for entry in [entry for entry in self._waiting if entry[0] < now]:
+            self._waiting.remove(entry)
+            entry[1].cancel()
+            entry[3](False, f"{entry[2].partition('/')[0]} did not answer in time")
+
+    def _client(self, kind: Any, service: str) -> Any:
+        if service not in self._clients:
+            self._clients[service] = self._node.create_client(kind, service)
+        return self._clients[service]
 
     def _look(self) -> None:
         """Who is there, which axes they publish, and how the excitation is."""
@@ -185,15 +313,20 @@ class Link:
         if "excitation" not in names or not client.service_is_ready():
             self.heard.lifecycle = ""
             return
-        client.call_async(GetState.Request()).add_done_callback(lambda future: setattr(self.heard, "lifecycle", future.result().current_state.label))
+
+        def seen(future: Any) -> None:
+            self.heard.lifecycle = future.result().current_state.label
+
+        client.call_async(GetState.Request()).add_done_callback(self.wall.around(seen))
 
     def _listen(self, kind: str, axis: str) -> None:
         topic = f"{kind}/{axis}"
+        around = self.wall.around
         if kind == "story":
-            self._node.create_subscription(String, topic, lambda message: self._on_story(axis, message), LATCHED_QOS)
+            self._node.create_subscription(String, topic, around(lambda message: self._on_story(axis, message)), LATCHED_QOS)
             return
         quality: Any = LATCHED_QOS if kind == "transfer_function" else 10
-        self._node.create_subscription(Float64MultiArray, topic, lambda message: self.heard.array(array_from_ros(topic, message)), quality)
+        self._node.create_subscription(Float64MultiArray, topic, around(lambda message: self.heard.array(array_from_ros(topic, message))), quality)
 
     def _on_story(self, axis: str, message: String) -> None:
         problem = self.heard.story(axis, message.data)

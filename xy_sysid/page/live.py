@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import itertools
+import math
+import re
 import time
 from typing import Any
 
-from xy_sysid.axis_model import STANDARD
+from xy_sysid.axis.model import STANDARD
 from xy_sysid.errors import BadInput
-from xy_sysid.page.heard import Heard
 from xy_sysid.page.link import Link
-from xy_sysid.page.wishes import Act, Job, Wish
+from xy_sysid.page.orders import Order, OrderKind, OrderState
+from xy_sysid.page.topics_state import TopicsState
 
 NODE = "diagnoser"
 LONG = 600.0  # s that a diagnosis may take
+SETTLES = 3.0  # s after an answer in which the diagnoser begins, or has said what it has done
+ENOUGH = 10.0  # s of data with which the rigid model is fitted unasked, so that the first picture shows where it fails
 SERVICES = {"diagnose": "diagnose", "next": "add_next", "auto": "auto", "reset": "reset_model"}
+AXIS = re.compile(r"axis (\S+): (.*)")
 
 
 class Live:
@@ -23,10 +28,12 @@ class Live:
     live = True
     key = "live"
 
-    def __init__(self, heard: Heard, link: Link, say: Any) -> None:
+    def __init__(self, heard: TopicsState, link: Link, say: Any) -> None:
         self.title, self.heard, self.link, self._say = "live", heard, link, say
-        self._job: Job | None = None
+        self._job: OrderState | None = None
         self._asked = 0
+        self._settled = (math.inf, 0)  # when the last order was answered, and the stamp then
+        self._enough = ENOUGH
         self._numbers = itertools.count(1)
 
     def axes(self) -> tuple[str, ...]:
@@ -39,15 +46,26 @@ class Live:
 
     def stamp(self, axis: str) -> int:
         """Grows with each story and each change of what is done."""
-        versions = self.heard.version
-        return versions.get(f"story {axis}", 0) + versions.get("progress", 0) + self._asked
+        return self.heard.version.get(f"story {axis}", 0) + self.heard.version.get("progress", 0) + self._asked
 
-    def job(self, axis: str) -> Job | None:
+    def job(self, axis: str) -> OrderState | None:
         """What the diagnoser says that it does, for any axis, or what it was asked for a moment ago."""
         words, since = self.heard.progress
         if words and NODE in self.heard.present:
-            return Job(Wish(0, "diagnose", axis), since, None, True, words.replace("_", " "))
+            told = AXIS.fullmatch(words)
+            own, said = (told.group(1), told.group(2)) if told else (axis, words)
+            return OrderState(order=Order(0, "diagnose", own), begun=since, part=None, running=True, said=said.replace("_", " "))
+        at, stamp = self._settled
+        if self._job is not None and (time.monotonic() - at > SETTLES or (self._news() != stamp and math.isfinite(at))):
+            self._job = None
         return self._job
+
+    def begin(self) -> None:
+        """Have the rigid model fitted, once there are data for it and nobody has asked for more."""
+        kept = self.heard.values(NODE).get("seconds kept (s)", "0")
+        if not self.heard.stories and NODE in self.heard.present and float(kept) >= self._enough:
+            self._enough = 2.0 * float(kept)
+            self.link.trigger(f"{NODE}/begin", lambda done, words: None, LONG)
 
     def ready(self, axis: str) -> bool:
         """Whether something can be asked for: the diagnoser is there."""
@@ -68,19 +86,19 @@ class Live:
         """The nodes that are lost are told elsewhere."""
         return ""
 
-    def ask(self, act: Act, axis: str, argument: str = "") -> None:
+    def ask(self, act: OrderKind, axis: str, argument: str = "") -> None:
         """Pass it on to the diagnoser."""
         if act in ("add", "remove"):
             effects = self._effects(axis)
             if act == "add" and (argument in effects or not argument):
                 raise BadInput("effect", repr(argument), "one that is not in the model yet", "Choose another.")
             wanted = [*effects, argument] if act == "add" else [name for name in effects if name != argument]
-            self.link.set_parameters(NODE, {f"effects.{axis}": wanted or [""]}, self._told)
+            self.link.set_parameters(NODE, {f"effects.{axis}": wanted or [""]}, self._set)
         elif act in SERVICES:
             self.link.trigger(f"{NODE}/{SERVICES[act]}", self._told, LONG)
         else:
             raise BadInput("order", act, ", ".join(("add", "remove", *SERVICES)), "Record a bag and open it for that.")
-        self._job = Job(Wish(next(self._numbers), act, axis, argument), time.monotonic(), None, True)
+        self._job, self._settled = OrderState(Order(next(self._numbers), act, axis, argument), time.monotonic(), None, True), (math.inf, 0)
         self._asked += 1
 
     def cancel(self, axis: str) -> None:
@@ -90,8 +108,19 @@ class Live:
     def _told(self, done: bool, words: str) -> None:
         self._job = None
         self._asked += 1
-        if words or not done:
+        if not done:  # what was done stands in the story
             self._say(words or "the diagnoser refused", done)
+
+    def _set(self, done: bool, words: str) -> None:
+        """A parameter is set at once; what follows from it begins a moment later."""
+        if done and not words:
+            self._settled = time.monotonic(), self._news()
+        else:
+            self._told(done, words)
+
+    def _news(self) -> int:
+        """Grows with each story of any axis."""
+        return sum(number for name, number in list(self.heard.version.items()) if name.startswith("story "))
 
     def _effects(self, axis: str) -> list[str]:
         ladder = (self.document(axis) or {}).get("ladder") or [{}]

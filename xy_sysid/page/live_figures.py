@@ -2,27 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
 
-from xy_sysid.messages import ArrayMessage
-from xy_sysid.page.heard import Tracked, columns, thinned
-from xy_sysid.report.parts import QUANTILE, band, broken, decibel, frequency_axis, phase_of, positive, rows, turns, unbroken
+from xy_sysid.linear.simulate import held_response
+from xy_sysid.linear.transfer_function import TransferFunction
+from xy_sysid.live.messages import ArrayMessage
+from xy_sysid.page.topics_state import Tracked, columns, thinned
+from xy_sysid.report.parts import band, broken, decibel, frequency_axis, outline, phase_of, plain, positive, rows, turns, unbroken
 from xy_sysid.report.theme import BEFORE, FAILS, MEASURED, MODEL, UNTRUSTED, fade
-from xy_sysid.simulation import held_response
-from xy_sysid.stream import FloatArray
-from xy_sysid.transfer_function import TransferFunction
+from xy_sysid.response.frf import Z95
+from xy_sysid.samples.block import FloatArray
+from xy_sysid.units import USUAL, Units, over, readable
 
 MOST = 1200  # lines drawn
 LEAST = 0.3  # coherence of a trusted line
+SOLID, DASHED = {"color": MEASURED, "width": 1.8}, {"color": MODEL, "width": 1.8, "dash": "dash"}
 NOTABLE = 4.0  # sigma above which a stretch of lines is shaded
 STRETCH = 3  # neighbouring lines that must be above it
 
 
-def response_figure(frf: ArrayMessage, comparison: ArrayMessage | None, tf: TransferFunction | None, sampling_rate: float) -> go.Figure:
-    """Magnitude and phase with 95 % band, the model over them, coherence, and the residual in standard errors.
+def response_figure(
+    frf: ArrayMessage, comparison: ArrayMessage | None, tf: TransferFunction | None, sampling_rate: float, units: Units = USUAL
+) -> go.Figure:
+    """Where the model fails in standard errors, then magnitude and phase with 95 % band, the model over them, and the coherence.
 
     sampling_rate: Hz, for the hold of the voltage that the model is seen through; 0 if it is not known
     """
@@ -33,38 +39,38 @@ def response_figure(frf: ArrayMessage, comparison: ArrayMessage | None, tf: Tran
     kept = kept[frequency[kept] > 0]
     frequency, coherence, response, sigma = frequency[kept], coherence[kept], response[kept], table["sigma"][kept]
     trusted = coherence >= LEAST
-    figure = rows(4, shared=True, gap=0.04, heights=[0.36, 0.24, 0.16, 0.24])
-    part = QUANTILE * np.where(np.isfinite(sigma), sigma, 0.0) / np.sqrt(2) / np.maximum(np.abs(response), 1e-300)
-    level, phase = decibel(response, "m"), phase_of(response)
+    figure = rows(4, shared=True, gap=0.04, heights=[0.24, 0.36, 0.24, 0.16])
+    part = Z95 * np.where(np.isfinite(sigma), sigma, 0.0) / np.sqrt(2) / np.maximum(np.abs(response), 1e-300)
+    level, phase = decibel(response, units.output), phase_of(response)
     turn = np.degrees(np.arcsin(np.minimum(part, 1.0)))
     curves = (
-        (1, level, level + 20 * np.log10(np.maximum(1 - part, 1e-3)), level + 20 * np.log10(1 + part)),
-        (2, phase, phase - turn, phase + turn),
+        (2, level, level + 20 * np.log10(np.maximum(1 - part, 1e-3)), level + 20 * np.log10(1 + part)),
+        (3, phase, phase - turn, phase + turn),
     )
     pieces = _stretches(trusted, frequency)
     for row, middle, low, high in curves:
-        _untrusted(figure, row, frequency, middle, ~trusted, row == 1)
+        _untrusted(figure, row, frequency, middle, ~trusted, row == 2)
         if pieces:
-            band(figure, row, pieces, frequency, low, high, MEASURED, "measured", "95 % band" if row == 1 else "")
-            _curve(figure, row, broken(pieces, frequency), broken(pieces, middle), MEASURED, "solid", "measured", row == 1)
-    shown = {1: [level], 2: [phase]}
+            band(figure, row, outline(pieces, frequency, low, high), MEASURED, "measured", "95 % band" if row == 2 else "")
+            _curve(figure, row, (broken(pieces, frequency), broken(pieces, middle)), SOLID, "measured", row == 2)
+    shown = {2: [level], 3: [phase]}
     if tf is not None:
         model = held_response(tf, frequency, sampling_rate) if sampling_rate > 0 else tf.response(frequency)
         shifted = phase_of(model)
         if bool(trusted.any()):
             shifted = shifted + 360 * np.round(np.median((phase - shifted)[trusted]) / 360)
-        shown[1].append(decibel(model, "m"))
-        shown[2].append(shifted)
-        _curve(figure, 1, frequency, shown[1][1], MODEL, "dash", "model", True)
-        _curve(figure, 2, frequency, shifted, MODEL, "dash", "model", False)
-    _untrusted(figure, 3, frequency, coherence, ~trusted, False)
+        shown[2].append(decibel(model, units.output))
+        shown[3].append(shifted)
+        _curve(figure, 2, (frequency, shown[2][1]), DASHED, "model", True)
+        _curve(figure, 3, (frequency, shifted), DASHED, "model")
+    _untrusted(figure, 4, frequency, coherence, ~trusted, False)
     if pieces:
-        _curve(figure, 3, broken(pieces, frequency), broken(pieces, coherence), MEASURED, "solid", "coherence", False)
+        _curve(figure, 4, (broken(pieces, frequency), broken(pieces, coherence)), SOLID, "coherence")
     _residual(figure, comparison)
-    figure.update_yaxes(title_text="dB re 1 mm/V", row=1, col=1)
-    figure.update_yaxes(title_text="phase (°)", dtick=turns([phase[trusted] if bool(trusted.any()) else phase]), row=2, col=1)
-    figure.update_yaxes(title_text="coherence", range=[-0.03, 1.05], row=3, col=1)
-    figure.update_yaxes(title_text="residual (σ)", type="log", dtick=1, tickformat="~g", row=4, col=1)
+    figure.update_yaxes(title_text="residual (σ)", type="log", dtick=1, tickformat="~g", row=1, col=1)
+    figure.update_yaxes(title_text=f"dB re 1 {plain(over(readable(units.output)[1], units.input))}", row=2, col=1)
+    figure.update_yaxes(title_text="phase (°)", dtick=turns([phase[trusted] if bool(trusted.any()) else phase]), row=3, col=1)
+    figure.update_yaxes(title_text="coherence", range=[-0.03, 1.05], row=4, col=1)
     for row, found in shown.items():
         seen = np.concatenate([values[trusted] if bool(trusted.any()) else values for values in found])
         room = max(0.06 * float(np.ptp(seen)), 1.0)
@@ -100,9 +106,9 @@ def failing_words(comparison: ArrayMessage | None) -> str:
     if comparison is None:
         return "No model yet."
     if not found:
-        return "No stretch of the band stands out: the model is within what noise explains, line by line."
+        return "No stretch of the band stands out: the linear fit is within what noise explains, line by line."
     worst = "; ".join(f"{low:.3g} to {high:.3g} Hz, up to {size:.2g} standard errors" for low, high, size in found[:3])
-    return f"The model fails at {worst}."
+    return f"The linear fit fails at {worst}."
 
 
 def tracking_figure(history: Sequence[Tracked]) -> go.Figure:
@@ -128,20 +134,20 @@ def _residual(figure: go.Figure, comparison: ArrayMessage | None) -> None:
         return
     frequency, size = table["frequency"], table["residual_sigma"]
     kept = thinned(frequency, size, MOST)
-    _curve(figure, 4, frequency[kept], positive(size[kept]), MODEL, "solid", "residual", False, 1.2)
-    figure.add_hline(y=QUANTILE, line={"color": UNTRUSTED, "width": 1, "dash": "dot"}, row=4, col=1)
+    _curve(figure, 1, (frequency[kept], positive(size[kept])), {"color": MODEL, "width": 1.2}, "residual")
+    figure.add_hline(y=Z95, line={"color": UNTRUSTED, "width": 1, "dash": "dot"}, row=1, col=1)
     for low, high, worst in failing(comparison)[:4]:
-        figure.add_vrect(x0=low, x1=high, fillcolor=fade(FAILS, 0.13), line={"color": fade(FAILS, 0.5), "width": 1}, row=4, col=1)
+        figure.add_vrect(x0=low, x1=high, fillcolor=fade(FAILS, 0.13), line={"color": fade(FAILS, 0.5), "width": 1}, row=1, col=1)
         figure.add_annotation(
-            text=f"fails: {worst:.2g} σ", x=float(np.log10(np.sqrt(low * high))), xref="x4", y=1, yref="y4 domain", yanchor="top", showarrow=False,
+            text=f"fails: {worst:.2g} σ", x=float(np.log10(np.sqrt(low * high))), xref="x", y=1, yref="y domain", yanchor="top", showarrow=False,
             font={"color": FAILS, "size": 11},
         )  # fmt: skip
     top = float(np.nanmax(np.log10(np.maximum(size, 1e-2))))
-    figure.update_yaxes(range=[-1.0, max(top, 1.0) + 0.35], row=4, col=1)
+    figure.update_yaxes(range=[-1.0, max(top, 1.0) + 0.35], row=1, col=1)
 
 
-def _curve(figure: go.Figure, row: int, x: FloatArray, y: FloatArray, colour: str, dash: str, name: str, legend: bool, width: float = 1.8) -> None:
-    line = {"color": colour, "width": width, "dash": dash}
+def _curve(figure: go.Figure, row: int, curve: tuple[FloatArray, FloatArray], line: Mapping[str, Any], name: str, legend: bool = False) -> None:
+    x, y = curve
     figure.add_scatter(x=x, y=y, mode="lines", line=line, name=name, legendgroup=name, showlegend=legend, row=row, col=1)
 
 

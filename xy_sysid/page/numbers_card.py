@@ -7,9 +7,14 @@ from typing import Any
 import numpy as np
 from nicegui import ui
 
-from xy_sysid.page.facts import Fact, facts, story_facts, transfer_function_html
+from xy_sysid.page.facts import Fact, base_fails, facts, story_facts, transfer_function_html
+from xy_sysid.page.live_figures import failing
+from xy_sysid.page.orders import Source
 from xy_sysid.page.session import Session
-from xy_sysid.page.wishes import Source
+from xy_sysid.page.views import View
+from xy_sysid.report.parts import plain
+from xy_sysid.report.story_parts import pictured
+from xy_sysid.report.story_parts import words as spoken
 
 
 class Numbers:
@@ -17,17 +22,18 @@ class Numbers:
 
     def __init__(self) -> None:
         self._shown: object = None
-        with ui.element("div").classes("card") as self._card:
+        with ui.element("div").classes("card numbers") as self._card:
             self._math = ui.element("div").classes("math").props('tabindex=0 aria-label="transfer function"')
             self._facts = ui.element("div").classes("facts")
 
-    def refresh(self, session: Session, source: Source, axis: str) -> None:
+    def refresh(self, session: Session, source: Source, axis: str, view: View) -> None:
         """Write them again if they have changed."""
-        stamp = (source.key, axis, source.stamp(axis), session.heard.version.get(f"axis {axis}", 0) if source.live else 0)
+        heard = session.heard.version.get(f"axis {axis}", 0) if view.linear else 0
+        stamp = (source.key, axis, source.stamp(axis), view, heard)
         if stamp == self._shown:
             return
         self._shown = stamp
-        found, words = numbers_of(session, source, axis)
+        found, words = numbers_of(session, source, axis, view)
         self._card.set_visibility(bool(found))
         self._math.clear()
         with self._math:
@@ -40,7 +46,7 @@ class Numbers:
 
 def show(fact: Fact) -> None:
     """One number with its meaning as a tooltip, which a screen reader reads too."""
-    state = {True: " good", False: " bad", None: ""}[fact.good]
+    state = {True: " good", False: " bad", None: ""}[fact.good] + ("" if fact.sure else " unsure")
     with ui.element("div").classes(f"fact{state}").props("tabindex=0 role=group") as card:
         card.props["aria-label"], card.props["aria-description"] = fact.label, fact.meaning
         ui.label(fact.label).classes("label")
@@ -48,14 +54,18 @@ def show(fact: Fact) -> None:
         ui.tooltip(fact.meaning)
 
 
-def numbers_of(session: Session, source: Source, axis: str) -> tuple[list[Fact], str]:
-    """The numbers and the mathematics: live from the identifier, else from the story."""
+def numbers_of(session: Session, source: Source, axis: str, view: View) -> tuple[list[Fact], str]:
+    """The numbers and the mathematics of the model that is shown: the story's, or the identifier's linear fit."""
     document = source.document(axis)
-    if source.live:
+    if view.linear:
         tf = session.heard.transfer_function(axis)
         words = "" if tf is None else transfer_function_html(tf.numerator, tf.denominator, tf.delay)
-        return facts(session.heard.values(f"axis {axis}"), session.heard.arrays.get(f"frf/{axis}")), words
-    if document is None or not document.get("model"):
+        fails = bool(failing(session.heard.table("comparison", axis)) or base_fails(document))
+        return facts(session.heard.values(f"axis {axis}"), session.heard.table("frf", axis), fails), words
+    shown = None if document is None else pictured(document, view.step)
+    if document is None or shown is None:
         return [], ""
-    linear: dict[str, Any] = document["model"]["linear"]
-    return story_facts(document), transfer_function_html(np.array(linear["numerator"]), np.array(linear["denominator"]), linear["delay"])
+    linear: dict[str, Any] = shown["pictures"]["linear"]
+    words = transfer_function_html(np.array(linear["numerator"]), np.array(linear["denominator"]), linear["delay"])
+    beside = "".join(f" and {plain(spoken(name))}" for name in shown["effects"])
+    return story_facts(document, view.step), words + (f'<span class="with">{beside.strip()}</span>' if beside else "")

@@ -4,7 +4,9 @@ window.xyStop = async () => {
   try {
     const answer = await fetch("/stop", { method: "POST", headers: { "X-Requested-With": "xy_sysid" } });
     if (!answer.ok) throw new Error(String(answer.status));
-    gone.classList.remove("shown");
+    const said = await answer.json();
+    gone.textContent = said.asked && !said.stopped ? "STOP: " + said.words : "";
+    gone.classList.toggle("shown", Boolean(gone.textContent));
   } catch (error) {
     gone.textContent = "STOP did not reach the server (" + error.message + "). Use the emergency stop of the machine.";
     gone.classList.add("shown");

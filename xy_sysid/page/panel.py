@@ -9,11 +9,14 @@ from nicegui import app, ui
 
 from xy_sysid.page.control import Control
 from xy_sysid.page.facts import seconds_text
+from xy_sysid.page.failure_card import FailureCard
+from xy_sysid.page.live_card import LiveCards
 from xy_sysid.page.numbers_card import Numbers
+from xy_sysid.page.orders import Source
 from xy_sysid.page.picture_card import Cards
 from xy_sysid.page.session import Session
 from xy_sysid.page.story_card import StoryCard
-from xy_sysid.page.wishes import Source
+from xy_sysid.page.views import NOW, View, view_of, views
 
 SHORT = 3  # letters of an axis' name that needs the word axis before it
 
@@ -26,22 +29,29 @@ class Panel:
         self._axis = ""
         self._axes: tuple[str, ...] = ()
         self._control: Control | None = None
+        self._views: dict[str, str] = {}
         with ui.element("section").classes("panel").props(f'id={source.key} aria-label="{"machine" if source.live else "recording"}"') as self._root:
             with ui.element("div").classes("head"):
-                self._title = ui.label("").classes("grow").props("role=heading aria-level=2").style("font-weight:600;font-size:1.1rem")
+                self._title = ui.label("").classes("grow").props("role=heading aria-level=2").classes("title")
+                with ui.element("div").classes("buttons") as self._model:
+                    ui.label("Model shown:").classes("soft")
+                    self._view = ui.toggle({}).props('dense no-caps aria-label="model that is shown" data-part=view')
                 self._choice = ui.toggle({}, on_change=lambda event: self._turn(str(event.value))).props('dense no-caps aria-label="axis"')
                 if not source.live:
                     ui.button(icon="close", on_click=lambda: session.close_recording(source.key)).props('flat dense aria-label="close recording"')
             self._problem = ui.label("").classes("notice").props("role=alert")
+            self._reading = ui.label("").props("role=status data-part=reading")
             self._wait = ui.linear_progress(0, show_value=False).props('instant-feedback aria-label="reading"')
             with ui.element("div").classes("split") as self._split:
                 with ui.element("div").classes("stack") as self._pictures:
+                    self._first = FailureCard(session, source)
+                    self._live = LiveCards(session) if source.live else None
                     self._numbers = Numbers()
-                    self._cards = Cards(session, source)
+                    self._cards = Cards(session, source, self._first.plots["frequency"])
                 with ui.element("div").classes("stack side"):
+                    self._story = StoryCard(session, source)
                     if source.live:
                         self._control = Control(session)
-                    self._story = StoryCard(session, source)
 
     def delete(self) -> None:
         """Take it off the page."""
@@ -57,19 +67,35 @@ class Panel:
             wanted = (self._axis, self._tab().get(self._source.key, ""), *axes)
             self._axis = next((axis for axis in wanted if axis in axes), "")
             self._choice.set_options({axis: f"axis {axis}" if len(axis) <= SHORT else axis for axis in axes}, value=self._axis or None)
-        if self._control is not None:
-            self._control.refresh(self._axes)
+        begun = bool(self._axis) and source.document(self._axis) is not None
+        waits = self._control is not None and self._control.refresh(self._axes, begun)
+        self._root.classes(add="begun" if begun else "", remove="" if begun else "begun")
         self._pictures.set_visibility(bool(self._axis))
-        self._story.root.set_visibility(bool(self._axis))
+        for part in (self._story.head, self._story.body):
+            part.set_visibility(bool(self._axis))
         if self._axis:
-            self._numbers.refresh(self._session, source, self._axis)
-            await self._story.refresh(self._axis)
-            await self._cards.refresh(self._axis)
+            axis, view = self._axis, self._choose()
+            self._numbers.refresh(self._session, source, axis, view)  # first what waits for nothing: meanwhile the browser may go
+            await self._story.refresh(axis, quiet=waits)
+            await self._first.refresh(axis, view)
+            if self._live is not None:
+                await self._live.refresh(axis, view.linear)
+            await self._cards.refresh(axis, view)
+
+    def _choose(self) -> View:
+        """What is looked at; whenever the story goes on, its newest model."""
+        found = views(self._source.document(self._axis), self._source.live)
+        key = {"": self._axis, **found}
+        if key != self._views:
+            self._views = key
+            self._view.set_options(found, value=next(iter(found), None))
+        self._model.set_visibility(len(found) > 1)
+        return view_of(str(self._view.value or NOW))
 
     def _head(self) -> None:
         source = self._source
         about: dict[str, Any] = getattr(source, "about", {})
-        words = source.title if not source.live else "The machine, live"
+        words = source.title if not source.live else f"The machine, live{self._control.pace() if self._control is not None else ''}"
         if about:
             words += f" · {seconds_text(about['seconds'])} at {about['rate']:g} Hz"
         self._title.set_text(words)
@@ -78,6 +104,8 @@ class Panel:
         self._problem.set_text(f"Closed: {problem}" if problem else "")
         reading = getattr(source, "reading", None)
         self._wait.set_visibility(reading is not None)
+        self._reading.set_visibility(reading is not None)
+        self._reading.set_text(f"reading {source.title} ...")
         if reading is not None:
             self._wait.set_value(reading)
         self._choice.set_visibility(len(self._axes) > 1)

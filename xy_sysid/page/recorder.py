@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 
 from xy_sysid.page.facts import seconds_text
-from xy_sysid.starter import FOLLOW
+from xy_sysid.processes.starter import FOLLOW
 
 ORDERLY = 8.0  # s that the recorder may take to finish the bag
 

@@ -1,4 +1,4 @@
-"""A recording that is open on the page: its worker, the stories so far, and the wishes that wait."""
+"""A recording that is open on the page: its worker, the stories so far, and the orders that wait."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from typing import Any
 
 from xy_sysid.errors import BadInput
 from xy_sysid.page import worker
-from xy_sysid.page.wishes import Act, Job, News, Reading, Wish
+from xy_sysid.page.orders import Order, OrderKind, OrderState, Reading, WorkerNews
 
 KEYS = itertools.count(1)
 
@@ -32,7 +32,7 @@ class OpenRecording:
         self.reading: float | None = 0.0
         self._say = say or (lambda text: None)
         self._documents: dict[str, dict[str, Any]] = {}
-        self._jobs: dict[str, Job] = {}
+        self._jobs: dict[str, OrderState] = {}
         self._stamps: dict[str, int] = {}
         self._problem = ""
         self._numbers = itertools.count(1)
@@ -57,7 +57,7 @@ class OpenRecording:
         """Grows with each change."""
         return self._stamps.get(axis, 0) + self._stamps.get("", 0)
 
-    def job(self, axis: str) -> Job | None:
+    def job(self, axis: str) -> OrderState | None:
         """What is being done for the axis."""
         return self._jobs.get(axis)
 
@@ -77,27 +77,27 @@ class OpenRecording:
         """Why it is closed."""
         return self._problem
 
-    def ask(self, act: Act, axis: str, argument: str = "") -> None:
+    def ask(self, act: OrderKind, axis: str, argument: str = "") -> None:
         """Order something for an axis, one thing at a time."""
         if axis not in self.axes():
             raise BadInput("axis", repr(axis), ", ".join(self.axes()) or "none yet", "Wait until the recording is read.")
         if axis in self._jobs:
-            raise BadInput(f"axis {axis}", f"busy {self._jobs[axis].wish.words}", "one thing at a time", "Wait, or cancel it.")
-        wish = Wish(next(self._numbers), act, axis, argument)
-        self._jobs[axis] = Job(wish, time.monotonic(), running=not self._jobs)
+            raise BadInput(f"axis {axis}", f"busy {self._jobs[axis].order.words}", "one thing at a time", "Wait, or cancel it.")
+        order = Order(next(self._numbers), act, axis, argument)
+        self._jobs[axis] = OrderState(order, time.monotonic(), running=not self._jobs)
         self._changed(axis)
-        self._send(wish)
+        self._send(order)
 
     def cancel(self, axis: str) -> None:
         """Leave the fit of this axis; if it waits behind another one, that one goes on."""
         job = self._jobs.get(axis)
         if job is None or self._process.pid is None or not self._process.is_alive():
             return
-        first = min(list(self._jobs.values()), key=lambda item: item.wish.number)
+        first = min(list(self._jobs.values()), key=lambda item: item.order.number)
         if first is job:
             os.kill(self._process.pid, worker.LEAVE)
         else:
-            self._say(f"{self.title}: axis {axis} waits for axis {first.wish.axis}; cancel that one first")
+            self._say(f"{self.title}: axis {axis} waits for axis {first.order.axis}; cancel that one first")
 
     def close(self) -> None:
         """End the worker."""
@@ -107,9 +107,9 @@ class OpenRecording:
         if self._process.is_alive():
             self._process.kill()
 
-    def _send(self, wish: Wish) -> None:
+    def _send(self, order: Order) -> None:
         try:
-            self._orders.send(wish)
+            self._orders.send(order)
         except OSError:
             self._lost("its process has ended")
 
@@ -121,7 +121,7 @@ class OpenRecording:
                 self._lost("its process has ended")
                 return
 
-    def _hear(self, news: News) -> None:
+    def _hear(self, news: WorkerNews) -> None:
         if news.kind == "opened":
             self.about, self.reading = news.content, None
             self._changed("")
@@ -142,7 +142,7 @@ class OpenRecording:
             self._changed(news.axis)
         waiting = list(self._jobs.items())  # another thread may ask for more meanwhile
         for axis, job in waiting:
-            running = job.wish.number == min(item.wish.number for _, item in waiting)
+            running = job.order.number == min(item.order.number for _, item in waiting)
             if running != job.running:
                 self._jobs[axis] = replace(job, running=running, begun=time.monotonic())
 

@@ -19,6 +19,7 @@ from xy_sysid.page.guard import Guard
 from xy_sysid.page.layout import build
 from xy_sysid.page.session import Session
 
+CONFIRMS = 2.0  # s in which the machine confirms a STOP; then the request is answered that it has not
 GRACE = 1  # s that open pages may take when the server ends
 PORTS = 20  # tried after the wished one when that is taken
 
@@ -33,7 +34,14 @@ def serve(session: Session, host: str, port: int, token: str, browse: bool, say:
         if browse:
             webbrowser.open(address)
         config = uvicorn.Config(
-            app, log_level="warning", access_log=False, timeout_graceful_shutdown=GRACE, server_header=False, ws_max_size=1 << 22, lifespan="on"
+            app,
+            log_level="warning",
+            access_log=False,
+            timeout_graceful_shutdown=GRACE,
+            server_header=False,
+            ws="websockets",  # it closes a line that is no UTF-8; its successor prints a traceback
+            ws_max_size=1 << 22,
+            lifespan="on",
         )
         uvicorn.Server(config).run(sockets=[place])
 
@@ -44,9 +52,9 @@ def application(session: Session, access: Access) -> FastAPI:
 
     @app.post("/stop")
     def stop() -> JSONResponse:
-        """Zero volts."""
-        session.stop()
-        return JSONResponse({"asked": session.link is not None})
+        """Zero volts; answered when the machine has confirmed it, or that it has not."""
+        stopped, words = session.stop(CONFIRMS)
+        return JSONResponse({"asked": session.link is not None, "stopped": stopped, "words": words})
 
     @app.get("/alive")
     def alive() -> JSONResponse:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections import deque
 from collections.abc import Callable
@@ -13,11 +14,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from xy_sysid.errors import BadInput
-from xy_sysid.page.heard import Heard
+from xy_sysid.page.orders import Reading, Source
 from xy_sysid.page.recorder import Recorder
 from xy_sysid.page.recordings import OpenRecording
 from xy_sysid.page.shelf import Shelf
-from xy_sysid.page.wishes import Reading, Source
+from xy_sysid.page.topics_state import TopicsState
 
 if TYPE_CHECKING:
     from xy_sysid.page.link import Link
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 
 MOST_OPEN = 6  # recordings at a time
 MESSAGES = 50
+ONCE = 3.0  # s in which the same words are one message
 DRAWN = 200  # figures kept, so that a second page does not draw them again
 
 
@@ -44,7 +46,7 @@ class Session:
 
     def __init__(self, shelf: Shelf, live: bool, namespace: str = "/xy", reading: Reading | None = None) -> None:
         self.shelf, self.namespace, self.reading = shelf, namespace, reading or Reading()
-        self.heard = Heard()
+        self.heard = TopicsState()
         self.recordings: list[OpenRecording] = []
         self.recorder = Recorder()
         self.messages: deque[Message] = deque(maxlen=MESSAGES)
@@ -57,7 +59,7 @@ class Session:
             from xy_sysid.page.link import Link
             from xy_sysid.page.live import Live
 
-            self.link = Link(self.heard, namespace)
+            self.link = Link(self.heard, namespace, self.say)
             self.live = Live(self.heard, self.link, self.say)
 
     def sources(self) -> list[Source]:
@@ -65,15 +67,18 @@ class Session:
         return [*([self.live] if self.live else []), *self.recordings]
 
     def say(self, words: str, good: bool = False) -> None:
-        """A line on every page."""
+        """A line on every page; what was said a moment ago is not said twice, as by the button and the key of one STOP."""
+        now = time.monotonic()
+        if any(message.words == words and now - message.at < ONCE for message in list(self.messages)):
+            return
         self._count += 1
-        self.messages.append(Message(self._count, time.strftime("%H:%M:%S"), time.monotonic(), words, good))
+        self.messages.append(Message(number=self._count, clock=time.strftime("%H:%M:%S"), at=now, words=words, good=good))
 
-    def open(self, path: Path, title: str = "") -> OpenRecording:
-        """Open a recording beside the others."""
+    def open(self, path: Path, title: str = "", reading: Reading | None = None) -> OpenRecording:
+        """Open a recording beside the others. reading: how it is read, if not as all are."""
         if len(self.recordings) >= MOST_OPEN:
             raise BadInput("recordings", f"{MOST_OPEN} already", f"at most {MOST_OPEN}", "Close one first.")
-        made = OpenRecording(path, title, self.say, self.reading)
+        made = OpenRecording(path, title, self.say, reading or self.reading)
         self.recordings.append(made)
         return made
 
@@ -83,23 +88,29 @@ class Session:
             self.recordings.remove(one)
             one.close()
 
-    def stop(self) -> None:
-        """Zero volts, now."""
+    def stop(self, patience: float = 0.0) -> tuple[bool, str]:
+        """Zero volts, now; whether the machine has confirmed it after so many seconds at most, and what there is to say."""
         if self.link is None:
-            return
+            return False, "no machine is driven from here"
         self.stopping = True
+        answered = threading.Event()
+        answer = [(False, "not confirmed yet: look at the machine, and use its emergency stop")]
 
         def told(done: bool, words: str) -> None:
             self.stopping = False
+            answer[0] = done, words
+            answered.set()
             self.say(words, done)
 
         self.link.stop(told)
+        answered.wait(patience)
+        return answer[0]
 
-    def report(self, path: Path) -> str:
-        """The report of a recording, as ``xy-sysid report`` writes it; raises BadInput with what it says. Takes a while."""
+    def report(self, path: Path, reading: Reading) -> str:
+        """The report of a recording that is read so, as ``xy-sysid report`` writes it; raises BadInput with what it says. Takes a while."""
         with tempfile.TemporaryDirectory() as folder:
             out = Path(folder) / "report.html"
-            command = [sys.executable, "-m", "xy_sysid", "report", str(path), "-o", str(out), *self.reading.words]
+            command = [sys.executable, "-m", "xy_sysid", "report", str(path), "-o", str(out), *reading.words]
             done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
             if done.returncode != 0 or not out.is_file():
                 lines = [line for line in done.stderr.splitlines() if line.strip()]

@@ -9,6 +9,7 @@ from nicegui import ui
 from xy_sysid.errors import BadInput
 from xy_sysid.page.session import Session
 from xy_sysid.settings import AxisExcitation, Knob, changed, knobs
+from xy_sysid.units import USUAL, Units
 
 OFTEN = ("kind", "rms", "low", "high", "limit")  # shown first
 
@@ -34,13 +35,18 @@ def changes(knob_values: dict[str, Any], typed: dict[str, Any]) -> dict[str, Any
     return {name: getattr(after, name) for name in wanted if getattr(after, name) != getattr(before, name)}
 
 
-def limits(item: Knob) -> str:
-    """0 to 100 V, or the choices."""
+def limits(item: Knob, units: Units = USUAL) -> str:
+    """0 to 100 V, or the choices; units: what V and m stand for."""
     if item.choices:
         return ", ".join(item.choices)
     if item.low is None or item.high is None:
         return "any"
-    return f"{item.low:g} to {item.high:g} {item.unit}".rstrip()
+    return f"{item.low:g} to {item.high:g} {units.of(item.unit)}".rstrip()
+
+
+def labelled(item: Knob, units: Units = USUAL) -> str:
+    """rms (V), or rms (N m)."""
+    return f"{item.name} ({units.of(item.unit)})" if item.unit else item.name
 
 
 class SettingsForm:
@@ -50,6 +56,8 @@ class SettingsForm:
         self._session, self._axis = session, axis
         self._now: dict[str, Any] = {}
         self._fields: dict[str, Any] = {}
+        self._tips: dict[str, Any] = {}
+        self._units = USUAL
         rest = []
         with ui.element("div").classes("stack").style("gap:.4rem"):
             ui.html(f"<h3>Axis {axis}</h3>", sanitize=False) if axis.isidentifier() else None
@@ -77,14 +85,13 @@ class SettingsForm:
             self._session.link.get_parameters("excitation", names, self._got, lambda done, words: None)
 
     def _field(self, item: Knob) -> None:
-        label = f"{item.name} ({item.unit})" if item.unit else item.name
         if item.choices:
-            made: Any = ui.select(list(item.choices), label=label, value=item.value)
+            made: Any = ui.select(list(item.choices), label=labelled(item), value=item.value)
         else:
-            made = ui.number(label, value=item.value)  # no min and max: a wrong value is refused in words, not silently changed
+            made = ui.number(labelled(item), value=item.value)  # no min and max: a wrong value is refused in words, not silently changed
         made.props(f"outlined dense data-knob={self._axis}.{item.name}")
         with made:
-            ui.tooltip(f"{item.meaning}; {limits(item)}")
+            self._tips[item.name] = ui.tooltip(f"{item.meaning}; {limits(item)}")
         self._fields[item.name] = made
 
     def _got(self, values: dict[str, Any]) -> None:
@@ -93,6 +100,7 @@ class SettingsForm:
         self._fresh = True
 
     def _show(self) -> None:
+        self._name(self._session.heard.units("excitation"))
         if getattr(self, "_fresh", False):
             self._fresh = False
             for name, value in self._now.items():
@@ -102,6 +110,15 @@ class SettingsForm:
         if text != self._told.text:
             self._told.set_text(text)
             self._told.classes(remove="good bad", add="good" if good else "bad")
+
+    def _name(self, units: Units) -> None:
+        """Every field in the units of what the excitation sends and hears."""
+        if units != self._units:
+            self._units = units
+            for item in knobs(AxisExcitation()):
+                self._fields[item.name].props["label"] = labelled(item, units)
+                self._fields[item.name].update()
+                self._tips[item.name].set_text(f"{item.meaning}; {limits(item, units)}")
 
     def _apply(self) -> None:
         try:

@@ -1,4 +1,4 @@
-"""The story of an axis in one column: verdict, buttons, falling ladder, candidates, what is in the model, look-alikes, next experiment."""
+"""The story of an axis in one column: headline, what is next, falling ladder, what is in the model, candidates, look-alikes."""
 
 from __future__ import annotations
 
@@ -10,15 +10,16 @@ from typing import Any
 from nicegui import ui
 
 from xy_sysid.errors import XySysidError
-from xy_sysid.page.downloads import offer
+from xy_sysid.page.document_words import candidate_rows, ladder_words, look_alike_lines, model_effects, spaced, step_names, verdict_words
+from xy_sysid.page.downloads import Downloads
 from xy_sysid.page.facts import seconds_text
-from xy_sysid.page.picture_card import Plot
+from xy_sysid.page.orders import OrderKind, Source
+from xy_sysid.page.plot import Plot
 from xy_sysid.page.session import Session
-from xy_sysid.page.story_words import candidate_rows, ladder_words, look_alike_lines, model_effects, step_names, verdict_words
-from xy_sysid.page.wishes import Act, Source
 from xy_sysid.report import story_figures as draw
+from xy_sysid.report.headline import detail, headline, next_act
 
-BUTTONS: tuple[tuple[Act, str, str], ...] = (
+BUTTONS: tuple[tuple[OrderKind, str, str], ...] = (
     ("diagnose", "Diagnose", "Which effect is missing in the rigid base? Tries them all."),
     ("next", "Find the next", "Add the effect that helps most now."),
     ("auto", "Auto", "Add effects until the noise floor is reached or nothing helps, then take out what is not needed."),
@@ -32,35 +33,35 @@ class StoryCard:
     def __init__(self, session: Session, source: Source) -> None:
         self._session, self._source, self._axis = session, source, ""
         self._shown: object = None
-        self._buttons: list[ui.button] = []
-        with ui.element("section").classes("card").props('aria-label="story"') as self.root:
-            ui.html("<h2>The story</h2>", sanitize=False)
+        self._filled: object = None
+        self._named = ""
+        self._buttons: dict[str, ui.button] = {}
+        with ui.element("section").classes("card story").props('aria-label="story"') as self.head:
+            self._headline = ui.label("").classes("headline").props("role=heading aria-level=2 aria-live=polite data-part=headline")
             self._verdict = ui.label("").classes("sentence").props("role=status aria-live=polite data-part=verdict")
             self._note = ui.label("").classes("soft")
             with ui.element("div").classes("buttons"):
+                self._button("named", "Add", "What the diagnosis names: fit it together with all that is in the model.", self._add_named)
+                self._button("keep", "Download the model", "The newest models of all axes as YAML.", lambda: self._downloads.take("model"))
                 for act, text, meaning in BUTTONS:
-                    self._button(text, meaning, partial(self._ask, act)).props(f"data-act={act}")
+                    self._button(act, text, meaning, partial(self._ask, act))
             with ui.element("div").classes("buttons").props("role=status aria-live=polite") as self._busy:
                 ui.spinner(size="1.2em")
                 self._doing = ui.label("").classes("grow")
                 ui.button("Cancel", on_click=lambda: source.cancel(self._axis)).props("outline dense data-act=cancel")
-            self._ladder = Plot(
-                "Each step adds one effect. Held-out error is what counts; dotted is the noise floor that no model can pass.", "ladder"
-            )
+        with ui.element("section").classes("card evidence").props('aria-label="steps and evidence"') as self.body:
+            self._ladder = Plot("Each step adds one effect. Held-out error counts; no model can pass the dotted noise floor.", "ladder")
             self._model = ui.element("div").classes("stack").style("gap:.3rem")
             with ui.element("div").classes("stack").style("gap:.4rem") as self._evidence:
-                ui.html("<h3>What could be missing</h3>", sanitize=False)
-                self._candidates = Plot(
-                    "What each effect would leave of the error. Shortest is best; hover for its evidence and parameters.", "candidates"
-                )
+                ui.html("<h3>What the rigid model misses</h3>", sanitize=False)
+                self._told = ui.label("").classes("small").props("data-part=diagnosis")
+                self._candidates = Plot("What each effect would leave of the error; shortest is best.", "candidates")
                 self._ranked = ui.element("div").classes("ranked")
             with ui.element("div").classes("buttons"):
                 self._choice = (
                     ui.select({}, label="add any effect", with_input=True).props("outlined dense options-dense").style("flex:1;min-width:12rem")
                 )
-                self._button("Add", "Fit it together with all that is in the model.", lambda: self._ask("add", str(self._choice.value or ""))).props(
-                    "data-act=add"
-                )
+                self._button("add", "Add", "Fit it together with all that is in the model.", lambda: self._ask("add", str(self._choice.value or "")))
             self._more = ui.element("div").classes("stack").style("gap:.4rem")
             with ui.expansion("Before and after").classes("w-full").props("dense") as self._overlay:
                 with ui.element("div").classes("buttons"):
@@ -71,21 +72,24 @@ class StoryCard:
                 )
             self._pair: tuple[int, int] = (0, 0)
             with ui.expansion("Download").classes("w-full").props("dense"):
-                offer(session, source, lambda: self._axis)
+                self._downloads = Downloads(session, source, lambda: self._axis)
 
-    async def refresh(self, axis: str) -> None:
-        """Write and draw again what has changed."""
+    async def refresh(self, axis: str, quiet: bool = False) -> None:
+        """Write and draw again what has changed; quiet: something else on the page is to be done first."""
         self._axis = axis
         at = self._source.stamp(axis)  # before the document, which another thread may exchange: never an old picture under a new stamp
         job = self._source.job(axis)
-        self._busy.set_visibility(job is not None)
-        if job is not None:
-            waits = "" if job.running or self._source.live else "waiting: "
-            self._doing.set_text(f"{waits}{job.words} ({seconds_text(time.monotonic() - job.begun)})")
         document = self._source.document(axis)
+        self._busy.set_visibility(job is not None)
+        own = job is not None and job.order.axis == axis and (job.running or self._source.live)
+        if job is not None:
+            waits = "" if own else "waits: " if not self._source.live else f"axis {job.order.axis}: "
+            self._doing.set_text(f"{waits}{job.words} ({seconds_text(time.monotonic() - job.begun)})")
+        self._headline.set_text(headline(document, spaced(job.words) if job is not None and own else ""))
         able = job is None and self._source.ready(axis)
-        for button in self._buttons:
+        for button in self._buttons.values():
             button.set_enabled(able)
+        self._fill(document, able and not quiet)
         effects = self._source.effects()
         if len(effects) != len(self._choice.options):
             self._choice.set_options({name: _words(name) for name in effects})
@@ -105,22 +109,39 @@ class StoryCard:
             first, last = self._pair
             await self._before_after.show(self._session, (*key, "pair", first, last), draw.before_after, document, first, last)
 
-    def _button(self, text: str, meaning: str, act: Callable[[], None]) -> ui.button:
-        button = ui.button(text, on_click=act).props("outline dense no-caps")
+    def _button(self, act: str, text: str, meaning: str, do: Callable[[], None]) -> None:
+        button = ui.button(text, on_click=do).props(f"outline dense no-caps data-act={act}")
         with button:
-            ui.tooltip(meaning)
-        self._buttons.append(button)
-        return button
+            ui.tooltip(meaning).props("delay=700")
+        self._buttons[act] = button
 
-    def _ask(self, act: Act, argument: str = "") -> None:
+    def _fill(self, document: dict[str, Any] | None, able: bool) -> None:
+        """Fill the one button that is next, and show those that are sometimes next only then."""
+        act, name = next_act(document) or ("diagnose" if document is None else "", "")
+        chosen = {"add": "named"}.get(act, act)
+        if (chosen, name, able) == self._filled:
+            return
+        self._filled = chosen, name, able
+        self._named = name
+        self._buttons["named"].set_text(f"Add {_words(name)}")
+        for own, button in self._buttons.items():
+            if own in ("named", "keep"):
+                button.set_visibility(own == chosen)
+            filled = own == chosen and able
+            button.props(add="unelevated" if filled else "outline", remove="outline" if filled else "unelevated")
+
+    def _add_named(self) -> None:
+        self._ask("add", self._named)
+
+    def _ask(self, act: OrderKind, argument: str = "") -> None:
         try:
             self._source.ask(act, self._axis, argument)
         except XySysidError as problem:
             self._session.say(str(problem))
 
     def _write(self, document: dict[str, Any] | None) -> None:
-        self._verdict.set_text(verdict_words(document) if document else self._source.words(self._axis))
-        note = str((document or {}).get("note") or "")
+        self._verdict.set_text(spaced(detail(document)) if document else self._source.words(self._axis))
+        note = spaced(str((document or {}).get("note") or ""))
         self._note.set_text(note)
         self._note.set_visibility(bool(note))
         self._evidence.set_visibility(bool(document and document["candidates"]))
@@ -130,6 +151,8 @@ class StoryCard:
         if document is None:
             return
         there = model_effects(document)
+        self._told.set_text(verdict_words(document) if there else "")
+        self._told.set_visibility(bool(there))
         with self._model:
             ui.label("In the model: rigid base with delay" + ("" if there else ", nothing else"))
             for name in there:
@@ -150,7 +173,7 @@ class StoryCard:
         self._first.set_options(steps, value=self._pair[0])
         self._last.set_options(steps, value=self._pair[1])
 
-    def _row_button(self, text: str, act: Act, name: str) -> None:
+    def _row_button(self, text: str, act: OrderKind, name: str) -> None:
         button = ui.button(text, on_click=lambda: self._ask(act, name)).props(
             f'outline dense no-caps aria-label="{text} {_words(name)}" data-{act}={name}'
         )

@@ -7,15 +7,20 @@ from __future__ import annotations
 
 import signal
 import sys
+import time
 from collections.abc import Callable
 from multiprocessing.connection import Connection
 from pathlib import Path
 from types import FrameType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from xy_sysid.errors import XySysidError
-from xy_sysid.page.wishes import News, Reading, Wish
+from xy_sysid.page.orders import Order, Reading, WorkerNews
 
+if TYPE_CHECKING:
+    from xy_sysid.story.acts import Act, Job
+
+ACTS: dict[str, Act] = {"next": "add_next", "auto": "auto"}
 LEAVE = signal.SIGUSR1
 
 
@@ -26,57 +31,56 @@ class Left(Exception):
 class Desk:
     """The recording, its stories, and what is done with them. Runs in the worker's process."""
 
-    def __init__(self, path: Path, reading: Reading, say: Callable[[News], None]) -> None:
+    def __init__(self, path: Path, reading: Reading, say: Callable[[WorkerNews], None]) -> None:
+        from xy_sysid.files.effects import library
         from xy_sysid.imports import load
-        from xy_sysid.user_effects import library
 
         self._say = say
         self._library = library(reading.effect_files)
-        self._recording = load(path, **reading.load, progress=lambda part: say(News("progress", words=f"reading {path.name}", part=part)))
+        self._recording = load(path, **reading.load, progress=lambda part: say(WorkerNews("progress", words=f"reading {path.name}", part=part)))
         self._stories: dict[str, Any] = {}
         seconds, rate = self._recording.duration, self._recording.sampling_rate
         told = {"axes": list(self._recording.axes), "seconds": seconds, "rate": rate, "notes": list(self._recording.notes)}
         told["effects"] = [effect.name for effect in self._library.acting]
-        say(News("opened", content=told))
+        say(WorkerNews("opened", content=told))
 
-    def do(self, wish: Wish) -> None:
-        """One wish; raises XySysidError in a sentence, or Left."""
-        from xy_sysid import story as core
+    def do(self, order: Order) -> None:
+        """One order, as the node and the replay do theirs (``story.acts``); raises XySysidError in a sentence, or Left."""
+        from xy_sysid.greybox.free_run import EPSILON
+        from xy_sysid.story.acts import Job
+        from xy_sysid.story.story import added, diagnosed, removed
 
-        u, y = self._samples(wish.axis)
-        if wish.act in ("begin", "reset") or wish.axis not in self._stories:
-            units = self._recording.input_unit, self._recording.output_unit
-            self._keep(wish, core.begin(wish.axis, self._recording.sampling_rate, u, y, self._library, units=units))
-        now = self._stories[wish.axis]
-        if wish.act == "diagnose":
-            self._keep(wish, core.diagnosed(now, u, y, self._library))
-        elif wish.act == "add":
-            self._keep(wish, core.added(now, u, y, wish.argument, self._library))
-        elif wish.act == "remove":
-            self._keep(wish, core.removed(now, u, y, wish.argument, self._library))
-        elif wish.act == "next":
-            self._keep(wish, core.next_best(now, u, y, self._library))
-        elif wish.act == "auto":
-            while len((grown := core.next_best(now, u, y, self._library)).steps) > len(now.steps) and len(grown.effects) <= len(now.effects) + 1:
-                now = grown
-                self._keep(wish, now)  # each step is shown as it comes
-            self._keep(wish, core.auto(now, u, y, self._library))
+        run = self._recording.run(order.axis)
+        story = None if order.act in ("begin", "reset") else self._stories.get(order.axis)
+        if story is None:
+            self._perform(order, Job(act="begin", run=run, story=None, effects=(), tolerance=EPSILON))
+            story = self._stories[order.axis]
+        if order.act == "diagnose":  # the data are the same as before: the model stays what it is
+            self._keep(order, diagnosed(story, run.voltage, run.position, self._library, time.process_time))
+        elif order.act == "add":
+            self._keep(order, added(story, run.voltage, run.position, order.argument, self._library))
+        elif order.act == "remove":
+            self._keep(order, removed(story, run.voltage, run.position, order.argument, self._library))
+        elif order.act in ("next", "auto"):
+            self._perform(order, Job(act=ACTS[order.act], run=run, story=story, effects=story.effects, tolerance=EPSILON))
 
-    def _keep(self, wish: Wish, story: Any) -> None:
-        from xy_sysid.story_document import document
+    def _perform(self, order: Order, job: Job) -> None:
+        """Each step is shown as it comes."""
+        from xy_sysid.story.acts import perform
 
-        self._stories[wish.axis] = story
-        self._say(News("story", wish.number, wish.axis, content=document(story)))
+        for _, made in perform(job, self._library, time.process_time):
+            if made is not None:
+                self._keep(order, made)
 
-    def _samples(self, axis: str) -> Any:
-        """Input and output of the longest run without a gap."""
-        run = max(self._recording.runs(), key=lambda part: part.stop - part.start)
-        u, y = self._recording.axis(axis)
-        return u[run], y[run]
+    def _keep(self, order: Order, story: Any) -> None:
+        from xy_sysid.story.document import document
+
+        self._stories[order.axis] = story
+        self._say(WorkerNews("story", order.number, order.axis, content=document(story)))
 
 
 def main(path: str, reading: Reading, orders: Connection, words: Connection) -> None:
-    """The worker's process: wishes in, news out, until nobody is there any more."""
+    """The worker's process: orders in, news out, until nobody is there any more."""
     busy = [False]
 
     def leave(_number: int, _frame: FrameType | None) -> None:
@@ -84,7 +88,7 @@ def main(path: str, reading: Reading, orders: Connection, words: Connection) -> 
             busy[0] = False
             raise Left
 
-    def say(news: News) -> None:
+    def say(news: WorkerNews) -> None:
         """Whole, or not at all: half a message would end all talk."""
         at_work, busy[0] = busy[0], False
         words.send(news)
@@ -95,21 +99,21 @@ def main(path: str, reading: Reading, orders: Connection, words: Connection) -> 
     try:
         desk = Desk(Path(path), reading, say)
     except XySysidError as problem:
-        words.send(News("closed", words=str(problem)))
+        words.send(WorkerNews("closed", words=str(problem)))
         return
     while True:
         try:
-            wish: Wish = orders.recv()
+            order: Order = orders.recv()
         except (EOFError, OSError):
             sys.exit(0)
         try:
             busy[0] = True
-            desk.do(wish)
+            desk.do(order)
             busy[0] = False
-            words.send(News("done", wish.number, wish.axis))
+            words.send(WorkerNews("done", order.number, order.axis))
         except Left:
-            words.send(News("failed", wish.number, wish.axis, "Left as it was."))
+            words.send(WorkerNews("failed", order.number, order.axis, "Left as it was."))
         except (XySysidError, ArithmeticError, ValueError, MemoryError, OSError) as problem:
             busy[0] = False
             text = str(problem) if isinstance(problem, XySysidError) else f"{type(problem).__name__}: {problem}"
-            words.send(News("failed", wish.number, wish.axis, text))
+            words.send(WorkerNews("failed", order.number, order.axis, text))

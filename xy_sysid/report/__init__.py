@@ -1,0 +1,10 @@
+"""Recordings drawn and told on one page of HTML that needs nothing else.
+
+axis_report:    what is known of one axis, from all that stands upstream
+study:          the study of the paper, parameter by parameter, and what its tables say (``tables``)
+words, captions, remarks, story_words: what is said
+figures, signals, story_*: what is drawn, in the colours of ``theme``
+parts, sheet:   pieces of a page, and the page around them
+report_page, study_page: the two pages
+plots, notebook: single pictures, and results as a notebook shows them
+"""

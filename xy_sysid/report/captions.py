@@ -8,10 +8,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from xy_sysid.fitting import Fit
-from xy_sysid.frf import FrequencyResponse
 from xy_sysid.report.signals import Excitation, Motion
 from xy_sysid.report.study import AxisStudy, BeforeAfter
 from xy_sysid.report.words import estimate_text, interval_text, number, quantity
+from xy_sysid.response.frf import FrequencyResponse
 
 INTRODUCTION = (
     "Figures 2 to 7 and tables 1 and 2 of the frequency-domain study of a ball-screw XY table, redrawn for this recording: what it was "
@@ -104,7 +104,8 @@ def coherence(responses: Mapping[str, FrequencyResponse], least: float) -> str:
 def fit(axis: str, fits: Mapping[str, Fit]) -> str:
     """What figure 6 shows of one axis."""
     each = ", ".join(f"{name} {number(one.error_cost, 3)} %" for name, one in fits.items())
-    return f"Axis {axis}: fits over the measured response; relative error {each}."
+    banded = "; shaded is the 95 % band of the ML fit, widened by what it leaves beyond noise" if math.isfinite(fits["ML"].misfit) else ""
+    return f"Axis {axis}: fits over the measured response{banded}; relative error {each}."
 
 
 def change(axis: str, one: BeforeAfter) -> str:

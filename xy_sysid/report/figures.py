@@ -8,15 +8,17 @@ import numpy as np
 import plotly.graph_objects as go
 
 from xy_sysid.fitting import Fit
-from xy_sysid.frf import FrequencyResponse
-from xy_sysid.report.parts import QUANTILE, band, broken, decibel, frequency_axis, phase_of, plain, positive, rows, turns, unbroken
+from xy_sysid.fitting.model_band import model_band
+from xy_sysid.report.parts import band, broken, decibel, frequency_axis, outline, phase_of, plain, positive, rows, turns, unbroken
 from xy_sysid.report.signals import Excitation, Motion
 from xy_sysid.report.study import BeforeAfter, Pair
 from xy_sysid.report.theme import AFTER, BEFORE, DRIFT, METHODS, axis_colour, fade
-from xy_sysid.report.words import people_unit
-from xy_sysid.stream import FloatArray
+from xy_sysid.response.frf import Z95, FrequencyResponse
+from xy_sysid.samples.block import FloatArray
+from xy_sysid.units import over, readable
 
 DASHES = {"LLS": "dot", "NLLS": "dash", "ML": "solid"}
+UNCERTAIN = "ML"  # the fit whose parameters have a covariance
 
 
 def excitation_figure(inputs: Mapping[str, Excitation], unit: str) -> go.Figure:
@@ -49,10 +51,10 @@ def excitation_figure(inputs: Mapping[str, Excitation], unit: str) -> go.Figure:
     figure.update_xaxes(title_text="time (s)", row=1, col=1)
     figure.update_yaxes(title_text=f"input ({plain(unit)})", row=1, col=1)
     figure.update_xaxes(title_text=f"input ({plain(unit)})", row=2, col=1)
-    figure.update_yaxes(title_text=f"density (1/{plain(unit)})", rangemode="tozero", row=2, col=1)
+    figure.update_yaxes(title_text=f"density ({plain(over('1', unit))})", rangemode="tozero", row=2, col=1)
     figure.update_xaxes(title_text="frequency (Hz)", type="log", dtick=1, tickformat="~g", row=3, col=1)
     highest = max((float(np.max(one.density.density)) for one in inputs.values()), default=1.0)
-    figure.update_yaxes(title_text=f"PSD ({plain(unit)}²/Hz)", type="log", exponentformat="power", dtick=2, row=3, col=1)
+    figure.update_yaxes(title_text=f"PSD ({plain(over('', unit)[1:])}²/Hz)", type="log", exponentformat="power", dtick=2, row=3, col=1)
     if highest > 0:
         figure.update_yaxes(range=[np.log10(highest) - 8, np.log10(highest) + 0.5], row=3, col=1)
     return figure
@@ -60,7 +62,7 @@ def excitation_figure(inputs: Mapping[str, Excitation], unit: str) -> go.Figure:
 
 def position_figure(outputs: Mapping[str, Motion], unit: str) -> go.Figure:
     """Figure 3: the measured output of each axis over time, and the straight line of its drift."""
-    scale, shown = people_unit(unit)
+    scale, shown = readable(unit)
     figure = rows(len(outputs), shared=True, gap=0.06)
     for number, (axis, one) in enumerate(outputs.items()):
         row = number + 1
@@ -85,7 +87,7 @@ def response_figure(responses: Mapping[str, FrequencyResponse]) -> go.Figure:
     for number, (axis, frf) in enumerate(responses.items()):
         lines = frf.select(frf.trusted) if bool(np.any(frf.trusted)) else frf
         colour = axis_colour(number)
-        part = QUANTILE * np.where(np.isfinite(lines.sigma), lines.sigma, 0.0) / np.sqrt(2) / np.abs(lines.response)
+        part = Z95 * np.where(np.isfinite(lines.sigma), lines.sigma, 0.0) / np.sqrt(2) / np.abs(lines.response)
         phase = phase_of(lines.response)
         phases.append(phase)
         spans.append(lines.frequency)
@@ -96,7 +98,7 @@ def response_figure(responses: Mapping[str, FrequencyResponse]) -> go.Figure:
         for row, middle, low, high in ((1, level, level + down, level + 20 * np.log10(1 + part)), (2, phase, phase - turn, phase + turn)):
             pieces = unbroken(lines.frequency)
             if bool(np.any(frf.trusted)):
-                band(figure, row, pieces, lines.frequency, low, high, colour, axis, f"95 % band, {plain(axis)}" if row == 1 else "")
+                band(figure, row, outline(pieces, lines.frequency, low, high), colour, axis, f"95 % band, {plain(axis)}" if row == 1 else "")
             figure.add_scatter(
                 x=broken(pieces, lines.frequency), y=broken(pieces, middle), mode="lines" if len(pieces) == 1 else "lines+markers",
                 line={"color": colour, "width": 1.6}, marker={"color": colour, "size": 3}, name=f"axis {plain(axis)}", legendgroup=axis,
@@ -161,6 +163,8 @@ def fit_figure(frf: FrequencyResponse, fits: Mapping[str, Fit]) -> go.Figure:
         phase = phase + 360 * np.round(np.median(reference - phase) / 360)
         phases.append(phase)
         error = 100 * np.abs((fit.measured - fit.response) / fit.measured)
+        if name == UNCERTAIN:
+            _model_band(figure, fit, decibel(fit.response, frf.output_unit), phase)
         for row, values in ((1, decibel(fit.response, frf.output_unit)), (2, phase), (3, positive(error))):
             figure.add_scatter(
                 x=fit.frequency, y=values, mode="lines", line={**line, "width": 1.2} if row == 3 else line, name=name,
@@ -172,6 +176,17 @@ def fit_figure(frf: FrequencyResponse, fits: Mapping[str, Fit]) -> go.Figure:
     figure.update_layout(height=680)
     frequency_axis(figure, 3, [one.frequency])
     return figure
+
+
+def _model_band(figure: go.Figure, fit: Fit, level: FloatArray, phase: FloatArray) -> None:
+    """95 % band of a fitted response over its magnitude and phase; nothing where it is not known."""
+    sigma = model_band(fit)
+    if not bool(np.isfinite(sigma.magnitude).all() and np.isfinite(sigma.phase).all()):
+        return
+    pieces, colour = [slice(0, fit.frequency.size)], METHODS[UNCERTAIN]
+    for row, middle, half in ((1, level, 20 / np.log(10) * Z95 * sigma.magnitude), (2, phase, np.degrees(Z95 * sigma.phase))):
+        name = f"{UNCERTAIN}, 95 % band" if row == 1 else ""
+        band(figure, row, outline(pieces, fit.frequency, middle - half, middle + half), colour, UNCERTAIN, name)
 
 
 def pair_figure(change: BeforeAfter) -> go.Figure:
@@ -189,7 +204,7 @@ def pair_figure(change: BeforeAfter) -> go.Figure:
         frequency, measured, model = fit.frequency[chosen], fit.measured[chosen], fit.response[chosen]
         factor = 2j * np.pi * frequency if fit.structure.integrators else np.ones_like(measured)
         sigma = 1.0 / fit.weight[chosen] if fit.structure.weighting == "sigma" else np.zeros(frequency.size)
-        part = QUANTILE * sigma / np.sqrt(2) / np.abs(measured)
+        part = Z95 * sigma / np.sqrt(2) / np.abs(measured)
         phase = phase_of(measured * factor)
         if turned is not None and phase.size:
             phase = phase + 360 * np.round((turned - np.mean(phase)) / 360)
@@ -223,7 +238,8 @@ def pair_figure(change: BeforeAfter) -> go.Figure:
         figure.update_xaxes(title_text=f"shift, {change.after_name} − {change.before_name} (Hz)", row=3, col=1)
         figure.update_yaxes(range=[-0.6, len(shifts) - 0.4], row=3, col=1)
     speed = bool(known) and known[0][1].fit.structure.integrators > 0
-    ratio = f"{people_unit(known[0][1].fit.tf.output_unit)[1]}{'/s' if speed else ''}/{known[0][1].fit.tf.input_unit}" if known else ""
+    tf = known[0][1].fit.tf if known else None
+    ratio = over(f"{readable(tf.output_unit)[1]}{'/s' if speed else ''}", tf.input_unit) if tf is not None else ""
     figure.update_yaxes(title_text=f"dB re {plain(ratio)}", row=1, col=1)
     figure.update_yaxes(title_text="phase (°)", row=2, col=1)
     figure.update_xaxes(title_text="", range=[low, high], matches="x", row=1, col=1)
@@ -248,4 +264,4 @@ def _zoom(pairs: list[Pair]) -> tuple[float, float]:
 
 
 def _ratio(frf: FrequencyResponse) -> str:
-    return plain(f"1 {people_unit(frf.output_unit)[1]}/{frf.input_unit}")
+    return plain(f"1 {over(readable(frf.output_unit)[1], frf.input_unit)}")

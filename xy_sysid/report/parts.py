@@ -9,12 +9,11 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from xy_sysid.frf import ComplexArray
 from xy_sysid.report.theme import ROW, fade, template
-from xy_sysid.report.words import people_unit
-from xy_sysid.stream import FloatArray
+from xy_sysid.response.frf import ComplexArray
+from xy_sysid.samples.block import FloatArray
+from xy_sysid.units import readable
 
-QUANTILE = 1.959963984540054  # 97.5 % of the normal distribution
 GAP = 2.5  # times the usual spacing of lines, above which a curve is interrupted
 
 
@@ -25,7 +24,7 @@ def plain(text: str) -> str:
 
 def decibel(response: ComplexArray, output_unit: str) -> FloatArray:
     """20 log10 of the magnitude in people's unit of the output (mm for m)."""
-    scale, _ = people_unit(output_unit)
+    scale, _ = readable(output_unit)
     return np.asarray(20 * np.log10(np.maximum(np.abs(response) * scale, np.finfo(float).tiny)), dtype=np.float64)
 
 
@@ -55,14 +54,16 @@ def broken(pieces: list[slice], values: FloatArray) -> FloatArray:
     return np.concatenate([np.append(values[piece], np.nan) for piece in pieces])[:-1]
 
 
-def band(
-    figure: go.Figure, row: int, pieces: list[slice], x: FloatArray, low: FloatArray, high: FloatArray, colour: str, axis: str, name: str
-) -> None:
-    """The area between two curves, in the pieces of ``x``; without a name it has no legend."""
+def outline(pieces: list[slice], x: FloatArray, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(x, y) around the area between two curves, piece by piece."""
     across = np.concatenate([np.concatenate((x[piece], x[piece][::-1], [np.nan])) for piece in pieces])
-    up = np.concatenate([np.concatenate((high[piece], low[piece][::-1], [np.nan])) for piece in pieces])
+    return across, np.concatenate([np.concatenate((high[piece], low[piece][::-1], [np.nan])) for piece in pieces])
+
+
+def band(figure: go.Figure, row: int, around: tuple[FloatArray, FloatArray], colour: str, axis: str, name: str) -> None:
+    """The area inside an outline; without a name it has no legend."""
     figure.add_scatter(
-        x=across, y=up, mode="lines", line={"width": 0}, fill="toself",
+        x=around[0], y=around[1], mode="lines", line={"width": 0}, fill="toself",
         fillcolor=fade(colour, 0.25), hoverinfo="skip", name=name, legendgroup=axis, showlegend=bool(name), row=row, col=1,
     )  # fmt: skip
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from xy_sysid.fitting import Fit
-from xy_sysid.frf import ComplexArray
 from xy_sysid.report.study import AxisStudy, BeforeAfter
 from xy_sysid.report.tables import roots_text
 from xy_sysid.report.words import estimate_text, interval_text, number
+from xy_sysid.response.frf import ComplexArray
 
 MUCH_BETTER = 3.0  # times smaller error at which the delay in the model is called the reason
 NOT_A_CONFIDENCE = (

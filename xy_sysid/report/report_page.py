@@ -3,24 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from html import escape
 from typing import Any
 
-from xy_sysid.axis_model import STANDARD, Library
+from xy_sysid.axis.model import STANDARD, Library
 from xy_sysid.report import captions, figures, story_figures, story_words
 from xy_sysid.report.axis_report import AxisReport
+from xy_sysid.report.headline import headline
 from xy_sysid.report.remarks import NOT_A_CONFIDENCE, axis_remarks
 from xy_sysid.report.sheet import Drawing, block, listing, paragraph, pictures, provenance_html, section, table_html, whole
+from xy_sysid.report.story_failure import failure, failure_words
 from xy_sysid.report.story_parts import words
 from xy_sysid.report.story_words import spoken
-from xy_sysid.report.tables import Table, coefficient_table, result_table
+from xy_sysid.report.tables import Table, coefficient_table, order_table, result_table
 from xy_sysid.report.words import quantity
 
 ABOUT = (
     "What was recorded, how each axis answers, which model describes it, where that model fails, what was missing, and how far each number "
-    "can be trusted. The summary is for everybody; the rest is what it stands on. Every fit saw the first two thirds of the recording, and "
-    "the last third was kept to test it."
+    "can be trusted. The summary is for everybody; the rest is what it stands on. Every fit saw two thirds of the recording, and the rest "
+    "was kept to test it: the last third for transfer functions, parts spread over the recording for what is missing."
 )
+FAILS = "Left: error over the noise floor by frequency on data that no fit has seen, grey the rigid model, solid the last one. Right:"
+SUMMARY_HEIGHT = 270  # px of the two pictures of an axis in the summary
 MARKS = {"explained": "good", "partly explained": "fair", "not explained": "bad", "nothing can be said": "none"}
 
 
@@ -41,39 +46,42 @@ class _Page:
         self.parts.append(html)
 
 
-def report_page(
-    title: str,
-    axes: Mapping[str, AxisReport],
-    units: tuple[str, str],
-    facts: tuple[tuple[str, str], ...],
-    least_coherence: float,
-    origins: Mapping[str, Mapping[str, Any]],
-    notes: tuple[str, ...] = (),
-    library: Library = STANDARD,
-) -> str:
-    """The whole page.
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """What is told of the recording itself.
 
-    title: name of the recording; axes: by name; units: of input and output; facts: (what, value) of the experiment
-    least_coherence: limit of a trusted line; origins: label -> provenance; notes: what was odd while reading
+    title: its name; units: of input and output; facts: (what, value) of the experiment
+    origins: label -> provenance; notes: what was odd while reading
     """
+
+    title: str
+    units: tuple[str, str]
+    facts: tuple[tuple[str, str], ...]
+    origins: Mapping[str, Mapping[str, Any]]
+    notes: tuple[str, ...] = ()
+
+
+def report_page(recorded: Recorded, axes: Mapping[str, AxisReport], least_coherence: float, library: Library = STANDARD) -> str:
+    """The whole page. axes: by name; least_coherence: limit of a trusted line."""
     page = _Page()
     _summary(page, axes, library)
-    _experiment(page, axes, units, facts)
+    _experiment(page, axes, recorded.units, recorded.facts)
     _response(page, axes, least_coherence)
     _fits(page, axes)
     for number_, one in enumerate(axes.values()):
         if one.story is not None and one.story["ladder"]:
             _axis(page, number_, one, one.story, library)
-    remarks = [*notes]
+    remarks = [*recorded.notes]
     for one in axes.values():
         remarks += [f"Axis {one.axis}: {one.note}"] if one.note else []
         remarks += axis_remarks(one.study)
     if remarks:
         page.add("remarks", "Remarks", f'<section id="remarks"><h2>Remarks</h2>{listing(remarks)}</section>')
-    page.add("provenance", "Provenance", provenance_html(origins))
+    page.add("provenance", "Provenance", provenance_html(recorded.origins))
     links = "".join(f'<li><a href="#{name}">{escape(text)}</a></li>' for name, text in page.links)
-    head = f'<h1>Report on {escape(title)}</h1>{paragraph(ABOUT)}<nav aria-label="sections"><ul>{links}</ul></nav>'
-    return whole(f"Report on {title}", head, page.parts, page.drawings)
+    stands = "".join(f'<p class="stand"><strong>Axis {escape(axis)}</strong>: {escape(_stands(one, library))}</p>' for axis, one in axes.items())
+    head = f'<h1>Report on {escape(recorded.title)}</h1>{stands}{paragraph(ABOUT)}<nav aria-label="sections"><ul>{links}</ul></nav>'
+    return whole(f"Report on {recorded.title}", head, page.parts, page.drawings)
 
 
 def _summary(page: _Page, axes: Mapping[str, AxisReport], library: Library) -> None:
@@ -85,10 +93,23 @@ def _summary(page: _Page, axes: Mapping[str, AxisReport], library: Library) -> N
         picture = ""
         if one.story is not None and one.story["ladder"]:
             alt = f"Axis {one.axis}: the error falls from step to step towards the noise floor."
-            picture = pictures([page.draw(f"ladder-{place}", story_figures.ladder(one.story), alt)], story_words.LADDER if place == 0 else "")
+            fails = failure(one.story, "frequency")
+            fails.update_layout(height=SUMMARY_HEIGHT)
+            ladder = story_figures.ladder(one.story)
+            ladder.update_layout(height=SUMMARY_HEIGHT)
+            drawn = [page.draw(f"fails-{place}", fails, failure_words(one.story, "frequency")), page.draw(f"ladder-{place}", ladder, alt)]
+            picture = pictures(drawn, f"{FAILS} {story_words.LADDER}" if place == 0 else "")
         cards.append(f'<article class="card"><div>{title}{"".join(paragraph(text) for text in texts)}</div>{picture}</article>')
     table = table_html(_key_figures(axes)) if len(axes) > 1 else ""
     page.add("summary", "Summary", f'<section id="summary"><h2>Summary</h2>{table}{"".join(cards)}</section>')
+
+
+def _stands(one: AxisReport, library: Library) -> str:
+    """Where an axis stands, and with which effects."""
+    if one.story is None:
+        return one.problem
+    effects = one.story["ladder"][-1]["effects"] if one.story["ladder"] else []
+    return spoken(headline(one.story) + (f", with {' and '.join(effects)}" if effects else ""), library)
 
 
 def _told(one: AxisReport, library: Library) -> tuple[str, ...]:
@@ -100,7 +121,8 @@ def _told(one: AxisReport, library: Library) -> tuple[str, ...]:
     elif not story["ladder"]:
         made.append(str(story["sentence"]))
     else:
-        made += [story_words.verdict(story, library), story_words.size(story, one.speed), story_words.confidence(story)]
+        made += [story_words.verdict(story, library), story_words.size(story, one.speed)]
+        made += [story_words.confidence(story), story_words.runner_up(story)]
     made.append(captions.summary(one.study).replace(f"Axis {one.axis}: ", "Transfer function: ", 1))
     if one.verdicts is not None:
         failed = ", ".join(check.name.replace("_", " ") for check in one.verdicts.verdicts if not check.ok)
@@ -162,13 +184,14 @@ def _fits(page: _Page, axes: Mapping[str, AxisReport]) -> None:
         drawn.append(page.draw(f"fit-{place}", figures.fit_figure(frf, one.study.fits), captions.fit(axis, one.study.fits), f"Axis {axis}"))
     tables = "".join(table_html(result_table(one.study)) + table_html(coefficient_table(axis, one.study.fits)) for axis, one in fitted.items())
     checks = "".join(table_html(_verdicts(axis, one)) for axis, one in fitted.items())
-    extra = f"{paragraph(captions.COEFFICIENTS)}{paragraph(NOT_A_CONFIDENCE)}{tables}<h3>Checks of the ML fit</h3>{checks}"
+    orders = "".join(_optional(order_table(axis, one.verdicts.orders, one.study.fits["ML"])) for axis, one in fitted.items() if one.verdicts)
+    extra = f"{orders}{paragraph(captions.COEFFICIENTS)}{paragraph(NOT_A_CONFIDENCE)}{tables}<h3>Checks of the ML fit</h3>{checks}"
     page.add("fits", title, section("fits", title, drawn, captions.FITS, extra))
 
 
 def _verdicts(axis: str, one: AxisReport) -> Table:
     checks = one.verdicts.verdicts if one.verdicts is not None else ()
-    rows = tuple((check.name.replace("_", " "), "✓ passed" if check.ok else "✗ not passed", check.sentence) for check in checks)
+    rows = tuple((check.name.replace("_", " "), "✓\u00a0passed" if check.ok else "✗\u00a0not\u00a0passed", check.sentence) for check in checks)
     return Table(f"Axis {axis}: checks", ("check", "", "in words"), rows)
 
 
@@ -192,6 +215,7 @@ def _axis(page: _Page, place: int, one: AxisReport, story: Mapping[str, Any], li
         parts.append("<h3>With what was added</h3>")
         parts.append(pictures([draw("overlay", story_figures.before_after(story, 0, last), story_words.BEFORE_AFTER)], story_words.BEFORE_AFTER))
         parts.append(_against(draw, story, last, "left", story_words.LEFT))
+    left = draw("correlation", story_figures.residual_correlation(story), story_words.CORRELATION, "Correlation of what is left")
     parts.append("<h3>The model</h3>")
     shown = [
         draw("zoom", story_figures.zoom(story), story_words.SIGNALS, "Velocity, zoomed"),
@@ -199,6 +223,7 @@ def _axis(page: _Page, place: int, one: AxisReport, story: Mapping[str, Any], li
         draw("roots", story_figures.poles_zeros(story), story_words.ROOTS, "Poles and zeros"),
     ]
     parts.append(pictures(shown, f"{story_words.SIGNALS} {story_words.ROOTS}"))
+    parts.append(pictures([left], story_words.CORRELATION))
     parts.append(table_html(story_words.parameter_table(story, axis, library)))
     parts.append(table_html(story_words.ladder_table(story, axis)))
     title = f"Axis {axis}: what is missing, and what is left"

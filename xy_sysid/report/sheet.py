@@ -1,6 +1,6 @@
 """One HTML page that opens offline: headings, figures with words, tables, and where it all comes from.
 
-What goes on it is the business of ``page`` (the paper's study) and ``report_page`` (everything).
+What goes on it is the business of ``study_page`` (the paper's study) and ``report_page`` (everything).
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from plotly.offline import get_plotlyjs
 from xy_sysid.report.tables import Table
 from xy_sysid.report.theme import template
 
+KEPT = ("svg", "png", "csv")  # what a figure can be kept as; PDF by printing, or ``xy-sysid figures``
 SENTENCE = 42  # letters from which a cell is a sentence
 
 
@@ -127,7 +128,12 @@ def _safe(document: object) -> str:
 def _plot(drawing: Drawing) -> str:
     height, title = int(drawing.figure.layout.height), f"<h3>{escape(drawing.title)}</h3>" if drawing.title else ""
     alt = escape(drawing.alt)
-    return f'<div>{title}<div class="plot" id="{drawing.name}" role="img" aria-label="{alt}" style="height:{height}px"></div></div>'
+    name = drawing.name
+    keep = "".join(
+        f'<button type="button" data-keep="{kind}" data-of="{name}" aria-label="save {name} as {kind}">{kind.upper()}</button>' for kind in KEPT
+    )
+    plot = f'<div class="plot" id="{name}" role="img" aria-label="{alt}" style="height:{height}px"></div>'
+    return f'<div>{title}{plot}<div class="keep">{keep}</div></div>'
 
 
 def _flat(value: object) -> str:

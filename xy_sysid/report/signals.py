@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import welch
 
-from xy_sysid.recording import Recording
-from xy_sysid.stream import FloatArray
+from xy_sysid.samples.block import FloatArray
+from xy_sysid.samples.recording import Recording
 
 POINTS = 1500  # bins of an envelope: about one per pixel of a wide screen
 SPECTRUM_POINTS = 400
@@ -93,13 +93,13 @@ def motion(recording: Recording, axis: str, bins: int = POINTS) -> Motion:
     spread = float(np.mean((time - middle) ** 2))
     drift = float(np.mean((time - middle) * y) / spread) if spread > 0 else 0.0
     offset = float(np.mean(y)) - drift * middle
-    return Motion(np.concatenate(times), np.concatenate(values), drift, offset, float(np.min(y)), float(np.max(y)))
+    return Motion(time=np.concatenate(times), value=np.concatenate(values), drift=drift, offset=offset, low=float(np.min(y)), high=float(np.max(y)))
 
 
 def excitation(recording: Recording, axis: str) -> Excitation:
     """The input of one axis: excerpt from the middle, distribution, power spectral density of the longest gap-free part."""
     u, _ = recording.axis(axis)
-    run = max(recording.runs(), key=lambda part: part.stop - part.start)
+    run = recording.run(axis).rows
     middle = (run.start + run.stop) // 2
     excerpt = slice(max(run.start, middle - EXCERPT // 2), min(run.stop, middle + EXCERPT // 2))
     counts, edges = np.histogram(u, bins=61, density=True)

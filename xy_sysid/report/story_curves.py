@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import plotly.graph_objects as go
 
-from xy_sysid.report.parts import band, broken, frequency_axis, plain, turns
+from xy_sysid.report.parts import band, broken, frequency_axis, outline, plain, turns
 from xy_sysid.report.story_parts import SMALL, Document, drawing, grey, nothing, pictured, row
 from xy_sysid.report.theme import FAILS, MEASURED, MODEL, fade
-from xy_sysid.report.words import number, people_unit
-from xy_sysid.stream import FloatArray
+from xy_sysid.report.words import number
+from xy_sysid.samples.block import FloatArray
+from xy_sysid.units import over, readable
 
 LEAST = 0.3  # coherence of a trusted line
 
@@ -20,10 +21,10 @@ def bode(document: Document, step: int | None = None, mode: str = "light") -> go
     if shown is None:
         return nothing(document["sentence"], mode)
     measured, model = document["measured"]["frequency_response"], shown["pictures"]["frequency_response"]
-    scale, unit = people_unit(document["units"]["output"])
+    scale, unit = readable(document["units"]["output"])
     lift = 20 * np.log10(scale)
     frequency, trusted = row(measured["frequency"]), np.array(measured["trusted"], dtype=bool)
-    pieces, seen = _stretches(trusted), _between(trusted)
+    pieces, seen = stretches(trusted), _between(trusted)
     figure = drawing([0.58, 0.42], 420, mode)
     curves = (
         (1, "magnitude_db", "magnitude_low_db", "magnitude_high_db", lift),
@@ -33,7 +34,7 @@ def bode(document: Document, step: int | None = None, mode: str = "light") -> go
         values = row(measured[name]) + up
         first = at == 1
         if pieces:
-            band(figure, at, pieces, frequency, row(measured[low]) + up, row(measured[high]) + up, MEASURED, "measured", "")
+            band(figure, at, outline(pieces, frequency, row(measured[low]) + up, row(measured[high]) + up), MEASURED, "measured", "")
             figure.add_scatter(
                 x=broken(pieces, frequency), y=broken(pieces, values), mode="lines", line={"color": MEASURED, "width": 1.8},
                 name="measured, 95 % band", legendgroup="measured", showlegend=first, row=at, col=1,
@@ -50,7 +51,7 @@ def bode(document: Document, step: int | None = None, mode: str = "light") -> go
             )  # fmt: skip
     _range(figure, 1, [(row(measured["magnitude_db"]) + lift)[seen], (row(model["magnitude_db"]) + lift)[seen]])
     _range(figure, 2, [row(measured["phase_deg"])[seen], row(model["phase_deg"])[seen]])
-    figure.update_yaxes(title_text=f"dB re 1 {plain(unit)}/{plain(document['units']['input'])}", row=1, col=1)
+    figure.update_yaxes(title_text=f"dB re 1 {plain(over(unit, document['units']['input']))}", row=1, col=1)
     figure.update_yaxes(title_text="phase (°)", dtick=turns([row(measured["phase_deg"])[seen]]), row=2, col=1)
     frequency_axis(figure, 2, [frequency])
     return figure
@@ -63,7 +64,7 @@ def coherence(document: Document, step: int | None = None, mode: str = "light") 
     measured = document["measured"]["frequency_response"]
     frequency, values, trusted = row(measured["frequency"]), row(measured["coherence"]), np.array(measured["trusted"], dtype=bool)
     figure = drawing([1.0], SMALL, mode)
-    pieces = _stretches(trusted)
+    pieces = stretches(trusted)
     if pieces:
         figure.add_scatter(
             x=broken(pieces, frequency),
@@ -117,7 +118,7 @@ def _signs(root: dict[str, float]) -> tuple[int, ...]:
     return (1, -1) if abs(root["imag"]) > 0 else (1,)
 
 
-def _stretches(trusted: np.ndarray) -> list[slice]:
+def stretches(trusted: np.ndarray) -> list[slice]:
     """Runs of neighbouring trusted lines."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], trusted.astype(np.int8), [0]))))
     return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]

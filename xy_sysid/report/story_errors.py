@@ -7,8 +7,8 @@ import plotly.graph_objects as go
 
 from xy_sysid.report.parts import frequency_axis, plain, positive
 from xy_sysid.report.story_parts import Document, drawing, floor_line, held_out_from, nothing, pictured, ratio_axis, row, shade
-from xy_sysid.report.theme import MODEL, UNTRUSTED, fade
-from xy_sysid.report.words import people_unit
+from xy_sysid.report.theme import FAILS, MODEL, UNTRUSTED, fade
+from xy_sysid.units import motion
 
 LEAST = 0.25  # of the noise floor: a mean error below it is shown as the trifle that it is
 
@@ -42,7 +42,7 @@ def residual(document: Document, step: int | None = None, mode: str = "light") -
     ratio_axis(figure, [ratio])
     floor_line(figure)
     places = [item for item in shown["pictures"]["failing"] if item["kind"] == "frequency" and item["to"] > frequency[0]]
-    shade(figure, places, float(frequency[0]), float(frequency[-1]), log=True)
+    shade(figure, places, (float(frequency[0]), float(frequency[-1])), log=True)
     frequency_axis(figure, 1, [frequency])
     return figure
 
@@ -62,13 +62,43 @@ def residual_time(document: Document, step: int | None = None, mode: str = "ligh
     return _against(document, "time", step, mode)
 
 
+def residual_correlation(document: Document, step: int | None = None, mode: str = "light") -> go.Figure:
+    """Does the error go with itself, and with past inputs? Grey is what unrelated signals show; stems beyond it are a model's fault."""
+    shown = pictured(document, step)
+    if shown is None:
+        return nothing(document["sentence"], mode)
+    picture = shown["pictures"]["residual"].get("correlation")
+    if picture is None:
+        return nothing("Too few samples to tell whether the error goes with the input.", mode)
+    figure = drawing([0.5, 0.5], 380, mode, gap=0.2, shared=False)
+    curves = (
+        (1, "lag", "autocorrelation", "white", "autocorrelation"),
+        (2, "shift", "input_correlation", "unrelated", "cross-correlation"),
+    )
+    for at, by, name, bound, title in curves:
+        time, value, limit = row(picture[by]), row(picture[name]), float(picture[bound])
+        beyond = np.abs(value) > limit
+        for chosen, colour, said in ((~beyond, UNTRUSTED, "as of unrelated signals"), (beyond, FAILS, "beyond chance")):
+            figure.add_bar(
+                x=time[chosen], y=value[chosen], marker={"color": colour, "line": {"width": 0}}, name=said, legendgroup=said,
+                showlegend=at == 2, row=at, col=1,
+            )  # fmt: skip
+        figure.add_hrect(y0=-limit, y1=limit, fillcolor=fade(UNTRUSTED, 0.25), line_width=0, layer="below", row=at, col=1)  # no shape without a curve
+        seen = value[1:] if at == 1 else value  # at lag 0 it is 1 by definition
+        reach = 1.15 * max(float(np.max(np.abs(seen), initial=0.0)), 1.5 * limit)
+        figure.update_yaxes(title_text=title, range=[-reach, reach], tickformat="~g", row=at, col=1)
+        figure.update_xaxes(title_text="lag (s)" if at == 1 else "lag behind the input (s)", row=at, col=1)
+    figure.update_layout(bargap=0.15, barmode="overlay")
+    return figure
+
+
 def _against(document: Document, kind: str, step: int | None, mode: str) -> go.Figure:
     shown = pictured(document, step)
     if shown is None:
         return nothing(document["sentence"], mode)
     output = document["units"]["output"]
-    scale, unit = {"speed": people_unit(f"{output}/s"), "position": people_unit(output), "time": (1.0, "s")}[kind]
-    faster, speed = people_unit(f"{output}/s")
+    scale, unit = {"speed": motion(f"{output}/s"), "position": motion(output), "time": (1.0, "s")}[kind]
+    faster, speed = motion(f"{output}/s")
     picture = shown["pictures"]["residual"][kind]
     by, ratio, mean = row(picture[kind]), row(picture["error_over_floor"]), row(picture["mean_error"])
     figure = drawing([0.55, 0.45], 340, mode)
@@ -81,7 +111,7 @@ def _against(document: Document, kind: str, step: int | None, mode: str) -> go.F
     if kind == "speed":  # a place is a range of its size; the picture has its sign
         places += [{**item, "from": -item["to"], "to": -item["from"]} for item in places]
     if by.size > 1:
-        shade(figure, places, float(by[0]), float(by[-1]), log=False, scale=scale)
+        shade(figure, places, (float(by[0]), float(by[-1])), log=False, scale=scale)
     if kind == "time":
         start = held_out_from(document)
         for at in (1, 2):

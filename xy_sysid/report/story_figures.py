@@ -2,6 +2,7 @@
 
     bode coherence poles_zeros                                        over frequency, and the linear part
     residual residual_speed residual_position residual_time           where the model fails, over the noise floor
+    residual_correlation                                              whether what is left goes with itself and with the input
     zoom velocity position                                            measured and simulated, in time
     ladder before_after candidates                                    progress
 
@@ -13,7 +14,7 @@ steps gives a figure with its sentence. Colours read on both papers, so a page m
 from __future__ import annotations
 
 from xy_sysid.report.story_curves import bode, coherence, poles_zeros
-from xy_sysid.report.story_errors import residual, residual_position, residual_speed, residual_time
+from xy_sysid.report.story_errors import residual, residual_correlation, residual_position, residual_speed, residual_time
 from xy_sysid.report.story_progress import before_after, candidates, ladder
 from xy_sysid.report.story_signals import position, velocity, zoom
 
@@ -26,6 +27,7 @@ __all__ = [
     "poles_zeros",
     "position",
     "residual",
+    "residual_correlation",
     "residual_position",
     "residual_speed",
     "residual_time",

@@ -10,8 +10,9 @@ import plotly.graph_objects as go
 
 from xy_sysid.report.parts import rows
 from xy_sysid.report.theme import FAILS, FLOOR, UNTRUSTED, fade
-from xy_sysid.report.words import number, people_unit
-from xy_sysid.stream import FloatArray
+from xy_sysid.report.words import number
+from xy_sysid.samples.block import FloatArray
+from xy_sysid.units import motion
 
 Document = Mapping[str, Any]
 
@@ -36,7 +37,7 @@ def pictured(document: Document, step: int | None = None) -> Mapping[str, Any] |
 
 def speed_unit(document: Document) -> tuple[float, str]:
     """Factor and name of people's unit of velocity: 1000 and mm/s for m."""
-    return people_unit(f"{document['units']['output']}/s")
+    return motion(f"{document['units']['output']}/s")
 
 
 def drawing(heights: list[float], height: int, mode: str, gap: float = 0.07, shared: bool = True) -> go.Figure:
@@ -65,8 +66,9 @@ def floor_line(figure: go.Figure, at: int = 1, level: float = 1.0, label: str = 
     )  # fmt: skip
 
 
-def shade(figure: go.Figure, places: list[Mapping[str, Any]], low: float, high: float, log: bool, scale: float = 1.0, at: int = 1) -> None:
-    """Failing places as shaded stretches, each named by its size; low, high: ends of the axis in the document's unit."""
+def shade(figure: go.Figure, places: list[Mapping[str, Any]], ends: tuple[float, float], log: bool, scale: float = 1.0, at: int = 1) -> None:
+    """Failing places as shaded stretches, each named by its size; ends: of the axis in the document's unit."""
+    low, high = ends
     for level, item in enumerate(places):
         first, last = max(float(item["from"]), low), min(float(item["to"]), high)
         if not last >= first:

@@ -14,6 +14,7 @@ from xy_sysid.report.story_parts import Document, drawing, floor_line, nothing, 
 from xy_sysid.report.theme import AFTER, BEFORE, FLOOR, MODEL, UNTRUSTED, fade
 from xy_sysid.report.words import number, quantity
 
+LEAST = 0.35  # of a decade to each side, so that a scale has two figures at least
 WIDE = 14  # letters of a line below a step of the ladder; one that runs over the edge is not drawn at all
 
 
@@ -55,7 +56,8 @@ def ladder(document: Document, mode: str = "light") -> go.Figure:
         )
     known = np.concatenate([values[np.isfinite(values) & (values > 0)] for values in errors.values()])
     bottom, top = np.log10(float(known.min())), np.log10(float(known.max()))
-    room = max(top - bottom, 0.4)
+    middle, half = 0.5 * (bottom + top), max(0.5 * (top - bottom), LEAST)
+    bottom, top, room = middle - half, middle + half, 2.0 * half
     figure.update_yaxes(
         title_text=f"rms error ({plain(unit)})", type="log", range=[bottom - 0.12 * room, top + 0.2 * room], dtick="D2" if room < 1.5 else 1,
         tickformat="~g", row=1, col=1,
@@ -106,7 +108,8 @@ def before_after(document: Document, first: int = 0, last: int | None = None, mo
 
 def candidates(document: Document, mode: str = "light", most: int = 8) -> go.Figure:
     """What each candidate leaves of the held-out error, least first, with its evidence on hover; dotted: the floor, dashed: without any."""
-    tried = sorted(document["candidates"], key=lambda item: float(item["held_out_error"]))[:most]
+    named = list(document["effects"])
+    tried = sorted(document["candidates"], key=lambda item: (float(f"{item['held_out_error']:.2g}"), item["effect"] not in named))[:most]
     if not tried:
         return nothing("No candidate was tried: " + str(document["sentence"]), mode)
     scale, unit = speed_unit(document)

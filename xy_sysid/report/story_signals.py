@@ -8,7 +8,7 @@ import plotly.graph_objects as go
 from xy_sysid.report.parts import plain
 from xy_sysid.report.story_parts import SMALL, Document, drawing, held_out_from, nothing, pictured, row, speed_unit
 from xy_sysid.report.theme import FAILS, MEASURED, MODEL, UNTRUSTED, fade
-from xy_sysid.report.words import people_unit
+from xy_sysid.units import readable
 
 
 def zoom(document: Document, step: int | None = None, mode: str = "light") -> go.Figure:
@@ -57,11 +57,11 @@ def velocity(document: Document, step: int | None = None, mode: str = "light") -
 
 
 def position(document: Document, step: int | None = None, mode: str = "light") -> go.Figure:
-    """The whole record: position measured, and simulated from the voltage alone."""
+    """The whole record: position measured, and simulated from the input alone."""
     shown = pictured(document, step)
     if shown is None:
         return nothing(document["sentence"], mode)
-    scale, unit = people_unit(document["units"]["output"])
+    scale, unit = readable(document["units"]["output"])
     measured = document["measured"]["time"]
     time = row(measured["time"])
     figure = drawing([1.0], SMALL, mode)

@@ -6,17 +6,17 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from xy_sysid.axis_model import Library
+from xy_sysid.axis.model import Library
 from xy_sysid.report.story_parts import Document, words
 from xy_sysid.report.tables import Table
 from xy_sysid.report.words import interval_text, number, quantity
+from xy_sysid.story.standing import nearer
 
-PARTLY = 0.7  # of the base's excess or error that may be left for "partly", as in xy-sysid refine
 STANDARD_TOLERANCE = 1e-3
 AHEAD = "one sample ahead"  # in the label of a step whose error is not that of a free simulation
 
 LADDER = (
-    "How the error falls as effects are added and everything is fitted again. Solid: the error on the last third, which no fit has seen; "
+    "How the error falls as effects are added and everything is fitted again. Solid: the error on the data held out, which no fit has seen; "
     "dashed: the error on the data of the fit; dotted: the noise floor, below which no model can come. A step at the floor has a tick."
 )
 CANDIDATES = "What each effect leaves of the held-out error when it alone is added to the rigid model. Shorter is better."
@@ -33,8 +33,12 @@ AGAINST = (
 )
 LEFT = "What the last model leaves, over the noise floor, in the same pictures."
 SIGNALS = (
-    "Measured, and simulated from the voltage alone: half a second around the rigid model's worst moment, and the position over the whole "
+    "Measured, and simulated from the input alone: half a second around the rigid model's worst moment, and the position over the whole "
     "recording. The simulated position is integrated freely from the first sample, so small errors of speed add up to a drift."
+)
+CORRELATION = (
+    "What is left, correlated with itself (top) and with the input (bottom), with the 95 % bounds of unrelated signals in grey. A stem beyond them "
+    "with the input after 0 s is motion that the model could still explain; before 0 s only feedback or a wrong delay brings it about."
 )
 ROOTS = "Poles and zeros of the linear part, without the effects that bend."
 
@@ -46,8 +50,8 @@ def status(story: Document | None) -> str:
     first, last = story["ladder"][0], story["ladder"][-1]
     if last["explained"]:
         return "explained"
-    gone = any(float(last[name]) < PARTLY * float(first[name]) for name in ("excess", "held_out_error"))
-    return "partly explained" if last["effects"] and gone else "not explained"
+    before, now = ((float(rung["excess"]), float(rung["held_out_error"])) for rung in (first, last))
+    return "partly explained" if last["effects"] and nearer(before, now) else "not explained"
 
 
 def named(name: str, library: Library) -> str:
@@ -85,10 +89,9 @@ def size(story: Document, speed: float) -> str:
     """How large the error is, against the motion, against the rigid model and against noise."""
     unit = story["error"]["unit"]
     first, last = story["ladder"][0], story["ladder"][-1]
-    how = "Predicted one sample ahead, as a contact allows no free simulation," if AHEAD in last["label"] else "Simulated from the voltage alone"
-    text = (
-        f"{how} on the last third of the recording, which no fit has seen, the model is off by {quantity(float(last['held_out_error']), unit, 3)} rms"
-    )
+    how = "Predicted one sample ahead, as a contact allows no free simulation," if AHEAD in last["label"] else "Simulated from the input alone"
+    off = quantity(float(last["held_out_error"]), unit, 3)
+    text = f"{how} on the part of the recording held out, which no fit has seen, the model is off by {off} rms"
     if math.isfinite(speed) and speed > 0:
         text += f", {number(100 * float(last['held_out_error']) / speed, 2)} % of the speed itself"
     text += f"; measurement noise alone makes {quantity(float(last['noise_floor']), unit, 3)}."
@@ -104,8 +107,12 @@ def confidence(story: Document) -> str:
     if story["verdict"] != "missing_effect":
         return ""
     sure = 100 * float(story["confidence"])
-    text = f"Confidence in {words(story['effects'][0])}: {'above 99' if sure > 99 else number(sure, 2)} %."
-    return text + (f" Runner-up: {story['runner_up']['sentence']}" if story["runner_up"] else "")
+    return f"Confidence in {words(story['effects'][0])}: {'above 99' if sure > 99 else number(sure, 2)} %."
+
+
+def runner_up(story: Document) -> str:
+    """Why the next best lost; empty where there is none."""
+    return f"Runner-up: {story['runner_up']['sentence']}" if story["verdict"] == "missing_effect" and story["runner_up"] else ""
 
 
 def places_table(story: Document, axis: str) -> Table | None:
@@ -134,7 +141,9 @@ def ladder_table(story: Document, axis: str) -> Table:
 
 def parameter_table(story: Document, axis: str, library: Library) -> Table:
     """Parameters of the last model with 95 % intervals and what they mean."""
-    rows = tuple((words(name.replace(".", ": ")), _interval(item), _meaning(name, library)) for name, item in story["model"]["parameters"].items())
+    rows = tuple(
+        (words(name.replace(".", ": ")), _interval(item, name), _meaning(name, library)) for name, item in story["model"]["parameters"].items()
+    )
     return Table(f"Axis {axis}: parameters of the last model", ("parameter", "value [95 % interval]", "what it is"), rows)
 
 
@@ -148,9 +157,9 @@ def look_alike_table(story: Document, axis: str, library: Library) -> Table | No
     return Table(f"Axis {axis}: what {words(story['effects'][0])} can be taken for", ("effect", "told apart by these data", "why"), rows)
 
 
-def _interval(item: Mapping[str, Any]) -> str:
+def _interval(item: Mapping[str, Any], name: str) -> str:
     low, high = (float("nan") if end is None else float(end) for end in item["ci95"])
-    text = interval_text(float(item["value"]), low, high, str(item["unit"])) if math.isfinite(low) and math.isfinite(high) else ""
+    text = interval_text(float(item["value"]), low, high, str(item["unit"]), name) if math.isfinite(low) and math.isfinite(high) else ""
     return text or f"{quantity(float(item['value']), str(item['unit']), 4)}, not determined"
 
 

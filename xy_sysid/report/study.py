@@ -11,12 +11,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from xy_sysid.errors import BadInput
-from xy_sysid.fitting import Estimate, Fit, Structure, identify, lls, nllsfdi
-from xy_sysid.frf import FrequencyResponse
-from xy_sysid.live_fit import LIGHT_DAMPING, structure_from, watched
-from xy_sysid.offline import AxisEstimate, estimate, split
-from xy_sysid.recording import Recording
+from xy_sysid.fitting import Fit, Interval, Structure, identify, lls, nllsfdi
+from xy_sysid.fitting.choose_orders import Choice
+from xy_sysid.fitting.of_recording import AxisEstimate, estimate, split, with_orders
+from xy_sysid.fitting.structure import structure_from
+from xy_sysid.live.fitter import LIGHT_DAMPING, watched
 from xy_sysid.report.signals import Excitation, Motion, excitation, motion
+from xy_sysid.response.frf import FrequencyResponse
+from xy_sysid.samples.recording import Recording
 from xy_sysid.settings import IdentifierSettings
 
 NEAR = 2.0  # an antiresonance belongs to a resonance when their frequencies differ by less than this factor
@@ -26,8 +28,8 @@ NEAR = 2.0  # an antiresonance belongs to a resonance when their frequencies dif
 class Pair:
     """Resonance, and the antiresonance that belongs to it where there is one, with intervals; in the fit named."""
 
-    resonance: Estimate
-    antiresonance: Estimate | None
+    resonance: Interval
+    antiresonance: Interval | None
     fit: Fit
 
 
@@ -73,7 +75,7 @@ class BeforeAfter:
 
 @dataclass(frozen=True, slots=True)
 class AxisStudy:
-    """Everything about one axis; ``fits`` holds LLS, NLLS (the paper's path) and ML, empty if ``problem`` says why not."""
+    """Everything about one axis; ``fits`` holds LLS, NLLS (the paper's path) and ML, empty if ``problem`` says why not; choice: of orders."""
 
     axis: str
     excitation: Excitation
@@ -83,6 +85,7 @@ class AxisStudy:
     pair: Pair | None
     change: BeforeAfter | None
     problem: str = ""
+    choice: Choice | None = None
 
     @property
     def frf(self) -> FrequencyResponse | None:
@@ -102,15 +105,15 @@ def study_axis(
     try:
         found = estimate(recording, axis, settings, period)
     except BadInput as problem:
-        return AxisStudy(axis, drive, moved, None, {}, None, None, str(problem))
-    structure = structure_from(settings)
+        return AxisStudy(axis=axis, excitation=drive, motion=moved, estimate=None, fits={}, pair=None, change=None, problem=str(problem))
     try:
-        fits = three_fits(found.frf, structure)
+        settings, choice = with_orders(found.frf, settings)
+        fits = three_fits(found.frf, structure_from(settings))
     except BadInput as problem:
-        return AxisStudy(axis, drive, moved, found, {}, None, None, str(problem))
+        return AxisStudy(axis=axis, excitation=drive, motion=moved, estimate=found, fits={}, pair=None, change=None, problem=str(problem))
     pair = pair_of(fits["ML"])
     change = before_after(recording, axis, settings, period, loose, fits["ML"]) if refit else None
-    return AxisStudy(axis, drive, moved, found, fits, pair, change)
+    return AxisStudy(axis=axis, excitation=drive, motion=moved, estimate=found, fits=fits, pair=pair, change=change, choice=choice)
 
 
 def three_fits(frf: FrequencyResponse, structure: Structure) -> dict[str, Fit]:
@@ -144,7 +147,7 @@ def before_after(
         pairs.append(pair_of(fit, near))
         if pairs[-1] is None:
             problems.append(f"{name}: no lightly damped resonance in the band.")
-    return BeforeAfter(names[0], names[1], pairs[0], pairs[1], " ".join(problems))
+    return BeforeAfter(before_name=names[0], after_name=names[1], before=pairs[0], after=pairs[1], problem=" ".join(problems))
 
 
 def pair_of(fit: Fit, near: float | None = None) -> Pair | None:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from xy_sysid.fitting import Estimate, Fit
+from xy_sysid.fitting import Fit, Interval
+from xy_sysid.fitting.model_orders import OrderTrial
 from xy_sysid.report.study import AxisStudy
-from xy_sysid.report.words import estimate_text, interval_parts, interval_text, number, people_unit, root
-from xy_sysid.stream import FloatArray
+from xy_sysid.report.words import estimate_text, interval_parts, interval_text, number, root
+from xy_sysid.samples.block import FloatArray
+from xy_sysid.units import over, readable
 
 METHODS = ("LLS", "NLLS", "ML")
 
@@ -27,7 +29,7 @@ class Table:
 def coefficient_table(axis: str, fits: Mapping[str, Fit]) -> Table:
     """Table 1, of one axis: coefficients of falling powers of s with the denominator's first one 1."""
     ml = fits["ML"]
-    scale, shown = people_unit(ml.tf.output_unit)
+    scale, shown = readable(ml.tf.output_unit)
     rows: list[tuple[str, ...]] = []
     for part, letter, factor in (("numerator", "b", scale), ("denominator", "a", 1.0)):
         size = max(getattr(fit.tf, part).size for fit in fits.values())
@@ -42,7 +44,7 @@ def coefficient_table(axis: str, fits: Mapping[str, Fit]) -> Table:
     delay = _named(ml, "delay")
     last = _with_interval(delay, 1e3) if delay else [number(ml.tf.delay * 1e3, 5), "fixed"]
     rows.append(("delay (ms)", "absorbed", "absorbed", *last))
-    caption = f"Axis {axis}: H(s) = Σ bₖ sᵏ / Σ aₖ sᵏ · e^(−s·delay), in {shown}/{ml.tf.input_unit} and rad/s"
+    caption = f"Axis {axis}: H(s) = Σ bₖ sᵏ / Σ aₖ sᵏ · e^(−s·delay), in {over(shown, ml.tf.input_unit)} and rad/s"
     return Table(caption, ("coefficient", "LLS", "NLLS", "ML", "ML, 95 % interval"), tuple(rows))
 
 
@@ -68,6 +70,23 @@ def result_table(one: AxisStudy) -> Table:
     return Table(f"Axis {one.axis}: values with their 95 % intervals", ("", *METHODS), tuple(rows))
 
 
+def order_table(axis: str, tried: Sequence[OrderTrial], fit: Fit) -> Table | None:
+    """The orders that were tried, the shortest description first; None if there was only one."""
+    if len(tried) < 2:
+        return None
+    at = fit.structure.numerator_order, fit.structure.denominator_order
+    least = min(item.length for item in tried)
+    rows: list[tuple[str, ...]] = []
+    for item in tried:
+        orders = item.numerator_order, item.denominator_order
+        cost = number(item.cost / fit.expected_cost, 3) if fit.expected_cost > 0 else number(item.cost, 4)
+        used = fit.structure.parameters + sum(orders) - sum(at)
+        rows.append((f"{orders[0]} / {orders[1]}{', taken' if orders == at else ''}", str(used), cost, number(item.length - least, 4)))
+    judged = "cost over noise" if fit.expected_cost > 0 else "cost"
+    caption = f"Axis {axis}: orders tried; the least description length (MDL) explains most for its parameters"
+    return Table(caption, ("zeros / poles", "parameters", judged, "MDL above the least (nats)"), tuple(rows))
+
+
 def change_table(studies: Mapping[str, AxisStudy]) -> Table | None:
     """The pair before and after, of every axis that has it; None if no axis has."""
     rows: list[tuple[str, ...]] = []
@@ -90,23 +109,23 @@ def roots_text(roots: FloatArray | object) -> str:
     return "; ".join(_together(root(complex(value))) for value in values if value.imag >= 0) or "none"
 
 
-def _with_interval(item: Estimate, factor: float) -> list[str]:
+def _with_interval(item: Interval, factor: float) -> list[str]:
     """[value, interval], both with the same decimals."""
     value, low, high, power = interval_parts(item.value * factor, item.low * factor, item.high * factor)
     return [f"{value}{power}", f"[{low}, {high}]{power}"]
 
 
-def _named(fit: Fit, name: str) -> Estimate | None:
-    return next((item for item in fit.intervals if item.name == name), None)
+def _named(fit: Fit, name: str) -> Interval | None:
+    return next((item for item in fit.intervals_with_misfit if item.name == name), None)
 
 
-def _slowest(fit: Fit) -> Estimate | None:
+def _slowest(fit: Fit) -> Interval | None:
     """The real pole nearest to zero that is no integrator."""
-    real = [item for item in fit.intervals if item.name.startswith("pole_") and "." not in item.name]
+    real = [item for item in fit.intervals_with_misfit if item.name.startswith("pole_") and "." not in item.name]
     return min(real, key=lambda item: abs(item.value)) if real else None
 
 
-def _interval(item: Estimate | None, without: str = "none found") -> str:
+def _interval(item: Interval | None, without: str = "none found") -> str:
     return _together(estimate_text(item)) if item is not None else without
 
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-AXES = ("#2f7fd0", "#d9691e", "#1a9a6c", "#9a62d0", "#c9478a", "#8a8420")
-METHODS = {"measured": "#7f8993", "LLS": "#d9691e", "NLLS": "#9a62d0", "ML": "#2f7fd0"}
-DRIFT = "#9a62d0"
-BEFORE, AFTER = "#2f7fd0", "#d9691e"
-MEASURED, MODEL, FLOOR, FAILS, UNTRUSTED = "#2f7fd0", "#d9691e", "#1a9a6c", "#c9478a", "#7f8993"  # of a story, each with a dash or marker too
+# told apart by who sees no red, green or blue, and readable on white and on near-black: test_report_theme.py
+AXES = ("#1e8fe4", "#e85a0d", "#257250", "#8a36ec", "#c9478a", "#8a8420")
+METHODS = {"measured": "#7f8993", "LLS": "#e85a0d", "NLLS": "#8a36ec", "ML": "#1e8fe4"}
+DRIFT = "#8a36ec"
+BEFORE, AFTER = "#1e8fe4", "#e85a0d"
+MEASURED, MODEL, FLOOR, FAILS, UNTRUSTED = "#1e8fe4", "#e85a0d", "#257250", "#ba189d", "#87959f"  # of a story, each with a dash or marker too
 FONT = "system-ui, -apple-system, 'Segoe UI', 'Liberation Sans', Arial, sans-serif"
 ROW = 230  # height of a row of a figure, px
 INK = {"light": ("#24292f", "#dfe3e8", "#aab2bb", "#ffffff"), "dark": ("#d7dce1", "#30363d", "#59636e", "#22272e")}

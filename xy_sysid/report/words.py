@@ -4,18 +4,11 @@ from __future__ import annotations
 
 import math
 
-from xy_sysid.fitting import Estimate
-
-SMALL = {"s": "ms", "m": "mm", "m/s": "mm/s", "m/s/V": "mm/s/V", "m/V": "mm/V", "m/(V s)": "mm/(V s)"}  # 1000 of the second make one of the first
+from xy_sysid.axis.model import STANDARD
+from xy_sysid.fitting import Interval
+from xy_sysid.units import motion, readable
 
 LARGE, TINY = 1e6, 1e-4  # numbers are written with a power of ten from LARGE on and below TINY
-
-
-def people_unit(unit: str) -> tuple[float, str]:
-    """(factor, name): 1000 and mm for m; 1 and the unit itself where people read SI."""
-    if unit in SMALL:
-        return 1e3, SMALL[unit]
-    return (1e3, f"m{unit}") if unit.startswith(("m/", "m^")) else (1.0, unit)
 
 
 def number(value: float, digits: int = 4) -> str:
@@ -37,8 +30,33 @@ def _superscript(value: int) -> str:
 
 def quantity(value: float, unit: str, digits: int = 4) -> str:
     """A number with the unit that people use for it."""
-    scale, shown = people_unit(unit)
+    scale, shown = readable(unit)
     return f"{number(value * scale, digits)} {shown}".rstrip()
+
+
+def moved(value: float, unit: str, digits: int = 4) -> str:
+    """A motion or its speed, as a number with the unit that people use for it."""
+    scale, shown = motion(unit)
+    return f"{number(value * scale, digits)} {shown}"
+
+
+def possible(name: str, figures: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Value and both ends of an interval, without what cannot be: a delay, a friction or a gap below zero.
+
+    name: of the parameter, as in ``gain`` or ``effect.parameter``
+    """
+    value, low, high = figures
+    if value >= 0.0 > low and _not_negative(name):
+        low = 0.0
+    return value, low, high
+
+
+def _not_negative(name: str) -> bool:
+    effect, _, own = name.partition(".")
+    if not own:
+        return effect == "delay"
+    known = STANDARD.effects.get(effect)
+    return known is not None and any(item.name == own and item.low >= 0.0 for item in known.parameters)
 
 
 def interval_parts(value: float, low: float, high: float) -> tuple[str, str, str, str]:
@@ -53,16 +71,17 @@ def interval_parts(value: float, low: float, high: float) -> tuple[str, str, str
     return value_text, low_text, high_text, f"·10{_superscript(exponent)}" if exponent else ""
 
 
-def interval_text(value: float, low: float, high: float, unit: str) -> str:
-    """value [low, high] unit, in people's units."""
-    scale, shown = people_unit(unit)
+def interval_text(value: float, low: float, high: float, unit: str, name: str = "") -> str:
+    """value [low, high] unit, in people's units; name: of the parameter, whose impossible values are left out."""
+    scale, shown = readable(unit)
+    value, low, high = possible(name, (value, low, high))
     middle, first, last, power = interval_parts(value * scale, low * scale, high * scale)
     return f"{middle} [{first}, {last}]{power} {shown}".rstrip()
 
 
-def estimate_text(item: Estimate) -> str:
+def estimate_text(item: Interval) -> str:
     """value [low, high] unit."""
-    return interval_text(item.value, item.low, item.high, item.unit)
+    return interval_text(item.value, item.low, item.high, item.unit, item.name)
 
 
 def root(value: complex, digits: int = 4) -> str:

@@ -1,0 +1,17 @@
+"""What is attacked: modules of attacks, and what each is called."""
+
+from __future__ import annotations
+
+GROUPS = {
+    "encoder": "Encoder",
+    "motion": "Limits",
+    "damage": "Changed bytes",
+    "hostile": "Files made to harm",
+    "disk": "Full disk",
+    "endings": "Ctrl-C, SIGTERM, kill -9",
+    "strange": "Strange signals and effect files",
+    "machine": "The machine, over DDS",
+    "door": "The page's door",
+    "tabs": "The page under load",
+    "network": "Two hosts",
+}

@@ -1,0 +1,186 @@
+"""Every effect of the folder is complete, honest about its limits, and absent when its size is zero."""
+
+from __future__ import annotations
+
+import ast
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.signal import butter, sosfilt
+
+from xy_sysid.axis.model import STANDARD, AxisModel, simulate
+from xy_sysid.effects import EFFECTS, Scene
+from xy_sysid.effects._contract import FUNCTIONS, WORDS
+from xy_sysid.errors import BadInput
+from xy_sysid.samples.block import FloatArray
+
+RATE = 2000.0
+PACKAGE = Path(__file__).parents[2] / "xy_sysid"
+RELATIONS = ("look_alikes", "suspects", "sum_of", "rubs")  # fields in which an effect may name others
+IN_WORK: tuple[str, ...] = ()  # these still name some; take them off when they no longer do
+
+
+def names(text: str) -> list[str]:
+    """The words of a table."""
+    return text.split()
+
+
+BASE = AxisModel(0.097, 1.29e-3, 246.0)
+NAMES = names("""time_delay viscous_friction coulomb_friction stribeck_friction presliding_hysteresis asymmetric_friction
+constant_load dead_zone saturation amplifier_lag backlash cogging lead_error screw_compliance base_resonance
+hardening_stiffness gain_drift position_dependent_gain asymmetric_viscous_friction gravity return_spring
+position_dependent_drag""")
+ACTING = [name for name in EFFECTS if EFFECTS[name].category != "base"]
+
+
+@cache
+def motion(n: int = 8001) -> tuple[FloatArray, FloatArray]:
+    """Band noise of 1 V rms, and a position that goes along with it, (n,) each."""
+    u = sosfilt(butter(4, 300, fs=RATE, output="sos"), np.random.default_rng(0).standard_normal(n))
+    u = np.asarray(u / u.std())
+    x = np.concatenate(([0.0], np.cumsum(simulate(BASE, RATE, u, np.zeros(n))) / RATE))
+    return u, x
+
+
+def test_the_folder_holds_the_promised_effects() -> None:
+    """The names of the design, each once."""
+    assert sorted(EFFECTS) == sorted(NAMES)
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_an_effect_says_everything_about_itself(name: str) -> None:
+    """Law, meaning, validity, source, how it shows itself, look-alikes that exist, an experiment, parameters in order."""
+    effect = EFFECTS[name]
+    assert effect.name == name
+    for text in (effect.law, effect.meaning, effect.validity, effect.source, effect.shows, effect.experiment):
+        assert len(text) >= 6
+        assert "\n" not in text
+    assert effect.look_alikes
+    assert set(effect.look_alikes) <= set(EFFECTS) - {name}
+    assert set(effect.suspects) <= set(EFFECTS) - {name}
+    assert effect.suspects or effect.simulable or effect.category == "base"  # else nothing would ever ask for it
+    assert bool(effect.mode_frequency) == (effect.category == "motion")
+    assert not effect.mode_frequency or dict(zip(effect.names, effect.parameters, strict=True))[effect.mode_frequency].unit == "Hz"
+    assert sorted(effect.functions) == sorted(FUNCTIONS[effect.category])
+    for parameter in effect.parameters:
+        assert parameter.name.isidentifier()
+        assert parameter.name not in WORDS or effect.category == "base"
+        assert parameter.meaning
+        assert parameter.unit or parameter.name in ("asymmetry", "split", "damping", "pole_damping", "depth", "share", "guide")
+        assert parameter.low < parameter.high
+        assert parameter.low <= parameter.typical <= parameter.high
+        assert not parameter.positive or parameter.low > 0
+
+
+@pytest.mark.parametrize("path", sorted(PACKAGE.rglob("*.py")), ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_no_effect_is_named_in_code_outside_its_own_file(path: Path) -> None:
+    """One effect, one file or folder: elsewhere only relation fields of other effects, and texts, know its name."""
+    place = path.relative_to(PACKAGE)
+    if place.as_posix() in IN_WORK:
+        pytest.skip("still names effects")
+    own = place.parts[1].removesuffix(".py") if place.parts[0] == "effects" else ""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    related = [item.value for item in ast.walk(tree) if isinstance(item, ast.keyword) and item.arg in RELATIONS and own in EFFECTS]
+    allowed = {id(node) for value in related for node in ast.walk(value)}
+    named = [
+        f"line {node.lineno}: {node.value}"
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Constant)
+        and isinstance(node.value, str)
+        and id(node) not in allowed
+        and node.value.partition(".")[0] in {*EFFECTS} - {own}
+    ]
+    imports = [item for item in ast.walk(tree) if isinstance(item, ast.ImportFrom) and str(item.module).startswith("xy_sysid.effects")]
+    taken = {part for item in imports for part in (*str(item.module).split(".")[2:3], *(alias.name for alias in item.names))}
+    named += sorted(taken & ({*EFFECTS} - {own}))
+    assert not named, f"{place} names effects: {', '.join(named)}; use what an effect says of itself (category, family, a field)"
+
+
+def test_the_folder_tells_effects_from_tools_by_their_names() -> None:
+    """What begins with an underscore is a tool; everything else is one effect, whose name is that of its file or folder."""
+    there = {path.stem for path in (PACKAGE / "effects").iterdir() if path.suffix == ".py" or (path / "__init__.py").is_file()}
+    assert {name for name in there if not name.startswith("_")} == set(EFFECTS)
+
+
+@pytest.mark.parametrize("name", ACTING)
+def test_an_effect_of_size_zero_is_the_base_bit_for_bit(name: str) -> None:
+    """Nothing of an absent effect is left in the loop."""
+    u, x = motion()
+    values = (0.0, *EFFECTS[name].typical[1:])
+    assert np.array_equal(simulate(BASE.with_effect(name, values), RATE, u, x), simulate(BASE, RATE, u, x))
+
+
+@pytest.mark.parametrize("name", ACTING)
+def test_an_effect_fades_with_its_size(name: str) -> None:
+    """A thousandth of the usual size moves the axis far less than the usual size does; or a thousandfold one, of a limit."""
+    effect = EFFECTS[name]
+    if not effect.simulable:
+        pytest.skip("free simulation does not judge it: without a gap there are still two masses")
+    u, x = motion()
+    base = simulate(BASE, RATE, u, x)
+    volts = [k == 0 or (effect.category == "friction" and item.unit == "V") for k, item in enumerate(effect.parameters)]
+    small = [value * (1e-3 if scaled else 1.0) for value, scaled in zip(effect.typical, volts, strict=True)]
+    if effect.mode_frequency:  # the pair closes only if its dampings are equal
+        damping = [k for k, item in enumerate(effect.parameters) if k and item.name != effect.mode_frequency]
+        small = [small[damping[0]] if k in damping else value for k, value in enumerate(small)]
+    full = simulate(BASE.with_effect(name), RATE, u, x) - base
+    assert np.all(np.isfinite(full))
+    assert np.std(full) > 1e-3 * np.std(base)
+    ways = [small, [effect.typical[0] * 1e3, *small[1:]]] if effect.category == "input" else [small]
+    assert min(float(np.std(simulate(BASE.with_effect(name, tuple(values)), RATE, u, x) - base)) for values in ways) < 0.05 * np.std(full)
+
+
+@pytest.mark.parametrize("name", ACTING)
+def test_an_effect_reads_its_start_values_from_data(name: str) -> None:
+    """Each of its traces is finite, of the data's length, and read into one value per parameter; there are some once the axis travels."""
+    u, x = motion()
+    effect = EFFECTS[name]
+    truth = simulate(BASE.with_effect(name), RATE, u, x)
+    base = simulate(BASE, RATE, u, x)
+    assert effect.guesses is not None
+    near, far = (list(effect.guesses(Scene(RATE, BASE.gain, BASE.pole, u[:-1], truth, place * x[:-1], truth - base))) for place in (1.0, 100.0))
+    assert far
+    for guess in (*near, *far):
+        assert guess.columns.shape[1] == truth.size
+        assert np.all(np.isfinite(guess.columns))
+        values = guess.read(np.full(guess.columns.shape[0], 0.1))
+        assert len(values) == len(effect.parameters)
+        assert np.all(np.isfinite(values))
+
+
+def test_a_weight_is_not_looked_for_where_it_is_a_load_and_a_spring() -> None:
+    """Less than half a radian of travel, or a linear axis: no trace, so that the simpler laws get the name."""
+    u, x = motion()
+    still = np.zeros(u.size - 1)
+    for reach, traces in ((0.4, 0), (0.6, 1)):
+        scene = Scene(RATE, BASE.gain, BASE.pole, u[:-1], still, np.linspace(2.0, 2.0 + reach, x.size - 1), still)
+        guesses = EFFECTS["gravity"].guesses
+        assert guesses is not None and len(list(guesses(scene))) == traces
+
+
+def test_a_frequency_that_is_no_parameter_is_refused() -> None:
+    """The error names what there is."""
+    with pytest.raises(BadInput, match="mode_frequency is 'resonance'; allowed: split, frequency, damping, pole_damping"):
+        replace(EFFECTS["base_resonance"], mode_frequency="resonance")
+
+
+def test_a_law_with_an_unknown_word_is_refused() -> None:
+    """The error names the argument and what is known."""
+    effect = EFFECTS["constant_load"]
+
+    def force(load: float, temperature: float) -> float:
+        return load * temperature
+
+    with pytest.raises(BadInput, match=r"argument of force is 'temperature'; allowed: .*\bx\b"):
+        replace(effect, functions={"force": force})
+
+
+def test_an_unknown_effect_is_answered_with_the_nearest_name() -> None:
+    """A typo is an error."""
+    with pytest.raises(BadInput, match="coulomb_friction"):
+        AxisModel(0.1, 0.0, 200.0, (("coulomb_frction", (0.1,)),))
+    with pytest.raises(BadInput, match="not in the library yet"):
+        STANDARD.extended([EFFECTS["cogging"]])

@@ -1,0 +1,114 @@
+"""An effect of a user's own, and the pages that tell of effects."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import typer
+from helpers import ROOT
+from scipy.signal import butter, sosfilt
+from typer.testing import CliRunner
+
+from xy_sysid.axis.model import STANDARD, simulate
+from xy_sysid.cli.effects import effects as command
+from xy_sysid.effects import EFFECTS
+from xy_sysid.effects._binding import law_texts
+from xy_sysid.effects._contract import WORDS
+from xy_sysid.errors import BadInput
+from xy_sysid.files.effects import from_file, library
+from xy_sysid.files.effects_doc import document
+from xy_sysid.greybox.free_run import fit_base, fit_with, look, prepare
+
+DOCS = ROOT / "docs"
+GUIDE = (DOCS / "your-own-effect.md").read_text(encoding="utf-8")
+RATE = 2000.0
+
+
+@pytest.fixture(scope="module")
+def example(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The guide's own file."""
+    path = tmp_path_factory.mktemp("own") / "quadratic_drag.py"
+    path.write_text(re.findall(r"```python\n(.*?)```", GUIDE, re.DOTALL)[0], encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def app() -> typer.Typer:
+    """The command alone."""
+    made = typer.Typer()
+    made.command()(command)
+    return made
+
+
+def test_the_page_of_effects_is_made_from_the_folder() -> None:
+    """python -m xy_sysid.files.effects_doc > docs/effects.md"""
+    assert (DOCS / "effects.md").read_text(encoding="utf-8") == document()
+
+
+def test_the_guide_names_every_word_that_a_law_can_use() -> None:
+    """The table of the guide is that of the contract."""
+    for word, meaning in WORDS.items():
+        assert f"| `{word}` | {meaning} |" in GUIDE
+
+
+def test_the_guides_example_is_simulated_screened_and_fitted(example: Path) -> None:
+    """An effect from a file is found among all others and its size recovered to 2 per cent."""
+    known = library([example])
+    assert set(known.effects) == {*EFFECTS, "quadratic_drag"}
+    random = np.random.default_rng(4)
+    n = 40_001
+    voltage = sosfilt(butter(4, 300, fs=RATE, output="sos"), random.standard_normal(n)) * 3.0
+    still = prepare(RATE, voltage, np.cumsum(random.standard_normal(n)) * 1e-6)
+    model = fit_base(still, known).model.__class__(0.097, 1.29e-3, 246.0, library=known).with_effect("quadratic_drag", (40.0,))
+    velocity = simulate(model, RATE, voltage, np.zeros(n))
+    position = np.concatenate(([0.0], np.cumsum(velocity) / RATE)) + 1e-7 * random.standard_normal(n)
+    data = prepare(RATE, voltage, position)
+    base = fit_base(data, known)
+    assert look(data, base, known.acting)[0].effect == "quadratic_drag"
+    better = fit_with(data, base, ["quadratic_drag"])
+    assert base.excess > 0.5
+    assert better.excess < 0.05
+    assert better.parameter("quadratic_drag.coefficient").value == pytest.approx(40.0, rel=0.02)
+
+
+def test_a_file_that_changes_changes_no_effect_that_was_loaded_before(example: Path, tmp_path: Path) -> None:
+    """A loop's name on the disk tells by the text that was loaded whose law is compiled in it: never that of the file as it is now."""
+    text, files = example.read_text(encoding="utf-8"), [tmp_path / "own.py", tmp_path / "other" / "own.py"]
+    files[1].parent.mkdir()
+    effects = []
+    for file, factor in ((files[0], 1.0), (files[0], 2.0), (files[1], 3.0)):
+        file.write_text(text.replace("return coefficient *", f"return {factor} * coefficient *"), encoding="utf-8")
+        effects.append(library([file]).effects["quadratic_drag"])
+    for effect, factor in zip(effects, (1.0, 2.0, 3.0), strict=True):
+        assert effect.functions["force"](40.0, 1.0) == 40.0 * factor
+        assert [f"return {factor} * coefficient" in source for source in law_texts([effect])] == [True]
+
+
+def test_a_file_without_an_effect_is_refused_in_one_line(tmp_path: Path) -> None:
+    """The error says what to write."""
+    empty, broken = tmp_path / "empty.py", tmp_path / "broken.py"
+    empty.write_text("x = 1\n", encoding="utf-8")
+    broken.write_text("def f(:\n", encoding="utf-8")
+    for path, words in ((empty, "EFFECT = Effect"), (broken, "SyntaxError"), (tmp_path / "none.py", "a .py file")):
+        with pytest.raises(BadInput, match=words) as caught:
+            from_file(path)
+        assert "\n" not in str(caught.value)
+
+
+def test_the_command_lists_every_effect_and_shows_one_in_full(app: typer.Typer, example: Path) -> None:
+    """As a table, in full, and as JSON with units; a file's effect too."""
+    run = CliRunner()
+    listed = run.invoke(app, [])
+    assert listed.exit_code == 0
+    for name in STANDARD.effects:
+        assert name in listed.output
+    one = run.invoke(app, ["quadratic_drag", "--effect-file", str(example)])
+    assert "coefficient |v| v" in one.output
+    assert "V/(m/s)2" in one.output
+    told = json.loads(run.invoke(app, ["--json"]).output)["effects"]
+    assert told["cogging"]["parameters"]["period"]["unit"] == "m"
+    assert told["cogging"]["look_alikes"]

@@ -1,0 +1,92 @@
+"""The orders of a fit come from the data when nobody asks for any."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from helpers.fitting_cases import LINES, function, held, paper_machine, response_of
+from helpers.real_data import data
+
+import xy_sysid as xy
+from xy_sysid.cli.simulated_recording import simulate
+from xy_sysid.fitting import Structure
+from xy_sysid.fitting.choose_orders import Choice, choose
+from xy_sysid.fitting.verdicts import validate
+from xy_sysid.linear.simulate import held_response
+from xy_sysid.linear.transfer_function import TransferFunction
+
+
+def orders(found: Choice) -> tuple[int, int]:
+    """Of numerator and denominator."""
+    return found.fit.structure.numerator_order, found.fit.structure.denominator_order
+
+
+def two_resonances() -> TransferFunction:
+    """The paper's machine with a second pair, at 120 and 150 Hz."""
+    one, zero, pole = paper_machine(), 2 * np.pi * 120.0, 2 * np.pi * 150.0
+    numerator = np.polymul(one.numerator, (pole / zero) ** 2 * np.array([1.0, 2 * 0.03 * zero, zero**2]))
+    return function(numerator, np.polymul(one.denominator, [1.0, 2 * 0.03 * pole, pole**2]), one.delay)
+
+
+@pytest.mark.parametrize(
+    ("machine", "wanted"),
+    [
+        (function([20.0], [1.0, 240.0, 0.0], 1e-3), (0, 2)),
+        (function([0.1], [1.0, 0.0], 1e-3), (0, 1)),
+        (paper_machine(), (2, 4)),
+        (two_resonances(), (4, 6)),
+    ],
+    ids=["rigid", "integrator", "one resonance", "two resonances"],
+)
+def test_simulated_machines_get_their_own_orders(machine: TransferFunction, wanted: tuple[int, int]) -> None:
+    """From an integrator with delay up to two resonances, with a verdict that says why, and no other orders tried again."""
+    seen = held(machine, 0.01, seed=3)
+    found = choose(seen, Structure())
+    assert orders(found) == wanted
+    checked = validate(found.fit, seen, choice=found)
+    assert f"Orders {wanted[0]}/{wanted[1]}, chosen from the data" in next(item.sentence for item in checked.verdicts if item.name == "order")
+    assert checked.ok
+
+
+def test_misfit_that_no_pole_explains_buys_no_orders() -> None:
+    """A response that bends as friction does, ten times above its noise: the resonance is told, the cost never reaches that of noise."""
+    bent = held_response(paper_machine(), LINES, 2000.0) * (1.0 + 0.1 / (1.0 + (LINES / 3.0) ** 2) + 0.02 * np.sin(LINES / 40.0))
+    found = choose(response_of(bent, 0.002, seed=4), Structure())
+    assert orders(found) == (2, 4)
+    assert not found.fit.consistent
+    assert found.fit.interval("resonance_1.frequency").value == pytest.approx(47.0, abs=0.3)
+
+
+def test_friction_beside_a_resonance_leaves_the_orders_as_they_are() -> None:
+    """Coulomb friction on the paper's machine: one resonance; on a rigid table: none."""
+    for machine, wanted in (("rigid.yaml", (0, 2)), ("paper.yaml", (2, 4))):
+        model = xy.fit(xy.frf(simulate(20.0, effects=["coulomb_friction"], machine=machine).run("x")))
+        assert model.fit is not None
+        assert (model.fit.structure.numerator_order, model.fit.structure.denominator_order) == wanted
+
+
+def test_few_lines_buy_few_orders() -> None:
+    """Eight lines of a machine with a resonance: a rigid body, since richer orders have fewer than four numbers for each parameter."""
+    few = held(paper_machine(), 0.01, seed=3).select(slice(60, 120, 8))
+    assert orders(choose(few, Structure())) in ((0, 1), (0, 2))
+
+
+@pytest.mark.parametrize(
+    ("path", "hold", "wanted", "frequency"),
+    [
+        ("two_inertia_bench/multisineA.npz", "none", (2, 4), 76.2),
+        ("two_inertia_bench/multisineB.npz", "none", (2, 4), 76.2),
+        ("lsb250/lsb250_exp1.npz", "zoh", (2, 4), 13.5),
+        ("lsb250/lsb250_exp2.npz", "zoh", (2, 4), 13.5),
+        ("crane/crane_1.npz", "zoh", (0, 1), None),
+        ("hsm150/hsm_pos_0.06_1.npz", "zoh", (0, 2), None),
+        ("emps/emps_train.npz", "zoh", (0, 2), None),
+    ],
+)
+def test_real_machines_get_no_more_than_they_show(path: str, hold: str, wanted: tuple[int, int], frequency: float | None) -> None:
+    """One resonance of the bench and of the guide, none of the others, though no cost comes near that of noise."""
+    model = xy.fit(xy.frf(xy.load(data(path)), hold=hold), hold=hold)
+    assert model.fit is not None
+    assert (model.fit.structure.numerator_order, model.fit.structure.denominator_order) == wanted
+    if frequency is not None:
+        assert model.fit.interval("resonance_1.frequency").value == pytest.approx(frequency, rel=0.03)

@@ -1,0 +1,86 @@
+"""What is held out: never seen by a fit, spread over the record, and it moves; of several recordings, of each."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from helpers.simulated import recorded
+
+from xy_sysid.greybox.axis_data import AxisData, prepare, prepare_all
+from xy_sysid.search.diagnose import diagnose, diagnose_all
+
+
+def noise(samples: int, seed: int = 1) -> np.ndarray:
+    return np.random.default_rng(seed).standard_normal(samples)
+
+
+def moved(samples: int, seed: int = 1) -> tuple[np.ndarray, np.ndarray]:
+    """A rigid axis without friction, V and m."""
+    u = noise(samples, seed)
+    velocity = np.zeros(samples)
+    for k in range(1, samples):
+        velocity[k] = 0.9 * velocity[k - 1] + 0.01 * u[k - 1]
+    return u, np.cumsum(velocity) / 2000.0 + 1e-7 * noise(samples, seed + 100)
+
+
+def inside(data: AxisData, begins: np.ndarray) -> np.ndarray:
+    """(n,) the samples of ``velocity`` that some window holds."""
+    held = np.zeros(data.velocity.size, dtype=bool)
+    for begin in begins:
+        held[begin : begin + data.layout.length] = True
+    return held
+
+
+@pytest.mark.parametrize("sizes", [(1200,), (5000,), (60_000,), (60_000, 40_000), (20_000, 20_000, 20_000)])
+def test_windows_that_judge_share_no_sample_with_those_that_a_fit_sees(sizes: tuple[int, ...]) -> None:
+    """Short, long, and several recordings; no window lies across the joint of two; the first stage sees nothing held out either."""
+    data = prepare_all(2000.0, [moved(size, k) for k, size in enumerate(sizes)])
+    fitted, held, brief = (inside(data, windows.begins) for windows in (data.fitted, data.held, data.brief))
+    assert fitted.any() and held.any() and brief.any()
+    assert not (fitted & held).any()
+    assert not (brief & held).any()
+    assert np.array_equal(data.held_samples(), held)
+    for step in data.steps:
+        for begin in (*data.fitted.begins, *data.held.begins):
+            assert not begin < step.start < begin + data.layout.length
+
+
+def test_what_is_held_out_is_spread_over_the_record() -> None:
+    """Some of each quarter, so that it holds the motion that it judges."""
+    data = prepare(2000.0, *moved(60_000))
+    assert all(part.any() and not part.all() for part in np.array_split(inside(data, data.held.begins), 4))
+
+
+def test_of_several_recordings_each_is_held_out_in_part() -> None:
+    """And each is fitted in part."""
+    data = prepare_all(2000.0, [moved(60_000, 1), moved(40_000, 2)])
+    for windows in (data.fitted, data.held):
+        assert all(inside(data, windows.begins)[step].any() for step in data.steps)
+
+
+def test_an_axis_that_moves_a_tenth_of_the_time_is_not_judged() -> None:
+    """9 %, at the start: nothing is named, and it is said what is lacking."""
+    u, y = moved(60_000)
+    still = 5400
+    u[still:] = 0.0
+    y[still:] = y[still]
+    found = diagnose(2000.0, u, y)
+    assert found.verdict == "not_enough_data" and found.effects == ()
+    assert "stands most of the time" in found.sentence
+
+
+def test_noise_that_does_not_follow_the_input_is_not_judged() -> None:
+    """Two signals that have nothing to do with each other."""
+    found = diagnose(2000.0, noise(40_000, 3), np.cumsum(noise(40_000, 4)))
+    assert found.verdict == "not_enough_data" and "does not follow the input" in found.sentence
+
+
+def test_two_recordings_of_one_machine_are_one_question() -> None:
+    """Another excitation of the same axis beside the first: the same name, fitted to both, and the parameter is known better."""
+    pair = [recorded("coulomb_friction", seconds=12.0, seed=seed).axis("x") for seed in (21, 21)]
+    both, one = diagnose_all(2000.0, pair), diagnose(2000.0, *pair[0])
+    assert (both.verdict, both.effects) == ("missing_effect", ("coulomb_friction",))
+    assert both.ladder is not None and one.ladder is not None
+    widths = [(found.high - found.low) for found in (item.ladder.final.parameter("coulomb_friction.coulomb") for item in (both, one) if item.ladder)]
+    assert widths[0] < widths[1]
+    assert both.ladder.final.parameter("coulomb_friction.coulomb").value == pytest.approx(0.2, rel=0.01)

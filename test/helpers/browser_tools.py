@@ -1,0 +1,165 @@
+"""A real browser and a real page server in tests.
+
+Import from a test module that starts with ``pytestmark = needs_browser``.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from helpers.busy import PATIENCE
+from helpers.cli_tools import bare
+
+CHROMIUM = next((path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None)
+needs_browser = pytest.mark.skipif(
+    CHROMIUM is None or importlib.util.find_spec("playwright") is None, reason="no Chromium (Debian: apt-get install chromium) or no playwright"
+)
+ARGUMENTS = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+
+
+class Server:
+    """``xy-sysid page`` as a process; ``first`` is the line that it printed, ``address`` the same if it is one."""
+
+    def __init__(self, folder: Path, *arguments: object, **environment: str) -> None:
+        self.log = folder / f"page{time.monotonic_ns()}.log"
+        words = [sys.executable, "-m", "xy_sysid", "page", *map(str, arguments), "--port", "0", "--no-browse", "--folder", str(folder)]
+        self.begun = time.monotonic()
+        with self.log.open("wb") as err:
+            self.process = subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=err, text=True, env=bare(**environment))
+        assert self.process.stdout is not None
+        self.first = self.process.stdout.readline().strip()
+        self.address = self.first if self.first.startswith("http") else ""
+        assert self.first, self.said()
+
+    def said(self) -> str:
+        """All it wrote on stderr."""
+        return self.log.read_text(encoding="utf-8", errors="replace")
+
+    def children(self) -> list[int]:
+        """Its processes: one for each recording, and Python's own helper."""
+        return [int(word) for word in Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text().split()]
+
+    def end(self) -> int:
+        """Ctrl-C; the exit code."""
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGINT)
+        try:
+            return self.process.wait(PATIENCE * 15)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            return self.process.wait(5)
+
+
+@contextmanager
+def browser() -> Iterator[Any]:
+    """A browser with a profile of its own."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as play:
+        made = play.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        try:
+            yield made
+        finally:
+            made.close()
+
+
+class Tab:
+    """One tab on the page, with what went wrong in it."""
+
+    def __init__(self, made: Any, address: str, width: int = 1400, mode: str = "light") -> None:
+        self.context = made.new_context(viewport={"width": width, "height": 900}, color_scheme=mode)
+        self.page = self.context.new_page()
+        self.errors: list[str] = []
+        self.asked: list[str] = []
+        self.page.on("pageerror", lambda error: self.errors.append(str(error)))
+        self.page.on("console", lambda message: self.errors.append(message.text) if message.type == "error" else None)
+        self.page.on("request", lambda request: self.asked.append(request.url))
+        self.page.goto(address)
+
+    def until(self, done: Callable[[], object], seconds: float = 20.0, why: str = "") -> None:
+        """Let the browser work until it is done; it may take PATIENCE times the seconds."""
+        end = time.monotonic() + PATIENCE * seconds
+        while not done():
+            assert time.monotonic() < end, f"{why or 'waited in vain'}: {self.verdict()!r}; messages: {self.notices()}"
+            self.page.wait_for_timeout(50)
+
+    def verdict(self) -> str:
+        """The sentence of the first story."""
+        found = self.page.locator("[data-part=verdict]")
+        return str(found.first.text_content()) if found.count() else ""
+
+    def headline(self) -> str:
+        """Where the axis of the first story stands."""
+        found = self.page.locator("[data-part=headline]")
+        return str(found.first.text_content()) if found.count() else ""
+
+    def fact(self, label: str) -> str:
+        """The text of a number."""
+        found = self.page.locator(f".fact[aria-label='{label}'] .value")
+        return str(found.first.text_content()) if found.count() else ""
+
+    def filled(self) -> list[str]:
+        """Words of the filled buttons that can be seen; STOP is always filled and not counted."""
+        return [text.strip() for text in self.page.locator("main .q-btn--unelevated:visible:not(.q-btn-group *)").all_text_contents()]
+
+    def failing(self, by: str) -> str:
+        """Words in the first picture, by frequency, speed, position or time."""
+        plot = self.page.locator(f".js-plotly-plot[aria-label^='Error over the noise floor by {by}']")
+        return " ".join(plot.locator(".annotation-text").all_text_contents()) if plot.count() else ""
+
+    def over_floor(self) -> float:
+        """Largest error over the noise floor by frequency in the first picture; 0 while it is not drawn."""
+        (found,) = self.curves("Error over the noise floor by frequency", "this model")
+        return max(found, default=0.0)
+
+    def notices(self) -> str:
+        """All messages and warnings that can be seen."""
+        return " | ".join(text for text in self.page.locator(".notice:visible").all_text_contents())
+
+    def curves(self, label: str, *names: str) -> list[list[float]]:
+        """y of named curves of the plot whose description begins so, all of one moment; empty lists while it is not drawn."""
+        script = """([label, names]) => {
+            const plot = [...document.querySelectorAll(".js-plotly-plot")].find(p => (p.getAttribute("aria-label") || "").startsWith(label));
+            return names.map(name => {
+                const trace = plot && plot._fullData && plot._fullData.find(t => t.name === name);
+                return trace ? Array.from(trace.y, Number) : [];
+            });
+        }"""
+        return [[float(value) for value in row] for row in self.page.evaluate(script, [label, list(names)])]
+
+    def ladder(self) -> list[float]:
+        """Held-out error of each step over the noise floor there."""
+        held, floor = self.curves("The error ladder", "held-out error", "noise floor")
+        return [a / b for a, b in zip(held[::2], floor[::2], strict=True)]
+
+    def press(self, act: str) -> None:
+        """A button by what it does."""
+        self.page.locator(f"[data-act={act}]").first.click()
+
+    def wide(self) -> int:
+        """Width of the content, px."""
+        return int(self.page.evaluate("document.documentElement.scrollWidth"))
+
+    def close(self) -> None:
+        """Away with it."""
+        self.context.close()

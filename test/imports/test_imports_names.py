@@ -1,0 +1,274 @@
+"""Any table: columns are understood in any spelling, or as the user says; what was guessed is said, what cannot be known is asked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.io
+from helpers.table_making import RATE, T, U, Y, csv_of
+
+from xy_sysid.errors import BadInput, BadRecording
+from xy_sysid.imports import load
+from xy_sysid.imports.foreign_units import unit_of
+from xy_sysid.imports.names import header, meaning
+from xy_sysid.imports.reading import pairs
+from xy_sysid.samples.block import FloatArray
+from xy_sysid.samples.recording import Recording
+
+
+def assert_the_axis(recording: Recording, axis: str = "x") -> None:
+    """It holds what was written, in SI."""
+    assert recording.axes == (axis,) and recording.sampling_rate == RATE
+    np.testing.assert_allclose(recording.voltage[:, 0], U, rtol=1e-12)
+    np.testing.assert_allclose(recording.position[:, 0], Y, rtol=1e-12, atol=1e-18)
+
+
+@pytest.mark.parametrize(
+    ("time", "voltage", "position", "axis"),
+    [
+        ("Time", "Motor Voltage (V)", "Encoder Pos [mm]", "x"),
+        ("time_ms", "u_x", "Encoder_X (um)", "x"),
+        ("TIME [ms]", "VOLTAGE", "POSITION[MM]", "x"),
+        ("Zeit (s)", "Spannung [mV]", "Weg in mm", "x"),
+        ("__time", "/gantry/left/voltage", "/gantry/left/position", "gantry_left"),
+        ("timestamp", "motorVoltage2", "encoderPos2", "axis2"),
+        ("t", "u1", "y1", "axis1"),
+        ("time", "left_u", "left_pos", "left"),
+    ],
+)
+def test_headers_in_any_case_and_spelling(tmp_path: Path, time: str, voltage: str, position: str, axis: str) -> None:
+    """Capitals, blanks, signs, units at the end, other languages; a note says what was understood."""
+    text = f"{time} {voltage} {position}"
+    milli = "ms" in text, "mV" in text
+    units = {"mm": 1e3, "MM": 1e3, "um": 1e6}
+    factor = next((factor for unit, factor in units.items() if unit in position), 1.0)
+    path = csv_of(tmp_path, {time: T * (1e3 if milli[0] else 1.0), voltage: U * (1e3 if milli[1] else 1.0), position: Y * factor})
+    recording = load(path)
+    assert_the_axis(recording, axis)
+    assert any(f"= {header(voltage)[0]!r}" in note for note in recording.notes)
+
+
+@pytest.mark.parametrize(
+    ("name", "role", "axis", "unit"),
+    [
+        ("y_position", "output", "y", ""),
+        ("u_y", "input", "y", ""),
+        ("x_y", "output", "x", ""),
+        ("pos_ref", "reference", "", ""),
+        ("x position command", "reference", "x", ""),
+        ("current_A", "input", "", "A"),
+        ("voltage_a", "input", "a", ""),
+        ("speed_rpm", "output", "", "rpm"),
+        ("joint1_effort", "input", "joint1", ""),
+    ],
+)
+def test_what_a_name_says(name: str, role: str, axis: str, unit: str) -> None:
+    """The role, the axis and the unit, where letters could mean several things."""
+    found = meaning(*header(name))
+    assert found is not None and (found.role, found.axis, found.unit) == (role, axis, unit)
+
+
+@pytest.mark.parametrize("name", ["position_error", "CH1", "temperature", "state", "supply voltage"])
+def test_names_that_say_nothing(name: str) -> None:
+    """They are no role."""
+    assert meaning(*header(name)) is None
+
+
+def test_columns_can_be_mapped_scaled_and_given_units(tmp_path: Path) -> None:
+    """The issue's example: time, input and output by their names, counts with their length, and a rate."""
+    path = csv_of(tmp_path, {"Zeit": T * 0, "Motor Voltage": U, "Pos": np.round(Y / 0.5e-9), "junk": U})
+    said = pairs(['time=Zeit,x.input="Motor Voltage",x.output=Pos'], "--map")
+    assert said == {"time": "Zeit", "x.input": "Motor Voltage", "x.output": "Pos"}
+    recording = load(path, columns=said, units={"x.output": "counts"}, scales={"x.output": 0.5e-9}, rate=1000.0)
+    assert recording.output_unit == "m" and recording.sampling_rate == 1000.0
+    np.testing.assert_allclose(recording.position[:, 0], Y, atol=0.5e-9)
+    assert any("counts times 5e-10 is in m" in note for note in recording.notes)
+    assert any("'Zeit' is not used" in note for note in recording.notes)
+
+
+def test_a_column_can_be_given_by_its_number_or_in_another_spelling(tmp_path: Path) -> None:
+    """1 is the first; case and signs do not matter; a name that is not there is said with those that are."""
+    path = csv_of(tmp_path, {"A b": T, "ch 2": U, "ch 3": Y})
+    assert_the_axis(load(path, columns={"time": "1", "input": "CH_2", "output": "#3"}))
+    with pytest.raises(BadRecording, match="no column 'ch 4'; it has A b, ch 2, ch 3"):
+        load(path, columns={"time": "1", "input": "ch 4", "output": "3"})
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ({"columns": {"x.volts": "a"}}, "--map is 'x.volts'"),
+        ({"units": {"speed": "m/s"}}, "--unit is 'speed'"),
+        ({"scales": {"output": 0.0}}, "a number that is not 0"),
+        ({"rate": -5.0}, "rate is -5.0"),
+        ({"rate": float("nan")}, "rate is nan"),
+    ],
+)
+def test_wrong_options_of_reading_are_one_line(tmp_path: Path, options: dict[str, Any], says: str) -> None:
+    """What was given, what is allowed."""
+    with pytest.raises(BadInput) as caught:
+        load(csv_of(tmp_path, {"time": T, "u": U, "y": Y}), **options)
+    assert says in str(caught.value)
+
+
+def test_a_table_without_time_needs_a_rate(tmp_path: Path) -> None:
+    """The refusal says so, and with the rate it reads; a first row of numbers is no header."""
+    path = csv_of(tmp_path, {"u": U, "y": Y})
+    with pytest.raises(BadRecording, match=r"no time column.*--rate in Hz"):
+        load(path)
+    assert_the_axis(load(path, rate=1000.0))
+    path.write_text(path.read_text().partition("\n")[2])
+    found = load(path, rate=1000.0, columns={"input": "1", "output": "2"})
+    assert_the_axis(found)
+    assert any("first row holds numbers" in note for note in found.notes)
+
+
+def test_a_row_for_each_joint(tmp_path: Path) -> None:
+    """Long format: a column names the joint of each row; each becomes an axis, in any order of rows."""
+    names = ["shoulder", "elbow_2"]
+    rows = [(t, name, u * (1 + k), y * (1 + k)) for t, u, y in zip(T, U, Y, strict=True) for k, name in enumerate(names)]
+    columns: dict[str, FloatArray | Sequence[str]] = {
+        "time": np.array([row[0] for row in rows]),
+        "joint": [row[1] for row in rows],
+        "Current (A)": np.array([row[2] for row in rows]),
+        "angle": np.array([row[3] for row in rows]),
+    }
+    recording = load(csv_of(tmp_path, columns))
+    assert (recording.axes, recording.input_unit, recording.output_unit, len(recording)) == (("shoulder", "elbow_2"), "A", "rad", len(T))
+    np.testing.assert_allclose(recording.position[:, 1], 2 * Y)
+    assert load(tmp_path / "data.csv", axes=["elbow_2"]).axes == ("elbow_2",)
+
+
+def test_rows_of_their_own_for_input_and_output(tmp_path: Path) -> None:
+    """PlotJuggler writes a row for each stamp of each topic: the input is held until its next."""
+    late = 0.0003
+    time = np.concatenate((T, T + late))
+    order = np.argsort(time)
+    hollow = np.full(len(T), np.nan)
+    columns = {"__time": time[order], "/x/voltage": np.concatenate((U, hollow))[order], "/x/position": np.concatenate((hollow, Y))[order]}
+    recording = load(csv_of(tmp_path, columns))
+    assert recording.sampling_rate == RATE and len(recording) == len(T) and len(recording.runs()) == 1
+    np.testing.assert_array_equal(recording.voltage[:, 0], U)
+    np.testing.assert_array_equal(recording.position[:, 0], Y)
+    assert any("rows of their own" in note for note in recording.notes)
+
+
+def test_words_in_other_columns_do_not_matter(tmp_path: Path) -> None:
+    """A column of states is passed over; so is a bad cell in a column that nobody wants."""
+    path = csv_of(tmp_path, {"time": T, "state": ["RUN"] * len(T), "x_voltage": U, "x_position": Y, "note": ["1", *["oops"] * (len(T) - 1)]})
+    assert_the_axis(load(path))
+
+
+def test_titles_and_a_row_of_units(tmp_path: Path) -> None:
+    """Lines of one cell above the names are left out, and said; units may stand in a row of their own; a decimal comma is none of columns."""
+    path = csv_of(tmp_path, {"Time": T, "Voltage": U, "Pos": 1e3 * Y})
+    table = path.read_text()
+    names, _, rest = table.partition("\n")
+    path.write_text(f"Test bench 7\n{names}\ns,V,mm\n{rest}")
+    recording = load(path)
+    assert_the_axis(recording)
+    assert any("'Test bench 7'" in note for note in recording.notes)
+    path.write_text(f"Zeit;Spannung [V];Weg [mm]\n{rest.replace(',', ';').replace('.', ',')}")
+    assert_the_axis(load(path))
+
+
+def test_what_may_be_either_is_asked(tmp_path: Path) -> None:
+    """Two columns for one role: both are named, and the option that chooses; of voltage and current the voltage is taken, and said."""
+    path = csv_of(tmp_path, {"time": T, "torque left motor": U, "torque motor left": U, "left position": Y})
+    with pytest.raises(BadRecording, match=r"'torque left motor' and 'torque motor left' may both be the input\. Choose one with --map left.input="):
+        load(path)
+    path = csv_of(tmp_path, {"Time": T, "Motor Current": Y, "Motor Voltage": U, "Pos": Y, "Vel": U})
+    recording = load(path)
+    assert_the_axis(recording)
+    assert any("'Motor Voltage' is taken as the input, not 'Motor Current'" in note for note in recording.notes)
+
+
+@pytest.mark.parametrize("unit", ["ms", "us", "ns"])
+def test_clocks_since_1970_are_understood(tmp_path: Path, unit: str) -> None:
+    """A stamp of 1.8e12 counts ms, and says so; dates are times, too."""
+    factor = {"ms": 1e3, "us": 1e6, "ns": 1e9}[unit]
+    recording = load(csv_of(tmp_path, {"stamp": np.round((T + 1.8e9) * factor), "u": U, "y": Y}))
+    assert recording.sampling_rate == pytest.approx(RATE, rel=1e-3) and len(recording) == len(T)
+    assert any(f"taken as {unit} since 1970" in note for note in recording.notes)
+    dates = [f"2026-03-01T12:00:{t:06.3f}" for t in T]
+    assert load(csv_of(tmp_path, {"time": dates, "u": U, "y": Y})).sampling_rate == pytest.approx(RATE)
+
+
+@pytest.mark.parametrize(
+    ("given", "name", "scale", "quantity", "guessed"),
+    [
+        ("mm", "m", 1e-3, "position", False),
+        ("MM", "m", 1e-3, "position", True),
+        ("ft", "m", 0.3048, "position", False),
+        ("counts", "counts", 1.0, "position", False),
+        ("rpm", "rad/s", 2 * np.pi / 60, "velocity", False),
+        ("mm/s", "m/s", 1e-3, "velocity", False),
+        ("m/s²", "m/s^2", 1.0, "acceleration", False),
+        ("N·m", "N m", 1.0, "torque", False),
+        ("nm", "m", 1e-9, "position", False),
+        ("NM", "NM", 1.0, "unknown", False),
+        ("%", "FS", 0.01, "command", False),
+        ("min", "s", 60.0, "time", False),
+        ("furlong", "furlong", 1.0, "unknown", False),
+    ],
+)
+def test_units(given: str, name: str, scale: float, quantity: str, guessed: bool) -> None:
+    """Known, guessed by another spelling, or carried; what could be two things (NM) is not guessed."""
+    found = unit_of(given)
+    assert (found.name, found.quantity, found.guessed) == (name, quantity, guessed) and found.scale == pytest.approx(scale)
+
+
+def test_units_that_are_guessed_or_unknown_are_said(tmp_path: Path) -> None:
+    """MM is mm, and a note says so; counts are no length; furlongs are carried."""
+    for unit, says in (
+        ("MM", "'MM' of the output is taken as mm"),
+        ("counts", "counts, which is no length"),
+        ("furlong", "'furlong' of the output is not known"),
+    ):
+        assert any(says in note for note in load(csv_of(tmp_path, {"time": T, "u": U, f"y[{unit}]": Y})).notes)
+    assert load(csv_of(tmp_path, {"time[min]": T / 60, "u": U, "y": Y})).sampling_rate == pytest.approx(RATE)
+    with pytest.raises(BadRecording, match="'V' of the time is none of time"):
+        load(csv_of(tmp_path, {"time[V]": T, "u": U, "y": Y}))
+
+
+@pytest.mark.parametrize("kind", ["npz", "mat"])
+def test_arrays_take_the_same_names_and_options(tmp_path: Path, kind: str) -> None:
+    """NPZ and MAT: names in any spelling, --map, a matrix with columns, units and scale."""
+    path = tmp_path / f"a.{kind}"
+
+    def written(**content: Any) -> Path:
+        np.savez(path, **content) if kind == "npz" else scipy.io.savemat(path, content)
+        return path
+
+    assert_the_axis(load(written(Time=T, Motor_Voltage=U, Encoder_mm=1e3 * Y)))
+    matrix = np.column_stack((T, 0 * T, Y / 1e-6, U))
+    recording = load(written(data=matrix, n=3.0), columns={"time": "data:1", "input": "data:4", "output": "data:3"}, scales={"output": 1e-6})
+    assert_the_axis(recording)
+    with pytest.raises(BadRecording) as caught:
+        load(written(data=matrix))
+    assert "--map" in str(caught.value) and "data:4" in str(caught.value) and "key" not in str(caught.value)
+
+
+def test_structs_of_control_desk_simulink_and_iddata(tmp_path: Path) -> None:
+    """X and Y(n).Data with names, signals(n).values with labels, InputData and OutputData with Ts; in structs in structs, too."""
+    path = tmp_path / "a.mat"
+    block = {"Name": '"Model Root"/"{}"/"In1"', "Unit": ""}
+    y = [{**block, "Name": block["Name"].format(name), "Data": values} for name, values in (("Motor positie", Y), ("motor input", U))]
+    scipy.io.savemat(path, {"meas": {"X": {"Name": "", "Data": T}, "Y": y, "Capture": {"SamplingPeriod": 1e-3}}})
+    assert_the_axis(load(path))
+    assert_the_axis(load(path, columns={"output": "Motor positie", "input": "motor input"}))
+    signals = [{"label": name, "values": values} for name, values in (("voltage", U), ("position", Y))]
+    scipy.io.savemat(path, {"out": {"time": T, "signals": signals}})
+    assert_the_axis(load(path))
+    scipy.io.savemat(
+        path, {"z": {"OutputData": Y, "InputData": U, "Ts": 1e-3, "InputUnit": np.array(["V"], object), "OutputUnit": "m", "InterSample": "foh"}}
+    )
+    recording = load(path)
+    assert_the_axis(recording)
+    assert any("foh" in note for note in recording.notes)
+    scipy.io.savemat(path, {"lab": {"run": {"first": {"t": T, "u": U, "y": Y}}, "date": "today"}})
+    assert_the_axis(load(path))

@@ -1,0 +1,106 @@
+"""What looks wrong is said in words, with what to do; none of it is said of a good recording."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from helpers.cli_tools import cli, refused
+from helpers.real_data import data
+from helpers.table_making import RATE, T, U, Y, csv_of
+
+from xy_sysid.imports import load
+
+HALF = np.arange(len(T)) > len(T) // 2
+
+
+def notes_of(path: Path, **columns: Any) -> str:
+    """All that is said about an axis with these columns changed."""
+    content = {"time": T, "x_voltage": U, "x_position": Y} | columns
+    return " | ".join(load(csv_of(path, content)).notes)
+
+
+def test_nothing_is_said_of_a_good_recording(tmp_path: Path) -> None:
+    """No note at all."""
+    assert notes_of(tmp_path) == ""
+
+
+@pytest.mark.parametrize(
+    ("columns", "says"),
+    [
+        ({"time": T * 1000}, "1 s apart (1 Hz): is time in ms"),
+        ({"time": T * 1e-6}, "is that the unit of time?"),
+        ({"x_voltage": Y * 1e3, "x_position": U * 1e-3}, "are input and output swapped?"),
+        ({"x_position": Y * 3e7}, "is it in mm or counts? Say --unit output=mm"),
+        ({"x_position": np.where(HALF, Y[len(T) // 2], Y)}, "dead from 1.5 s to the end (50 % of the samples) under an input as lively as elsewhere"),
+        ({"x_position": np.where(HALF, Y[len(T) // 2], Y), "x_voltage": np.where(HALF, 0.3 * U, U)}, "stands still from 1.5 s to the end"),
+        ({"x_position": Y + 1e9}, "where numbers are 1.2e-07 apart"),
+        ({"x_position": Y * 1e-12}, "m in all: is that its unit?"),
+        ({"x_voltage": U * 1e-12}, "V in all: is that its unit?"),
+        ({"x_position": np.clip(Y, None, np.quantile(Y, 0.7))}, "lies at its highest value"),
+        ({"x_voltage": np.clip(U, -0.5, 0.5)}, "the input lies at its highest value, 0.5 V, in 31 % of the samples: is it saturated?"),
+        ({"x_position": 0 * Y}, "the output never changes"),
+        ({"x_voltage": 0 * U + 3}, "the input never changes"),
+        ({"x_position": np.round(Y / np.ptp(Y)) * 1e-3}, "the axis stands, or its encoder is too coarse"),
+        ({"time": np.where(HALF, T + 0.25, T)}, "1 gap in the samples, the longest of 250 (0.25 s) after 1.5 s"),
+    ],
+)
+def test_what_looks_wrong_is_said(tmp_path: Path, columns: dict[str, Any], says: str) -> None:
+    """Swapped columns, units, gaps, constant, standing, stuck, saturated, the same twice: in seconds, with the next act."""
+    begun = time.process_time()
+    assert says in notes_of(tmp_path, **columns)
+    assert time.process_time() - begun < 5.0
+
+
+@pytest.mark.parametrize(
+    ("head", "says"),
+    [
+        ({"x_voltage[rad]": U, "x_position": Y}, "the input is in rad, which drives nothing"),
+        ({"x_voltage": U, "x_position[V]": Y}, "the output is in V, which is no motion"),
+        ({"Measured Voltage": U, "x_position": Y}, "the input 'Measured Voltage' was measured, so it is hardly held"),
+        ({"x_voltage[A]": U, "x_position": Y}, "if it was measured and not commanded, it is not held"),
+    ],
+)
+def test_units_that_do_not_fit_are_said(tmp_path: Path, head: dict[str, Any], says: str) -> None:
+    """A drive in rad, a motion in V; a current is rarely held."""
+    assert says in " | ".join(load(csv_of(tmp_path, {"time": T} | head)).notes)
+
+
+def test_one_column_for_both_is_refused(tmp_path: Path) -> None:
+    """Voltage equal to position: no answer would mean anything. Beside another axis that axis alone is left out."""
+    said = refused("diagnose", csv_of(tmp_path, {"time": T, "x_voltage": U, "x_position": U}))
+    assert "input and output of axis x are the same numbers" in said and "--map" in said
+    recording = load(csv_of(tmp_path, {"time": T, "x_voltage": U, "x_position": U, "z_voltage": U, "z_position": Y}))
+    assert recording.axes == ("z",) and any("same numbers" in note for note in recording.notes)
+
+
+def test_a_dead_part_becomes_a_gap(tmp_path: Path) -> None:
+    """An encoder that stops half-way: the rest is read; so the model is that of the rest, and not of an effect that nobody has."""
+    middle = (np.arange(len(T)) > 1000) & (np.arange(len(T)) < 2200)
+    recording = load(csv_of(tmp_path, {"time": T, "x_voltage": U, "x_position": np.where(middle, Y[1001], Y)}))
+    assert len(recording) == int(np.sum(~middle)) and len(recording.runs()) == 2
+
+
+def test_switching_inputs_are_no_saturation(tmp_path: Path) -> None:
+    """Two levels by nature (PRBS), three levels by a relay: nothing is said."""
+    assert "saturated" not in notes_of(tmp_path, x_voltage=np.sign(U))
+
+
+def test_answers_with_json_carry_the_notes(tmp_path: Path) -> None:
+    """Nobody who reads JSON misses them."""
+    path = csv_of(tmp_path, {"time": T, "x_voltage": np.clip(U, -0.5, 0.5), "x_position": Y})
+    short = ("--set", "length=512", "--json")
+    assert any("saturated" in note for note in cli("frf", path, *short).json["recording"]["notes"])
+    twice = cli("compare", path, path, path, *short).json
+    assert any("saturated" in note for note in twice["notes"]) and any("3 recordings, one after the other" in note for note in twice["notes"])
+
+
+@pytest.mark.parametrize("path", ["emps/emps_train.npz", "lsb250/lsb250_exp1.npz", "hsm150/hsm_pos_0.06_1.npz"])
+def test_good_real_recordings_are_not_doubted(path: str) -> None:
+    """Real machines with real friction and saturation: at most what was converted is said."""
+    recording = load(data(path))
+    assert [note for note in recording.notes if "converted" not in note] == []
+    assert recording.sampling_rate == pytest.approx(RATE, rel=1e-3)

@@ -1,0 +1,309 @@
+"""Node excitation over real DDS: nothing before activate, zero volts last however it ends, lockstep bit for bit."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from helpers import ROOT
+from helpers.ros_tools import World, needs_ros, world_in
+
+from xy_sysid.excitation.drive import Drive
+from xy_sysid.samples.block import Block
+from xy_sysid.settings import AxisExcitation, ExcitationSettings
+
+MODULE = "xy_sysid.nodes.excitation"
+LOCKSTEP: dict[str, Any] = {"lockstep": True, "speed": 0.0, "ramp": 0.05}
+
+
+class Integrator:
+    """A machine whose position is the sum of the voltage, 0.1 m/s/V; silent after ``blocks`` blocks."""
+
+    def __init__(self, blocks: int = 10**9) -> None:
+        self.left, self.place = blocks, np.zeros(2)
+
+    def __call__(self, block: Block) -> Block | None:
+        self.left -= 1
+        if self.left < 0:
+            return None
+        path = self.place + np.cumsum(block.values, axis=0) * 0.1 / 2000
+        self.place = path[-1]
+        return Block(block.axes, block.seq, block.time, path)
+
+
+@pytest.fixture
+def world(tmp_path: Path) -> Iterator[World]:
+    with world_in(tmp_path) as made:
+        yield made
+
+
+def activate(world: World) -> None:
+    assert world.transition("excitation", "configure")
+    assert world.transition("excitation", "activate")
+
+
+def moving(blocks: list[Block]) -> bool:
+    return any(block.values.any() for block in blocks[-2:])
+
+
+@needs_ros
+def test_nothing_before_activate_and_zero_after_deactivate(world: World) -> None:
+    """Lifecycle: not one block before `activate`; after `deactivate` the last block is zeros; and it can go again."""
+    blocks = world.blocks()
+    world.machine(Integrator())
+    process = world.start(MODULE, {"watchdog": 2.0, "ramp": 0.1})
+    assert world.transition("excitation", "configure")
+    world.spin(0.3)
+    assert blocks == [] and world.state("excitation") == "inactive"
+    assert world.transition("excitation", "activate")
+    assert world.until(lambda: len(blocks) > 30 and moving(blocks))
+    assert blocks[0].axes == ("x", "y") and blocks[0].values.shape == (20, 2) and not blocks[0].values.any()
+    assert world.transition("excitation", "deactivate")
+    world.spin(0.2)
+    sent = len(blocks)
+    assert not blocks[-1].values.any() and world.state("excitation") == "inactive"
+    world.spin(0.3)
+    assert len(blocks) == sent
+    assert world.transition("excitation", "activate")
+    assert world.until(lambda: len(blocks) > sent + 20 and moving(blocks))
+    assert blocks[sent].seq[0] > blocks[sent - 1].seq[-1] + 1  # the pause is a gap
+    assert "Traceback" not in process.output()
+
+
+@needs_ros
+@pytest.mark.parametrize(("number", "lockstep"), [(signal.SIGINT, False), (signal.SIGTERM, True)])
+def test_a_signal_ends_at_zero_volts(world: World, number: signal.Signals, lockstep: bool) -> None:
+    """Zero volts is the last thing published on Ctrl-C and SIGTERM; the exit is clean, and a second Ctrl-C changes nothing."""
+    blocks = world.blocks()
+    world.machine(Integrator())
+    process = world.start(MODULE, {"watchdog": 2.0, "ramp": 0.2, "lockstep": lockstep})
+    activate(world)
+    assert world.until(lambda: len(blocks) > 20 and moving(blocks))
+    process.send(number)
+    world.spin(0.15)
+    process.send(signal.SIGINT)
+    assert world.until(lambda: process.process.poll() is not None, 40.0)
+    world.spin(0.2)
+    assert process.wait() == 0
+    assert not blocks[-1].values.any()
+    fading = np.concatenate([block.values for block in blocks])
+    assert np.abs(np.diff(fading[-400:], axis=0)).max() < 1.5  # no step to zero: the noise itself changes by less
+    assert "Traceback" not in process.output() and "Error" not in process.output()
+
+
+@needs_ros
+def test_positions_that_stop_trip_the_watchdog(world: World) -> None:
+    """Encoder watchdog: ramp to zero, go inactive, say why in the log and in the metrics."""
+    blocks, statuses = world.blocks(), world.statuses()
+    world.machine(Integrator(blocks=60))
+    process = world.start(MODULE, {"watchdog": 0.3, "ramp": 0.0})
+    activate(world)
+    assert world.until(lambda: "no position from the machine for 300 ms" in process.output())
+    assert world.until(lambda: world.state("excitation") == "inactive", 2)
+    assert not blocks[-1].values.any() and moving(blocks[:50])
+    assert world.until(lambda: any("no position" in status.message for status in statuses), 2)
+    last = statuses[-1]
+    assert last.name == "excitation" and last.level == b"\x02"
+    assert {"state", "reason", "blocks_late", "x.rms", "y.clipped"} <= {pair.key for pair in last.values}
+
+
+@needs_ros
+def test_a_machine_that_never_answers_is_named(world: World) -> None:
+    """When the machine never answers: says so, at 0 V, and goes inactive."""
+    blocks = world.blocks()
+    process = world.start(MODULE, {"patience": 0.4, "lockstep": True})
+    activate(world)
+    assert world.until(lambda: "no answer from the machine for 0.4 s" in process.output())
+    assert world.state("excitation") == "inactive"
+    assert blocks and not any(block.values.any() for block in blocks)
+    process.send(signal.SIGINT)
+    assert process.wait() == 0
+
+
+@needs_ros
+def test_lockstep_is_bit_for_bit_what_the_drive_makes_of_the_positions(world: World) -> None:
+    """Lockstep: block k goes out on the answer to block k - ahead and uses exactly that position; duration ends it."""
+    blocks, machine = world.blocks(), Integrator()
+    world.machine(machine)
+    process = world.start(MODULE, {**LOCKSTEP, "ahead": 2, "duration": 3.0, "autostart": True, "x.centring": 5.0})
+    assert world.until(lambda: "the duration of 3 s is over" in process.output(), 20)
+    world.spin(0.2)
+    axes = {"x": AxisExcitation(seed=1, centring=5.0), "y": AxisExcitation(seed=2)}
+    drive = Drive(ExcitationSettings(axes=axes, lockstep=True, speed=0.0, ramp=0.05, ahead=2, duration=3.0))
+    drive.start()
+    twin = Integrator()
+    answers: list[Block] = []
+    expected: list[Block] = []
+    while drive.state != "stopped":
+        if len(answers) >= 2:
+            drive.see(answers[-2])
+        expected.append(drive.next(20))
+        answer = twin(expected[-1])
+        assert answer is not None
+        answers.append(answer)
+    assert len(blocks) == len(expected) > 300
+    begun = blocks[0].time[0]
+    assert abs(time.time() - begun) < 60.0, "not ROS time"
+    for mine, heard in zip(expected, blocks, strict=True):
+        assert np.array_equal(mine.seq, heard.seq) and np.array_equal(mine.values, heard.values)
+        assert np.allclose(heard.time - begun, mine.time, rtol=0.0, atol=1e-6)
+    assert not blocks[-1].values.any()
+
+
+@needs_ros
+@pytest.mark.parametrize("where", ["Drive.tick", "Drive.next"])
+def test_an_error_of_its_own_ends_at_zero_volts(world: World, where: str) -> None:
+    """Zero volts is the last thing published on an error, even one in the very place that makes the voltage; it is not hidden."""
+    blocks = world.blocks()
+    world.machine(Integrator())
+    code = f"""
+import sys, itertools
+from xy_sysid.excitation.drive import Drive
+count, honest = itertools.count(), {where}
+def failing(self, argument):
+    if next(count) > 60:
+        raise RuntimeError("a bug")
+    return honest(self, argument)
+{where} = failing
+from xy_sysid.nodes.excitation import main
+sys.exit(main())
+"""
+    process = world.start(code, {**LOCKSTEP, "speed": 1.0, "autostart": True})
+    assert world.until(lambda: process.process.poll() is not None, 40.0)
+    world.spin(0.3)
+    assert process.wait() == 1 and "RuntimeError: a bug" in process.output()
+    assert any(block.values.any() for block in blocks) and not blocks[-1].values.any()
+
+
+@needs_ros
+@pytest.mark.parametrize("number", [1, 2, 5, 99])
+def test_a_transition_that_is_not_allowed_is_refused_and_ends_nothing(world: World, number: int) -> None:
+    """configure (1) or cleanup (2) of one that drives, by number as other tools ask for it: refused, and it drives on; it ended the node."""
+    from lifecycle_msgs.msg import Transition
+    from lifecycle_msgs.srv import ChangeState
+
+    blocks = world.blocks()
+    world.machine(Integrator())
+    node = world.start(MODULE, {"watchdog": 2.0, "ramp": 0.0})
+    activate(world)
+    assert world.until(lambda: len(blocks) > 10 and moving(blocks))
+    answer = world.call(ChangeState, "/xy/excitation/change_state", ChangeState.Request(transition=Transition(id=number)))
+    assert not answer.success
+    sent = len(blocks)
+    assert world.until(lambda: len(blocks) > sent + 10 and moving(blocks)) and world.state("excitation") == "active"
+    assert "could not be dealt with" in node.output() and "Traceback" not in node.output()
+
+
+@needs_ros
+def test_real_time_is_kept_without_drift(world: World) -> None:
+    """Block k is due at t0 + k * block / rate: two seconds are 200 blocks, in order and without gaps."""
+    blocks = world.blocks()
+    world.machine(Integrator())
+    world.start(MODULE, {"watchdog": 2.0, "autostart": True})
+    assert world.until(lambda: len(blocks) >= 50, 40.0)
+    before = len(blocks)
+    world.spin(2.0)
+    seq = np.concatenate([block.seq for block in blocks])
+    lost = (seq[-1] - seq[0] + 1) / 20 - len(blocks)
+    assert 190 <= len(blocks) - before + lost <= 210
+    assert (np.diff(seq) > 0).all() and lost < 100
+
+
+@needs_ros
+def test_parameters_change_live_or_are_refused_with_a_sentence(world: World) -> None:
+    """rms and limits live; the rest only while inactive; limits and spelling are checked."""
+    blocks = world.blocks()
+    world.machine(Integrator())
+    process = world.start(MODULE, {**LOCKSTEP, "speed": 1.0, "ahead": 1})
+    assert world.set_parameter("excitation", "x.kind", "multisine") == (True, "")
+    activate(world)
+    assert world.until(lambda: len(blocks) > 20 and moving(blocks))
+    assert world.set_parameter("excitation", "y.rms", 0.0) == (True, "")
+    world.spin(0.2)
+    assert not blocks[-1].values[:, 1].any() or np.abs(blocks[-1].values[:, 1]).max() < 0.05  # centring only
+    for name, value, words in (
+        ("x.kind", "noise", "Deactivate first"),
+        ("x.rms", -1.0, ""),
+        ("x.kind", "noyse", "noise"),
+        ("rate", 500.0, "Deactivate"),
+    ):
+        changed, reason = world.set_parameter("excitation", name, value)
+        assert not changed and words in reason and reason and "\n" not in reason
+    assert "Traceback" not in process.output()
+
+
+@needs_ros
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("x.rmss", 1.0, "Did you mean 'x.rms'?"),
+        ("x.rms", -1.0, "x.rms is -1.0"),
+        ("axes", "x", 'list of names like ["x", "y"]'),
+        ("x.rms", "{", "Couldn't parse"),
+    ],
+)
+def test_a_wrong_parameter_is_one_line_and_exit_code_2(world: World, name: str, value: object, words: str) -> None:
+    """Unknown names give the nearest spelling, values what is allowed; no traceback."""
+    process = world.start(MODULE, {name: value})
+    assert process.wait() == 2
+    lines = [line for line in process.output().splitlines() if "[rcl]" not in line]
+    assert len(lines) == 1 and words in lines[0]
+
+
+@needs_ros
+def test_axes_can_be_named_and_a_signal_that_does_not_fit_is_refused(world: World) -> None:
+    """Axes come from the parameter `axes`; configure fails with a sentence when a signal does not fit the rate."""
+    blocks = world.blocks()
+    process = world.start(MODULE, {"axes": '["a"]', "a.high": 900, "rate": 1000.0})
+    assert not world.transition("excitation", "configure")
+    assert "below half the rate, 500 Hz" in process.output()
+    assert world.set_parameter("excitation", "a.high", 400.0) == (True, "")
+    activate(world)
+    assert world.until(lambda: len(blocks) > 2)
+    assert blocks[0].axes == ("a",) and not any(block.values.any() for block in blocks)
+    process.send(signal.SIGTERM)
+    assert process.wait() == 0
+
+
+@needs_ros
+def test_broken_positions_do_not_crash_it(world: World) -> None:
+    """NaN, wrong columns and wrong sizes count as no position."""
+    from std_msgs.msg import Float64MultiArray
+
+    from xy_sysid.nodes.common import DATA_QOS, to_message
+
+    publisher = world.node.create_publisher(Float64MultiArray, "position", DATA_QOS)
+    process = world.start(MODULE, {"patience": 1.0})
+    blocks = world.blocks()
+    activate(world)
+    one = np.array([5.0])
+    broken = [
+        Float64MultiArray(),
+        to_message(Block(("x", "q"), one, one, np.zeros((1, 2)))),
+        to_message(Block(("x", "y"), one, one, np.array([[np.nan, 0]]))),
+    ]
+    broken.append(to_message(Block(("x", "y"), one * np.nan, one, np.array([[0.0, 0]]))))
+    for _ in range(5):
+        for message in broken:
+            publisher.publish(message)
+        world.spin(0.1)
+    assert world.until(lambda: "no answer from the machine" in process.output(), 5)
+    assert "not usable" in process.output() and "layout.dim" in process.output() and "Traceback" not in process.output()
+    assert blocks and not any(block.values.any() for block in blocks)
+
+
+def test_without_ros_it_says_in_one_line_what_to_install() -> None:
+    """An extra [ros] brings the wheels; without it a node says in one line what to install."""
+    code = "import sys; sys.modules['rclpy'] = None; from xy_sysid.nodes.excitation import main; sys.exit(main())"
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=30, check=False)
+    assert done.returncode == 2 and done.stdout == ""
+    assert done.stderr.splitlines() == ["ROS 2 (rclpy) is not installed. Install it with: pip install 'xy_sysid[ros]'"]

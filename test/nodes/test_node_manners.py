@@ -1,0 +1,193 @@
+"""What ROS expects of a node: quality of service that is obeyed, diagnostics that name it, descriptors, namespaces, remapped topics, a clock."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from helpers import ROOT
+from helpers.cli_tools import bare
+from helpers.live_nodes import FAST, newest
+from helpers.ros_tools import Integrator, World, needs_ros, world_in
+
+pytestmark = needs_ros
+
+EXCITATION, IDENTIFIER, DIAGNOSER = (f"xy_sysid.nodes.{name}" for name in ("excitation", "identifier", "diagnoser"))
+BALLSCREW = "xy_sim.node"
+QUICK: dict[str, Any] = {"length": 512, "refit": 2.0, "reorder": 0.2, "numerator_order": 0, "denominator_order": 2}
+
+
+@pytest.fixture
+def world(tmp_path: Path) -> Iterator[World]:
+    with world_in(tmp_path) as made:
+        yield made
+
+
+def test_qos_overrides_of_publishers_are_obeyed(world: World) -> None:
+    """Metrics that are latched by a parameter reach who comes late, as many as the depth says; the graph shows the same."""
+    from diagnostic_msgs.msg import DiagnosticArray
+    from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+    topic = "qos_overrides./xy/metrics.publisher"
+    node = world.start(IDENTIFIER, {**QUICK, f"{topic}.durability": "transient_local", f"{topic}.depth": 2})
+    first = world.statuses()
+    assert world.until(lambda: len([one for one in first if one.name == "streams"]) >= 4, 40.0), node.output()
+    (offer,) = world.node.get_publishers_info_by_topic("/xy/metrics")
+    assert offer.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
+    late: list[Any] = []
+    quality = QoSProfile(depth=50, durability=DurabilityPolicy.TRANSIENT_LOCAL, reliability=ReliabilityPolicy.RELIABLE)
+    known = world.node.get_clock().now()
+    world.node.create_subscription(DiagnosticArray, "metrics", late.append, quality)
+    assert world.until(lambda: len(late) > 2)
+    old = [one for one in late if one.header.stamp.sec + 1e-9 * one.header.stamp.nanosec < 1e-9 * known.nanoseconds]
+    assert len(old) == 2
+
+
+def test_qos_overrides_of_subscriptions_are_obeyed_and_not_overruled(world: World) -> None:
+    """A user who wants best effort gets it, although the publisher offers more."""
+    from rclpy.qos import ReliabilityPolicy
+    from std_msgs.msg import Float64MultiArray
+
+    from xy_sysid.nodes.common import DATA_QOS
+
+    world.node.create_publisher(Float64MultiArray, "position", DATA_QOS)
+    world.node.create_publisher(Float64MultiArray, "voltage", DATA_QOS)
+    world.start(IDENTIFIER, {**QUICK, "qos_overrides./xy/position.subscription.reliability": "best_effort"})
+    statuses = world.statuses()
+    assert world.until(lambda: bool(newest(statuses, "streams")), 40.0)
+    heard = {topic: world.node.get_subscriptions_info_by_topic(f"/xy/{topic}") for topic in ("position", "voltage")}
+    found = {topic: {item.qos_profile.reliability for item in items} for topic, items in heard.items()}
+    assert found == {"position": {ReliabilityPolicy.BEST_EFFORT}, "voltage": {ReliabilityPolicy.RELIABLE}}
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("voltage.publisher.reliability", "loudly", "reliable, best_effort"),
+        ("voltage.publisher.depth", "0", "1 to 1000000"),
+        ("position.subscription.colour", "red", "history, depth, reliability, durability"),
+    ],
+)
+def test_a_wrong_override_is_one_line(name: str, value: str, words: str) -> None:
+    """Name, value, what is allowed; exit code 2."""
+    command = [sys.executable, "-m", EXCITATION, "--ros-args", "-p", f"qos_overrides./xy/{name}:={value}"]
+    said = subprocess.run(command, capture_output=True, text=True, env=bare(), timeout=60, check=False, cwd=ROOT)
+    lines = [line for line in said.stderr.splitlines() if "bringing up" not in line]
+    assert said.returncode == 2 and len(lines) == 1 and name in lines[0] and words in lines[0], said.stderr
+
+
+def test_two_tables_in_two_namespaces_are_told_apart(world: World) -> None:
+    """Each is driven by its own excitation alone, and on /diagnostics each name and hardware is there once."""
+    from diagnostic_msgs.msg import DiagnosticArray
+
+    heard: dict[str, Any] = {}
+
+    def on(message: Any) -> None:
+        heard.update({one.name: one for one in message.status})
+
+    def streams(space: str) -> int:
+        return int(next(pair.value for pair in heard[f"{space}/identifier: streams"].values if pair.key == "samples paired"))
+
+    world.node.create_subscription(DiagnosticArray, "/diagnostics", on, 100)
+    for space in ("/left", "/right"):
+        where = ["-r", f"__ns:={space}"]
+        world.start(BALLSCREW, {"machine": "rigid.yaml"}, arguments=where)
+        world.start(IDENTIFIER, QUICK, arguments=where)
+    world.start(EXCITATION, {**FAST, "autostart": True}, arguments=["-r", "__ns:=/left"])
+    names = {f"{space}/{name}" for space in ("left", "right") for name in ("ballscrew", "identifier: streams")}
+    names |= {"left/excitation", "left/identifier: axis x"}
+    assert world.until(lambda: names <= set(heard) and streams("left") > 0, 60.0), sorted(heard)
+    assert {one.hardware_id for one in heard.values()} == {"left", "right"}
+    assert all(one.level in (b"\x00", b"\x01", b"\x02") for one in heard.values())  # STALE is the aggregator's word
+    assert streams("right") == 0
+
+
+def test_topics_that_are_remapped_go_on_working(world: World) -> None:
+    """As SetRemap of a launch file writes it: every node under other names, and the effect is the same."""
+    names = ["-r", "voltage:=drive/u", "-r", "position:=drive/y", "-r", "metrics:=told"]
+    statuses = world.statuses("told")
+    world.start(BALLSCREW, {"machine": "rigid.yaml"}, arguments=names)
+    world.start(IDENTIFIER, QUICK, arguments=names)
+    world.start(EXCITATION, {**FAST, "autostart": True, "renamed": True}, arguments=names)
+    assert world.until(lambda: int(newest(statuses, "axis x").get("windows", "0")) > 20, 60.0)
+    assert float(newest(statuses, "axis x")["relative error (1)"]) < 0.05
+    assert world.node.count_publishers("/xy/voltage") == 0
+
+
+def test_with_use_sim_time_samples_are_stamped_by_the_clock_topic(world: World) -> None:
+    """Real processes: the excitation's samples and the identifier's diagnostics stand in the time of /clock, and drive on while it runs."""
+    from builtin_interfaces.msg import Time
+    from rosgraph_msgs.msg import Clock
+
+    begun = 5000
+    clock = world.node.create_publisher(Clock, "/clock", 10)
+    now = [0]
+
+    def tick() -> None:
+        now[0] += 20
+        clock.publish(Clock(clock=Time(sec=begun + now[0] // 1000, nanosec=now[0] % 1000 * 1_000_000)))
+
+    world.node.create_timer(0.02, tick)
+    world.machine(Integrator())
+    blocks, statuses = world.blocks(), world.statuses()
+    world.start(IDENTIFIER, {**QUICK, "use_sim_time": True})
+    world.start(EXCITATION, {"use_sim_time": True, "autostart": True, "duration": 3.0, "watchdog": 5.0})
+    assert world.until(lambda: newest(statuses, "excitation").get("state") == "stopped", 60.0)
+    assert begun < blocks[0].time[0] < begun + now[0] / 1000
+    assert world.until(lambda: int(newest(statuses, "streams").get("samples paired", "0")) > 4000)
+
+
+def test_descriptors_say_what_may_be_set(world: World) -> None:
+    """Choices as additional constraints, numbers with ranges, and what is fixed for a running node as read only."""
+    from rcl_interfaces.srv import DescribeParameters
+
+    world.start(IDENTIFIER, QUICK)
+    world.start(EXCITATION)
+    names = {"identifier": ["source", "window", "overlap", "axes", "input_unit"], "excitation": ["x.kind", "x.rms", "output", "rate", "axes"]}
+    found: dict[str, Any] = {}
+    for node, asked in names.items():
+        answer = world.call(DescribeParameters, f"/xy/{node}/describe_parameters", DescribeParameters.Request(names=asked), 40.0)
+        found |= {f"{node} {item.name}": item for item in answer.descriptors}
+    assert found["identifier source"].additional_constraints == "one of blocks, joint_state" and found["identifier source"].read_only
+    assert found["identifier input_unit"].read_only and found["identifier axes"].read_only and found["excitation axes"].read_only
+    assert found["excitation output"].read_only and "one of blocks, commands" in found["excitation output"].additional_constraints
+    assert "multisine" in found["excitation x.kind"].additional_constraints and not found["excitation x.kind"].read_only
+    assert found["excitation x.rms"].floating_point_range[0].to_value == 100.0
+    assert found["identifier overlap"].floating_point_range and all(item.description for item in found.values())
+
+
+def test_a_lifecycle_manager_takes_it_through_all_states_and_back(world: World) -> None:
+    """As nav2's manager does, without a bond: configure, activate, deactivate, cleanup, and once more, then shutdown."""
+    world.machine(Integrator())
+    process = world.start(EXCITATION)
+    for _ in range(2):
+        assert [world.transition("excitation", label) for label in ("configure", "activate", "deactivate", "cleanup")] == [True] * 4
+    assert world.state("excitation") == "unconfigured"
+    assert world.transition("excitation", "shutdown")
+    assert "Traceback" not in process.output()
+
+
+@pytest.mark.parametrize("module", [EXCITATION, IDENTIFIER, DIAGNOSER, BALLSCREW])
+def test_every_node_says_when_it_is_ready(world: World, module: str) -> None:
+    """One line, after everything is compiled and subscribed: what a launch file can wait for."""
+    node = world.start(module)
+    assert world.until(lambda: "]: ready" in node.output(), 60.0), node.output()
+    assert world.until(lambda: world.node.count_publishers("/xy/metrics") == 1)
+
+
+def test_an_excitation_that_starts_by_itself_waits_for_the_machine_however_long_it_takes(world: World) -> None:
+    """A machine that is there and silent for longer than patience is no end: it begins anew until the machine answers."""
+    machine = Integrator()
+    machine.alive = False
+    world.machine(machine)
+    statuses, blocks = world.statuses(), world.blocks()
+    node = world.start(EXCITATION, {"autostart": True, "patience": 0.5, "duration": 1.0})
+    assert world.until(lambda: node.output().count("begins anew") >= 1, 40.0), node.output()
+    assert not any(block.values.any() for block in blocks)
+    machine.alive = True
+    assert world.until(lambda: any(block.values.any() for block in blocks), 20.0), node.output()
+    assert world.until(lambda: newest(statuses, "excitation").get("reason", "").startswith("the duration")), newest(statuses, "excitation")

@@ -1,0 +1,148 @@
+"""Real processes over DDS: what happens to the machine when the excitation is killed, doubled, or its clock is taken away."""
+
+from __future__ import annotations
+
+import json
+import signal
+import time
+import urllib.request
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers.browser_tools import Server
+from helpers.busy import allowed
+from helpers.ros_tools import Integrator, World, needs_ros, world_in
+
+from xy_sysid.samples.block import Block
+
+pytestmark = needs_ros
+EXCITATION, MACHINE = "xy_sysid.nodes.excitation", "xy_sim.node"
+PUSH = {"x.kind": '"off"', "x.offset": 1.0, "x.centring": 0.0, "y.kind": '"off"', "y.centring": 0.0, "ramp": 0.05, "watchdog": 1.0}
+
+
+@pytest.fixture
+def world(tmp_path: Path) -> Iterator[World]:
+    with world_in(tmp_path) as made:
+        yield made
+
+
+def activate(world: World, node: str = "excitation") -> None:
+    assert world.transition(node, "configure")
+    assert world.transition(node, "activate")
+
+
+@pytest.mark.parametrize("watchdog", [0.05, 0.0])
+def test_kill_9_of_the_excitation_is_what_the_drive_makes_of_it(world: World, watchdog: float) -> None:
+    """Killed at 1 V: a drive with a watchdog lets the axis rest within 50 ms and 30 mm; one without runs into the end stop."""
+    positions, statuses = world.blocks("position"), world.statuses()
+    world.start(MACHINE, {"machine": "rigid.yaml", "realtime": True, "watchdog": watchdog})
+    process = world.start(EXCITATION, PUSH)
+    activate(world)
+
+    def place() -> float:
+        return float(positions[-1].values[-1, 0]) if positions else 0.0
+
+    assert world.until(lambda: place() > 0.005, 20.0)
+    process.send(signal.SIGKILL)
+    killed = place()
+    if watchdog > 0:
+        assert world.until(lambda: any("the drive went to 0 V" in status.message for status in statuses), 3.0)
+        rest = place()
+        world.spin(0.5)
+        assert abs(place() - rest) < 1e-4 and place() - killed < 0.03 and place() < 0.14
+    else:
+        assert world.until(lambda: place() > 0.149, 5.0)
+    seq = np.concatenate([block.seq for block in positions])
+    assert (np.diff(seq) == 1).all()  # the encoder went on reporting
+
+
+def test_guards_do_not_sleep_when_the_clock_is_taken_away(world: World) -> None:
+    """use_sim_time is set while it drives, and nobody publishes a clock: voltage goes on, and the watchdog still sees a silent machine."""
+    blocks, machine = world.blocks(), Integrator()
+    world.machine(machine)
+    process = world.start(EXCITATION, {"watchdog": 0.5, "ramp": 0.0})
+    activate(world)
+    assert world.until(lambda: len(blocks) > 10 and bool(blocks[-1].values.any()))
+    assert world.set_parameter("excitation", "use_sim_time", True) == (True, "")
+    sent = len(blocks)
+    assert world.until(lambda: len(blocks) > sent + 20 and bool(blocks[-1].values.any()))
+    machine.alive, silent = False, time.monotonic()
+    assert world.until(lambda: "no position from the machine for 500 ms" in process.output(), 5.0)
+    assert time.monotonic() - silent < allowed(4.0)
+    assert world.until(lambda: not blocks[-1].values.any(), 1.0) and world.state("excitation") == "inactive"
+
+
+def test_two_excitations_never_drive_one_machine(world: World) -> None:
+    """A second one that appears stops the first, with its name; and activate of either is refused while the other is there."""
+    blocks, statuses = world.blocks(), world.statuses()
+    world.machine(Integrator())
+    first = world.start(EXCITATION, {"watchdog": 2.0, "ramp": 0.0})
+    activate(world)
+    assert world.until(lambda: len(blocks) > 10 and bool(blocks[-1].values.any()))
+    second = world.start(EXCITATION, {"watchdog": 2.0}, arguments=["-r", "__node:=other"])
+    assert world.until(lambda: "/xy/other publishes /xy/voltage, too: two must not drive one machine" in first.output(), 20.0), first.output()
+    assert world.until(lambda: not blocks[-1].values.any(), 1.0) and world.state("excitation") == "inactive"
+    for node, process, name in (("other", second, "/xy/excitation"), ("excitation", first, "/xy/other")):
+        if node == "other":
+            assert world.transition(node, "configure")
+        assert not world.transition(node, "activate")
+        assert f"{name} publishes /xy/voltage, too: no activate beside it" in process.output()
+    assert world.until(lambda: any("no activate beside it" in status.message for status in statuses), 2.0)
+    second.send(signal.SIGTERM)
+    assert second.wait() == 0
+    assert world.until(lambda: world.transition("excitation", "activate"), 10.0)
+
+
+def test_an_encoder_that_freezes_is_told_and_ends_at_zero_volts(world: World) -> None:
+    """Frozen while driven, over DDS: zero volts, inactive, status ERROR with the reason."""
+    blocks, statuses, machine = world.blocks(), world.statuses(), Integrator()
+
+    def answer(block: Block) -> Block | None:
+        true = machine(block)
+        assert true is not None
+        frozen = np.tile(true.values[:1] if len(blocks) < 100 else np.array([[0.01, 0.01]]), (len(block), 1))
+        return Block(block.axes, block.seq, block.time, true.values if len(blocks) < 100 else frozen)
+
+    world.machine(answer)
+    process = world.start(EXCITATION, {**PUSH, "x.offset": 2.0})
+    activate(world)
+    assert world.until(lambda: "inactive: x: the position " in process.output(), 20.0), process.output()
+    assert world.until(lambda: world.state("excitation") == "inactive", 3.0) and not blocks[-1].values.any()
+    assert world.until(lambda: any(status.level == b"\x02" and status.message.startswith("x: the position ") for status in statuses), 3.0)
+
+
+def test_post_stop_is_answered_from_the_machines_state(world: World, tmp_path: Path) -> None:
+    """The page's server: no 'stopped' while nobody has confirmed it, and with an excitation zero volts and its own word."""
+    from std_msgs.msg import Bool
+
+    blocks = world.blocks()
+    server = Server(tmp_path, ROS_DOMAIN_ID=str(world.domain), ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST")
+    try:
+
+        def post() -> dict[str, object]:
+            request = urllib.request.Request(f"{server.address}stop", method="POST", headers={"X-Requested-With": "xy_sysid"})
+            with urllib.request.urlopen(request, timeout=80.0) as answer:
+                found: dict[str, object] = json.load(answer)
+                return found
+
+        nobody = post()
+        assert nobody["asked"] is True and nobody["stopped"] is False and "emergency stop" in str(nobody["words"])
+        world.machine(Integrator())
+        process = world.start(EXCITATION, {"watchdog": 2.0, "ramp": 0.0})
+        assert world.transition("excitation", "configure")
+        assert world.until(lambda: "STOP is on" in process.output(), 10.0)  # still on, from before the excitation was there
+        release = world.node.create_publisher(Bool, "stop", 10)
+        assert world.until(lambda: release.get_subscription_count() > 0)
+        release.publish(Bool(data=False))
+        assert world.until(lambda: "STOP is released" in process.output(), 5.0) and world.transition("excitation", "activate")
+        assert world.until(lambda: len(blocks) > 10 and bool(blocks[-1].values.any()))
+        with ThreadPoolExecutor() as pool:
+            asked = pool.submit(post)
+            assert world.until(asked.done, 20.0)
+        assert asked.result()["stopped"] is True and world.state("excitation") == "inactive"
+        assert not blocks[-1].values.any()
+    finally:
+        server.end()

@@ -1,0 +1,52 @@
+"""Which column is what: what is chosen on the page becomes what a command would have been told."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from xy_sysid.errors import BadInput
+from xy_sysid.imports import load
+from xy_sysid.imports.listing import listing
+from xy_sysid.page.columns_dialog import AxisColumns, guesses, reading_of
+from xy_sysid.page.orders import Reading
+
+
+def test_what_is_chosen_reads_the_file_and_is_the_same_in_words(tmp_path: Path) -> None:
+    """Two axes of a table whose names tell nothing, one in mm; the command's words are those of --map, --unit and --rate."""
+    rng = np.random.default_rng(1)
+    table = np.column_stack([rng.normal(size=(3000, 2)), np.cumsum(rng.normal(size=(3000, 2)), axis=0)])
+    np.savetxt(tmp_path / "a.csv", table, "%.9g", ",", header="p,q,r,s", comments="")
+    axes = [AxisColumns("x", "p", "r", "V", "mm"), AxisColumns("y", "q", "s", "", "mm")]
+    made = reading_of("", 500.0, axes, Reading(words=("--effects", "mine.py")))
+    found = load(tmp_path / "a.csv", **made.load)
+    assert found.axes == ("x", "y") and found.sampling_rate == 500.0
+    assert np.allclose(np.ptp(found.position[:, 0]), 1e-3 * np.ptp(table[:, 2]))
+    assert made.words[:4] == ("--effects", "mine.py", "--map", "x.input=p")
+    assert made.words[-2:] == ("--rate", "500") and "y.output=mm" in made.words
+
+
+def test_names_that_tell_are_chosen_already(tmp_path: Path) -> None:
+    """Time in ms, a voltage and a position: nothing is left to choose; units are no part of a name."""
+    rows = np.column_stack((np.arange(400) / 1e3, np.sin(np.arange(400.0)), np.cos(np.arange(400.0))))
+    np.savetxt(tmp_path / "a.csv", rows, "%.9g", ",", header="Time,Motor Voltage (V),Encoder Pos", comments="")
+    time, (axis,) = guesses(listing(tmp_path / "a.csv"))
+    assert (time, axis.input, axis.output) == ("Time", "Motor Voltage", "Encoder Pos")
+
+
+@pytest.mark.parametrize(
+    ("time", "rate", "axes", "words"),
+    [
+        ("", None, [AxisColumns("x", "p", "q")], "a column, or a rate"),
+        ("t", None, [AxisColumns("x", "p", "")], "output of x is not chosen"),
+        ("t", None, [AxisColumns("x", "p", "q"), AxisColumns("x", "r", "s")], "none twice"),
+        ("t", None, [], "a name for each"),
+        ("t", -5.0, [AxisColumns("x", "p", "q")], "> 0 Hz"),
+    ],
+)
+def test_what_is_not_chosen_is_named(time: str, rate: float | None, axes: list[AxisColumns], words: str) -> None:
+    """One line with the value, what is allowed and what to do."""
+    with pytest.raises(BadInput, match=words):
+        reading_of(time, rate, axes, Reading())

@@ -1,0 +1,158 @@
+"""Who may open the page: host, origin, token; judged as values, and before an application."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+import pytest
+
+from xy_sysid.page.access import COOKIE, LARGEST, Access, cookie_of, is_loopback, judge, name_of, rules, same_origin
+from xy_sysid.page.guard import Guard
+
+HERE = {"host": "127.0.0.1:8080"}
+
+
+@pytest.mark.parametrize("host", ["localhost:8080", "127.0.0.1:8080", "[::1]:8080", "LOCALHOST"])
+def test_this_machine_may_come_in_by_its_names(host: str) -> None:
+    """On loopback nothing more is asked."""
+    assert judge(rules("127.0.0.1"), {"host": host}, "").status == 200
+
+
+@pytest.mark.parametrize(
+    "host", ["evil.example:8080", "127.0.0.1.evil.example", "", "localhost.evil.example", "[::1", "192.168.0.7:8080", "a@localhost.b"]
+)
+def test_a_name_that_was_made_to_point_here_is_refused(host: str) -> None:
+    """DNS rebinding: the name in the request is not one of this machine."""
+    answer = judge(rules("127.0.0.1"), {"host": host}, "")
+    assert answer.status == 403 and "does not answer" in answer.words
+
+
+@pytest.mark.parametrize(
+    "origin", ["http://evil.example", "https://127.0.0.1.evil.example", "http://127.0.0.1:9999", "null", "http://localhost:8080", "file://", "x"]
+)
+def test_a_foreign_origin_is_refused(origin: str) -> None:
+    """Other pages, other ports and sandboxes may not give orders, whatever else they know."""
+    for access in (rules("127.0.0.1"), rules("0.0.0.0", "secret")):
+        answer = judge(access, {**HERE, "origin": origin, "cookie": f"{COOKIE}=secret"}, "")
+        assert answer.status == 403 and "refused" in answer.words
+    assert not same_origin(origin, HERE["host"])
+
+
+def test_the_page_s_own_origin_is_let_through() -> None:
+    """Scheme http, same name, same port."""
+    assert judge(rules("127.0.0.1"), {**HERE, "origin": "http://127.0.0.1:8080"}, "").status == 200
+
+
+def test_a_cross_site_request_without_an_origin_is_refused_but_a_link_may_be_followed() -> None:
+    """Images and scripts of other sites are refused; clicking a link to the page is not."""
+    assert judge(rules("127.0.0.1"), {**HERE, "sec-fetch-site": "cross-site", "sec-fetch-mode": "no-cors"}, "").status == 403
+    assert judge(rules("127.0.0.1"), {**HERE, "sec-fetch-site": "cross-site", "sec-fetch-mode": "navigate"}, "").status == 200
+
+
+@pytest.mark.parametrize(
+    ("host", "here"), [("127.0.0.1", True), ("127.8.0.1", True), ("::1", True), ("localhost", True), ("0.0.0.0", False), ("::", False), ("x", False)]
+)
+def test_only_loopback_goes_without_a_token(host: str, here: bool) -> None:
+    """Any other address to listen on gets a token that cannot be guessed."""
+    assert is_loopback(host) is here
+    access = rules(host)
+    assert bool(access.token) is not here
+    assert here or (len(access.token) >= 32 and access.token != rules(host).token)
+
+
+def test_a_token_in_the_address_becomes_a_cookie_and_leaves_the_address() -> None:
+    """Right token: a cookie, and on to the plain address. Wrong or none: 401 in words."""
+    access = Access("secret", ())
+    entered = judge(access, {"host": "machine:8080"}, "token=secret&x=1")
+    assert (entered.status, entered.cookie, entered.to) == (303, "secret", "/")
+    assert judge(access, {"host": "machine:8080", "cookie": f"a=b; {COOKIE}=secret"}, "").status == 200
+    for headers, query in (({}, ""), ({}, "token=secre"), ({"cookie": f"{COOKIE}=secre"}, ""), ({"cookie": "\x00=;;"}, ""), ({}, "token=")):
+        answer = judge(access, {"host": "machine:8080", **headers}, query)
+        assert answer.status == 401 and "token" in answer.words.lower()
+
+
+@pytest.mark.parametrize("length", ["1048577", "99999999999999999999", "-1", "1e3", "", "abc", "10, 20", "\u0663"])
+def test_a_body_that_is_too_large_or_has_no_honest_length_is_refused(length: str) -> None:
+    """Before a byte of it is read: 413, in words; what fits is let through."""
+    answer = judge(rules("127.0.0.1"), {**HERE, "content-length": length}, "")
+    assert answer.status == 413 and str(LARGEST) in answer.words
+    assert judge(rules("127.0.0.1"), {**HERE, "content-length": str(LARGEST)}, "").status == 200
+
+
+def test_a_body_without_a_length_ends_where_it_becomes_too_large() -> None:
+    """Chunk after chunk without end: the application hears that the other side has gone, and no more of it."""
+    taken: list[int] = []
+
+    async def application(scope: Any, receive: Any, send: Any) -> None:
+        while (message := await receive())["type"] == "http.request":
+            taken.append(len(message["body"]))
+
+    async def endless() -> dict[str, Any]:
+        return {"type": "http.request", "body": bytes(65536), "more_body": True}
+
+    async def nowhere(message: Any) -> None:
+        return None
+
+    scope = {"type": "http", "method": "POST", "path": "/", "query_string": b"", "headers": [(b"host", b"127.0.0.1:8080")]}
+    asyncio.run(asyncio.wait_for(Guard(application, rules("127.0.0.1"))(scope, endless, nowhere), 10.0))
+    assert sum(taken) <= LARGEST
+
+
+def test_odd_headers_do_not_break_it() -> None:
+    """Broken names and cookies are no names and no cookies."""
+    assert name_of("[[[") == "" and cookie_of("=;=\xff;") == "" and name_of("Host:notaport") == "host"
+
+
+async def _application(scope: Any, receive: Any, send: Any) -> None:
+    if scope["type"] == "websocket":
+        await send({"type": "websocket.accept"})
+        return
+    await send({"type": "http.response.start", "status": 200, "headers": []})
+    await send({"type": "http.response.body", "body": b"inside"})
+
+
+def ask(access: Access, path: str = "/", kind: str = "http", query: str = "", **headers: str) -> tuple[dict[str, Any], dict[str, str], str]:
+    """The first message, headers and body with which a guarded application answers."""
+    given = {"host": "127.0.0.1:8080", **{name.replace("_", "-"): value for name, value in headers.items()}}
+    scope = {
+        "type": kind,
+        "path": path,
+        "query_string": query.encode(),
+        "headers": [(name.encode(), value.encode()) for name, value in given.items()],
+    }
+    sent: list[dict[str, Any]] = []
+
+    async def receive() -> dict[str, Any]:
+        return {"type": "websocket.connect"}
+
+    async def send(message: Any) -> None:
+        sent.append(dict(message))
+
+    asyncio.run(Guard(_application, access)(scope, receive, send))
+    told = {name.decode(): value.decode() for name, value in sent[0].get("headers", [])}
+    return sent[0], told, b"".join(message.get("body", b"") for message in sent).decode()
+
+
+def test_the_guard_stands_before_http_and_websockets() -> None:
+    """What is refused never reaches the application; what is let in may not be framed by others."""
+    access = rules("127.0.0.1")
+    first, headers, body = ask(access)
+    assert first["status"] == 200 and body == "inside" and headers["x-frame-options"] == "DENY"
+    assert "frame-ancestors 'none'" in headers["content-security-policy"]
+    first, _, body = ask(access, "/stop", origin="http://evil.example")
+    assert first["status"] == 403 and "inside" not in body
+    assert "<script>" not in ask(access, host="<script>")[2]
+    assert ask(access, kind="websocket", origin="http://127.0.0.1:8080")[0]["type"] == "websocket.accept"
+    refused = ask(access, kind="websocket", origin="http://evil.example")[0]
+    assert refused["type"] == "websocket.close" and refused["code"] == 4403
+
+
+def test_the_guard_sets_a_cookie_out_of_reach_of_scripts() -> None:
+    """HttpOnly and SameSite=Strict, and the redirect never leaves this server."""
+    access = Access("secret", ())
+    assert ask(access)[0]["status"] == 401
+    first, headers, _ = ask(access, "//evil.example/", query="token=secret")
+    assert first["status"] == 303 and headers["location"] == "/"
+    assert "HttpOnly" in headers["set-cookie"] and "SameSite=Strict" in headers["set-cookie"]
+    assert ask(access, cookie=headers["set-cookie"].partition(";")[0])[2] == "inside"

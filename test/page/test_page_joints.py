@@ -1,0 +1,37 @@
+"""The page's state of a joint whose name no topic can have: every topic finds its axis, whatever comes first."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+
+from xy_sysid.live.messages import OK, ArrayMessage, StatusMessage, topic_of
+from xy_sysid.page.topics_state import TopicsState
+
+AXIS = "joint-2"
+
+
+def table(kind: str) -> ArrayMessage:
+    return ArrayMessage(topic_of(kind, AXIS), ("line", "frequency,real,imag,coherence,sigma"), (1, 5), np.ones(5))
+
+
+def test_topics_statuses_and_stories_of_joint_2_are_one_axis() -> None:
+    """Arrays on frf/joint_2 alone are called so as long as nobody says better; with a status or a story they are those of joint-2."""
+    heard = TopicsState()
+    heard.array(table("frf"))
+    assert heard.axes() == ("joint_2",)
+    units = (("input unit", "N m"), ("output unit", "rad"), ("sampling rate (Hz)", "200"))
+    heard.status(StatusMessage(f"axis {AXIS}", OK, "well", units), 1.0)
+    assert heard.axes() == (AXIS,) and heard.table("frf", AXIS) is not None and heard.units(f"axis {AXIS}") == ("N m", "rad")
+    before = heard.version[f"axis {AXIS}"]
+    heard.array(table("comparison"))
+    assert heard.version[f"axis {AXIS}"] == before + 1 and heard.table("comparison", AXIS) is not None
+
+
+def test_a_story_is_kept_under_the_name_that_stands_in_it() -> None:
+    """Not under that of its topic."""
+    heard = TopicsState()
+    assert heard.story("joint_2", json.dumps({"axis": AXIS})) == ""
+    heard.array(table("frf"))
+    assert heard.axes() == (AXIS,) and set(heard.stories) == {AXIS} and f"story {AXIS}" in heard.version

@@ -1,0 +1,210 @@
+"""The live page in a real browser, with real nodes over DDS: curves converge, an effect is found, STOP stops, the lost are named."""
+
+from __future__ import annotations
+
+import functools
+import os
+import sqlite3
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from helpers.browser_tools import Server, Tab, browser, needs_browser
+from helpers.ros_tools import World, needs_ros, world_in
+
+pytestmark = [needs_browser, needs_ros]
+
+SIMULATED = {"lockstep": True, "speed": 2.0, "ramp": 0.05, "abort_ramp": 0.01}
+
+
+class Scene:
+    """A simulated machine with its nodes, a page server, and a tab on it."""
+
+    def __init__(self, world: World, folder: Path, made: Any) -> None:
+        self.world, self.folder = world, folder
+        self.blocks = world.blocks()
+        world.start("xy_sim.node", {"machine": "surprise.yaml"})
+        self.identifier = world.start("xy_sysid.nodes.identifier", {"numerator_order": 0, "denominator_order": 2})
+        world.start("xy_sysid.nodes.diagnoser", {"minimum": 8.0, "memory": 20.0})
+        world.start("xy_sysid.nodes.excitation", SIMULATED)
+        self.server = Server(folder, ROS_DOMAIN_ID=str(world.domain), ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST")
+        self.tab = Tab(made, self.server.address)
+
+    def lifecycle(self, words: str, seconds: float = 15.0) -> None:
+        """Wait until the page says so of the excitation."""
+        self.tab.until(lambda: words in str(self.tab.page.locator("[data-part=lifecycle]").text_content()), seconds, words)
+
+    def drive(self) -> None:
+        """Configure and Activate by clicks, if it does not drive already."""
+        state = str(self.tab.page.locator("[data-part=lifecycle]").text_content())
+        if "driving" in state:
+            return
+        self.tab.until(lambda: all(f"{name}" in self.nodes() for name in ("excitation", "identifier", "ballscrew", "diagnoser")), 30)
+        if "not configured" in state or "not there" in state:
+            self.lifecycle("not configured")
+            self.tab.press("configure")
+        self.lifecycle("nothing moves before Activate")
+        self.tab.until(self.tab.page.locator("[data-act=activate]").is_enabled)
+        self.tab.press("activate")
+        self.lifecycle("driving")
+
+    def nodes(self) -> str:
+        """What the page says of the nodes."""
+        return str(self.tab.page.locator("[data-part=nodes]").text_content())
+
+    def silent(self) -> bool:
+        """No more voltage comes, and the last was zero."""
+        self.world.spin(0.3)
+        count = len(self.blocks)
+        self.world.spin(0.4)
+        return len(self.blocks) == count and not self.blocks[-1].values.any()
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Scene]:
+    folder = tmp_path_factory.mktemp("live")
+    with browser() as made, world_in(folder) as world:
+        one = Scene(world, folder, made)
+        yield one
+        one.tab.close()
+        assert one.server.end() == 130 and "Traceback" not in one.server.said(), one.server.said()
+
+
+def test_curves_converge_live(scene: Scene) -> None:
+    """Nothing moves before Activate; then the response comes, and its band narrows as windows come in."""
+    tab = scene.tab
+    scene.lifecycle("not configured", 30)
+    assert scene.blocks == []
+    scene.drive()
+
+    linear = tab.page.get_by_role("button", name="linear fit")
+    tab.until(lambda: linear.count() == 1, 40, "no story begins by itself")
+    linear.click()
+
+    def width() -> float:
+        (band,) = tab.curves("Frequency response of axis x", "95 % band")
+        known = [value for value in band if np.isfinite(value)]
+        return float(np.mean(np.abs(np.diff(known)))) if len(known) > 10 else 0.0
+
+    def windows() -> int:
+        found = tab.page.locator(".fact[aria-label=windows] .value")
+        return int(found.first.text_content() or 0) if found.count() else 0
+
+    tab.until(lambda: windows() >= 4 and width() > 0, 30, "no response")
+    first, early = width(), windows()
+    tab.until(lambda: windows() >= 2 * early + 4, 40, "no more windows")
+    tab.until(lambda: 0 < width() < first, 10, f"the band does not narrow: {first} dB at first, now {width()} dB")
+    assert "windows heard" in str(tab.page.locator("[data-part=windows]").text_content())
+
+
+def test_the_failing_picture_comes_by_itself_and_every_number_follows_the_story(scene: Scene) -> None:
+    """Unasked, the rigid model's failure is drawn; Diagnose, Add: headline, picture, ladder and tiles are the explained model's.
+
+    The linear fit is one click away, its intervals marked as unsure; Remove and Start over leave nothing stale.
+    """
+    tab = scene.tab
+    scene.drive()
+    tab.page.get_by_role("button", name="axis y").click()
+    tab.until(lambda: tab.headline().startswith("Something is missing: ") and tab.over_floor() > 4, 40, "no failing picture")
+    tab.page.wait_for_timeout(2500)  # some more of the travel
+    tab.press("diagnose")
+    tab.until(lambda: "Missing: coulomb friction" in tab.verdict() and tab.filled() == ["Add coulomb friction"], 90)
+    assert len(tab.ladder()) == 1 and tab.ladder()[0] > 4 and tab.headline().startswith("Something is missing: ")
+    tab.press("named")
+    tab.until(lambda: tab.headline().startswith("Explained: ") and tab.over_floor() < 2 and len(tab.ladder()) == 2, 60)
+    tab.until(lambda: tab.fact("worst place").startswith("nowhere"), 5, "the tiles are stale")
+    assert tab.ladder()[1] < 1.2 and "at the noise floor" in tab.verdict() and tab.fact("held-out error").startswith("0.3")
+    assert tab.page.locator("[aria-label='linear fit, live']:visible").count() == 0
+    tab.page.get_by_role("button", name="linear fit").click()
+    tab.until(lambda: tab.page.locator(".fact.unsure[aria-label=gain]").count() == 1 and tab.fact("held-out error") == "", 5)
+    assert "fails" in str(tab.page.locator("[aria-label='linear fit, live']").text_content())
+    tab.page.locator("[data-remove=coulomb_friction]:enabled").first.click()
+    tab.until(lambda: tab.headline().startswith("Something is missing: ") and tab.over_floor() > 4, 40, "stale after Remove")
+    tab.press("reset")
+    tab.until(lambda: len(tab.ladder()) == 1 and tab.headline().startswith("Something is missing: "), 10, "stale after Start over")
+    assert tab.filled() == ["Add coulomb friction"]
+
+
+def test_settings_are_checked_and_reach_the_node(scene: Scene) -> None:
+    """A value outside its limits is refused with the limits; one inside arrives at the node."""
+    tab, world = scene.tab, scene.world
+    tab.page.locator("[data-part=excitation]").click()
+    field = tab.page.locator("input[data-knob='x.rms']")
+    told = tab.page.locator("[data-told=x]")
+
+    def says(words: str) -> bool:
+        return words in str(told.text_content())
+
+    for typed, words in (("-5", ">= 0"), ("", "empty"), ("1e9", "100")):
+        field.fill(typed)
+        tab.page.locator("[data-apply=x]").click()
+        tab.until(functools.partial(says, words), 5, words)
+    field.fill("0.5")
+    tab.page.locator("[data-apply=x]").click()
+    tab.until(lambda: "applied" in str(told.text_content()), 10)
+    from rcl_interfaces.srv import GetParameters
+
+    answer = world.call(GetParameters, "/xy/excitation/get_parameters", GetParameters.Request(names=["x.rms"]))
+    assert answer.values[0].double_value == 0.5
+
+
+def test_a_bag_is_recorded_and_opened_beside(scene: Scene) -> None:
+    """A name that is a path is refused; a plain one becomes a bag, which opens as a second panel."""
+    tab = scene.tab
+    scene.drive()
+    tab.page.locator("[data-part=record]").click()
+    name = tab.page.locator("input[data-part=bag]")
+    name.fill("../elsewhere")
+    tab.press("record")
+    tab.until(lambda: "name of the bag is '../elsewhere'" in tab.notices(), 5)
+    name.fill("taken")
+    tab.press("record")
+    tab.until(lambda: (scene.folder / "taken").is_dir(), 15)
+    tab.until(lambda: min(recorded(scene.folder / "taken", topic) for topic in ("voltage", "position")) > 300, 40, "the bag does not grow")
+    tab.press("finish")
+    tab.until(lambda: "recorded taken" in tab.notices(), 15)
+    tab.press("open-bag")
+    tab.until(lambda: tab.page.locator(".panel").count() == 2 and "2000 Hz" in str(tab.page.locator(".panel").nth(1).text_content()), 30)
+    assert not (scene.folder.parent / "elsewhere").exists()
+    tab.page.get_by_role("button", name="close recording").click()
+
+
+def recorded(bag: Path, topic: str) -> int:
+    """Messages of a topic that a bag holds already, while it is written."""
+    for file in bag.glob("*.db3"):
+        with closing(sqlite3.connect(f"file:{file}?mode=ro", uri=True)) as data:
+            try:
+                query = "SELECT count(*) FROM messages JOIN topics ON topics.id = topic_id WHERE name = ?"
+                return int(data.execute(query, (f"/xy/{topic}",)).fetchone()[0])
+            except sqlite3.OperationalError:  # its tables are being made, or it is being written
+                return 0
+    return 0
+
+
+@pytest.mark.parametrize("way", ["button", "Escape"])
+def test_stop_really_makes_the_excitation_inactive(scene: Scene, way: str) -> None:
+    """By the button and by the key: the node itself says inactive, the last voltage is zero, and the page says so."""
+    tab, world = scene.tab, scene.world
+    scene.drive()
+    world.spin(0.3)
+    assert scene.blocks[-1].values.any() or scene.blocks[-2].values.any()
+    if way == "button":
+        tab.page.get_by_role("button", name="Open a recording").click()  # even with a dialog over the page
+        tab.page.get_by_role("button", name="STOP").click()
+    else:
+        tab.page.locator("body").press("Escape")
+    scene.lifecycle("nothing moves before Activate")
+    tab.until(lambda: "stopped: the excitation is" in tab.notices(), 10)
+    assert world.state("excitation") == "inactive" and scene.silent()
+    if way == "button":
+        tab.page.get_by_role("button", name="Cancel").last.click()
+
+
+def test_a_lost_node_is_named(scene: Scene) -> None:
+    """kill -9 of the identifier: the page says that it is lost."""
+    os.kill(scene.identifier.process.pid, 9)
+    scene.tab.until(lambda: "identifier" in scene.nodes() and ("lost" in scene.nodes() or "does not answer" in scene.nodes()), 20)
+    assert scene.tab.errors == [], scene.tab.errors

@@ -1,0 +1,58 @@
+"""What the search finds in recordings of real machines; skipped where the recordings are not there."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import pytest
+from helpers.real_data import data
+
+from xy_sysid.axis.model import STANDARD
+from xy_sysid.imports import load
+from xy_sysid.search.diagnose import Diagnosis, diagnose
+
+
+@cache
+def found(path: str) -> tuple[Diagnosis, float]:
+    """The answer for the only axis, and the sampling rate, Hz."""
+    recording = load(data(path))
+    return diagnose(recording.sampling_rate, *recording.axis(recording.axes[0])), recording.sampling_rate
+
+
+@pytest.mark.parametrize("path", ["crane/crane_1.npz", "bam_servo/bam_xl330_sin_time_square_kp800_even.npz"])
+def test_no_mode_is_named_above_what_the_sampling_can_see(path: str) -> None:
+    """0.8 of Nyquist, in any set that could have been best; what was fitted above is refused, in words."""
+    item, rate = found(path)
+    assert item.ladder is not None
+    highest = 0.4 * rate
+    for names, fit in ((item.effects, item.ladder.final), *((rival.effects, rival.fit) for rival in item.ladder.rivals)):
+        for name in names:
+            mode = STANDARD[name].mode_frequency
+            if mode:
+                assert fit.parameter(f"{name}.{mode}").value <= highest, (names, name)
+    above = [reason for _, reason in item.refused if "a mode at" in reason]
+    assert all("outside of what these data excite and see" in reason for reason in above)
+
+
+def test_emps_has_coulomb_friction_and_drag_that_differs_between_directions() -> None:
+    """These two, nothing in front of them; more than 97 % of the error's power, and what is left is told apart from the encoder's noise."""
+    item, _ = found("emps/emps_train.npz")
+    assert item.verdict == "missing_effect"
+    assert set(item.effects[:2]) == {"coulomb_friction", "asymmetric_viscous_friction"}
+    assert item.explained > 0.97
+    assert item.discrepancy > 10.0 * item.noise
+    assert item.sentence.startswith("Missing: coulomb_friction")
+
+
+def test_a_servo_that_lifts_a_pendulum_feels_gravity() -> None:
+    """Its joint turns far enough to tell a weight from a spring."""
+    item, _ = found("bam_servo/bam_xl330_sin_time_square_kp800_even.npz")
+    assert (item.verdict, item.effects[0]) == ("missing_effect", "gravity")
+    assert item.explained > 0.95
+
+
+def test_hsm150_has_coulomb_friction() -> None:
+    """Over all the record it turns one way, where a constant load is the same law."""
+    item, _ = found("hsm150/hsm_pos_0.06_1.npz")
+    assert item.verdict == "missing_effect"
+    assert "coulomb_friction" in item.effects

@@ -1,0 +1,373 @@
+"""The search with a judge that only looks numbers up: what is tried in which order, what is remembered, and what ends it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from math import exp, inf
+
+import pytest
+
+from xy_sysid.search.best_first import FEW, Search
+from xy_sysid.search.criteria import LEAST as SMALLEST
+from xy_sysid.search.criteria import PRICE
+from xy_sysid.search.judge import Move
+
+Set = frozenset[str]
+LEAST = 0.02  # of what is left, for an effect to be worth its name
+
+
+def of(*names: str) -> Set:
+    return frozenset(names)
+
+
+@dataclass(frozen=True)
+class Looked:
+    """A fit that was looked up."""
+
+    effects: Set
+    excess: float
+
+
+@dataclass
+class Table:
+    """A judge that knows what each set leaves (nats), and what each move from it promises; it writes down what it was asked.
+
+    leaves: a set that is not there cannot be fitted; promises: from a set, (effects to add, gain)
+    """
+
+    leaves: Mapping[Set, float]
+    promises: Mapping[Set, Sequence[tuple[Set, float]]]
+    refuses: Mapping[Set, str] = field(default_factory=dict)
+    dry: Set = frozenset()
+    parameters: Mapping[str, int] = field(default_factory=dict)
+    briefs: list[Set] = field(default_factory=list)
+    wholes: list[Set] = field(default_factory=list)
+
+    def moves(self, now: Looked) -> list[Move]:
+        return [
+            Move(
+                effects=now.effects | added,
+                gain=gain,
+                rest=10.0,
+                parameters=sum(self.parameters.get(name, 1) for name in added),
+                starts=tuple((name, (1.0,)) for name in sorted(added)),
+                expected=added <= self.dry,
+            )
+            for added, gain in self.promises.get(now.effects, ())
+        ]
+
+    def brief(self, now: Looked, move: Move, hopeless: float = inf) -> Looked | None:
+        if move.effects == now.effects:  # the first set once more, so that brief fits are compared with a brief one
+            return now
+        self.briefs.append(move.effects)
+        return Looked(move.effects, self.leaves[move.effects]) if move.effects in self.leaves else None
+
+    def whole(self, found: Looked) -> Looked:
+        self.wholes.append(found.effects)
+        return found
+
+    def refusal(self, found: Looked) -> str:
+        return self.refuses.get(found.effects, "")
+
+    def size(self, found: Looked, before: Looked) -> float:
+        return exp(before.excess - found.excess) - 1.0
+
+
+def never() -> float:
+    return 0.0
+
+
+class Ticking:
+    """A clock that goes on by one second whenever somebody looks."""
+
+    def __init__(self) -> None:
+        self.now = -1.0
+
+    def __call__(self) -> float:
+        self.now += 1.0
+        return self.now
+
+
+def searched(judge: Table, clock: object = None, budget: float = 10.0, most: int = 4) -> tuple[Search[Looked], list[Set]]:
+    """A search from the empty set, gone to its end, and what it said it would try."""
+    search: Search[Looked] = Search(judge, clock if callable(clock) else never, budget, most, LEAST)
+    return search, list(search.steps(Looked(of(), judge.leaves[of()])))
+
+
+def all_of(*moves: tuple[Iterable[str], float]) -> list[tuple[Set, float]]:
+    return [(frozenset(names), gain) for names, gain in moves]
+
+
+def test_the_most_promising_is_tried_first() -> None:
+    """Whatever the order in which the judge names the moves."""
+    promises = {of(): all_of(("a", 0.5), ("b", 1.5), ("c", 1.0))}
+    leaves = {of(): 3.0, of("a"): 2.9, of("b"): 2.9, of("c"): 2.9}
+    _, tried = searched(Table(leaves, promises))
+    assert tried[:2] == [of("b"), of("c")]
+
+
+def test_of_two_that_promise_the_same_the_simpler_is_tried_first() -> None:
+    """Three parameters against one."""
+    promises = {of(): all_of(("a", 0.3), ("b", 0.3))}
+    leaves = {of(): 3.0, of("a"): 2.0, of("b"): 2.0}
+    _, tried = searched(Table(leaves, promises, parameters={"a": 3}))
+    assert tried == [of("b"), of("a")]
+
+
+def test_of_two_that_promise_the_same_friction_is_tried_first() -> None:
+    """Every machine has it."""
+    promises = {of(): all_of(("a", 0.4), ("b", 0.4))}
+    leaves = {of(): 3.0, of("a"): 2.0, of("b"): 2.0}
+    _, tried = searched(Table(leaves, promises, dry=of("b")))
+    assert tried[0] == of("b")
+
+
+def test_the_simpler_of_two_sets_that_leave_the_same_is_best() -> None:
+    """A parameter has a price."""
+    promises = {of(): all_of(("a", 1.0), ("b", 1.0))}
+    leaves = {of(): 3.0, of("a"): 1.0, of("b"): 1.0}
+    search, tried = searched(Table(leaves, promises, parameters={"a": 2}))
+    assert set(tried) == {of("a"), of("b")}
+    assert search.best.effects == of("b")
+    assert search.best.score == pytest.approx(1.0 + PRICE)
+
+
+def test_a_parameter_that_gains_less_than_its_price_is_not_taken() -> None:
+    """It was tried, and the set without it stays best."""
+    promises = {of(): all_of(("a", 1.0)), of("a"): all_of(("b", 0.3))}
+    leaves = {of(): 3.0, of("a"): 1.0, of("a", "b"): 1.0 - 0.5 * PRICE}
+    search, tried = searched(Table(leaves, promises))
+    assert tried == [of("a"), of("a", "b")]
+    assert search.best.effects == of("a")
+
+
+def test_nothing_is_fitted_twice() -> None:
+    """a then b is b then a: one set, one fit, by memory."""
+    promises = {of(): all_of(("a", 1.0), ("b", 0.9), ("ab", 0.8)), of("a"): all_of(("b", 0.9)), of("b"): all_of(("a", 0.9))}
+    leaves = {of(): 4.0, of("a"): 3.0, of("b"): 2.0, of("a", "b"): 1.0}
+    judge = Table(leaves, promises)
+    search, tried = searched(judge)
+    assert set(tried) == {of("a"), of("b"), of("a", "b")}
+    assert len(judge.briefs) == len(set(judge.briefs)) == len(tried)
+    assert set(search.nodes) == {of(), *tried}
+
+
+def test_what_is_said_before_is_what_is_fitted_after() -> None:
+    """Each yield comes before its fit, so that whoever looks sees what is being done."""
+    promises = {of(): all_of(("a", 1.0), ("b", 0.9))}
+    judge = Table({of(): 3.0, of("a"): 2.0, of("b"): 2.5}, promises)
+    search: Search[Looked] = Search(judge, never, 10.0, 4, LEAST)
+    steps = search.steps(Looked(of(), 3.0))
+    first = next(steps)
+    assert judge.briefs == []
+    second = next(steps)
+    assert judge.briefs == [first] != [second]
+
+
+def test_only_what_is_near_the_best_is_fitted_wholly() -> None:
+    """A brief fit that leaves much more costs no more time."""
+    promises = {of(): all_of(("a", 1.0), ("b", 0.9))}
+    judge = Table({of(): 3.0, of("a"): 1.0, of("b"): 2.5}, promises)
+    search, _ = searched(judge)
+    assert judge.briefs == [of("a"), of("b")]
+    assert judge.wholes == [of("a")]
+    assert search.nodes[of("a")].whole and not search.nodes[of("b")].whole
+
+
+def test_it_goes_on_from_the_best_only() -> None:
+    """What leads away from a worse set is not asked for."""
+    promises = {of(): all_of(("a", 1.0), ("b", 0.9)), of("a"): all_of(("c", 0.5)), of("b"): all_of(("d", 5.0))}
+    leaves = {of(): 3.0, of("a"): 1.0, of("b"): 2.5, of("a", "c"): 0.5, of("b", "d"): 0.0}
+    _, tried = searched(Table(leaves, promises))
+    assert set(tried) == {of("a"), of("b"), of("a", "c")}
+
+
+def test_two_at_once_are_found_where_neither_helps_alone() -> None:
+    """Each alone leaves all; together they leave nothing."""
+    promises = {of(): all_of(("a", 0.3), ("b", 0.2), ("ab", 0.9))}
+    judge = Table({of(): 2.0, of("a"): 2.0, of("b"): 2.0, of("a", "b"): 0.01}, promises)
+    search, tried = searched(judge)
+    assert of("a", "b") in tried
+    assert search.best.effects == of("a", "b")
+
+
+def test_two_are_found_one_after_the_other_where_the_first_shows_the_second() -> None:
+    """The rigid base promised the second nothing."""
+    promises = {of(): all_of(("a", 1.0)), of("a"): all_of(("b", 0.9))}
+    search, tried = searched(Table({of(): 2.0, of("a"): 1.0, of("a", "b"): 0.0}, promises))
+    assert tried == [of("a"), of("a", "b")]
+    assert search.best.effects == of("a", "b") and not search.stopped
+
+
+def test_it_ends_where_nothing_is_left() -> None:
+    """Moves that wait are not tried any more."""
+    promises = {of(): all_of(("a", 1.0), ("b", 0.9))}
+    search, tried = searched(Table({of(): 2.0, of("a"): 0.5 * SMALLEST, of("b"): 0.0}, promises))
+    assert tried == [of("a")]
+    assert not search.stopped
+
+
+def test_a_base_that_leaves_nothing_asks_for_no_fit() -> None:
+    """A clean axis."""
+    judge = Table({of(): 0.5 * SMALLEST, of("a"): 0.0}, {of(): all_of(("a", 1.0))})
+    search, tried = searched(judge)
+    assert tried == judge.briefs == []
+    assert search.best.effects == of()
+
+
+def test_it_ends_by_itself_where_nothing_promises_a_gain() -> None:
+    """Less than the least gain and the price is not tried, and that is no stop."""
+    little = 0.1 * SMALLEST
+    search, tried = searched(Table({of(): 2.0, of("a"): 0.0}, {of(): all_of(("a", little))}))
+    assert tried == []
+    assert not search.stopped and search.best.effects == of()
+
+
+def test_what_is_left_unexplained_could_feign_is_not_tried() -> None:
+    """The gain is small against the whole error, though it is something in excess."""
+
+    class Faint(Table):
+        def moves(self, now: Looked) -> list[Move]:
+            return [Move(of("a"), 0.5, 0.01, 1, (("a", (1.0,)),))]
+
+    judge = Faint({of(): 2.0, of("a"): 1.0}, {})
+    search: Search[Looked] = Search(judge, never, 10.0, 4, 0.7)
+    assert list(search.steps(Looked(of(), 2.0))) == []
+
+
+def test_what_every_machine_has_is_tried_though_the_whole_error_promises_little() -> None:
+    """Friction that bends shows little to first order, and may explain much."""
+
+    class Rough(Table):
+        def moves(self, now: Looked) -> list[Move]:
+            return [Move(of("a"), 0.5, 0.01, 1, (("a", (1.0,)),), expected=True)] if not now.effects else []
+
+    search: Search[Looked] = Search(Rough({of(): 2.0, of("a"): 1.0}, {}), never, 10.0, 4, 0.7)
+    assert list(search.steps(Looked(of(), 2.0))) == [of("a")]
+
+
+def test_from_a_set_whose_last_effect_is_not_worth_its_name_it_does_not_go_on() -> None:
+    """It explains less than was asked of it over what is left; two at once must explain as much each."""
+    promises = {
+        of(): all_of(("a", 1.0)),
+        of("a"): all_of(("b", 0.9), ("bc", 0.9)),
+        of("a", "b"): all_of(("d", 2.0)),
+        of("a", "b", "c"): all_of(("d", 2.0)),
+    }
+    leaves = {of(): 4.0, of("a"): 3.0, of("a", "b"): 2.7, of("a", "b", "c"): 2.3, of("a", "b", "d"): 0.5, of("a", "b", "c", "d"): 0.5}
+    judge = Table(leaves, promises)
+    search: Search[Looked] = Search(judge, never, 10.0, 4, 0.5)
+    assert set(search.steps(Looked(of(), 4.0))) == {of("a"), of("a", "b"), of("a", "b", "c")}
+
+
+def test_promises_that_are_not_kept_are_believed_less() -> None:
+    """After a few tries from a set that brought nothing, moves of small promise are left alone; they are tried where tries bring much."""
+    moves = [(of(name), 0.03) for name in "abcdefgh"]
+    _, tried = searched(Table({of(): 2.0, **{names: 2.0 for names, _ in moves}}, {of(): moves}))
+    assert len(tried) == FEW
+    _, tried = searched(Table({of(): 2.0, **{names: 1.9 for names, _ in moves}}, {of(): moves}))
+    assert len(tried) > FEW
+
+
+def test_the_budget_stops_it_and_that_is_said() -> None:
+    """One second for each try, three seconds: the best so far is the answer, and it was stopped."""
+    names = "abcdefgh"
+    promises = {of(): all_of(*((name, 3.0 - 0.1 * k) for k, name in enumerate(names)))}
+    leaves = {of(): 3.0, **{of(name): 2.0 - 0.1 * k for k, name in enumerate(names)}}
+    judge = Table(leaves, promises)
+    search, tried = searched(judge, Ticking(), budget=3.0)
+    assert search.stopped
+    assert len(tried) == len(judge.briefs) == 3
+    assert search.best.effects == min(tried, key=lambda names: leaves[names])
+    endless, every = searched(Table(leaves, promises))
+    assert not endless.stopped and len(every) > len(tried)
+
+
+def test_a_search_that_ended_in_time_was_not_stopped() -> None:
+    """Nothing promised anything any more before the time was up: that is an end, whatever the clock says then."""
+    promises = {of(): all_of(("a", 1.0))}
+    search, tried = searched(Table({of(): 2.0, of("a"): 1.0}, promises), Ticking(), budget=1.0)
+    assert tried == [of("a")]
+    assert not search.stopped
+
+
+def test_it_can_be_left_at_any_time() -> None:
+    """Whoever stops asking has the best so far."""
+    promises = {of(): all_of(("a", 1.0), ("b", 0.9))}
+    search: Search[Looked] = Search(Table({of(): 3.0, of("a"): 2.0, of("b"): 1.0}, promises), never, 10.0, 4, LEAST)
+    steps = search.steps(Looked(of(), 3.0))
+    next(steps)
+    assert search.best.effects == of()
+    next(steps)
+    assert search.best.effects == of("a")
+
+
+def test_a_refused_set_is_never_best() -> None:
+    """Though it leaves least; it is remembered with its reason, and nothing is built upon it."""
+    promises = {of(): all_of(("a", 1.0), ("b", 0.9)), of("a"): all_of(("c", 1.0))}
+    judge = Table({of(): 2.0, of("a"): 0.5, of("b"): 1.0, of("a", "c"): 0.0}, promises, refuses={of("a"): "a: size is at its bound"})
+    search, tried = searched(judge)
+    assert of("a") in tried and of("a", "c") not in tried
+    assert search.best.effects == of("b")
+    assert search.nodes[of("a")].refused == "a: size is at its bound"
+
+
+def test_where_all_are_refused_the_start_is_best() -> None:
+    """And the search ends."""
+    promises = {of(): all_of(("a", 1.0), ("b", 0.9))}
+    refuses = {of("a"): "no", of("b"): "no"}
+    search, _ = searched(Table({of(): 2.0, of("a"): 0.0, of("b"): 0.0}, promises, refuses=refuses))
+    assert search.best.effects == of()
+
+
+def test_a_set_that_cannot_be_fitted_is_passed_over() -> None:
+    """No fit is no answer, no node and no end of the search; it is not tried again."""
+    promises = {of(): all_of(("a", 1.0), ("b", 0.9))}
+    judge = Table({of(): 2.0, of("b"): 1.0}, promises)
+    search, tried = searched(judge)
+    assert tried == [of("a"), of("b")]
+    assert of("a") not in search.nodes and search.best.effects == of("b")
+
+
+@pytest.mark.parametrize("most", [0, 1, 2])
+def test_no_set_has_more_effects_than_were_asked_for(most: int) -> None:
+    """Not even by two at once."""
+    promises = {of(): all_of(("a", 1.0), ("b", 0.9), ("ab", 1.2)), of("a"): all_of(("b", 0.9), ("c", 0.8)), of("a", "b"): all_of(("c", 0.8))}
+    leaves = {of(): 5.0, of("a"): 3.0, of("b"): 4.0, of("a", "b"): 2.0, of("a", "c"): 2.5, of("a", "b", "c"): 1.0}
+    search, tried = searched(Table(leaves, promises), most=most)
+    assert all(len(names) <= most for names in tried)
+    assert len(search.best.effects) == most
+
+
+def test_a_rival_that_promised_as_much_is_fitted_in_the_end() -> None:
+    """What was not tried, as the first did well at once, so that the runner-up is the true second; what promised little is not."""
+    promises = {of(): all_of(("a", 1.0), ("b", 0.95), ("c", 0.1))}
+    judge = Table({of(): 2.0, of("a"): 0.0, of("b"): 0.5, of("c"): 1.9}, promises)
+    search, tried = searched(judge)
+    assert tried == [of("a")]
+    assert list(search.rivals(of("a"))) == [of("b")]
+    assert search.best.effects == of("a") and of("b") in search.nodes
+
+
+def test_a_rival_may_turn_out_to_be_better() -> None:
+    """Then it is the best."""
+    promises = {of(): all_of(("a", 1.0), ("b", 0.95))}
+    search, _ = searched(Table({of(): 2.0, of("a"): 0.02, of("b"): 0.0}, promises))
+    list(search.rivals(of("a")))
+    assert search.best.effects == of("b")
+
+
+def test_the_same_search_twice_is_the_same() -> None:
+    """Sets have no order, tries have."""
+    promises = {of(): all_of(("a", 1.0), ("b", 1.0), ("c", 1.0), ("ab", 1.0), ("bc", 1.0)), of("b"): all_of(("a", 0.5), ("c", 0.5))}
+    leaves = {of(): 3.0, of("a"): 2.5, of("b"): 1.5, of("c"): 2.5, of("a", "b"): 1.0, of("b", "c"): 1.0}
+    assert searched(Table(leaves, promises))[1] == searched(Table(leaves, promises))[1]
+
+
+def test_it_begins_from_what_is_given() -> None:
+    """The given effects are in the first set, and moves add to them."""
+    judge = Table({of("g"): 2.0, of("g", "a"): 1.0}, {of("g"): all_of(("a", 1.0))})
+    search: Search[Looked] = Search(judge, never, 10.0, 4, LEAST)
+    assert list(search.steps(Looked(of("g"), 2.0), of("g"))) == [of("g", "a")]
+    assert search.best.effects == of("g", "a")

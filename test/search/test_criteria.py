@@ -1,0 +1,80 @@
+"""The numbers that steer the search: one table, each with its reason, and none beside it."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+from helpers import ROOT
+
+from xy_sysid.files.search_doc import document
+from xy_sysid.search import criteria
+
+SEARCH = ROOT / "xy_sysid" / "search"
+MOST = 17
+IN_WORK = ("beside_one_step.py", "best_first.py", "refine.py")  # these still hold some; take them off when they no longer do
+
+
+def bare_numbers(path: Path) -> list[str]:
+    """Names of a module's own numbers; zero steers nothing."""
+    found = []
+    for item in ast.parse(path.read_text(encoding="utf-8")).body:
+        if isinstance(item, ast.Assign):
+            targets, value = item.targets, item.value
+        elif isinstance(item, ast.AnnAssign) and item.value is not None:
+            targets, value = [item.target], item.value
+        else:
+            continue
+        if any(isinstance(node, ast.Constant) and isinstance(node.value, int | float) and node.value for node in ast.walk(value)):
+            found += [ast.unparse(target) for target in targets]
+    return found
+
+
+def test_the_table_fits_on_one_page() -> None:
+    """At most seventeen numbers, each named once."""
+    names = [row.name for row in criteria.TABLE]
+    assert 0 < len(names) <= MOST
+    assert len(set(names)) == len(names)
+
+
+@pytest.mark.parametrize("row", criteria.TABLE, ids=lambda row: row.name)
+def test_each_number_says_in_which_unit_it_is_and_why(row: criteria.Criterion) -> None:
+    """A sentence of what was measured, not a repetition of the name."""
+    assert row.unit
+    assert len(row.because.split()) >= 6, row.because
+    assert row.value > 0.0
+
+
+def test_each_number_is_used() -> None:
+    """By another module; what nothing asks for is deleted."""
+    body = ast.parse((SEARCH / "criteria.py").read_text(encoding="utf-8")).body
+    given = {ast.unparse(item.targets[0]) for item in body if isinstance(item, ast.Assign) and _is_number(item)}
+    assert len(given) == len(criteria.TABLE)
+    used = set()
+    for path in sorted((ROOT / "xy_sysid").rglob("*.py")):
+        for item in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(item, ast.ImportFrom) and item.module == "xy_sysid.search.criteria":
+                used |= {alias.name for alias in item.names}
+    assert given <= used, f"not used by any module: {', '.join(sorted(given - used))}"
+
+
+def _is_number(item: ast.Assign) -> bool:
+    return isinstance(item.value, ast.Call) and ast.unparse(item.value.func) == "_number"
+
+
+@pytest.mark.parametrize("path", sorted(SEARCH.glob("*.py")), ids=lambda path: path.name)
+def test_no_other_module_of_the_search_holds_a_number_of_its_own(path: Path) -> None:
+    """A number that steers stands in criteria.py, with its reason."""
+    numbers = bare_numbers(path)
+    if path.name == "criteria.py":
+        return
+    if path.name in IN_WORK:
+        assert numbers, f"{path.name} holds none any more: take it off the list"
+        pytest.skip(f"still holds {', '.join(numbers)}")
+    assert not numbers, f"{path.name} holds {', '.join(numbers)}: put them into criteria.py"
+
+
+def test_the_page_of_the_search_has_the_table() -> None:
+    """python -m xy_sysid.files.search_doc --write"""
+    assert document() in (ROOT / "docs" / "search.md").read_text(encoding="utf-8")

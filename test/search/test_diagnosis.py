@@ -1,0 +1,253 @@
+"""Naming the missing effect on the simulated machine, whose physics and numerics are others; and saying so when nothing fits."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from functools import partial
+from itertools import count
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.signal
+import yaml
+from helpers.simulated import recorded
+
+from xy_sim.parts import PARTS
+from xy_sysid.axis.model import STANDARD, Library
+from xy_sysid.cli import run
+from xy_sysid.effects import EFFECTS
+from xy_sysid.greybox.axis_data import prepare
+from xy_sysid.greybox.free_run import GreyboxFit
+from xy_sysid.imports import save
+from xy_sysid.search.criteria import AT_FLOOR
+from xy_sysid.search.diagnose import diagnose, judged
+from xy_sysid.search.judge import FreeRunJudge
+from xy_sysid.search.refine import Effort, refine
+
+
+@pytest.mark.parametrize("effect", ["coulomb_friction", "cogging", "dead_zone", "constant_load", "saturation", "lead_error"])
+def test_the_missing_effect_is_named_and_the_error_falls_to_the_floor(effect: str) -> None:
+    """First name right, held-out error within 5 % of the noise, confident; nearly all of the error's power explained, and that is said."""
+    u, y = recorded(effect).axis("x")
+    found = diagnose(2000.0, u, y)
+    assert (found.verdict, found.effects) == ("missing_effect", (effect,))
+    assert found.ladder is not None
+    assert found.ladder.final.held_out_error < 1.05 * found.ladder.final.noise_floor
+    assert found.ladder.steps[0].fit.excess > 0.3
+    assert found.confidence > 0.5
+    assert found.explained > 0.9
+    assert found.discrepancy < 0.35 * found.noise
+    assert not found.stopped
+    assert effect in found.sentence and "What is left is the encoder's noise" in found.sentence
+
+
+def test_two_effects_are_both_named() -> None:
+    """One after the other, the larger one first."""
+    u, y = recorded("coulomb_friction+cogging").axis("x")
+    found = diagnose(2000.0, u, y)
+    assert found.verdict == "missing_effect"
+    assert set(found.effects) == {"coulomb_friction", "cogging"}
+
+
+def test_what_was_found_comes_first_and_what_is_left_is_said() -> None:
+    """Of an axis with one effect and something beside that no law has: the effect, what it explains, and what it does not."""
+    found = diagnose(2000.0, *recorded("coulomb_friction+thermal_viscosity", seconds=20.0).axis("x"))
+    assert (found.verdict, found.effects[0]) == ("missing_effect", "coulomb_friction")
+    assert found.sentence.startswith("Missing: coulomb_friction") and " of the error's power (" in found.sentence
+    assert 0.9 < found.explained < 1.0
+    assert found.confidence < 0.9
+    assert found.discrepancy > 0.0
+    assert "What is left: " in found.sentence and "of the motion, beyond the encoder's noise of " in found.sentence
+
+
+@pytest.mark.parametrize("effect", ["coulomb_friction", "backlash"])
+def test_words_for_people_steer_no_search(effect: str) -> None:
+    """A library whose effects look like nothing finds the same, with the same confidence and in the same words."""
+    u, y = recorded(effect, seconds=20.0).axis("x")
+    found, told = diagnose(2000.0, u, y), diagnose(2000.0, u, y, Library([replace(item, look_alikes=()) for item in EFFECTS.values()]))
+    assert (found.verdict, found.effects) == ("missing_effect", (effect,))
+    assert (told.verdict, told.effects, told.confidence, told.sentence) == (found.verdict, found.effects, found.confidence, found.sentence)
+
+
+@pytest.mark.parametrize("effect", ["coulomb_friction=0.001", "dead_zone=0.002"])
+def test_an_effect_in_the_noise_is_not_named_with_confidence(effect: str) -> None:
+    """The base is at the floor; whether or not the right name is said, it is no certainty, and no other name is said."""
+    found = diagnose(2000.0, *recorded(effect).axis("x"))
+    assert found.ladder is not None and found.ladder.base.excess < AT_FLOOR
+    if found.verdict == "nothing_missing":
+        assert found.effects == () and found.explained == 0.0
+    else:
+        assert (found.verdict, found.effects) == ("missing_effect", (effect.partition("=")[0],))
+        assert found.confidence < 0.5
+
+
+def test_a_base_without_any_excess_is_no_division_by_zero() -> None:
+    """Excess and discrepancy exactly 0: nothing is missing, with certainty."""
+    data = prepare(2000.0, *recorded("").axis("x"))
+    ladder = refine(data)
+    base = replace(ladder.base, excess=0.0)
+    found = judged(data, replace(ladder, steps=(replace(ladder.steps[0], fit=base),), final=base, effects=(), discrepancy=0.0), STANDARD)
+    assert (found.verdict, found.confidence, found.tolerance) == ("nothing_missing", 1.0, 0.0)
+
+
+def test_a_clean_axis_misses_nothing() -> None:
+    """No false alarm on either axis."""
+    recording = recorded("")
+    for axis in recording.axes:
+        assert diagnose(2000.0, *recording.axis(axis)).verdict == "nothing_missing"
+
+
+@pytest.mark.parametrize("effect", ["thermal_viscosity", "quadratic_drag"])
+def test_what_is_not_in_the_library_is_not_named(effect: str) -> None:
+    """Never a name with confidence for an effect that no hypothesis knows."""
+    u, y = recorded(effect, seconds=20.0).axis("x")
+    found = diagnose(2000.0, u, y)
+    assert found.verdict == "not_in_library"
+    assert found.effect is None or found.confidence <= 0.5
+
+
+@pytest.mark.parametrize(
+    ("u", "y", "words"),
+    [
+        (np.sin(np.arange(200.0)), np.cos(np.arange(200.0)), "Record for longer"),
+        (np.sin(np.arange(40_000.0) ** 1.3), np.cumsum(np.sin(np.arange(40_000.0) ** 1.7)), "does not follow the input"),
+        (np.ones(40_000), np.arange(40_000.0), "the input does not move"),
+        (np.sin(np.arange(40_000.0)), np.ones(40_000), "the output does not move"),
+    ],
+)
+def test_what_is_lacking_in_the_data_is_said(u: np.ndarray, y: np.ndarray, words: str) -> None:
+    """Too short, not excited, standing still: each in words."""
+    found = diagnose(2000.0, u, y)
+    assert found.verdict == "not_enough_data"
+    assert words in found.sentence
+
+
+@pytest.mark.parametrize("samples", [300, 40_000])
+def test_one_sine_is_too_little_to_name_anything(samples: int) -> None:
+    """Any law has two numbers to fit its size and its phase."""
+    found = diagnose(2000.0, np.sin(np.arange(samples)), np.cos(np.arange(samples)))
+    assert found.verdict == "not_enough_data"
+
+
+@pytest.fixture(scope="module")
+def rec(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("rec") / "rec.npz"
+    save(recorded("x:coulomb_friction", seconds=20.0), path)
+    return path
+
+
+def test_diagnose_answers_with_the_contracts_document(rec: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Verdict, error, places, candidates with parameters, next experiment; nothing missing on the other axis."""
+    assert run(["diagnose", str(rec), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    x = told["axes"]["x"]
+    assert (x["verdict"], x["effect"]) == ("missing_effect", "coulomb_friction")
+    assert x["error"]["unit"] == "m/s" and x["error"]["now"] > 5 * x["error"]["held_out"]
+    assert {place["kind"] for place in x["where"]} <= {"frequency", "speed", "position", "amplitude", "direction", "time"}
+    best = next(item for item in x["candidates"] if item["effect"] == "coulomb_friction")
+    size = PARTS["coulomb_friction"].parameters[0].default
+    assert best["parameters"]["coulomb_friction.coulomb"]["value"] == pytest.approx(size, rel=0.01)
+    assert best["share"] > 0.97 and x["explained"] > 0.97
+    assert 0.0 <= x["discrepancy"] < 0.35 * x["noise"]
+    assert x["stopped"] is None
+    assert all(set(item) == {"effect", "reason"} for item in x["refused"])
+    assert x["next_experiment"]
+    assert told["axes"]["y"]["verdict"] == "nothing_missing"
+
+
+def test_refine_writes_the_ladder_and_the_model(rec: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The error falls from rung to rung; the YAML holds physical parameters with intervals."""
+    model = tmp_path / "model.yaml"
+    assert run(["refine", str(rec), "--auto", "-a", "x", "--model", str(model), "--json"]) == 0
+    x = json.loads(capsys.readouterr().out)["axes"]["x"]
+    assert [rung["added"] for rung in x["ladder"]] == [None, "coulomb_friction"]
+    assert x["ladder"][1]["held_out_error"] < 0.2 * x["ladder"][0]["held_out_error"]
+    assert x["verdict"] == "explained"
+    written = yaml.safe_load(model.read_text(encoding="utf-8"))
+    assert written["axes"]["x"]["parameters"]["coulomb_friction.coulomb"]["unit"] == "V"
+
+
+def test_an_effect_can_be_added_by_name(rec: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Right or wrong: the ladder tells; a name that nobody knows is refused with the nearest."""
+    assert run(["refine", str(rec), "--add", "cogging", "-a", "x", "--json"]) == 0
+    x = json.loads(capsys.readouterr().out)["axes"]["x"]
+    assert [rung["added"] for rung in x["ladder"]] == [None, "cogging"]
+    assert x["ladder"][1]["held_out_error"] > 0.5 * x["ladder"][0]["held_out_error"]
+    assert x["verdict"] != "explained"
+    assert run(["refine", str(rec), "--add", "coulomb", "-a", "x"]) == 2
+    assert "coulomb_friction" in capsys.readouterr().err
+
+
+def test_what_is_compiled_at_first_use_costs_no_budget(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a fresh machine the first fit compiles the laws for longer than the whole budget: the search has its time all the same."""
+    now = [0.0]
+    begin = FreeRunJudge.begin
+
+    def slow(judge: FreeRunJudge) -> GreyboxFit:
+        now[0] += 100.0
+        return begin(judge)
+
+    monkeypatch.setattr(FreeRunJudge, "begin", slow)
+    found = diagnose(2000.0, *recorded("coulomb_friction", seconds=20.0).axis("x"), budget=10.0, clock=lambda: now[0])
+    assert found.effects == ("coulomb_friction",) and not found.stopped
+
+
+def test_a_part_that_rattles_is_no_mode_with_confidence() -> None:
+    """The mode explains most of it, and leaves much of it just where it acts; a true mode of the same strength leaves nothing there."""
+    rattles, rings = (diagnose(2000.0, *recorded(name, seconds=20.0).axis("x")) for name in ("loose_mode", "base_resonance"))
+    assert rattles.effect is None or rattles.confidence < 0.9
+    assert rings.effects == ("base_resonance",) and rings.confidence > 0.9
+    assert rattles.ladder is not None and rings.ladder is not None
+    assert rings.ladder.astray < 0.02
+
+
+def test_not_in_the_library_is_said_less_surely_the_more_is_left() -> None:
+    """An effect may hide in it; and what some set takes away is no longer nowhere."""
+    data = prepare(2000.0, *recorded("quadratic_drag", seconds=20.0).axis("x"))
+    ladder = refine(data)
+    nothing = replace(ladder, effects=(), explained=0.0, helps=0.0)
+    sure = [judged(data, replace(nothing, discrepancy=part * data.layout.rms(data.floor.motion)), STANDARD).confidence for part in (5e-4, 0.03, 0.3)]
+    assert sure[0] == 1.0 > sure[1] > sure[2] > 0.0
+    helped = judged(data, replace(nothing, discrepancy=0.0, helps=0.3), STANDARD)
+    assert helped.verdict == "not_in_library" and helped.confidence == pytest.approx(0.7)
+
+
+def test_effects_come_in_the_order_of_what_each_would_cost() -> None:
+    """By the best set known without it, so that there is an answer where the time left no fit without it, too."""
+    data = prepare(2000.0, *recorded("coulomb_friction+cogging", seconds=20.0).axis("x"))
+    budget, stopped = math.inf, []
+    for _ in range(2):
+        ticks = count()
+        ladder = refine(data, effort=Effort(budget=budget, clock=partial(next, ticks)))
+        stopped.append(ladder.stopped)
+        assert ladder.effects and set(ladder.effects) == set(ladder.sizes)
+        costs = [ladder.sizes[name] for name in ladder.effects]
+        assert costs == sorted(costs, reverse=True) and costs[-1] > 0.0
+        budget = 0.3 * next(ticks)
+    assert stopped == [False, True]
+
+
+def test_a_spring_beside_friction_is_not_taken_for_a_pendulum_and_bumps() -> None:
+    """A machine of plain Euler steps: what stands back for a law that does the same is left out, and the law that is there stays."""
+    rate, sub = 1000.0, 10
+    rng = np.random.default_rng(8)
+    voltage = scipy.signal.sosfilt(scipy.signal.butter(4, [0.3, 80.0], "band", fs=rate, output="sos"), rng.normal(size=40_000))
+    voltage /= voltage.std()
+    place = speed = 0.0
+    position = np.empty(voltage.size)
+    for k, volts in enumerate(voltage.tolist()):
+        position[k] = place
+        for _ in range(sub):
+            pull = volts - 0.05 * speed - 0.8 * place
+            if speed != 0.0 or abs(pull) > 0.05:
+                sign = np.sign(speed) if speed != 0.0 else np.sign(pull)
+                after = speed + (pull - 0.05 * sign) / (0.01 * rate * sub)
+                speed = 0.0 if speed != 0.0 and after * speed < 0.0 else after
+            place += speed / (rate * sub)
+    found = diagnose(rate, voltage, np.round(position / 1e-4) * 1e-4)
+    assert found.verdict == "missing_effect"
+    assert len(found.effects) == 2 and "coulomb_friction" in found.effects, found.sentence
+    assert {EFFECTS[name].family for name in found.effects} == {"spring", "dry_friction"}, found.sentence

@@ -1,0 +1,67 @@
+"""The gallery's scripts run as they stand, in an empty folder."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+EXAMPLES = ROOT / "docs" / "examples"
+
+
+def run(name: str, folder: Path, *arguments: object) -> str:
+    """What it says; fails if it does not end well."""
+    done = subprocess.run([sys.executable, str(EXAMPLES / name), *map(str, arguments)], cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, f"{name}\n{done.stdout}\n{done.stderr}"
+    return done.stdout
+
+
+def test_the_gallery_shows_every_example() -> None:
+    """Each script has a link, and each link a script."""
+    told = re.findall(r"\]\(examples/(\w+\.py)\)", (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8"))
+    assert sorted(told) == sorted(path.name for path in EXAMPLES.glob("*.py"))
+
+
+def test_a_hidden_effect_is_named_and_the_error_falls_to_the_floor(tmp_path: Path) -> None:
+    """Cogging, as README says; a picture and a model are left behind."""
+    said = run("hidden_effect.py", tmp_path)
+    assert "Missing: cogging" in said
+    last = re.findall(r"([\d.]+) mm/s, floor ([\d.]+)", said)[-1]
+    assert float(last[0]) < 1.1 * float(last[1])
+    assert (tmp_path / "ladder.html").is_file() and (tmp_path / "axis_x.yaml").is_file()
+
+
+def test_a_csv_gives_a_transfer_function(tmp_path: Path) -> None:
+    """Millimetres are converted and told; every parameter has its interval."""
+    said = run("own_csv.py", tmp_path)
+    assert "is converted from mm to m" in said and re.search(r"resonance.*Hz", said)
+    assert run("own_csv.py", tmp_path, "mine.csv") == said
+
+
+def test_an_effect_of_ones_own_is_fitted(tmp_path: Path) -> None:
+    """The file of docs/your-own-effect.md; its coefficient comes back."""
+    page = (ROOT / "docs" / "your-own-effect.md").read_text(encoding="utf-8")
+    (tmp_path / "quadratic_drag.py").write_text(page.split("```python\n")[1].split("```")[0], encoding="utf-8")
+    said = run("own_effect.py", tmp_path)
+    found = float(re.findall(r"^quadratic_drag.coefficient\s+([\d.e+-]+)", said, re.MULTILINE)[0])
+    assert found == pytest.approx(40.0, rel=0.05)
+
+
+def test_bags_of_two_days_are_compared(tmp_path: Path) -> None:
+    """The same machine still holds."""
+    said = run("bag.py", tmp_path)
+    assert said.count("the model holds") == 2
+
+
+def test_emps_is_diagnosed_where_its_data_are(tmp_path: Path) -> None:
+    """Without the data it says where to get them, in one line."""
+    done = subprocess.run([sys.executable, str(EXAMPLES / "emps.py")], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 1 and "docs/real-data.md" in done.stderr and len(done.stderr.splitlines()) == 1
+    data = ROOT.parent / "shared" / "data" / "emps" / "emps_train.npz"
+    if not data.exists():
+        pytest.skip("no EMPS data")
+    assert "friction" in run("emps.py", tmp_path, data)

@@ -1,0 +1,16 @@
+"""A simulator that takes short cuts: steps of first order, and stops found to one step only."""
+
+from __future__ import annotations
+
+from xy_sim.parts.contract import Parameter, Part
+
+PART = Part(
+    name="first_order_steps",
+    kind="integrator",
+    group="imperfection",
+    law="v(t + step) = v(t) + step v'(t), q(t + step) = q(t) + step v(t + step); a motor whose speed changes its sign stands at the step's end",
+    meaning="not a machine but another maker's plant: nothing inside a step is resolved, neither a stop nor a contact",
+    source="semi-implicit Euler: Hairer, Lubich & Wanner, Geometric Numerical Integration, 2nd ed. 2006, sec. I.1.2",
+    parameters=(Parameter("step", "s", 25e-6, 25e-6, 25e-6, "longest step", 1e-7, 1e-3),),
+    drawn=False,
+)

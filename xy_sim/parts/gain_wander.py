@@ -1,0 +1,29 @@
+"""The drive's gain wanders slowly, up and down."""
+
+from __future__ import annotations
+
+from xy_sim.inlined import inlined
+from xy_sim.parts import curve
+from xy_sim.parts.contract import Parameter, Part
+from xy_sysid.samples.block import FloatArray
+
+PART = Part(
+    name="gain_wander",
+    kind="drive",
+    group="imperfection",
+    law="v -> v max(1 + depth curve(t / time), 0.1)",
+    meaning="supply voltage, temperature of the amplifier, field weakening: not a trend but a walk",
+    source="Krishnan 2010, sec. 1.3 (temperature); smooth random curve",
+    parameters=(
+        Parameter("depth", "", 0.02, 0.01, 0.05, "rms of the relative change", 0.0, 0.9),
+        Parameter("time", "s", 5.0, 2.0, 10.0, "time in which it changes", 0.01, 1e6),
+        Parameter("seed", "", 3.0, 1.0, 1e6, "of the curve", 0.0, 1e9, whole=True),
+    ),
+    drawn=False,
+)
+
+
+@inlined
+def factor(p: FloatArray, first: int, depth: float, time: float, t: float) -> float:
+    """Gain at ``t`` (s) over its mean; the curve begins at ``first`` of ``p``."""
+    return curve.around_one(p, first, depth, t / time)

@@ -1,0 +1,27 @@
+"""Voltages do not arrive when their number says."""
+
+from __future__ import annotations
+
+from xy_sim.inlined import inlined
+from xy_sim.parts import chance
+from xy_sim.parts.contract import Parameter, Part
+
+PART = Part(
+    name="late_drive",
+    kind="input",
+    group="imperfection",
+    law="v(t) = u(t - delay - e); e uniform in -largest..largest, new for each sample, never before the command",
+    meaning="the drive's cycle is not locked to the controller's, or its task waits",
+    source="Wittenmark, Nilsson & Torngren, Timing problems in real-time control systems, ACC 1995",
+    parameters=(
+        Parameter("largest", "s", 50e-6, 5e-6, 100e-6, "largest error of the instant; half a sample at most", 0.0, 1.0),
+        Parameter("seed", "", 7.0, 1.0, 1e6, "of the errors", 0.0, 1e9, whole=True),
+    ),
+    drawn=False,
+)
+
+
+@inlined
+def lateness(largest: float, seed: float, sample: int) -> float:
+    """By how much the voltage of sample number ``sample`` is late, s."""
+    return largest * chance.centred(seed, sample)

@@ -1,0 +1,29 @@
+"""The drag changes along the travel, as it likes."""
+
+from __future__ import annotations
+
+from xy_sim.inlined import inlined
+from xy_sim.parts import curve
+from xy_sim.parts.contract import Parameter, Part
+from xy_sysid.samples.block import FloatArray
+
+PART = Part(
+    name="uneven_drag",
+    kind="friction",
+    group="imperfection",
+    law="drag -> drag max(1 + depth curve(q / length), 0.1)",
+    meaning="guides that are not straight, grease that is not everywhere, a preload that wanders",
+    source="Armstrong-Helouvry 1991, ch. 3: friction of position; smooth random curve",
+    parameters=(
+        Parameter("depth", "", 0.05, 0.02, 0.1, "rms of the relative change", 0.0, 0.9),
+        Parameter("length", "m", 3e-3, 1e-3, 8e-3, "way over which it changes", 1e-5, 10.0),
+        Parameter("seed", "", 1.0, 1.0, 1e6, "of the curve", 0.0, 1e9, whole=True),
+    ),
+    drawn=False,
+)
+
+
+@inlined
+def factor(p: FloatArray, first: int, depth: float, length: float, q: float) -> float:
+    """Drag at ``q`` (m) over its mean; the curve begins at ``first`` of ``p``."""
+    return curve.around_one(p, first, depth, q / length)

@@ -1,0 +1,10 @@
+"""One axis in the time domain: a rigid base and any of a library's effects.
+
+model:         gain, delay, pole, the values of the effects; its simulation
+resonant_loop: resonances inside the loop
+interpolation: where the axis is between two samples of its encoder
+loop_template: the frame of the simulation loop
+loop_source:   the text of one loop, written from the laws of a set of effects
+loop_compile:  from that text to machine code, kept on disk
+linear_part:   the linear part as a transfer function
+"""

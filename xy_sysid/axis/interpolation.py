@@ -1,0 +1,16 @@
+"""Where the axis is between two samples of its encoder."""
+
+from __future__ import annotations
+
+from xy_sysid.axis.resonant_loop import inner
+from xy_sysid.samples.block import FloatArray
+
+
+@inner
+def along(x: FloatArray, i: int, part: float) -> float:
+    """Position a part (0..1) of the way from sample i to the next, m: on the parabola with the mean of both second differences."""
+    straight: float = x[i] + part * (x[i + 1] - x[i])
+    if i == 0 or i + 2 >= x.shape[0]:
+        return straight
+    bent: float = straight - 0.25 * part * (1.0 - part) * (x[i + 2] - x[i + 1] - x[i] + x[i - 1])
+    return bent

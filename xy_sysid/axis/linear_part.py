@@ -1,0 +1,71 @@
+"""The linear part of an axis model as a transfer function: base, delay, resonances and lags, without friction and the like.
+
+Which effects are linear is found by trying their laws, so that effects of users count too.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from xy_sysid.axis.model import AxisModel
+from xy_sysid.effects import Effect
+from xy_sysid.effects._contract import arguments
+from xy_sysid.linear.transfer_function import TransferFunction
+from xy_sysid.units import USUAL, Units
+
+FINE = 1e5  # Hz at which a section is asked for its roots: far above any resonance, where s = ln(z) fs is exact enough
+STEP = 1e-5  # s of the trial of a lag
+
+
+def linear_part(model: AxisModel, units: Units = USUAL) -> TransferFunction:
+    """Position over voltage, continuous, with the delay: gain pole / (s (s + pole)) times every linear effect."""
+    numerator, denominator = np.array([model.gain * model.pole]), np.array([1.0, model.pole, 0.0])
+    for name, values in model.effects:
+        top, bottom = _section(model.library[name], values)
+        numerator, denominator = np.polymul(numerator, top), np.polymul(denominator, bottom)
+    return TransferFunction(numerator / denominator[0], denominator / denominator[0], model.delay, input_unit=units.input, output_unit=units.output)
+
+
+def nonlinear(model: AxisModel) -> tuple[str, ...]:
+    """Names of the effects that the linear part leaves out."""
+    return tuple(name for name, values in model.effects if np.array_equal(_section(model.library[name], values), ([1.0], [1.0])))
+
+
+def _section(effect: Effect, values: tuple[float, ...]) -> tuple[Any, Any]:
+    """Numerator and denominator with gain 1 at 0 Hz; 1 and 1 for an effect that is not linear."""
+    if effect.category == "motion":
+        b0, b1, b2, a1, a2 = effect.functions["section"](**_bound(effect.functions["section"], effect, values, {"fs": FINE}))
+        return _polynomial([b0, b1, b2]), _polynomial([1.0, a1, a2])
+    lag = _lag(effect, values) if effect.category == "state" and len(effect.states) == 1 else None
+    return ([1.0], [1.0]) if lag is None else ([1.0], [lag, 1.0])
+
+
+def _polynomial(discrete: list[float]) -> Any:
+    """In s, 1 at 0 Hz, with the roots s = ln(z) fs."""
+    roots = np.roots(discrete)
+    kept = np.log(roots[np.abs(roots) > 1e-9].astype(np.complex128)) * FINE
+    found = np.real(np.poly(kept))
+    return found / found[-1]
+
+
+def _lag(effect: Effect, values: tuple[float, ...]) -> float | None:
+    """The time constant if the law is a first-order lag of the voltage, whatever speed, place and time."""
+
+    def end(u: float, state: float, v: float) -> float:
+        words = {"u": u, effect.states[0]: state, "v": v, "x": v, "t": abs(v), "h": STEP, "gain": 0.1, "pole": 100.0}
+        return float(effect.functions["advance"](**_bound(effect.functions["advance"], effect, values, words))[-1])
+
+    one = end(1.0, 0.0, 0.0)
+    tries = (end(7.0, 0.0, 0.0) / 7.0, end(-0.01, 0.0, 0.1) / -0.01, 1.0 - end(0.0, 1.0, -0.1))
+    if not 0.0 < one < 1.0 or not np.allclose(tries, one, rtol=1e-6) or not math.isclose(end(1.0, 3.0, 0.5), 3.0 - 2.0 * one, rel_tol=1e-6):
+        return None
+    return -STEP / math.log1p(-one)
+
+
+def _bound(function: Callable[..., Any], effect: Effect, values: tuple[float, ...], words: dict[str, float]) -> dict[str, float]:
+    known = {**words, **dict(zip(effect.names, values, strict=True))}
+    return {name: known[name] for name in arguments(function)}

@@ -1,0 +1,269 @@
+"""The frame of the loop, into which ``loop_source`` writes the laws of the effects.
+
+Three ways through it: forces that are constant between switching instants, exactly; laws that bend with speed, in
+sub-steps; and an axis with resonances, with these inside (``resonant_loop``): exactly, and in sub-steps where laws heed the speed.
+The second frame takes effects out of a recording, for those that only one-step prediction can judge.
+"""
+
+from __future__ import annotations
+
+from string import Template
+
+TEMPLATE = Template("""\
+def $name(u, x, p, on, fs, fine, out):
+    n = out.shape[0]
+    gain, delay, pole = p[0], p[1], p[2]
+$unpack
+$flags
+$places
+    held = u.copy()
+$inputs
+    rest_forth = rest_back = fixed_forth = fixed_back = 0.0
+$levels
+$states
+    late = delay * fs
+    whole = int(late)
+    part = late - whole
+    cuts = math.ceil(fine / fs) if curved else 1
+    h_old, h_new = part / fs / cuts, (1.0 - part) / fs / cuts
+    decay_old, decay_new = math.exp(-pole * h_old), math.exp(-pole * h_new)
+    spent_old, spent_new = -math.expm1(-pole * h_old) / pole, -math.expm1(-pole * h_new) / pole
+    turn = math.copysign(1.0, gain)  # friction opposes motion, whatever the sign of the gain
+    v = 0.0
+    hung = False
+    top, bottom = np.ones(1), np.ones(1)
+$hang
+    if hung:
+        generator_moving = generator(gain, pole, top, bottom, fs)
+        generator_still = resting(generator_moving)
+        stiff = math.ceil(fastest(pole, bottom, fs) / ($stiff * fs))
+        lighter = generator_moving[1, top.size + 1] / (gain * pole)  # without what hangs on it: sooner does it follow the friction
+        wanted = fine * lighter if curved else fine
+        cuts = min(max(math.ceil(wanted / fs), stiff), math.ceil($most * fine)) if heeded or curved else 1
+        h_old, h_new = part / fs / cuts, (1.0 - part) / fs / cuts
+        moving_old, moving_new = exponential(generator_moving, h_old), exponential(generator_moving, h_new)
+        still_old, still_new = exponential(generator_still, h_old), exponential(generator_still, h_new)
+        size = top.size + 2
+        swung, spare, series = np.zeros(size), np.zeros(size), np.zeros(($terms, size))
+        for i in range(n):
+            moved = 0.0
+            for piece in range(2):
+                if piece == 0:
+                    h, moving, still, middle_of = h_old, moving_old, still_old, 0.5 * part
+                else:
+                    h, moving, still, middle_of = h_new, moving_new, still_new, 0.5 * (1.0 + part)
+                if h <= 0.0:
+                    continue
+                k = i - whole - 1 + piece
+                volts = held[k] if k >= 0 else 0.0
+                time = (i + middle_of) / fs
+                aside = $gauss * (middle_of if piece == 0 else 1.0 - middle_of)
+                place, near, far = along(x, i, middle_of), along(x, i, middle_of - aside), along(x, i, middle_of + aside)
+                pull = 0.0
+                if any_pull:
+$pulls
+                for cut in range(cuts):
+                    v = swung[1]
+                    drive = volts
+                    if any_state:
+$advance
+                    net = drive - pull
+                    drag = 0.0
+$drag_start
+                    push = net - drag
+                    if not dry and not bristled:
+                        middle = 0.5 * (v + ahead(moving, swung, push))
+                        drag = 0.0
+$drag_free
+                        moved += step(moving, swung, net - drag, spare)
+                        continue
+                    if v != 0.0:
+                        direction = 1.0 if v > 0.0 else -1.0
+                    else:
+                        direction = turn if push + tug(generator_moving, swung) > 0.0 else -turn
+                    level = fixed_forth if direction > 0.0 else fixed_back
+$level_start
+                    if bristled:
+$bristle_hung
+                        continue
+                    plus, minus = (rest_forth, rest_back) if gain > 0.0 else (rest_back, rest_forth)
+                    if v == 0.0 and -minus <= push + tug(generator_moving, swung) <= plus:
+                        moved += hold(generator_moving, generator_still, still, swung, push, plus, minus, h, series, spare)
+                        continue
+                    middle = 0.5 * (v + ahead(moving, swung, push - turn * direction * level))
+                    if middle * direction < 0.0:
+                        middle = 0.0
+                    drag = 0.0
+$drag_middle
+                    push = net - drag
+                    level = fixed_forth if direction > 0.0 else fixed_back
+$level_middle
+                    force = push - turn * direction * level
+                    if ahead(moving, swung, force) * direction >= 0.0:
+                        moved += step(moving, swung, force, spare)
+                    else:
+                        moved += stop(generator_moving, generator_still, swung, push, force, plus, minus, h, series)
+            out[i] = moved * fs
+    elif not curved:
+        # v runs in the direction of the voltage here; forth and back are directions of motion
+        size = abs(gain)
+        plus, minus = (fixed_forth, fixed_back) if gain > 0.0 else (fixed_back, fixed_forth)
+        for i in range(n):
+            moved = 0.0
+            for piece in range(2):
+                if piece == 0:
+                    h, decay, spent, middle_of = h_old, decay_old, spent_old, 0.5 * part
+                else:
+                    h, decay, spent, middle_of = h_new, decay_new, spent_new, 0.5 * (1.0 + part)
+                if h <= 0.0:
+                    continue
+                k = i - whole - 1 + piece
+                volts = held[k] if k >= 0 else 0.0
+                push = volts
+                if any_pull:
+                    time = (i + middle_of) / fs
+                    aside = $gauss * (middle_of if piece == 0 else 1.0 - middle_of)
+                    place, near, far = along(x, i, middle_of), along(x, i, middle_of - aside), along(x, i, middle_of + aside)
+                    pull = 0.0
+$pulls
+                    push = volts - pull
+                if not dry:
+                    reach = size * push
+                    moved += reach * h + (v - reach) * spent
+                    v = reach + (v - reach) * decay
+                    continue
+                if v > 0.0 or (v == 0.0 and push > plus):
+                    reach = size * (push - plus)
+                    end = reach + (v - reach) * decay
+                    if end >= 0.0:
+                        moved += reach * h + (v - reach) * spent
+                        v = end
+                        continue
+                elif v < 0.0 or push < -minus:
+                    reach = size * (push + minus)
+                    end = reach + (v - reach) * decay
+                    if end <= 0.0:
+                        moved += reach * h + (v - reach) * spent
+                        v = end
+                        continue
+                else:
+                    continue
+                # it comes to rest within the piece: find when, then see whether it sticks or turns
+                gone = min(math.log1p(-v / reach) / pole, h)
+                moved += reach * gone + v / pole
+                v = 0.0
+                if push > plus:
+                    reach = size * (push - plus)
+                elif push < -minus:
+                    reach = size * (push + minus)
+                else:
+                    continue
+                left = h - gone
+                grown = -math.expm1(-pole * left)
+                moved += reach * (left - grown / pole)
+                v = reach * grown
+            out[i] = turn * moved * fs
+    else:
+        for i in range(n):
+            moved = 0.0
+            for piece in range(2):
+                if piece == 0:
+                    h, decay, spent, middle_of = h_old, decay_old, spent_old, 0.5 * part
+                else:
+                    h, decay, spent, middle_of = h_new, decay_new, spent_new, 0.5 * (1.0 + part)
+                if h <= 0.0:
+                    continue
+                k = i - whole - 1 + piece
+                volts = held[k] if k >= 0 else 0.0
+                time = (i + middle_of) / fs
+                aside = $gauss * (middle_of if piece == 0 else 1.0 - middle_of)
+                place, near, far = along(x, i, middle_of), along(x, i, middle_of - aside), along(x, i, middle_of + aside)
+                pull = 0.0
+                if any_pull:
+$pulls
+                for cut in range(cuts):
+                    drive = volts
+                    if any_state:
+$advance
+                    net = drive - pull
+                    drag = 0.0
+$drag_start
+                    push = net - drag
+                    if not dry and not bristled:
+                        middle = v + 0.5 * (gain * push - v) * (1.0 - decay)
+                        drag = 0.0
+$drag_free
+                        reach = gain * (net - drag)
+                        moved += reach * h + (v - reach) * spent
+                        v = reach + (v - reach) * decay
+                        continue
+                    if v != 0.0:
+                        direction = 1.0 if v > 0.0 else -1.0
+                    else:
+                        direction = turn if push > 0.0 else -turn
+                    level = fixed_forth if direction > 0.0 else fixed_back
+$level_start
+                    if bristled:
+$bristle
+                        continue
+                    if v == 0.0:
+                        level = rest_forth if direction > 0.0 else rest_back
+                        if abs(push) <= level:
+                            continue
+                    middle = v + 0.5 * (gain * (push - turn * direction * level) - v) * (1.0 - decay)
+                    if middle * direction < 0.0:
+                        middle = 0.0
+                    drag = 0.0
+$drag_middle
+                    push = net - drag
+                    level = fixed_forth if direction > 0.0 else fixed_back
+$level_middle
+                    reach = gain * (push - turn * direction * level)
+                    end = reach + (v - reach) * decay
+                    if end * direction >= 0.0:
+                        moved += reach * h + (v - reach) * spent
+                        v = end
+                        continue
+                    gone = min(math.log1p(-v / reach) / pole, h) if v != 0.0 else 0.0
+                    moved += reach * gone + v / pole
+                    v = 0.0
+                    direction = turn if push > 0.0 else -turn
+                    rest = rest_forth if direction > 0.0 else rest_back
+                    if abs(push) > rest:
+                        reach = gain * (push - turn * direction * rest)
+                        left = h - gone
+                        grown = -math.expm1(-pole * left)
+                        moved += reach * (left - grown / pole)
+                        v = reach * grown
+            out[i] = moved * fs
+$motions
+$encoders
+""")
+
+UNDOING = Template("""\
+def $name(u, x, p, on, fs, held, where, against):
+    n = held.shape[0]
+    gain, delay, pole = p[0], p[1], p[2]
+$unpack
+$flags
+$places
+    where[:] = x[: n + 1]
+    through = 1.0
+$motions
+    held[:] = u[:n]
+$inputs
+$states
+    h, late = 1.0 / fs, int(delay * fs + 0.5)
+    for i in range(n):
+        drive = held[i]
+$advance
+        held[i] = drive
+    for i in range(n):
+        volts, pull, time = held[max(i - late, 0)], 0.0, (i + 0.5) / fs
+        near, far = along(x, i, 0.5 * (1.0 - $gauss)), along(x, i, 0.5 * (1.0 + $gauss))
+$pulls
+        against[0, i], pull = pull, 0.0
+$loads
+        against[1, i] = pull
+    return through
+""")

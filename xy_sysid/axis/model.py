@@ -1,0 +1,208 @@
+"""One axis in the time domain: a rigid base (gain, delay, pole) and any of a library's effects.
+
+The velocity is simulated from rest. What depends on position uses the measured one, so that nothing drifts. Scheme:
+each sample is split where the delayed voltage changes; between, the viscous pole is integrated exactly for a constant
+force, and dry friction finds its zero crossings in time (Karnopp 1985's problem without his dead band). Laws that bend
+with speed get sub-steps (two in each piece at 2 kHz), by the midpoint rule. Resonances filter the sampled motion, unless
+a law heeds the speed: then they are in the loop with it (``resonant_loop``), with the same parameters and the same linear limit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from xy_sysid.axis.loop_compile import Kernel, Undoing, build, build_undoing
+from xy_sysid.axis.loop_source import BASE, slots, undoable
+from xy_sysid.effects import EFFECTS, Effect
+from xy_sysid.errors import BadInput
+from xy_sysid.samples.block import FloatArray
+from xy_sysid.settings import unknown_name
+
+FINE = 8000.0  # Hz: sub-steps of each of a sample's two pieces; LuGre bristles of 10 um and Stribeck curves of 10 mm/s need it
+
+
+class Library:
+    """A set of effects that simulate in one compiled loop, which is made at its first use."""
+
+    def __init__(self, effects: Iterable[Effect]) -> None:
+        self.effects: dict[str, Effect] = {effect.name: effect for effect in effects}
+        self.acting: tuple[Effect, ...] = tuple(effect for effect in self.effects.values() if effect.category != "base")
+        self.places: Mapping[str, int] = slots(self.acting)
+        self._kernel: Kernel | None = None
+        self._undoing: Undoing | None = None
+
+    def __getitem__(self, name: str) -> Effect:
+        """The effect of this name; raises BadInput with the nearest spelling."""
+        if name not in self.effects:
+            raise unknown_name(name, list(self.effects), "effect")
+        return self.effects[name]
+
+    @property
+    def kernel(self) -> Kernel:
+        """The compiled loop; see ``loop_source.text``."""
+        if self._kernel is None:
+            self._kernel = build(self.acting)
+        return self._kernel
+
+    @property
+    def undoing(self) -> Undoing:
+        """The compiled loop that takes effects out of a recording; see ``loop_source.undoing``."""
+        if self._undoing is None:
+            self._undoing = build_undoing(self.acting)
+        return self._undoing
+
+    def extended(self, effects: Iterable[Effect]) -> Library:
+        """A library with more effects; raises BadInput for a name that is taken."""
+        added = list(effects)
+        for effect in added:
+            if effect.name in self.effects:
+                raise BadInput("effect", effect.name, "a name that is not in the library yet", "Rename it.")
+        return Library([*self.effects.values(), *added])
+
+
+STANDARD = Library(EFFECTS.values())
+
+
+@dataclass(frozen=True, slots=True)
+class AxisModel:
+    """A hypothesis about an axis.
+
+    gain: m/s/V; delay: s; pole: rad/s; effects: (name, parameter values in the effect's order), SI
+    """
+
+    gain: float
+    delay: float
+    pole: float
+    effects: tuple[tuple[str, tuple[float, ...]], ...] = ()
+    library: Library = field(default=STANDARD, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        for name, value, low in (("gain", self.gain, -np.inf), ("delay", self.delay, 0.0), ("pole", self.pole, 1e-9)):
+            if not (np.isfinite(value) and value >= low):
+                raise BadInput(name, value, f"finite, at least {low:g}", "Give another value.")
+        for name, values in self.effects:
+            effect = self.library[name]
+            if effect.category == "base":
+                raise BadInput("effect", name, "one that is not in every model already", "Leave it out.")
+            if len(values) != len(effect.parameters):
+                raise BadInput(
+                    f"effect {name}", f"{len(values)} values", f"{len(effect.parameters)}: {', '.join(effect.names)}", "Give one per name."
+                )
+
+    def __contains__(self, name: str) -> bool:
+        return any(name == own for own, _ in self.effects)
+
+    @property
+    def ahead(self) -> Effect | None:
+        """The effect in it that only one-step prediction can judge, if there is one: then errors are of one sample ahead."""
+        return next((self.library[name] for name, _ in self.effects if self.library[name].one_step is not None), None)
+
+    def with_effect(self, name: str, values: Iterable[float] | None = None) -> AxisModel:
+        """The model with one effect added or changed (None: its typical size)."""
+        chosen = self.library[name].typical if values is None else tuple(float(value) for value in values)
+        return replace(self, effects=(*((own, old) for own, old in self.effects if own != name), (name, chosen)))
+
+    def without(self, name: str) -> AxisModel:
+        """The model without this effect."""
+        return replace(self, effects=tuple(item for item in self.effects if item[0] != name))
+
+    def taken_apart(self, name: str) -> AxisModel:
+        """The same model with an effect written as those that it is the sum of."""
+        whole = self.library[name].sum_of
+        if whole is None or any(part in self for part in whole.parts):
+            return self
+        parts = zip(whole.parts, whole.apart(dict(self.effects)[name]), strict=True)
+        return replace(self, effects=(*self.without(name).effects, *((part, self._turned(part, values)) for part, values in parts)))
+
+    def _turned(self, name: str, values: tuple[float, ...]) -> tuple[float, ...]:
+        """A size in the sense of the motion, where friction acts, as one in the sense of the drive, where a force does; and the way back."""
+        return (-values[0], *values[1:]) if self.gain < 0.0 and self.library[name].category == "force" else values
+
+    def joined(self) -> AxisModel:
+        """The same model with one effect for several where they are its very law."""
+        own = dict(self.effects)
+        for effect in self.library.acting:
+            if effect.sum_of is not None and all(part in own for part in effect.sum_of.parts):
+                values = effect.sum_of.joined([self._turned(part, own[part]) for part in effect.sum_of.parts])
+                if all(item.low <= value <= item.high for item, value in zip(effect.parameters, values, strict=True)):
+                    kept = tuple((name, old) for name, old in self.effects if name not in effect.sum_of.parts)
+                    return replace(self, effects=(*kept, (effect.name, values)))
+        return self
+
+    def values(self) -> dict[str, float]:
+        """Every parameter by ``gain``, ``delay``, ``pole``, ``effect.parameter``."""
+        own = {f"{name}.{key}": value for name, row in self.effects for key, value in zip(self.library[name].names, row, strict=True)}
+        return {"gain": self.gain, "delay": self.delay, "pole": self.pole, **own}
+
+
+def simulator(
+    library: Library, active: Iterable[str], sampling_rate: float, voltage: FloatArray, position: FloatArray, fine: float = FINE
+) -> Callable[[FloatArray], FloatArray]:
+    """A function from parameters to the simulated velocity (n - 1,), m/s, for many runs on the same data.
+
+    Its argument is a row: gain, delay, pole, then each active effect's parameters, in the order of ``active``.
+    voltage, position: (n,) V and m; the voltage of sample k is held to k + 1; fine: Hz, sub-steps for what heeds speed
+    """
+    if voltage.shape != position.shape or voltage.ndim != 1 or voltage.size < 2:
+        raise BadInput("shape of voltage and position", f"{voltage.shape} and {position.shape}", "one and the same (n,), n >= 2", "Give one axis.")
+    u = np.ascontiguousarray(voltage[:-1], dtype=np.float64)
+    x = np.ascontiguousarray(position, dtype=np.float64)
+    chosen = [library[name] for name in active]
+    row = np.ones(len(library.places))
+    where = np.array([library.places[name] for name in (*BASE, *(f"{effect.name}.{key}" for effect in chosen for key in effect.names))])
+    names = [effect.name for effect in library.acting]
+    sizes = [(names.index(effect.name), library.places[f"{effect.name}.{effect.names[0]}"]) for effect in chosen]
+    kernel = library.kernel
+
+    def run(parameters: FloatArray) -> FloatArray:
+        row[where] = parameters
+        on = np.zeros(len(names), dtype=np.uint8)
+        for place, size in sizes:
+            on[place] = row[size] != 0.0
+        out = np.empty(u.size)
+        kernel(u, x, row, on, float(sampling_rate), fine, out)
+        return out
+
+    return run
+
+
+def undoer(
+    library: Library, active: Iterable[str], sampling_rate: float, voltage: FloatArray, position: FloatArray
+) -> Callable[[FloatArray, int], tuple[FloatArray, FloatArray, FloatArray, float]]:
+    """A function that takes effects (of ``undoable``) out of the first samples of a recording.
+
+    Its arguments are a row as of ``simulator``, and n; it returns the voltage behind the amplifier (n,), V, the position before
+    resonances and the scale's errors (n + 1,), m, the forces against the drive (2, n), at the motor and on the table, V, and how
+    much of a sudden change of that position the encoder shows at once.
+    """
+    members = [effect for effect in library.acting if undoable(effect)]
+    places, names = slots(members), [effect.name for effect in members]
+    chosen = [library[name] for name in active]
+    row, on = np.ones(len(places)), np.zeros(len(names), dtype=np.uint8)
+    on[[names.index(effect.name) for effect in chosen]] = 1
+    where = np.array([places[name] for name in (*BASE, *(f"{effect.name}.{key}" for effect in chosen for key in effect.names))])
+    u, x = np.ascontiguousarray(voltage, dtype=np.float64), np.ascontiguousarray(position, dtype=np.float64)
+    kernel = library.undoing
+
+    def undo(parameters: FloatArray, samples: int) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+        row[where] = parameters
+        held, place, against = np.empty(samples), np.empty(samples + 1), np.empty((2, samples))
+        through = kernel(u[:samples], x[: samples + 1], row, on, float(sampling_rate), held, place, against)
+        return held, place, against, through
+
+    return undo
+
+
+def simulate(model: AxisModel, sampling_rate: float, voltage: FloatArray, position: FloatArray) -> FloatArray:
+    """(n - 1,) mean velocity of each sample, m/s, from rest; arguments as in ``simulator``."""
+    names = [name for name, _ in model.effects]
+    run = simulator(model.library, names, sampling_rate, voltage, position)
+    return run(np.array([model.gain, model.delay, model.pole, *(value for _, values in model.effects for value in values)]))
+
+
+def sample_velocity(sampling_rate: float, position: FloatArray) -> FloatArray:
+    """(n - 1,) mean velocity of each sample, m/s: what ``simulate`` predicts."""
+    return np.asarray(np.diff(position) * sampling_rate)

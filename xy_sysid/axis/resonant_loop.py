@@ -1,0 +1,287 @@
+"""Resonances inside the loop: where friction acts on the motion that the encoder sees, not on the rigid one.
+
+Base and resonances together are one linear system from the force (in volts) to the speed v at the encoder,
+
+    v = gain pole / (s + pole) prod_i H_i(s) (u - friction),   H_i = Z_i(s) / P_i(s),
+
+whose order is 1 + m, m = 2 for each resonance. It is split where friction can hold it, with sigma = s / rate and
+Z = prod Z_i = sigma^m + sum z_j sigma^j:
+
+    v'   = rate (strength (u - friction) - drag v - sum c_j q_j)
+    q_j' = rate q_(j+1),   q_(m-1)' = rate (v - sum z_j q_j)
+
+so that drag and c are what is left of (sigma + pole / rate) prod P_i after division by Z. The q are the masses that hang
+on the encoder's side: base on its feet (Preumont, Vibration Control of Active Structures, 3rd ed., sec. 2.4) or table on
+the screw; with v held at zero they swing freely, at the zeros. Between changes of the force all of this is exact
+(matrix exponential; Moler & Van Loan, SIAM Review 45 (2003), method 3).
+
+A state is a row (x, v, q_0 .. q_(m-1), force), (m + 3,); its generator carries the force along as a constant.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import ParamSpec, TypeVar
+
+import numpy as np
+from numba.extending import register_jitable
+
+from xy_sysid.samples.block import FloatArray
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+FINE = 1e5  # Hz at which a section is asked for its roots: far above any resonance, so that none is folded back
+TERMS = 10  # of power series within a sub-step; as STIFF is 0.5, the first that is left out is below 1e-10
+STIFF = 0.5  # longest sub-step times the fastest rate
+CUTS = 0.004  # s: most sub-steps of a piece over the rate asked for, Hz, however stiff a trial is: a first round must not last minutes
+
+
+def inner(function: Callable[P, R]) -> Callable[P, R]:
+    """The same function, callable from Python and from the compiled loop."""
+    made: Callable[P, R] = register_jitable(function)
+    return made
+
+
+@inner
+def roots(c1: float, c2: float, rate: float) -> tuple[float, float]:
+    """a0, a1 of sigma^2 + a1 sigma + a0, sigma = s / rate, for z^2 + c1 z + c2 at FINE, z = exp(s / FINE); nan if there is none."""
+    if not c2 > 0.0:
+        return math.nan, math.nan
+    middle, cosine = 0.5 * math.log(c2), -0.5 * c1 / math.sqrt(c2)
+    if not cosine > -1.0:
+        return math.nan, math.nan
+    turn = math.acos(cosine) ** 2 if cosine <= 1.0 else -(math.acosh(cosine) ** 2)
+    scale = FINE / rate
+    return (middle * middle + turn) * scale * scale, -2.0 * middle * scale
+
+
+@inner
+def times(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Product of two polynomials, lowest power first."""
+    product = np.zeros(first.size + second.size - 1)
+    for i in range(first.size):
+        for j in range(second.size):
+            product[i + j] += first[i] * second[j]
+    return product
+
+
+@inner
+def generator(gain: float, pole: float, top: FloatArray, bottom: FloatArray, rate: float) -> FloatArray:
+    """(m + 3, m + 3) rate of change of a state, 1/s.
+
+    top, bottom: products of the resonances' zeros and poles in sigma, (m + 1,), lowest power first, the highest is 1
+    """
+    whole = times(np.array([pole / rate, 1.0]), bottom)
+    m = top.size - 1
+    made = np.zeros((m + 3, m + 3))
+    made[0, 1] = 1.0
+    drag = whole[m] - top[m - 1]
+    made[1, 1] = -drag * rate
+    made[1, m + 2] = gain * whole[0] / top[0] * rate
+    for j in range(m):
+        made[1, 2 + j] = -(whole[j] - (top[j - 1] if j > 0 else 0.0) - drag * top[j]) * rate
+        if j < m - 1:
+            made[2 + j, 3 + j] = rate
+        made[m + 1, 2 + j] = -top[j] * rate
+    made[m + 1, 1] = rate
+    return made
+
+
+@inner
+def resting(moving: FloatArray) -> FloatArray:
+    """The generator while friction holds v at zero."""
+    made = moving.copy()
+    made[:2, :] = 0.0
+    return made
+
+
+@inner
+def fastest(pole: float, bottom: FloatArray, rate: float) -> float:
+    """Upper bound of the rates of the whole system, rad/s, within a factor of 2 (Fujiwara 1916)."""
+    found = pole / rate
+    m = bottom.size - 1
+    for k in range(1, m + 1):
+        found = max(found, abs(bottom[m - k]) ** (1.0 / k))
+    return found * rate
+
+
+@inner
+def product(a: FloatArray, b: FloatArray) -> FloatArray:
+    """a b of two square matrices."""
+    n = a.shape[0]
+    made = np.zeros((n, n))
+    for i in range(n):
+        for k in range(n):
+            for j in range(n):
+                made[i, j] += a[i, k] * b[k, j]
+    return made
+
+
+@inner
+def exponential(a: FloatArray, h: float) -> FloatArray:
+    """exp(a h) by scaling and squaring."""
+    n, norm = a.shape[0], 0.0
+    for i in range(n):
+        norm = max(norm, np.sum(np.abs(a[i])) * h)
+    halvings = max(math.ceil(math.log2(norm / 0.25)), 0) if norm > 0.0 else 0
+    small = a * (h / 2.0**halvings)
+    made, term = np.eye(n), np.eye(n)
+    for k in range(1, 13):
+        term = product(term, small) / k
+        made += term
+    for _ in range(halvings):
+        made = product(made, made)
+    return made
+
+
+@inner
+def ahead(by: FloatArray, state: FloatArray, force: float) -> float:
+    """Speed at the end of a sub-step under a constant force."""
+    n = state.size
+    total: float = by[1, n - 1] * force
+    for j in range(1, n - 1):
+        total += by[1, j] * state[j]
+    return total
+
+
+@inner
+def step(by: FloatArray, state: FloatArray, force: float, spare: FloatArray) -> float:
+    """Moves the state on by a sub-step; returns the distance, m."""
+    n = state.size
+    state[0], state[n - 1] = 0.0, force
+    for i in range(n - 1):
+        total = 0.0
+        for j in range(1, n):
+            total += by[i, j] * state[j]
+        spare[i] = total
+    for i in range(n - 1):
+        state[i] = spare[i]
+    distance: float = spare[0]
+    return distance
+
+
+@inner
+def tug(moving: FloatArray, state: FloatArray) -> float:
+    """What the hanging masses add to the force at this instant, V."""
+    n = state.size
+    total: float = 0.0
+    for j in range(2, n - 1):
+        total += moving[1, j] * state[j] / moving[1, n - 1]
+    return total
+
+
+@inner
+def unfold(a: FloatArray, state: FloatArray, force: float, series: FloatArray) -> None:
+    """series (TERMS, m + 3): the state as powers of time, from now on."""
+    n = state.size
+    for i in range(n):
+        series[0, i] = state[i]
+    series[0, 0], series[0, n - 1] = 0.0, force
+    for k in range(1, TERMS):
+        for i in range(n):
+            total = 0.0
+            for j in range(1, n):
+                total += a[i, j] * series[k - 1, j]
+            series[k, i] = total / k
+
+
+@inner
+def follow(series: FloatArray, t: float, state: FloatArray) -> float:
+    """The state after ``t`` s of its series; returns the distance, m."""
+    for i in range(state.size):
+        total = 0.0
+        for k in range(TERMS):
+            total = total * t + series[TERMS - 1 - k, i]
+        state[i] = total
+    distance: float = state[0]
+    return distance
+
+
+@inner
+def crossing(powers: FloatArray, h: float) -> float:
+    """Where a polynomial (TERMS,), lowest power first, changes its sign between 0 and ``h``: Newton's way, held by halving."""
+    low, high, rising = 0.0, h, powers[0] < 0.0
+    slope = powers[1]
+    t = -powers[0] / slope if slope != 0.0 else 0.5 * h
+    for _ in range(60):
+        if not low < t < high:
+            t = 0.5 * (low + high)
+        value = slope = 0.0
+        for k in range(TERMS):
+            slope = slope * t + value
+            value = value * t + powers[TERMS - 1 - k]
+        if (value < 0.0) == rising:
+            low = t
+        else:
+            high = t
+        change = value / slope if slope != 0.0 else h
+        t -= change
+        if abs(change) < 1e-12 * h:
+            break
+    return min(max(t, 0.0), h)
+
+
+@inner
+def stop(
+    moving: FloatArray, still: FloatArray, state: FloatArray, push: float, force: float, forth: float, back: float, h: float, series: FloatArray
+) -> float:
+    """A sub-step within which v comes to zero: then it sticks, or turns; returns the distance, m.
+
+    push: without friction, V; force: with that of the motion until now, V; forth, back: levels at rest, V, along the voltage
+    """
+    gone = 0.0
+    moved = 0.0
+    if state[1] != 0.0:
+        unfold(moving, state, force, series)
+        gone = crossing(series[:, 1].copy(), h)
+        moved = follow(series, gone, state)
+        state[1] = 0.0
+    needed = push + tug(moving, state)
+    if needed > forth:
+        unfold(moving, state, push - forth, series)
+    elif needed < -back:
+        unfold(moving, state, push + back, series)
+    else:
+        unfold(still, state, push, series)
+    return moved + follow(series, h - gone, state)
+
+
+@inner
+def hold(
+    moving: FloatArray,
+    still: FloatArray,
+    by: FloatArray,
+    state: FloatArray,
+    push: float,
+    forth: float,
+    back: float,
+    h: float,
+    series: FloatArray,
+    spare: FloatArray,
+) -> float:
+    """A sub-step that begins at rest: the hanging masses may tear it loose; returns the distance, m. Arguments as of ``stop``."""
+    n = state.size
+    after = push
+    for j in range(2, n - 1):
+        total = 0.0
+        for k in range(2, n - 1):
+            total += by[j, k] * state[k]
+        after += moving[1, j] * total / moving[1, n - 1]
+    if -back <= after <= forth:
+        return step(by, state, push, spare)
+    level = forth if after > 0.0 else -back
+    unfold(still, state, push, series)
+    powers = np.zeros(TERMS)
+    powers[0] = push - level
+    for k in range(TERMS):
+        for j in range(2, n - 1):
+            powers[k] += moving[1, j] * series[k, j] / moving[1, n - 1]
+    gone = crossing(powers, h)
+    follow(series, gone, state)
+    unfold(moving, state, push - level, series)
+    return follow(series, h - gone, state)
+
+
+LOOP = {item.__name__: item for item in (roots, times, generator, resting, fastest, exponential, ahead, step, tug, stop, hold)}

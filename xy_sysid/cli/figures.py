@@ -1,0 +1,83 @@
+"""xy-sysid figures: every picture of a recording as vectors, and the numbers that are drawn."""
+
+from __future__ import annotations
+
+import json as _json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from xy_sysid.cli import options as o
+from xy_sysid.cli.diagnose import Own
+from xy_sysid.cli.output import emit, progress, say
+from xy_sysid.cli.reading import chosen, each, read, reads
+
+if TYPE_CHECKING:
+    from xy_sysid.imports.reading import Reading
+
+KINDS = ("svg", "pdf", "csv")
+
+
+@reads
+def figures(
+    recs: o.Recs,
+    reading: Reading,
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="the folder to write into, made if it is not there")] = Path("figures"),
+    kind: Annotated[list[str] | None, typer.Option("--kind", metavar="KIND", help="svg, pdf or csv (may be repeated; default all three)")] = None,
+    effect_file: Own = None,
+    json: o.Json = False,
+) -> None:
+    """Write every picture of the story of each axis, from where the rigid model fails to the falling error, as SVG, PDF and CSV."""
+    from xy_sysid.errors import BadInput
+    from xy_sysid.files.effects import library
+    from xy_sysid.report.axis_report import told
+    from xy_sysid.report.figure_data import table
+    from xy_sysid.report.gallery import gallery
+    from xy_sysid.report.headline import headline
+    from xy_sysid.report.vector import vectors
+
+    kinds = tuple(dict.fromkeys(kind or KINDS))
+    for one in kinds:
+        if one not in KINDS:
+            raise BadInput("--kind", repr(one), ", ".join(KINDS), "Choose one of these.")
+    if out.exists() and not out.is_dir():
+        raise BadInput("--out", str(out), "a folder", "Give another name.")
+    known = library(effect_file or [])
+    recording = read(recs, reading, json)
+    written: dict[str, list[str]] = {}
+    with progress() as bar:
+        names = chosen(recording, reading.axes)
+        task = bar.add_task("telling the story", total=len(names))
+
+        def work(name: str) -> dict[str, Any]:
+            bar.update(task, description=f"axis {name}")
+            story = dict(told(recording, name, known))
+            made = []
+            for title, figure in gallery(story).items():
+                for one in kinds:
+                    path = out / f"{name}_{title}.{one}"
+                    made.append((path, table(_json.loads(figure.to_json())).encode() if one == "csv" else vectors(figure, one)))
+            _write(out, made)
+            written[name] = [path.name for path, _ in made]
+            bar.advance(task)
+            return story
+
+        found, refused = each(names, work)
+    if json:
+        emit({"folder": str(out), "files": written, "refused": refused})
+        return
+    for name, story in found.items():
+        say(f"axis {name}: {headline(story)}. {len(written[name])} files.")
+    for name, text in refused.items():
+        say(f"axis {name}: {text}")
+    say(f"wrote {sum(len(names) for names in written.values())} files into {out}")
+
+
+def _write(out: Path, made: list[tuple[Path, bytes]]) -> None:
+    from xy_sysid.bags.atomic import whole
+
+    out.mkdir(parents=True, exist_ok=True)
+    for path, content in made:
+        with whole(path) as part:
+            part.write_bytes(content)

@@ -1,0 +1,59 @@
+"""Ctrl-C and SIGTERM end a command for sure: an interrupt that something swallows is raised again.
+
+Python raises KeyboardInterrupt wherever it is at that moment. In a callback of its own (of a weak reference, in the middle of an import)
+it is printed and forgotten, and the command would go on for ever.
+"""
+
+from __future__ import annotations
+
+import signal
+import sys
+from types import FrameType, TracebackType
+
+AGAIN = 0.2  # s from an interrupt to the next, as long as it is not on its way through the program
+
+
+def deaf() -> None:
+    """What comes from now on changes nothing: all is done and said, and the interpreter only tidies up."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
+
+
+class Interrupts:
+    """Within it, SIGINT and SIGTERM raise KeyboardInterrupt until it is left. came: one did; terminated: a SIGTERM was one of them."""
+
+    def __init__(self) -> None:
+        self.terminated, self.came = False, False
+
+    def __enter__(self) -> None:
+        self._hook = sys.unraisablehook
+        sys.unraisablehook = self._forgotten
+        signal.signal(signal.SIGALRM, self._again)
+        if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # else the shell wants it ignored
+            signal.signal(signal.SIGINT, self._first)
+        if signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
+            signal.signal(signal.SIGTERM, self._first)
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        sys.unraisablehook = self._hook
+
+    def _first(self, number: int, frame: FrameType | None) -> None:
+        self.came = True
+        self.terminated = self.terminated or number == signal.SIGTERM
+        signal.setitimer(signal.ITIMER_REAL, AGAIN, AGAIN)
+        raise KeyboardInterrupt
+
+    def _again(self, number: int, frame: FrameType | None) -> None:
+        """What is half written may be cleared away in peace: while an interrupt is being handled, there is no other."""
+        error = sys.exc_info()[1]
+        while error is not None:
+            if isinstance(error, KeyboardInterrupt):
+                return
+            error = error.__context__
+        raise KeyboardInterrupt
+
+    def _forgotten(self, lost: sys.UnraisableHookArgs) -> None:
+        """No traceback for an interrupt that comes again."""
+        if not issubclass(lost.exc_type, KeyboardInterrupt):
+            self._hook(lost)

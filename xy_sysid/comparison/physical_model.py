@@ -1,0 +1,64 @@
+"""An axis with physical effects as a model to be judged, drawn and saved like any other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from xy_sysid.axis.linear_part import linear_part
+from xy_sysid.axis.model import AxisModel, simulate
+from xy_sysid.greybox.free_run import Estimate, GreyboxFit
+from xy_sysid.linear.transfer_function import TransferFunction
+from xy_sysid.samples.block import FloatArray
+from xy_sysid.units import USUAL, Units, moved
+
+
+@dataclass(frozen=True, slots=True)
+class PhysicalModel:
+    """A rigid axis with physical effects, and what is known of it.
+
+    model: gain, delay, pole and the effects with their values; fit: with intervals and errors, None of a model from a file
+    axis:  its name; data: SHA-256 of the samples of each recording that it was fitted to; units: of input and output
+    """
+
+    model: AxisModel
+    axis: str = ""
+    data: tuple[str, ...] = ()
+    units: Units = USUAL
+    fit: GreyboxFit | None = None
+
+    @property
+    def tf(self) -> TransferFunction:
+        """The linear part: base, delay, resonances and lags, without friction and the like."""
+        return linear_part(self.model, self.units)
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Their names."""
+        return tuple(name for name, _ in self.model.effects)
+
+    @property
+    def parameters(self) -> tuple[Estimate, ...]:
+        """gain, delay, pole, then ``effect.parameter``, with 95 % intervals; empty of a model from a file (``model.values()`` has the values)."""
+        return self.fit.parameters if self.fit is not None else ()
+
+    @property
+    def doubt(self) -> str:
+        """What speaks against judging the model by its free simulation; empty if nothing does."""
+        names = [name for name in self.effects if not self.model.library[name].simulable]
+        if not names:
+            return ""
+        return f"no free simulation can follow {' and '.join(names)} (the contact is chaotic): the error says little about the model"
+
+    @property
+    def label(self) -> str:
+        """A few words for a legend."""
+        return f"rigid with {' and '.join(self.effects).replace('_', ' ')}" if self.effects else "rigid"
+
+    def velocity(self, sampling_rate: float, voltage: FloatArray, position: FloatArray) -> FloatArray:
+        """(n - 1,) simulated mean velocity of each sample, m/s, from rest."""
+        return simulate(self.model, sampling_rate, voltage, position)
+
+    def __repr__(self) -> str:
+        told = f" of axis {self.axis}" if self.axis else ""
+        error = f", held-out error {moved(self.fit.held_out_error, self.units.speed)}" if self.fit is not None else ""
+        return f"<PhysicalModel{told}: {self.label}{error}>"

@@ -1,0 +1,259 @@
+"""Where does a model fail? The velocity error on data that no fit saw, against the floor that the data allow.
+
+By frequency, speed, direction of motion, position (once or repeating), amplitude of the input, and time: each place with its
+size in multiples of the noise floor.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy import signal
+
+from xy_sysid.errors import BadInput
+from xy_sysid.greybox.floor import Windows, bands, encoder_noise, floor
+from xy_sysid.greybox.free_run import EPSILON
+from xy_sysid.linear.simulate import simulate
+from xy_sysid.linear.transfer_function import TransferFunction
+from xy_sysid.samples.block import FloatArray
+from xy_sysid.units import USUAL, Units, motion, moved, told
+
+PlaceKind = Literal["frequency", "speed", "direction", "position", "amplitude", "time"]
+
+SKIP = 0.5  # s at the start, in which the simulation forgets that it started from rest; a fifth of a short run
+SHORTEST_RUN = 600  # samples
+WINDOWS = 7  # window lengths that the samples hold at least
+TWICE = 2.0  # times the floor from which a place is worth a word
+STANDS_OUT = 1.3  # times the whole error that a bin must reach to be a place of its own
+SPEED_BINS, POSITION_BINS, AMPLITUDE_BINS, TIME_BINS = 10, 24, 6, 10
+UNEVEN = 0.3  # of the whole error that the two directions must differ by
+FEWEST = 200  # samples in a bin
+PERIODS = 200  # spatial periods tried, from SHORTEST to a third of the travel
+SHORTEST = 2e-4  # m
+ENVELOPE = 0.1  # s over which the amplitude of the input is taken
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """One place where the model fails: a range of ``kind`` from low to high in ``unit``, and its error over the floor."""
+
+    kind: PlaceKind
+    low: float
+    high: float
+    unit: str
+    error_over_floor: float
+    sentence: str
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """A model against unseen samples, in velocity.
+
+    time: (n,) s; measured, predicted: (n,) m/s; position: (n,) m
+    error, noise_floor: rms, m/s, up to the top band; noise_floor is what the encoder alone adds, the same as in a diagnosis
+    band_end: Hz, where motion and noise meet; error_below_end, floor_below_end: rms up to there, m/s
+    frequency: (bands,) Hz centres; error_over_floor: (bands,) amplitude ratio; places: worst first
+    The floor of the last three and of the places has, beside the noise, the part of the motion to which laws are trusted (EPSILON).
+    """
+
+    time: FloatArray
+    measured: FloatArray
+    predicted: FloatArray
+    position: FloatArray
+    error: float
+    noise_floor: float
+    error_below_end: float
+    floor_below_end: float
+    band_end: float
+    unit: str
+    frequency: FloatArray
+    error_over_floor: FloatArray
+    places: tuple[Place, ...]
+
+    def __repr__(self) -> str:
+        return f"<Comparison: {self.sentence}>"
+
+    @property
+    def sentence(self) -> str:
+        """For people."""
+        if not np.isfinite(self.error):
+            return "the simulated model runs away: it is not stable."
+        ratio = self.error / self.noise_floor if self.noise_floor > 0 else float("inf")
+        if not self.places:
+            return f"nothing stands out: the error is {told(ratio, 2)} times the noise floor."
+        return f"the error is {told(ratio)} times the noise floor; " + "; ".join(place.sentence for place in self.places[:4]) + "."
+
+
+@dataclass(frozen=True, slots=True)
+class Unseen:
+    """Samples of a gap-free run that no fit saw.
+
+    voltage, position: (n,) input and output; begins: time of the first, s
+    encoder: rms of the encoder's noise, in units.output, if more of the recording is known; None: from these samples
+    """
+
+    voltage: FloatArray
+    position: FloatArray
+    sampling_rate: float
+    units: Units = USUAL
+    begins: float = 0.0
+    encoder: float | None = None
+
+
+def compare(tf: TransferFunction, u: FloatArray, y: FloatArray, sampling_rate: float) -> Comparison:
+    """A transfer function against input and output (n,) of a gap-free run. Raises BadInput if it is too short."""
+    return compare_velocity(np.diff(simulate(tf, sampling_rate, u)) * sampling_rate, u, y, sampling_rate, Units(tf.input_unit, tf.output_unit))
+
+
+def compare_velocity(model: FloatArray, u: FloatArray, y: FloatArray, sampling_rate: float, units: Units = USUAL, begins: float = 0.0) -> Comparison:
+    """A simulated mean velocity (n - 1,) of any model against the measured output (n,). begins: time of the first sample, s."""
+    return compare_motion(model, Unseen(voltage=u, position=y, sampling_rate=sampling_rate, units=units, begins=begins))
+
+
+def compare_motion(model: FloatArray, unseen: Unseen) -> Comparison:
+    """A simulated mean velocity (n - 1,) of any model against the measured output (n,)."""
+    unit, sampling_rate, y = unseen.units.speed, unseen.sampling_rate, unseen.position
+    if y.shape[0] < SHORTEST_RUN or model.shape[0] != y.shape[0] - 1:
+        raise BadInput("number of samples", y.shape[0], f"{SHORTEST_RUN} or more", "Give a longer recording.")
+    first = min(int(SKIP * sampling_rate), y.shape[0] // 5)
+    measured, predicted = np.diff(y)[first:] * sampling_rate, model[first:]
+    position, drive = y[first:], unseen.voltage[first:-1]
+    error = measured - predicted
+    encoder = encoder_noise(sampling_rate, y) if unseen.encoder is None else unseen.encoder
+    layout = bands(sampling_rate, error.size // WINDOWS)
+    every = Windows(layout, np.arange(0, max(error.size - layout.length, 0) + 1, layout.length // 2))
+    least = floor(every, measured, encoder, EPSILON)
+    offset = float(np.mean(error))
+    power = layout.power(every.spectrum(error - offset))
+    edges = layout.edges()
+    centres = np.append(0.5 * edges[1], np.sqrt(edges[2:] * edges[1:-1]))
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        ratio = np.sqrt(power / np.maximum(least.power, 1e-300))
+    audible = np.flatnonzero(least.motion > least.noise)
+    seen = int(audible[-1]) + 1 if audible.size else layout.count
+    end = float(edges[seen])
+    noise = float(np.sqrt(np.sum((layout.lines * least.power)[:seen]) * 2.0 / layout.length))
+    low_error, low_speed = (_low_pass(values, end, sampling_rate) for values in (error, measured))
+    time = unseen.begins + (np.arange(error.shape[0]) + first) / sampling_rate
+    places = _frequency_places(edges, ratio, end)
+    total = float(np.sqrt(np.mean(low_error**2)))
+    if abs(offset) > TWICE * noise:
+        text = f"a constant error of {moved(offset, unit)}, {told(abs(offset) / noise)} times the floor"
+        places.append(_place("frequency", (0.0, float(edges[1])), "Hz", abs(offset) / noise, text))
+    if total > TWICE * noise:
+        width = max(int(ENVELOPE * sampling_rate), 1)
+        envelope = np.sqrt(np.maximum(signal.oaconvolve(drive**2, np.full(width, 1.0 / width), mode="same"), 0.0))
+        here = position[:-1]
+        places += _binned("speed", (np.abs(low_speed), unit), SPEED_BINS, low_error, noise)
+        places += _direction(low_speed, low_error, noise, unit)
+        places += _binned("position", (here, unseen.units.output), POSITION_BINS, low_error, noise)
+        places += _periodic(here, low_error, noise, unseen.units.output)
+        places += _binned("amplitude", (envelope, unseen.units.input), AMPLITUDE_BINS, low_error, noise)
+        places += _binned("time", (time, "s"), TIME_BINS, low_error, noise)
+    return Comparison(
+        time=time,
+        measured=measured,
+        predicted=predicted,
+        position=position[:-1],
+        error=float(np.hypot(layout.rms(power), offset)),
+        noise_floor=layout.rms(least.noise),
+        error_below_end=total,
+        floor_below_end=noise,
+        band_end=end,
+        unit=unit,
+        frequency=centres,
+        error_over_floor=ratio,
+        places=tuple(sorted(places, key=lambda place: -place.error_over_floor)),
+    )
+
+
+def _place(kind: PlaceKind, span: tuple[float, float], unit: str, ratio: float, sentence: str) -> Place:
+    return Place(kind=kind, low=span[0], high=span[1], unit=unit, error_over_floor=ratio, sentence=sentence)
+
+
+def _low_pass(values: FloatArray, end: float, sampling_rate: float) -> FloatArray:
+    if end >= 0.45 * sampling_rate:
+        return values
+    taps = signal.firwin(257, end, fs=sampling_rate)
+    return np.asarray(signal.oaconvolve(values, taps, mode="same"), dtype=np.float64)
+
+
+def _frequency_places(edges: FloatArray, ratio: FloatArray, end: float) -> list[Place]:
+    """Runs of neighbouring bands that are above twice the floor."""
+    places: list[Place] = []
+    known = np.flatnonzero(np.isfinite(ratio))
+    filled = np.interp(np.arange(ratio.size), known, ratio[known]) if known.size else ratio  # the lowest bands may hold no line
+    bad = (filled > TWICE) & (edges[1:] <= end * 1.05)
+    start: int | None = None
+    for k, flag in enumerate([*bad.tolist(), False]):
+        if flag and start is None:
+            start = k
+        if not flag and start is not None:
+            size = float(np.max(filled[start:k]))
+            low, high = float(edges[start]), float(edges[k])
+            at = start + int(np.argmax(filled[start:k]))
+            worst = float(np.sqrt(edges[at] * edges[at + 1])) if edges[at] > 0.0 else 0.5 * float(edges[at + 1])
+            text = f"{told(size)} times the floor near {worst:.3g} Hz, above twice the floor from {low:.3g} to {high:.3g} Hz"
+            places.append(_place("frequency", (low, high), "Hz", size, text))
+            start = None
+    return places
+
+
+def _binned(kind: PlaceKind, of: tuple[FloatArray, str], number: int, error: FloatArray, noise: float) -> list[Place]:
+    """The bin of equal counts whose error stands out most, joined with neighbours that do too. of: (n,) values, and their unit."""
+    (by, unit), total = of, float(np.sqrt(np.mean(error**2)))
+    edges = np.unique(np.quantile(by, np.linspace(0.0, 1.0, number + 1)))
+    if edges.size < 3:
+        return []
+    which = np.clip(np.searchsorted(edges, by, side="right") - 1, 0, edges.size - 2)
+    count = np.bincount(which, minlength=edges.size - 1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        size = np.sqrt(np.bincount(which, weights=error**2, minlength=edges.size - 1) / count)
+    high = (size > STANDS_OUT * total) & (count >= FEWEST)
+    if not bool(high.any()) or bool(high.all()):
+        return []
+    worst = int(np.argmax(np.where(high, size, 0.0)))
+    left, right = worst, worst
+    while left > 0 and high[left - 1]:
+        left -= 1
+    while right < high.size - 1 and high[right + 1]:
+        right += 1
+    ratio = float(size[worst] / noise)
+    scale, shown = motion(unit)
+    span = f"{edges[left] * scale:.3g} to {edges[right + 1] * scale:.3g} {shown}"
+    words = {"speed": f"at speeds of {span}", "position": f"at positions of {span}", "amplitude": f"at input amplitudes of {span}"}
+    sentence = f"{told(ratio)} times the floor {words.get(kind, f'from {span}')}"
+    return [_place(kind, (float(edges[left]), float(edges[right + 1])), unit, ratio, sentence)]
+
+
+def _direction(speed: FloatArray, error: FloatArray, noise: float, unit: str) -> list[Place]:
+    """A mean error that differs between the two directions of motion."""
+    slow = 0.1 * float(np.sqrt(np.mean(speed**2)))
+    forth, back = error[speed > slow], error[speed < -slow]
+    if min(forth.size, back.size) < FEWEST:
+        return []
+    difference = 0.5 * abs(float(np.mean(forth)) - float(np.mean(back)))
+    if difference < TWICE * noise or difference < UNEVEN * float(np.sqrt(np.mean(error**2))):
+        return []
+    ratio = difference / noise
+    return [_place("direction", (-difference, difference), unit, ratio, f"{told(ratio)} times the floor apart between the two directions of motion")]
+
+
+def _periodic(position: FloatArray, error: FloatArray, noise: float, unit: str) -> list[Place]:
+    """A part of the error that repeats along the travel, at least three times."""
+    travel = float(np.ptp(position))
+    if travel < 6 * SHORTEST:
+        return []
+    bins = min(int(np.ceil(8.0 * travel / SHORTEST)), 2**16)
+    place = np.minimum((position - position.min()) / travel * bins, bins - 1).astype(np.int64)
+    turns = np.fft.rfft(np.bincount(place, error, bins), 4 * bins)
+    periods = np.geomspace(SHORTEST, travel / 3.0, PERIODS)
+    size = np.sqrt(2.0) * np.abs(turns[np.minimum(np.round(4.0 * travel / periods), 2 * bins).astype(np.int64)]) / error.size
+    best = int(np.argmax(size))
+    ratio = float(size[best] / noise)
+    if ratio < TWICE / 2 or size[best] < 6.0 * float(np.median(size)):
+        return []
+    period = float(periods[best])
+    return [_place("position", (period, period), unit, ratio, f"{told(ratio)} times the floor repeating every {moved(period, unit)} of position")]

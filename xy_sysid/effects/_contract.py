@@ -1,0 +1,343 @@
+"""What an effect tells about itself, and the places of the simulation where its law can act.
+
+A law is an ordinary function of numbers. Its arguments are bound by name: parameters and states of the effect, and what
+the simulation knows at that moment (``WORDS``). So a law reads as the equation does, and needs no other glue.
+
+| category | function | returns | where it acts |
+|---|---|---|---|
+| base | (none) | | part of every model: gain, delay, pole |
+| input | output(u, t, x) | V | on each held voltage sample, before the delay |
+| state | advance(states, u, v, x, t, h, gain, pole) | V that is left of u, new states | on the voltage in each sub-step |
+| force | force(u, v, x, t, gain) | V against the drive | in each sub-step; x is the measured position |
+| friction | level(v, direction) | V, never negative | dry friction: sticks, and zero crossings are found in time |
+| bristle | bend(state, v, h, level), force(state, v, level) | new state; V | takes over all dry friction |
+| motion | section(fs) | b0, b1, b2, a1, a2 | linear section, 1 at 0 Hz, that the motion passes (see ``axis.resonant_loop``) |
+| encoder | error(x) | m | added to what the encoder reads; x is where the axis is, 0 where the encoder shows 0 |
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal, ParamSpec, Protocol, TypeVar
+
+import numpy as np
+from numba.extending import register_jitable
+from numpy.typing import NDArray
+
+from xy_sysid.effects._scene import Guess, Scene
+from xy_sysid.errors import BadInput
+from xy_sysid.samples.block import FloatArray
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+Category = Literal["base", "input", "state", "force", "friction", "bristle", "motion", "encoder"]
+Law = Callable[..., Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Beside:
+    """What acts beside an effect that one-step prediction judges, and how to take it out of a recording.
+
+    start, low, high, unit: (k,) of its numbers, SI (unit: size of 1); positive: (k,) fitted as a logarithm
+    undo: gain, delay, pole and the k numbers, and n -> voltage (n,), V; position (n + 1,), m; forces against the drive (2, n), V, at the
+          motor and on the table;
+          how much of a sudden change of that position the encoder shows at once
+    """
+
+    start: FloatArray
+    low: FloatArray
+    high: FloatArray
+    unit: FloatArray
+    positive: NDArray[np.bool_]
+    undo: Callable[[FloatArray, int], tuple[FloatArray, FloatArray, FloatArray, float]]
+
+
+@dataclass(frozen=True, slots=True)
+class DryFriction:
+    """Dry friction beside an effect that one-step prediction judges.
+
+    laws: effects of category friction or bristle, which act together as in the simulation; values: their parameters, SI, one law
+    after another; spread: standard errors of these, if known
+    """
+
+    laws: tuple[Effect, ...] = ()
+    values: tuple[float, ...] = ()
+    spread: tuple[float, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the laws."""
+        return tuple(effect.name for effect in self.laws)
+
+    def rows(self) -> list[tuple[Effect, tuple[float, ...], tuple[float, ...]]]:
+        """Each law with its values, and their standard errors (0 where not known)."""
+        found, at = [], 0
+        spread = self.spread or (0.0,) * len(self.values)
+        for effect in self.laws:
+            end = at + len(effect.parameters)
+            found.append((effect, self.values[at:end], spread[at:end]))
+            at = end
+        return found
+
+
+def in_time() -> bool:
+    """Never late."""
+    return False
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """How long a fit by one-step prediction goes on.
+
+    bar: rms of the held-out innovations of the best that is known without the effect: what cannot come near is given up soon;
+         m/s where errors are velocities, m in a task
+    late: then it ends with the best so far
+    """
+
+    bar: float | None = None
+    late: Callable[[], bool] = in_time
+
+
+PATIENT = Limits()
+
+
+@dataclass(frozen=True, slots=True)
+class OneStepTask:
+    """What one-step prediction is to fit an effect to.
+
+    base: gain, delay, pole to begin with; noise: of the encoder, m; stages: samples of the first stage, of training, of all
+    beside, dry: what acts beside it; begin: an earlier result without what is new beside
+    """
+
+    sampling_rate: float
+    base: tuple[float, float, float]
+    noise: float
+    stages: tuple[int, int, int]
+    beside: Beside
+    dry: DryFriction
+    begin: Followed | None = None
+    limits: Limits = PATIENT
+
+
+class OneStep(Protocol):
+    """Fits base and effect together by one-step prediction, beside any laws of dry friction."""
+
+    def fit(self, task: OneStepTask) -> Followed:
+        """The numbers that make the innovations least."""
+
+    def innovation(self, sampling_rate: float, found: Followed, beside: Beside, samples: int) -> FloatArray:
+        """(samples,) measured minus predicted position over the noise, with the numbers of an earlier result; ``beside.start`` is beside."""
+
+
+@dataclass(frozen=True, slots=True)
+class Followed:
+    """What one-step prediction found.
+
+    base, values: gain, delay, pole, and the effect's parameters, SI; base_spread, spread: their standard errors
+    dry:          friction that came out beside it
+    beside:       (k,) numbers of ``Beside``, and their standard errors
+    innovation:   (n,) measured minus predicted position, one step ahead, m
+    without:      (n,) the same of the same filter (process noise, what is beside) with the effect taken out and all else refitted, m
+    noise:        standard deviation of the encoder, m; runs: how often the filter ran
+    too_small:    True if the effect found is so small that it is none
+    given_up:     True if it ended early, because it could not come near the bar
+    """
+
+    base: tuple[float, float, float]
+    values: tuple[float, ...]
+    base_spread: tuple[float, float, float]
+    spread: tuple[float, ...]
+    dry: DryFriction
+    beside: tuple[tuple[float, ...], tuple[float, ...]]
+    innovation: FloatArray
+    without: FloatArray
+    noise: float
+    runs: int
+    too_small: bool = False
+    given_up: bool = False
+
+
+FUNCTIONS: Mapping[str, tuple[str, ...]] = {
+    "base": (),
+    "input": ("output",),
+    "state": ("advance",),
+    "force": ("force",),
+    "friction": ("level",),
+    "bristle": ("bend", "force"),
+    "motion": ("section",),
+    "encoder": ("error",),
+}
+
+WORDS: Mapping[str, str] = {
+    "u": "voltage at this place of the chain, V",
+    "v": "velocity of the axis, m/s",
+    "x": "measured position, m",
+    "t": "time since the start, s",
+    "h": "length of the sub-step, s",
+    "direction": "+1 forth, -1 back",
+    "level": "size of all dry friction at this speed, V",
+    "gain": "speed per volt of the base, m/s/V",
+    "pole": "rate of the base, rad/s",
+    "fs": "sampling rate, Hz",
+}
+
+
+def law(function: Callable[P, R]) -> Callable[P, R]:
+    """The same function, callable from Python, and compiled into the simulation."""
+    compilable: Callable[P, R] = register_jitable(forceinline=True)(function)
+    return compilable
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One number of an effect.
+
+    low, high: what a fit may reach, SI; positive: fitted as a logarithm; typical: a usual size (scale of a step, tests)
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    typical: float
+    meaning: str
+    positive: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Sum:
+    """One law written as several effects.
+
+    parts: their names; apart: the effect's values -> values of each part; joined: the way back
+    """
+
+    parts: tuple[str, ...]
+    apart: Callable[[Sequence[float]], tuple[tuple[float, ...], ...]]
+    joined: Callable[[Sequence[Sequence[float]]], tuple[float, ...]]
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """One physical effect.
+
+    law:         one line of mathematics
+    meaning:     what it is on a real machine
+    validity:    where the law holds, and where it does not
+    source:      paper or book, with the equation
+    category:    where it acts (table above)
+    parameters:  the first one is its size: at zero the effect is absent
+    shows:       how it looks in data
+    look_alikes: names of effects that it can be taken for; words for people, which steer nothing
+    experiment:  what separates it from them
+    functions:   the compiled law, by the names of the table above
+    guesses:     its signatures on a scene, with a way to read start values
+    joint:       start values of base and effect together: (gain, delay beyond the scene's, pole, values of the parameters);
+                 for effects so large that the base alone is led astray
+    states:      names of the law's states; all start at zero
+    family:      effects of one family replace one another
+    order:       place among the effects of its category, in the direction of the signal
+    simulable:   False if free simulation cannot judge it
+    plausible:   False for values that no machine has, though each is within its bounds
+    one_step:    then this does: fits the effect by one-step prediction (see ``contact.Contact``)
+    sum_of:      other effects that together are the very same law, if there are and motor and table are one
+    on_table:    True for a force that acts on the table: across a gap the motor does not feel it
+    rubs:        for ``one_step``: the effect whose dry friction it begins with where no other is given
+    suspects:    names of effects whose trace in an error is a reason to try this one, too: its own trace does not tell
+    mode_frequency: of a resonance: which parameter is its frequency, Hz; a mode that the data do not excite cannot be named
+    """
+
+    name: str
+    law: str
+    meaning: str
+    validity: str
+    source: str
+    category: Category
+    parameters: tuple[Parameter, ...]
+    shows: str
+    look_alikes: tuple[str, ...]
+    experiment: str
+    functions: Mapping[str, Law] = field(default_factory=dict)
+    guesses: Callable[[Scene], Iterable[Guess]] | None = None
+    joint: Callable[[Scene], Iterable[tuple[float, float, float, tuple[float, ...]]]] | None = None
+    states: tuple[str, ...] = ()
+    family: str = ""
+    order: int = 0
+    simulable: bool = True
+    one_step: OneStep | None = None
+    plausible: Callable[[Sequence[float]], bool] | None = None
+    sum_of: Sum | None = None
+    on_table: bool = False
+    rubs: str = ""
+    suspects: tuple[str, ...] = ()
+    mode_frequency: str = ""
+
+    def __post_init__(self) -> None:
+        """Raises BadInput if the functions do not fit the category or ask for words that nobody knows."""
+        if self.category not in FUNCTIONS:
+            raise BadInput(f"effect {self.name}: category", repr(self.category), ", ".join(FUNCTIONS), "Choose one of these.")
+        expected = FUNCTIONS[self.category]
+        if tuple(sorted(self.functions)) != tuple(sorted(expected)):
+            raise BadInput(f"effect {self.name}: functions", sorted(self.functions), " and ".join(expected) or "none", "Give these.")
+        if not self.name.isidentifier() or not self.parameters:
+            raise BadInput(f"effect {self.name!r}", "incomplete", "a Python name and at least one parameter", "Complete it.")
+        if self.guesses is not None and not callable(self.guesses):
+            raise BadInput(f"effect {self.name}: guesses", repr(self.guesses), "a function of the scene, or None", "Correct it.")
+        known = {*WORDS, *self.states, *(parameter.name for parameter in self.parameters)}
+        for name in expected:
+            for word in arguments(self.functions[name]):
+                if word not in known:
+                    raise BadInput(f"effect {self.name}: argument of {name}", repr(word), ", ".join(sorted(known)), "Rename it.")
+        if self.mode_frequency and self.mode_frequency not in self.names:
+            raise BadInput(f"effect {self.name}: mode_frequency", repr(self.mode_frequency), ", ".join(self.names), "Name one of these.")
+
+    @property
+    def is_dry(self) -> bool:
+        """True for a law of dry friction."""
+        return self.category in ("friction", "bristle")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+        return tuple(parameter.name for parameter in self.parameters)
+
+    @property
+    def typical(self) -> tuple[float, ...]:
+        """A usual size of each parameter, SI."""
+        return tuple(parameter.typical for parameter in self.parameters)
+
+    def guessed(self, scene: Scene) -> list[Guess]:
+        """What it guesses from a scene; nothing without ``guesses``.
+
+        Raises BadInput for columns that are not one finite number for each sample, as an effect of one's own may give.
+        """
+        found = list(self.guesses(scene)) if self.guesses is not None else []
+        wanted = scene.error.size
+        for guess in found:
+            shape = np.shape(guess.columns)
+            if len(shape) != 2 or shape[1] != wanted:
+                given, allowed = f"of shape {' x '.join(map(str, shape)) or '()'}", f"rows of {wanted} samples"
+            elif not np.isfinite(guess.columns).all():
+                given, allowed = "not finite", "finite numbers"
+            else:
+                continue
+            raise BadInput(f"columns that {self.name} guesses", given, allowed, "Make them from the scene's own signals.")
+        return found
+
+    def read(self, guess: Guess, coefficients: FloatArray) -> tuple[float, ...]:
+        """The values of the parameters that belong to the coefficients of a guess's columns.
+
+        Raises BadInput for other than one finite number each, as an effect of one's own may give.
+        """
+        given = tuple(guess.read(coefficients))
+        if len(given) != len(self.parameters) or not all(isinstance(value, (int, float, np.number)) and np.isfinite(value) for value in given):
+            said, allowed = ", ".join(str(value)[:20] for value in given), f"a number for each of {', '.join(self.names)}"
+            raise BadInput(f"values that {self.name} guesses", said or "nothing", allowed, "Return them in this order.")
+        return tuple(float(value) for value in given)
+
+
+def arguments(function: Law) -> tuple[str, ...]:
+    """The names of a law's arguments."""
+    return tuple(inspect.signature(function).parameters)

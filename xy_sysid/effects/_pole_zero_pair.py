@@ -1,0 +1,119 @@
+"""A pole-zero pair on the sampled motion: what both resonances share.
+
+Poles and zeros are mapped by z = exp(s / fs) (matched z-transform; Franklin, Powell & Workman, Digital Control of Dynamic
+Systems, 3rd ed., sec. 6.2.3), with gain 1 at 0 Hz. As the pair lies close together, what the mapping does far above it
+cancels.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import scipy.signal
+from numpy.typing import NDArray
+
+from xy_sysid.effects._contract import law
+from xy_sysid.effects._scene import Guess, Scene, columns
+from xy_sysid.samples.block import FloatArray
+
+_DAMPING = 0.03  # of the first guess; real frames and screws have 0.01 to 0.1
+
+
+@law
+def polynomial(frequency: float, damping: float, fs: float) -> tuple[float, float]:
+    """c1, c2 of z^2 + c1 z + c2 for an oscillation at ``frequency`` (Hz) with this damping ratio."""
+    w = 2.0 * math.pi * frequency / fs
+    decay = math.exp(-damping * w)
+    under = 1.0 - damping * damping
+    turn = math.cos(w * math.sqrt(under)) if under > 0.0 else math.cosh(w * math.sqrt(-under))
+    return -2.0 * decay * turn, decay * decay
+
+
+@law
+def pair(zero: float, zero_damping: float, pole: float, pole_damping: float, fs: float) -> tuple[float, float, float, float, float]:
+    """b0, b1, b2, a1, a2 of the section with zeros and poles at these frequencies (Hz)."""
+    b1, b2 = polynomial(zero, zero_damping, fs)
+    a1, a2 = polynomial(pole, pole_damping, fs)
+    b0 = (1.0 + a1 + a2) / (1.0 + b1 + b2)
+    return b0, b0 * b1, b0 * b2, a1, a2
+
+
+def guesses(scene: Scene, low: float, high: float) -> Iterator[Guess]:
+    """Traces of pairs with poles between ``low`` and ``high`` (Hz), every 6 per cent; none where the sampling is too slow to see one."""
+    top = min(high, 0.35 * scene.sampling_rate)
+    if top <= low:
+        return
+    model = scene.velocity - scene.error
+    for frequency in np.geomspace(low, top, max(int(math.log(top / low) / 0.06), 2)):
+        w = 2.0 * math.pi * float(frequency)
+        c = w / math.tan(0.5 * w / scene.sampling_rate)  # s = c (z - 1) / (z + 1), exact at the pair
+        a = np.array([c * c + 2.0 * _DAMPING * w * c + w * w, 2.0 * (w * w - c * c), c * c - 2.0 * _DAMPING * w * c + w * w])
+        traces = [scipy.signal.lfilter(b, a, model) for b in (c * c * np.array([1.0, -2.0, 1.0]), c * w * np.array([1.0, 0.0, -1.0]))]
+        yield Guess(columns(*traces), _Reader(float(frequency)), at_encoder=True)
+
+
+class _Reader:
+    """(antiresonance, its damping, split, damping of the resonance) from the two coefficients of a pole at ``frequency``."""
+
+    def __init__(self, frequency: float) -> None:
+        self.frequency = frequency
+
+    def __call__(self, c: FloatArray) -> tuple[float, ...]:
+        stretch = max(1.0 + float(c[0]), 1.02)
+        zero = self.frequency / math.sqrt(stretch)
+        damping = (2.0 * _DAMPING + float(c[1])) / (2.0 * math.sqrt(stretch))
+        return (self.frequency / zero - 1.0, zero, min(max(damping, 0.005), 0.2), _DAMPING)
+
+
+def joint(scene: Scene, low: float, high: float) -> Iterator[tuple[float, float, float, tuple[float, ...]]]:
+    """Gain, delay beyond the scene's, pole, and the pair's parameters, all from the frequency response.
+
+    Three poles and two zeros, by linear least squares with weights worked out again (Sanathanan & Koerner 1963), for delays
+    on a grid; the pair must lie between ``low`` and ``high`` (Hz).
+    """
+    f, response, weight = _response(scene)
+    scale = 2.0 * math.pi * float(np.sqrt(f[0] * f[-1]))
+    s = 2j * math.pi * f / scale
+    box = np.sinc(f / scene.sampling_rate) ** 2  # held input, mean output
+    best, chosen = np.inf, None
+    for delay in np.arange(-4.0, 4.01, 0.25) / scene.sampling_rate:
+        target = response * np.exp(s * scale * delay) / box
+        denominator = np.ones_like(target)
+        for _ in range(6):
+            row = weight / (np.abs(target) * np.abs(denominator))
+            matrix = np.stack([s**2, s, s**0, -target * s**2, -target * s, -target], axis=1) * row[:, None]
+            right = target * s**3 * row
+            found = np.linalg.lstsq(np.vstack((matrix.real, matrix.imag)), np.concatenate((right.real, right.imag)), rcond=None)[0]
+            denominator = s**3 + found[3] * s**2 + found[4] * s + found[5]
+        model = (found[0] * s**2 + found[1] * s + found[2]) / denominator
+        cost = float(np.sum((weight * np.abs(1.0 - model / target)) ** 2))
+        if cost < best:
+            best, chosen = cost, (float(delay), found)
+    if chosen is None:
+        return
+    delay, c = chosen
+    zeros, poles = np.roots(c[:3]) * scale, np.roots([1.0, *c[3:]]) * scale
+    real = poles[np.abs(poles.imag) < 1e-9 * np.abs(poles)]
+    pair_of = poles[poles.imag > 1e-9 * np.abs(poles)]
+    zero_of = zeros[zeros.imag > 0.0]
+    if real.size != 1 or pair_of.size != 1 or zero_of.size != 1 or real[0].real >= 0.0:
+        return
+    bottom, top = float(abs(zero_of[0])) / (2.0 * math.pi), float(abs(pair_of[0])) / (2.0 * math.pi)
+    if not low <= bottom <= high or top <= bottom:
+        return
+    dampings = [max(-float(root.real) / float(abs(root)), 1e-3) for root in (zero_of[0], pair_of[0])]
+    yield float(c[2] / c[5]), delay, -float(real[0].real), (top / bottom - 1.0, bottom, dampings[0], dampings[1])
+
+
+def _response(scene: Scene) -> tuple[FloatArray, NDArray[np.complex128], FloatArray]:
+    """Frequency (Hz), response (m/s/V) and weight of the relative error, at the excited lines."""
+    length = int(2 ** np.floor(np.log2(min(2.0 * scene.sampling_rate, scene.voltage.size / 4.0))))
+    f, cross = scipy.signal.csd(scene.voltage, scene.velocity, scene.sampling_rate, "hann", length)
+    power = scipy.signal.welch(scene.voltage, scene.sampling_rate, "hann", length)[1]
+    output = scipy.signal.welch(scene.velocity, scene.sampling_rate, "hann", length)[1]
+    coherence = np.clip(np.abs(cross) ** 2 / np.maximum(power * output, 1e-300), 0.0, 0.9999)
+    used = (f > 0.0) & (f < 0.35 * scene.sampling_rate) & (power > 1e-3 * np.max(power)) & (coherence > 0.1)
+    weight = np.sqrt(coherence / (1.0 - coherence))
+    return np.asarray(f[used]), np.asarray(cross[used] / power[used]), np.asarray(weight[used])

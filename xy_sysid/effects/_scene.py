@@ -1,0 +1,102 @@
+"""The measured motion as an effect sees it when it looks for its traces."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy.signal
+
+from xy_sysid.samples.block import FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """One axis in motion, with the base model's view of it.
+
+    sampling_rate: Hz; gain: m/s/V; pole: rad/s of the base
+    voltage:  (n,) what arrives at the amplifier (delayed), mean over each sample, V
+    velocity: (n,) measured mean velocity of each sample, m/s
+    position: (n,) measured, at the middle of each sample, m
+    error:    (n,) measured velocity minus the model's, m/s
+    """
+
+    sampling_rate: float
+    gain: float
+    pole: float
+    voltage: FloatArray
+    velocity: FloatArray
+    position: FloatArray
+    error: FloatArray
+    _known: dict[tuple[str, float], FloatArray] = field(init=False, repr=False, compare=False, default_factory=dict)
+
+    @property
+    def time(self) -> FloatArray:
+        """(n,) s since the start, at the middle of each sample."""
+        return np.asarray((np.arange(self.voltage.size) + 0.5) / self.sampling_rate, dtype=np.float64)
+
+    def smooth(self, signal: FloatArray, cutoff: float) -> FloatArray:
+        """The signal below ``cutoff`` (Hz), without shift in time. Of the scene's own signals each is worked out once."""
+        own = next((name for name in ("voltage", "velocity", "error") if signal is getattr(self, name)), None)
+        if own is None:
+            return self._smoothed(signal, cutoff)
+        if (own, cutoff) not in self._known:
+            self._known[own, cutoff] = self._smoothed(signal, cutoff)
+        return self._known[own, cutoff]
+
+    def _smoothed(self, signal: FloatArray, cutoff: float) -> FloatArray:
+        share = min(2.0 * cutoff / self.sampling_rate, 0.9)
+        return np.asarray(scipy.signal.sosfiltfilt(scipy.signal.butter(2, share, output="sos"), signal), dtype=np.float64)
+
+    def direction(self) -> FloatArray:
+        """(n,) -1..1, the direction of motion, blurred where noise hides it."""
+        v = self.smooth(self.velocity, 300.0)
+        noise = float(np.std(self.velocity - v)) + 1e-12
+        return np.asarray(np.tanh(v / noise))
+
+    def missing_force(self) -> FloatArray:
+        """(n,) force against the drive that would explain the error, V, below 100 Hz."""
+        e = self.smooth(self.error, 100.0)
+        return -(np.gradient(e) * self.sampling_rate / self.pole + e) / self.gain
+
+    def periods(self, numerator: FloatArray, denominator: FloatArray, count: int = 4, least: float = 1.5) -> list[float]:
+        """Lengths (m) at which numerator / denominator repeats along the travel, strongest first.
+
+        Only lengths with ``least`` periods within the travel: longer ones act as polynomials and explain anything.
+        """
+        low, high = np.quantile(self.position, [0.01, 0.99])
+        travel = float(high - low)
+        if travel <= 0.0:
+            return []
+        bins = 2048
+        place = np.clip(((self.position - low) / travel * bins).astype(np.int64), 0, bins - 1)
+        top = np.bincount(place, numerator, bins)
+        bottom = np.bincount(place, denominator, bins)
+        profile = np.where(bottom > 0.0, top / np.maximum(bottom, 0.05 * float(np.mean(bottom)) + 1e-300), 0.0)
+        weight = np.hanning(bins)
+        profile = (profile - np.average(profile, weights=weight)) * weight
+        power = np.abs(np.fft.rfft(profile, 4 * bins)) ** 2
+        inside = np.arange(power.size) / 4.0 >= least
+        inside &= np.arange(power.size) / 4.0 <= bins / 8.0
+        peaks, _ = scipy.signal.find_peaks(np.where(inside, power, 0.0))
+        best = peaks[np.argsort(power[peaks])[::-1][:count]]
+        return [float(4.0 * travel / peak) for peak in best]
+
+
+@dataclass(frozen=True, slots=True)
+class Guess:
+    """A trace that an effect would leave, to first order.
+
+    columns: (k, n) per unit coefficient: V against the drive, or m/s where ``at_encoder``
+    read:    start values of all parameters, in order, from the k coefficients that explain the error best
+    """
+
+    columns: FloatArray
+    read: Callable[[FloatArray], tuple[float, ...]]
+    at_encoder: bool = False
+
+
+def columns(*signals: FloatArray) -> FloatArray:
+    """(k, n) from k signals of n samples."""
+    return np.vstack(signals)

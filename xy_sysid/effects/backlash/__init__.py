@@ -1,0 +1,86 @@
+"""Motor and table are coupled through a gap.
+
+contact:         its fit by one-step prediction, in stages
+innovations:     what the filter leaves, as a function of numbers that a solver moves
+descent:         the solver
+contact_filter:  the compiled filter for the laws of friction that act beside
+filter_source:   its text, written from these laws
+filter_template: the frame of that
+filter_parts:    force of the contact, and the covariance's next step
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from xy_sysid.effects._contract import Effect, Parameter, law
+from xy_sysid.effects._scene import Guess, Scene, columns
+from xy_sysid.effects.backlash.contact import Contact
+
+
+@law
+def advance(
+    gap: float,
+    share: float,
+    rate: float,
+    damping: float,
+    loss: float,
+    guide: float,
+    apart: float,
+    table: float,
+    u: float,
+    v: float,
+    h: float,
+    gain: float,
+    pole: float,
+) -> tuple[float, float, float]:
+    """(voltage that acts on the whole mass, motor minus table, speed of the table) after ``h`` s.
+
+    The motor feels the voltage, its part of the drag and the contact; the table the contact and its part of the drag.
+    """
+    reduced = share * (1.0 - share)
+    depth = apart - min(max(apart, -0.5 * gap), 0.5 * gap)
+    contact, closing = 0.0, v - table
+    if depth != 0.0:
+        contact = reduced * rate * (rate * depth + (rate * loss * abs(depth) + 2.0 * damping) * closing)
+        if contact * depth < 0.0:
+            contact = 0.0
+    faster = table + (contact - pole * guide * table) / (1.0 - share) * h
+    left = (u - contact / (pole * gain) - (1.0 - guide) * v / gain) / share + v / gain
+    speed = v + pole * (gain * left - v) * h
+    return left, apart + (speed - faster) * h, faster
+
+
+def guesses(scene: Scene) -> Iterator[Guess]:
+    """One start: what a gap does cannot be told from the measured motion alone."""
+    missing = scene.direction() * abs(scene.missing_force())
+    yield Guess(columns(missing), lambda c: (20e-6, 0.5, 1500.0, 0.2, 5.0, 0.03))
+
+
+EFFECT = Effect(
+    name="backlash",
+    law="m_motor v' = drive - contact(x_motor - x_table, gap / 2); m_table v_table' = contact; contact = k d (1 + loss d') + c d', never pulling",
+    meaning="a nut without preload, a worn coupling",
+    validity="free simulation is chaotic at the contact: use it for pictures and one-step prediction, not to judge a fit",
+    source="Nordin & Gutman, Automatica 38 (2002), sec. 2.2; Hunt & Crossley, J. Appl. Mech. 42 (1975), eq. 8",
+    category="state",
+    parameters=(
+        Parameter("gap", "m", 1e-9, 1e-2, 20e-6, "free play, flank to flank"),
+        Parameter("share", "", 0.02, 0.98, 0.5, "the motor's part of the moving mass"),
+        Parameter("rate", "rad/s", 10.0, 1e5, 1500.0, "natural frequency of the closed contact, on the reduced mass"),
+        Parameter("damping", "", 0.0, 2.0, 0.2, "damping ratio of the closed contact", positive=False),
+        Parameter("loss", "s/m", 0.0, 500.0, 5.0, "loss of the contact per approach speed", positive=False),
+        Parameter("guide", "", 0.0, 0.9, 0.03, "the table's part of the drag", positive=False),
+    ),
+    shows="fast, small motions meet less mass than large ones; knocks after each reversal",
+    look_alikes=("screw_compliance", "amplifier_lag", "presliding_hysteresis"),
+    experiment="push the table while the motor holds: free play is felt; or a second encoder on the table",
+    functions={"advance": advance},
+    guesses=guesses,
+    states=("apart", "table"),
+    order=100,
+    simulable=False,
+    one_step=Contact(),
+    rubs="coulomb_friction",
+    suspects=("screw_compliance", "amplifier_lag", "presliding_hysteresis"),
+)

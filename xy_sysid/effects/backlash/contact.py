@@ -1,0 +1,114 @@
+"""Gap, masses and contact of an axis with backlash, from one-step prediction.
+
+Contact is chaotic: free simulations of the same gap part within milliseconds, so a model with backlash can only be judged
+by how well it predicts the next sample from what was measured up to now (one-step prediction; Ljung, System
+Identification, 2nd ed., sec. 3.2). The filter that predicts is in ``filter_template``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from xy_sysid.effects._contract import Beside, DryFriction, Followed, OneStepTask
+from xy_sysid.effects.backlash.filter_source import NAMES
+from xy_sysid.effects.backlash.innovations import Innovations, View
+from xy_sysid.samples.block import FloatArray
+
+GAPS = np.geomspace(2e-6, 150e-6, 10)  # m, tried first
+FLANKS = (0.4, 1500.0, 0.2, 5.0, 0.03)  # share, rate, damping, loss, guide to begin with
+RIGID = (1e-10, 0.4, 1500.0, 0.1, 0.0, 0.03)  # no gap
+SOFT = 10.0  # rad/s of the spring at least that may take the place of the gap
+BRIEF = 6.0  # s of the first fits
+WORTH_A_LOOK = 60.0  # innovation over noise after the first few steps above which the fit is given up
+PROMISING = 20.0  # the same after the brief fits
+SEEN, LEFT = 2.5, 1.5  # encoder noises, and innovations, that a gap must have to be one
+DEAF = 12.0  # the filter is told this much more encoder noise on the way: a smoother valley
+COARSE, FINE = 3, 6  # sub-steps of a sample on the way, and in the end
+FAR, BEHIND = 8.0, 1.5  # innovation over the bar, of the best gap tried and after a first fit, at which it is given up. Development draws:
+# true gaps 0.5 to 2.4 and 0.05 to 0.9; where there is none 12 to 70 and 1.5 to 18
+CLOSED = 0.8  # innovation without a gap over that with it from which the gap is not looked for where it was
+OWN, GAP = len(NAMES), NAMES.index("gap")
+
+
+class Contact:
+    """Gap, masses and contact from the innovations of the first samples, judged on those after the training."""
+
+    def fit(self, task: OneStepTask) -> Followed:
+        """See ``OneStep``."""
+        first, _, n = task.stages
+        fit = Innovations(task.sampling_rate, task.base, task.noise, task.beside, task.dry.laws)
+        fit.late = task.limits.late
+        brief = min(first, int(BRIEF * task.sampling_rate))
+        loose, near, whole = View(brief, 2.0, COARSE, DEAF), View(brief, 1.0, COARSE, DEAF), View(first, 1.0, FINE, DEAF)
+        rigid = self._rigid(fit, fit.start(task.base, RIGID, task.dry.values), loose, 1e-2)
+        best, given_up = self._searched(fit, task, rigid, brief)
+        every = np.arange(best.size)
+        if not given_up and fit.size(best, near) < PROMISING:
+            best = fit.solved(best, every, whole, 8, 1e-4)
+        rigid = self._rigid(fit, self._closed(fit, rigid, best, near), near if given_up else whole, 1e-3)
+        values, spread = fit.outer(best), fit.spread(best, View(brief if given_up else first, cuts=FINE))
+        innovation = fit.seen(best, View(n, cuts=FINE))
+        large = values[GAP] > max(SEEN, LEFT * float(np.sqrt(np.mean(innovation[:first] ** 2)))) * task.noise
+        return Followed(
+            base=_three(values),
+            values=tuple(values[3:OWN].tolist()),
+            base_spread=_three(spread),
+            spread=tuple(spread[3:OWN].tolist()),
+            dry=DryFriction(task.dry.laws, tuple(values[fit.friction].tolist()), tuple(spread[fit.friction].tolist())),
+            beside=(tuple(values[fit.others].tolist()), tuple(spread[fit.others].tolist())),
+            innovation=innovation * task.noise,
+            without=fit.softened(SOFT).seen(rigid, View(n, cuts=FINE)) * task.noise,
+            noise=task.noise,
+            runs=fit.runs,
+            too_small=not large,
+            given_up=given_up,
+        )
+
+    def innovation(self, sampling_rate: float, found: Followed, beside: Beside, samples: int) -> FloatArray:
+        """See ``OneStep``."""
+        fit = Innovations(sampling_rate, found.base, found.noise, beside, found.dry.laws)
+        return fit.seen(fit.start(found.base, found.values, found.dry.values), View(samples, cuts=COARSE))
+
+    @staticmethod
+    def _searched(fit: Innovations, task: OneStepTask, rigid: FloatArray, brief: int) -> tuple[FloatArray, bool]:
+        """Coordinates after the brief fits, and True if they were given up: they cannot come near the bar."""
+        loose, near, true = View(brief, 2.0, COARSE, DEAF), View(brief, 1.0, COARSE, DEAF), View(brief, 1.0, COARSE)
+        bar = np.inf if task.limits.bar is None else task.limits.bar / task.noise
+        base, friction, begin = task.base, task.dry.values, task.begin
+        if begin is not None:
+            base, friction = begin.base, begin.dry.values if begin.dry.names == task.dry.names else friction
+        if begin is not None and not begin.too_small:
+            best = fit.start(base, begin.values, friction)
+        else:  # nothing draws a gap open that has closed
+            starts = [fit.start(base, (gap, *FLANKS), friction) for gap in GAPS]
+            best = min(starts, key=lambda start: fit.size(start, loose))
+        if np.isfinite(bar) and fit.size(best, true) > FAR * bar:
+            return best, True
+        every = np.arange(best.size)
+        best = fit.solved(best, every, loose, 15, 1e-2)
+        if np.isfinite(bar) and fit.size(best, true) > BEHIND * bar:
+            return best, True
+        if begin is not None or fit.size(best, loose) < WORTH_A_LOOK:
+            best = fit.solved(best, every, near, 40, 1e-3)
+        if CLOSED * fit.size(best, near) > fit.softened(SOFT).size(rigid, near):  # no gap does far better: begin there
+            other = fit.solved(rigid, every, near, 40, 1e-3)
+            best = min(best, other, key=lambda item: fit.size(item, near))
+        return best, False
+
+    @staticmethod
+    def _closed(fit: Innovations, rigid: FloatArray, best: FloatArray, view: View) -> FloatArray:
+        """Where the filter without a gap goes on from: the better of its own first fit, and of what was found with the gap closed."""
+        rigid[fit.others] = best[fit.others]
+        closed = best.copy()
+        closed[GAP] = rigid[GAP]
+        soft = fit.softened(SOFT)
+        return min(rigid, closed, key=lambda start: soft.size(start, view))
+
+    @staticmethod
+    def _rigid(fit: Innovations, start: FloatArray, view: View, enough: float) -> FloatArray:
+        """Without a gap, by the same filter; any spring will do then."""
+        return fit.softened(SOFT).solved(start, np.delete(np.arange(start.size), GAP), view, 15, enough)
+
+
+def _three(numbers: FloatArray) -> tuple[float, float, float]:
+    return float(numbers[0]), float(numbers[1]), float(numbers[2])

@@ -1,0 +1,208 @@
+"""The frame of the filter across a gap, into which ``filter_source`` writes the laws of dry friction.
+
+Two masses that touch across a gap, followed sample by sample: an extended Kalman filter on the motor's position. State: motor
+position (x) and speed (v), motor minus table (d), its rate (w). Flanks push as k depth (1 + loss speed) + c speed and never
+pull (Hunt & Crossley, J. Appl. Mech. 42, 1975, eq. 8). The motor rubs by the laws of dry friction given; the deflection of
+bristles follows the motor's position and is corrected with it. Integrated by the explicit midpoint rule within each of a
+sample's two pieces of constant voltage (the filter: Jazwinski, Stochastic Processes and Filtering Theory, 1970, sec. 8.3).
+
+Derivatives come from the same recursion, differentiated with the filter's gain held: what a parameter changes in the covariance
+is left out. (Near the optimum their angle to differences of the filter is below 0.1; the covariance's own would cost some ten
+times as much.)
+"""
+
+from __future__ import annotations
+
+from string import Template
+
+TEMPLATE = Template("""\
+@law
+def level_of(q, v, direction):
+    return $level
+
+
+@law
+def force_of(q, z, v):
+    return $force
+
+
+@law
+def bent(q, z, v, h):
+    return $bent
+
+
+@law
+def rubbed(q, z, v):
+$rubbed
+
+
+@law
+def ridden(q, before, after, v, h):
+    if abs(v) * h > 1e-11:
+        return (after - before) / (v * h)
+    return (bent(q, before, math.copysign($slow, v), 1e-9 / $slow) - before) * math.copysign(1e9, v)
+
+
+def $name(u, y, against, q, fs, noise, drift, cuts, moved_u, moved_y, moved_f, column, nudge, out, slopes):
+    n, count, taken, frictions = out.shape[0], slopes.shape[1], column.shape[0], nudge.shape[0]
+    sloped = slopes.shape[0] > 0
+    gain, delay, pole, gap, share, rate, damping, loss, guide = q[0], q[1], q[2], q[3], q[4], q[5], q[6], q[7], q[8]
+    reduced = share * (1.0 - share)
+    k, c = reduced * rate * rate, 2.0 * reduced * damping * rate
+    turn = math.copysign(1.0, gain)
+    per_volt, per_net = pole * abs(gain), pole * gain
+    drag_motor, drag_table = pole * (1.0 - guide), pole * guide
+    per_motor, per_table = 1.0 / share, 1.0 / (1.0 - share)
+    uneven = (1.0 - 2.0 * share) / reduced
+    half = 0.5 * gap
+    late = delay * fs
+    whole = int(late)
+    part = late - whole
+    p = (noise, 0.0, 0.0, 0.0, 1e-8, 0.0, 0.0, half * half + 1e-14, 0.0, 1e-8)
+    x, v, d, w, z, zm = y[0], 0.0, 0.0, 0.0, 0.0, 0.0
+    rho, rub, slip, spring, follows = 0.0, 0.0, 0.0, 0.0, 0.0
+    sx, sv, sd, sw, sz = np.zeros(count), np.zeros(count), np.zeros(count), np.zeros(count), np.zeros(count)
+    to_v, to_w, to_z = np.zeros(count), np.zeros(count), np.zeros(count)
+    fine = 1e-6 * abs(bent(q, 0.0, $slow, 1e-3)) + 1e-300
+    for i in range(n):
+        for piece in range(2):
+            length = part if piece == 0 else 1.0 - part
+            steps = max(math.ceil(cuts * length), 1)
+            h = length / fs / steps
+            at = i - whole - 1 + piece
+            volts = u[at] if at >= 0 else 0.0
+            if sloped and piece == 1:
+                jump = per_net * ((u[at - 1] if at >= 1 else 0.0) - volts) * per_motor
+                sv[1] += jump
+                sw[1] += jump
+            if h <= 0.0:
+                continue
+            net = volts - against[0, i]
+            push, hold = per_net * net, per_net * against[1, i]
+            for _ in range(steps):
+                force, _by_d, _by_w = contact(d, w, half, k, c, loss)
+                if $rubs:
+                    rub = per_volt * rubbed(q, z, v)[0]
+                a = (push - rub - drag_motor * v - force) * per_motor
+                r = a - (force - drag_table * (v - w) - hold) * per_table
+                vm, dm, wm = v + 0.5 * h * a, d + 0.5 * h * w, w + 0.5 * h * r
+                force, by_d, by_w = contact(dm, wm, half, k, c, loss)
+                if $bristled:
+                    before = z
+                    zm = bent(q, z, vm, 0.5 * h)
+                    z = bent(q, zm, vm, 0.5 * h)
+                if $rubs:
+                    rho, slip, spring = rubbed(q, zm, vm)
+                    rub, slip, spring = per_volt * rho, per_volt * slip, per_volt * spring
+                a = (push - rub - drag_motor * vm - force) * per_motor
+                on_table = force - drag_table * (vm - wm) - hold
+                r = a - on_table * per_table
+                v_x = 0.0
+                if $bristled:
+                    follows = ridden(q, before, z, vm, h)
+                    v_x = -spring * follows * per_motor
+                v_v, v_d, v_w = -(drag_motor + slip) * per_motor, -by_d * per_motor, -by_w * per_motor
+                w_v, w_d, w_w = v_v + drag_table * per_table, v_d - by_d * per_table, v_w - (by_w + drag_table) * per_table
+                if sloped:
+                    for b in range(count):
+                        to_v[b], to_w[b] = 0.0, 0.0
+                    for b in range(taken):
+                        change = per_net * ((moved_u[b, at] if at >= 0 else 0.0) - moved_f[b, 0, i]) * per_motor
+                        to_v[column[b]] += change
+                        to_w[column[b]] += change + per_net * moved_f[b, 1, i] * per_table
+                    change = pole * (net - turn * rho) * per_motor
+                    to_v[0] += change
+                    to_w[0] += change + pole * against[1, i] * per_table
+                    change = (gain * net - abs(gain) * rho - (1.0 - guide) * vm) * per_motor
+                    to_v[2] += change
+                    to_w[2] += change + (guide * (vm - wm) + gain * against[1, i]) * per_table
+                    change = -a * per_motor
+                    to_v[4] += change
+                    to_w[4] += change - on_table * per_table * per_table
+                    change = pole * vm * per_motor
+                    to_v[8] += change
+                    to_w[8] += change + pole * (vm - wm) * per_table
+                    if force != 0.0:
+                        both = per_motor + per_table
+                        side = 1.0 if dm > 0.0 else -1.0
+                        depth = abs(dm) - half
+                        damped = c * wm
+                        change = 0.5 * by_d * side
+                        to_v[3] += change * per_motor
+                        to_w[3] += change * both
+                        change = -force * uneven
+                        to_v[4] += change * per_motor
+                        to_w[4] += change * both
+                        change = -(2.0 * force - damped) / rate
+                        to_v[5] += change * per_motor
+                        to_w[5] += change * both
+                        change = -2.0 * reduced * rate * wm
+                        to_v[6] += change * per_motor
+                        to_w[6] += change * both
+                        change = -k * depth * wm
+                        to_v[7] += change * per_motor
+                        to_w[7] += change * both
+                    if $rubs:
+                        for b in range(frictions):
+                            kept = q[9 + b]
+                            q[9 + b] = kept + nudge[b]
+                            change = -per_volt * (rubbed(q, zm, vm)[0] - rho) / nudge[b] * per_motor
+                            if $bristled:
+                                to_z[9 + b] = (bent(q, before, vm, h) - z) / nudge[b]
+                            q[9 + b] = kept
+                            to_v[9 + b] += change
+                            to_w[9 + b] += change
+                    if $bristled:
+                        by_z = (bent(q, before + fine, vm, h) - z) / fine
+                        by_v = (bent(q, before, vm + $nudge, h) - z) / $nudge
+                        of_z = -spring * per_motor
+                        for b in range(count):
+                            after = by_z * sz[b] + by_v * sv[b] + to_z[b]
+                            to_v[b] += of_z * 0.5 * (sz[b] + after)
+                            to_w[b] += of_z * 0.5 * (sz[b] + after)
+                            sz[b] = after
+                    g = 0.5 * h
+                    for b in range(count):
+                        xx, vv, dd, ww = sx[b], sv[b], sd[b], sw[b]
+                        vh = vv + g * (v_v * vv + v_d * dd + v_w * ww + to_v[b])
+                        wh = ww + g * (w_v * vv + w_d * dd + w_w * ww + to_w[b])
+                        dh = dd + g * ww
+                        sx[b] = xx + h * vh
+                        sv[b] = vv + h * (v_v * vh + v_d * dh + v_w * wh + to_v[b])
+                        sd[b] = dd + h * wh
+                        sw[b] = ww + h * (w_v * vh + w_d * dh + w_w * wh + to_w[b])
+                x, v, d, w = x + h * vm, v + h * a, d + h * wm, w + h * r
+                p = spread_on(p, (v_x, v_v, v_d, v_w), (v_x, w_v, w_d, w_w), h, drift)
+        xx, xv, xd, xw, vv, vd, vw, dd, dw, ww = p
+        seen = xx + noise
+        error = y[i + 1] - x
+        out[i] = error
+        k0, k1, k2, k3 = xx / seen, xv / seen, xd / seen, xw / seen
+        if sloped:
+            for b in range(count):
+                slopes[i, b] = -sx[b]
+            for b in range(taken):
+                slopes[i, column[b]] += moved_y[b, i + 1] - moved_y[b, 0]
+            for b in range(count):
+                miss = slopes[i, b]
+                sx[b] += k0 * miss
+                sv[b] += k1 * miss
+                sd[b] += k2 * miss
+                sw[b] += k3 * miss
+                sz[b] += follows * k0 * miss
+        if $bristled:
+            z += k0 * error * follows
+        x, v, d, w = x + k0 * error, v + k1 * error, d + k2 * error, w + k3 * error
+        p = (
+            xx - k0 * xx,
+            xv - k0 * xv,
+            xd - k0 * xd,
+            xw - k0 * xw,
+            vv - k1 * xv,
+            vd - k1 * xd,
+            vw - k1 * xw,
+            dd - k2 * xd,
+            dw - k2 * xw,
+            ww - k3 * xw,
+        )
+""")

@@ -1,0 +1,51 @@
+"""The weight of a joint that lifts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from xy_sysid.effects._contract import Effect, Parameter, law
+from xy_sysid.effects._scene import Guess, Scene, columns
+
+LEAST = 0.5  # rad of travel: within less, a sine is a load and a linear spring to 1.6 % of its amplitude
+
+
+@law
+def force(amplitude: float, phase: float, x: float, gain: float) -> float:
+    """Force towards where the arm hangs at the angle ``x``, V; the drive may be wired the other way round."""
+    return math.copysign(amplitude, gain) * math.sin(x + phase)
+
+
+def guesses(scene: Scene) -> Iterator[Guess]:
+    """Sine and cosine of the position, an angle; none where the travel is too short to tell them from a load and a spring."""
+    low, high = np.quantile(scene.position, [0.01, 0.99])
+    way = math.copysign(1.0, scene.gain)
+    if high - low >= LEAST:
+        yield Guess(
+            columns(way * np.sin(scene.position), way * np.cos(scene.position)),
+            lambda c: (max(math.hypot(float(c[0]), float(c[1])), 1e-3), math.atan2(float(c[1]), float(c[0]))),
+        )
+
+
+EFFECT = Effect(
+    name="gravity",
+    law="F = amplitude sin(x + phase) = a sin(x) + b cos(x); x is the angle, rad",
+    meaning="a joint that lifts its arm, a pendulum, a wheel out of balance",
+    validity=f"x is an angle in rad, of one joint whose load hangs still; travel of {LEAST:g} rad or more",
+    source="Spong, Hutchinson & Vidyasagar, Robot Modeling and Control, 2nd ed., 2020, sec. 6.4 (one link with gravity)",
+    category="force",
+    parameters=(
+        Parameter("amplitude", "V", 1e-6, 1000.0, 0.5, "input that holds the arm level: mass, g and lever"),
+        Parameter("phase", "rad", -100.0, 100.0, 0.0, "angle from where the arm hangs to the encoder's zero", positive=False),
+    ),
+    shows="error goes with the sine of the angle, the same at all speeds and in both directions; a pendulum's resonance at low frequency",
+    look_alikes=("return_spring", "hardening_stiffness", "constant_load", "cogging"),
+    experiment="hold still at several angles around the turn: the input needed is a sine, that of a spring goes on rising",
+    functions={"force": force},
+    guesses=guesses,
+    on_table=True,
+    suspects=("return_spring", "hardening_stiffness"),
+)

@@ -1,0 +1,36 @@
+"""Viscous drag that changes along the travel."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from xy_sysid.effects._contract import Effect, Parameter, law
+from xy_sysid.effects._scene import Guess, Scene, columns
+
+
+@law
+def force(slope: float, v: float, x: float, gain: float) -> float:
+    """Drag beyond the base's own v / gain at ``x``, V; negative where it is less."""
+    return slope * x * v / gain
+
+
+def guesses(scene: Scene) -> Iterator[Guess]:
+    """Position times speed, in volts of the base's own drag."""
+    v = scene.smooth(scene.velocity, 300.0)
+    yield Guess(columns(scene.position * v / scene.gain), lambda c: (float(c[0]),))
+
+
+EFFECT = Effect(
+    name="position_dependent_drag",
+    law="F = (1 + slope x) v / gain, of which v / gain is the base's: its drag at x = 0",
+    meaning="a guide or screw that is not quite straight or parallel, preload that grows towards one end, grease on a part of the way",
+    validity="drag that rises steadily from one end to the other and never below zero; what is largest in the middle is not seen",
+    source="Armstrong-Helouvry, Dupont & Canudas de Wit, Automatica 30 (1994), sec. 2 (position-dependent friction)",
+    category="force",
+    parameters=(Parameter("slope", "1/m", -1e4, 1e4, 3.0, "relative change of the drag per distance along the travel", positive=False),),
+    shows="error in proportion to speed that changes its sign with the place: too slow at one end, too fast at the other",
+    look_alikes=("position_dependent_gain", "asymmetric_viscous_friction", "cogging"),
+    experiment="constant speeds from end to end, both ways: the extra input grows with speed and place, and is opposed to the motion both ways",
+    functions={"force": force},
+    guesses=guesses,
+)

@@ -1,0 +1,54 @@
+"""A spring that pulls back to its rest, and may soften."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from xy_sysid.effects._contract import Effect, Parameter, law
+from xy_sysid.effects._scene import Guess, Scene, columns
+
+
+@law
+def force(stiffness: float, rest: float, softening: float, x: float, gain: float) -> float:
+    """Force towards the rest at ``x``, V; the drive may be wired the other way round."""
+    stretched = x - rest
+    return math.copysign(stiffness, gain) * stretched * (1.0 - softening * stretched * stretched)
+
+
+def guesses(scene: Scene) -> Iterator[Guess]:
+    """A linear spring with its preload; and position and cube, seen from the middle of the travel."""
+    x, way = scene.position, math.copysign(1.0, scene.gain)
+    yield Guess(columns(way * x, np.full_like(x, way)), lambda c: (_stiffness(c[0]), -float(c[1]) / _stiffness(c[0]), 0.0))
+    low, high = np.quantile(x, [0.01, 0.99])
+    middle = 0.5 * float(low + high)
+    far = x - middle
+    yield Guess(columns(way * far, way * far**3), lambda c: (_stiffness(c[0]), middle, -float(c[1]) / _stiffness(c[0])))
+
+
+def _stiffness(coefficient: float) -> float:
+    return max(float(coefficient), 1e-3)
+
+
+EFFECT = Effect(
+    name="return_spring",
+    law="F = stiffness d (1 - softening d^2), d = x - rest",
+    meaning="a return or torsion spring: of a valve, a throttle, a flexure, a joint; a rubber bush, which softens",
+    validity="no coil touches another; far below where a softening spring would give way: softening d^2 < 1/3",
+    source="Kovacic & Brennan, The Duffing Equation, 2011, sec. 1.2 (linear, softening and hardening restoring forces)",
+    category="force",
+    parameters=(
+        Parameter("stiffness", "V/m", 1e-6, 1e7, 10.0, "input that holds it, per distance (per rad where the position is an angle)"),
+        Parameter("rest", "m", -1e4, 1e4, 0.0, "where it neither pulls nor pushes; far outside the travel for a preloaded one", positive=False),
+        Parameter("softening", "1/m2", -1e6, 1e6, 100.0, "part of the stiffness lost per distance squared; below 0 it stiffens", positive=False),
+    ),
+    shows="the axis comes back by itself; the response is flat below a low frequency; error with the sign of the position",
+    look_alikes=("hardening_stiffness", "gravity", "constant_load"),
+    experiment="hold still at several places over the whole travel: the input needed is the law",
+    functions={"force": force},
+    guesses=guesses,
+    family="spring",
+    on_table=True,
+)

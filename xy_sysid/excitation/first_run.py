@@ -1,0 +1,181 @@
+"""The first motion of an unknown machine: one axis at a time, a push forth and back at each of many small voltages.
+
+After each push the answer is looked at before a louder one is asked for: did this axis move, and no other; plus to plus; as far as
+a machine of this travel may; was it still before; is there room for the next. The first problem ends it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from xy_sysid.excitation.motion_check import gains
+from xy_sysid.samples.block import FloatArray
+from xy_sysid.settings import ExcitationSettings
+from xy_sysid.units import bare
+from xy_sysid.units import moved as in_words
+
+FIRST, GROWS = 0.005, 1.6  # the first push as part of the limit, and how much louder the next one is
+LOUDEST = 2.0  # times rms, the last push
+COUNTS, SIGMAS = 6.0, 6.0  # encoder counts, and standard deviations at rest, that are motion
+LARGE, SMALL = 30.0, 0.01  # times the speed per volt that travel and full voltage suggest: beyond, the unit is wrong
+CLEAR = 0.2  # of the furthest push, what another must reach to count for gain and friction: less is the give of a contact that sticks
+NEXT = 1.5  # the next push may go so many times further than in proportion
+SLOWEST = 0.1  # s of delay and lag; the travel limits look no further ahead
+HALF = 0.5  # part of the push at which voltage counts as on
+
+
+@dataclass(frozen=True, slots=True)
+class Push:
+    """What is to be done next: an axis, and V forth and back."""
+
+    axis: str
+    volts: float
+
+
+@dataclass(frozen=True, slots=True)
+class PushResult:
+    """What one push showed. moved: m forth and m back; sentence: for people; problem: why it must end, or nothing."""
+
+    push: Push
+    moved: tuple[float, float]
+    sentence: str
+    problem: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class AxisFound:
+    """What is known of an axis: speed per volt (m/s/V), friction (V), greatest voltage that left it at rest and least that
+    moved it (V), delay and lag together (s), noise at rest (m); None where it did not show.
+    """
+
+    velocity_gain: float | None
+    friction: float | None
+    still: float
+    moves: float | None
+    lag: float | None
+    noise: float
+
+
+@dataclass(slots=True)
+class _Seen:
+    """Of one axis: V s and s of the pushes that moved it, and how far they did, m."""
+
+    still: float = 0.0
+    moves: float | None = None
+    pushed: list[tuple[float, float, float]] = field(default_factory=list)
+    lag: float | None = None
+    noise: float = 0.0
+
+
+class FirstRun:
+    """``next`` says what to do, ``took`` what came of it; the machine is driven by somebody else."""
+
+    def __init__(self, settings: ExcitationSettings) -> None:
+        self.settings = settings
+        self.axes = tuple(settings.axes)
+        self.problem = ""
+        self._expected, self._units = gains(settings), settings.units
+        self._asked = f"is the position in {self._units.output}? (or set velocity_gain)"
+        self._seen = {axis: _Seen() for axis in self.axes}
+        self._plan = [Push(axis, volts) for axis in self.axes for volts in self._levels(axis)]
+
+    def _levels(self, axis: str) -> list[float]:
+        wanted = self.settings.axes[axis]
+        top = min(wanted.limit, LOUDEST * wanted.rms)
+        count = max(0, int(np.ceil(np.log(max(top / (FIRST * wanted.limit), 1.0)) / np.log(GROWS))))
+        return [*(FIRST * wanted.limit * GROWS**k for k in range(count)), top] if top > 0 else []
+
+    def next(self) -> Push | None:
+        """The next push, or None when all is known or a problem was found."""
+        return None if self.problem or not self._plan else self._plan[0]
+
+    def took(self, voltage: FloatArray, position: FloatArray) -> PushResult:
+        """The samples of a push from rest to rest, (n, axes) V and m, as they were published."""
+        push, rate = self._plan.pop(0), self.settings.rate
+        column = self.axes.index(push.axis)
+        seen, volts, place = self._seen[push.axis], voltage[:, column], position[:, column]
+        forth, back = np.flatnonzero(volts > HALF * push.volts), np.flatnonzero(volts < -HALF * push.volts)
+        if forth.size == 0 or back.size == 0 or not np.isfinite(position).all():
+            return self._end(push, "the push or its positions did not arrive whole")
+        begin, turn = int(np.flatnonzero(volts > 0)[0]), int(np.flatnonzero(volts < 0)[0])
+        if begin < 8:
+            return self._end(push, "no position at rest before the push")
+        rest = position[:begin]
+        noise = rest.std(axis=0)
+        steps = np.abs(np.diff(position, axis=0))
+        count = np.array([np.min(steps[:, k][steps[:, k] > 0], initial=np.inf) for k in range(len(self.axes))])
+        least = np.maximum(SIGMAS * noise, COUNTS * np.where(np.isfinite(count), count, 0.0))
+        middle, end = position[turn - 1] - rest.mean(axis=0), position[-1] - position[turn - 1]
+        seen.noise = float(noise[column])
+        moved = (float(middle[column]), float(end[column]))
+        others = [axis for k, axis in enumerate(self.axes) if k != column and abs(middle[k]) > max(least[k], abs(middle[column]))]
+        if others:
+            return self._end(push, f"{others[0]} moved and {push.axis} did not: cables or columns are swapped", moved)
+        if abs(moved[0]) <= least[column] and abs(moved[1]) <= least[column]:
+            seen.still = push.volts
+            return PushResult(push, moved, f"{push.axis} at {push.volts:.3g} V: at rest (noise {in_words(noise[column], self._units.output, 2)})")
+        if moved[0] < -least[column]:
+            return self._end(push, "plus volts move it to minus: swap the motor's wires or the encoder's sign", moved)
+        return self._moved(push, moved, (volts[:turn] / rate, place[:turn] - rest[:, column].mean()))
+
+    def _moved(self, push: Push, moved: tuple[float, float], forth: tuple[FloatArray, FloatArray]) -> PushResult:
+        """It moved the right way: how far for what, how late, and is there room for more."""
+        column, rate = self.axes.index(push.axis), self.settings.rate
+        seen, sums = self._seen[push.axis], np.cumsum(forth[0])
+        seen.moves = push.volts if seen.moves is None else seen.moves
+        on = np.flatnonzero(forth[0] * rate > HALF * push.volts)
+        seen.pushed.append((float(sums[-1]), on.size / rate, moved[0]))
+        gain = moved[0] / float(sums[-1])
+        seen.lag = max(0.0, float(sums[on[-1]] - forth[1][on[-1]] / gain) / push.volts)
+        ratio = gain / self._expected[column]
+        sentence = f"{push.axis} at {push.volts:.3g} V: +{bare(moved[0], self._units.output)} and {in_words(moved[1], self._units.output)}"
+        sentence += f", {gain:.3g} {self._units.of('m/s/V')}, after {seen.lag * 1000:.2g} ms"
+        if ratio > LARGE:
+            return self._end(push, f"it moves {ratio:.0f} times as far as its travel suggests: {self._asked}", moved)
+        still_friction = seen.still > 0.5 * push.volts
+        if ratio < SMALL and not still_friction and len(seen.pushed) > 2:
+            return self._end(push, f"it moves {1 / ratio:.0f} times less than its travel suggests: {self._asked}", moved)
+        if seen.lag > SLOWEST:
+            return self._end(
+                push, f"it answers after {seen.lag * 1000:.0f} ms; the guards look {SLOWEST * 1000:.0f} ms ahead: shorten the way", moved
+            )
+        self._leave_room(push, moved)
+        return PushResult(push, moved, sentence)
+
+    def _leave_room(self, push: Push, moved: tuple[float, float]) -> None:
+        """Leave out pushes that could go further than half of the travel between the brake zones."""
+        wanted = self.settings.axes[push.axis]
+        room = (wanted.travel_max - wanted.travel_min) / 2 - wanted.brake
+        most = push.volts * room / (NEXT * max(abs(moved[0]), abs(moved[1])))
+        self._plan = [one for one in self._plan if one.axis != push.axis or one.volts <= most]
+
+    def _end(self, push: Push, problem: str, moved: tuple[float, float] = (0.0, 0.0)) -> PushResult:
+        self.problem = f"{push.axis} at {push.volts:.3g} V: {problem}"
+        return PushResult(push, moved, self.problem, problem)
+
+    def found(self, axis: str) -> AxisFound:
+        """What is known of an axis so far."""
+        seen = self._seen[axis]
+        gain = friction = None
+        clear = [push for push in seen.pushed if push[2] > CLEAR * max(one[2] for one in seen.pushed)]
+        if len(clear) == 1:
+            gain = clear[0][2] / clear[0][0]
+        elif clear:  # moved = gain (V s - friction s)
+            table = np.array(clear)
+            gain, lost = (float(x) for x in np.linalg.lstsq(table[:, :2], table[:, 2], rcond=None)[0])
+            friction = max(0.0, -lost / gain) if gain > 0 else None
+        return AxisFound(velocity_gain=gain, friction=friction, still=seen.still, moves=seen.moves, lag=seen.lag, noise=seen.noise)
+
+    def summary(self, axis: str) -> str:
+        """The same in a sentence, with what to write into the run file."""
+        found = self.found(axis)
+        if found.velocity_gain is None or found.moves is None:
+            return f"{axis}: did not move up to {found.still:.3g} V: raise rms, or look at brake and friction"
+        friction = f", friction {found.friction:.2g} V" if found.friction is not None else ""
+        answers = f", answers after {found.lag * 1000:.2g} ms" if found.lag is not None else ""
+        return (
+            f"{axis}: plus is plus, {found.velocity_gain:.3g} {self._units.of('m/s/V')}{friction}, moves from {found.moves:.3g} V{answers}; "
+            f"write velocity_gain: {found.velocity_gain:.3g} and breakaway: {1.5 * max(found.moves, found.friction or 0.0):.2g}"
+        )

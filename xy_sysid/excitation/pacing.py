@@ -1,0 +1,88 @@
+"""When the next block is due: by the clock, or by the machine's answers. Told the time and the answers; asks for neither."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from xy_sysid.samples.block import Block
+
+CATCH_UP = 3  # blocks late that are still sent one after the other; after a longer stall time is skipped
+
+
+@dataclass(slots=True)
+class Clock:
+    """Block k is due at start + k * period, s of a monotonic clock; period 0 is always due.
+
+    late: blocks that came more than a period after they were due, or were skipped
+    """
+
+    period: float
+    start: float
+    sent: int = 0
+    late: int = 0
+
+    def due(self, now: float) -> int:
+        """Blocks due and not sent yet."""
+        if self.period == 0:
+            return 1
+        return max(0, int((now - self.start) / self.period) + 1 - self.sent)
+
+    def skip(self, now: float) -> int:
+        """After a stall of more than CATCH_UP blocks: how many blocks of time to leave out, so that nothing bursts."""
+        behind = self.due(now) - 1
+        if self.period == 0 or behind < CATCH_UP:
+            return 0
+        self.sent += behind
+        self.late += behind
+        return behind
+
+    def slip(self, now: float) -> None:
+        """Move the start so that at most one block is due: for a stream that may not skip."""
+        behind = self.due(now) - 1
+        if self.period > 0 and behind > 0:
+            self.start += behind * self.period
+
+    def count(self, now: float) -> None:
+        """One block was sent."""
+        if self.due(now) > 1:
+            self.late += 1
+        self.sent += 1
+
+
+@dataclass(slots=True)
+class Answers:
+    """Positions that came back, handed out up to a sample: in lockstep nobody may see a later one, however it was sent."""
+
+    _given: float = -1.0
+    _blocks: deque[Block] = field(default_factory=deque)
+
+    def add(self, block: Block) -> None:
+        """Positions as they arrive; a counter that is not finite or was handed out before is not an answer."""
+        if len(block) and np.isfinite(block.seq).all() and block.seq[-1] > self._given:
+            self._blocks.append(block)
+
+    def up_to(self, seq: float) -> Block | None:
+        """Rows not handed out yet with a counter up to ``seq``, or None while the machine has not come so far."""
+        if not self._blocks or self._blocks[-1].seq[-1] < seq:
+            return None
+        taken = [_rows(self._blocks[0], slice(0, 0))]
+        while self._blocks and self._blocks[0].seq[0] <= seq:
+            block = self._blocks.popleft()
+            rows = int(np.searchsorted(block.seq, seq, side="right"))
+            taken.append(_rows(block, slice(None, rows)))
+            if rows < len(block):
+                self._blocks.appendleft(_rows(block, slice(rows, None)))
+        self._given = seq
+        return Block(
+            taken[0].axes,
+            np.concatenate([block.seq for block in taken]),
+            np.concatenate([block.time for block in taken]),
+            np.concatenate([block.values for block in taken]),
+        )
+
+
+def _rows(block: Block, rows: slice) -> Block:
+    return Block(block.axes, block.seq[rows], block.time[rows], block.values[rows])

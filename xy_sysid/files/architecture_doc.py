@@ -1,0 +1,93 @@
+"""The picture of the packages in docs/architecture.md, made from what the files import.
+
+python -m xy_sysid.files.architecture_doc           # the picture
+python -m xy_sysid.files.architecture_doc --write   # put it into the page
+"""
+
+from __future__ import annotations
+
+import ast
+import sys
+from collections import Counter
+from collections.abc import Mapping
+from pathlib import Path
+
+from xy_sysid.errors import BadInput
+
+BEGIN, END = "<!-- the picture: python -m xy_sysid.files.architecture_doc --write -->", "<!-- the end of the picture -->"
+COMMON = ("errors", "settings", "units", "jit")  # what everybody imports, so that it tells nothing
+FLOORS = {
+    "what arrives": ("samples", "excitation"),
+    "in frequency": ("response", "linear", "fitting"),
+    "in time": ("effects", "axis", "greybox", "comparison", "search"),
+    "told": ("story", "live"),
+    "the edge": ("bags", "imports", "files", "processes"),
+    "surfaces": ("nodes", "report", "page", "cli"),
+}
+
+
+def imports(package: Path) -> dict[tuple[str, str], int]:
+    """(who, whom) -> number of files of package ``who`` that import from package ``whom``, but for those that everybody imports."""
+    counted: Counter[tuple[str, str]] = Counter()
+    for path in sorted(package.rglob("*.py")):
+        parts = path.relative_to(package).parts
+        if len(parts) == 1:
+            continue
+        found = set()
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(f"{package.name}."):
+                found.add(str(node.module).split(".")[1])
+            elif isinstance(node, ast.ImportFrom) and node.module == package.name:
+                found |= {alias.name for alias in node.names}
+        counted.update((parts[0], whom) for whom in found - {parts[0], *COMMON})
+    return dict(counted)
+
+
+def reduced(edges: Mapping[tuple[str, str], int]) -> list[tuple[str, str]]:
+    """The edges that no longer way says already: what is imported only through others is not drawn twice."""
+    after: dict[str, set[str]] = {}
+    for who, whom in edges:
+        after.setdefault(whom, set()).add(who)
+
+    def reached(start: str) -> set[str]:
+        seen: set[str] = set()
+        waiting = [start]
+        while waiting:
+            for name in after.get(waiting.pop(), ()):
+                if name not in seen:
+                    seen.add(name)
+                    waiting.append(name)
+        return seen
+
+    return sorted((whom, who) for who, whom in edges if not any(who in reached(other) for other in after[whom] - {who}))
+
+
+def picture(package: Path) -> str:
+    """A Mermaid flow chart: an arrow goes from what is imported to what imports it, so that it follows the data."""
+    edges = imports(package)
+    known = [name for names in FLOORS.values() for name in names]
+    there = sorted(path.parent.name for path in package.glob("*/__init__.py"))
+    if sorted(known) != there:
+        odd = sorted(set(known) ^ set(there))
+        raise BadInput("packages", ", ".join(odd), "those of FLOORS", "Say in xy_sysid/files/architecture_doc.py on which floor they are.")
+    lines = ["flowchart TB"]
+    for number, (floor, names) in enumerate(FLOORS.items()):
+        lines += [f'  subgraph floor{number}["{floor}"]', "    direction LR", *(f"    {name}" for name in names), "  end"]
+    lines += [f"  {start} --> {end}" for start, end in reduced(edges)]
+    return "\n".join(["```mermaid", *lines, "```"])
+
+
+def placed(page: str, drawn: str) -> str:
+    """The page with the picture in its place."""
+    before, rest = page.split(BEGIN)
+    return f"{before}{BEGIN}\n\n{drawn}\n\n{END}{rest.split(END)[1]}"
+
+
+if __name__ == "__main__":
+    root = Path(__file__).parents[2]
+    made = picture(root / "xy_sysid")
+    if "--write" in sys.argv[1:]:
+        target = root / "docs" / "architecture.md"
+        target.write_text(placed(target.read_text(encoding="utf-8"), made), encoding="utf-8")
+    else:
+        sys.stdout.write(made + "\n")

@@ -1,0 +1,64 @@
+"""docs/effects.md, made from the folder of effects: python -m xy_sysid.files.effects_doc > docs/effects.md"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from xy_sysid.effects import EFFECTS, Effect, Parameter
+
+HEAD = """# Effects
+
+Every physical effect that a diagnosis can name, made from `xy_sysid/effects/` by `python -m xy_sysid.files.effects_doc > docs/effects.md`.
+`xy-sysid effects` prints the same. Forces are in volts of the drive (the voltage that overcomes them): times the drive's
+force per volt they are newtons. F is a force against the drive, u_eff the voltage that acts, v velocity, x position; the
+base of every model is `v' = pole (gain u_eff - v)`. How to add your own: [your-own-effect.md](your-own-effect.md).
+
+| name | law | where it acts | look-alikes |
+|---|---|---|---|
+"""
+
+
+def document(effects: Iterable[Effect] = EFFECTS.values()) -> str:
+    """The page."""
+    shown = sorted(effects, key=lambda effect: (effect.category != "base", effect.name))
+    rows = [f"| [{e.name}](#{e.name}) | `{_cell(e.law)}` | {e.category} | {', '.join(e.look_alikes)} |" for e in shown]
+    return HEAD + "\n".join(rows) + "\n" + "".join(_section(effect) for effect in shown)
+
+
+def bounds(parameter: Parameter) -> str:
+    """What a fit may reach, as text."""
+    return f"{parameter.low:g} to {parameter.high:g}"
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|")
+
+
+def _section(e: Effect) -> str:
+    rows = [f"| `{item.name}` | {item.unit} | {bounds(item)} | {item.typical:g} | {_cell(item.meaning)} |" for item in e.parameters]
+    table = "\n".join(["| parameter | unit | allowed | usual | meaning |", "|---|---|---|---|---|", *rows])
+    return f"""
+## {e.name}
+
+    {e.law}
+
+{_sentence(e.meaning)}
+
+{table}
+
+- Valid for: {e.validity}{"; acts on the table: across a gap the motor does not feel it" if e.on_table else ""}
+- Shows as: {e.shows}
+- Taken for: {", ".join(e.look_alikes)}
+- Told apart by: {e.experiment}
+- Source: {e.source}
+"""
+
+
+def _sentence(text: str) -> str:
+    return f"{text[0].upper()}{text[1:]}."
+
+
+if __name__ == "__main__":
+    import sys
+
+    sys.stdout.write(document())

@@ -1,0 +1,158 @@
+"""Models in files, of either kind: a transfer function (``fit --model``) or an axis with physical effects (``refine --model``)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from xy_sysid.axis.linear_part import linear_part, nonlinear
+from xy_sysid.axis.model import STANDARD, AxisModel, Library
+from xy_sysid.bags.atomic import whole, write_text
+from xy_sysid.comparison.physical_model import PhysicalModel
+from xy_sysid.errors import BadInput, BadRecording
+from xy_sysid.files.linear_models import FORMAT, Quoting, fitted_to, linear_axis, model_file, read_saved
+from xy_sysid.files.seal import sealed
+from xy_sysid.files.unasked import free
+from xy_sysid.fitting.of_run import LinearModel
+from xy_sysid.greybox.free_run import GreyboxFit
+from xy_sysid.units import USUAL, Units
+
+AXIS_FORMAT = "xy_sysid axis model 1"
+REWRITE = "Write the model again with xy-sysid refine --model."
+Model = LinearModel | PhysicalModel
+
+
+def save(model: Model | Mapping[str, Model], path: Path | str, axis: str = "", *, force: bool = False) -> None:
+    """Write a model as YAML that ``load_model`` and the commands read: whole or not at all.
+
+    model: of one axis, or {axis: model}, all of the same kind; axis: its name where the model does not know it
+    Raises BadInput if the file is there and not ``force``, BadRecording if it cannot be written.
+    """
+    path = Path(path)
+    free("file", path, force, "say force=True")
+    models = dict(model) if isinstance(model, Mapping) else {axis or model.axis or "x": model}
+    if not models:
+        raise BadInput("model", "none", "one or more", "Give a model.")
+    kinds = {type(item) for item in models.values()}
+    if len(kinds) > 1 or not kinds <= {LinearModel, PhysicalModel}:
+        names = ", ".join(sorted(kind.__name__ for kind in kinds))
+        raise BadInput(
+            "model", names, "transfer functions only, or axis models only", "Give step.model or what fit gives; a file of its own for each kind."
+        )
+    digests = {name: item.data[0] if len(item.data) == 1 else list(item.data) for name, item in models.items() if item.data}
+    document: dict[str, Any] = {"format": FORMAT, "provenance": {"data_sha256": digests}, "axes": {}}
+    for name, item in models.items():
+        if isinstance(item, LinearModel):
+            document["axes"][name] = linear_axis(item)
+        else:
+            document["format"] = AXIS_FORMAT
+            document["axes"][name] = _physical(item)
+    write_text(path, sealed(yaml.dump(document, Dumper=Quoting, sort_keys=False, width=120, allow_unicode=True)))
+
+
+def load_model(path: Path | str, axis: str = "", library: Library = STANDARD) -> Model:
+    """A model that ``save``, ``fit --model`` or ``refine --model`` wrote: a transfer function, or an axis with physical effects.
+
+    axis: which one, of a file with several; library: with effects of your own, if the model has any
+    Raises BadRecording or BadInput in one line.
+    """
+    models = read_models(Path(path), library)
+    if not axis and len(models) > 1:
+        raise BadInput("axis", "not given", ", ".join(models), f"{path} holds several: choose one with axis=.")
+    if axis and axis not in models:
+        raise BadInput("axis", repr(axis), ", ".join(models), "Choose one of these.")
+    return models[axis or next(iter(models))]
+
+
+def axis_document(fits: Mapping[str, GreyboxFit], provenance: Mapping[str, Any]) -> dict[str, Any]:
+    """Axis models with intervals, errors and origin, in plain types."""
+    return {"format": AXIS_FORMAT, "provenance": dict(provenance), "axes": {name: _axis(fit) for name, fit in fits.items()}}
+
+
+def _axis(fit: GreyboxFit) -> dict[str, Any]:
+    parameters = {item.name: {"value": float(item.value), "unit": item.unit, "ci95": [float(item.low), float(item.high)]} for item in fit.parameters}
+    errors = {"held_out_error": float(fit.held_out_error), "noise_floor": float(fit.noise_floor)}
+    return _written(fit.model, fit.units, parameters, errors)
+
+
+def _physical(item: PhysicalModel) -> dict[str, Any]:
+    if item.fit is not None:
+        return _axis(item.fit)
+    return _written(item.model, item.units, {name: {"value": float(value)} for name, value in item.model.values().items()}, {})
+
+
+def _written(model: AxisModel, units: Units, parameters: dict[str, Any], errors: dict[str, float]) -> dict[str, Any]:
+    tf = linear_part(model)
+    return {
+        "input_unit": units.input,
+        "output_unit": units.output,
+        "effects": [name for name, _ in model.effects],
+        "parameters": parameters,
+        **errors,
+        "linear_part": {
+            "numerator": [float(value) for value in tf.numerator],
+            "denominator": [float(value) for value in tf.denominator],
+            "delay_s": float(tf.delay),
+            "leaves_out": list(nonlinear(model)),
+        },
+    }
+
+
+def write_axis_models(path: Path, fits: Mapping[str, GreyboxFit], provenance: Mapping[str, Any]) -> None:
+    """As YAML that ``read_models`` reads. Raises BadRecording if it cannot be written."""
+    text = yaml.dump(axis_document(fits, provenance), Dumper=Quoting, sort_keys=False, width=120, allow_unicode=True)
+    write_text(path, sealed(text))
+
+
+def write_axis_mat(path: Path, fits: Mapping[str, GreyboxFit]) -> None:
+    """For MATLAB: tf(x_num, x_den, 'InputDelay', x_delay) is the linear part, x_parameters a struct, x_effects the names."""
+    from scipy.io import savemat
+
+    content: dict[str, Any] = {}
+    for axis, fit in fits.items():
+        name = "".join(c if c.isalnum() else "_" for c in axis)
+        name = name if name[:1].isalpha() else f"axis_{name}"
+        tf = linear_part(fit.model)
+        content |= {f"{name}_num": tf.numerator, f"{name}_den": tf.denominator, f"{name}_delay": tf.delay}
+        content[f"{name}_effects"] = np.array([own for own, _ in fit.model.effects], dtype=object)
+        content[f"{name}_parameters"] = {item.name.replace(".", "_"): item.value for item in fit.parameters}
+    with whole(path) as part:
+        savemat(part, content, oned_as="row", long_field_names=True)
+
+
+def read_models(path: Path, library: Library) -> Mapping[str, Model]:
+    """The models of a file of either kind, by axis; raises BadRecording or BadInput in one line if it is none."""
+    document = model_file(path, (FORMAT, AXIS_FORMAT))
+    if document["format"] == FORMAT:
+        return {axis: LinearModel(item.tf, item.hold, axis, item.data) for axis, item in read_saved(path).items()}
+    origin = document.get("provenance")
+    found = {}
+    for axis, part in document["axes"].items():
+        model = _model(path, str(axis), part, library)
+        units = Units(str(part.get("input_unit", USUAL.input)), str(part.get("output_unit", USUAL.output)))
+        found[str(axis)] = PhysicalModel(model, str(axis), fitted_to(origin, str(axis)), units)
+    return found
+
+
+def _model(path: Path, axis: str, part: Any, library: Library) -> AxisModel:
+    try:
+        values = {str(name): float(item["value"]) for name, item in part["parameters"].items()}
+        names = [str(name) for name in part["effects"]]
+        base = values["gain"], values["delay"], values["pole"]
+    except (AttributeError, KeyError, TypeError, ValueError, OverflowError):
+        needed = "effects as a list and parameters gain, delay and pole, each with its value"
+        raise BadRecording(path, f"axis {axis} has no {needed}", REWRITE) from None
+    effects = []
+    for name in names:
+        missing = [key for key in library[name].names if f"{name}.{key}" not in values]
+        if missing:
+            raise BadRecording(path, f"axis {axis} has no value of {name}.{missing[0]}", REWRITE)
+        effects.append((name, tuple(values[f"{name}.{key}"] for key in library[name].names)))
+        for item, value in zip(library[name].parameters, effects[-1][1], strict=True):
+            if not item.low <= value <= item.high:
+                raise BadInput(f"{path}: axis {axis}: {name}.{item.name}", value, f"{item.low:g} to {item.high:g} {item.unit}", "Correct it.")
+    return AxisModel(*base, tuple(effects), library)

@@ -1,0 +1,172 @@
+"""ROS parameter files: checked against the settings before any node sees them, and written from the settings.
+
+Fed with text, gives values; reading the file is for the caller.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import yaml
+
+from xy_sysid.errors import BadInput
+from xy_sysid.settings import (
+    AXES,
+    BallscrewSettings,
+    DiagnoserSettings,
+    ExcitationSettings,
+    IdentifierSettings,
+    Knob,
+    RecorderSettings,
+    Settings,
+    build,
+    for_axes,
+    knobs,
+    of_other_axes,
+    unknown_name,
+)
+
+NODES: dict[str, type[Settings]] = {
+    "excitation": ExcitationSettings,
+    "ballscrew": BallscrewSettings,
+    "identifier": IdentifierSettings,
+    "diagnoser": DiagnoserSettings,
+    "recorder": RecorderSettings,
+}
+BARE_BOOLEANS = re.compile(r"y|n|yes|no|on|off|true|false", re.IGNORECASE)
+
+
+def load(text: str, where: str) -> Any:
+    """The YAML document; raises BadInput for text that is no YAML, and for a bare ``y`` as a name, which ROS reads as true."""
+    try:
+        root = yaml.compose(text, Loader=yaml.SafeLoader)
+        document = yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        raise BadInput(where, "not YAML", "a YAML document", " ".join(str(error).split())) from None
+    for key in _keys(root):
+        if key.style is None and BARE_BOOLEANS.fullmatch(key.value):
+            line = key.start_mark.line + 1
+            raise BadInput(f"{where}: name in line {line}", key.value, "a quoted one", f'Write "{key.value}": a bare one means true or false.')
+    return document
+
+
+def _keys(node: yaml.Node | None) -> Iterator[yaml.ScalarNode]:
+    if isinstance(node, yaml.MappingNode):
+        for key, value in node.value:
+            if isinstance(key, yaml.ScalarNode):
+                yield key
+            yield from _keys(value)
+    elif isinstance(node, yaml.SequenceNode):
+        for value in node.value:
+            yield from _keys(value)
+
+
+def flat(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Nested parameters with dotted names: {"x": {"rms": 1}} becomes {"x.rms": 1}."""
+    found: dict[str, Any] = {}
+    for key, value in values.items():
+        if isinstance(value, Mapping):
+            found |= flat(value, f"{prefix}{key}.")
+        else:
+            found[f"{prefix}{key}"] = value
+    return found
+
+
+WITH_AXES = ("excitation", "identifier", "diagnoser")  # nodes with the parameter axes
+
+
+def _axes(node: str, values: Mapping[str, Any], where: str) -> list[str]:
+    """The names in ``axes``; raises BadInput if it is no list of names."""
+    axes = values.get("axes", list(AXES))
+    if node not in WITH_AXES or not isinstance(axes, list) or not axes or not all(isinstance(axis, str) and axis for axis in axes):
+        raise BadInput(f"{where}: axes", repr(axes), 'a list of names like ["x", "y"]', "Change it and try again.")
+    return axes
+
+
+def checked(node: str, values: Mapping[str, Any], where: str) -> dict[str, Any]:
+    """Parameters of one kind of node, by dotted name, each in the type that the node declares (2 becomes 2.0 for a float).
+
+    Raises BadInput for an unknown name (with the nearest spelling) and for a value outside its limits.
+    """
+    cls, given = NODES[node], flat(values)
+    named = {"axes": _axes(node, given, where)} if "axes" in given else {}
+    axes = given.pop("axes", list(AXES))
+    defaults = {knob.name: knob.value for knob in knobs(for_axes(cls, axes))}
+    others = of_other_axes(cls, given, axes)
+    for name in given:
+        if name not in defaults and name not in others:
+            raise unknown_name(name, [*defaults, "axes"], where)
+    settings = build(cls, {**defaults, **{name: value for name, value in given.items() if name not in others}}, where)
+    return named | {knob.name: knob.value for knob in knobs(settings) if knob.name in given}
+
+
+def parameters(text: str, where: str, nodes: Mapping[str, str] | None = None) -> dict[str, dict[str, Any]]:
+    """Parameters of every node that a ROS parameter file speaks of, by node name.
+
+    ``nodes`` says which kind each node name is, for nodes that were given names of their own. A section ``/**`` is for
+    every node, and each of its names must be known to at least one. Raises BadInput.
+    """
+    kinds = dict(nodes or {name: name for name in NODES})
+    document = load(text, where)
+    if not isinstance(document, dict) or not document:
+        raise BadInput(where, "no parameter file", "sections like /**/excitation: with ros__parameters: in them", "Start from config/default.yaml.")
+    found: dict[str, dict[str, Any]] = {name: {} for name in kinds}
+    for section, content in document.items():
+        if not isinstance(content, dict) or set(content) != {"ros__parameters"} or not isinstance(content["ros__parameters"], dict):
+            raise BadInput(f"{where}: section", repr(section), "one that holds ros__parameters: and nothing else", "Indent the parameters under it.")
+        name, values = str(section).rpartition("/")[2], flat(content["ros__parameters"])
+        if name == "**":
+            for key, kind in kinds.items():
+                known = {knob.name for knob in knobs(for_axes(NODES[kind], values.get("axes", AXES)))} | ({"axes"} if kind in WITH_AXES else set())
+                found[key] |= checked(kind, {k: v for k, v in values.items() if k in known}, where)
+            everything = {knob.name: None for kind in kinds.values() for knob in knobs(for_axes(NODES[kind], values.get("axes", AXES)))} | {
+                "axes": None
+            }
+            for key in values:
+                if key not in everything:
+                    raise unknown_name(key, everything, where)
+        elif name in kinds:
+            found[name] |= checked(kinds[name], values, f"{where}: {name}")
+        else:
+            raise unknown_name(name, kinds, f"{where}: node")
+    return {name: values for name, values in found.items() if values}
+
+
+def default_text() -> str:
+    """The parameter file with every knob of every node at its default, meaning and unit beside it."""
+    lines = [
+        "# Every parameter of every node, at its default. Units are SI.",
+        '# Made from xy_sysid/settings.py: python -m xy_sysid.files.ros_parameters. Keep "x" and "y" quoted: a bare y means true.',
+    ]
+    for node, cls in NODES.items():
+        lines += ["", f"/**/{node}:", "  ros__parameters:"]
+        group, explained = "", set[str]()
+        if node in WITH_AXES:
+            lines.append('    axes: ["x", "y"]  # names; parameters of axes that are not named here are not used')
+        for knob in knobs(cls()):
+            axis, _, name = knob.name.rpartition(".")
+            if axis != group:
+                lines.append(f'    "{axis}":')
+                group = axis
+            lines += _lines(knob, name, "      " if axis else "    ", knob.meaning not in explained)
+            explained.add(knob.meaning)
+    return "\n".join(lines) + "\n"
+
+
+def _lines(knob: Knob, name: str, indent: str, explain: bool) -> list[str]:
+    value = yaml.safe_dump(knob.value, default_flow_style=True, width=1000).removesuffix("...\n").strip()
+    if isinstance(knob.value, str):
+        value = f'"{knob.value}"'
+    limits = " | ".join(knob.choices) or (f"{knob.low:.10g} to {knob.high:.10g}" if knob.low is not None and knob.high is not None else "")
+    facts = "; ".join(part for part in (knob.unit, limits) if part)
+    comment = [f"{indent}# {knob.meaning}{f' [{facts}]' if facts else ''}"] if explain else []
+    shown = f'"{name}"' if BARE_BOOLEANS.fullmatch(name) or name == "x" else name
+    return [*comment, f"{indent}{shown}: {value}"]
+
+
+if __name__ == "__main__":
+    import sys
+
+    sys.stdout.write(default_text())

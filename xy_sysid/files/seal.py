@@ -1,0 +1,38 @@
+"""A model file says in its first line what the rest adds up to, so that a cut or a changed one is seen."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from pathlib import Path
+
+from xy_sysid.errors import BadRecording
+
+LINE = re.compile(r"# sha256 of all lines below: (\w*)[^\n]*\n")
+HINT = "after a change by hand, delete this line"
+
+
+def sealed(text: str) -> str:
+    """The text behind a line with its sum; for YAML, that line is a comment."""
+    return f"# sha256 of all lines below: {_sum(text)} ({HINT})\n{text}"
+
+
+def unsealed(path: Path, text: str) -> str:
+    """The text without its first line, if that was a sum.
+
+    Raises BadRecording if the sum is another, or if a file of an older version, which has none, ends inside a line.
+    """
+    found = LINE.match(text)
+    if found is None:
+        if text and not text.endswith("\n"):
+            raise BadRecording(path, "ends inside a line, so it was cut off", "Take another copy, or write the model again.")
+        return text
+    rest = text[found.end() :]
+    if _sum(rest) != found.group(1):
+        problem = "was cut off or changed since it was written (the sum in its first line is another)"
+        raise BadRecording(path, problem, "Take another copy; if you changed it yourself, delete that line.")
+    return rest
+
+
+def _sum(text: str) -> str:
+    return hashlib.sha256(text.encode("utf-8", "surrogateescape")).hexdigest()

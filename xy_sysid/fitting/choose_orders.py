@@ -1,0 +1,201 @@
+"""Which orders does a response tell? From the rigid body with delay upward, as long as every step is clear and could be a machine.
+
+A step up adds a pole, or a pair with or without its zeros. It is taken if (1) it shortens the description by more than CLEARLY,
+where the cost counts in units of what the richest plausible model leaves (overdispersion: Burnham & Anderson, Model Selection and
+Multimodel Inference, 2nd ed., sec. 2.5, as no real machine is explained by noise alone); (2) near the frequencies that it adds it
+takes away at least half of what noise does not explain, as a real resonance does and a patch on friction does not; and (3) it
+could be a machine: stable, with roots in the band, of which none cancel and none hang on a single line.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from xy_sysid.errors import BadInput
+from xy_sysid.fitting.identify import identify
+from xy_sysid.fitting.model_orders import CLEARLY, OrderTrial, description_length, independent_data
+from xy_sysid.fitting.result import Fit
+from xy_sysid.fitting.structure import Structure
+from xy_sysid.linear.transfer_function import Mode
+from xy_sysid.response.frf import FrequencyResponse
+
+STEPS = ((0, 1), (2, 2), (0, 2), (1, 2), (4, 4))  # zeros and poles added at once; two pairs, where one alone finds no minimum
+MOST_POLES = 9  # beside the integrators
+HALF = 0.5  # of the misfit near what a step adds that it may leave
+NEAR = 1.4  # times and over the frequencies added: there the misfit is counted
+LIGHT = 0.7  # damping above which a pair is no resonance
+NUMBERS_EACH = 4.0  # independent numbers that every parameter of a step up needs
+WIDEST = 0.1  # relative standard error, misfit counted, of a frequency that is told
+FAR_ABOVE = 3.0  # times the band's end beyond which a rigid body's pole is not seen at all
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """The fit of the orders chosen, the structures tried (best first), and the reason in words."""
+
+    fit: Fit
+    tried: tuple[OrderTrial, ...]
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class _Step:
+    """A richer fit, the pole modes that it adds, and why it is not to be believed (empty if it is)."""
+
+    fit: Fit
+    added: tuple[Mode, ...]
+    doubt: str
+
+
+def choose(frf: FrequencyResponse, family: Structure, thorough: bool = True) -> Choice:
+    """The orders that the data tell; of ``family`` everything but the orders is kept, with sigma as weight in the s domain.
+
+    thorough: look for more, too, when noise already explains what is there. Raises BadInput for too few lines even for a rigid body.
+    """
+    family = replace(family, weighting="sigma", domain="s")
+    rigid = _rigid(frf, family)
+    now, tried, refused = rigid, [rigid], ""
+    words: list[str] = []
+    while True:
+        steps = _steps(frf, now) if thorough or not now.consistent else []
+        tried += [step.fit for step in steps]
+        data = independent_data(frf, len(now.frequency))
+        sure = [step.fit for step in steps if not step.doubt]
+        scale = max(1.0, min(excess(fit) for fit in (now, *sure)))
+        clear = [step for step in steps if description_length(step.fit, data, scale) < description_length(now, data, scale) - CLEARLY]
+        good = [step for step in clear if not step.doubt]
+        if not good:
+            if clear:
+                nearest = min(clear, key=lambda step: description_length(step.fit, data, scale))
+                refused = f"{_orders(nearest.fit)} would leave {_times(nearest.fit)}, but {nearest.doubt}"
+            break
+        best = min(good, key=lambda step: description_length(step.fit, data, scale))
+        words.append(f"{_named(best)} {'take' if len(best.added) > 1 else 'takes'} that to {_times(best.fit)}")
+        now = best.fit
+    data = independent_data(frf, len(now.frequency))
+    scale = max(1.0, excess(now))
+    trials = {(fit.structure.numerator_order, fit.structure.denominator_order): fit for fit in tried}
+    ranked = sorted((_trial(fit, data, scale) for fit in trials.values()), key=lambda item: item.length)
+    base = "a rigid body" if rigid.structure.denominator_order > max(family.integrators, 1) else "an integrator" if family.integrators else "a lag"
+    reason = f"Orders {_orders(now)}, chosen from the data: {base}{' with delay' if family.free_delay else ''} leaves {_times(rigid)}"
+    reason += "".join(f"; {text}" for text in words)
+    reason += f"; {refused}." if refused else f"; nothing richer of {len(trials) - 1} tried is clearly better."
+    return Choice(now, tuple(ranked), reason)
+
+
+def excess(fit: Fit) -> float:
+    """Cost over what noise alone lets expect; 1 where that is not known."""
+    return fit.cost / fit.expected_cost if fit.expected_cost > 0.0 else 1.0
+
+
+def _rigid(frf: FrequencyResponse, family: Structure) -> Fit:
+    """A mass with drag (or on a spring, without integrators) and delay; one pole less where the last is not seen, or nothing stable is found."""
+    order = max(2, family.integrators + 1)
+    rigid = identify(frf, replace(family, numerator_order=0, denominator_order=order))
+    if rigid.converged and rigid.tf.is_stable and rigid.tf.pole_modes()[-1].frequency < FAR_ABOVE * rigid.frequency[-1]:
+        return rigid
+    bare = identify(frf, replace(family, numerator_order=0, denominator_order=order - 1))
+    return bare if bare.converged and bare.tf.is_stable and not bare.cost > NEAR * rigid.cost else rigid
+
+
+def _steps(frf: FrequencyResponse, now: Fit) -> list[_Step]:
+    found: list[_Step] = []
+    at = now.structure
+    for zeros, poles in STEPS:
+        structure = replace(at, numerator_order=at.numerator_order + zeros, denominator_order=at.denominator_order + poles)
+        if (
+            structure.denominator_order > MOST_POLES + at.integrators
+            or independent_data(frf, len(now.frequency)) < NUMBERS_EACH * structure.parameters
+        ):
+            continue
+        try:
+            fit = identify(frf, structure)
+        except (BadInput, ZeroDivisionError, np.linalg.LinAlgError):  # beyond what numbers can hold
+            continue
+        if fit.converged:
+            added = _added(now.tf.pole_modes(), fit.tf.pole_modes(), poles)
+            found.append(_Step(fit, added, _doubt(now, fit, added, poles)))
+    return found
+
+
+def _added(before: tuple[Mode, ...], after: tuple[Mode, ...], poles: int) -> tuple[Mode, ...]:
+    """What so many poles more have brought: the lightest pairs that are new, or the real pole that is; fewer, if there is no such thing."""
+    pairs = poles > 1
+
+    def alike(mode: Mode) -> bool:
+        return mode.frequency > 0.0 and (abs(mode.damping) <= LIGHT if pairs else abs(mode.damping) >= 1.0)
+
+    left = [mode for mode in after if alike(mode)]
+    for old in filter(alike, before):
+        if left:
+            left.remove(min(left, key=lambda mode: abs(math.log(mode.frequency / old.frequency))))
+    return tuple(sorted(left, key=lambda mode: abs(mode.damping))[: max(poles // 2, 1)])
+
+
+def _doubt(now: Fit, fit: Fit, added: tuple[Mode, ...], poles: int) -> str:
+    """Why a richer fit is no machine, or not told by the data; empty if there is nothing against it."""
+    low, high = float(fit.frequency[0]), float(fit.frequency[-1])
+    if not fit.tf.is_stable:
+        return "it is unstable"
+    if len(added) < max(poles // 2, 1):
+        return "its poles are no resonance" if poles > 1 else "its pole is not real"
+    for kind, modes in (("pole", added), ("zero", fit.tf.zero_modes())):
+        outside = [mode.frequency for mode in modes if not low <= mode.frequency <= high]
+        if outside:
+            return f"its {kind} at {outside[0]:.3g} Hz lies outside the band of {low:.3g} to {high:.4g} Hz"
+    if any(mode.damping < -LIGHT for mode in fit.tf.zero_modes()):
+        return "its zero makes it go the wrong way first"
+    for mode in added:
+        apart = min((abs(mode.root - zero) for zero in fit.tf.zeros()), default=math.inf) / (2.0 * math.pi)
+        if apart < 0.5 * fit_resolution(fit):
+            return f"its pole and zero near {mode.frequency:.4g} Hz are less than half a line apart"
+    factor = math.sqrt(max(excess(fit), 1.0))
+    for item in fit.intervals:
+        ours = any(abs(item.value - mode.frequency) < 1e-6 * mode.frequency for mode in added)
+        if item.name.startswith("resonance") and ours and not factor * item.sigma < WIDEST * item.value:
+            return f"its resonance at {item.value:.3g} Hz is not determined"
+    left = _misfit(fit, fit, added) / max(_misfit(now, fit, added), 1e-300)
+    return f"it leaves {100.0 * left:.0f} % of the misfit where it stands" if left > HALF else ""
+
+
+def fit_resolution(fit: Fit) -> float:
+    """Hz between the lines of a fit."""
+    return float(np.min(np.diff(fit.frequency))) if fit.frequency.size > 1 else 0.0
+
+
+def _misfit(fit: Fit, richer: Fit, added: tuple[Mode, ...]) -> float:
+    """Cost beyond noise near the modes added, and near the zeros that stand beside them; all of it for a single pole."""
+    parts = 0.5 * np.abs(fit.weight * (fit.measured - fit.response)) ** 2
+    noise = fit.expected_cost / max(len(parts), 1)
+    if all(abs(mode.damping) >= 1.0 for mode in added):
+        return max(float(np.sum(parts - noise)), 0.0)
+    zeros = [zero.frequency for zero in richer.tf.zero_modes() if abs(zero.damping) < 1.0]
+    inside = np.zeros(len(parts), dtype=np.bool_)
+    for mode in added:
+        beside = min(zeros, key=lambda zero: abs(math.log(zero / mode.frequency)), default=mode.frequency)
+        beside = beside if 0.5 < beside / mode.frequency < 2.0 else mode.frequency
+        bottom, top = min(beside, mode.frequency) / NEAR, max(beside, mode.frequency) * NEAR
+        inside |= (fit.frequency >= bottom) & (fit.frequency <= top)
+    return max(float(np.sum((parts - noise)[inside])), 0.0)
+
+
+def _trial(fit: Fit, data: float, scale: float) -> OrderTrial:
+    return OrderTrial(fit.structure.numerator_order, fit.structure.denominator_order, fit.cost, description_length(fit, data, scale))
+
+
+def _orders(fit: Fit) -> str:
+    return f"{fit.structure.numerator_order}/{fit.structure.denominator_order}"
+
+
+def _times(fit: Fit) -> str:
+    return f"{excess(fit):.3g} times the cost of noise alone"
+
+
+def _named(step: _Step) -> str:
+    pairs = [mode for mode in step.added if abs(mode.damping) < 1.0]
+    if not pairs:
+        return f"a pole at {step.added[0].frequency:.4g} Hz"
+    return " and ".join(f"a resonance at {mode.frequency:.4g} Hz" for mode in pairs)

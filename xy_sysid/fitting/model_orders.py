@@ -1,0 +1,73 @@
+"""Which orders do the data support? Minimum description length over a small family of structures.
+
+With sigma known, twice the maximum-likelihood cost is a chi-square, and MDL = cost + parameters / 2 * ln(number of
+independent real data) (Rissanen 1978; Ljung, System Identification, 2nd ed., sec. 16.4).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from xy_sysid.errors import BadInput
+from xy_sysid.fitting.identify import identify
+from xy_sysid.fitting.result import Fit
+from xy_sysid.fitting.structure import Structure
+from xy_sysid.response.frf import FrequencyResponse
+
+WIDER = 2  # orders tried above and below the one that was asked for
+CLEARLY = 10.0  # MDL by which another order must win before it is suggested: odds of e^10
+
+
+@dataclass(frozen=True, slots=True)
+class OrderTrial:
+    """One structure tried: its orders, cost, and description length."""
+
+    numerator_order: int
+    denominator_order: int
+    cost: float
+    length: float
+
+
+def independent_data(frf: FrequencyResponse, lines: int) -> float:
+    """Real numbers' worth of independent data in so many lines, whose errors are correlated."""
+    return 2.0 * lines / float(1.0 + 2.0 * frf.line_correlation[1:].sum())
+
+
+def try_orders(frf: FrequencyResponse, fit: Fit) -> tuple[OrderTrial, ...]:
+    """Structures near the one of ``fit``, best first; those that do not converge are left out.
+
+    The relative degree is kept (a pole and a zero more or less at a time) and varied by one.
+    """
+    asked = fit.structure
+    data = independent_data(frf, len(fit.frequency))
+    found = [_trial(fit, data)]
+    excess = asked.denominator_order - asked.numerator_order
+    seen = {(asked.numerator_order, asked.denominator_order)}
+    for order in range(max(asked.integrators + 1, asked.denominator_order - WIDER), min(12, asked.denominator_order + WIDER) + 1):
+        for degree in (excess, excess + 1):
+            orders = (order - degree, order)
+            if orders in seen or not 0 <= orders[0] <= orders[1]:
+                continue
+            seen.add(orders)
+            trial = _fitted(frf, replace(asked, numerator_order=orders[0], denominator_order=orders[1], weighting="sigma"))
+            if trial is not None:
+                found.append(_trial(trial, data))
+    return tuple(sorted(found, key=lambda item: item.length))
+
+
+def _fitted(frf: FrequencyResponse, structure: Structure) -> Fit | None:
+    try:
+        fit = identify(frf, structure)
+    except BadInput:
+        return None
+    return fit if fit.converged else None
+
+
+def description_length(fit: Fit, data: float, scale: float = 1.0) -> float:
+    """nats; scale: cost over that of noise alone which no model gets below."""
+    return fit.cost / scale + 0.5 * fit.structure.parameters * math.log(max(data, 2.0))
+
+
+def _trial(fit: Fit, data: float) -> OrderTrial:
+    return OrderTrial(fit.structure.numerator_order, fit.structure.denominator_order, fit.cost, description_length(fit, data))

@@ -1,0 +1,235 @@
+"""Frequency response of a whole recording, axis by axis."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from xy_sysid.errors import BadInput
+from xy_sysid.fitting import Fit, identify
+from xy_sysid.fitting.choose_orders import Choice, choose
+from xy_sysid.fitting.structure import structure_from
+from xy_sysid.response.batch_spectra import batch_spectra
+from xy_sysid.response.closed_loop import joint_input_output, loop_spectra
+from xy_sysid.response.frf import FrequencyResponse
+from xy_sysid.response.friction_hint import friction_hint, friction_note
+from xy_sysid.response.h1 import H1Options, frequency_response
+from xy_sysid.response.period import find_period, period_note
+from xy_sysid.response.window_check import stretches
+from xy_sysid.response.windows import WindowShape
+from xy_sysid.samples.block import FloatArray
+from xy_sysid.samples.rate import error_of_rate
+from xy_sysid.samples.recording import Recording
+from xy_sysid.settings import IdentifierSettings
+
+HARDLY = 4.0  # standard deviations of the number of lines that chance makes coherent (neighbours are alike, hence the 2)
+JOINT = "Closed loop: the joint input-output method, with the reference as instrument."
+FIXED = ("nllsfdi",)  # estimators of the paper's own structure: orders that are not asked for are 2/4
+TRANSIENT = 1  # periods left out at the start of a periodic recording
+ROUNDING = 1e-12  # of the response: no line of a made-up signal without noise is more exact than its numbers
+SMALLEST, LARGEST = 1e-100, 1e100  # of what is measured: squares of more or less leave the range of numbers
+
+
+@dataclass(frozen=True, slots=True)
+class AxisEstimate:
+    """The response of one axis and how it came about.
+
+    period: samples of one period of the input, None if it does not repeat; notes: sentences a user should read
+    """
+
+    axis: str
+    frf: FrequencyResponse
+    period: int | None
+    windows: int
+    notes: tuple[str, ...]
+
+
+def estimate(recording: Recording, axis: str, settings: IdentifierSettings, period: int | None = 0) -> AxisEstimate:
+    """The response of one axis, by H1 or, with ``settings.response``, by the joint input-output method.
+
+    period: samples of a period (the window becomes one period, without a taper), 0 to look for one, None for none
+    Windows in which the encoder stands still or leaps are left out, as online, and a note says so.
+    Raises BadInput if the axis is not there, was not excited, or the data are too short for one window.
+    """
+    u, y = recording.axis(axis)
+    r = _reference(recording, axis) if settings.response == "joint_input_output" else None
+    repeats = u if r is None else r
+    _moving(axis, u, y, recording.units)
+    runs = recording.runs()
+    longest = recording.run(axis).rows
+    notes: list[str] = []
+    if period == 0:
+        period = find_period(repeats[longest])
+    elif period:
+        notes += period_note(repeats[longest], period)
+    if period:
+        settings, runs = _periodic(settings, runs, period, notes, recording.sampling_rate, "input" if r is None else "reference")
+    _possible(settings, recording.sampling_rate, _samples(longest))
+    shape = WindowShape.of(settings.window, settings.length, settings.overlap)
+    grid = 0 if period or not _fits(recording, runs, shape, settings.differenced) else 1
+    pieces = [(grid * int(recording.seq[run][0]), u[run], y[run]) for run in runs]
+    frozen = max(round(settings.frozen * recording.sampling_rate), 2)
+    kept, left_out = stretches(pieces, shape, settings.differenced, frozen)
+    notes += left_out
+    options = H1Options(
+        differenced=settings.differenced,
+        periodic=bool(period),
+        band=(settings.band_low, settings.band_high),
+        min_coherence=settings.min_coherence,
+        units=recording.units,
+        rate_error=error_of_rate(recording.time, recording.seq),
+    )
+    cut = [(pieces[k][0] + start, pieces[k][1][start:stop], pieces[k][2][start:stop]) for k, start, stop in kept]
+    if r is None:
+        spectra = batch_spectra(cut, shape, settings.differenced)
+        frf = frequency_response(spectra, shape, recording.sampling_rate, options)
+    else:
+        references = [r[runs[k]][start:stop] for k, start, stop in kept]
+        loop = loop_spectra([(seq, ref, one, other) for ref, (seq, one, other) in zip(references, cut, strict=True)], shape, settings.differenced)
+        spectra, frf = loop.output, joint_input_output(loop, shape, recording.sampling_rate, options)
+        notes.append(JOINT)
+    frf = replace(frf, sigma=np.maximum(frf.sigma, ROUNDING * np.abs(frf.response)))
+    notes += _coherence(frf, settings, bool(period))
+    longest = max(runs, key=_samples)
+    friction = friction_note(friction_hint(u[longest], y[longest], recording.sampling_rate))
+    notes += [*(_closed_loop(recording, axis) if r is None else []), *([friction] if friction else [])]
+    return AxisEstimate(axis=axis, frf=frf, period=period or None, windows=int(spectra.weight), notes=tuple(notes))
+
+
+def _reference(recording: Recording, axis: str) -> FloatArray:
+    """(n,) of one axis; raises BadInput if there is none, or one that does not move."""
+    if recording.reference is None:
+        act = "Record it (topic reference, column x_reference), or leave response at h1."
+        raise BadInput("response", "joint_input_output, and the recording has no reference", "a recording with a reference", act)
+    reference = recording.reference[:, recording.axes.index(axis)]
+    _moving(axis, reference, reference, (recording.output_unit, recording.output_unit), ("reference", "reference"))
+    return reference
+
+
+def _samples(run: slice) -> int:
+    return int(run.stop - run.start)
+
+
+def _moving(axis: str, u: FloatArray, y: FloatArray, units: tuple[str, str], names: tuple[str, str] = ("input", "output")) -> None:
+    """Raises BadInput for an input or output that does not move, or that moves by more than numbers can be squared."""
+    acts = "Excite this axis.", "Check the encoder, and that the axis is enabled."
+    for name, values, unit, act in zip(names, (u, y), units, acts, strict=True):
+        if values.size == 0 or float(np.ptp(values)) == 0.0:
+            raise BadInput(f"{name} of axis {axis}", f"constant at {float(values[0]) if values.size else 0.0:g} {unit}", "a moving one", act)
+        size = float(np.max(np.abs(values)))
+        if not (float(np.ptp(values)) >= SMALLEST and size <= LARGEST):
+            allowed = f"{SMALLEST:g} to {LARGEST:g} {unit}"
+            raise BadInput(f"{name} of axis {axis}", f"up to {size:.3g} {unit} in size", allowed, "Check its unit and how it was written.")
+
+
+def _possible(settings: IdentifierSettings, rate: float, samples: int) -> None:
+    """Raises BadInput, before any work is done, for windows longer than the data and for a band that they cannot show."""
+    needed = settings.length + int(settings.differenced)
+    if samples < needed:
+        act = f"Record for longer, or shorten the window with --set length={max(samples // 4, 16)}."
+        raise BadInput("longest gap-free run", f"{samples} samples", f"{needed} or more", act)
+    lowest, highest = rate / settings.length, 0.5 * rate
+    if max(settings.band_low, lowest) > min(settings.band_high, highest):
+        shown = f"some of {lowest:.4g} to {highest:.4g} Hz, which {rate:.6g} Hz and windows of {settings.length} samples show"
+        raise BadInput(
+            "band", f"{settings.band_low:g} to {settings.band_high:g} Hz", shown, "Change it with --set band_low= and band_high=, or the length."
+        )
+
+
+def _fits(recording: Recording, runs: list[slice], shape: WindowShape, differenced: bool) -> bool:
+    """Whether a window of the grid (see ``windows``) lies in any run; a short recording may lie between two."""
+    return any(-int(recording.seq[run.start]) % shape.hop + shape.length + int(differenced) <= _samples(run) for run in runs)
+
+
+def _coherence(frf: FrequencyResponse, settings: IdentifierSettings, periodic: bool) -> list[str]:
+    """Too little to judge, or hardly more trusted lines than noise alone would give."""
+    if frf.averages < 2.0:
+        return [f"Only {frf.averages:.1f} independent windows: no uncertainty, so no line is trusted. Record longer, or shorten the window."]
+    if periodic:
+        return []
+    none = 1.0 - settings.min_coherence  # chance that a line of no coherence stays below
+    chance = none ** (frf.averages - 1.0) * len(frf)
+    usual = 1.0 - none * 0.1 ** (1.0 / (frf.averages - 1.0))  # nine of ten such lines by chance have no more coherence
+    trusted = int(frf.trusted.sum())
+    many = trusted > chance + HARDLY * math.sqrt(2.0 * chance)
+    if many or (trusted and float(np.median(frf.coherence[frf.trusted])) > usual):
+        return []
+    return [
+        f"Only {trusted} of {len(frf)} lines in the band are coherent with the input, and chance alone gives {chance:.0f}: "
+        "the output hardly follows the input. Excite more, narrow the band, or check the wiring."
+    ]
+
+
+def _periodic(
+    settings: IdentifierSettings, runs: list[slice], period: int, notes: list[str], rate: float, what: str
+) -> tuple[IdentifierSettings, list[slice]]:
+    """what: repeats, the input or the reference."""
+    first = runs[0]
+    if (first.stop - first.start) // period > TRANSIENT + 1:
+        runs = [slice(first.start + TRANSIENT * period, first.stop), *runs[1:]]
+        notes.append(f"The {what} repeats every {period} samples ({period / rate:.6g} s): windows of one period, the first one left out.")
+    else:
+        notes.append(f"The {what} repeats every {period} samples ({period / rate:.6g} s): windows of one period.")
+    return replace_settings(settings, window="boxcar", length=period, overlap=0.0), runs
+
+
+def replace_settings(settings: IdentifierSettings, **values: object) -> IdentifierSettings:
+    """The settings with some values changed, unchecked by limits that only concern users."""
+    return settings.model_copy(update=values)
+
+
+def _closed_loop(recording: Recording, axis: str) -> list[str]:
+    """A reference in the recording means feedback: H1 is then biased towards minus the inverse controller."""
+    if recording.reference is None:
+        return []
+    column = recording.axes.index(axis)
+    error = recording.reference[:, column] - recording.position[:, column]
+    u = recording.voltage[:, column]
+    if float(np.std(error)) == 0.0 or float(np.std(u)) == 0.0:
+        return []
+    likeness = abs(float(np.corrcoef(error, u)[0, 1]))
+    if likeness < 0.3:
+        return []
+    return [
+        f"Closed loop: the input follows the tracking error (correlation {likeness:.2f}). H1 is biased where noise and friction are "
+        "large against the excitation; if the reference moves in the whole band, --set response=joint_input_output takes it as instrument; "
+        "otherwise trust lines of high coherence only, or measure with open loop."
+    ]
+
+
+def judged(frf: FrequencyResponse) -> None:
+    """Raises BadInput for a response without an uncertainty of its own, to which nothing can be fitted or compared."""
+    if frf.averages < 2.0:
+        act = "Record longer, or shorten the window with --set length=."
+        raise BadInput("number of independent windows", f"{frf.averages:.1f}", "2 or more, so that there is an uncertainty", act)
+
+
+def with_orders(frf: FrequencyResponse, settings: IdentifierSettings) -> tuple[IdentifierSettings, Choice | None]:
+    """The settings with the orders that the response tells, and why; unchanged, and None, where somebody asked for orders."""
+    if not settings.orders_from_data:
+        return settings, None
+    choice = choose(frf, structure_from(settings))
+    structure = choice.fit.structure
+    orders = {"numerator_order": structure.numerator_order, "denominator_order": structure.denominator_order}
+    return settings.model_copy(update=orders), choice
+
+
+def fitted(frf: FrequencyResponse, settings: IdentifierSettings) -> Fit:
+    """A transfer function of the orders asked for, or of those that the response tells."""
+    settings, choice = with_orders(frf, settings)
+    return choice.fit if choice is not None else identify(frf, structure_from(settings))
+
+
+def split(recording: Recording, held_out: float) -> tuple[Recording, Recording]:
+    """The first part to fit, and the last ``held_out`` (0..0.9) of the samples that no fit sees."""
+    if not 0.0 <= held_out <= 0.9:
+        raise BadInput("held-out part", held_out, "0 to 0.9", "Choose for example 0.2.")
+    cut = len(recording) - round(held_out * len(recording))
+    return part(recording, slice(0, cut)), part(recording, slice(cut, len(recording)))
+
+
+def part(recording: Recording, rows: slice) -> Recording:
+    """Some consecutive rows of a recording."""
+    return recording.only(rows)

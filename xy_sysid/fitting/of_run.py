@@ -1,0 +1,119 @@
+"""From a run to its frequency response, and from that to a transfer function with its verdicts: one call each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from xy_sysid.errors import BadInput
+from xy_sysid.fitting import ESTIMATORS, Fit, identify
+from xy_sysid.fitting.of_recording import FIXED, estimate, judged, with_orders
+from xy_sysid.fitting.result import Interval
+from xy_sysid.fitting.structure import structure_from
+from xy_sysid.fitting.verdicts import Verdict, validate
+from xy_sysid.linear.simulate import simulate
+from xy_sysid.linear.transfer_function import TransferFunction
+from xy_sysid.response.frf import FrequencyResponse
+from xy_sysid.samples.block import FloatArray
+from xy_sysid.samples.recording import Origin, Recording, Run, one_run
+from xy_sysid.settings import IdentifierSettings, build, changed
+
+
+@dataclass(frozen=True, slots=True)
+class LinearModel:
+    """A transfer function of one axis, and what is known of it.
+
+    hold:     how its input behaves between samples
+    axis:     its name; data: SHA-256 of the samples of each recording that it was fitted to
+    fit:      the fit with its intervals, None of a model that comes from a file
+    verdicts: whether to believe it, one check each
+    """
+
+    tf: TransferFunction
+    hold: Literal["zoh", "none"] = "zoh"
+    axis: str = ""
+    data: tuple[str, ...] = ()
+    fit: Fit | None = None
+    verdicts: tuple[Verdict, ...] = ()
+
+    @property
+    def doubt(self) -> str:
+        """Nothing speaks against simulating it."""
+        return ""
+
+    @property
+    def label(self) -> str:
+        """A few words for a legend."""
+        return f"transfer function {self.tf.numerator.size - 1}/{self.tf.denominator.size - 1}"
+
+    @property
+    def intervals(self) -> tuple[Interval, ...]:
+        """95 % intervals of coefficients, delay, gain, poles, zeros, resonances, for noise alone; empty of a model from a file."""
+        return self.fit.intervals if self.fit is not None else ()
+
+    @property
+    def intervals_with_misfit(self) -> tuple[Interval, ...]:
+        """The same, widened by what the model leaves beyond noise."""
+        return self.fit.intervals_with_misfit if self.fit is not None else ()
+
+    @property
+    def ok(self) -> bool:
+        """Every verdict is good."""
+        return all(verdict.ok for verdict in self.verdicts)
+
+    def velocity(self, sampling_rate: float, voltage: FloatArray, position: FloatArray) -> FloatArray:
+        """(n - 1,) simulated mean velocity of each sample, m/s, from rest."""
+        with np.errstate(over="ignore", invalid="ignore"):  # what runs away is told as such
+            return np.asarray(np.diff(simulate(self.tf, sampling_rate, voltage)) * sampling_rate)
+
+    def __repr__(self) -> str:
+        told = f" of axis {self.axis}" if self.axis else ""
+        modes = [f"{mode.frequency:.4g} Hz" for mode in self.tf.pole_modes() if abs(mode.damping) < 1.0]
+        shown = f", resonance {', '.join(modes)}" if modes else ""
+        passed = f", {sum(item.ok for item in self.verdicts)} of {len(self.verdicts)} checks passed" if self.verdicts else ""
+        factor = self.fit.misfit if self.fit is not None else 1.0
+        doubt = f", misfit: intervals {factor:.3g} times too narrow" if factor > 1.0 else ""
+        return f"<LinearModel{told}: {self.label}, delay {1e3 * self.tf.delay:.4g} ms{shown}{passed}{doubt}>"
+
+
+def frf(data: Run | Recording, period: int | None = 0, **settings: Any) -> FrequencyResponse:
+    """H1 with coherence and sigma of every line.
+
+    data:     a run, or a recording of one axis; period: samples of a period of the input, 0 to look for one, None for none
+    settings: any of the identifier's (docs/settings.md), for example length=8192, window="hann", band_low=1.0
+    Source: Bendat & Piersol, Random Data, 4th ed., sec. 6.1.4. What a user should read is in ``origin.notes``.
+    Raises BadInput if the axis does not move, the data are too short for one window, or a setting is unknown.
+    """
+    run = one_run(data)
+    recording = data if isinstance(data, Recording) else run.recording()
+    found = estimate(recording, run.axis, build(IdentifierSettings, settings, "frf"), period)
+    return replace(found.frf, origin=Origin(run.axis, run.digest, found.notes))
+
+
+def fit(response: FrequencyResponse, method: str = "best", **settings: Any) -> LinearModel:
+    """A transfer function with delay, its 95 % intervals and its verdicts.
+
+    method:   best (maximum likelihood), lls, iwls, nlls, ml, nllsfdi
+    settings: any of the identifier's, for example numerator_order=2, denominator_order=3, delay=False
+    Orders that are not given are those that the response tells, from a rigid body with delay upward; the verdict "order" says why.
+    Source: Pintelon & Schoukens, System Identification, 2nd ed., ch. 9 and 10.
+    Raises BadInput for a response without uncertainty, or orders beyond what numbers can hold.
+    """
+    judged(response)
+    if method != "best" and method not in ESTIMATORS:
+        raise BadInput("method", repr(method), ", ".join(("best", *ESTIMATORS)), "Choose one of these.")
+    chosen = changed(IdentifierSettings(), settings)
+    try:
+        with np.errstate(all="ignore"):  # what overflows ends in a figure that the verdicts judge
+            chosen, choice = with_orders(response, chosen) if method not in FIXED else (chosen, None)
+            if choice is not None and method == "best":
+                found = choice.fit
+            else:
+                found = {"best": identify, **ESTIMATORS}[method](response, structure_from(chosen))
+            verdicts = validate(found, response, choice=choice).verdicts
+    except (np.linalg.LinAlgError, ZeroDivisionError):
+        raise BadInput("fit", "beyond what numbers can hold", "orders that the data determine", "Lower them or widen the band.") from None
+    known = (response.origin.data,) if response.origin.data else ()
+    return LinearModel(tf=found.tf, hold=found.structure.hold, axis=response.origin.axis, data=known, fit=found, verdicts=verdicts)

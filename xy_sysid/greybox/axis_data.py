@@ -1,0 +1,190 @@
+"""What is fitted: one axis, moving in one or several recordings, cut into windows of which some are held out.
+
+Windows that judge are spread over the record, in blocks between those that a fit sees, and share no sample with them; so they
+hold the motion that they judge. Of several recordings each is cut so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xy_sysid.axis.model import sample_velocity
+from xy_sysid.errors import BadInput
+from xy_sysid.greybox.floor import Bands, Floor, Windows, bands, encoder_noise, floor
+from xy_sysid.samples.block import FloatArray
+from xy_sysid.units import USUAL, Units
+
+FIRST = 28_000  # samples of the first stage of a fit
+TRAINING = 2.0 / 3.0  # of the record, for what must run through from the start (one-step prediction)
+EPSILON = 1e-3  # part of the motion to which laws and their integration are trusted
+FEWEST = 256  # samples
+WINDOWS = 14.0  # window lengths that a record must hold at least; else they are made shorter
+SEEN, HELD = 3.0, 1.5  # window lengths of a block that a fit sees, and of one that is held out
+SHIFTS = 4  # places tried for the blocks that are held out
+
+
+@dataclass(frozen=True, slots=True)
+class AxisData:
+    """One axis without gaps, ready to be fitted, with what its data allow.
+
+    voltage, position: (n,) V and m, recordings one after the other; velocity: (n - r,) mean of each sample, m/s, of r recordings
+    starts: sample of ``voltage`` at which each recording begins
+    fitted, held: windows of ``velocity`` that a fit sees, and that judge it; brief: those of the first stage
+    training: samples of ``velocity`` for what must run through; first: samples of the first stage
+    units: what V and m stand for, wherever words are made of it
+    """
+
+    sampling_rate: float
+    voltage: FloatArray
+    position: FloatArray
+    velocity: FloatArray
+    starts: tuple[int, ...]
+    layout: Bands
+    fitted: Windows
+    held: Windows
+    brief: Windows
+    training: int
+    first: int
+    floor: Floor
+    units: Units = USUAL
+
+    @property
+    def noise_floor(self) -> float:
+        """rms of the encoder's noise in velocity, below the top band, m/s."""
+        return self.layout.rms(self.floor.noise)
+
+    @property
+    def runs(self) -> tuple[slice, ...]:
+        """The samples of each recording."""
+        return tuple(slice(a, b) for a, b in zip(self.starts, (*self.starts[1:], self.voltage.size), strict=True))
+
+    @property
+    def steps(self) -> tuple[slice, ...]:
+        """The same of ``velocity``."""
+        return tuple(slice(run.start - k, run.stop - k - 1) for k, run in enumerate(self.runs))
+
+    @property
+    def moving(self) -> float:
+        """rms of the motion where it is held out over that where it is fitted."""
+        held, fitted = (float(np.mean(np.abs(windows.spectrum(self.velocity)) ** 2)) for windows in (self.held, self.fitted))
+        return float(np.sqrt(held / fitted)) if fitted > 0.0 else 0.0
+
+    def middle(self) -> FloatArray:
+        """(n - r,) measured position at the middle of each sample, m."""
+        return np.concatenate([0.5 * (self.position[run][1:] + self.position[run][:-1]) for run in self.runs])
+
+    def held_samples(self) -> NDArray[np.bool_]:
+        """(n - r,) those of ``velocity`` in a window that is held out."""
+        inside = np.zeros(self.velocity.size, dtype=np.bool_)
+        for begin in self.held.begins:
+            inside[begin : begin + self.layout.length] = True
+        return inside
+
+    def first_windows(self) -> Windows:
+        """Every window of the first stage, fitted and held out; those held out alone where the first stage is all that there is."""
+        if self.first >= self.velocity.size:
+            return self.held
+        both = np.sort(np.concatenate((self.brief.begins, self.held.before(self.first).begins)))
+        return Windows(self.layout, np.unique(both))
+
+    def longest(self) -> AxisData:
+        """The longest recording alone."""
+        if len(self.starts) == 1:
+            return self
+        run = max(self.runs, key=lambda part: part.stop - part.start)
+        return prepare(self.sampling_rate, self.voltage[run], self.position[run], self.floor.epsilon, self.units)
+
+
+def prepare(sampling_rate: float, voltage: FloatArray, position: FloatArray, epsilon: float = EPSILON, units: Units = USUAL) -> AxisData:
+    """One recording of an axis for fitting. Raises BadInput for less than 256 samples or arrays that do not fit together."""
+    return prepare_all(sampling_rate, [(voltage, position)], epsilon, units)
+
+
+def prepare_all(
+    sampling_rate: float, recordings: Sequence[tuple[FloatArray, FloatArray]], epsilon: float = EPSILON, units: Units = USUAL
+) -> AxisData:
+    """Several recordings, V and m, of the same axis for one fit. Raises BadInput as ``prepare``."""
+    for voltage, position in recordings:
+        if voltage.shape != position.shape or voltage.ndim != 1:
+            raise BadInput("shape of voltage and position", f"{voltage.shape} and {position.shape}", "one and the same (n,)", "Give one axis.")
+        if voltage.size < FEWEST:
+            raise BadInput("number of samples", voltage.size, f"{FEWEST} or more", "Record for longer.")
+        if not (np.all(np.isfinite(voltage)) and np.all(np.isfinite(position))):
+            raise BadInput("samples", "not finite", "finite numbers", "Remove what is not a number.")
+    sizes = [voltage.size for voltage, _ in recordings]
+    starts = tuple(int(start) for start in np.cumsum([0, *sizes[:-1]]))
+    velocities = [sample_velocity(sampling_rate, position) for _, position in recordings]
+    velocity = np.concatenate(velocities)
+    layout = bands(sampling_rate, int(max(sizes) / WINDOWS))
+    edges = np.cumsum([0, *(item.size for item in velocities)])
+    spans = [(int(a), int(b)) for a, b in pairwise(edges)]
+    whole = Windows(layout, np.concatenate([_begins(layout.length, *span) for span in spans]))
+    encoder = max(encoder_noise(sampling_rate, position) for _, position in recordings)
+    fitted, held = _split(layout, spans, velocity)
+    stage = int(min(FIRST, edges[1]))
+    brief = fitted.before(stage)
+    if brief.begins.size < 2:
+        stage, brief = int(edges[1]), fitted.before(int(edges[1]))
+    return AxisData(
+        sampling_rate=sampling_rate,
+        voltage=np.concatenate([voltage for voltage, _ in recordings]),
+        position=np.concatenate([position for _, position in recordings]),
+        velocity=velocity,
+        starts=starts,
+        layout=layout,
+        fitted=fitted,
+        held=held,
+        brief=brief if brief.begins.size else fitted,
+        training=int(TRAINING * velocities[0].size),
+        first=stage if brief.begins.size else velocity.size,
+        floor=floor(whole, velocity, encoder, epsilon),
+        units=units,
+    )
+
+
+def loosened(data: AxisData, epsilon: float) -> AxisData:
+    """The same axis with laws that are trusted less."""
+    both = Windows(data.layout, np.concatenate((data.fitted.begins, data.held.begins)))
+    return replace(data, floor=floor(both, data.velocity, data.floor.encoder, epsilon))
+
+
+def _begins(length: int, start: int, stop: int) -> NDArray[np.int64]:
+    """First samples of half overlapping windows of one recording."""
+    return np.arange(start, max(stop - length, start) + 1, max(length // 2, 1), dtype=np.int64)
+
+
+def _split(layout: Bands, spans: Sequence[tuple[int, int]], velocity: FloatArray) -> tuple[Windows, Windows]:
+    """Windows to be fitted and to be held out: the blocks lie where both move alike."""
+    choices = []
+    for shift in range(SHIFTS):
+        cut = [_blocks(layout.length, start, stop, shift) for start, stop in spans]
+        fitted, held = (Windows(layout, np.concatenate([part[k] for part in cut])) for k in (0, 1))
+        if fitted.begins.size and held.begins.size:
+            sizes = [float(np.mean(np.abs(windows.spectrum(velocity)) ** 2)) + 1e-300 for windows in (fitted, held)]
+            choices.append((abs(float(np.log(sizes[0] / sizes[1]))), shift, fitted, held))
+    if not choices:
+        whole = Windows(layout, np.concatenate([_begins(layout.length, start, stop) for start, stop in spans]))
+        return whole, whole
+    _, _, fitted, held = min(choices, key=lambda item: (round(item[0], 1), item[1]))
+    return fitted, held
+
+
+def _blocks(length: int, start: int, stop: int, shift: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """First samples of the windows within blocks that are fitted, and within those that are held out."""
+    seen, held = int(SEEN * length), int(HELD * length)
+    fitted: list[NDArray[np.int64]] = []
+    out: list[NDArray[np.int64]] = []
+    at, fits = start - shift * (seen + held) // SHIFTS, True
+    while at < stop:
+        end = at + (seen if fits else held)
+        low, high = max(at, start), min(end, stop)
+        if high - low >= length:
+            (fitted if fits else out).append(_begins(length, low, high))
+        at, fits = end, not fits
+    none = np.zeros(0, dtype=np.int64)
+    return np.concatenate([none, *fitted]), np.concatenate([none, *out])

@@ -1,0 +1,218 @@
+"""How large an error in velocity is, band by band, against the least that the data allow.
+
+The error passes overlapping Hann windows; one line of one window is one number. With half overlap the windows add up to a
+constant, so scaled by ``1 / sqrt(sum of window^2 per sample)`` the squares add up to those of the samples (Parseval), and
+divided by the power density of the error they are the terms of a likelihood (Whittle 1953).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+from xy_sysid.response.frf import ComplexArray
+from xy_sysid.samples.block import FloatArray
+
+TOP = 700.0  # Hz; above, at 2 kHz, differences of an encoder's position are all noise
+TOP_SHARE = 0.35  # of the sampling rate, for slow sampling
+WINDOW = 2.0  # s, nearly: the lowest band is 1/2 Hz wide
+NOISE_BAND = (0.6, 0.94)  # of Nyquist: the quietest twentieth there is the encoder's; friction's harmonics may reach in
+SEEN = 3.0  # a band is excited if the measured velocity has this many times the encoder's noise
+
+
+@dataclass(frozen=True, slots=True)
+class Bands:
+    """Windows and bands of one sampling rate.
+
+    length: samples of a window; band: (lines,) number of the band that each line of the spectrum up to the top is in
+    """
+
+    sampling_rate: float
+    length: int
+    band: NDArray[np.int64]
+    count: int
+
+    @property
+    def frequency(self) -> FloatArray:
+        """(lines,) Hz."""
+        return np.asarray(np.arange(self.band.size) * self.sampling_rate / self.length)
+
+    def edges(self) -> FloatArray:
+        """(count + 1,) Hz: where each band begins, and where the last one ends."""
+        first = np.searchsorted(self.band, np.arange(self.count))
+        return np.append(self.frequency[first], self.frequency[-1])
+
+    def spectrum(self, signal: FloatArray) -> ComplexArray:
+        """(windows, lines) of a signal (n,) in m/s; squares add up to those of the samples, m^2/s^2."""
+        hop = self.length // 2
+        if signal.size < self.length:
+            signal = np.concatenate((signal, np.zeros(self.length - signal.size)))
+        taper = np.sqrt(2.0 / 0.75 / self.length) * np.sin(np.pi * (np.arange(self.length) + 0.5) / self.length) ** 2
+        windows = np.lib.stride_tricks.sliding_window_view(signal, self.length)[::hop]
+        return np.asarray(scipy.fft.rfft(windows * taper, axis=1)[:, : self.band.size])
+
+    def power(self, spectrum: ComplexArray) -> FloatArray:
+        """(count,) variance per sample that each band would have if its density held up to Nyquist, m^2/s^2."""
+        lines = np.mean(spectrum.real**2 + spectrum.imag**2, axis=0)
+        return np.asarray(np.bincount(self.band, lines, self.count) / self.lines)
+
+    def powers(self, spectrum: ComplexArray) -> FloatArray:
+        """(windows, count): the same of each window."""
+        lines = spectrum.real**2 + spectrum.imag**2
+        return np.asarray(np.add.reduceat(lines, np.searchsorted(self.band, np.arange(self.count)), axis=1) / self.lines)
+
+    @property
+    def lines(self) -> FloatArray:
+        """(count,) lines of the spectrum in each band."""
+        return np.bincount(self.band, minlength=self.count).astype(np.float64)
+
+    def rms(self, power: FloatArray) -> float:
+        """m/s below the top, of a power (count,)."""
+        return float(np.sqrt(np.sum(self.lines * power) * 2.0 / self.length))
+
+
+@dataclass(frozen=True, slots=True)
+class Windows:
+    """Some of the windows of a recording. layout: how they are cut; begins: (windows,) first sample of each."""
+
+    layout: Bands
+    begins: NDArray[np.int64]
+
+    def spectrum(self, signal: FloatArray) -> ComplexArray:
+        """(windows, lines) of a signal (n,) in m/s; see ``Bands.spectrum``."""
+        length = self.layout.length
+        if signal.size < length:
+            signal = np.concatenate((signal, np.zeros(length - signal.size)))
+        taper = np.sqrt(2.0 / 0.75 / length) * np.sin(np.pi * (np.arange(length) + 0.5) / length) ** 2
+        cut = np.lib.stride_tricks.sliding_window_view(signal, length)[self.begins]
+        return np.asarray(scipy.fft.rfft(cut * taper, axis=1)[:, : self.layout.band.size])
+
+    def before(self, samples: int) -> Windows:
+        """Those that end within the first samples."""
+        return Windows(self.layout, self.begins[self.begins + self.layout.length <= samples])
+
+    @property
+    def end(self) -> int:
+        """Sample after the last of them."""
+        return int(self.begins[-1]) + self.layout.length if self.begins.size else 0
+
+
+def bands(sampling_rate: float, samples: int, count: int = 36) -> Bands:
+    """Windows of about 2 s (less for short data) and ``count`` bands or fewer, evenly spaced in the logarithm."""
+    wanted = min(WINDOW * sampling_rate, samples)
+    length = 2 ** max(int(np.round(np.log2(max(wanted, 16.0)))), 4)
+    top = min(TOP, TOP_SHARE * sampling_rate)
+    last = max(int(top * length / sampling_rate), 2)
+    edges = np.unique(np.round(np.geomspace(2.0, last + 1, count + 1)).astype(np.int64))
+    band = np.maximum(np.searchsorted(edges, np.arange(last + 1), side="right") - 1, 0)
+    return Bands(sampling_rate, length, band, int(band[-1]) + 1)
+
+
+@dataclass(frozen=True, slots=True)
+class Floor:
+    """What no model can go below.
+
+    noise:   (bands,) of the encoder alone, m^2/s^2, as of ``Bands.power``; power: with what laws and their integration are not trusted to
+    motion:  (bands,) of what is measured; excited: (bands,) bool
+    encoder: rms of the encoder's noise in position, m; epsilon: part of the motion to which laws are trusted; lines: (bands,) in each
+    """
+
+    noise: FloatArray
+    power: FloatArray
+    motion: FloatArray
+    excited: NDArray[np.bool_]
+    encoder: float
+    epsilon: float
+    lines: FloatArray
+
+    def rest(self, reference: FloatArray) -> Callable[[FloatArray], float]:
+        """power (bands,) of an error -> that beyond the noise, over the same of a reference (bands,); never below what laws are trusted to.
+
+        Bands count by how far the reference's rest, taken as flat, stands out of the noise: what nobody can see does not decide.
+        """
+        flat = float(np.sum(self.lines * self.motion) / np.sum(self.lines))
+        least = max(self.epsilon**2 * flat, 1e-300)
+        level = least
+        weight = self.lines / (self.noise + level)
+        for _ in range(50):
+            weight = self.lines / (self.noise + level)
+            new = max(float(np.sum(weight * (reference - self.noise)) / np.sum(weight)), least)
+            if abs(new - level) < 1e-3 * level:
+                break
+            level = new
+        whole, share = level * float(np.sum(weight)), least / level
+        return lambda power: max(float(np.sum(weight * (power - self.noise))) / whole, share)
+
+
+def encoder_noise(sampling_rate: float, position: FloatArray) -> float:
+    """rms of white noise in position, m: from the quietest band below Nyquist, not below what counting alone makes."""
+    velocity = np.diff(position) * sampling_rate
+    length = min(4096, velocity.size // 2 * 2)
+    windows = np.lib.stride_tricks.sliding_window_view(velocity, length)[:: length // 2] * np.hanning(length)
+    power = np.mean(np.abs(scipy.fft.rfft(windows, axis=1)) ** 2, axis=0) / np.sum(np.hanning(length) ** 2)
+    share = np.arange(power.size) / (length / 2.0)
+    white = power / np.maximum((2.0 * np.sin(0.5 * np.pi * share) * sampling_rate) ** 2, 1e-300)
+    seen = [float(np.median(white[(share >= low) & (share < low + 0.05)])) for low in np.arange(*NOISE_BAND, 0.05)]
+    return float(np.sqrt(max(min(seen), count_size(position) ** 2 / 12.0)))
+
+
+def count_size(position: FloatArray) -> float:
+    """Step of the encoder, m: the smallest difference that most others are multiples of; 0 if there is none."""
+    steps = np.abs(np.diff(position))
+    steps = np.unique(steps[steps > 0.0])
+    if steps.size == 0:
+        return 0.0
+    scale = float(np.max(np.abs(position))) + 1e-300
+    least = float(steps[steps > 16.0 * np.finfo(np.float64).eps * scale].min(initial=np.inf))
+    if not np.isfinite(least):
+        return 0.0
+    whole = steps[steps < 200.0 * least] / least
+    fits = np.abs(whole - np.round(whole)) < 1e-3 * np.maximum(whole, 1.0)
+    return least if whole.size >= 2 and float(np.mean(fits)) > 0.9 else 0.0
+
+
+def floor(windows: Windows, velocity: FloatArray, encoder: float, epsilon: float) -> Floor:
+    """The floor of data with this measured velocity (n,), m/s."""
+    layout = windows.layout
+    share = np.bincount(layout.band, (2.0 * np.sin(np.pi * layout.frequency / layout.sampling_rate)) ** 2, layout.count)
+    noise = share / layout.lines * (encoder * layout.sampling_rate) ** 2
+    signal = layout.power(windows.spectrum(velocity))
+    own = np.maximum(signal - noise, 0.0)
+    around = np.concatenate(([own[0]], own, [own[-1]]))
+    envelope = np.maximum(np.maximum(around[:-2], around[2:]), own)
+    return Floor(
+        noise=noise,
+        power=noise + epsilon**2 * envelope,
+        motion=own,
+        excited=signal > SEEN * noise,
+        encoder=encoder,
+        epsilon=epsilon,
+        lines=layout.lines,
+    )
+
+
+def tolerance(layout: Bands, error: ComplexArray, least: Floor) -> FloatArray:
+    """(bands,) m^2/s^2 by which squared errors (a spectrum of them) are divided in a fit.
+
+    What a model leaves above the floor is systematic: taken as one common error of each band (as Kennedy & O'Hagan 2001 do
+    for model discrepancy), it does not average out over the band's lines. So at the floor every line counts, and far above
+    it every band does, wide or narrow.
+    """
+    return np.asarray(least.power + layout.lines * np.maximum(layout.power(error) - least.power, 0.0))
+
+
+def excess(power: FloatArray, least: Floor) -> float:
+    """nats by which the power of an error (bands,) is above the floor: half the mean over the excited bands, half as a whole; 0 is nothing left.
+
+    Bands alone would count a machine's slow motion, where its largest error may be, as one among many; the whole alone would not see a
+    small error in a quiet band.
+    """
+    used = least.excited if bool(np.any(least.excited)) else np.ones_like(least.excited)
+    lowest = np.maximum(least.power, 1e-300)
+    bands = np.maximum(np.log(np.maximum(power / lowest, 1e-12)), 0.0)
+    whole = float(np.log(max(float(np.sum((least.lines * power)[used]) / np.sum((least.lines * lowest)[used])), 1.0)))
+    return 0.5 * (float(np.mean(bands[used])) + whole)

@@ -1,0 +1,327 @@
+"""Fitting an axis model by free simulation: the base alone, or with chosen effects, all parameters together.
+
+First on the first stage's data, where a step is quick, then on all windows that are not held out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from xy_sysid.axis.model import FINE, STANDARD, AxisModel, Library, simulator
+from xy_sysid.effects import Effect, Parameter, Scene
+from xy_sysid.effects._contract import in_time
+from xy_sysid.errors import BadInput
+from xy_sysid.greybox.axis_data import EPSILON, AxisData, loosened, prepare, prepare_all
+from xy_sysid.greybox.floor import excess
+from xy_sysid.greybox.least_squares import Round, Scale, Schedule, Solution, Target, solve
+from xy_sysid.greybox.score_test import Screen, Trace, bounded, screen
+from xy_sysid.greybox.start_inverse import inverse_starts
+from xy_sysid.greybox.start_rigid import base_start
+from xy_sysid.samples.block import FloatArray
+from xy_sysid.units import USUAL, Units
+
+__all__ = [
+    "EPSILON",
+    "AxisData",
+    "Estimate",
+    "GreyboxFit",
+    "finish",
+    "fit",
+    "fit_base",
+    "fit_instead",
+    "fit_with",
+    "look",
+    "loosened",
+    "prepare",
+    "prepare_all",
+    "screened",
+]
+
+BRIEF = (Round(6, 1e-2), Round(6, 3e-3), Round(8, 1e-4))  # weights are worked out before each round
+LONG = (Round(4, 1e-3), Round(6, 1e-5))
+COARSE, MIDDLING = 2000.0, 4000.0  # Hz: sub-steps of first rounds (errors up to 3e-3 of the motion) and of brief fits (6e-4)
+Z95 = 1.959964
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """One parameter with its 95 % interval."""
+
+    name: str
+    value: float
+    unit: str
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True)
+class GreyboxFit:
+    """An axis model fitted to data.
+
+    parameters:     gain, delay, pole, then ``effect.parameter``, with 95 % intervals
+    training_error: rms in the windows of the fit, below the top band, m/s
+    held_out_error: the same in those held out, which no fit saw
+    noise_floor:    what the encoder's noise alone makes, m/s
+    excess:         mean ln(power of the held-out error / floor) over the excited bands; 0 is nothing left
+    simulated:      (n - r,) velocity over all recordings, m/s; error: (n - r,) measured minus simulated
+    held:           (windows, bands) power of the held-out error, m^2/s^2
+    units:          of input and output; m/s above is ``units.speed``
+    brief:          of the first stage's data only: errors are of all of its windows, and what it simulates ends with them
+    """
+
+    model: AxisModel
+    parameters: tuple[Estimate, ...]
+    training_error: float
+    held_out_error: float
+    noise_floor: float
+    excess: float
+    simulated: FloatArray
+    error: FloatArray
+    runs: int
+    converged: bool
+    held: FloatArray
+    brief: bool = False
+    units: Units = USUAL
+
+    @property
+    def power(self) -> FloatArray:
+        """(bands,) of the held-out error, m^2/s^2."""
+        return np.asarray(self.held.mean(axis=0))
+
+    def parameter(self, name: str) -> Estimate:
+        """The parameter of this name; raises BadInput."""
+        for item in self.parameters:
+            if item.name == name:
+                return item
+        raise BadInput("parameter", repr(name), ", ".join(item.name for item in self.parameters), "Choose one of these.")
+
+
+def fit_base(data: AxisData, library: Library = STANDARD) -> GreyboxFit:
+    """Gain, delay and pole without a start value."""
+    gain, delay, pole = base_start(data.sampling_rate, data.voltage[: data.first], data.velocity[: data.first])
+    return fit(data, AxisModel(gain, delay, pole, library=library))
+
+
+def fit_with(
+    data: AxisData,
+    base: GreyboxFit,
+    names: Iterable[str],
+    starts: Mapping[str, tuple[float, ...]] | None = None,
+    brief: bool = False,
+    hopeless: float = np.inf,
+) -> GreyboxFit:
+    """The model of ``base`` with more effects, all refitted together; starts: their first values, else read from the data.
+
+    brief: on the first stage's data only, and no longer than a first round if that leaves more excess than ``hopeless``
+    """
+    model = base.model
+    for name in names:
+        values = (starts or {}).get(name)
+        model = _begun(data, base, model, name) if values is None else model.with_effect(name, bounded(model.library[name], values))
+    return fit(data, model, brief, hopeless)
+
+
+def fit_instead(data: AxisData, base: GreyboxFit, own: str, name: str, brief: bool = False, hopeless: float = np.inf) -> GreyboxFit:
+    """The model of ``base`` with the effect ``name`` in the place of its relative ``own``, all refitted together.
+
+    Where ``own`` is the sum of others and one of these is the relative, the rest of them stay.
+    """
+    library = base.model.library
+    model = base.model if library[own].family == library[name].family and not library[own].sum_of else base.model.taken_apart(own)
+    place = next(key for key, _ in model.effects if library[key].family == library[name].family)
+    known = dict(zip(library[place].names, dict(model.effects)[place], strict=True))
+    rest, effect = model.without(place), library[name]
+    starts = (look(data, base, [effect])[0].values, effect.typical)
+    shared = [tuple(known.get(key, value) for key, value in zip(effect.names, start, strict=True)) for start in starts]
+    candidates = [rest.with_effect(name, bounded(effect, values)) for values in shared]
+    return fit(data, min(candidates, key=lambda candidate: first_excess(data, candidate)), brief, hopeless)
+
+
+def _begun(data: AxisData, base: GreyboxFit, model: AxisModel, name: str) -> AxisModel:
+    """The model with one more effect, its start read from the data: the best of trace, inverse and joint starts."""
+    effect = model.library[name]
+    traced = model.with_effect(name, look(data, base, [effect])[0].values)
+    return best_start(data, [traced, *other_starts(data, base, model, name)])
+
+
+def other_starts(data: AxisData, base: GreyboxFit, model: AxisModel, name: str, scene: Scene | None = None) -> list[AxisModel]:
+    """The model with one more effect, from inverse identification, and from starts of base and effect together.
+
+    scene: of the base and the first stage's data, if it is known
+    """
+    effect, scene = model.library[name], scene or scene_of(data, base, data.first)
+    candidates = []
+    for gain, pole, values in inverse_starts(effect, scene, scene.velocity.size):
+        whole = replace(model, gain=gain, pole=min(max(pole, 1e-2), 1e5))
+        candidates.append(whole.with_effect(name, bounded(effect, values)))
+    if effect.joint is not None:
+        for gain, later, pole, values in effect.joint(scene):
+            whole = replace(model, gain=gain, delay=max(base.model.delay + later, 0.0), pole=min(max(pole, 1e-2), 1e5))
+            candidates.append(whole.with_effect(name, bounded(effect, values)))
+    return candidates
+
+
+def best_start(data: AxisData, candidates: list[AxisModel]) -> AxisModel:
+    """The candidate that leaves least on the first stage's data, without a fit; the whole error counts three times as much as the bands.
+
+    Small errors in many high bands would else hide a large one in a few low bands: on EMPS that chooses the valley with the true friction.
+    """
+    return candidates[0] if len(candidates) == 1 else min(candidates, key=lambda candidate: _misfit(data, candidate))
+
+
+def _misfit(data: AxisData, model: AxisModel) -> float:
+    power = _first_power(data, model)
+    whole = data.layout.rms(power) / data.layout.rms(data.floor.power)
+    return excess(power, data.floor) + 2.0 * float(np.log(max(whole, 1e-6)))
+
+
+def first_excess(data: AxisData, model: AxisModel) -> float:
+    """Excess over the first stage's data, without a fit."""
+    return excess(_first_power(data, model), data.floor)
+
+
+def _first_power(data: AxisData, model: AxisModel) -> FloatArray:
+    run, values, _ = _problem(data, model, data.first, COARSE)
+    return data.layout.power(data.brief.spectrum(data.velocity[: data.first] - run(values)))
+
+
+def look(data: AxisData, fitted: GreyboxFit, effects: Iterable[Effect]) -> list[Trace]:
+    """What each effect would explain of the error of a fit, best first, with start values."""
+    return list(screened(data, fitted, effects).traces)
+
+
+def screened(data: AxisData, fitted: GreyboxFit, effects: Iterable[Effect]) -> Screen:
+    """The score test of effects on what a fit leaves, alone and together."""
+    run, values, scale = _problem(data, fitted.model, data.velocity.size, COARSE)
+    inner = scale.inner(values)
+    here, nuisance = run(values), []
+    for k in range(values.size):
+        moved = inner.copy()
+        moved[k] += 1e-4
+        nuisance.append(run(scale.outer(moved)) - here)
+    return screen(effects, scene_of(data, fitted, data.velocity.size), np.array(nuisance), data.fitted, data.floor, data.first)
+
+
+def scene_of(data: AxisData, fitted: GreyboxFit, samples: int) -> Scene:
+    """The measured motion of the first samples as effects see it."""
+    model = fitted.model
+    late = [_delayed(data.voltage[run], model.delay * data.sampling_rate)[:-1] for run in data.runs]
+    return Scene(
+        sampling_rate=data.sampling_rate,
+        gain=model.gain,
+        pole=model.pole,
+        voltage=np.concatenate(late)[:samples],
+        velocity=data.velocity[:samples],
+        position=data.middle()[:samples],
+        error=fitted.error[:samples],
+    )
+
+
+def fit(data: AxisData, start: AxisModel, brief: bool = False, hopeless: float = np.inf, late: Callable[[], bool] = in_time) -> GreyboxFit:
+    """All parameters of a model, from where it is; brief, hopeless: see ``fit_with``; late: then the best so far is taken."""
+    run, values, scale = _problem(data, start, data.first, COARSE)
+    velocity = data.velocity[: data.first]
+    target = Target(velocity, data.brief, data.floor)
+    found = solve(run, target, scale, values, Schedule(BRIEF[:1], late))
+    left = data.layout.power(data.brief.spectrum(velocity - run(found.values)))
+    if not (late() or (brief and excess(left, data.floor) > hopeless)):
+        run, _, _ = _problem(data, start, data.first, MIDDLING)
+        more = solve(run, target, scale, found.values, Schedule(BRIEF[1:], late))
+        found = replace(more, runs=found.runs + more.runs)
+    if not brief:
+        return finish(data, _model(start, found.values), found.runs, late)
+    return _result(data, start, scale, found, brief=True)
+
+
+def finish(data: AxisData, start: AxisModel, runs: int = 0, late: Callable[[], bool] = in_time) -> GreyboxFit:
+    """The second stage alone, on all windows that are not held out, from a model that is nearly there.
+
+    Its sub-steps are as fine as what the model leaves asks for: they need not follow the law closer than a tenth of that.
+    """
+    left = data.layout.rms(_first_power(data, start)) / max(data.layout.rms(data.floor.motion), 1e-300)
+    fine = next((step for step, error in ((COARSE, 3e-3), (MIDDLING, 6e-4)) if left > 10.0 * error), FINE)
+    run, values, scale = _problem(data, start, data.velocity.size, fine)
+    found = solve(run, Target(data.velocity, data.fitted, data.floor), scale, values, Schedule(LONG, late))
+    return _result(data, start, scale, replace(found, runs=runs + found.runs))
+
+
+def _result(data: AxisData, start: AxisModel, scale: Scale, found: Solution, brief: bool = False) -> GreyboxFit:
+    model = _model(start, found.values)
+    samples = data.first if brief else data.velocity.size
+    run, _, _ = _problem(data, start, samples, MIDDLING if brief else FINE)
+    simulated = run(found.values)
+    error = data.velocity[:samples] - simulated
+    fitted, judging = (data.brief, data.first_windows()) if brief else (data.fitted, data.held)
+    held = data.layout.powers(judging.spectrum(error))
+    inner, spread = scale.inner(found.values), Z95 * np.sqrt(np.diag(found.covariance))
+    wide = Scale(np.where(scale.positive, scale.low, -np.inf), np.full_like(scale.high, np.inf), scale.positive, scale.unit)
+    low, high = wide.outer(inner - spread), np.where(np.isinf(spread), np.inf, wide.outer(inner + spread))
+    high = np.where(scale.positive & np.isfinite(spread), np.minimum(high, np.maximum(scale.high, found.values)), high)  # no machine has more
+    low[1] = max(low[1], 0.0)  # no delay is negative
+    inner_units = ["m/s/V", "s", "rad/s", *(item.unit for name, _ in model.effects for item in model.library[name].parameters)]
+    units = [data.units.of(unit) for unit in inner_units]
+    estimates = tuple(
+        Estimate(name=name, value=value, unit=unit, low=float(min(a, b)), high=float(max(a, b)))
+        for (name, value), unit, a, b in zip(model.values().items(), units, low, high, strict=True)
+    )
+    return GreyboxFit(
+        model=model,
+        parameters=estimates,
+        training_error=data.layout.rms(data.layout.power(fitted.spectrum(error))),
+        held_out_error=data.layout.rms(held.mean(axis=0)),
+        noise_floor=data.noise_floor,
+        excess=excess(held.mean(axis=0), data.floor),
+        simulated=simulated,
+        error=error,
+        runs=found.runs,
+        converged=found.converged,
+        held=held,
+        brief=brief,
+        units=data.units,
+    )
+
+
+def _problem(data: AxisData, model: AxisModel, samples: int, fine: float = FINE) -> tuple[Callable[[FloatArray], FloatArray], FloatArray, Scale]:
+    """Simulation of the first samples in sub-steps of ``fine`` Hz, the model's parameters as a row, and how each may move."""
+    names = [name for name, _ in model.effects]
+    runs = []
+    for run, step in zip(data.runs, data.steps, strict=True):
+        length = min(samples - step.start, step.stop - step.start)
+        if length > 0:
+            part = slice(run.start, run.start + length + 1)
+            runs.append(simulator(model.library, names, data.sampling_rate, data.voltage[part], data.position[part], fine))
+
+    def simulated(values: FloatArray) -> FloatArray:
+        return runs[0](values) if len(runs) == 1 else np.concatenate([one(values) for one in runs])
+
+    items = [item for name in names for item in model.library[name].parameters]
+    values = np.array([model.gain, model.delay, model.pole, *(value for _, row in model.effects for value in row)])
+    scale = Scale(
+        np.array([-np.inf, 0.0, 1e-2, *(item.low for item in items)]),
+        np.array([np.inf, max(data.first / data.sampling_rate / 4.0, model.delay), 1e5, *(item.high for item in items)]),
+        np.array([False, False, True, *(item.positive for item in items)]),
+        np.array([abs(model.gain) or 1.0, 20.0 / data.sampling_rate, 1.0, *(unit_of(item) for item in items)]),
+    )
+    return simulated, values, scale
+
+
+def unit_of(item: Parameter) -> float:
+    """Size of 1 in a solver, for a parameter that is not fitted as a logarithm."""
+    return abs(item.typical) or min(1.0, item.high - item.low)
+
+
+def _model(start: AxisModel, values: FloatArray) -> AxisModel:
+    rest = iter(values[3:].tolist())
+    effects = tuple((name, tuple(next(rest) for _ in row)) for name, row in start.effects)
+    return replace(start, gain=float(values[0]), delay=float(values[1]), pole=float(values[2]), effects=effects)
+
+
+def _delayed(voltage: FloatArray, samples: float) -> FloatArray:
+    """Mean over each sample of the voltage that many samples ago, before the start 0."""
+    whole = int(samples)
+    part = samples - whole
+    padded = np.concatenate((np.zeros(whole + 1), voltage))
+    return np.asarray(part * padded[: voltage.size] + (1.0 - part) * padded[1 : voltage.size + 1])

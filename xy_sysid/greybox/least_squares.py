@@ -1,0 +1,214 @@
+"""Levenberg-Marquardt on the whitened error in velocity.
+
+Levenberg 1944, Marquardt 1963; whitening by the error's own power, worked out again a few times: iteratively reweighted
+least squares towards the Whittle likelihood. Derivatives are forward differences of the simulation, taken anew only when a
+step did not do what they promised, and else brought up to date with what it did (Broyden 1965).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xy_sysid.effects._contract import in_time
+from xy_sysid.greybox.floor import Bands, Floor, Windows, tolerance
+from xy_sysid.samples.block import FloatArray
+
+TRUSTED = 0.25  # a step whose fall differs by less than this part from the one expected needs no new derivatives
+LAW = 3e-4  # part of the motion in a band to which laws and their integration are trusted; tuned on development draws
+STEP = 1e-4  # of a logarithm, or of a parameter's scale: far above rounding, far below what bends
+
+
+@dataclass(frozen=True, slots=True)
+class Round:
+    """Steps with one set of weights. iterations: the most; enough: relative fall of the cost below which it ends."""
+
+    iterations: int
+    enough: float
+
+
+@dataclass(frozen=True, slots=True)
+class Schedule:
+    """Rounds of a solution, and whether it is late: then the best so far is taken after the step in hand."""
+
+    rounds: tuple[Round, ...]
+    late: Callable[[], bool] = in_time
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """How each parameter is moved: low, high: bounds; positive: as a logarithm; unit: size of 1 in the solver else."""
+
+    low: FloatArray
+    high: FloatArray
+    positive: NDArray[np.bool_]
+    unit: FloatArray
+
+    def inner(self, values: FloatArray) -> FloatArray:
+        """The solver's coordinates."""
+        safe = np.where(self.positive, np.clip(values, self.low, self.high), 1.0)
+        return np.where(self.positive, np.log(safe), values / self.unit)
+
+    def outer(self, inner: FloatArray) -> FloatArray:
+        """Parameters, kept within their bounds."""
+        values = np.where(self.positive, np.exp(np.where(self.positive, np.clip(inner, -700.0, 700.0), 0.0)), inner * self.unit)
+        return np.asarray(np.clip(values, self.low, self.high))
+
+
+@dataclass(frozen=True, slots=True)
+class Solution:
+    """values: (k,) parameters; covariance: (k, k) of the solver's coordinates; cost: whitened; runs: simulations done."""
+
+    values: FloatArray
+    covariance: FloatArray
+    cost: float
+    runs: int
+    converged: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """What is to be explained: velocity (n,) m/s, in some windows of it, down to a floor."""
+
+    velocity: FloatArray
+    windows: Windows
+    least: Floor
+
+
+def solve(run: Callable[[FloatArray], FloatArray], target: Target, scale: Scale, start: FloatArray, schedule: Schedule) -> Solution:
+    """The parameters that explain a target best.
+
+    run: parameters -> velocity (n,); schedule: the weights are worked out before each round.
+    """
+    windows, least, layout = target.windows, target.least, target.windows.layout
+    measured = windows.spectrum(target.velocity)
+    runs = 0
+
+    def left(inner: FloatArray) -> NDArray[np.complex128]:
+        nonlocal runs
+        runs += 1
+        return np.asarray(measured - windows.spectrum(run(scale.outer(inner))))
+
+    def slopes(inner: FloatArray, error: NDArray[np.complex128], old: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        """New ones, as far as there is time."""
+        taken = old.copy()
+        for k in range(inner.size):
+            if schedule.late():
+                break
+            step = STEP if scale.outer(inner)[k] < scale.high[k] else -STEP
+            moved = inner.copy()
+            moved[k] += step
+            taken[k] = (left(moved) - error) / step
+        return taken
+
+    inner = scale.inner(start)
+    error = left(inner)
+    size = inner.size
+    normal, cost, converged = np.eye(size), np.inf, False
+    change = slopes(inner, error, np.zeros((size, *error.shape), dtype=np.complex128))
+    exact = True
+    for stage in schedule.rounds:
+        power = tolerance(layout, error, least)
+        weight = np.sqrt(1.0 / power)[layout.band]
+        cost = _cost(error * weight)
+        damping, converged, fresh = 1e-3, False, False
+        for _ in range(stage.iterations):
+            if not fresh:
+                columns = (change * weight).reshape(size, -1).view(np.float64)
+                normal, slope = columns @ columns.T, columns @ (error * weight).ravel().view(np.float64)
+                fresh = True
+            if schedule.late():
+                break
+            diagonal = np.maximum(np.diag(normal), 1e-12 * float(np.max(np.diag(normal))) + 1e-300)
+            move = -np.linalg.solve(normal + damping * np.diag(diagonal), slope)
+            move *= min(1.0, 2.0 / float(np.max(np.abs(move)) + 1e-300))
+            trial = scale.inner(scale.outer(inner + move))
+            found = left(trial)
+            new = _cost(found * weight)
+            if np.isfinite(new) and new < cost:
+                fall, gone = (cost - new) / cost, trial - inner
+                hoped = -float(2.0 * slope @ gone + gone @ normal @ gone)
+                if abs((cost - new) - hoped) < TRUSTED * hoped:
+                    change, exact = _updated(change, gone, diagonal, found - error), False
+                else:
+                    change, exact = slopes(trial, found, change), True
+                inner, error, cost, fresh = trial, found, new, False
+                damping = max(damping * 0.2, 1e-9)
+                if fall < stage.enough:
+                    converged = True
+                    break
+            elif not exact:
+                change, exact, fresh = slopes(inner, error, change), True, False
+            else:
+                damping *= 10.0
+                if damping > 1e6:
+                    converged = True
+                    break
+    noise = _covariance(normal)
+    power = tolerance(layout, error, least)
+    repeats = 1.0 + (1.0 - least.power / power) * (windows.begins.size - 1)
+    covariance = _that_repeats(change * weight, np.sqrt(repeats)[layout.band], noise)
+    return Solution(
+        values=scale.outer(inner),
+        covariance=covariance + _of_the_law(change * weight, measured * weight, layout, noise),
+        cost=cost,
+        runs=runs,
+        converged=converged,
+    )
+
+
+def _updated(change: NDArray[np.complex128], gone: FloatArray, size: FloatArray, moved: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Derivatives (k, windows, lines) that agree with the step just taken, else as they were (Broyden 1965, eq. 4.5).
+
+    gone: (k,) step; size: (k,) its weights; moved: change of the error that it made
+    """
+    missing = moved - np.tensordot(gone, change, 1)
+    return np.asarray(change + np.multiply.outer(size * gone / float(size @ gone**2), missing))
+
+
+def _covariance(normal: FloatArray) -> FloatArray:
+    """Inverse of the normal matrix; infinite for a parameter that the data do not see at all."""
+    spread = np.sqrt(np.diag(normal))
+    seen = spread > 0.0
+    covariance = np.diag(np.where(seen, 0.0, np.inf))
+    unit = np.outer(spread[seen], spread[seen])
+    covariance[np.ix_(seen, seen)] = np.linalg.pinv(normal[np.ix_(seen, seen)] / unit, rcond=1e-12, hermitian=True) / unit
+    return covariance
+
+
+def _that_repeats(change: NDArray[np.complex128], times: FloatArray, noise: FloatArray) -> FloatArray:
+    """(k, k) covariance where what is left unexplained in a band is the same mistake in every window: it does not average out over them.
+
+    Noise does. change: (k, windows, lines), whitened; times: (lines,) square root of how many windows say the same; noise: (k, k) covariance if
+    every window were independent. The sandwich of White 1982 (eq. 3.2), with windows as clusters of one common error (Kennedy & O'Hagan 2001).
+    """
+    seen = np.isfinite(np.diag(noise))
+    if not np.any(seen):
+        return noise
+    columns = np.ascontiguousarray(change[seen] * times).reshape(int(seen.sum()), -1).view(np.float64)
+    found = noise.copy()
+    found[np.ix_(seen, seen)] = noise[np.ix_(seen, seen)] @ (columns @ columns.T) @ noise[np.ix_(seen, seen)]
+    return found
+
+
+def _of_the_law(change: NDArray[np.complex128], motion: NDArray[np.complex128], layout: Bands, noise: FloatArray) -> FloatArray:
+    """(k, k) what laws and integration that are not exact add to the covariance, however long the record.
+
+    In each band the model's motion may be off by one common complex factor of size LAW. change, motion: whitened, (k, windows, lines) and
+    (windows, lines).
+    """
+    lines = np.einsum("kwl,wl->kl", change.conj(), motion)
+    pulls = np.stack([np.bincount(layout.band, part, layout.count) for row in lines for part in (row.real, row.imag)]) * LAW
+    pulls = pulls.reshape(lines.shape[0], -1)
+    seen = np.isfinite(np.diag(noise))
+    found = np.zeros_like(noise)
+    shifts = noise[np.ix_(seen, seen)] @ pulls[seen]
+    found[np.ix_(seen, seen)] = 0.5 * shifts @ shifts.T
+    return found
+
+
+def _cost(error: NDArray[np.complex128]) -> float:
+    return float(np.vdot(error, error).real)

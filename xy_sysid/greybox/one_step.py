@@ -1,0 +1,195 @@
+"""Effects that only one-step prediction can judge, alone or with others beside them, as fits like all others.
+
+Their error is the filter's innovation, measured minus predicted position one sample ahead, times the sampling rate: m/s,
+as for a free simulation. Their floor is the encoder's noise. What acts beside them is taken out of the recording first,
+with numbers that are fitted together with theirs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from xy_sysid.axis.loop_source import undoable
+from xy_sysid.axis.model import AxisModel, Library, undoer
+from xy_sysid.effects import Effect
+from xy_sysid.effects._contract import PATIENT, Beside, DryFriction, Followed, Limits, OneStepTask, arguments
+from xy_sysid.errors import BadInput
+from xy_sysid.greybox.floor import count_size
+from xy_sysid.greybox.free_run import Z95, AxisData, Estimate, GreyboxFit, unit_of
+from xy_sysid.greybox.score_test import bounded
+from xy_sysid.samples.block import FloatArray
+
+AT_NOISE = 3.5  # held-out innovation over the encoder's noise up to which an effect explains the axis
+BETTER = 2.0  # innovation without the effect over that with it, at least
+CLEAN = 1.6  # innovation over the noise up to which next to nothing else is left in it,
+LITTLE_BETTER = 1.03  # and what is enough there in the place of BETTER: a gap of one encoder count makes 1.04 to 1.07
+TELLING = 0.005  # dry friction over the rms voltage from which it is named
+
+Others = Sequence[tuple[str, tuple[float, ...]]]
+
+
+def one_step_fit(
+    data: AxisData, base: GreyboxFit, effect: Effect, new: Others = (), begin: Followed | None = None, limits: Limits = PATIENT
+) -> GreyboxFit:
+    """An effect, and what ``base`` has beside it, by one-step prediction; excess is 0 where that explains the axis.
+
+    new: more effects beside it, with start values; begin: an earlier result without them; limits: see ``Limits``, bar in m/s.
+    Raises BadInput if it cannot.
+    """
+    return followed(data, base, effect, new, begin, limits)[0]
+
+
+def followed(
+    data: AxisData, base: GreyboxFit, effect: Effect, new: Others = (), begin: Followed | None = None, limits: Limits = PATIENT
+) -> tuple[GreyboxFit, Followed]:
+    """As ``one_step_fit``, with the filter's own result, from which a next fit can begin."""
+    if effect.one_step is None:
+        raise BadInput(f"effect {effect.name}", "no one-step prediction", "an effect that has one", "Fit it by simulation.")
+    library = base.model.library
+    dry, others = beside(base.model, effect)
+    for name, values in new:
+        if library[name].is_dry:
+            dry = _with_law(dry, library[name], values, effect)
+        else:
+            others += ((name, values),)
+    first = data.training if any(_ages(library[name]) for name, _ in others) else data.first
+    found = effect.one_step.fit(
+        OneStepTask(
+            sampling_rate=data.sampling_rate,
+            base=(base.model.gain, base.model.delay, base.model.pole),
+            noise=noise_of(data),
+            stages=(first, data.training, data.position.size - 1),
+            beside=as_beside(data, library, others),
+            dry=dry,
+            begin=begin,
+            limits=replace(limits, bar=None if limits.bar is None else limits.bar / data.sampling_rate),
+        )
+    )
+    return _result(data, library, effect, [name for name, _ in others], found), found
+
+
+def _with_law(dry: DryFriction, law: Effect, values: tuple[float, ...], effect: Effect) -> DryFriction:
+    """One more law of dry friction, in the place of its relatives and of what the effect begins with."""
+    kept = [(own, its) for own, its, _ in dry.rows() if own.name not in (law.name, effect.rubs) and not (law.family and own.family == law.family)]
+    return DryFriction((*(own for own, _ in kept), law), (*(value for _, its in kept for value in its), *values))
+
+
+def _ages(effect: Effect) -> bool:
+    """True if the law knows the time: the first stage is too short to see it."""
+    return any("t" in arguments(function) for function in effect.functions.values())
+
+
+def beside(model: AxisModel, effect: Effect) -> tuple[DryFriction, tuple[tuple[str, tuple[float, ...]], ...]]:
+    """Dry friction of a model and its effects that can be taken out of a recording; raises BadInput for others."""
+    rubbing, others = [], []
+    for name, values in model.effects:
+        own = model.library[name]
+        if own.is_dry:
+            rubbing.append((own, values))
+        elif undoable(own):
+            others.append((name, values))
+        elif name != effect.name:
+            raise BadInput("effects", f"{effect.name} with {name}", f"{effect.name} with dry friction, or what does not heed speed", "Leave it out.")
+    if not rubbing and effect.rubs in model.library.effects:
+        first = model.library[effect.rubs]
+        rubbing = [(first, tuple(item.low for item in first.parameters))]
+    return DryFriction(tuple(own for own, _ in rubbing), tuple(value for _, values in rubbing for value in values)), tuple(others)
+
+
+def change_without(data: AxisData, model: AxisModel, name: str) -> float:
+    """Mean square of what the innovations over the noise would change by, were one effect of a model absent and all else as it is."""
+    effect = model.ahead
+    assert effect is not None
+    least = (effect.parameters[0].low, *dict(model.effects)[effect.name][1:])
+    nothing = model.with_effect(name, least) if name == effect.name else model.without(name)
+    return float(np.mean((_innovation(data, nothing, effect) - _innovation(data, model, effect)) ** 2))
+
+
+def _innovation(data: AxisData, model: AxisModel, effect: Effect) -> FloatArray:
+    """(n,) innovations over the noise of a model as it is."""
+    assert effect.one_step is not None
+    dry, others = beside(model, effect)
+    values = dict(model.effects)[effect.name]
+    found = Followed(
+        base=(model.gain, model.delay, model.pole),
+        values=values,
+        base_spread=(0.0, 0.0, 0.0),
+        spread=(0.0,) * len(values),
+        dry=dry,
+        beside=((), ()),
+        innovation=np.empty(0),
+        without=np.empty(0),
+        noise=noise_of(data),
+        runs=0,
+    )
+    return effect.one_step.innovation(data.sampling_rate, found, as_beside(data, model.library, others), data.position.size - 1)
+
+
+def noise_of(data: AxisData) -> float:
+    """Standard deviation of the encoder, m."""
+    count = count_size(data.position)
+    return min(data.floor.encoder, max(count / np.sqrt(12.0), 1e-12)) if count > 0.0 else data.floor.encoder
+
+
+def as_beside(data: AxisData, library: Library, others: Others) -> Beside:
+    """Effects with start values, ready to be fitted and taken out of the recording."""
+    names = [name for name, _ in others]
+    items = [item for name in names for item in library[name].parameters]
+    return Beside(
+        start=np.array([value for name, values in others for value in bounded(library[name], values)]),
+        low=np.array([item.low for item in items]),
+        high=np.array([item.high for item in items]),
+        unit=np.array([unit_of(item) for item in items]),
+        positive=np.array([item.positive for item in items], dtype=np.bool_),
+        undo=undoer(library, names, data.sampling_rate, data.voltage, data.position),
+    )
+
+
+def _result(data: AxisData, library: Library, effect: Effect, names: Sequence[str], found: Followed) -> GreyboxFit:
+    error = found.innovation * data.sampling_rate
+    settled = min(int(0.5 * data.sampling_rate), data.training // 4)
+    held = float(np.sqrt(np.mean(error[data.training :] ** 2)))
+    noise_floor = found.noise * data.sampling_rate
+    worse = held if found.too_small else error_without(data, found)
+    told = held < CLEAN * noise_floor and worse > LITTLE_BETTER * held
+    far = max(held / (AT_NOISE * noise_floor), 0.0 if told else BETTER * held / worse)
+    rows: list[tuple[str, tuple[float, ...], tuple[float, ...]]] = [(effect.name, bounded(effect, found.values), found.spread)]
+    for law, its, errors in found.dry.rows():
+        if its[0] > TELLING * float(np.std(data.voltage)) and its[0] > 5.0 * errors[0]:
+            rows.append((law.name, bounded(law, its), errors))
+    values, spread = iter(found.beside[0]), iter(found.beside[1])
+    rows += [(name, tuple(next(values) for _ in library[name].names), tuple(next(spread) for _ in library[name].names)) for name in names]
+    gain, delay, pole = found.base
+    model = AxisModel(gain, max(delay, 0.0), pole, library=library)
+    estimates = [
+        Estimate(name=key, value=value, unit=data.units.of(unit), low=value - Z95 * s, high=value + Z95 * s)
+        for key, unit, value, s in zip(("gain", "delay", "pole"), ("m/s/V", "s", "rad/s"), found.base, found.base_spread, strict=True)
+    ]
+    for name, own, errors in rows:
+        model = model.with_effect(name, bounded(library[name], own))
+        estimates += [
+            Estimate(name=f"{name}.{item.name}", value=value, unit=data.units.of(item.unit), low=value - Z95 * s, high=value + Z95 * s)
+            for item, value, s in zip(library[name].parameters, own, errors, strict=True)
+        ]
+    return GreyboxFit(
+        model=model,
+        parameters=tuple(estimates),
+        training_error=float(np.sqrt(np.mean(error[settled : data.training] ** 2))),
+        held_out_error=held,
+        noise_floor=noise_floor,
+        excess=max(0.0, 2.0 * float(np.log(far))),
+        simulated=data.velocity - error,
+        error=error,
+        runs=found.runs,
+        converged=not found.given_up,
+        held=data.layout.powers(data.held.spectrum(error)),
+        units=data.units,
+    )
+
+
+def error_without(data: AxisData, found: Followed) -> float:
+    """Held-out error one step ahead, m/s, of the same filter without the effect, all else refitted: what the effect must beat."""
+    return float(np.sqrt(np.mean(found.without[data.training :] ** 2))) * data.sampling_rate

@@ -1,0 +1,124 @@
+"""A model on its own from the first sample to the last: the position that it predicts from the voltage alone.
+
+The hardest test, as every small error in velocity adds up. What depends on position in a model (cogging) is simulated at the
+measured one, as everywhere here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from xy_sysid.axis.model import AxisModel, simulate, simulator
+from xy_sysid.effects import Effect
+from xy_sysid.effects._contract import arguments
+from xy_sysid.greybox.free_run import AxisData, Estimate, GreyboxFit
+from xy_sysid.samples.block import FloatArray
+
+ROUNDS = 40  # of the least squares
+STEP = 1e-4  # of a parameter's size, for its derivative
+EDGE = 1e-9  # of a parameter's size, from its bound
+SLOW = ("friction", "bristle", "force", "input")  # categories that decide the slow motion, unless they go with position
+
+
+@dataclass(frozen=True, slots=True)
+class OpenLoop:
+    """Measured minus simulated position over a whole record, from its first sample.
+
+    error: (n,) m; rms, worst: m; share: rms over the standard deviation of the measured position
+    """
+
+    error: FloatArray
+    rms: float
+    worst: float
+    share: float
+
+
+def open_loop(sampling_rate: float, position: FloatArray, simulated: FloatArray) -> OpenLoop:
+    """What a simulated velocity (n - 1,), m/s, from rest, makes of the position (n,), m."""
+    error = position - position[0] - _travelled(sampling_rate, simulated)
+    rms, spread = _rms(error), float(np.std(position))
+    return OpenLoop(error, rms, float(np.max(np.abs(error))), rms / spread if spread > 0.0 else np.inf)
+
+
+def from_input_alone(sampling_rate: float, position: FloatArray, simulated: FloatArray, pole: float) -> tuple[float, float]:
+    """(rms error of the position over the whole record, m; part 0..1 of the motion's power that is explained).
+
+    simulated: (n - 1,) velocity from rest, m/s; the speed at the first sample, which fades with the pole (rad/s), is estimated.
+    """
+    time = (np.arange(simulated.size) + 0.5) / sampling_rate
+    fading = np.exp(-pole * time)
+    drift = position - position[0] - _travelled(sampling_rate, simulated)
+    started = _travelled(sampling_rate, fading)
+    speed = float(drift @ started) / float(started @ started)
+    measured = np.diff(position) * sampling_rate
+    left = measured - simulated - speed * fading
+    power = float(np.sum(measured**2))
+    explained = 1.0 - float(np.sum(left**2)) / power if power > 0.0 else 0.0
+    return _rms(drift - speed * started), min(max(explained, 0.0), 1.0)
+
+
+def settled(data: AxisData, fitted: GreyboxFit) -> GreyboxFit:
+    """The same effects with the mass, drag, friction and load that predict the whole record best, in velocity and position.
+
+    Output error (Ljung, System Identification, 2nd ed. 1999, sec. 7.2), with the speed at the first sample as one more unknown. What the
+    fast motion knows better stays as it was: delay, modes, and what goes with position. Errors on held-out data stay those of ``fitted``, as
+    now there is nothing that no fit saw. Values that moved have no interval (infinite): errors that add up are not independent.
+    """
+    model = fitted.model
+    free = [name for name, _ in model.effects if _slow(model.library[name])]
+    items = [item for name in free for item in model.library[name].parameters]
+    speed = float(np.std(data.velocity)) or 1.0
+    start = np.array([model.gain, model.pole, 0.0, *(value for name, row in model.effects if name in free for value in row)])
+    size = np.array([abs(model.gain), model.pole, speed, *(abs(item.typical) or min(1.0, item.high - item.low) for item in items)])
+    signs = sorted((0.1 * model.gain, 10.0 * model.gain))
+    low = np.array([signs[0], 0.1 * model.pole, -10.0 * speed, *(item.low for item in items)]) / size
+    high = np.array([signs[1], 10.0 * model.pole, 10.0 * speed, *(item.high for item in items)]) / size
+    run = simulator(model.library, [name for name, _ in model.effects], data.sampling_rate, data.voltage, data.position)
+    target = data.position - data.position[0]
+    time = (np.arange(data.velocity.size) + 0.5) / data.sampling_rate
+    far = _rms(target - _travelled(data.sampling_rate, fitted.simulated)) or 1.0
+    fast = _rms(fitted.error) or 1.0
+
+    def left(inner: FloatArray) -> FloatArray:
+        values = inner * size
+        moved = _moved(model, free, values)
+        velocity = run(np.array(list(moved.values().values()))) + values[2] * np.exp(-moved.pole * time)
+        drift = target - _travelled(data.sampling_rate, velocity)
+        return np.concatenate((drift / far, (data.velocity - velocity) / fast))
+
+    inside = np.clip(start / size, low + EDGE, high - EDGE)
+    found = least_squares(left, inside, bounds=(low, high), diff_step=[STEP] * size.size, max_nfev=ROUNDS)
+    return _with(data, fitted, _moved(model, free, found.x * size))
+
+
+def _slow(effect: Effect) -> bool:
+    return effect.category in SLOW and not any("x" in arguments(law) for law in effect.functions.values())
+
+
+def _moved(model: AxisModel, free: list[str], values: FloatArray) -> AxisModel:
+    """Gain, pole and (behind the start speed) the parameters of the free effects, from one row."""
+    rest = iter(values[3:].tolist())
+    effects = tuple((name, tuple(next(rest) for _ in row) if name in free else row) for name, row in model.effects)
+    return replace(model, gain=float(values[0]), pole=float(values[1]), effects=effects)
+
+
+def _with(data: AxisData, fitted: GreyboxFit, model: AxisModel) -> GreyboxFit:
+    simulated = simulate(model, data.sampling_rate, data.voltage, data.position)
+    values = model.values()
+    estimates = tuple(
+        item if item.value == values[item.name] else Estimate(name=item.name, value=values[item.name], unit=item.unit, low=-np.inf, high=np.inf)
+        for item in fitted.parameters
+    )
+    return replace(fitted, model=model, parameters=estimates, simulated=simulated, error=data.velocity - simulated)
+
+
+def _travelled(sampling_rate: float, velocity: FloatArray) -> FloatArray:
+    """(n,) m since the first sample."""
+    return np.concatenate(([0.0], np.cumsum(velocity) / sampling_rate))
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2)))

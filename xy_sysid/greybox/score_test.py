@@ -1,0 +1,153 @@
+"""How much of a model's error an effect would explain, to first order: a score test, and start values for its fit.
+
+An effect's trace is its force on the measured motion, passed through the base (Rao 1948, score test); what a change of
+gain, delay or pole would do is projected out first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.signal
+from numpy.typing import NDArray
+
+from xy_sysid.effects import Effect, Guess, Scene
+from xy_sysid.greybox.floor import Floor, Windows, excess, tolerance
+from xy_sysid.greybox.start_rigid import mean_velocity_filter
+from xy_sysid.samples.block import FloatArray
+
+MANY = 5  # traces of one effect; more are looked at on the first part of the data only
+
+
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """share: part (0..1) of the whitened error's power that the effect's best trace explains; values: start of its parameters."""
+
+    effect: str
+    share: float
+    values: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Screen:
+    """The score test of several effects on one error, alone or together.
+
+    traces: largest share first; whitened: (k, m) columns of each effect's best trace; error: (m,) whitened error
+    band: (m,) band of each number; power: (bands,) of the error; least: as it was given
+    """
+
+    traces: tuple[Trace, ...]
+    whitened: Mapping[str, FloatArray]
+    error: FloatArray
+    band: NDArray[np.int64]
+    power: FloatArray
+    least: Floor
+
+    def gain(self, names: Iterable[str]) -> Gain:
+        """What effects take away to first order, each with its best trace: linear algebra alone."""
+        rows = np.concatenate([self.whitened[name] for name in names])
+        coefficients = np.linalg.pinv(rows @ rows.T, rcond=1e-8, hermitian=True) @ (rows @ self.error)
+        left = self.error - coefficients @ rows
+        size = self.power.size
+        before = np.bincount(self.band, self.error**2, size)  # 0 in bands that are not excited: nobody knows what happens there
+        ratio = np.where(before > 0.0, np.bincount(self.band, left**2, size) / np.maximum(before, 1e-300), 1.0)
+        after = self.power * np.minimum(ratio, 1.0)
+        rest = self.least.rest(self.power)
+        return Gain(excess(self.power, self.least) - excess(after, self.least), float(np.log(max(rest(self.power), 1e-12) / max(rest(after), 1e-12))))
+
+
+@dataclass(frozen=True, slots=True)
+class Gain:
+    """nats: of the mean over the bands (``floor.excess``), and of the whole error's power beyond the noise (``Floor.rest``)."""
+
+    excess: float
+    rest: float
+
+
+def screen(effects: Iterable[Effect], scene: Scene, nuisance: FloatArray, windows: Windows, least: Floor, short: int) -> Screen:
+    """The best trace of each effect.
+
+    nuisance: (k, n) change of the model's velocity per unit of each parameter that it has already;
+    short: samples to which the guesses of effects with many of them are confined.
+    """
+    power = tolerance(windows.layout, windows.spectrum(scene.error), least)
+    weight = (least.excited / np.sqrt(power))[windows.layout.band]
+    whole = _Prepared(scene.error, nuisance, windows, weight)
+    brief = replace_scene(scene, short)
+    part = _Prepared(brief.error, nuisance[:, : brief.error.size], windows.before(brief.error.size), weight) if short < scene.error.size else whole
+    found, columns = [], {}
+    for effect in effects:
+        many = effect.category == "motion"
+        guesses = effect.guessed(brief if many else scene)
+        space = part if many or len(guesses) > MANY else whole
+        best, chosen = Trace(effect.name, 0.0, effect.typical), None
+        for guess in guesses:
+            share, coefficients, white = space.share(_through_base(guess, scene, space.samples))
+            if share > best.share:
+                best, chosen = Trace(effect.name, share, bounded(effect, effect.read(guess, coefficients))), white
+        found.append(best)
+        if chosen is not None:
+            columns[effect.name] = (space, chosen)
+    common = part if any(space is part for space, _ in columns.values()) else whole
+    rows = {name: white if space is common else common.first_of(space, white) for name, (space, white) in columns.items()}
+    return Screen(
+        traces=tuple(sorted(found, key=lambda trace: -trace.share)),
+        whitened=rows,
+        error=common.error,
+        band=np.tile(np.tile(windows.layout.band, 2), common.windows.begins.size),
+        power=windows.layout.power(common.windows.spectrum(scene.error)),
+        least=least,
+    )
+
+
+def replace_scene(scene: Scene, samples: int) -> Scene:
+    """The first samples of a scene."""
+    if samples >= scene.error.size:
+        return scene
+    cut = {name: getattr(scene, name)[:samples] for name in ("voltage", "velocity", "position", "error")}
+    return replace(scene, **cut)
+
+
+def bounded(effect: Effect, values: Iterable[float]) -> tuple[float, ...]:
+    """The values, moved into the bounds of the effect's parameters."""
+    return tuple(float(min(max(value, item.low), item.high)) for value, item in zip(values, effect.parameters, strict=True))
+
+
+def _through_base(guess: Guess, scene: Scene, samples: int) -> FloatArray:
+    columns = guess.columns[:, :samples]
+    if guess.at_encoder:
+        return columns
+    b, a = mean_velocity_filter(scene.gain, scene.pole, scene.sampling_rate)
+    return np.asarray(-scipy.signal.lfilter(b, a, columns, axis=1))
+
+
+class _Prepared:
+    """The error over the first samples, whitened, with the nuisance projected out."""
+
+    def __init__(self, error: FloatArray, nuisance: FloatArray, windows: Windows, weight: FloatArray) -> None:
+        self.samples, self.windows, self.weight = error.size, windows, weight
+        self.basis = np.linalg.qr(np.stack([self._white(row) for row in nuisance], axis=1))[0]
+        self.error = self._clean(self._white(error))
+        self.power = float(self.error @ self.error) + 1e-300
+
+    def _white(self, signal: FloatArray) -> FloatArray:
+        values = self.windows.spectrum(signal) * self.weight
+        return np.concatenate((values.real, values.imag), axis=1).ravel()
+
+    def _clean(self, values: FloatArray) -> FloatArray:
+        return np.asarray(values - (values @ self.basis) @ self.basis.T)
+
+    def first_of(self, other: _Prepared, white: FloatArray) -> FloatArray:
+        """Columns of longer data, cut to these windows."""
+        return np.stack([self._clean(row[: self.error.size]) for row in white])
+
+    def share(self, columns: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+        """Part of the error's power explained, the coefficients, and the whitened columns."""
+        white = np.stack([self._clean(self._white(row)) for row in columns])
+        size = np.linalg.norm(white, axis=1) + 1e-300
+        white /= size[:, None]
+        seen = white @ self.error
+        coefficients = np.linalg.pinv(white @ white.T, rcond=1e-10, hermitian=True) @ seen
+        return float(seen @ coefficients) / self.power, np.asarray(coefficients / size), white

@@ -1,0 +1,67 @@
+"""One step ahead without a filter: the error of a free simulation, predicted from its own past by an autoregressive model.
+
+A fair rival of every one-step prediction: it, too, follows whatever the physics leaves out (Ljung, System Identification,
+2nd ed., sec. 3.2 and 10.1).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.signal
+from numpy.typing import NDArray
+
+from xy_sysid.errors import BadInput
+from xy_sysid.samples.block import FloatArray
+
+ORDER = 60  # past samples of which one is predicted: 30 ms at 2 kHz
+RIDGE = 1e-12  # of the power: for an error that is exactly predictable
+
+
+def whitened_rms(error: FloatArray, held: NDArray[np.bool_], order: int = ORDER) -> float:
+    """rms, in the unit of ``error``, of what an autoregressive model leaves of it on samples that its fit did not see.
+
+    error: (n,) measured minus simulated, evenly sampled; held: (n,) True where it is judged; the rest is what it is fitted to,
+    by least squares. A model in velocity is that in position: the last position is measured. Raises BadInput.
+    """
+    if error.shape != held.shape or error.ndim != 1:
+        raise BadInput("shape of error and held", f"{error.shape} and {held.shape}", "one and the same (n,)", "Give one flag a sample.")
+    if not np.all(np.isfinite(error)):
+        raise BadInput("error", "not finite", "finite numbers", "Give the error of a simulation that did not diverge.")
+    judged = held.copy()
+    judged[:order] = False
+    runs = [(a, b) for a, b in _runs(~held) if b - a > order]
+    rows = sum(b - a - order for a, b in runs)
+    if order < 1 or rows < 4 * order or not np.any(judged):
+        raise BadInput(
+            "samples to fit and to judge an autoregressive model",
+            f"{rows} and {int(np.sum(judged))}",
+            f"at least {4 * max(order, 1)}, and one, with order >= 1",
+            "Record for longer, hold out fewer samples, or lower the order.",
+        )
+    mean = float(np.mean(error[~held]))
+    centred = error - mean
+    products = np.zeros((order + 1, order + 1))
+    for a, b in runs:
+        products += _products(centred[a:b], order)
+    ridge = RIDGE * products[0, 0] + 1e-300
+    past = np.linalg.solve(products[1:, 1:] + ridge * np.eye(order), products[1:, 0])
+    left = scipy.signal.lfilter(np.concatenate(([1.0], -past)), [1.0], centred)
+    return float(np.sqrt(np.mean(left[judged] ** 2)))
+
+
+def _runs(wanted: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """(first, one past the last) of each stretch that is True."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], wanted, [False])).astype(np.int8)))
+    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _products(error: FloatArray, order: int) -> FloatArray:
+    """(order + 1, order + 1): sums of e[t - i] e[t - j] over t = order .. end. One row by sums, the rest from what enters and leaves."""
+    n = error.size
+    found = np.empty((order + 1, order + 1))
+    found[0] = [error[order:] @ error[order - lag : n - lag] for lag in range(order + 1)]
+    found[:, 0] = found[0]
+    enters, leaves = error[order - 1 :: -1], error[n - 1 : n - 1 - order : -1]  # at lag 0, 1, ..., order - 1, one sample earlier
+    for lag in range(order):
+        found[lag + 1, 1:] = found[lag, :-1] + enters[lag] * enters - leaves[lag] * leaves
+    return found

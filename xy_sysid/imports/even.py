@@ -1,0 +1,128 @@
+"""Uneven time --> even samples: stamps that jitter are counted, time that is truly uneven is resampled, or refused.
+
+Jitter of the stamps alone leaves them within a period of a straight line, now before it and now after; the samples
+themselves are even and stay as they are. Where the instants wander off the line the samples are uneven: the input, which is
+held from sample to sample, becomes its mean over each even step (so that no drive is lost or doubled), and the output is
+interpolated (cubic), both only where no more than ``GAP`` periods lie between two samples.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from xy_sysid.errors import BadInput, BadRecording
+from xy_sysid.imports.paired_streams import is_jitter, steady
+from xy_sysid.samples.block import FloatArray
+from xy_sysid.samples.recording import rate_from_time
+
+GAP = 2.5  # periods; over a longer step nothing is interpolated
+LOCAL = 50  # samples over which the period is looked at
+STEADY = 0.005  # relative; a period that wanders by less is even enough: frequencies are off by no more
+BURST = 0.2  # of a period; more steps than BURSTS shorter than that are stamps that came in bursts
+BURSTS = 0.2
+LOST = 0.3  # of the time; in steps longer than GAP more than that is lost
+Values = tuple[FloatArray, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Even:
+    """seq (n,), time (n,) s, rate Hz; values: as given, or resampled."""
+
+    seq: FloatArray
+    time: FloatArray
+    rate: float
+    values: Values
+
+
+def even(path: Path, time: FloatArray, held: FloatArray, smooth: Values, notes: list[str]) -> Even:
+    """Number samples by their instants. held: (n, axes) the input; smooth: (n, axes) output and reference. Raises BadRecording."""
+    try:
+        rate = rate_from_time(time)
+    except BadInput as error:
+        act = "Sort the rows by time, or if stamps are too coarse for the samples give --rate in Hz."
+        raise BadRecording(path, f"{error.what} is {error.value}", act) from None
+    steps = np.diff(time) * rate
+    if float(steps.min()) < -1.0:
+        row = int(np.argmin(steps)) + 1
+        raise BadRecording(path, f"time falls back from {time[row - 1]:.9g} to {time[row]:.9g} s at sample {row + 1}", "Sort the samples by time.")
+    if _wanders(steps):
+        return _resampled(path, time, rate, held, smooth, notes)
+    seq = np.concatenate(([0.0], np.cumsum(np.rint(steps))))
+    drift = np.rint((time - time[0]) * rate)
+    if float(np.max(np.abs(seq - drift))) <= 1:
+        seq = drift
+    if is_jitter(np.diff(seq)):
+        notes.append("the time column jitters by more than half a sample; samples are numbered as they stand, with even times")
+        instants = steady(time)
+        return Even(np.arange(len(time), dtype=np.float64), instants, rate_from_time(instants), (held, *smooth))
+    return Even(seq, time, rate, (held, *smooth))
+
+
+def _wanders(steps: FloatArray) -> bool:
+    """Whether the period itself changes, rather than single stamps jitter about a steady one."""
+    near = steps[(steps > 0) & (steps < GAP)]
+    if len(near) < 2 * LOCAL:
+        return False
+    mean = float(np.mean(near))
+    off = near / mean - 1.0
+    sums = np.concatenate(([0.0], np.cumsum(off)))
+    local = (sums[LOCAL:] - sums[:-LOCAL]) / LOCAL
+    line = np.arange(len(sums)) - (len(sums) - 1) / 2
+    from_line = sums - sums.mean() - line * (line @ sums) / (line @ line)
+    if float(np.max(np.abs(from_line))) < 1.0:  # never a whole period off: jitter, or nothing to lose
+        return False
+    return float(np.max(np.abs(local))) > STEADY
+
+
+def _resampled(path: Path, time: FloatArray, rate: float, held: FloatArray, smooth: Values, notes: list[str]) -> Even:
+    steps = np.diff(time) * rate
+    shortest, middle, longest = (float(value) / rate * 1e3 for value in (steps.min(), np.median(steps), steps.max()))
+    uneven = f"time is uneven: steps from {shortest:.4g} to {longest:.4g} ms, most {middle:.4g} ms"
+    taken = "If the samples were taken evenly all the same, say so with --rate in Hz; else record again with a steady clock."
+    if float(np.mean(steps < BURST)) > BURSTS:
+        raise BadRecording(path, f"{uneven}; {100 * np.mean(steps < BURST):.0f} % of the stamps come in bursts", taken)
+    if float(np.sum(steps[steps > GAP])) > LOST * float(np.sum(steps)):
+        raise BadRecording(path, f"{uneven}; {100 * np.sum(steps[steps > GAP]) / np.sum(steps):.0f} % of the time lies in gaps", taken)
+    fresh = np.concatenate(([True], np.diff(time) > 1e-3 / rate))
+    if not fresh.all():
+        notes.append(f"{int(np.sum(~fresh))} samples are there twice; the first is kept")
+        time, held, smooth = time[fresh], held[fresh], tuple(values[fresh] for values in smooth)
+    spread = float(np.std(np.diff(time)[np.diff(time) * rate < GAP])) * rate
+    edges = np.flatnonzero(np.diff(time) * rate > GAP) + 1
+    numbers: list[FloatArray] = []
+    parts: list[Values] = []
+    for begin, end in zip([0, *edges.tolist()], [*edges.tolist(), len(time)], strict=True):
+        if end - begin < 4:
+            continue
+        first, last = int(np.ceil((time[begin] - time[0]) * rate - 1e-6)), int(np.floor((time[end - 1] - time[0]) * rate - 1.0 + 1e-6))
+        if last < first:
+            continue
+        count = np.arange(first, last + 1, dtype=np.float64)
+        instants = time[0] + count / rate
+        numbers.append(count)
+        mine = slice(begin, end)
+        parts.append((_means(time[mine], held[mine], instants, 1.0 / rate), *(_between(time[mine], values[mine], instants) for values in smooth)))
+    if not numbers:
+        raise BadRecording(path, f"{uneven}; no stretch is long enough", taken)
+    seq = np.concatenate(numbers)
+    notes.append(
+        f"{uneven} ({100 * spread:.2g} % rms); {len(time)} samples are resampled to {len(seq)} at {rate:.6g} Hz: "
+        "the input is held, the output interpolated"
+    )
+    return Even(seq, time[0] + seq / rate, rate, tuple(np.concatenate([part[place] for part in parts]) for place in range(1 + len(smooth))))
+
+
+def _means(time: FloatArray, held: FloatArray, instants: FloatArray, period: float) -> FloatArray:
+    """(m, axes) mean of the held input from each instant to the next."""
+    lasting = np.diff(time)[:, None] * held[:-1]
+    area = np.concatenate((np.zeros((1, held.shape[1])), np.cumsum(lasting, axis=0)))
+    edges = np.append(instants, instants[-1] + period)
+    return np.diff(np.column_stack([np.interp(edges, time, column) for column in area.T]), axis=0) / period
+
+
+def _between(time: FloatArray, values: FloatArray, instants: FloatArray) -> FloatArray:
+    return np.asarray(CubicSpline(time, values, axis=0)(instants))

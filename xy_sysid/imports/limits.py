@@ -1,0 +1,32 @@
+"""How much a file may become: nothing is unpacked before its size is known to fit, and nothing is read that never ends."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+
+from xy_sysid.errors import BadRecording
+
+SHARE = 0.6  # of the machine's memory that a recording may take
+MOST_COLUMNS = 10_000  # of a table, or arrays of a file; no recording has more signals
+COPIES = 4  # times its size that reading and pairing need while they work
+
+
+def room() -> float:
+    """Bytes of samples that may be loaded at once."""
+    return SHARE * os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / COPIES
+
+
+def fits(path: Path, size: float, what: str = "unpacked") -> None:
+    """Raises BadRecording for more bytes than there is room for."""
+    if size > room():
+        problem = f"{what} it would take {size / 1e9:.3g} GB, and {room() / 1e9:.2g} GB may be loaded at once"
+        raise BadRecording(path, problem, "Store a shorter part, or as a rosbag2 and give a part with --span.")
+
+
+def plain_file(path: Path) -> None:
+    """Raises BadRecording for a pipe, a device or a socket, which may never end; OSError where there is nothing."""
+    mode = path.stat().st_mode
+    if not stat.S_ISREG(mode):
+        raise BadRecording(path, "not a file but a pipe, a device or a folder", "Copy its content into a file first.")

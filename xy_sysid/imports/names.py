@@ -1,0 +1,127 @@
+"""What a column's name says: ``Motor Voltage (V)`` is an input, ``time_ms`` the time, ``u_x`` the input of the axis x.
+
+Only the words in the tables below are known; whoever calls things otherwise says so with ``--map``.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from xy_sysid.imports.foreign_units import KNOWN, Quantity, unit_of
+from xy_sysid.imports.sheet import spoken
+
+HEADER = re.compile(r"^\s*(?P<name>.*?)\s*(?:[\[\(]\s*(?P<unit>[^\]\)]*?)\s*[\]\)])?\s*$")
+TIME = "time t zeit timestamp stamp tijd temps tiempo tempo clock elapsed"
+INPUTS: tuple[tuple[Quantity, str], ...] = (
+    ("voltage", "voltage volt volts spannung spanning u uin vin"),
+    ("command", "input inp command cmd control ctrl duty pwm drive stellgrösse stellgroesse"),
+    ("current", "current curr amps strom stroom"),
+    ("torque", "torque moment drehmoment tau"),
+    ("force", "force kraft kracht"),
+    ("unknown", "effort"),
+)
+OUTPUTS: tuple[tuple[Quantity, str], ...] = (
+    ("position", "position pos posi positie posizione posicion lage weg angle winkel hoek theta encoder enc displacement output out y q"),
+    ("velocity", "velocity vel speed geschwindigkeit drehzahl snelheid omega"),
+    ("acceleration", "acceleration accel acc beschleunigung versnelling"),
+)
+REFERENCE = "reference ref setpoint target desired des demand demanded commanded soll sollwert r"
+ASKED = ("command", "cmd", *REFERENCE.split())
+OTHER = "error err fehler noise status state temperature temp bus supply limit diff id index flag mode sigma unit"
+FILLERS = "motor actual act measured meas ist value val signal sig raw filtered data feedback fb joint joints states the axis achse in of root model"
+ANGLES = "angle winkel hoek theta omega drehzahl"
+LETTERS = ("t", "u", "y", "r", "q")  # roles of one letter give way to a word: y_position is of the axis y
+LONG = 5  # letters from which a word counts inside a longer one: motorvoltage
+
+
+USUAL: dict[Quantity, str] = {"voltage": "V", "command": "V", "current": "A", "torque": "N m", "force": "N", "unknown": "effort"}
+MOVED: dict[Quantity, tuple[str, str]] = {"position": ("m", "rad"), "velocity": ("m/s", "rad/s"), "acceleration": ("m/s^2", "rad/s^2")}
+
+
+@dataclass(frozen=True, slots=True)
+class Meaning:
+    """What a name says. role: one of ``reading.ROLES``; quantity: what is measured; rank: the smaller, the likelier."""
+
+    role: str
+    quantity: Quantity
+    axis: str
+    unit: str
+    rank: int
+
+
+def header(cell: str) -> tuple[str, str]:
+    """Name and unit of a header like ``x_position[mm]``; brackets around a mere number belong to the name."""
+    found = HEADER.match(cell)
+    if found is None or not found["unit"] or (found["unit"].isdigit() and found["unit"] != "1"):
+        return cell.strip(), ""
+    return found["name"].strip(), found["unit"]
+
+
+def meaning(name: str, unit: str) -> Meaning | None:
+    """What a name and a unit say, None where they say nothing."""
+    words = [piece for word in spoken(name) for piece in _pieces(word)]
+    unit, words = _unit(name, unit, words)
+    if any(word in OTHER.split() for word in words):
+        return None
+    hits = [(place, *hit) for place, word in enumerate(words) for hit in _hits(word)]
+    if any(words[place] not in LETTERS for place, *_ in hits):
+        hits = [hit for hit in hits if words[hit[0]] not in LETTERS]
+    elif len(hits) > 1:  # letters alone: u_y is u of y, x_y is y of x, y_y is y of y
+        hits = [next((hit for hit in hits if words[hit[0]] in ("u", "t", "r")), hits[-1])]
+    if not hits:
+        return None
+    rest = [word for place, word in enumerate(words) if place not in {hit[0] for hit in hits} and word not in FILLERS.split()]
+    asked = any(words[place] in ASKED for place, *_ in hits)
+    roles = {role for _, role, *_ in hits}
+    _, role, quantity, rank = next((hit for hit in reversed(hits) if hit[1] in ("input", "output") and words[hit[0]] not in ASKED), hits[-1])
+    if role == "output" and asked:
+        role = "reference"
+    elif "time" in roles and len(roles) > 1:
+        return None
+    measured = unit_of(unit).quantity if unit else "unknown"
+    fitting = MOVED if role in ("output", "reference") else USUAL
+    if measured in fitting and measured != "unknown":
+        quantity = measured
+    later = asked and role == "input" and quantity != "command"  # what was measured is likelier than what was asked for
+    return Meaning(role=role, quantity=quantity, axis="_".join(rest), unit=unit, rank=2 * rank + later)
+
+
+def _pieces(word: str) -> list[str]:
+    """joint1 stays; u1, pos2 are a word and a number."""
+    found = re.fullmatch(r"(\D+)(\d+)", word)
+    return [found[1], found[2]] if found and _hits(found[1]) else [word]
+
+
+def _hits(word: str) -> list[tuple[str, Quantity, int]]:
+    """(role, quantity, rank) that a word may stand for."""
+    if word in TIME.split():
+        return [("time", "time", 0)]
+    if word in REFERENCE.split():
+        return [("reference", "position", 0)]
+    for exact in (True, False):
+        for role, table in (("input", INPUTS), ("output", OUTPUTS)):
+            for rank, (quantity, names) in enumerate(table):
+                if any(word == one or (not exact and len(one) >= LONG and one in word) for one in names.split()):
+                    return [(role, quantity, rank)]
+    return []
+
+
+def _unit(name: str, unit: str, words: list[str]) -> tuple[str, list[str]]:
+    """A unit at the end of a name (time_ms, pos_mm, speed_rpm) where it fits what stands before it."""
+    last = re.split(r"[\s_.\-/]+", name.strip())[-1]
+    if unit or last not in KNOWN or len(words) < 2 or words[-1] != last.casefold():
+        return unit, words
+    fits = KNOWN[last].quantity
+    before = [hit for word in words[:-1] for hit in _hits(word)]
+    if any(quantity == fits or (role == "input" and quantity == "command" and fits != "time") for role, quantity, _ in before):
+        return last, words[:-1]
+    return unit, words
+
+
+def usual_unit(name: str, found: Meaning) -> str:
+    """The unit of a column that names none; duty and pwm are parts of full scale."""
+    words = [piece for word in spoken(name) for piece in _pieces(word)]
+    if found.quantity in MOVED:
+        return MOVED[found.quantity][any(word in ANGLES.split() for word in words)]
+    return "FS" if any(word in ("duty", "pwm") for word in words) else USUAL.get(found.quantity, "s")

@@ -1,0 +1,240 @@
+"""What looks wrong in a recording, said in words: none of it is corrected, since only who measured knows.
+
+Thresholds are wide of any machine axis that was met in measured data (../docs/real-data.md); they only ask.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xy_sysid.errors import BadRecording
+from xy_sysid.imports.foreign_units import DRIVES, unit_of
+from xy_sysid.samples.block import FloatArray
+from xy_sysid.samples.recording import Recording
+
+HUGE = 1e100  # a number beyond it has no square, let alone the square of its derivative
+SLOW = 3.0  # Hz; slower sampling is asked about
+FAR, FAST = 20.0, 50.0  # m and m/s; longer or faster axes are asked about
+TURNING = 3000.0  # rad/s, 30,000 turns a minute
+TINY = {"m": 1e-8, "rad": 1e-8, "V": 1e-6, "A": 1e-6}  # a signal that moves less in all is asked about
+ROUGH = 0.5  # steps over spread; a position is smoother than that, noise is not
+SMOOTHER = 0.25  # of the output's roughness; an input that is that much smoother may be a position
+LIKE = 0.5  # correlation of one signal's steps with the other, when they have been swapped
+LEAKS = (1.0, 0.3, 0.1, 0.03, 0.01)  # of the axis that is asked about then, part of a step
+STUCK_SECONDS, STUCK_PART = 1.0, 0.1  # an output that stands for longer and for more of the recording, while the input moves
+DEAD_PART = 0.2  # of the recording; a longer rest under a lively input is taken out
+LIVELY = 0.8  # of the input's spread and steps elsewhere; an output that stands under as much input is not held by friction
+CLIPPED = 0.05  # part of the samples that lie at one end of the range
+LEVELS = 8  # a signal of fewer levels is a switching one, and lies at its ends by nature
+COARSE = 0.02  # of the usual step; numbers further apart than that, because of an offset, say little
+FEW = 4  # counts in all
+ENOUGH = 50  # samples
+LOOK = 200_000  # samples from which steps and levels are counted
+
+
+def meaningful(path: Path, recording: Recording) -> Recording:
+    """Without the axes whose input and output are one and the same; raises BadRecording if none is left, or for numbers beyond any unit."""
+    for name, values in (("input", recording.voltage), ("output", recording.position)):
+        largest = float(np.max(np.abs(values))) if values.size else 0.0
+        if largest > HUGE:
+            raise BadRecording(path, f"the {name} reaches {largest:.3g}, which cannot be squared", "Say its unit with --unit, or --scale.")
+    if len(recording) < ENOUGH:
+        return recording
+    same = [axis for axis in recording.axes if np.array_equal(*recording.axis(axis)) and float(np.ptp(recording.axis(axis)[0])) > 0]
+    if not same:
+        return recording
+    problem = f"input and output of axis {', '.join(same)} are the same numbers, one column taken for both"
+    columns = [place for place, axis in enumerate(recording.axes) if axis not in same]
+    if not columns:
+        raise BadRecording(path, problem, "Choose two columns with --map input=...,output=... (see xy-sysid columns FILE).")
+    return dataclasses.replace(
+        recording,
+        axes=tuple(recording.axes[place] for place in columns),
+        voltage=recording.voltage[:, columns],
+        position=recording.position[:, columns],
+        reference=None if recording.reference is None else recording.reference[:, columns],
+        notes=(*recording.notes, f"{problem}; left out"),
+    )
+
+
+def without_dead_parts(recording: Recording) -> Recording:
+    """Without long stretches in which an output does not change by a bit under an input as lively as elsewhere: they become gaps."""
+    if len(recording) < ENOUGH:
+        return recording
+    keep = np.ones(len(recording), dtype=np.bool_)
+    notes: list[str] = []
+    for axis in recording.axes:
+        u, y = recording.axis(axis)
+        begin, size = _longest_rest(y)
+        if float(np.ptp(y)) == 0.0 or size < DEAD_PART * len(y) or size < STUCK_SECONDS * recording.sampling_rate:
+            continue
+        inside = np.zeros(len(y), dtype=np.bool_)
+        inside[begin : begin + size] = True
+        lively = all(0.0 < float(np.std(values[part])) >= LIVELY * float(np.std(values[other])) for values, part, other in _compared(u, inside))
+        if not lively or int(np.sum(~inside)) < ENOUGH:
+            continue
+        keep &= ~inside
+        notes.append(
+            f"axis {axis}: the output is dead {_between(recording, begin, size)} under an input as lively as elsewhere (encoder, enable, end stop?); "
+            f"that part is left out{' of all axes' if len(recording.axes) > 1 else ''}"
+        )
+    if not notes or int(np.sum(keep)) < ENOUGH:
+        return recording
+    return dataclasses.replace(recording.only(keep), notes=(*recording.notes, *notes))
+
+
+def _compared(u: FloatArray, inside: NDArray[np.bool_]) -> list[tuple[FloatArray, NDArray[np.bool_], NDArray[np.bool_]]]:
+    """The input and its steps, with where to look at them: inside and outside."""
+    both = inside[1:] & inside[:-1], ~inside[1:] & ~inside[:-1]
+    return [(u, inside, ~inside), (np.diff(u), *both)]
+
+
+def _longest_rest(y: FloatArray) -> tuple[int, int]:
+    """First sample and length of the longest stretch without any change."""
+    edges = np.concatenate(([-1], np.flatnonzero(np.diff(y) != 0), [len(y) - 1]))
+    place = int(np.argmax(np.diff(edges)))
+    return int(edges[place]) + 1, int(np.diff(edges)[place])
+
+
+def _between(recording: Recording, begin: int, size: int) -> str:
+    end = "the end" if begin + size >= len(recording) else f"{recording.time[begin + size - 1]:.5g} s"
+    return f"from {recording.time[begin]:.5g} s to {end} ({100 * size / len(recording):.0f} % of the samples)"
+
+
+def remarks(recording: Recording, output: FloatArray) -> list[str]:
+    """Sentences about the whole and about each axis. output: (n, axes) what was measured, which may be a velocity."""
+    if len(recording) < ENOUGH:
+        return _of_units(recording)
+    found = _of_time(recording)
+    with np.errstate(all="ignore"):  # numbers near the end of their range have no square; what is odd about them is said
+        for place, axis in enumerate(recording.axes):
+            found += [f"axis {axis}: {text}" for text in _of_axis(recording, recording.voltage[:, place], output[:, place])]
+    return found + _of_units(recording)
+
+
+def _of_time(recording: Recording) -> list[str]:
+    rate, runs = recording.sampling_rate, recording.runs()
+    found = []
+    if rate < SLOW:
+        found.append(f"the samples are {1 / rate:.4g} s apart ({rate:.4g} Hz): is time in ms, or a sample number? Say --unit time=ms, or --rate")
+    if rate > 1e6:
+        found.append(f"the samples are {1e9 / rate:.4g} ns apart ({rate:.4g} Hz): is that the unit of time? Say --unit time=...")
+    if len(runs) > 1:
+        gaps = [(int(recording.seq[b.start] - recording.seq[a.stop - 1]) - 1, float(recording.time[a.stop - 1])) for a, b in itertools.pairwise(runs)]
+        most, where = max(gaps)
+        longest = max(run.stop - run.start for run in runs) / rate
+        found.append(
+            f"{len(gaps)} gap{'s' if len(gaps) > 1 else ''} in the samples, the longest of {most} ({most / rate:.4g} s) after {where:.6g} s; "
+            f"the longest stretch without one lasts {longest:.4g} s"
+        )
+    return found
+
+
+def _of_units(recording: Recording) -> list[str]:
+    found = []
+    drive, motion = unit_of(recording.input_unit).quantity, unit_of(recording.output_unit).quantity
+    if drive not in (*DRIVES, "unknown"):
+        found.append(f"the input is in {recording.input_unit}, which drives nothing: are columns swapped, or is it a reference?")
+    if motion in DRIVES:
+        found.append(f"the output is in {recording.output_unit}, which is no motion: are columns swapped, or is it a sensor's voltage (--scale)?")
+    if drive == "current":
+        found.append("the input is a current: if it was measured and not commanded, it is not held between samples (--set hold=none)")
+    return found
+
+
+def _of_axis(recording: Recording, u: FloatArray, y: FloatArray) -> list[str]:
+    found = []
+    ranges = float(np.ptp(u)), float(np.ptp(y))
+    units = recording.input_unit, f"{recording.output_unit}{_per(recording)}"
+    names = "input", "output"
+    for name, size, unit in zip(names, ranges, units, strict=True):
+        if size == 0.0:
+            found.append(f"the {name} never changes")
+        elif size < TINY.get(unit, 0.0):
+            found.append(f"the {name} moves by {size:.3g} {unit} in all: is that its unit? Say --unit or --scale")
+    if 0.0 in ranges:
+        return found
+    found += _of_size(recording, y, ranges[1])
+    swapped = _swapped(u, y)
+    if swapped:
+        found.append(swapped)
+    found += _stuck(recording, u, y)
+    for name, values in zip(names, (u, y), strict=True):
+        found += _clipped(name, values, units[names.index(name)])
+    return found
+
+
+def _per(recording: Recording) -> str:
+    return {"velocity": "/s", "acceleration": "/s^2"}.get(recording.measured, "")
+
+
+def _of_size(recording: Recording, y: FloatArray, size: float) -> list[str]:
+    """Travel, speed and resolution of a position."""
+    found = []
+    step = float(np.quantile(np.abs(np.diff(y[:LOOK])), 0.9))
+    if recording.measured == "position":
+        speed = step * recording.sampling_rate
+        if recording.output_unit == "m" and (size > FAR or speed > FAST):
+            found.append(f"the output moves over {size:.4g} m at {speed:.3g} m/s: is it in mm or counts? Say --unit output=mm, or --scale")
+        if recording.output_unit == "rad" and speed > TURNING:
+            found.append(f"the output turns at {speed:.3g} rad/s: is it in deg or counts? Say --unit output=deg, or --scale")
+    largest = float(np.max(np.abs(y)))
+    apart = float(np.spacing(largest))
+    if apart > COARSE * step and step > 0 and largest > 10 * size:
+        found.append(
+            f"the output lies at {largest:.3g}, where numbers are {apart:.2g} apart, and moves by {step:.2g} a sample: store it without offset"
+        )
+    levels = np.unique(y[:LOOK])
+    if len(levels) <= FEW:
+        found.append(f"the output has {len(levels)} different values in all: the axis stands, or its encoder is too coarse")
+    return found
+
+
+def _swapped(u: FloatArray, y: FloatArray) -> str:
+    """A smooth input that follows the integral of a rough output."""
+    rough = [float(np.std(np.diff(values)) / np.std(values)) for values in (u, y)]
+    if not (np.isfinite(rough).all() and rough[1] > ROUGH and rough[0] < SMOOTHER * rough[1]):
+        return ""
+    steps = np.diff(u)
+    best = max(abs(float(np.corrcoef(steps, _leaky(y, leak)[:-1])[0, 1])) for leak in LEAKS)
+    if best < LIKE:
+        return ""
+    return f"the input is smooth, the output is not, and the input's steps follow the output (correlation {best:.2f}): are input and output swapped?"
+
+
+def _leaky(values: FloatArray, leak: float) -> FloatArray:
+    from scipy.signal import lfilter
+
+    return np.asarray(lfilter([leak], [1.0, leak - 1.0], values - values.mean()))
+
+
+def _stuck(recording: Recording, u: FloatArray, y: FloatArray) -> list[str]:
+    """The longest stretch over which the output does not change by a bit, although the input goes on."""
+    begin, size = _longest_rest(y)
+    seconds = size / recording.sampling_rate
+    if seconds < STUCK_SECONDS or size < STUCK_PART * len(y):
+        return []
+    part = u[begin : begin + size]
+    if float(np.std(part)) < 0.1 * float(np.std(u)) or float(np.std(part)) == 0.0:
+        return []
+    return [
+        f"the output stands still {_between(recording, begin, size)} while the input moves: "
+        "does the encoder work, is the axis enabled, or does friction hold it? Leave that part out with --span"
+    ]
+
+
+def _clipped(name: str, values: FloatArray, unit: str) -> list[str]:
+    """Samples that lie exactly at the end of the range."""
+    if len(np.unique(values[:LOOK])) <= LEVELS:
+        return []
+    found = []
+    for end, word in ((float(values.max()), "highest"), (float(values.min()), "lowest")):
+        part = float(np.mean(values == end))
+        if part > CLIPPED and np.count_nonzero(np.diff((values == end).astype(np.int8))) > 3:
+            found.append(f"the {name} lies at its {word} value, {end:.4g} {unit}, in {100 * part:.0f} % of the samples: is it saturated?")
+    return found

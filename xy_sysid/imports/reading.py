@@ -1,0 +1,101 @@
+"""How a file is to be read: one value that every reader takes, made from keywords or from the options of a command."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+from xy_sysid.bags import POSITION, VOLTAGE
+from xy_sysid.errors import BadInput
+
+ROLES = ("time", "seq", "joint", "input", "output", "reference")
+OF_AN_AXIS = ("input", "output", "reference")
+WHAT = "time, seq, joint, input, output, reference, or one axis's like x.input"
+PAIR = re.compile(r",(?=\s*[^,=]*?(?:time|seq|joint|input|output|reference)\s*=)", re.IGNORECASE)
+Value = TypeVar("Value")
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """Which columns of a file mean what.
+
+    columns: column by what it is, {"time": "Zeit", "x.input": "Motor Voltage", "output": "Pos"}; without an axis: of any
+    units:   unit by what it is, {"x.output": "counts", "time": "ms"}; scales: factor to SI, or to ``units``
+    rate:    Hz; samples are taken as they stand, evenly spaced, whatever a time column says
+    axes:    which axes to take, and in which order; None is all
+    start, stop: s after the first sample; None is the end
+    voltage_topic, position_topic: block topics of a bag; joint_topic: its JointState topic, found if there is one only
+    effort_as_voltage: take the joints' effort as the input, even if there is a voltage topic
+    joints:  the joint of each axis, as x=shoulder_pan_joint; effort_lag: samples by which effort is older than its stamp
+    """
+
+    columns: Mapping[str, str] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
+    scales: Mapping[str, float] = field(default_factory=dict)
+    rate: float | None = None
+    axes: Sequence[str] | None = None
+    start: float = 0.0
+    stop: float | None = None
+    voltage_topic: str = VOLTAGE
+    position_topic: str = POSITION
+    joint_topic: str | None = None
+    effort_as_voltage: bool = False
+    joints: Sequence[str] = ()
+    effort_lag: int = 0
+
+    def __post_init__(self) -> None:
+        if not self.start >= 0 or (self.stop is not None and not self.stop > self.start):
+            raise BadInput("start and stop", f"{self.start}, {self.stop}", "0 <= start < stop, in s", "Choose another part.")
+        if self.rate is not None and not (math.isfinite(self.rate) and self.rate > 0):
+            raise BadInput("rate", self.rate, "> 0 Hz", "Give the sampling rate in Hz.")
+        for option, given in (("--map", self.columns), ("--unit", self.units), ("--scale", self.scales)):
+            for what in given:
+                if what.rpartition(".")[2] not in (OF_AN_AXIS if "." in what else ROLES):
+                    raise BadInput(option, repr(what), WHAT, f"Write for example {option} x.output=...")
+        for what, scale in self.scales.items():
+            if not (math.isfinite(scale) and scale != 0):
+                raise BadInput("--scale", f"{what}={scale}", "a number that is not 0", "Give the factor to SI.")
+
+    def unit(self, role: str, axis: str = "") -> str | None:
+        """The unit given for a role of an axis; a reference is measured like the output."""
+        return _of(self.units, role, axis)
+
+    def scale(self, role: str, axis: str = "") -> float | None:
+        """The factor given for a role of an axis."""
+        return _of(self.scales, role, axis)
+
+
+def _of(given: Mapping[str, Value], role: str, axis: str) -> Value | None:
+    for name in (role, "output") if role == "reference" else (role,):
+        for key in (f"{axis}.{name}", name):
+            if key in given:
+                return given[key]
+    return None
+
+
+def pairs(texts: Sequence[str], option: str) -> dict[str, str]:
+    """WHAT=VALUE pairs, several in one text separated by commas: {"time": "Zeit", "x.input": "Motor Voltage"}."""
+    found: dict[str, str] = {}
+    for text in texts:
+        for pair in PAIR.split(text):
+            what, equals, value = pair.partition("=")
+            what, value = what.strip(), value.strip().strip('"')
+            if not (equals and what and value):
+                raise BadInput(option, repr(pair), "WHAT=VALUE", f"Write for example {option} x.output=...")
+            role = what.rpartition(".")[2].lower()
+            found[what[: len(what) - len(role)] + role] = value
+    return found
+
+
+def numbers(texts: Sequence[str], option: str) -> dict[str, float]:
+    """The same with numbers as values."""
+    found: dict[str, float] = {}
+    for what, text in pairs(texts, option).items():
+        try:
+            found[what] = float(text)
+        except ValueError:
+            raise BadInput(option, f"{what}={text}", "a number", "Give the factor to SI, for example 0.5e-6.") from None
+    return found

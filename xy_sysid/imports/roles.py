@@ -1,0 +1,159 @@
+"""Columns of a file --> their roles: which column is the time, and which are input, output and reference of each axis.
+
+What the user says (``Reading.columns``) comes first, then the contract's own names (``time``, ``x_voltage``,
+``x_position``), then what the words of a name say; what was guessed is said in a note.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from xy_sysid.errors import BadRecording
+from xy_sysid.imports.names import Meaning, meaning
+from xy_sysid.imports.reading import Reading
+from xy_sysid.imports.sheet import Column, Sheet, spoken
+
+CONTRACT: Mapping[str, tuple[str, ...]] = {
+    "input": ("voltage", "u", "input"),
+    "output": ("position", "y", "output"),
+    "reference": ("reference", "r"),
+}
+WORDS: Mapping[str, str] = {"input": "voltage", "output": "position"}  # how a missing role is called in an error
+JOINT_WORDS = ({"joint"}, {"joint", "name"}, {"name"}, {"axis"}, {"axis", "name"}, {"achse"}, {"gelenk"}, {"joint", "id"})
+EXAMPLE = "Name them with --map time=...,input=...,output=... (see xy-sysid columns FILE)."
+Found = dict[str, Column]
+
+
+@dataclass(frozen=True, slots=True)
+class Roles:
+    """Columns by role; guessed: whether a name had to be understood, which a note then says."""
+
+    time: Column | None
+    seq: Column | None
+    joint: Column | None
+    inputs: Found
+    outputs: Found
+    references: Found
+    guessed: bool
+
+    def sides(self) -> tuple[tuple[str, Found], ...]:
+        """Columns by axis, of each role that an axis has."""
+        return ("input", self.inputs), ("output", self.outputs), ("reference", self.references)
+
+
+def assigned(sheet: Sheet, reading: Reading, notes: list[str]) -> Roles:
+    """Which columns are what."""
+    said = {what: sheet.find(name) for what, name in reading.columns.items() if "." in what or what in ("time", "seq", "joint")}
+    meanings = {column.name: understood for column in sheet.columns if (understood := meaning(column.name, column.unit)) is not None}
+    found: dict[str, Found] = {}
+    plain, free = _contract(sheet), False
+    for role in ("input", "output", "reference"):
+        given = {what.rpartition(".")[0]: column for what, column in said.items() if what.endswith(f".{role}")}
+        if role in reading.columns:
+            given |= _of_any_axis(sheet, reading.columns[role])
+        found[role] = given or plain.get(role, {})
+    if not _paired(found):
+        for role in ("input", "output", "reference"):
+            if not any(what == role or what.endswith(f".{role}") for what in reading.columns):
+                found[role], free = _by_words(sheet, meanings, role, notes) or found[role], True
+    for role in ("input", "output"):
+        if not found[role]:
+            raise BadRecording(sheet.path, f"no {WORDS[role]} {sheet.kind}; {sheet.names()}", EXAMPLE)
+    pairs = _named(sheet, found, notes)
+    times = [column for column in sheet.columns if column.name in ("time", "t")]
+    time = said.get("time") or (sheet.usable(times[0]) if times else None)
+    if time is None:
+        clocks = [column for column in sheet.columns if column.name in meanings and meanings[column.name].role == "time"]
+        time = sheet.usable(clocks[0]) if clocks else None
+        free |= time is not None
+    counters = [column for column in sheet.columns if column.name == "seq"]
+    joints = [column for column in sheet.columns if column.words and set(spoken(column.name)) in JOINT_WORDS]
+    return Roles(
+        time=time,
+        seq=said.get("seq") or (sheet.usable(counters[0]) if counters else None),
+        joint=said.get("joint") or (joints[0] if joints else None),
+        inputs=pairs["input"],
+        outputs=pairs["output"],
+        references=pairs["reference"],
+        guessed=free,
+    )
+
+
+def _contract(sheet: Sheet) -> dict[str, Found]:
+    """Columns with the contract's own names, by role and axis."""
+    found: dict[str, Found] = {}
+    for role, endings in CONTRACT.items():
+        for ending in endings:
+            columns = _ending(sheet, ending)
+            if columns:
+                found[role] = columns
+                break
+    return found
+
+
+def _ending(sheet: Sheet, ending: str) -> Found:
+    """Columns called ``<axis>_<ending>``, or only ``ending``, which is the axis x."""
+    found: Found = {}
+    for column in sheet.columns:
+        axis, _, last = column.name.rpartition("_")
+        if last == ending and (axis or column.name == ending):
+            found.setdefault(axis or "x", sheet.usable(column))
+    return found
+
+
+def _of_any_axis(sheet: Sheet, name: str) -> Found:
+    """A column of that name, or the columns of all axes that end in it."""
+    if name not in [column.name for column in sheet.columns]:
+        columns = _ending(sheet, name)
+        if columns:
+            return columns
+    return {"": sheet.find(name)}
+
+
+def _paired(found: Mapping[str, Found]) -> bool:
+    """Whether any axis has both input and output, or could have."""
+    inputs, outputs = found["input"], found["output"]
+    return bool(set(inputs) & set(outputs)) or (len(inputs) == len(outputs) == 1 and ("" in inputs or "" in outputs))
+
+
+def _by_words(sheet: Sheet, meanings: Mapping[str, Meaning], role: str, notes: list[str]) -> Found:
+    """For each axis the likeliest column of a role."""
+    offers: dict[str, list[tuple[int, Column]]] = {}
+    for column in sheet.columns:
+        known = meanings.get(column.name)
+        if known is not None and known.role == role and not column.words:
+            offers.setdefault(known.axis, []).append((known.rank, column))
+    found: Found = {}
+    for axis, columns in offers.items():
+        least = min(rank for rank, _ in columns)
+        best = [column for rank, column in columns if rank == least]
+        if len(best) > 1 and role != "reference":
+            names = " and ".join(repr(column.name) for column in best)
+            what = f"{axis}.{role}" if axis else role
+            raise BadRecording(sheet.path, f"{names} may both be the {role}", f"Choose one with --map {what}={best[0].name!r}.")
+        found[axis] = sheet.usable(best[0])
+        others = [column.name for rank, column in columns if rank > least]
+        if others and role != "reference":
+            notes.append(f"{best[0].name!r} is taken as the {role}, not {', '.join(map(repr, others))}; choose with --map")
+    return found
+
+
+def _named(sheet: Sheet, found: dict[str, Found], notes: list[str]) -> dict[str, Found]:
+    """The same with a name for every axis; raises BadRecording if no axis has both input and output."""
+    inputs, outputs = found["input"], found["output"]
+    if len(inputs) == len(outputs) == 1 and set(inputs) != set(outputs) and ("" in inputs or "" in outputs or not _contract(sheet)):
+        axis = next((name for name in (*outputs, *inputs) if name), "x")
+        inputs, outputs = {axis: next(iter(inputs.values()))}, {axis: next(iter(outputs.values()))}
+        references = found["reference"]
+        found = {"input": inputs, "output": outputs, "reference": {axis: next(iter(references.values()))} if len(references) == 1 else references}
+    axes = [axis for axis in found["input"] if axis in found["output"]]
+    if not axes:
+        raise BadRecording(sheet.path, f"no axis has both voltage and position; {sheet.names()}", EXAMPLE)
+    if set(found["input"]) != set(found["output"]):
+        notes.append(f"only {', '.join(_axis(axis) for axis in axes)} has both voltage and position; the others are left out")
+    return {role: {_axis(axis): column for axis, column in columns.items()} for role, columns in found.items()}
+
+
+def _axis(name: str) -> str:
+    return f"axis{name}" if name.isdigit() else name or "x"

@@ -1,0 +1,71 @@
+"""What a file holds before anybody says what it means: columns with a name, perhaps a unit, and numbers or words."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from xy_sysid.errors import BadRecording
+from xy_sysid.samples.block import FloatArray
+
+WORD = re.compile(r"[^\W_]+")
+CAMEL = re.compile(r"(?<=[a-zà-ÿ0-9])(?=[A-ZÀ-Þ][a-zà-ÿ])|(?<=[a-zà-ÿ])(?=[A-ZÀ-Þ])")
+MANY = 12  # names said in one line
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """name: as the file has it; unit: as the file says, "" for nothing; values: (n,), not a number where there is none; words: text instead."""
+
+    name: str
+    unit: str
+    values: FloatArray
+    words: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Sheet:
+    """The columns of one file.
+
+    fs: Hz, if the file says it; kind: what the file calls a column; notes: what was odd
+    bad: what stands in a cell that is no number, by column: said when the column is to be used
+    """
+
+    path: Path
+    columns: tuple[Column, ...]
+    kind: str = "column"
+    fs: float | None = None
+    notes: tuple[str, ...] = ()
+    bad: dict[str, str] = field(default_factory=dict)
+
+    def names(self) -> str:
+        """For people: the columns there are."""
+        shown = [column.name for column in self.columns]
+        return "it has " + (", ".join(shown[:MANY]) + (f" and {len(shown) - MANY} more" if len(shown) > MANY else "") or "nothing")
+
+    def find(self, name: str) -> Column:
+        """The column of that name, in this spelling or another (case, blanks, signs), or of that number (1 is the first)."""
+        for same in (lambda one: one == name, lambda one: one.casefold() == name.casefold(), lambda one: spoken(one) == spoken(name) != ()):
+            found = [column for column in self.columns if same(column.name)]
+            if len(found) > 1:
+                raise BadRecording(self.path, f"the {self.kind} {name!r} is there twice", "Give every column its own name.")
+            if found:
+                return self.usable(found[0])
+        number = name.removeprefix("#")
+        if number.isascii() and number.isdigit() and 1 <= int(number[:9]) <= len(self.columns):
+            return self.usable(self.columns[int(number) - 1])
+        raise BadRecording(self.path, f"no {self.kind} {name!r}; {self.names()}", "See xy-sysid columns FILE.")
+
+    def usable(self, column: Column) -> Column:
+        """The column; raises BadRecording if it holds something that is not a number."""
+        if column.name in self.bad:
+            raise BadRecording(self.path, self.bad[column.name], "Correct or delete that row, or choose another column.")
+        if sum(other.name == column.name for other in self.columns) > 1:
+            raise BadRecording(self.path, f"row 1: the {self.kind} {column.name!r} is there twice", "Give every column its own name.")
+        return column
+
+
+def spoken(name: str) -> tuple[str, ...]:
+    """The words of a name, small: "Motor_Voltage", "motorVoltage" and "MOTOR VOLTAGE" are one."""
+    return tuple(word.casefold() for part in CAMEL.split(name) for word in WORD.findall(part))

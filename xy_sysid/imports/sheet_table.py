@@ -1,0 +1,202 @@
+"""A sheet, with its roles --> Table: instants in seconds, values in SI, a column for each joint."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+
+from xy_sysid.errors import BadInput, BadRecording
+from xy_sysid.imports.foreign_units import COUNTS, MOTIONS, Unit, to_si, unit_of
+from xy_sysid.imports.names import meaning, usual_unit
+from xy_sysid.imports.reading import Reading
+from xy_sysid.imports.roles import Found, Roles, assigned
+from xy_sysid.imports.sheet import Column, Sheet, spoken
+from xy_sysid.imports.table import Table
+from xy_sysid.samples.block import FloatArray
+
+EPOCHS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"))  # a clock that reads more than this counts no seconds since 1970
+MEASURED = {"measured", "meas", "actual", "act", "feedback", "fb", "ist"}  # words of an input that was read, not commanded
+JOINTS = 64  # more names than that are no joints
+
+
+def table(sheet: Sheet, reading: Reading, notes: list[str]) -> Table:
+    """What the sheet says about a recording; raises BadRecording that names the columns there are."""
+    notes += sheet.notes
+    roles = assigned(sheet, reading, notes)
+    if roles.joint is not None:
+        roles = _by_joint(sheet, roles, notes)
+    axes = tuple(axis for axis in roles.inputs if axis in roles.outputs)
+    time, fs = _time(sheet, roles, reading, notes)
+    u, input_unit = _values(sheet, "input", roles.inputs, axes, reading, notes)
+    y, output_unit = _values(sheet, "output", roles.outputs, axes, reading, notes)
+    reference = None
+    if axes and all(axis in roles.references for axis in axes):
+        r, unit = _values(sheet, "reference", roles.references, axes, reading, [])
+        reference = r if unit == output_unit else None
+    read = [column.name for axis, column in roles.inputs.items() if axis in axes and MEASURED & set(spoken(column.name))]
+    if read:
+        notes.append(f"the input {', '.join(map(repr, read))} was measured, so it is hardly held from sample to sample: fit it with --set hold=none")
+    if roles.guessed:
+        notes.append(_taken(roles, axes, {"input": input_unit, "output": output_unit}))
+    return Table(
+        axes=axes,
+        time=time,
+        fs=fs,
+        seq=None if roles.seq is None or reading.rate is not None else roles.seq.values,
+        input=u,
+        output=y,
+        reference=reference,
+        input_unit=input_unit.name,
+        output_unit=output_unit.name,
+        measured=output_unit.quantity if output_unit.quantity in MOTIONS else "position",
+    )
+
+
+def _time(sheet: Sheet, roles: Roles, reading: Reading, notes: list[str]) -> tuple[FloatArray | None, float | None]:
+    """Instants in s, or None with the rate."""
+    if reading.rate is not None:
+        if roles.time is not None:
+            notes.append(f"the samples are taken as they stand, {reading.rate:g} Hz; the time {roles.time.name!r} is not used")
+        return None, reading.rate
+    if roles.time is None:
+        if sheet.fs is None and roles.seq is None:
+            raise BadRecording(sheet.path, f"no time {sheet.kind}; {sheet.names()}", "Name it with --map time=..., or give --rate in Hz.")
+        return None, sheet.fs
+    values, unit = roles.time.values, reading.unit("time") or roles.time.unit
+    if roles.time.words:
+        return _dates(sheet, roles.time), sheet.fs
+    if not unit:
+        known = meaning(roles.time.name, "")
+        unit = "" if known is None else known.unit
+    largest = float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))
+    if not unit:
+        unit = next((name for least, name in EPOCHS if largest > least), "s")
+        if unit != "s":
+            notes.append(f"the time {roles.time.name!r} reads {largest:.4g}: it is taken as {unit} since 1970")
+    seconds = in_seconds(sheet.path, values * (reading.scale("time") or 1.0), unit, notes)
+    if largest > EPOCHS[0][0]:  # a clock of ns since 1970 keeps them only as long as it is not a double of seconds
+        seconds = (values - values[np.isfinite(values)][0]) * unit_of(unit).scale
+    return seconds, sheet.fs
+
+
+def in_seconds(path: Path, values: FloatArray, unit: str, notes: list[str]) -> FloatArray:
+    """Instants in s; raises BadRecording for a unit that is none of time."""
+    seconds, found = to_si(values, unit, "time", notes)
+    if found.quantity != "time":
+        raise BadRecording(path, f"the unit {unit!r} of the time is none of time", "Give s, ms, us, ns, min or h with --unit time=...")
+    return seconds
+
+
+def _dates(sheet: Sheet, column: Column) -> FloatArray:
+    """Seconds from dates like 2026-03-01T12:00:00.001, counted from the first."""
+    found: list[datetime] = []
+    for number, text in enumerate(column.words, 1):
+        try:
+            one = datetime.fromisoformat(text)
+        except ValueError:
+            act = "Give seconds, or dates like 2026-03-01T12:00:00.001."
+            raise BadRecording(sheet.path, f"the time {column.name!r} is {text[:40]!r} in sample {number}", act) from None
+        found.append(one if one.tzinfo else one.replace(tzinfo=UTC))
+    return np.array([(one - found[0]).total_seconds() for one in found])
+
+
+def _values(sheet: Sheet, role: str, columns: Found, axes: tuple[str, ...], reading: Reading, notes: list[str]) -> tuple[FloatArray, Unit]:
+    """(n, axes) in SI, and the unit that they share."""
+    found: list[FloatArray] = []
+    units: dict[str, Unit] = {}
+    texts: set[str] = set()
+    said: list[str] = []
+    for axis in axes:
+        column = columns[axis]
+        if column.words:
+            raise BadRecording(sheet.path, f"the {sheet.kind} {column.name!r} holds words ({column.words[0][:20]!r})", "Choose one of numbers.")
+        text = reading.unit(role, axis) or column.unit or _usual(column, role)
+        scale = reading.scale(role, axis)
+        told: list[str] = []
+        values, text = scaled(column.values, text, scale, f"the {role} of {axis}", told)
+        values, unit = to_si(values, text, f"the {role}", told)
+        found.append(values)
+        units[axis] = unit
+        texts.add(text)
+        said += told
+    if len({unit.name for unit in units.values()}) > 1:
+        given = ", ".join(sorted(texts))
+        raise BadRecording(sheet.path, f"axes in different units ({given})", "Give all axes of one kind the same unit, or choose some with --axis.")
+    if len({len(one) for one in found}) > 1:
+        lengths = ", ".join(f"{columns[axis].name} {len(one)}" for axis, one in zip(axes, found, strict=True))
+        raise BadRecording(sheet.path, f"lengths differ: {lengths}", "Give one row per sample.")
+    notes += dict.fromkeys(said)
+    return np.column_stack(found), units[axes[0]]
+
+
+def scaled(values: FloatArray, text: str, scale: float | None, what: str, notes: list[str]) -> tuple[FloatArray, str]:
+    """Values times a factor, and the unit they then have: counts and unknown units become SI."""
+    if scale is None:
+        return values, text
+    unit = unit_of(text)
+    after = unit.name.replace(COUNTS, "m") if unit.quantity != "unknown" else "V" if " input" in f" {what}" else "m"
+    if unit.quantity == "unknown" or unit.name.startswith(COUNTS):
+        notes.append(f"{what}: {text} times {scale:g} is in {after}")
+        text = after
+    else:
+        notes.append(f"{what} is multiplied by {scale:g}")
+    return values * scale, text
+
+
+def _usual(column: Column, role: str) -> str:
+    known = meaning(column.name, "")
+    if known is None or known.role not in (role, "reference"):
+        return "V" if role == "input" else "m"
+    if known.unit:
+        return known.unit
+    return usual_unit(column.name, known) if known.role == role else "m"
+
+
+def _taken(roles: Roles, axes: tuple[str, ...], units: Mapping[str, Unit]) -> str:
+    """What was understood, for people to check."""
+    said = [] if roles.time is None else [f"time = {roles.time.name!r}"]
+    for axis in axes:
+        for role, columns in roles.sides():
+            if axis in columns:
+                said.append(f"{axis}.{role} = {columns[axis].name!r}" + (f" in {units[role].name}" if role in units else ""))
+    return f"by their names: {', '.join(said)} (choose others with --map and --unit)"
+
+
+def _by_joint(sheet: Sheet, roles: Roles, notes: list[str]) -> Roles:
+    """A row for each joint at each instant --> a column for each joint; what a joint lacks is not a number."""
+    joint, time = roles.joint, roles.time
+    assert joint is not None
+    words = np.array(joint.words or [f"{value:g}" for value in joint.values.tolist()])
+    names = list(dict.fromkeys(words.tolist()))
+    if len(names) > JOINTS:
+        raise BadRecording(
+            sheet.path, f"the {sheet.kind} {joint.name!r} names {len(names)} joints", "Choose the column of joint names with --map joint=..."
+        )
+    rows = {name: np.flatnonzero(words == name) for name in names}
+    instants = None if time is None else np.unique(time.values[np.isfinite(time.values)])
+    longest = max(len(found) for found in rows.values())
+
+    def spread(column: Column, name: str) -> Column:
+        here = rows[name]
+        if instants is None or time is None:
+            place, size = np.arange(len(here)), longest
+        else:
+            here = here[np.isfinite(time.values[here])]
+            place, size = np.searchsorted(instants, time.values[here]), len(instants)
+        values = np.full(size, np.nan)
+        values[place[::-1]] = column.values[here[::-1]]  # of two samples of one instant the first is kept
+        return replace(column, name=f"{name} {column.name}", values=values, unit=column.unit)
+
+    def all_joints(columns: Found) -> Found:
+        return {name: spread(next(iter(columns.values())), name) for name in names} if columns else {}
+
+    if len(roles.inputs) > 1:
+        raise BadInput("--map", "several axes beside a column of joint names", "input=, output= without an axis", "Name one column for all joints.")
+    notes.append(f"a row for each joint: {', '.join(names)} become the axes")
+    inputs, outputs, references = (all_joints(columns) for columns in (roles.inputs, roles.outputs, roles.references))
+    clock = None if instants is None or time is None else replace(time, values=instants)
+    return replace(roles, time=clock, seq=None, inputs=inputs, outputs=outputs, references=references)

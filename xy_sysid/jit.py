@@ -1,0 +1,77 @@
+"""numba's njit with types: compiled to machine code at first use, and kept on disk for the next process.
+
+Also from text: a loop that is written from laws becomes a function through Python's own import machinery, under a name that
+carries the check sum of every text that has a part in it, so that a changed law is never run stale.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.abc
+import importlib.util
+import inspect
+from collections.abc import Callable, Iterable, Mapping
+from types import CodeType, ModuleType
+from typing import Any, ParamSpec, TypeVar, cast
+
+import numba
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+REORDERED = frozenset({"contract", "reassoc", "arcp", "nsz"})
+
+
+def compiled(function: Callable[P, R], exact: bool = True) -> Callable[P, R]:
+    """The same function, compiled. Results repeat bit for bit on one machine: strict IEEE arithmetic, or, if not exact, sums and
+    products in an order that the compiler chooses, up to twice as fast (infinities and what is not a number stay what they are)."""
+    return cast("Callable[P, R]", numba.njit(cache=True, fastmath=False if exact else set(REORDERED))(function))
+
+
+class TextLoader(importlib.abc.InspectLoader):
+    """A module whose source is a text in memory and whose names are given; file: where numba's cache is to be kept beside."""
+
+    def __init__(self, source: str, file: str, names: Mapping[str, object]) -> None:
+        self.source, self.file, self.names = source, file, names
+
+    def get_source(self, fullname: str) -> str:
+        return self.source
+
+    def get_code(self, fullname: str) -> CodeType:
+        return self.source_to_code(self.source, self.file)  # numba's cache asks for a file that is there
+
+    def exec_module(self, module: ModuleType) -> None:
+        module.__dict__.update(self.names)
+        super().exec_module(module)
+
+
+def module_text(item: object) -> str:
+    """Source of the module that a function is from, and of a text its name, for which compiled code asks; of what was typed in, its own."""
+    module = inspect.getmodule(item)
+    loader = getattr(module, "__loader__", None)
+    if module is not None and isinstance(loader, TextLoader):
+        return f"# {module.__name__}\n{loader.source}"
+    return inspect.getsource(module or cast("Callable[..., Any]", item))
+
+
+def compiled_text(text: Callable[[str], str], names: Mapping[str, object], parts: Iterable[str], exact: bool = True) -> Callable[..., Any]:
+    """The function that ``text(name)`` defines; compiling happens at its first call, or never if the disk has it.
+
+    names: what the text may call; parts: every other text on which its code depends; exact: see ``compiled``. numba keeps the code
+    beside the file in which ``text`` is written, and finds it again by that file's module.
+    """
+    total = hashlib.sha256(text("loop").encode())
+    for part in (*sorted(set(parts)), "" if exact else repr(sorted(REORDERED))):
+        total.update(part.encode())
+    name = f"run_{total.hexdigest()[:16]}"
+    loader = TextLoader(text(name), inspect.getfile(text), {**names, "__name__": text.__module__})
+    spec = importlib.util.spec_from_loader(f"{text.__module__}_{name}", loader)
+    assert spec is not None
+    made = importlib.util.module_from_spec(spec)
+    loader.exec_module(made)
+    function: Callable[..., Any] = made.__dict__[name]
+    try:
+        return compiled(function, exact)
+    except RuntimeError:  # no folder that numba may write to: compile for this process only
+        return cast("Callable[..., Any]", numba.njit(fastmath=False if exact else set(REORDERED))(function))

@@ -1,0 +1,9 @@
+"""The online logic: told of samples and of time, it asks for neither.
+
+identifier:      samples in, requests for fits out
+fitter:          fits that follow one another
+resonance_watch: has a resonance moved away
+messages:        what goes on the topics, as plain numbers and words
+diagnoser:       what a live diagnosis does when
+replay:          the same logic on blocks from anywhere
+"""

@@ -1,0 +1,222 @@
+"""Fits that follow one another: warm starts, the watch on a resonance, and what is to be published.
+
+``LiveFitter.fit(request)`` depends only on the requests so far, in their order, so that a replay repeats it bit for bit.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from xy_sysid.errors import BadInput
+from xy_sysid.fitting import identify
+from xy_sysid.fitting.choose_orders import choose
+from xy_sysid.fitting.modes import pole_estimates
+from xy_sysid.fitting.result import Fit, Interval
+from xy_sysid.fitting.structure import FitOptions, Structure, structure_from
+from xy_sysid.live.identifier import AxisRequest, FitRequest
+from xy_sysid.live.messages import ERROR, OK, WARN, ArrayMessage, StatusMessage, comparison_message, frf_message, transfer_function_message
+from xy_sysid.live.resonance_watch import Resonance, Track, alarm_sentence, follow
+from xy_sysid.response.frf import FrequencyResponse
+from xy_sysid.response.h1 import H1Options, frequency_response
+from xy_sysid.response.spectra import RunningSpectra, State, Transformer
+from xy_sysid.response.windows import Window, WindowShape
+from xy_sysid.samples.block import FloatArray, columns, unpack
+from xy_sysid.samples.pairing import QUANTITIES, Pairer
+from xy_sysid.samples.ring import RATE_SAMPLES
+from xy_sysid.settings import IdentifierSettings
+
+LIGHT_DAMPING = 0.4  # a pole pair with more damping is no resonance to be watched
+FIRST_FITS = 3  # fits in which a warm start that noise does not explain is checked against a cold one,
+LATER_DOUBT = 15  # and every so many later: an axis with friction is never explained by noise, and a cold start is slow
+OPTIONS = FitOptions(relative_change=1e-6)  # of the cost: a hundredth of a standard error is left at the most
+GOOD_ERROR = 0.05  # relative error above which the sentence of an axis says that the model does not fit yet
+
+
+@dataclass(frozen=True, slots=True)
+class AxisUpdate:
+    """One axis after a fit; ``fit`` is None and ``problem`` says why when it could not be tried."""
+
+    frf: FrequencyResponse
+    fit: Fit | None
+    track: Track
+    windows: int
+    dropped: dict[str, int]
+    problem: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Update:
+    """All axes after one request."""
+
+    request: FitRequest
+    axes: dict[str, AxisUpdate]
+
+    def arrays(self) -> list[ArrayMessage]:
+        """The array topics, in a fixed order."""
+        found: list[ArrayMessage] = []
+        for axis, update in self.axes.items():
+            found.append(frf_message(axis, update.frf))
+            if update.fit is not None and update.fit.converged:
+                found.append(transfer_function_message(axis, update.fit.tf))
+                found.append(comparison_message(axis, update.fit))
+        return found
+
+    def statuses(self) -> list[StatusMessage]:
+        """``metrics``: one status per axis."""
+        return [_status(axis, update, self.request) for axis, update in self.axes.items()]
+
+
+class LiveFitter:
+    """Keeps the last model of each axis as the next start, and its resonance's history."""
+
+    def __init__(self, settings: IdentifierSettings) -> None:
+        self._settings = settings
+        self._structures: dict[str, Structure] = {}
+        self._last: dict[str, Fit] = {}
+        self._tracks: dict[str, Track] = {}
+
+    def fit(self, request: FitRequest) -> Update:
+        """Fit every axis of the request."""
+        return Update(request, {axis: self._axis(axis, asked, request.number) for axis, asked in request.axes.items()})
+
+    def reset(self) -> None:
+        """Forget models and references."""
+        self._structures.clear()
+        self._last.clear()
+        self._tracks.clear()
+
+    def references(self) -> dict[str, Resonance]:
+        """The resonance that each axis is watched against."""
+        return {axis: track.reference for axis, track in self._tracks.items() if track.reference}
+
+    def restore(self, references: dict[str, Resonance]) -> None:
+        """Watch against these, as before a restart."""
+        self._tracks = {axis: Track(reference=reference) for axis, reference in references.items()}
+
+    def state(self) -> State:
+        """The references as named arrays, to be kept over a restart."""
+        return {f"reference/{axis}": np.array([found.frequency, found.error]) for axis, found in self.references().items()}
+
+    def recall(self, state: State) -> None:
+        """Watch against what ``state`` gave."""
+        prefix = "reference/"
+        self.restore({name.removeprefix(prefix): Resonance(*map(float, value)) for name, value in state.items() if name.startswith(prefix)})
+
+    def _axis(self, axis: str, asked: AxisRequest, number: int) -> AxisUpdate:
+        track = self._tracks.get(axis, Track())
+        start = self._last.get(axis)
+        structure = self._structures.get(axis, structure_from(self._settings))
+        try:
+            if self._settings.orders_from_data and number & (number - 1) == 0:  # 1, 2, 4, 8, ...: twice the data may tell more
+                found = choose(asked.frf, structure_from(self._settings), thorough=False).fit
+                structure = self._structures[axis] = found.structure
+                start = found
+            doubt = number <= FIRST_FITS or number % LATER_DOUBT == 0
+            fit = identify(asked.frf, structure, start.tf if start else None, OPTIONS, doubt)
+        except BadInput as problem:
+            return AxisUpdate(frf=asked.frf, fit=None, track=track, windows=asked.windows, dropped=asked.dropped, problem=str(problem))
+        if fit.converged:
+            self._last[axis] = fit
+        overall = watched(fit)
+        track = follow(track, overall, self._recent(asked, fit, track), asked.windows, self._settings.alarm_sigma)
+        self._tracks[axis] = track
+        return AxisUpdate(frf=asked.frf, fit=fit, track=track, windows=asked.windows, dropped=asked.dropped)
+
+    def _recent(self, asked: AxisRequest, fit: Fit, track: Track) -> Resonance | None:
+        if asked.recent is None or not fit.converged:
+            return None
+        try:
+            poles = pole_estimates(asked.recent, fit.structure, fit.tf, OPTIONS)
+        except BadInput:
+            return None
+        return _light(poles, fit.frequency, track.reference.frequency if track.reference else None)
+
+
+def watched(fit: Fit, near: float | None = None) -> Resonance | None:
+    """The resonance to watch: of those in the band with little damping the least damped one, or the one nearest to ``near`` Hz."""
+    return _light(fit.intervals, fit.frequency, near)
+
+
+def _light(intervals: tuple[Interval, ...], band: FloatArray, near: float | None) -> Resonance | None:
+    found: list[tuple[float, Resonance]] = []
+    low, high = float(band[0]), float(band[-1])
+    values = {item.name: item.value for item in intervals}
+    for item in intervals:
+        if item.name.startswith("resonance_") and item.name.endswith(".frequency"):
+            damping = values[item.name.replace(".frequency", ".damping")]
+            if low <= item.value <= high and 0.0 < damping < LIGHT_DAMPING and math.isfinite(item.sigma):
+                distance = damping if near is None else abs(item.value - near)
+                found.append((distance, Resonance(item.value, item.sigma)))
+    return min(found, key=lambda pair: pair[0])[1] if found else None
+
+
+def _status(axis: str, update: AxisUpdate, request: FitRequest) -> StatusMessage:
+    fit, track = update.fit, update.track
+    values: dict[str, str] = {
+        "fit": str(request.number),
+        "windows": str(update.windows),
+        "averages": f"{update.frf.averages:.6g}",
+        "seconds of data (s)": f"{request.seconds:.6g}",
+        "sampling rate (Hz)": f"{request.sampling_rate:.9g}",
+        "input unit": update.frf.input_unit,
+        "output unit": update.frf.output_unit,
+        "dropped windows": str(sum(update.dropped.values())),
+    }
+    values |= {f"dropped windows: {reason}": str(number) for reason, number in sorted(update.dropped.items())}
+    values |= {f"stream: {reason}": str(number) for reason, number in sorted(request.faults.items())}
+    if fit is None:
+        return StatusMessage(f"axis {axis}", WARN, f"axis {axis}: no fit yet: {update.problem}", tuple(values.items()))
+    values["relative error (1)"], values["misfit (1)"] = f"{fit.relative_error:.6g}", f"{fit.misfit:.6g}"
+    for item in fit.intervals:
+        if item.name in ("delay", "gain") or "resonance" in item.name:
+            label = f"{item.name} ({item.unit or '1'})"
+            values[label] = f"{item.value:.9g}"
+            values[f"{item.name} 95 % low"], values[f"{item.name} 95 % high"] = f"{item.low:.9g}", f"{item.high:.9g}"
+    values["cost"], values["expected cost"] = f"{fit.cost:.6g}", f"{fit.expected_cost:.6g}"
+    if track.reference and track.now:
+        values["resonance watched (Hz)"], values["resonance reference (Hz)"] = f"{track.now.frequency:.6g}", f"{track.reference.frequency:.6g}"
+        values["resonance shift (Hz)"] = f"{track.shift:.6g}"
+    level, sentence = _verdict(axis, update, request)
+    return StatusMessage(f"axis {axis}", level, sentence, tuple(values.items()))
+
+
+def _verdict(axis: str, update: AxisUpdate, request: FitRequest) -> tuple[int, str]:
+    fit = update.fit
+    if update.track.alarm:
+        return ERROR, alarm_sentence(axis, update.track)
+    if fit is None or not fit.converged:
+        return WARN, f"axis {axis}: the fit did not converge: {fit.reason if fit else update.problem}"
+    if fit.relative_error > GOOD_ERROR:
+        return WARN, f"axis {axis}: relative error {100 * fit.relative_error:.2g} %; the model does not fit (yet)"
+    if any(request.faults.values()) or any(update.dropped.values()):
+        reasons = ", ".join(sorted({*request.faults, *update.dropped}))
+        return WARN, f"axis {axis}: relative error {100 * fit.relative_error:.2g} %; some data could not be used ({reasons})"
+    return OK, f"axis {axis}: relative error {100 * fit.relative_error:.2g} %"
+
+
+def warm_up(settings: IdentifierSettings) -> None:
+    """Pair made-up samples and fit a made-up response once, so that everything is compiled before data come in."""
+    rate, lines = 2000.0, 200
+    pairer = Pairer(("x",), settings.reorder)
+    for first in range(0, 3 * RATE_SAMPLES, RATE_SAMPLES):
+        seq = np.arange(first, first + RATE_SAMPLES, dtype=np.float64)
+        table = np.stack((seq, seq / rate, np.zeros(RATE_SAMPLES)), axis=1)
+        for kind in QUANTITIES:
+            pairer.feed(kind, unpack(columns(pairer.axes), RATE_SAMPLES, 3, table.ravel()))
+    shape = WindowShape.of(settings.window, settings.length, settings.overlap)
+    random = np.random.default_rng(0)
+    running = RunningSpectra(shape)
+    u = random.standard_normal((shape.length, 1))
+    y = np.concatenate((np.zeros((3, 1)), np.cumsum(u, axis=0)))[: shape.length + int(settings.differenced)]
+    transform = Transformer(shape, settings.differenced)
+    for index in range(4):
+        running.update(transform(Window(index, np.roll(u, index * 7, axis=0), y + 0.01 * random.standard_normal(y.shape)))[0])
+    frf = frequency_response(running.get(), shape, rate, H1Options(differenced=settings.differenced, band=(1.0, lines * rate / shape.length)))
+    structure = structure_from(settings)
+    try:
+        identify(frf, structure, identify(frf, structure).tf)
+    except BadInput:
+        return

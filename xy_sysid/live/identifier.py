@@ -1,0 +1,275 @@
+"""The online logic without any IO: feed(samples) -> what is due to be fitted.
+
+The same samples in any chunking, live or replayed, give the same requests, bit for bit: windows lie on a grid of the
+sample counter, and a fit falls due after a set number of seconds of data, never of clock.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from xy_sysid.errors import BadInput
+from xy_sysid.response.frf import FrequencyResponse
+from xy_sysid.response.h1 import H1Options, frequency_response
+from xy_sysid.response.spectra import RunningSpectra, State, Transformer
+from xy_sysid.response.window_check import window_fault
+from xy_sysid.response.windows import Window, Windower, WindowShape
+from xy_sysid.samples.block import Block, Samples
+from xy_sysid.samples.pairing import RATE_TOLERANCE, Gap, Pairer, Quantity
+from xy_sysid.samples.rate import StampLine
+from xy_sysid.settings import IdentifierSettings
+from xy_sysid.units import USUAL, Units
+
+STATE_VERSION = 1
+CUTS = ("time_jump", "restart", "unequal_rates")  # gaps after which stamps lie on another line
+
+
+@dataclass(frozen=True, slots=True)
+class AxisRequest:
+    """What one axis has to be fitted with.
+
+    frf:     from all that is remembered
+    recent:  from the newest ``alarm_windows`` windows, None before there are so many
+    windows: windows used so far; dropped: windows not used, by reason
+    """
+
+    frf: FrequencyResponse
+    recent: FrequencyResponse | None
+    windows: int
+    dropped: dict[str, int] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class FitRequest:
+    """A fit is due.
+
+    number: counts the requests from 1; seq: counter of the first sample after the newest window
+    seconds: of data heard; faults: samples or blocks not used, by reason
+    """
+
+    number: int
+    seq: int
+    seconds: float
+    sampling_rate: float
+    axes: dict[str, AxisRequest]
+    faults: dict[str, int]
+
+
+class Identifier:
+    """Pairs, cuts windows, runs spectra; ``feed`` gives the fits that fall due."""
+
+    def __init__(self, settings: IdentifierSettings, axes: tuple[str, ...], units: Units = USUAL) -> None:
+        if not axes:
+            raise BadInput("axes", "empty", "one name or more", "Name the axes, for example x and y.")
+        if settings.response != "h1":
+            act = "Record with the reference, and use it offline: xy-sysid fit REC --set response=joint_input_output."
+            raise BadInput("response", settings.response, "h1 while data come in", act)
+        self.settings = settings
+        self.axes = axes
+        self._units = units
+        self._shape = WindowShape.of(settings.window, settings.length, settings.overlap)
+        self._transform = Transformer(self._shape, settings.differenced)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything that was heard."""
+        self._pairer: Pairer | None = None
+        self._rate: float | None = None
+        self._line = StampLine()
+        self._windower = Windower(self._shape, len(self.axes), int(self.settings.differenced))
+        self._main: dict[str, RunningSpectra] = {}
+        self._recent: dict[str, RunningSpectra] = {}
+        self._used: Counter[str] = Counter()
+        self._dropped: dict[str, Counter[str]] = {axis: Counter() for axis in self.axes}
+        self._counts: Counter[str] = Counter()
+        self._said: dict[str, str] = {}
+        self._samples = 0
+        self._slot = -1
+        self._number = 0
+
+    def change(self, settings: IdentifierSettings) -> None:
+        """Use other settings from now on that leave the spectra what they are (band, refit, coherence, frozen)."""
+        self.settings = settings
+
+    @property
+    def sampling_rate(self) -> float | None:
+        """Hz, from all stamps of the samples in the windows; None until it is known."""
+        return self._rate and (self._line.rate or self._rate)
+
+    @property
+    def samples(self) -> int:
+        """Paired samples heard."""
+        return self._samples
+
+    @property
+    def faults(self) -> dict[str, int]:
+        """What was wrong with the streams, counted by reason."""
+        return dict(self._counts + (self._pairer.counts if self._pairer else Counter()))
+
+    @property
+    def sentences(self) -> dict[str, str]:
+        """The newest sentence for each reason."""
+        return (self._pairer.said if self._pairer else {}) | self._said
+
+    @property
+    def windows(self) -> dict[str, int]:
+        """Windows used, by axis."""
+        return {axis: self._used[axis] for axis in self.axes}
+
+    @property
+    def dropped(self) -> dict[str, dict[str, int]]:
+        """Windows not used, by axis and reason."""
+        return {axis: dict(self._dropped[axis]) for axis in self.axes}
+
+    @property
+    def waiting(self) -> dict[Quantity, int]:
+        """Newest counter of each stream; -1 is silence."""
+        return self._pairer.waiting if self._pairer else {"voltage": -1, "position": -1}
+
+    def feed(self, kind: Quantity, block: Block) -> list[FitRequest]:
+        """Take one block of one stream; the fits that fall due, in order."""
+        if self._pairer is None:
+            self._pairer = Pairer(self.axes, self.settings.reorder)
+        requests: list[FitRequest] = []
+        for event in self._pairer.feed(kind, block):
+            requests += self._gap(event) if isinstance(event, Gap) else self.take(event)
+        return requests
+
+    def take(self, samples: Samples, sampling_rate: float | None = None) -> list[FitRequest]:
+        """Take samples that are paired already; windows of samples without a known rate are counted and dropped."""
+        self._samples += len(samples)
+        if samples.time is not None and sampling_rate is None:
+            self._line.add(samples.seq, samples.time)
+        if self._rate is None:
+            self._rate = sampling_rate or (self._pairer.rate if self._pairer else None)
+        requests: list[FitRequest] = []
+        for window in self._windower.feed(samples):
+            if self._rate is None or (self._pairer is not None and sampling_rate is None and self._pairer.rate is None):
+                self._counts["no_rate"] += 1
+            else:
+                requests += self._window(window, self._follow_rate(self._rate))
+        return requests
+
+    def _follow_rate(self, before: float) -> float:
+        """The rate of the samples that come now; spectra of another one are given up, and that is said."""
+        rate = self._pairer.rate if self._pairer is not None else None
+        if rate is None or abs(rate / before - 1.0) <= RATE_TOLERANCE:
+            return before
+        self._counts["rate_changed"] += 1
+        self._said["rate_changed"] = f"the source came back at {rate:.6g} Hz, before it was {before:.6g} Hz; the spectra start anew"
+        self._rate, self._samples, self._slot, self._line = rate, 0, -1, StampLine()
+        self._main, self._recent, self._used = {}, {}, Counter()
+        return rate
+
+    def _gap(self, gap: Gap) -> list[FitRequest]:
+        touched = bool(self._windower.pending())
+        self._line.until(gap.seq)
+        if gap.reason in CUTS:
+            self._line.cut()
+        self._windower.reset()
+        for axis in self.axes:
+            self._dropped[axis][gap.reason] += int(touched)
+        return []
+
+    def _window(self, window: Window, rate: float) -> list[FitRequest]:
+        if not self._main:
+            self._start_spectra(rate)
+        frozen = max(round(self.settings.frozen * rate), 2)
+        for column, (axis, spectrum) in enumerate(zip(self.axes, self._transform(window), strict=True)):
+            fault = window_fault(window.voltage[:, column], window.position[:, column], frozen)
+            if fault is None:
+                self._main[axis].update(spectrum)
+                self._recent[axis].update(spectrum)
+                self._used[axis] += 1
+            else:
+                self._dropped[axis][fault] += 1
+        end = window.index * self._shape.hop + self._shape.length
+        self._line.until(end)
+        slot = end // max(round(self.settings.refit * rate), 1)
+        if slot == self._slot or not any(self._used.values()):
+            return []
+        self._slot = slot
+        self._number += 1
+        return [self.request(end, self._line.rate or rate)]
+
+    def _start_spectra(self, rate: float) -> None:
+        memory = self.settings.memory
+        forget = float(np.exp(-self._shape.hop / rate / memory)) if memory > 0 else 1.0
+        for axis in self.axes:
+            self._main[axis] = RunningSpectra(self._shape, forget, self.settings.sliding)
+            self._recent[axis] = RunningSpectra(self._shape, sliding=self.settings.alarm_windows)
+
+    def request(self, seq: int, rate: float) -> FitRequest:
+        """What there is to fit now."""
+        axes: dict[str, AxisRequest] = {}
+        for axis in self.axes:
+            if self._used[axis] == 0:
+                continue
+            enough = self._used[axis] >= self.settings.alarm_windows
+            axes[axis] = AxisRequest(
+                frf=self._frf(self._main[axis], rate),
+                recent=self._frf(self._recent[axis], rate) if enough else None,
+                windows=self._used[axis],
+                dropped=dict(self._dropped[axis]),
+            )
+        return FitRequest(number=self._number, seq=seq, seconds=self._samples / rate, sampling_rate=rate, axes=axes, faults=self.faults)
+
+    def _frf(self, running: RunningSpectra, rate: float) -> FrequencyResponse:
+        settings = self.settings
+        return frequency_response(
+            running.get(),
+            self._shape,
+            rate,
+            H1Options(
+                differenced=settings.differenced,
+                band=(settings.band_low, settings.band_high),
+                min_coherence=settings.min_coherence,
+                units=self._units,
+                rate_error=self._line.error,
+            ),
+        )
+
+    def state(self) -> State:
+        """Everything learnt, as named arrays, to go on after a restart."""
+        settings = self.settings
+        state: State = {
+            "version": np.array([STATE_VERSION], dtype=np.float64),
+            "axes": np.array(self.axes),
+            "key": np.array([settings.window, str(settings.length), str(settings.overlap), str(settings.differenced)]),
+            "numbers": np.array([self._rate or 0.0, self._samples, self._number], dtype=np.float64),
+            "clock": np.array([self._line.rate or 0.0, self._line.error], dtype=np.float64),
+            "used": np.array([self._used[axis] for axis in self.axes], dtype=np.float64),
+        }
+        for name, group in (("main", self._main), ("recent", self._recent)):
+            for axis, running in group.items():
+                state.update({f"{name}/{axis}/{key}": value for key, value in running.state().items()})
+        return state
+
+    def restore(self, state: State) -> None:
+        """Go on from a saved state; raises BadInput if it was made with other axes or windows."""
+        fresh = self.state()
+        for name in ("version", "axes", "key"):
+            if name not in state or not np.array_equal(state[name], fresh[name]):
+                saved = ", ".join(map(str, state.get(name, np.array(["missing"]))))
+                raise BadInput(
+                    f"saved state: {name}", saved, ", ".join(map(str, fresh[name])), "Delete the state file or restore the settings it was made with."
+                )
+        self.reset()
+        rate, samples, number = np.real(np.asarray(state["numbers"], dtype=np.float64))
+        self._rate, self._samples, self._number = (float(rate) or None), int(samples), int(number)
+        if self._rate is None:
+            return
+        self._start_spectra(self._rate)
+        clock = np.real(np.asarray(state.get("clock", np.zeros(2)), dtype=np.float64))
+        if clock[0] > 0.0:
+            self._line.start(*clock.tolist())
+        for axis, used in zip(self.axes, np.asarray(state["used"], dtype=np.float64), strict=True):
+            self._used[axis] = int(used)
+            for name, group in (("main", self._main), ("recent", self._recent)):
+                prefix = f"{name}/{axis}/"
+                arrays = {key.removeprefix(prefix): np.asarray(value) for key, value in state.items() if key.startswith(prefix)}
+                if arrays:
+                    group[axis].restore(arrays)

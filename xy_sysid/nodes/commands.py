@@ -1,0 +1,117 @@
+"""What a controller of ros2_control hears and says: one number a joint, on time, and joint states.
+
+The controllers of the kind (forward_command_controller, effort_controllers, velocity_controllers, position_controllers) take a
+``std_msgs/Float64MultiArray`` of one number a joint in their own order, without a layout, and keep to the last one they got.
+"""
+
+from __future__ import annotations
+
+import array
+import threading
+import time
+from collections.abc import Callable
+
+import numpy as np
+from rclpy.lifecycle import LifecycleNode
+from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+
+from xy_sysid.errors import BadInput
+from xy_sysid.excitation.pacing import Clock
+from xy_sysid.nodes.hearing import Ear
+from xy_sysid.samples.block import FloatArray
+from xy_sysid.samples.joint_states import joints_of
+from xy_sysid.settings import ExcitationSettings, given
+
+COMMAND_QOS = QoSProfile(depth=1, history=HistoryPolicy.KEEP_LAST, reliability=ReliabilityPolicy.RELIABLE)  # only the newest one counts
+STATE_QOS = QoSProfile(depth=10, history=HistoryPolicy.KEEP_LAST)  # only the newest one counts for guards
+BLOCK_TOPICS = ("voltage", "position", "reference")  # last parts of names under which blocks travel
+SLEEP = 0.0002  # s that a sleep may come late: the rest of the way is waited for awake
+
+
+class Commands:
+    """The controller's topic, and the positions of the axes' joints as they come."""
+
+    def __init__(
+        self, node: LifecycleNode, settings: ExcitationSettings, on_positions: Callable[[float, FloatArray], None], complain: Callable[[str], None]
+    ) -> None:
+        """on_positions: is called with the stamp, s, and (axes,) positions; complain: with a sentence. Raises BadInput for joints that do not fit."""
+        axes = tuple(settings.axes)
+        if settings.command_topic.rpartition("/")[2] in BLOCK_TOPICS:
+            raise BadInput(
+                "command_topic", repr(settings.command_topic), "the topic of a controller", "Blocks travel under this name: choose another."
+            )
+        self._joints = tuple(joints_of(axes, given(settings.joints)).values())
+        self._order = given(settings.controller_joints) or self._joints
+        missing = [joint for joint in self._joints if joint not in self._order]
+        if missing or len(set(self._order)) < len(self._order):
+            allowed = f"each joint once, with {', '.join(self._joints)} among them"
+            raise BadInput("controller_joints", ", ".join(self._order), allowed, "Write them as controllers.yaml has them.")
+        self._others = tuple(joint for joint in self._order if joint not in self._joints)
+        self._kept: dict[str, float] = {}  # where positions are sent: the others stay where they are
+        self._on_positions, self._complain, self._holds = on_positions, complain, settings.holds
+        self.publisher = node.create_publisher(Float64MultiArray, settings.command_topic, COMMAND_QOS)
+        self.states = Ear(node, JointState, settings.joint_topic, self._on_states, STATE_QOS)
+
+    def send(self, values: FloatArray) -> bool:
+        """One command: (axes,) values; nothing is sent, and False, as long as a number is not known."""
+        known = dict(zip(self._joints, values.tolist(), strict=True)) | (self._kept if self._holds else dict.fromkeys(self._others, 0.0))
+        numbers = [known.get(joint, np.nan) for joint in self._order]
+        if not np.isfinite(numbers).all():
+            return False
+        self.publisher.publish(Float64MultiArray(data=array.array("d", numbers)))
+        return True
+
+    def _on_states(self, message: JointState) -> None:
+        if len(message.position) != len(message.name):
+            self._complain(f"joint states: {len(message.name)} joints with {len(message.position)} positions")
+            return
+        places = dict(zip(message.name, message.position, strict=True))
+        missing = [joint for joint in self._joints if joint not in places]
+        if missing:
+            self._complain(f"joint states: no {', '.join(missing)} among {', '.join(message.name)}; set the parameter joints")
+            return
+        for joint in self._others:
+            if joint in places and np.isfinite(places[joint]):
+                self._kept.setdefault(joint, places[joint])
+        stamp = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
+        self._on_positions(stamp, np.array([places[joint] for joint in self._joints], dtype=np.float64))
+
+    def forget(self) -> None:
+        """Where the other joints were: they may be elsewhere by the next start."""
+        self._kept.clear()
+
+
+class Beat:
+    """A thread that calls ``step(skipped)`` once a period of the steady clock, skipped being how many periods were missed before."""
+
+    def __init__(self, period: float, step: Callable[[int], None]) -> None:
+        self.clock = Clock(period, time.monotonic())
+        self._step, self._over = step, threading.Event()
+        self._thread = threading.Thread(target=self._run, name="commands", daemon=True)
+        self._thread.start()
+
+    @property
+    def alive(self) -> bool:
+        """Whether it still beats."""
+        return self._thread.is_alive()
+
+    def close(self) -> None:
+        """No step begins after this."""
+        self._over.set()
+        if threading.current_thread() is not self._thread:
+            self._thread.join()
+
+    def _run(self) -> None:
+        while not self._over.is_set():
+            now = time.monotonic()
+            due = self.clock.due(now)
+            if due == 0:
+                wait = self.clock.start + self.clock.sent * self.clock.period - now
+                time.sleep(max(wait - SLEEP, SLEEP / 4))
+                continue
+            self.clock.sent += due - 1
+            self.clock.late += due - 1
+            self._step(due - 1)
+            self.clock.count(now)

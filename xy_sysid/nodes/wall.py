@@ -1,0 +1,56 @@
+"""Around every callback: what one message makes go wrong is told once, and the node goes on with the next.
+
+The wall stands around each callback and not around the executor, because an error that leaves a callback makes rclpy's
+EventsExecutor leave the messages that wait behind it unread (7.1.6).
+"""
+
+from __future__ import annotations
+
+import functools
+import traceback
+from collections.abc import Callable
+from types import TracebackType
+from typing import Any
+
+LONGEST = 200  # characters of an error that are told
+
+
+class Wall:
+    """``with wall: ...`` lets no error through but tells it. count: errors so far; told: the last one, empty if there was none."""
+
+    def __init__(self, say: Callable[[str], None]) -> None:
+        """say: takes the sentence, once for the same error again and again."""
+        self.count, self.told = 0, ""
+        self._say = say
+
+    def __enter__(self) -> Wall:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> bool:
+        if not isinstance(error, Exception):
+            return False
+        self.count += 1
+        words = f"a message or request could not be dealt with ({words_of(error)})"
+        if words != self.told:
+            self.told = words
+            self._say(words)
+        return True
+
+    def around(self, callback: Callable[..., Any]) -> Callable[..., Any]:
+        """The callback behind the wall; after an error it returns its last argument, which for a service is the response."""
+
+        @functools.wraps(callback)
+        def walled(*arguments: Any) -> Any:
+            with self:
+                return callback(*arguments)
+            return arguments[-1] if arguments else None
+
+        return walled
+
+
+def words_of(error: BaseException) -> str:
+    """Kind, text and place of an error in one short line."""
+    text = " ".join(str(error).split())[:LONGEST]
+    frames = traceback.extract_tb(error.__traceback__)
+    place = f", {frames[-1].name} line {frames[-1].lineno}" if frames else ""
+    return f"{type(error).__name__}{': ' if text else ''}{text}{place}"

@@ -1,0 +1,152 @@
+"""Say which column of a table is what, before it is opened: what ``xy-sysid columns`` lists, and ``--map``, ``--unit``, ``--rate`` by clicks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from nicegui import run, ui
+
+from xy_sysid.errors import BadInput, XySysidError
+from xy_sysid.imports.reading import Reading as FileReading
+from xy_sysid.page.orders import Reading
+from xy_sysid.page.session import Session
+
+if TYPE_CHECKING:
+    from xy_sysid.imports.listing import Listed, Listing
+
+NONE = "(none)"
+HEADS = ("column", "unit", "first", "least", "most", "looks like", "taken as")
+
+
+@dataclass(frozen=True, slots=True)
+class AxisColumns:
+    """What was chosen for one axis; empty units are those that the file names."""
+
+    axis: str
+    input: str
+    output: str
+    input_unit: str = ""
+    output_unit: str = ""
+
+
+def reading_of(time: str, rate: float | None, axes: Sequence[AxisColumns], usual: Reading) -> Reading:
+    """How the file is to be read, for the worker and as words for a command. Raises BadInput for what cannot be."""
+    if not time and not rate:
+        raise BadInput("time", "no column and no rate", "a column, or a rate in Hz", "Choose the column that holds the time, or give the rate.")
+    names = [one.axis for one in axes]
+    if not names or not all(names) or len(set(names)) < len(names):
+        raise BadInput("axes", ", ".join(names) or "none", "a name for each, none twice", "Name the axes, for example x and y.")
+    columns = {"time": time} if time else {}
+    units: dict[str, str] = {}
+    for one in axes:
+        for role, column, unit in (("input", one.input, one.input_unit), ("output", one.output, one.output_unit)):
+            if not column:
+                raise BadInput(f"{role} of {one.axis}", "not chosen", "a column", "Choose one.")
+            columns[f"{one.axis}.{role}"] = column
+            if unit:
+                units[f"{one.axis}.{role}"] = unit
+    FileReading(columns=columns, units=units, rate=rate)  # refuses what no reader takes
+    words = [text for what, column in columns.items() for text in ("--map", f"{what}={column}")]
+    words += [text for what, unit in units.items() for text in ("--unit", f"{what}={unit}")]
+    words += ["--rate", f"{rate:g}"] if rate else []
+    said = {"columns": columns, "units": units, **({"rate": rate} if rate else {})}
+    return replace(usual, load={**usual.load, **said}, words=(*usual.words, *words))
+
+
+def guesses(found: Listing) -> tuple[str, list[AxisColumns]]:
+    """(time, columns of each axis) as the file is read without being told; what is not known is empty."""
+    roles = {one.role: one.name for one in found.columns if one.role}
+    axes = list(dict.fromkeys(role.rpartition(".")[0] for role in roles if "." in role)) or ["x"]
+    clock = next((one.name for one in found.columns if one.looks.startswith("a clock")), "")
+
+    def column(axis: str, role: str) -> str:
+        return roles.get(f"{axis}.{role}", roles.get(role, ""))
+
+    return roles.get("time", clock), [AxisColumns(axis, column(axis, "input"), column(axis, "output")) for axis in axes]
+
+
+async def columns_dialog(session: Session, name: str) -> None:
+    """Show what is in a table of the shelf, let the user say what is what, and open it."""
+    try:
+        path = session.shelf.find(name)
+        waiting = ui.notification(f"Reading the columns of {name} ...", spinner=True, timeout=None)
+        try:
+            found: Listing | None = await run.io_bound(_listed, path)
+        finally:
+            waiting.dismiss()
+    except (XySysidError, OSError) as problem:
+        session.say(str(problem))
+        return
+    if found is not None:
+        ColumnsDialog(session, name, found)
+
+
+class ColumnsDialog:
+    """The table of columns, a row of choices for each axis, and Open."""
+
+    def __init__(self, session: Session, name: str, found: Listing) -> None:
+        self._session, self._name = session, name
+        self._names = [one.name for one in found.columns if one.looks not in ("words", "no numbers")]
+        self._rows: list[dict[str, Any]] = []
+        time, axes = guesses(found)
+        with ui.dialog() as self._dialog, ui.element("div").classes("card wide").props('data-part="columns"'):
+            ui.html("<h2>Which column is what?</h2>", sanitize=False)
+            told = f"reads as {found.reads}. Change what is wrong." if found.reads else "its names do not tell. Choose what is what, and the units."
+            ui.label(f"{name}: {told}").classes("soft small")
+            heads = [{"name": head, "label": head, "field": head, "align": "left"} for head in HEADS]
+            ui.table(columns=heads, rows=[dict(zip(HEADS, _cells(one), strict=True)) for one in found.columns]).props("dense flat").classes("columns")
+            with ui.element("div").classes("buttons"):
+                self._time = self._column("time", time)
+                self._rate = ui.number("or rate (Hz)", value=None, min=0).props('outlined dense data-pick="rate"')
+            self._axes = ui.element("div").classes("stack")
+            for one in axes:
+                self._add(one)
+            with ui.element("div").classes("buttons"):
+                ui.button("Open", on_click=self._open).props('unelevated data-pick="open"')
+                ui.button("Another axis", on_click=lambda: self._add(AxisColumns("", "", ""))).props("flat")
+                ui.button("Cancel", on_click=self._dialog.close).props("flat")
+        self._dialog.on("hide", self._dialog.delete)
+        self._dialog.open()
+
+    def _column(self, role: str, value: str) -> ui.select:
+        chosen = value if value in self._names else NONE
+        return ui.select([NONE, *self._names], value=chosen, label=role).props(f'outlined dense data-pick="{role}"').classes("pick")
+
+    def _add(self, one: AxisColumns) -> None:
+        with self._axes, ui.element("div").classes("buttons"):
+            row = {
+                "axis": ui.input("axis", value=one.axis).props('outlined dense data-pick="axis"').classes("narrow"),
+                "input": self._column("input", one.input),
+                "input_unit": ui.input("its unit", placeholder="V, A, N m ...").props('outlined dense data-pick="input-unit"').classes("narrow"),
+                "output": self._column("output", one.output),
+                "output_unit": ui.input("its unit", placeholder="mm, rad, m/s ...").props('outlined dense data-pick="output-unit"').classes("narrow"),
+            }
+        self._rows.append(row)
+
+    def _open(self) -> None:
+        axes = [AxisColumns(**{name: _text(element.value) for name, element in row.items()}) for row in self._rows]
+        try:
+            reading = reading_of(_text(self._time.value), self._rate.value or None, axes, self._session.reading)
+            self._session.open(self._session.shelf.find(self._name), self._name, reading)
+        except XySysidError as problem:
+            self._session.say(str(problem))
+            ui.notify(str(problem), type="negative", multi_line=True)
+            return
+        self._dialog.close()
+
+
+def _listed(path: Any) -> Listing:
+    from xy_sysid.imports.listing import listing
+
+    return listing(path)
+
+
+def _text(value: object) -> str:
+    return "" if value is None or value == NONE else str(value).strip()
+
+
+def _cells(one: Listed) -> tuple[str, ...]:
+    figures = ("" if value is None else f"{value:.5g}" if isinstance(value, float) else str(value)[:40] for value in (one.first, one.low, one.high))
+    return one.name, one.unit, *figures, one.looks, one.role

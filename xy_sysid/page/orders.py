@@ -1,0 +1,120 @@
+"""What a page can ask for and how far it is: plain values that go to the worker and back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal, Protocol
+
+OrderKind = Literal["begin", "diagnose", "add", "remove", "next", "auto", "reset"]
+
+DOING = {
+    "begin": "fitting the rigid base",
+    "diagnose": "looking for what is missing",
+    "add": "adding {}",
+    "remove": "taking out {}",
+    "next": "finding the next effect",
+    "auto": "adding effects until the floor is reached",
+    "reset": "going back to the rigid base",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """One order for one axis; argument: the effect's name for add and remove. number: grows with every order."""
+
+    number: int
+    act: OrderKind
+    axis: str = ""
+    argument: str = ""
+
+    @property
+    def words(self) -> str:
+        """What is being done."""
+        return DOING[self.act].format(self.argument.replace("_", " "))
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """How a recording is read. load: arguments of ``imports.load``; words: the same for a command; effect_files: effects of one's own."""
+
+    load: Mapping[str, Any] = field(default_factory=dict)
+    words: tuple[str, ...] = ()
+    effect_files: tuple[Path, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class WorkerNews:
+    """What the worker says. kind: opened (axes in content), progress (part), story (document), done, failed."""
+
+    kind: Literal["opened", "progress", "story", "done", "failed", "closed"]
+    order: int = 0
+    axis: str = ""
+    words: str = ""
+    part: float | None = None
+    content: Any = None
+
+
+@dataclass(frozen=True, slots=True)
+class OrderState:
+    """An order that is being fulfilled or waits; begun: seconds on the page's clock; part: 0..1 or None when nobody knows."""
+
+    order: Order
+    begun: float
+    part: float | None = None
+    running: bool = False
+    said: str = ""
+
+    @property
+    def words(self) -> str:
+        """What is being done."""
+        return self.said or self.order.words
+
+
+class Source(Protocol):
+    """Where an axis' story comes from: a recording, or the machine as it runs."""
+
+    key: str
+    title: str
+    live: bool
+
+    def axes(self) -> tuple[str, ...]:
+        """Its axes, in order."""
+        ...
+
+    def document(self, axis: str) -> dict[str, Any] | None:
+        """The story as it is now."""
+        ...
+
+    def stamp(self, axis: str) -> int:
+        """Grows whenever the document or the jobs of the axis change."""
+        ...
+
+    def job(self, axis: str) -> OrderState | None:
+        """What is being done for the axis."""
+        ...
+
+    def ready(self, axis: str) -> bool:
+        """Whether something can be asked for."""
+        ...
+
+    def words(self, axis: str) -> str:
+        """What there is to say while there is no story."""
+        ...
+
+    def effects(self) -> tuple[str, ...]:
+        """Names of all effects that can be added."""
+        ...
+
+    def problem(self) -> str:
+        """Why there is nothing (more) to come; empty while all is well."""
+        ...
+
+    def ask(self, act: OrderKind, axis: str, argument: str = "") -> None:
+        """Order something; raises BadInput for what cannot be asked for."""
+        ...
+
+    def cancel(self, axis: str) -> None:
+        """Leave what is being done for the axis."""
+        ...

@@ -1,0 +1,211 @@
+"""What came over the topics, and what that means now: who is there, who is lost, where a resonance has been. Pure; time is told."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections import deque
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from xy_sysid.linear.transfer_function import TransferFunction
+from xy_sysid.live.messages import ArrayMessage, StatusMessage, read_transfer_function, topic_of
+from xy_sysid.samples.block import FloatArray
+from xy_sysid.units import USUAL, Units
+
+LOST = 4.0  # s without a word or a place in the graph after which a node is called lost
+HISTORY = 2000  # resonances remembered for each axis
+KNOWN = ("excitation", "identifier", "ballscrew", "diagnoser", "recorder")
+SPEAKER = {"streams": "identifier"}  # who sends a status that does not have its own name
+OFTEN = {"excitation", "ballscrew", "identifier"}  # say something at least once a second
+
+
+@dataclass(frozen=True, slots=True)
+class Tracked:
+    """One look at the resonance: seconds of data, Hz, its 95 % interval, the reference, and whether the alarm was on."""
+
+    seconds: float
+    frequency: float
+    reference: float
+    alarm: bool
+
+
+@dataclass(frozen=True, slots=True)
+class NodeState:
+    """One node as the page tells of it. level: 0 well, 1 of note, 2 wrong, 3 silent or lost."""
+
+    name: str
+    level: int
+    words: str
+    lost: bool
+
+
+@dataclass
+class TopicsState:
+    """The newest of everything; ``version`` grows with each message of its kind, so that a page knows when to draw again.
+
+    One thread writes and others read: whoever walks through a table copies it first.
+    """
+
+    arrays: dict[str, ArrayMessage] = field(default_factory=dict)
+    statuses: dict[str, StatusMessage] = field(default_factory=dict)
+    when: dict[str, float] = field(default_factory=dict)
+    stories: dict[str, dict[str, Any]] = field(default_factory=dict)
+    resonances: dict[str, deque[Tracked]] = field(default_factory=dict)
+    present: dict[str, float] = field(default_factory=dict)
+    lifecycle: str = ""
+    progress: tuple[str, float] = ("", 0.0)
+    version: dict[str, int] = field(default_factory=dict)
+
+    def axes(self) -> tuple[str, ...]:
+        """Axes of which something was heard, in the order of their names."""
+        return tuple(sorted({self._axis(topic.partition("/")[2]) for topic in list(self.arrays)} | self._named()))
+
+    def table(self, kind: str, axis: str) -> ArrayMessage | None:
+        """The newest of ``frf``, ``comparison``, ``transfer_function`` or ``error_ladder`` of an axis."""
+        return self.arrays.get(topic_of(kind, axis))
+
+    def _named(self) -> set[str]:
+        """Axes that were named by a status or a story."""
+        return {name.removeprefix("axis ") for name in list(self.statuses) if name.startswith("axis ")} | set(self.stories)
+
+    def _axis(self, end: str) -> str:
+        """The axis whose topics end so: joint-2 of frf/joint_2, as no topic can be called like the axis."""
+        return next((axis for axis in self._named() if topic_of("frf", axis) == f"frf/{end}"), end)
+
+    def array(self, message: ArrayMessage) -> None:
+        """A topic of numbers."""
+        self.arrays[message.topic] = message
+        self._changed(message.topic)
+        self._changed(f"axis {self._axis(message.topic.partition('/')[2])}")
+
+    def status(self, status: StatusMessage, now: float) -> None:
+        """One status of ``metrics`` or ``diagnosis``."""
+        self.statuses[status.name] = status
+        self.when[SPEAKER.get(status.name, "identifier" if status.name.startswith("axis ") else status.name)] = now
+        self._changed(status.name)
+        if status.name.startswith("axis "):
+            self._track(status.name.removeprefix("axis "), status)
+
+    def story(self, axis: str, text: str) -> str:
+        """A story document; what is wrong with it, or nothing."""
+        try:
+            document = json.loads(text)
+        except ValueError:
+            return f"story/{axis} is not JSON"
+        except RecursionError:
+            return f"story/{axis} is nested too deeply to be a story"
+        if not isinstance(document, dict):
+            return f"story/{axis} is not a document"
+        axis = str(document.get("axis") or axis)
+        self.stories[axis] = document
+        self._changed(f"story {axis}")
+        return ""
+
+    def doing(self, words: str, now: float) -> None:
+        """What the diagnoser does now."""
+        words = "" if words == "idle" else words
+        if words != self.progress[0]:
+            self.progress = words, now
+            self._changed("progress")
+
+    def graph(self, names: set[str], now: float) -> None:
+        """Which nodes are in the namespace now."""
+        for name in names:
+            self.present[name] = now
+        self._changed("graph")
+
+    def nodes(self, now: float) -> list[NodeState]:
+        """Every node that belongs here and was ever there, with what it said last."""
+        found = []
+        for name in [*KNOWN, *sorted(set(self.present) - set(KNOWN))]:
+            seen = max(self.present.get(name, -math.inf), self.when.get(name, -math.inf))
+            if seen == -math.inf:
+                continue
+            status = self.statuses.get("streams" if name == "identifier" else name)
+            if now - seen > LOST:
+                found.append(NodeState(name, 3, f"lost: nothing heard for {now - seen:.0f} s", True))
+            elif name in OFTEN and name in self.when and now - self.when[name] > LOST:
+                found.append(NodeState(name, 3, f"does not answer: silent for {now - self.when[name]:.0f} s", True))
+            else:
+                level = status.level if status else 0
+                if level == 3 and self.lifecycle != "active":
+                    level = 0  # nobody drives: silence of the streams is as it should be
+                found.append(NodeState(name, level, status.message if status else "there", False))
+        return found
+
+    def values(self, name: str) -> dict[str, str]:
+        """The named values of a status."""
+        status = self.statuses.get(name)
+        return dict(status.values) if status else {}
+
+    def transfer_function(self, axis: str) -> TransferFunction | None:
+        """The newest fit of an axis."""
+        message = self.table("transfer_function", axis)
+        if message is None or len(message.sizes) != 3 or sum(message.sizes) != message.data.size:
+            return None
+        return read_transfer_function(message)
+
+    def rate(self, axis: str) -> float:
+        """Sampling rate in Hz, 0 while it is not known."""
+        try:
+            return float(self.values(f"axis {axis}").get("sampling rate (Hz)", "0"))
+        except ValueError:
+            return 0.0
+
+    def units(self, name: str) -> Units:
+        """Of input and output, as a status tells them: that of an axis, by the identifier, or of the excitation."""
+        told = self.values(name)
+        return Units(told.get("input unit", USUAL.input), told.get("output unit", USUAL.output))
+
+    def driving(self) -> bool:
+        """Whether the excitation says that it drives."""
+        return self.values("excitation").get("state") in ("active", "stopping")
+
+    def at_rest_since(self, begun: float) -> bool:
+        """Whether the excitation itself has said after that time that it does not drive."""
+        return self.when.get("excitation", -math.inf) > begun and self.values("excitation").get("state") in ("idle", "stopped")
+
+    def alarms(self) -> list[str]:
+        """Sentences of axes whose resonance has moved."""
+        return [status.message for name, status in sorted(self.statuses.items()) if name.startswith("axis ") and status.level == 2]
+
+    def _track(self, axis: str, status: StatusMessage) -> None:
+        values = dict(status.values)
+        try:
+            seconds = float(values["seconds of data (s)"])
+            now, reference = float(values["resonance watched (Hz)"]), float(values["resonance reference (Hz)"])
+        except (KeyError, ValueError):
+            return
+        past = self.resonances.setdefault(axis, deque(maxlen=HISTORY))
+        if past and seconds < past[-1].seconds:
+            past.clear()  # the identifier began anew
+        past.append(Tracked(seconds, now, reference, status.level == 2))
+
+    def _changed(self, name: str) -> None:
+        self.version[name] = self.version.get(name, 0) + 1
+
+
+def columns(message: ArrayMessage) -> dict[str, FloatArray]:
+    """The columns of a table topic by name; empty if it is not one."""
+    if len(message.sizes) != 2 or message.sizes[0] * message.sizes[1] != message.data.size:
+        return {}
+    names = message.labels[1].split(",")
+    table = message.data.reshape(message.sizes)
+    return {name: table[:, k] for k, name in enumerate(names)} if len(names) == table.shape[1] else {}
+
+
+def thinned(frequency: FloatArray, size: FloatArray, most: int) -> np.ndarray[Any, np.dtype[np.intp]]:
+    """At most about ``most`` lines that look the same on a log axis: of each narrow stretch the ends in size are kept."""
+    if frequency.size <= most:
+        return np.arange(frequency.size)
+    positive = np.maximum(frequency, frequency[frequency > 0].min() if (frequency > 0).any() else 1.0)
+    edges = np.geomspace(positive[0], positive[-1] * (1 + 1e-9), most // 2 + 1)
+    which = np.clip(np.searchsorted(edges, positive, side="right") - 1, 0, most // 2 - 1)
+    kept: list[int] = []
+    bounds = np.flatnonzero(np.diff(which)) + 1
+    for part in np.split(np.arange(frequency.size), bounds):
+        kept += sorted({int(part[np.argmin(size[part])]), int(part[np.argmax(size[part])])})
+    return np.array(kept, dtype=np.intp)

@@ -1,0 +1,7 @@
+"""Nodes and workers as processes and threads of their own.
+
+run_plan:      from a run file to the processes to start
+starter:       starts, watches and stops them
+fit_thread:    one thread that fits while another hears data
+story_process: a process that performs jobs on stories
+"""

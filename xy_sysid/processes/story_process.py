@@ -1,0 +1,141 @@
+"""A process that performs jobs on stories, so that nobody who hears data ever waits for a fit; cancelling ends the process.
+
+It is started by the first job and stays, idle, for the next ones. The core knows no processes; this is the adapters' own.
+"""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import os
+import queue
+import signal
+import threading
+import time
+from dataclasses import dataclass
+from multiprocessing import resource_tracker
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+
+from xy_sysid.errors import XySysidError
+from xy_sysid.files.effects import library
+from xy_sysid.story.acts import Job, perform
+from xy_sysid.story.document import document
+from xy_sysid.story.story import Story
+
+NICE = 10  # of the worker: whoever hears data goes first
+POLL = 0.1  # s after which it is looked whether a job was cancelled
+
+
+@dataclass(frozen=True, slots=True)
+class JobNews:
+    """What a job has come to: a step (``text`` is the story's document in JSON), or its end, with the problem if it failed."""
+
+    job: int
+    doing: str
+    story: Story | None = None
+    text: str = ""
+    ended: bool = False
+    problem: str = ""
+
+
+class StoryWorker:
+    """ask(job), then news() until one has ended; one job at a time."""
+
+    def __init__(self, effect_files: tuple[str, ...] = ()) -> None:
+        self._files = effect_files
+        self._jobs: queue.Queue[tuple[int, Job] | None] = queue.Queue()
+        self._news: queue.Queue[JobNews] = queue.Queue()
+        self._number = 0
+        self._thread = threading.Thread(target=self._run, name="story", daemon=True)
+        self._thread.start()
+
+    def ask(self, job: Job) -> int:
+        """Begin a job; its number."""
+        self._number += 1
+        self._jobs.put((self._number, job))
+        return self._number
+
+    def news(self) -> list[JobNews]:
+        """What has come since the last call, of the newest job only."""
+        found: list[JobNews] = []
+        while True:
+            try:
+                item = self._news.get_nowait()
+            except queue.Empty:
+                return found
+            if item.job == self._number:
+                found.append(item)
+
+    def cancel(self) -> None:
+        """End the job under way, if there is one; nothing more is heard of it."""
+        self._number += 1
+
+    def close(self) -> None:
+        """End the process and the thread."""
+        self.cancel()
+        self._jobs.put(None)
+        self._thread.join(3.0)
+
+    def _run(self) -> None:
+        process, pipe = None, None
+        while (item := self._jobs.get()) is not None:
+            number, job = item
+            if number != self._number:
+                continue
+            if process is None or pipe is None or not process.is_alive():
+                process, pipe = _begin(self._files)
+            try:
+                pipe.send((number, job))
+                while not self._ended(number, pipe):
+                    if number != self._number:
+                        process.terminate()
+            except (EOFError, OSError):
+                process.join(2.0)
+                text = f"the worker process ended (exit code {process.exitcode}); see the log."
+                self._news.put(JobNews(number, "", ended=True, problem=text))
+                process = None
+        if process is not None:
+            process.terminate()
+            process.join(2.0)
+
+    def _ended(self, number: int, pipe: Connection) -> bool:
+        """Pass on what comes in the next moment; whether it was the last word."""
+        if not pipe.poll(POLL):
+            return False
+        news: JobNews = pipe.recv()
+        self._news.put(news)
+        return news.ended
+
+
+def _begin(effect_files: tuple[str, ...]) -> tuple[BaseProcess, Connection]:
+    here, there = multiprocessing.Pipe()
+    process = multiprocessing.get_context("spawn").Process(target=work, args=(there, effect_files), name="story", daemon=True)
+    resource_tracker.ensure_running()  # its own start would let SIGINT through again
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # the child inherits it: Ctrl-C is for its parent
+    try:
+        process.start()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    there.close()
+    return process, here
+
+
+def work(pipe: Connection, effect_files: tuple[str, ...]) -> None:
+    """What the process does: jobs in, news out, until nobody is there any more."""
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    os.nice(NICE)
+    try:
+        known = library([Path(file).expanduser() for file in effect_files])
+        while True:
+            number, job = pipe.recv()
+            try:
+                for doing, story in perform(job, known, time.process_time):
+                    text = "" if story is None else json.dumps(document(story), allow_nan=False, separators=(",", ":"))
+                    pipe.send(JobNews(number, doing, story, text))
+                pipe.send(JobNews(number, "", ended=True))
+            except XySysidError as problem:
+                pipe.send(JobNews(number, "", ended=True, problem=str(problem)))
+    except (EOFError, OSError):
+        return

@@ -1,0 +1,57 @@
+"""The numbers of a figure as a table: what is drawn can be taken away and drawn anew elsewhere."""
+
+from __future__ import annotations
+
+import base64
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+
+def table(figure: Mapping[str, Any]) -> str:
+    """CSV of a figure in Plotly's JSON: two columns for each curve, named by the curve and by the titles of its axes."""
+    layout = figure.get("layout", {})
+    columns: list[tuple[str, list[str]]] = []
+    for number, trace in enumerate(figure.get("data", ())):
+        name = str(trace.get("name") or f"curve {number + 1}")
+        for letter in ("x", "y"):
+            values = trace.get(letter)
+            if values is None:
+                continue
+            title = _title(layout, letter, str(trace.get(f"{letter}axis") or letter))
+            columns.append((f"{name}: {title or letter}", [_text(value) for value in _row(values)]))
+    written = io.StringIO()
+    writer = csv.writer(written, lineterminator="\n")
+    writer.writerow([name for name, _ in columns])
+    longest = max((len(values) for _, values in columns), default=0)
+    for place in range(longest):
+        writer.writerow([values[place] if place < len(values) else "" for _, values in columns])
+    return written.getvalue()
+
+
+def _title(layout: Mapping[str, Any], letter: str, axis: str) -> str:
+    """Of the axis, or of the one that it is matched to; the lowest of shared axes carries the title."""
+    own = layout.get(f"{letter}axis{axis[1:]}") or {}
+    text = (own.get("title") or {}).get("text")
+    if not text:
+        others = [item for name, item in layout.items() if name.startswith(f"{letter}axis") and isinstance(item, Mapping)]
+        told = [str(item["title"]["text"]) for item in others if (item.get("title") or {}).get("text")]
+        text = told[-1] if len(set(told)) == 1 else ""
+    return str(text or "")
+
+
+def _row(values: Any) -> Sequence[Any]:
+    """Plotly writes numbers as lists or as typed bytes."""
+    if isinstance(values, Mapping):
+        made = np.frombuffer(base64.b64decode(values["bdata"]), dtype=np.dtype(values["dtype"]))
+        return list(made.tolist())
+    return list(values)
+
+
+def _text(value: Any) -> str:
+    if value is None or (isinstance(value, float) and not np.isfinite(value)):
+        return ""
+    return f"{value:.7g}" if isinstance(value, (float, np.floating)) else str(value)

@@ -1,0 +1,103 @@
+"""Pictures for a notebook, drawn by the report's own functions: each takes results and gives a Plotly figure (``.show()``)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+
+from xy_sysid.comparison.of_run import held
+from xy_sysid.comparison.where_it_fails import Comparison, compare_velocity
+from xy_sysid.errors import BadInput
+from xy_sysid.fitting.check_on_data import through_window
+from xy_sysid.fitting.of_run import LinearModel
+from xy_sysid.linear.any_model import AnyModel
+from xy_sysid.report import story_progress
+from xy_sysid.report.figures import coherence_figure, response_figure
+from xy_sysid.report.parts import decibel, phase_of, plain
+from xy_sysid.report.story_parts import drawing
+from xy_sysid.report.theme import FLOOR
+from xy_sysid.response.frf import FrequencyResponse
+from xy_sysid.samples.recording import Recording, Run, one_run
+from xy_sysid.search.diagnose import Diagnosis
+from xy_sysid.search.findings import rung
+from xy_sysid.search.ladder import Ladder
+from xy_sysid.search.of_run import Refinement
+from xy_sysid.settings import IdentifierSettings
+from xy_sysid.story.document import rung_document
+from xy_sysid.units import USUAL
+
+COLOURS = ("#d1495b", "#2e8b57", "#7b5ea7", "#c77d0a", "#00798c")
+DASHES = ("dash", "solid", "dot", "dashdot", "longdash")
+
+
+def bode(frf: FrequencyResponse, *models: AnyModel) -> go.Figure:
+    """Magnitude and phase of a measured response with its 95 % band, and of models over it (of physical ones the linear part).
+
+    Each model is drawn as a measurement like this one is expected to see it: held, sampled, blurred by the window.
+    """
+    figure = response_figure({frf.origin.axis or "measured": frf})
+    lines = frf.select(frf.trusted) if bool(np.any(frf.trusted)) else frf
+    reference = phase_of(lines.response)
+    for number, model in enumerate(models):
+        response = through_window(model.tf, lines, model.hold if isinstance(model, LinearModel) else "zoh")
+        phase = phase_of(response)
+        phase = phase + 360 * np.round(np.median(reference - phase) / 360)
+        name = plain(model.label)
+        line = {"color": COLOURS[number % len(COLOURS)], "width": 1.8, "dash": DASHES[number % len(DASHES)]}
+        for row, values in ((1, decibel(response, frf.output_unit)), (2, phase)):
+            figure.add_scatter(
+                x=lines.frequency, y=values, mode="lines", line=line, name=name, legendgroup=f"{number}", showlegend=row == 1, row=row, col=1
+            )
+    return figure
+
+
+def coherence(frf: FrequencyResponse) -> go.Figure:
+    """Coherence of every line; lines that no fit uses are small crosses."""
+    return coherence_figure({frf.origin.axis or "measured": frf}, IdentifierSettings().min_coherence)
+
+
+def ladder(found: Diagnosis | Refinement | Ladder) -> go.Figure:
+    """The errors of all steps as a falling staircase: training, held-out, and the noise floor that no model can pass."""
+    return story_progress.ladder(_document(found))
+
+
+def residual(data: Run | Recording | Comparison, *models: AnyModel) -> go.Figure:
+    """The error over the noise floor by frequency: of one comparison, or of models on a run."""
+    figure = drawing([1.0], 320, "light")
+    if isinstance(data, Comparison):
+        shown = [("error", data)]
+    else:
+        run = one_run(data)
+        if not models:
+            raise BadInput("models", "none", "one or more", "Give what fit, refine or load_model gives.")
+        shown = []
+        for model in models:
+            first = held(run) if run.digest in model.data else 0
+            velocity = model.velocity(run.sampling_rate, run.voltage, run.position)[first:]
+            shown.append((model.label, compare_velocity(velocity, run.voltage[first:], run.position[first:], run.sampling_rate, run.units)))
+    for number, (name, item) in enumerate(shown):
+        known = np.isfinite(item.error_over_floor)
+        line = {"color": COLOURS[number % len(COLOURS)], "width": 1.8, "dash": DASHES[number % len(DASHES)]}
+        figure.add_scatter(x=item.frequency[known], y=item.error_over_floor[known], mode="lines", line=line, name=plain(name), row=1, col=1)
+    figure.add_hline(y=1.0, line={"color": FLOOR, "width": 2, "dash": "dot"}, row=1, col=1)
+    figure.update_xaxes(title_text="frequency (Hz)", type="log", row=1, col=1)
+    figure.update_yaxes(title_text="error over the noise floor", type="log", row=1, col=1)
+    return figure
+
+
+def _document(found: Diagnosis | Refinement | Ladder) -> dict[str, Any]:
+    """The part of a story that the ladder is drawn from."""
+    rungs = found if isinstance(found, Ladder) else found.ladder
+    units = USUAL
+    if isinstance(found, Refinement):
+        units = found.model.units
+    elif isinstance(found, Diagnosis):
+        units = found.units
+    steps = rungs.steps if rungs is not None else ()
+    return {
+        "ladder": [rung_document(rung(step.fit, step.added)) for step in steps],
+        "sentence": found.sentence if isinstance(found, Diagnosis) else "",
+        "units": {"input": units.input, "output": units.output},
+    }

@@ -1,0 +1,223 @@
+"""A figure as vectors, SVG or PDF, without a browser: what Plotly would draw, drawn by Matplotlib.
+
+It knows what the figures of this package are made of: lines, markers, areas and bars in rows; logarithmic axes; shapes and words.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Mapping
+from html import unescape
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import plotly.graph_objects as go
+
+from xy_sysid.errors import MissingExtra
+from xy_sysid.samples.block import FloatArray
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+WIDTH, PIXELS = 6.8, 100.0  # inches; px of an inch of height
+LEFT, RIGHT, TOP, BOTTOM = 0.85, 0.15, 0.45, 0.55  # inches around the rows
+DASHES = {"solid": "-", "dash": "--", "dot": ":", "dashdot": "-."}
+SYMBOLS = {"x-thin": "x", "circle-open": "o", "circle": "o", "diamond": "D"}
+RGBA = re.compile(r"rgba?\(([^)]*)\)")
+INK = "#24292f"
+DECADES = 1.6  # of a logarithmic axis below which 2 and 5 are named, too
+
+
+def vectors(figure: go.Figure, kind: str) -> bytes:
+    """The figure as svg or pdf. Raises MissingExtra without Matplotlib."""
+    try:
+        import matplotlib as mpl
+    except ModuleNotFoundError:
+        raise MissingExtra("Matplotlib, which draws vectors,", "figures") from None
+    look: Any = {"svg.fonttype": "path", "pdf.fonttype": 42, "svg.hashsalt": "xy_sysid", "font.size": 8.5, "text.color": INK, "axes.labelcolor": INK}
+    with mpl.rc_context(look):
+        drawn = _drawn(figure)
+        written = io.BytesIO()
+        drawn.savefig(written, format=kind, metadata={"Date" if kind == "svg" else "CreationDate": None})
+        return written.getvalue()
+
+
+def _drawn(figure: go.Figure) -> Figure:
+    from matplotlib.figure import Figure as Paper
+
+    layout = figure.layout
+    height = float(layout.height or 400) / PIXELS
+    paper = Paper(figsize=(WIDTH, height + 0.3))
+    named = any(trace.type == "bar" for trace in figure.data)
+    axes = _rows(paper, layout, height + 0.3, (2.0 if named else 1.0) * LEFT)
+    previous: dict[str, tuple[FloatArray, FloatArray]] = {}
+    for trace in figure.data:
+        name = str(trace.yaxis or "y")
+        ax = axes[name]
+        if trace.type == "bar":
+            _bars(ax, trace)
+        else:
+            x, y = _numbers(trace.x), _numbers(trace.y)
+            _area(ax, trace, (x, y), previous.get(name))
+            _line(ax, trace, x, y)
+            previous[name] = x, y
+    for name, ax in axes.items():
+        _scales(ax, layout, name)
+    for shape in layout.shapes:
+        _shape(axes, shape)
+    for note in layout.annotations:
+        _note(paper, axes, note)
+    _legend(paper, axes)
+    return paper
+
+
+def _rows(paper: Figure, layout: Any, height: float, left: float) -> dict[str, Axes]:
+    """One set of axes for each y axis, in its place."""
+    inner = height - TOP - BOTTOM
+    found: dict[str, Axes] = {}
+    for key in ("yaxis", *(f"yaxis{k}" for k in range(2, 9))):
+        if key not in layout:
+            continue
+        low, high = layout[key].domain or (0.0, 1.0)
+        box = (left / WIDTH, (BOTTOM + low * inner) / height, (WIDTH - left - RIGHT) / WIDTH, (high - low) * inner / height)
+        ax = paper.add_axes(box)
+        ax.grid(visible=True, color="#dfe3e8", linewidth=0.6)
+        ax.set_axisbelow(True)
+        for side in ("top", "right"):
+            ax.spines[side].set_visible(False)
+        found[key.replace("axis", "")] = ax
+    return found
+
+
+def _line(ax: Axes, trace: Any, x: FloatArray, y: FloatArray) -> None:
+    mode = str(trace.mode or "lines")
+    colour, shown = _colour(trace.line.color), trace.showlegend is not False and bool(trace.name)
+    label = str(trace.name) if shown else "_nolegend_"
+    width = 0.75 * float(trace.line.width if trace.line.width is not None else 1.5)
+    if "lines" in mode and width > 0:
+        ax.plot(x, y, color=colour, linestyle=DASHES.get(str(trace.line.dash or "solid"), "-"), linewidth=width, label=label)
+        label = "_nolegend_"
+    if "markers" in mode:
+        symbol, size = SYMBOLS.get(str(trace.marker.symbol), "o"), 0.6 * float(trace.marker.size or 6)
+        face = "none" if str(trace.marker.symbol) == "circle-open" else None
+        own = _colour(trace.marker.color or trace.marker.line.color or trace.line.color)
+        ax.plot(x, y, linestyle="none", marker=symbol, markersize=size, color=own, markerfacecolor=face or own, label=label)
+
+
+def _area(ax: Axes, trace: Any, curve: tuple[FloatArray, FloatArray], before: tuple[FloatArray, FloatArray] | None) -> None:
+    x, y = curve
+    colour = _colour(trace.fillcolor)
+    if trace.fill == "toself":
+        label = str(trace.name) if trace.showlegend is not False and trace.name else "_nolegend_"
+        for piece in np.split(np.arange(x.size), np.flatnonzero(np.isnan(x))):
+            known = piece[np.isfinite(x[piece]) & np.isfinite(y[piece])]
+            if known.size:
+                ax.fill(x[known], y[known], color=colour, linewidth=0, label=label)
+                label = "_nolegend_"
+    elif trace.fill == "tozeroy":
+        ax.fill_between(x, y, np.full(x.size, 1e-9), color=colour, linewidth=0)
+    elif trace.fill == "tonexty" and before is not None and before[0].size == x.size:
+        ax.fill_between(x, y, before[1], color=colour, linewidth=0)
+
+
+def _bars(ax: Axes, trace: Any) -> None:
+    names, values = [_words(name) for name in trace.y], _numbers(trace.x)
+    colours = [_colour(each) for each in trace.marker.color] if isinstance(trace.marker.color, (list, tuple)) else _colour(trace.marker.color)
+    drawn = ax.barh(names, values, color=colours)
+    ax.bar_label(drawn, [_words(text) for text in trace.text or [""] * len(names)], padding=2, fontsize=7.5)
+
+
+def _shape(axes: Mapping[str, Axes], shape: Any) -> None:
+    place = str(shape.yref or "y").removesuffix(" domain")
+    ax = axes.get(place)
+    if ax is None:
+        return
+    colour, style = _colour(shape.line.color), DASHES.get(str(shape.line.dash or "solid"), "-")
+    across, along = str(shape.yref).endswith("domain"), str(shape.xref).endswith("domain")
+    if shape.type == "rect" and across:
+        ax.axvspan(float(shape.x0), float(shape.x1), color=_colour(shape.fillcolor), linewidth=0)
+    elif shape.type == "line" and across:
+        ax.axvline(float(shape.x0), color=colour, linestyle=style, linewidth=0.8)
+    elif shape.type == "line" and along:
+        ax.axhline(float(shape.y0), color=colour, linestyle=style, linewidth=1.0)
+
+
+def _note(paper: Figure, axes: Mapping[str, Axes], note: Any) -> None:
+    text = _words(note.text)
+    if not text:
+        return
+    horizontal = {"left": "left", "right": "right"}.get(str(note.xanchor), "center")
+    vertical = {"top": "top", "bottom": "bottom"}.get(str(note.yanchor), "center")
+    style: dict[str, Any] = {"ha": horizontal, "va": vertical, "fontsize": 7.5, "color": _colour(note.font.color) if note.font.color else INK}
+    ax = axes.get(str(note.yref or "y").removesuffix(" domain"))
+    if ax is None:
+        paper.text(float(note.x), float(note.y), text, **style)
+        return
+    x, y = note.x, float(note.y)
+    across, along = str(note.yref).endswith("domain"), str(note.xref).endswith("domain")
+    value = float(x) if along or ax.get_xscale() != "log" else 10.0 ** float(x)
+    level = y if across or ax.get_yscale() != "log" else 10.0**y
+    turned = ax.get_xaxis_transform() if across and not along else ax.get_yaxis_transform() if along and not across else None
+    shift = (2.0 if horizontal == "left" else 0.0, 0.75 * float(note.yshift or 0) + 1.0)
+    ax.annotate(
+        text, (value, level), xycoords=turned or ("axes fraction" if along else "data"), xytext=shift,
+        textcoords="offset points", annotation_clip=False, **style,
+    )  # fmt: skip
+
+
+def _scales(ax: Axes, layout: Any, name: str) -> None:
+    from matplotlib.ticker import LogLocator
+
+    number = name[1:]
+    own, across = layout[f"yaxis{number}"], layout[f"xaxis{number}"]
+    for axis, letter in ((across, "x"), (own, "y")):
+        if axis.type == "log":
+            getattr(ax, f"set_{letter}scale")("log")
+            low, high = axis.range if axis.range is not None else (0.0, DECADES)
+            if float(high) - float(low) < DECADES:
+                getattr(ax, f"{letter}axis").set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            getattr(ax, f"{letter}axis").set_major_formatter("{x:g}")
+            getattr(ax, f"{letter}axis").set_minor_formatter("")
+        if axis.range is not None:
+            low, high = (10.0 ** float(end) if axis.type == "log" else float(end) for end in axis.range)
+            getattr(ax, f"set_{letter}lim")(low, high)
+        if axis.title.text:
+            getattr(ax, f"set_{letter}label")(_words(axis.title.text))
+    if across.tickvals is not None:
+        ax.set_xticks([float(value) for value in across.tickvals], [_words(text) for text in across.ticktext])
+    if own.autorange == "reversed":
+        ax.invert_yaxis()
+    if not across.title.text and across.matches:
+        ax.tick_params(labelbottom=False)
+    for axis, shown in ((ax.xaxis, across.visible), (ax.yaxis, own.visible)):
+        if shown is False:
+            axis.set_visible(False)
+
+
+def _legend(paper: Figure, axes: Mapping[str, Axes]) -> None:
+    found: dict[str, Any] = {}
+    for ax in axes.values():
+        for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
+            found.setdefault(label, handle)
+    if len(found) > 1:
+        paper.legend(list(found.values()), list(found), loc="upper left", ncols=4, frameon=False, fontsize=7.5)
+
+
+def _numbers(values: Any) -> FloatArray:
+    return np.array([np.nan if value is None else float(value) for value in values], dtype=np.float64)
+
+
+def _colour(text: Any) -> Any:
+    """As Matplotlib takes it."""
+    found = RGBA.fullmatch(str(text)) if text is not None else None
+    if found is None:
+        return str(text) if text else INK
+    red, green, blue, *opacity = (float(part) for part in found.group(1).split(","))
+    return red / 255, green / 255, blue / 255, opacity[0] if opacity else 1.0
+
+
+def _words(text: Any) -> str:
+    """Without markup, lines as lines."""
+    return unescape(re.sub(r"<[^>]*>", "", re.sub(r"<br\s*/?>", "\n", str(text or ""))))

@@ -1,0 +1,100 @@
+"""Response of a machine whose controller stays in charge: the joint input-output method, with the reference as instrument.
+
+Feedback carries the output's noise into the input, so output over input (H1) lies between the machine and minus the inverse
+controller. What the reference does to either is free of that noise:
+
+    G = Syr / Sur,   sigma^2 = See / (|Sur|^2 / Srr) / (averages - 1)
+
+where e = y - G u is what reference and machine do not explain: See = Cyy - 2 Re(G* Cyu) + |G|^2 Cuu, with C the spectra of y and u
+less what goes along with the reference. (Pintelon & Schoukens, System Identification, 2nd ed., sec. 2.7 and 9.18; Ljung, System
+Identification, 2nd ed., sec. 13.5; Söderström & Stoica, Instrumental variable methods, 1983)
+
+A window blurs Syr and Sur, and not the machine itself, so no blur is told with the response: where either turns sharply within a
+few lines, let the reference repeat itself (a multisine), which leaks and blurs nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from xy_sysid.response.batch_spectra import batch_spectra
+from xy_sysid.response.frf import FrequencyResponse
+from xy_sysid.response.h1 import NOISE_SMOOTHING, H1Options, divisor, frequency_response, smoothed
+from xy_sysid.response.spectra import Spectra
+from xy_sysid.response.windows import WindowShape
+from xy_sysid.samples.block import FloatArray
+
+SURE = 0.2  # relative error of reference -> input up to which a quotient by it has the spread that is told, and no bias to speak of
+DRIVEN = 1e-6  # of the strongest line's power: what a reference that repeats itself leaves between its lines is less
+LINES = 2 * NOISE_SMOOTHING + 1
+
+
+@dataclass(frozen=True, slots=True)
+class LoopSpectra:
+    """Spectra of the three pairs of signals over the same windows: output and input by the reference, output by the input."""
+
+    output: Spectra
+    input: Spectra
+    between: Spectra
+
+
+def loop_spectra(runs: list[tuple[int, FloatArray, FloatArray, FloatArray]], shape: WindowShape, differenced: bool) -> LoopSpectra:
+    """Of whole runs: (counter of the first sample, reference (n,), input (n,), output (n,)) each; see ``batch_spectra``."""
+    cut = slice(None, -1) if differenced else slice(None)  # of the input, so that all pairs have the same windows
+    return LoopSpectra(
+        output=batch_spectra([(seq, r, y) for seq, r, _, y in runs], shape, differenced),
+        input=batch_spectra([(seq, r[cut], u[cut]) for seq, r, u, _ in runs], shape, False),
+        between=batch_spectra([(seq, u, y) for seq, _, u, y in runs], shape, differenced),
+    )
+
+
+def joint_input_output(spectra: LoopSpectra, shape: WindowShape, sampling_rate: float, options: H1Options) -> FrequencyResponse:
+    """The machine's response; coherence is the smaller one of reference with output and with input.
+
+    options: units are those of input and output. A line is trusted where both are, and the input follows the reference surely.
+    """
+    options = replace(options, repeated=0.0)
+    output = frequency_response(spectra.output, shape, sampling_rate, options)
+    through = frequency_response(spectra.input, shape, sampling_rate, replace(options, differenced=False))
+    lines = np.rint(output.frequency / output.resolution).astype(np.int64)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        response = output.response / through.response
+        sigma = np.sqrt(_unexplained(spectra)[lines] / _reached(spectra)[lines] / max(spectra.output.averages - 1.0, 0.0))
+        if options.differenced:
+            sigma = sigma / np.abs(divisor(output.frequency, sampling_rate))
+        sure = through.sigma <= SURE * np.abs(through.response)
+    sigma = np.where(np.isfinite(sigma) & (spectra.output.averages >= 2.0), sigma, np.inf)
+    return replace(
+        output,
+        response=np.where(np.isfinite(response), response, 0.0),
+        coherence=np.minimum(output.coherence, through.coherence),
+        sigma=sigma,
+        trusted=output.trusted & through.trusted & sure & np.isfinite(sigma),
+        kernel_offset=np.zeros(1),
+        kernel_weight=np.ones(1),
+        kernel_amplitude=np.zeros(0),
+    )
+
+
+def _reached(spectra: LoopSpectra) -> FloatArray:
+    """(lines,) power of the input that goes along with the reference, |Sur|^2 / Srr, by the gain of the lines around each."""
+    power = np.maximum(spectra.input.gxx, np.finfo(float).tiny)
+    gain = smoothed(np.abs(spectra.input.gyx) ** 2 / power, LINES) / np.maximum(smoothed(power, LINES), np.finfo(float).tiny)
+    return np.asarray(gain * power)
+
+
+def _unexplained(spectra: LoopSpectra) -> FloatArray:
+    """(lines,) power of e = y - G u that does not go along with the reference, as the mean of the driven lines around each."""
+    power = np.maximum(spectra.output.gxx, np.finfo(float).tiny)
+    to_output, to_input = spectra.output.gyx, spectra.input.gyx
+    driven = power > DRIVEN * float(np.max(power))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        response = np.where(driven & (np.abs(to_input) > 0), to_output / to_input, 0.0)
+    rest_output = spectra.output.gyy - np.abs(to_output) ** 2 / power
+    rest_input = spectra.input.gyy - np.abs(to_input) ** 2 / power
+    rest_both = spectra.between.gyx - to_output * to_input.conj() / power
+    left = np.maximum(rest_output - 2.0 * np.real(response.conj() * rest_both) + np.abs(response) ** 2 * rest_input, 0.0)
+    share = np.maximum(smoothed(driven.astype(np.float64), LINES), np.finfo(float).tiny)
+    return np.asarray(smoothed(np.where(driven, left, 0.0), LINES) / share)

@@ -1,0 +1,102 @@
+"""Frequency response function with its coherence and its uncertainty.
+
+H1 estimator: Bendat & Piersol, Random Data, 4th ed., eq. 6.37 (H = Gyx / Gxx) and table 9.6 (random error).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xy_sysid.samples.block import FloatArray
+from xy_sysid.samples.recording import Origin
+from xy_sysid.units import over
+
+ComplexArray = NDArray[np.complex128]
+Z95 = 1.959963984540054  # sigmas to each side of a 95 % interval: 97.5 % of the normal distribution
+
+
+def _one() -> FloatArray:
+    return np.ones(1)
+
+
+def _zero() -> FloatArray:
+    return np.zeros(1)
+
+
+def _none() -> FloatArray:
+    return np.zeros(0)
+
+
+@dataclass(frozen=True, slots=True)
+class FrequencyResponse:
+    """Measured response of one axis, output over input.
+
+    frequency:        (m,) Hz, increasing, evenly spaced unless lines were left out
+    response:         (m,) complex, output_unit / input_unit
+    coherence:        (m,) ordinary coherence, 0..1
+    sigma:            (m,) standard deviation of the complex error: E|measured - true|^2 = sigma^2
+    trusted:          (m,) bool: excited and coherent enough to be used for a fit
+    sampling_rate:    Hz; rate_error: its standard error, relative, where the stamps tell
+    averages:         effective number of independent averages
+    resolution:       spacing of the original lines, Hz
+    line_correlation: (k,) correlation of the errors that noise makes on lines 0..k-1 apart (1 at 0), from window and overlap
+    kernel_offset:    (j,) Hz and
+    kernel_weight:    (j,) how the window blurs: the expected estimate at f is sum_j weight_j G(f + offset_j),
+                      where G is the response of the quantity that was transformed (see ``differenced``)
+    kernel_amplitude: (j,) the window's transform at kernel_offset, its square is kernel_weight; empty where nothing leaks
+    pairs:            (n,) share of the pairs of windows that lie 0, 1, .. hops apart, counted both ways: sum of
+                      weight_i weight_j / (sum of weights)^2; hop: from window to window, in lengths of the window
+    smoothing:        lines over which the noise power was averaged for sigma
+    differenced:      True if the window was put on the output's difference y[n+1] - y[n] and the estimate divided by
+                      exp(j w T) - 1, so that blurring acts on the response times (exp(j w T) - 1)
+    origin:           axis, samples and notes, where they are known
+    """
+
+    frequency: FloatArray
+    response: ComplexArray
+    coherence: FloatArray
+    sigma: FloatArray
+    trusted: NDArray[np.bool_]
+    sampling_rate: float
+    averages: float
+    resolution: float
+    input_unit: str = "V"
+    output_unit: str = "m"
+    rate_error: float = 0.0
+    line_correlation: FloatArray = field(default_factory=_one)
+    kernel_offset: FloatArray = field(default_factory=_zero)
+    kernel_weight: FloatArray = field(default_factory=_one)
+    kernel_amplitude: FloatArray = field(default_factory=_none)
+    pairs: FloatArray = field(default_factory=_one)
+    hop: float = 1.0
+    smoothing: int = 1
+    differenced: bool = False
+    origin: Origin = field(default_factory=Origin)
+
+    def __len__(self) -> int:
+        return int(self.frequency.shape[0])
+
+    def __repr__(self) -> str:
+        if len(self) == 0:
+            return "<FrequencyResponse: no line>"
+        told = f" of axis {self.origin.axis}" if self.origin.axis else ""
+        lines = f"{len(self)} lines from {self.frequency[0]:.4g} to {self.frequency[-1]:.4g} Hz, {int(self.trusted.sum())} trusted"
+        return f"<FrequencyResponse{told}: {lines}, {self.averages:.1f} averages, {over(self.output_unit, self.input_unit)}>"
+
+    def select(self, lines: NDArray[np.bool_] | slice) -> FrequencyResponse:
+        """The same response at some of its lines."""
+        return replace(
+            self,
+            frequency=self.frequency[lines],
+            response=self.response[lines],
+            coherence=self.coherence[lines],
+            sigma=self.sigma[lines],
+            trusted=self.trusted[lines],
+        )
+
+    def band(self, low: float, high: float) -> FrequencyResponse:
+        """The lines from low to high, both included, Hz."""
+        return self.select((self.frequency >= low) & (self.frequency <= high))

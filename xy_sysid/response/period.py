@@ -1,0 +1,66 @@
+"""Does the input repeat itself? Then a window of one period leaks nothing, and lines between the excited ones are noise."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import fft
+
+from xy_sysid.errors import BadInput
+from xy_sysid.samples.block import FloatArray
+
+LIKENESS = 0.98  # correlation of the input with itself one period later; measured inputs carry a little noise
+OFF_WHOLE = 0.1  # of a sample that the true period may be off: windows then slip against it by less than half a sample in five
+FEWEST = 6  # periods that must be there, so that five are left to average after the transient
+
+
+def find_period(u: FloatArray, shortest: int = 16) -> int | None:
+    """Period of a (n,) input in samples, or None if it does not repeat at least six times.
+
+    The first peak of the autocorrelation, checked and sharpened on the samples themselves.
+    """
+    signal = u - u.mean()
+    number = signal.shape[0]
+    power = float(np.dot(signal, signal))
+    if number < FEWEST * shortest or power == 0.0:
+        return None
+    size = fft.next_fast_len(2 * number, real=True)
+    correlation = fft.irfft(np.abs(fft.rfft(signal, size)) ** 2, size)[: number // FEWEST + 1]
+    overlap = 1.0 - np.arange(correlation.shape[0]) / number
+    alike = correlation / (power * overlap)
+    below = np.flatnonzero(alike < 0.5)
+    if below.size == 0:
+        return None
+    start = max(int(below[0]), shortest)
+    peaks = np.flatnonzero(alike[start:] > LIKENESS - 0.05) + start
+    if peaks.size == 0:
+        return None
+    near = np.arange(max(int(peaks[0]) - 2, 1), min(int(peaks[0]) + 64, number // FEWEST) + 1)
+    exact = [likeness(signal, int(lag)) for lag in near]
+    best = int(np.argmax(exact))
+    return int(near[best]) if exact[best] > LIKENESS and _whole(signal, int(near[best])) else None
+
+
+def _whole(signal: FloatArray, period: int) -> bool:
+    """Whether the true period, by a parabola through the likeness of its neighbours, is this whole number of samples."""
+    before, here, after = (likeness(signal, period + shift) for shift in (-1, 0, 1))
+    bend = before - 2.0 * here + after
+    return bend < 0.0 and abs(0.5 * (before - after) / bend) < OFF_WHOLE
+
+
+def likeness(signal: FloatArray, lag: int) -> float:
+    """Correlation of a (n,) signal of mean 0 with itself, lag samples later."""
+    a, b = signal[:-lag], signal[lag:]
+    return float(np.dot(a, b) / np.sqrt(np.dot(a, a) * np.dot(b, b)))
+
+
+def period_note(u: FloatArray, period: int) -> list[str]:
+    """What to say about a period that the user gives: it need not repeat perfectly, but it must lie in the (n,) input.
+
+    Raises BadInput for a period longer than the input.
+    """
+    if period > u.shape[0]:
+        raise BadInput("period", f"{period} samples", f"2 to {u.shape[0]}, the longest gap-free run", "Give the input's period, auto or none.")
+    alike = likeness(u - u.mean(), period) if period < u.shape[0] else 1.0
+    if alike > LIKENESS:
+        return []
+    return [f"The input does not repeat after {period} samples (correlation {alike:.2f}): a window of that length leaks."]

@@ -1,0 +1,77 @@
+"""Is a window of samples fit to be used? What no counter shows: an encoder that stands still or leaps."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from xy_sysid.errors import BadInput
+from xy_sysid.response.windows import WindowShape
+from xy_sysid.samples.block import FloatArray
+
+Piece = tuple[int, FloatArray, FloatArray]
+"""Counter of the first sample, input (n,), output (n,) of a gap-free stretch."""
+
+CREST_FACTOR = 10.0  # a step of the encoder counts as a leap when it stands out so many times more than the voltage does
+CREST_USUAL = 4.0  # crest factor that any noise reaches in a few thousand samples
+
+REASONS = {
+    "frozen": "the encoder repeated one value while the voltage moved",
+    "leap": "the encoder leapt further than the voltage can explain",
+}
+
+
+def stands_still(voltage: FloatArray, position: FloatArray, frozen: int) -> bool:
+    """Whether the position (n,) keeps one value for ``frozen`` samples after the voltage (n,) has moved."""
+    edges = np.concatenate(([0], np.flatnonzero(np.diff(position) != 0) + 1, [position.shape[0]]))
+    for run in np.flatnonzero(np.diff(edges) >= frozen):
+        begin, end = int(edges[run]), int(edges[run + 1])
+        if float(np.ptp(voltage[begin : end - frozen + 2])) > 0.0:
+            return True
+    return False
+
+
+def window_fault(voltage: FloatArray, position: FloatArray, frozen: int) -> str | None:
+    """The reason (a key of REASONS) not to use this window of one axis, or None.
+
+    frozen: samples of standstill that are too many. A leap is a step whose ratio to the rms step is ten times what the
+    voltage's own crest factor suggests (an impulse has a large one, so its answer is not a leap).
+    """
+    if stands_still(voltage, position, frozen):
+        return "frozen"
+    step = np.diff(position)
+    rms = float(np.sqrt(np.mean(step**2)))
+    if rms == 0.0:
+        return None
+    drive = voltage - voltage.mean()
+    drive_rms = float(np.sqrt(np.mean(drive**2)))
+    usual = max(CREST_USUAL, float(np.max(np.abs(drive))) / drive_rms) if drive_rms > 0 else CREST_USUAL
+    return "leap" if float(np.max(np.abs(step))) > CREST_FACTOR * usual * rms else None
+
+
+def stretches(pieces: list[Piece], shape: WindowShape, differenced: bool, frozen: int) -> tuple[list[tuple[int, int, int]], list[str]]:
+    """(number of the piece, first sample, last sample + 1) of what holds windows without a fault, and a sentence about those left out.
+
+    differenced: a window needs one sample more. Raises BadInput if every window has a fault.
+    """
+    kept: list[tuple[int, int, int]] = []
+    faults: dict[str, int] = {}
+    total = 0
+    for number, (seq, u, y) in enumerate(pieces):
+        follows = False
+        for start in range(-seq % shape.hop, u.shape[0] - shape.length - int(differenced) + 1, shape.hop):
+            stop = start + shape.length + int(differenced)
+            fault = window_fault(u[start:stop], y[start:stop], frozen)
+            total += 1
+            if fault is not None:
+                faults[fault] = faults.get(fault, 0) + 1
+            elif follows:
+                kept[-1] = (number, kept[-1][1], stop)
+            else:
+                kept.append((number, start, stop))
+            follows = fault is None
+    if not faults:
+        return [(number, 0, len(u)) for number, (_, u, _) in enumerate(pieces)], []
+    why = "; ".join(f"in {count} {REASONS[name]}" for name, count in faults.items())
+    if not kept:
+        raise BadInput("number of sound windows", f"0 of {total} ({why})", "1 or more", "Check the encoder; --set frozen= allows longer standstill.")
+    return kept, [f"{sum(faults.values())} of {total} windows are left out: {why}."]

@@ -1,0 +1,156 @@
+"""Cut gap-free samples into overlapping windows, and what a window does to an estimate.
+
+Windows lie on a grid of the sample counter (multiples of the hop), so that the same samples give the same windows in
+any chunking, and an observer that starts late sees the same windows as one that was there before.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from scipy import signal
+
+from xy_sysid.errors import BadInput
+from xy_sysid.samples.block import FloatArray, Samples
+
+KERNEL_TAIL = 2e-5  # share of the window's power that may be cut off the blur kernel
+KERNEL_MOST = 64  # half lines to each side at the most (a boxcar's tail never ends)
+LINES_APART = 5  # errors of lines further apart count as independent (Hann: correlation 1/36 two lines apart, 0 beyond)
+
+
+@dataclass(frozen=True, slots=True)
+class WindowShape:
+    """A taper, its length and the hop from one window to the next, in samples."""
+
+    name: str
+    length: int
+    hop: int
+
+    @classmethod
+    def of(cls, name: str, length: int, overlap: float) -> WindowShape:
+        """From the overlap as a fraction; raises BadInput if the hop would be less than one sample."""
+        hop = round(length * (1.0 - overlap))
+        if hop < 1 or hop > length:
+            raise BadInput("overlap", overlap, f"0 to {1 - 1 / length:.4g} for {length} samples", "Choose a smaller overlap.")
+        return cls(name, length, hop)
+
+    def taper(self) -> FloatArray:
+        """(length,) periodic taper, as scipy.signal.get_window gives it; not to be written to."""
+        return _taper(self.name, self.length)
+
+
+@lru_cache(maxsize=8)
+def _taper(name: str, length: int) -> FloatArray:
+    values = np.asarray(signal.get_window(name, length, fftbins=True), dtype=np.float64)
+    values.setflags(write=False)
+    return values
+
+
+def blur_kernel(shape: WindowShape) -> FloatArray:
+    """(2 j + 1,) weights at half-line steps, centred: how the window blurs the response of a locally white input.
+
+    E[Y conj(X)] / E|X|^2 = sum over lags of g(lag) r(lag)/r(0), with r the window's autocorrelation: the response
+    convolved with |W(f)|^2, which 2 L points hold exactly as r is shorter than 2 L. (Bendat & Piersol, 4th ed., sec. 11.5)
+    """
+    power = np.abs(np.fft.fft(shape.taper(), 2 * shape.length)) ** 2
+    power /= power.sum()
+    most = min(KERNEL_MOST, shape.length - 1)
+    for half in range(1, most + 1):
+        side = power[1 : half + 1]
+        if power[0] + 2 * side.sum() >= 1.0 - KERNEL_TAIL:
+            break
+    weights = np.concatenate((side[::-1], power[:1], side))
+    return np.asarray(weights / weights.sum(), dtype=np.float64)
+
+
+@lru_cache(maxsize=8)
+def error_correlation(shape: WindowShape) -> FloatArray:
+    """(m, LINES_APART) correlation of H1 errors of windows m hops apart, of lines k apart; [0, 0] is 1.
+
+    Both input and noise are locally white and independent, so it is the squared magnitude of the windows' overlap
+    sum w(n) w(n + m hop) exp(-2 pi i n k / L) / sum w^2 (Welch 1967 for k = 0).
+    """
+    taper = shape.taper()
+    most = (shape.length - 1) // shape.hop
+    rows = np.empty((most + 1, LINES_APART))
+    turn = np.exp(-2j * np.pi * np.arange(shape.length)[:, None] * np.arange(LINES_APART)[None, :] / shape.length)
+    for m in range(most + 1):
+        shift = m * shape.hop
+        product = taper[: shape.length - shift] * taper[shift:]
+        rows[m] = np.abs(product @ turn[: shape.length - shift]) ** 2
+    rows /= rows[0, 0]
+    rows.setflags(write=False)
+    return rows
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """One window of samples.
+
+    index:    its place on the grid; it starts at sample index * hop
+    voltage:  (length, axes)
+    position: (length + extra, axes), extra = 1 where the position is to be differenced
+    """
+
+    index: int
+    voltage: FloatArray
+    position: FloatArray
+
+
+class Windower:
+    """Feeds on runs of samples, gives windows; a step in the counter ends a run and what it had not filled."""
+
+    def __init__(self, shape: WindowShape, axes: int, extra: int) -> None:
+        self.shape = shape
+        self._extra = extra
+        self._axes = axes
+        self._store = np.empty((0, 2 * axes))
+        self._start = 0
+        self._filled = 0
+
+    @property
+    def _next(self) -> int:
+        return self._start + self._filled
+
+    def feed(self, samples: Samples) -> list[Window]:
+        """The windows that these samples complete, in order."""
+        if samples.seq != self._next or self._filled == 0:
+            self._start, self._filled = samples.seq, 0
+        self._append(samples)
+        need = self.shape.length + self._extra
+        found: list[Window] = []
+        index = -(-self._start // self.shape.hop)
+        while index * self.shape.hop + need <= self._next:
+            a = index * self.shape.hop - self._start
+            rows = self._store[a : a + need]
+            found.append(Window(index, rows[: self.shape.length, : self._axes].copy(), rows[:, self._axes :].copy()))
+            index += 1
+        self._drop_before(index * self.shape.hop)
+        return found
+
+    def pending(self) -> int:
+        """Samples heard that no window has used yet."""
+        return self._filled
+
+    def reset(self) -> None:
+        """Forget the samples that wait for a full window."""
+        self._filled = 0
+
+    def _append(self, samples: Samples) -> None:
+        end = self._filled + len(samples)
+        if end > self._store.shape[0]:
+            grown = np.empty((max(end, 2 * self._store.shape[0], 4 * self.shape.length), 2 * self._axes))
+            grown[: self._filled] = self._store[: self._filled]
+            self._store = grown
+        self._store[self._filled : end, : self._axes] = samples.voltage
+        self._store[self._filled : end, self._axes :] = samples.position
+        self._filled = end
+
+    def _drop_before(self, seq: int) -> None:
+        cut = min(max(seq - self._start, 0), self._filled)
+        if cut:
+            keep = self._filled - cut
+            self._store[:keep] = self._store[cut : self._filled].copy()
+            self._start, self._filled = self._start + cut, keep

@@ -1,0 +1,210 @@
+"""Samples that carry a stamp and no counter (sensor_msgs/JointState) become counted samples, so that they pair like blocks.
+
+Alone they are counted by their stamps, which may jitter (``stamp_counter``). With a voltage stream the counter is that of the
+voltage sample nearest in time.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+from xy_sysid.errors import BadInput
+from xy_sysid.samples.block import Block, FloatArray
+from xy_sysid.samples.ring import RATE_SAMPLES
+from xy_sysid.samples.stamp_counter import StampCounter
+
+RESTART = 1.0  # s that a stamp must go back to mean that the source has started again
+APART = 1.0  # s between the newest stamps of voltage and joint states from which on they are not one clock
+ANCHORS = 20  # samples of voltage from which the rate is read at first
+SAME_RATE = 0.01  # part by which the rates of voltage and joint states may differ in what 200 jittering stamps tell
+CATCHING_UP = 0.2  # part by which steps of long stretches may leave the median step as long as it is believed
+AGAIN = 4  # times as many stamps as teach the rate at first, after which it is looked at again
+OTHER_RATE = 1.3  # factor by which their median and their mean step must both differ from it: losses change the mean alone, bursts the median alone
+STICKS = 0.8  # samples by which a sample may leave its voltage sample before it is given to another
+STILL = 20  # messages in a row with one stamp that mean that nobody stamps them
+
+
+def joints_of(axes: tuple[str, ...], entries: tuple[str, ...]) -> dict[str, str]:
+    """The joint of each axis, from entries like ``x=shoulder_pan_joint``; an axis without one is named like its joint.
+
+    Raises BadInput for an entry that is none, an axis that is not there, and a joint or an axis named twice.
+    """
+    found = {axis: axis for axis in axes}
+    named: set[str] = set()
+    for entry in entries:
+        axis, sign, joint = (part.strip() for part in entry.partition("="))
+        if not sign or not joint or axis not in found or axis in named:
+            raise BadInput("parameter joints", repr(entry), f"axis=joint, once for each of {', '.join(axes)}", "Change it and try again.")
+        named.add(axis)
+        found[axis] = joint
+    if len(set(found.values())) < len(axes):
+        raise BadInput("parameter joints", ", ".join(found.values()), "a joint of its own for each axis", "Change it and try again.")
+    return found
+
+
+def usual_step(times: FloatArray) -> float:
+    """s between samples: the median step, or where most cycles only catch up with a late one, that of a straight line."""
+    times = times[np.concatenate(([True], np.diff(np.maximum.accumulate(times)) > 0))]
+    far = max(len(times) // 4, 1)
+    step, mean = float(np.median(np.diff(times))), float(np.median(times[far:] - times[:-far])) / far
+    if abs(mean / step - 1.0) < CATCHING_UP:
+        return step
+    count = np.arange(len(times)) - (len(times) - 1) / 2
+    return float(count @ (times - times.mean()) / (count @ count))
+
+
+class JointCounter:
+    """add(time, row) -> a block of one or more counted samples, or None while the rate is not known yet."""
+
+    def __init__(self, axes: tuple[str, ...], with_voltage: bool) -> None:
+        """with_voltage: counters come from ``see_voltage``; otherwise from the stamps alone."""
+        self._axes = axes
+        self._with_voltage = with_voltage
+        self._rate: float | None = None
+        self._anchor: tuple[float, float] | None = None  # (time, counter)
+        self._begin: tuple[float, float] | None = None  # the first of the voltage samples that the rate is read from
+        self._early: list[tuple[float, FloatArray]] = []
+        self._counter: StampCounter | None = None
+        self._undecided: deque[FloatArray] = deque()  # samples whose number is not known yet
+        self._offset: int | None = None  # from numbers to counters of the voltage
+        self._stamps: deque[float] = deque(maxlen=RATE_SAMPLES)
+        self._newest, self._still = 0.0, 0
+        self._latest = 0.0  # stamp of the newest sample that was not left out
+        self._since: list[float] = []  # stamps since the period was learnt or found to be right
+
+    def see_voltage(self, block: Block) -> None:
+        """Learn rate and place from the voltage stream; blocks may have one row."""
+        if not self._with_voltage or len(block) == 0 or not bool(np.isfinite(block.time).all()):
+            return
+        first, last = (float(block.time[0]), float(block.seq[0])), (float(block.time[-1]), float(block.seq[-1]))
+        if self._begin is None or self._goes_elsewhere(*first):
+            self._begin, self._rate, self._counter = first, None, None
+        self._anchor = last
+        if last[1] - self._begin[1] >= ANCHORS - 1 and last[0] > self._begin[0]:
+            self._rate = (last[1] - self._begin[1]) / (last[0] - self._begin[0])
+
+    def _goes_elsewhere(self, time: float, seq: float) -> bool:
+        """Whether the voltage has started again: its counter or time went back, or they no longer belong together."""
+        assert self._anchor is not None
+        before_time, before_seq = self._anchor
+        lapse = (seq - before_seq) / self._rate if self._rate is not None else time - before_time
+        return seq <= before_seq or time <= before_time or abs(time - before_time - lapse) > APART
+
+    def wrong(self) -> str:
+        """Why stamped samples cannot become counted ones, in words; empty if they can."""
+        if not np.isfinite(self._newest):
+            return "joint_states: the stamps are not finite; stamp each message with its instant."
+        if self._still >= STILL:
+            stamps = "are zero" if self._newest == 0 else f"stay at {self._newest:.6f} s"
+            return f"joint_states: the stamps {stamps}; the driver must stamp each message with its instant."
+        if not self._with_voltage or self._anchor is None:
+            return ""
+        apart = self._newest - self._anchor[0]
+        if abs(apart) > APART:
+            return (
+                f"the clocks of voltage and joint_states are apart by {abs(apart):.6g} s (voltage {self._anchor[0]:.3f} s, "
+                f"joint_states {self._newest:.3f} s); stamp both in ROS time, on computers whose clocks agree."
+            )
+        own = self._own_rate()
+        if self._rate is not None and own is not None and abs(own / self._rate - 1.0) > SAME_RATE:
+            return (
+                f"the rates differ: voltage comes at {self._rate:.6g} Hz, joint_states at {own:.6g} Hz; "
+                "set the parameter rate of the excitation to that of the joint states."
+            )
+        return ""
+
+    def _own_rate(self) -> float | None:
+        """Hz, of the newest stamps, None while there are too few."""
+        steps = np.diff(np.array(self._stamps))
+        steps = steps[steps > 0]
+        if steps.size < RATE_SAMPLES // 2:
+            return None
+        return float(np.sum(np.rint(steps / np.median(steps))) / np.sum(steps))
+
+    def _watch(self, time: float) -> None:
+        self._still = self._still + 1 if time == self._newest else 0
+        if np.isfinite(time) and time < self._newest:
+            self._stamps.clear()
+        self._newest = time
+        if np.isfinite(time):
+            self._stamps.append(time)
+
+    def add(self, time: float, row: FloatArray) -> Block | None:
+        """One sample, (axes,) at its stamp in s; a stamp that does not advance the counter gives None."""
+        self._watch(time)
+        if not np.isfinite(time):
+            return None
+        self._early.append((time, row))
+        if self._rate is None or self._anchor is None:
+            if self._with_voltage:
+                self._early = self._early[-4 * RATE_SAMPLES :]
+            elif len(self._early) >= RATE_SAMPLES:
+                self._learn()
+            if self._rate is None or self._anchor is None:
+                return None
+        waiting, self._early = self._early, []
+        return self._count(waiting)
+
+    def _learn(self) -> None:
+        times = np.array([time for time, _ in self._early])
+        steps = np.diff(times)
+        usable = steps[steps > 0]
+        if usable.size < RATE_SAMPLES // 4:
+            self._early = []
+            return
+        period = usual_step(times)
+        self._rate, self._anchor = 1.0 / period, (float(times[0]) - period, -1.0)
+
+    def _learn_again(self, time: float) -> None:
+        """What was learnt while a source only caught up with a stall is not its period: from enough stamps since, it is learnt anew."""
+        self._since.append(time)
+        if len(self._since) < AGAIN * RATE_SAMPLES:
+            return
+        assert self._rate is not None
+        times, self._since = np.array(self._since), []
+        steps = self._rate * np.array([np.median(np.diff(times)), (times[-1] - times[0]) / (times.size - 1)])
+        if np.all(steps > OTHER_RATE) or np.all(steps < 1.0 / OTHER_RATE):
+            self._rate, self._counter = 1.0 / usual_step(times), None
+
+    def _count(self, samples: list[tuple[float, FloatArray]]) -> Block | None:
+        assert self._rate is not None and self._anchor is not None
+        seqs: list[float] = []
+        times: list[float] = []
+        rows: list[FloatArray] = []
+        for time, row in samples:
+            if self._with_voltage and abs(time - self._anchor[0]) > APART:
+                continue
+            if time < self._latest - RESTART:
+                self._since = []
+            if not self._with_voltage and time > self._latest:
+                self._learn_again(time)
+            if self._counter is None or time < self._latest - RESTART:
+                self._counter, self._offset = StampCounter(1.0 / self._rate), None
+                self._undecided.clear()
+                seqs, times, rows = [], [], []
+            decided = self._counter.add(time)
+            if decided is None:
+                continue
+            self._latest = time
+            self._undecided.append(row)
+            for number, instant in decided:
+                seq, row_of_it = self._place(number, instant), self._undecided.popleft()
+                if seq >= 0 and not (seqs and seq <= seqs[-1]):
+                    seqs.append(seq)
+                    times.append(instant)
+                    rows.append(row_of_it)
+        if not seqs:
+            return None
+        return Block(self._axes, np.array(seqs), np.array(times), np.array(rows))
+
+    def _place(self, number: int, instant: float) -> float:
+        """The counter of a sample: its number, or that of the voltage sample at the same instant; the same distance as long as it fits."""
+        if not self._with_voltage:
+            return float(number)
+        assert self._rate is not None and self._anchor is not None
+        nearest = self._anchor[1] + (instant - self._anchor[0]) * self._rate
+        if self._offset is None or abs(nearest - number - self._offset) > STICKS:
+            self._offset = round(nearest) - number
+        return float(number + self._offset)

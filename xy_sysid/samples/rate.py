@@ -1,0 +1,144 @@
+"""The sampling rate from all stamps so far: a straight line through them by least squares, with its standard error.
+
+Stamps jitter, and neighbours jitter alike (one late cycle makes the next ones late), so the line goes through means of BATCH
+samples, whose scatter tells the error. The same samples give the same figure to the last bit, in whatever pieces they come.
+Source: Draper & Smith, Applied Regression Analysis, 3rd ed., ch. 1; batch means: Law, Simulation Modeling and Analysis, 9.5.3.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xy_sysid.errors import BadInput
+from xy_sysid.jit import compiled
+from xy_sysid.samples.block import FloatArray
+from xy_sysid.samples.recording import rate_from_time, whole_rate
+
+BATCH = 50  # samples of one mean
+JUMP = 1.5  # periods by which a stamp may leave the one before it, as live
+FEWEST = 4  # means from which an error can be told, and a first period
+LEAP, STEP, ASIDE = 0.5, 0.75, 10  # a number slipped where one sample leaps by LEAP periods, and the means of ASIDE before and after by STEP
+
+
+class StampLine:
+    """add(first, stamps), cut() where the stamps leave their line, until(counter), then ``rate`` and ``error``."""
+
+    def __init__(self) -> None:
+        self._known: tuple[float, float] | None = None  # rate and relative error of earlier stretches
+        self._begin()
+
+    def _begin(self) -> None:
+        self._seq: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
+        self._time: FloatArray = np.zeros(0)
+        self._origin: tuple[int, float, float] | None = None  # counter, stamp, and period that residuals are taken against
+        self._sums = np.zeros(6)
+        self._waiting: tuple[float, FloatArray] | None = None  # the newest batch, which counts once it is known that nothing slipped at its end
+
+    def add(self, first: int, stamps: FloatArray) -> None:
+        """Stamps, s, of consecutive samples from counter ``first`` on."""
+        self._seq = np.concatenate((self._seq, np.arange(first, first + stamps.size)))
+        self._time = np.concatenate((self._time, stamps))
+
+    def until(self, counter: int) -> None:
+        """Take in whole batches of the samples before this counter."""
+        whole = int(np.searchsorted(self._seq, counter)) // BATCH * BATCH
+        if whole == 0 or (self._origin is None and whole < FEWEST * BATCH):
+            return
+        seq, time = self._seq[:whole], self._time[:whole]
+        self._seq, self._time = self._seq[whole:], self._time[whole:]
+        if self._origin is None:
+            try:
+                period = 1.0 / rate_from_time(time[: FEWEST * BATCH], seq[: FEWEST * BATCH])
+            except BadInput:
+                return
+            self._origin = int(seq[0]), float(time[0]), period
+        begin, instant, period = self._origin
+        place = (seq - begin).astype(np.float64)
+        off = (time - instant) - place * period
+        for x, rows in zip(place.reshape(-1, BATCH).mean(axis=1).tolist(), off.reshape(-1, BATCH), strict=True):
+            self._take(x, rows / period)
+
+    def _take(self, x: float, rows: FloatArray) -> None:
+        """One batch, in periods off; if a number slipped in it or at the end of the one before, neither counts, and a new stretch begins."""
+        before, self._waiting = self._waiting, (x, rows)
+        if before is None:
+            return
+        both = np.concatenate((before[1], rows))
+        at = np.arange(BATCH - ASIDE + 1, 2 * BATCH - ASIDE + 1)
+        sums = np.concatenate(([0.0], np.cumsum(both)))
+        after, ahead = sums[at + ASIDE] - sums[at], sums[at] - sums[at - ASIDE]
+        if bool(np.any((np.abs(both[at] - both[at - 1]) > LEAP) & (np.abs(after - ahead) > ASIDE * STEP))):
+            self._known, self._waiting, self._sums = self._both(), None, np.zeros(6)
+        else:
+            _grow(self._sums, before[0], float(before[1].mean()))
+
+    def cut(self) -> None:
+        """What follows lies on another line of the same rate: what is known of the rate is kept."""
+        found = self._both()
+        self._begin()
+        self._known = found
+
+    def start(self, rate: float, error: float) -> None:
+        """Go on from what was known before a restart."""
+        self._known = (rate, error)
+
+    @property
+    def rate(self) -> float | None:
+        """Hz, None as long as it is not known; one within 20 ppm of a whole number is that number."""
+        found = self._both()
+        return None if found is None else whole_rate(found[0])
+
+    @property
+    def error(self) -> float:
+        """Standard error of the rate, relative; 0 as long as it is not known."""
+        found = self._both()
+        return 0.0 if found is None else found[1]
+
+    def _both(self) -> tuple[float, float] | None:
+        """Of this stretch and those before, weighted by their errors."""
+        now, before = self._now(), self._known
+        if now is None or before is None:
+            return now or before
+        if before[1] == 0.0 or now[1] == 0.0:
+            return before if before[1] == 0.0 else now
+        weights = now[1] ** -2, before[1] ** -2
+        return (weights[0] * now[0] + weights[1] * before[0]) / sum(weights), sum(weights) ** -0.5
+
+    def _now(self) -> tuple[float, float] | None:
+        count, _, _, spread, along, across = self._sums.tolist()
+        if count < FEWEST or self._origin is None:
+            return None
+        slope = along / spread
+        left = max(across - slope * along, 0.0) / (count - 2.0)
+        return 1.0 / (self._origin[2] * (1.0 + slope)), math.sqrt(left / spread) / (1.0 + slope)
+
+
+def error_of_rate(time: FloatArray, seq: NDArray[np.int64]) -> float:
+    """Relative standard error of the rate of a whole recording; 0 for even or few stamps."""
+    line = StampLine()
+    try:
+        period = 1.0 / rate_from_time(time, seq)
+    except BadInput:
+        return 0.0
+    jumps = np.flatnonzero(np.abs(np.diff(time) - np.diff(seq) * period) > JUMP * period) + 1
+    for start, stop in zip([0, *jumps.tolist()], [*jumps.tolist(), len(seq)], strict=True):
+        line.cut()
+        for piece in np.split(np.arange(start, stop), np.flatnonzero(np.diff(seq[start:stop]) > 1) + 1):
+            line.add(int(seq[piece[0]]), time[piece])
+        line.until(int(seq[stop - 1]) + 1)
+    return line.error
+
+
+@compiled
+def _grow(sums: FloatArray, x: float, y: float) -> None:
+    """Number, means and centred sums of (x, y) with one pair more (Welford, Technometrics 4, 1962)."""
+    sums[0] += 1.0
+    dx, dy = x - sums[1], y - sums[2]
+    sums[1] += dx / sums[0]
+    sums[2] += dy / sums[0]
+    sums[3] += dx * (x - sums[1])
+    sums[4] += dx * (y - sums[2])
+    sums[5] += dy * (y - sums[2])

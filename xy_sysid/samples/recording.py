@@ -1,0 +1,323 @@
+"""A recording: what was applied to the axes and what their encoders read, checked and in SI."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xy_sysid.errors import BadInput
+from xy_sysid.samples.block import FloatArray
+from xy_sysid.units import SCALES, Units
+
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """Where a result comes from: axis, SHA-256 of its samples (empty if not known), and notes that a user should read."""
+
+    axis: str = ""
+    data: str = ""
+    notes: tuple[str, ...] = ()
+
+
+Sensed = Literal["position", "velocity", "acceleration"]
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """Consecutive samples of one axis, without a gap.
+
+    sampling_rate: Hz
+    voltage:       (n,) input in ``input_unit``, held from its instant to the next
+    position:      (n,) output in ``output_unit`` at its instant
+    first:         row of the first sample in the recording
+    """
+
+    axis: str
+    sampling_rate: float
+    voltage: FloatArray
+    position: FloatArray
+    first: int = 0
+    input_unit: str = "V"
+    output_unit: str = "m"
+
+    def __len__(self) -> int:
+        return int(self.voltage.shape[0])
+
+    @property
+    def seconds(self) -> float:
+        """Length in time."""
+        return len(self) / self.sampling_rate
+
+    @property
+    def rows(self) -> slice:
+        """Where the samples are in the recording."""
+        return slice(self.first, self.first + len(self))
+
+    def until(self, seconds: float) -> Run:
+        """The samples before that time; all if there are no more."""
+        last = round(seconds * self.sampling_rate)
+        return replace(self, voltage=self.voltage[:last], position=self.position[:last])
+
+    def after(self, sample: int) -> Run:
+        """The samples from this one on."""
+        return replace(self, voltage=self.voltage[sample:], position=self.position[sample:], first=self.first + sample)
+
+    @property
+    def units(self) -> Units:
+        """Of input and output."""
+        return Units(self.input_unit, self.output_unit)
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the samples: two runs with the same one are the same data."""
+        return hashlib.sha256(self.voltage.tobytes() + self.position.tobytes()).hexdigest()
+
+    def recording(self) -> Recording:
+        """The same as a recording of one axis."""
+        seq = np.arange(self.first, self.first + len(self), dtype=np.int64)
+        return Recording(
+            sampling_rate=self.sampling_rate,
+            axes=(self.axis,),
+            seq=seq,
+            time=seq / self.sampling_rate,
+            voltage=self.voltage[:, None],
+            position=self.position[:, None],
+            input_unit=self.input_unit,
+            output_unit=self.output_unit,
+        )
+
+    @property
+    def signals(self) -> tuple[FloatArray, FloatArray, float]:
+        """(voltage, position, sampling rate): what a simulation is compared with."""
+        return self.voltage, self.position, self.sampling_rate
+
+    def __repr__(self) -> str:
+        length = f"{len(self)} samples, {self.seconds:.6g} s at {self.sampling_rate:g} Hz"
+        return f"<Run of axis {self.axis}: {length}, {self.input_unit} -> {self.output_unit}>"
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """Paired samples of input and output.
+
+    sampling_rate: Hz, from the time stamps
+    axes:          names, one per column
+    seq:           (n,) strictly increasing sample counter; a step larger than one is a gap
+    time:          (n,) sample instants, s
+    voltage:       (n, axes) input in ``input_unit``, held from its instant to the next
+    position:      (n, axes) output in ``output_unit`` at its instant
+    reference:     (n, axes) the commanded position where the file has one (a sign of closed loop), else None
+    notes:         what was converted or assumed while reading, one sentence each
+    measured:      what the sensor reads; ``position`` is the integral of a velocity or an acceleration
+    """
+
+    sampling_rate: float
+    axes: tuple[str, ...]
+    seq: NDArray[np.int64]
+    time: FloatArray
+    voltage: FloatArray
+    position: FloatArray
+    input_unit: str = "V"
+    output_unit: str = "m"
+    reference: FloatArray | None = None
+    source: str = ""
+    notes: tuple[str, ...] = ()
+    measured: Sensed = "position"
+
+    @property
+    def units(self) -> Units:
+        """Of input and output."""
+        return Units(self.input_unit, self.output_unit)
+
+    @classmethod
+    def from_arrays(
+        cls, sampling_rate: float, voltage: Any, position: Any, axes: Sequence[str] = (), units: tuple[str, str] = ("V", "m")
+    ) -> Recording:
+        """A gap-free recording from samples in memory: lists, arrays, columns of a table, or a mapping of them by axis.
+
+        sampling_rate: Hz; voltage, position: (n,) of one axis, (n, axes), or {axis: (n,)}, sample by sample of the same instants
+        axes:          names, one per column; x, y, ... if not given
+        units:         of voltage and position; lengths, voltages and angles become SI (mm -> m), any other is carried as it is
+        Raises BadInput for what is not numbers, is not finite, or does not fit together.
+        """
+        inputs, outputs, axes = _columns(voltage, position, axes)
+        names = tuple(axes) or tuple("xyzabc"[: inputs.shape[1]] if inputs.shape[1] <= 6 else (f"axis{k + 1}" for k in range(inputs.shape[1])))
+        if len(set(names)) != inputs.shape[1]:
+            raise BadInput("axes", ", ".join(names), f"{inputs.shape[1]} different names", "Give one name per column.")
+        (input_unit, scale), (output_unit, stretch) = (SCALES.get(unit, (unit, 1.0)) for unit in units)
+        seq = np.arange(inputs.shape[0], dtype=np.int64)
+        return cls(
+            sampling_rate=_rate(sampling_rate),
+            axes=names,
+            seq=seq,
+            time=seq / _rate(sampling_rate),
+            voltage=inputs * scale,
+            position=outputs * stretch,
+            input_unit=input_unit,
+            output_unit=output_unit,
+            source="arrays",
+        )
+
+    def __repr__(self) -> str:
+        gaps = len(self.runs()) - 1
+        told = f", {gaps} gap{'s' if gaps > 1 else ''}" if gaps > 0 else ""
+        return f"<Recording of {', '.join(self.axes)}: {len(self)} samples, {self.duration:.6g} s at {self.sampling_rate:g} Hz{told}>"
+
+    def __post_init__(self) -> None:
+        rows = self.seq.shape[0]
+        expected = (rows, len(self.axes))
+        for name in ("voltage", "position"):
+            shape = getattr(self, name).shape
+            if shape != expected:
+                raise BadInput(f"shape of {name}", shape, str(expected), "Give one row per sample and one column per axis.")
+        if self.time.shape != (rows,):
+            raise BadInput("shape of time", self.time.shape, str((rows,)), "Give one instant per sample.")
+        if not (np.isfinite(self.sampling_rate) and self.sampling_rate > 0):
+            raise BadInput("sampling rate", self.sampling_rate, "> 0 Hz", "Check the time column.")
+        if rows > 1 and not bool(np.all(np.diff(self.seq) > 0)):
+            raise BadInput("seq", "not increasing", "strictly increasing", "Sort the samples and drop repeated ones.")
+
+    def __len__(self) -> int:
+        return int(self.seq.shape[0])
+
+    @property
+    def duration(self) -> float:
+        """Length of the data itself, without its gaps, s."""
+        return len(self) / self.sampling_rate
+
+    def runs(self) -> list[slice]:
+        """Slices of consecutive samples; the recording has ``len(runs()) - 1`` gaps."""
+        edges = np.flatnonzero(np.diff(self.seq) != 1) + 1
+        bounds = [0, *edges.tolist(), len(self)]
+        return [slice(a, b) for a, b in itertools.pairwise(bounds) if b > a]
+
+    def only(self, rows: slice | NDArray[np.bool_]) -> Recording:
+        """Some of its samples; those between become a gap."""
+        return replace(
+            self,
+            seq=self.seq[rows],
+            time=self.time[rows],
+            voltage=self.voltage[rows],
+            position=self.position[rows],
+            reference=None if self.reference is None else self.reference[rows],
+        )
+
+    def axis(self, name: str) -> tuple[FloatArray, FloatArray]:
+        """Input and output of one axis, (n,) each; raises BadInput for a name that is not there."""
+        if name not in self.axes:
+            raise BadInput("axis", repr(name), ", ".join(self.axes), "Choose one of these.")
+        column = self.axes.index(name)
+        return self.voltage[:, column], self.position[:, column]
+
+    def run(self, axis: str) -> Run:
+        """The longest stretch of one axis without a gap, the first of several; raises BadInput if there is no such axis, or no sample."""
+        u, y = self.axis(axis)
+        if len(self) == 0:
+            raise BadInput("number of samples", 0, "1 or more", "Record for longer, or choose another part.")
+        rows = max(self.runs(), key=lambda part: part.stop - part.start)
+        return Run(
+            axis=axis,
+            sampling_rate=self.sampling_rate,
+            voltage=u[rows],
+            position=y[rows],
+            first=rows.start,
+            input_unit=self.input_unit,
+            output_unit=self.output_unit,
+        )
+
+
+def _rate(value: Any) -> float:
+    try:
+        rate = float(value)
+    except (TypeError, ValueError):
+        raise BadInput("sampling rate", repr(value), "> 0 Hz", "Give samples per second.") from None
+    if not (np.isfinite(rate) and rate > 0):
+        raise BadInput("sampling rate", rate, "> 0 Hz", "Give samples per second.")
+    return rate
+
+
+def _columns(voltage: Any, position: Any, axes: Sequence[str]) -> tuple[FloatArray, FloatArray, Sequence[str]]:
+    """(n, axes) of both, and the axes' names as far as they are told."""
+    if isinstance(voltage, Mapping) != isinstance(position, Mapping):
+        raise BadInput("voltage and position", "one by axis and one not", "both by axis, or both arrays", "Give both alike.")
+    both = {"voltage": voltage, "position": position}
+    if isinstance(voltage, Mapping):
+        axes = tuple(axes) or tuple(str(name) for name in voltage)
+        for name, columns in both.items():
+            missing = [axis for axis in axes if axis not in columns]
+            if missing:
+                raise BadInput(name, f"without axis {missing[0]!r}", ", ".join(map(str, columns)), "Give one column per axis in both.")
+        parts = {name: [_numbers(name, columns[axis]) for axis in axes] for name, columns in both.items()}
+        sizes = {part.shape for columns in parts.values() for part in columns}
+        if len(sizes) != 1:
+            raise BadInput("samples", " and ".join(map(str, sorted(sizes))), "one and the same (n,) for every axis", "Give one value per sample.")
+        inputs, outputs = (np.column_stack(columns) for columns in parts.values())
+    else:
+        inputs, outputs = (_numbers(name, values) for name, values in both.items())
+    if inputs.shape != outputs.shape or inputs.ndim > 2:
+        shapes = f"{inputs.shape} and {outputs.shape}"
+        raise BadInput("shape of voltage and position", shapes, "one and the same, (n,) or (n, axes)", "Give one row per sample.")
+    return (inputs[:, None], outputs[:, None], axes) if inputs.ndim == 1 else (inputs, outputs, axes)
+
+
+def _numbers(name: str, values: Any) -> FloatArray:
+    """Finite numbers, whatever they come in."""
+    try:
+        found = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise BadInput(
+            name, f"{type(values).__name__} that is not an array of numbers", "real numbers, one per sample", "Give (n,) or (n, axes)."
+        ) from None
+    if found.ndim == 0 or found.size == 0:
+        raise BadInput(name, "empty" if found.ndim else "one number", "samples, (n,) or (n, axes)", "Give one value per sample.")
+    bad = int(np.sum(~np.isfinite(found)))
+    if bad:
+        raise BadInput(name, f"not finite in {bad} of {found.size} values", "finite numbers", "Leave those samples out, and cut the recording there.")
+    return found
+
+
+def one_run(data: Run | Recording) -> Run:
+    """A run, or the longest of a recording that has one axis only; raises BadInput for a recording of several."""
+    if isinstance(data, Run):
+        return data
+    if not isinstance(data, Recording):
+        raise BadInput("data", type(data).__name__, "a Run or a Recording of one axis", "Load it, and choose an axis with .run(name).")
+    if len(data.axes) != 1:
+        raise BadInput("recording", f"of {len(data.axes)} axes", "one axis", f"Choose one with .run(name): {', '.join(data.axes)}.")
+    return data.run(data.axes[0])
+
+
+def rate_from_time(time: FloatArray, seq: NDArray[np.int64] | None = None) -> float:
+    """Sampling rate in Hz from sample instants, robust to jitter and gaps.
+
+    The median step gives the scale; all that is regular gives the figure: with a counter a line by least squares, else its mean; a rate within
+    20 ppm of a whole number is that number. Raises BadInput if time does not increase.
+    """
+    if time.shape[0] < 2:
+        raise BadInput("number of samples", time.shape[0], "2 or more", "Record for longer.")
+    steps = np.diff(time)
+    if not bool(np.all(np.isfinite(steps))):
+        raise BadInput("time column", "not finite", "finite seconds", "Remove the rows without a time.")
+    counts = np.ones_like(steps) if seq is None else np.diff(seq).astype(np.float64)
+    period = float(np.median(steps / counts))
+    if period <= 0:
+        raise BadInput("median time step", f"{period:.3g} s", "> 0 s", "Sort the rows by time and drop repeated ones.")
+    regular = np.abs(steps - counts * period) < (0.5 if seq is None else 1.5) * period  # without a counter a lost sample is one step too long
+    number, instant = (np.concatenate(([0.0], np.cumsum(values[regular]))) for values in (counts, steps))
+    if seq is None:  # a period that wanders has a mean and no line
+        return whole_rate(float(number[-1] / instant[-1]) if instant[-1] > 0 else 1.0 / period)
+    number -= number.mean()
+    slope = float(number @ instant) / float(number @ number) if number.size > 1 else period
+    return whole_rate(1.0 / slope if slope > 0 else 1.0 / period)
+
+
+def whole_rate(rate: float) -> float:
+    """A rate within 20 ppm of a whole number of Hz is that number."""
+    whole = float(round(rate))
+    return whole if whole > 0 and abs(rate / whole - 1.0) < 20e-6 else rate

@@ -1,0 +1,195 @@
+"""Best-first search over sets of effects: the most promising move next, every fit remembered, simpler sets preferred.
+
+It knows nothing of machines: a judge says what moves promise, fits sets, and compares. It is a generator, so that whoever runs it
+shows what is being tried, and stops it at any time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from math import inf, log
+from typing import Generic, Protocol, TypeVar
+
+from xy_sysid.search.criteria import ALIKE, HOPELESS, LATER, LEAST, OPTIMISM, PRICE, SIMPLE_FIRST
+from xy_sysid.search.judge import Move
+
+FEW = 3  # tries from a set after which it is known what its promises are worth
+
+
+class Judged(Protocol):
+    """What the search needs to know of a fit."""
+
+    @property
+    def excess(self) -> float:
+        """nats; 0 is nothing left."""
+
+
+F = TypeVar("F", bound=Judged)
+
+
+class Judge(Protocol[F]):
+    """What the search asks; see ``judge.FreeRunJudge``."""
+
+    def moves(self, now: F) -> Sequence[Move]:
+        """What may be done next."""
+
+    def brief(self, now: F, move: Move, hopeless: float = inf) -> F | None:
+        """A quick fit."""
+
+    def whole(self, found: F) -> F:
+        """The same on all data."""
+
+    def refusal(self, found: F) -> str:
+        """Why it explains nothing, or empty."""
+
+    def size(self, found: F, before: F) -> float:
+        """What a fit explains of what one before it left, over what it leaves itself."""
+
+
+@dataclass(eq=False)
+class Node(Generic[F]):
+    """One set that was fitted.
+
+    parameters: that its effects have; whole: fitted on all data; refused: why it explains nothing, or empty; promised: gain
+    shown: largest gain of a move from it over what was promised; tried: moves from it that were tried; brief: excess of its brief fit
+    """
+
+    effects: frozenset[str]
+    fit: F
+    brief: F
+    parameters: int
+    whole: bool
+    promised: float = 0.0
+    refused: str = ""
+    shown: float = 0.0
+    tried: int = 0
+    leads: bool = True
+    later: float = 0.0
+
+    @property
+    def score(self) -> float:
+        """nats; less is better."""
+        later = 0.0 if self.whole else self.later
+        return inf if self.refused else self.fit.excess + later + PRICE * self.parameters
+
+    @property
+    def optimism(self) -> float:
+        """How many times more than promised a move from here may gain."""
+        most = LATER if self.effects else OPTIMISM
+        return most if self.tried < FEW else min(LATER * self.shown, most)
+
+    def hope(self, move: Move) -> float:
+        """The score that a move may reach."""
+        left = min(self.fit.excess - move.gain * self.optimism, move.begins)
+        return max(left, 0.0) + PRICE * (self.parameters + move.parameters)
+
+
+@dataclass
+class Search(Generic[F]):
+    """A search from a set that is given.
+
+    clock: s of processor time; budget: s until it stops; most: effects; least: what one must explain over what is left unexplained
+    nodes: every set that was fitted
+    stopped: the budget ended it, not that nothing promised anything any more
+    """
+
+    judge: Judge[F]
+    clock: Callable[[], float]
+    budget: float
+    most: int
+    least: float
+    nodes: dict[frozenset[str], Node[F]] = field(default_factory=dict)
+    waiting: list[tuple[Node[F], Move]] = field(default_factory=list)
+    stopped: bool = False
+
+    @property
+    def best(self) -> Node[F]:
+        """The set with the least score."""
+        return min(self.nodes.values(), key=lambda node: (node.score, not node.whole))
+
+    def steps(self, start: F, effects: frozenset[str] = frozenset()) -> Iterator[frozenset[str]]:
+        """Search; yields each set that is about to be fitted."""
+        until = self.clock() + self.budget
+        first = Node(
+            effects=effects,
+            fit=start,
+            brief=self.judge.brief(start, Move(effects=effects, gain=0.0, rest=0.0, parameters=0, starts=())) or start,
+            parameters=0,
+            whole=True,
+        )
+        self.nodes[effects] = first
+        self.waiting = self._moves(first)
+        while self.best.fit.excess >= LEAST:
+            open_to = [item for item in self.waiting if self._promising(*item)]
+            if not open_to:
+                return
+            if self.clock() > until:
+                self.stopped = True
+                return
+            parent, move = min(open_to, key=self._order)
+            self.waiting.remove((parent, move))
+            yield move.effects
+            before = self.best.score
+            node = self._fitted(parent, move)
+            if node is not None and node.whole and node.leads and node.score < before - LEAST and node.fit.excess >= LEAST:
+                self.waiting += self._moves(node)
+
+    def rivals(self, taken: frozenset[str], most: int = 2) -> Iterator[frozenset[str]]:
+        """Fit what promised as much as the last effect of a set that was taken, and was not tried as it did well; yields as ``steps``."""
+        for parent, move in sorted(self.waiting, key=lambda item: -item[1].gain):
+            known = [node.promised for node in self.nodes.values() if parent.effects < node.effects <= taken]
+            if most == 0 or not known:
+                continue
+            if move.effects not in self.nodes and len(move.effects) <= len(taken) and move.gain > ALIKE * max(known):
+                most -= 1
+                yield move.effects
+                self._fitted(parent, move)
+
+    def _promising(self, parent: Node[F], move: Move) -> bool:
+        """It may become better than the best, and what is new may be more than what is left unexplained could feign."""
+        nameable = move.expected or move.rest * parent.optimism >= _new(parent, move) * log(1.0 + self.least) or move.begins < parent.fit.excess
+        return nameable and move.effects not in self.nodes and parent.hope(move) <= self.best.score - LEAST
+
+    def _order(self, item: tuple[Node[F], Move]) -> tuple[float, bool]:
+        """What may become best first; simple and single moves are quick, and often enough; of equals what every machine has."""
+        parent, move = item
+        return round(parent.hope(move) + SIMPLE_FIRST * move.parameters * max(_new(parent, move), 1), 1), not move.expected
+
+    def _moves(self, node: Node[F]) -> list[tuple[Node[F], Move]]:
+        if len(node.effects) >= self.most:
+            return []
+        return [(node, move) for move in self.judge.moves(node.fit) if move.effects not in self.nodes and len(move.effects) <= self.most]
+
+    def _fitted(self, parent: Node[F], move: Move) -> Node[F] | None:
+        best, later = self.best, parent.fit.excess - parent.brief.excess  # what a whole fit will change, as it did for the parent
+        brief = self.judge.brief(parent.fit, move, min(best.fit.excess - later + HOPELESS, parent.brief.excess))
+        parent.tried += 1
+        if brief is None:
+            return None
+        parent.shown = max(parent.shown, (parent.brief.excess - brief.excess) / move.gain if move.gain > 0.0 else 0.0)
+        parameters = parent.parameters + move.parameters
+        least = (1.0 + self.least) ** _new(parent, move)
+        leads = self.judge.size(brief, parent.brief) >= least - 1.0
+        whole = brief.excess + later + PRICE * parameters < best.score - LEAST if leads else move.rest >= log(least)
+        found = self.judge.whole(brief) if whole else brief
+        if whole and not leads:  # what acts slowly does not show in a brief fit, but promised a name on all data
+            leads = self.judge.size(found, parent.fit) >= least - 1.0
+        node = Node(
+            effects=move.effects,
+            fit=found,
+            brief=brief,
+            parameters=parameters,
+            whole=whole,
+            promised=move.gain,
+            refused=self.judge.refusal(found),
+            leads=leads,
+            later=later,
+        )
+        self.nodes[move.effects] = node
+        return node
+
+
+def _new(parent: Node[F], move: Move) -> int:
+    """How many effects a move brings, each of which must be worth a name."""
+    return len(move.effects - parent.effects)

@@ -1,0 +1,271 @@
+"""Which physical effect is missing? A verdict with its evidence, its rivals, what is left, and the experiment that would settle doubt."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+import scipy.signal
+
+from xy_sysid.axis.model import STANDARD, Library
+from xy_sysid.comparison.where_it_fails import Comparison, compare_velocity
+from xy_sysid.errors import BadInput
+from xy_sysid.greybox.axis_data import AxisData, prepare_all
+from xy_sysid.greybox.free_run import GreyboxFit
+from xy_sysid.samples.block import FloatArray
+from xy_sysid.search.criteria import AT_FLOOR, FEWEST, FOLLOWS, SIZE, STILL
+from xy_sysid.search.ladder import Candidate, Ladder
+from xy_sysid.search.refine import BUDGET, Effort, never, refine
+from xy_sysid.units import USUAL, Units, bare, moved
+
+Kind = Literal["missing_effect", "nothing_missing", "not_in_library", "not_enough_data"]
+Recordings = Sequence[tuple[FloatArray, FloatArray]]
+
+_UNKNOWN = "Look at where the model fails, then excite only there: half and double the amplitude, another part of the travel, one direction."
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """What is missing in the rigid model of one axis.
+
+    verdict:    see Kind; effects: the names, that which explains most first; confidence: 0..1
+    tolerance:  part of the motion (rms) that is left unexplained beyond the noise
+    ladder:     the fits, from the base down; candidates: tried alone, least held-out error first
+    where:      the places where the base fails
+    explained:  part (0..1) of the base's held-out error power beyond the noise that the effects take away
+    units:      of input and output
+    noise, discrepancy: rms, m/s, of what is left: what the encoder adds, and what no effect explains
+    stopped:    the time was up before the search ended by itself; refused: (effects, why they explain nothing)
+    """
+
+    verdict: Kind
+    effects: tuple[str, ...]
+    confidence: float
+    tolerance: float
+    sentence: str
+    ladder: Ladder | None = None
+    candidates: tuple[Candidate, ...] = ()
+    where: Comparison | None = None
+    next_experiment: str = ""
+    explained: float = 0.0
+    noise: float = 0.0
+    discrepancy: float = 0.0
+    stopped: bool = False
+    refused: tuple[tuple[tuple[str, ...], str], ...] = field(default=())
+    units: Units = USUAL
+
+    @property
+    def effect(self) -> str | None:
+        """The first of the effects."""
+        return self.effects[0] if self.effects else None
+
+
+def diagnose(
+    sampling_rate: float,
+    voltage: FloatArray,
+    position: FloatArray,
+    library: Library = STANDARD,
+    budget: float = BUDGET,
+    clock: Callable[[], float] = never,
+) -> Diagnosis:
+    """Diagnose one axis from gap-free samples (n,), V and m. budget: see ``refine``."""
+    return diagnose_all(sampling_rate, [(voltage, position)], library, budget, clock)
+
+
+def diagnose_all(
+    sampling_rate: float,
+    recordings: Recordings,
+    library: Library = STANDARD,
+    budget: float = BUDGET,
+    clock: Callable[[], float] = never,
+    units: Units = USUAL,
+) -> Diagnosis:
+    """Diagnose one axis from several recordings, (voltage (n,), position (n,)) each; units: what V and m stand for."""
+    missing = lacking(sampling_rate, recordings)
+    if missing:
+        return not_enough(missing, units)
+    data = prepare_all(sampling_rate, recordings, units=units)
+    ladder = refine(data, library, effort=Effort(budget=budget, clock=clock, size=SIZE))
+    return judged(data, ladder, library)
+
+
+def not_enough(missing: str, units: Units = USUAL) -> Diagnosis:
+    """The verdict where the data do not suffice."""
+    return Diagnosis(
+        verdict="not_enough_data",
+        effects=(),
+        confidence=1.0,
+        tolerance=0.0,
+        sentence=f"Not enough data: {missing}",
+        next_experiment=missing,
+        units=units,
+    )
+
+
+def lacking(sampling_rate: float, recordings: Recordings) -> str:
+    """What is missing in the data, in words; empty if they will do."""
+    voltage, position = max(recordings, key=lambda pair: pair[0].size)
+    if float(voltage.std()) == 0.0:
+        return "the input does not move; excite the axis."
+    if float(position.std()) == 0.0:
+        return "the output does not move; excite more, or check the encoder."
+    try:
+        data = prepare_all(sampling_rate, recordings)
+    except BadInput as problem:
+        return str(problem)
+    if data.held is data.fitted:
+        seconds = voltage.size / sampling_rate
+        return f"{seconds:.3g} s without a gap are too few windows to fit some and judge by others; record longer, better 60 s."
+    followed, least = _coherence(sampling_rate, voltage, position)
+    if followed < least:
+        return f"the output does not follow the input (coherence {followed:.2g} at best, {least:.2g} is the least); check which signals these are."
+    moving = [_moving(data, begins) for begins in (data.fitted.begins, data.held.begins)]
+    if moving[0] < 2 * FEWEST or moving[1] < FEWEST:
+        seconds = data.layout.length / sampling_rate
+        return (
+            f"the axis stands most of the time: it moves in {moving[0] + moving[1]} of {data.fitted.begins.size + data.held.begins.size} windows "
+            f"of {seconds:.2g} s; let it move for longer, in all of its directions and speeds."
+        )
+    if _tones(voltage) < FEWEST:
+        return "the input holds one tone only; use noise, a multisine over the whole band, or steps."
+    excited = int(data.floor.excited.sum())
+    if excited < FEWEST:
+        return f"only {excited} bands of frequency are excited; use noise or a multisine over the whole band."
+    return ""
+
+
+def _moving(data: AxisData, begins: np.ndarray) -> int:
+    """How many windows hold motion, against the liveliest tenth of all."""
+    every = np.concatenate((data.fitted.begins, data.held.begins))
+    length = data.layout.length
+
+    def sizes(starts: np.ndarray) -> FloatArray:
+        return np.array([float(np.std(data.velocity[start : start + length])) for start in starts])
+
+    return int(np.sum(sizes(begins) > STILL * float(np.quantile(sizes(every), 0.9))))
+
+
+def _tones(voltage: FloatArray) -> float:
+    """How many tones the input holds, at least: lines of its spectrum within 50 dB of the largest, over the width of one tone's."""
+    power = np.abs(np.fft.rfft((voltage - voltage.mean()) * scipy.signal.get_window("blackmanharris", voltage.size))) ** 2
+    return float(np.sum(power > 1e-5 * float(power.max()))) / 8.0  # the window's main lobe; its side lobes are 92 dB down
+
+
+def _coherence(sampling_rate: float, voltage: FloatArray, position: FloatArray) -> tuple[float, float]:
+    """The best of all octaves' mean coherence of input and velocity, and the least that is not chance, for the best length of window."""
+    best = (0.0, 1.0)
+    for part in (16, 8):
+        length = int(2 ** np.floor(np.log2(voltage.size / part)))
+        if length < 32:
+            continue
+        frequency, value = scipy.signal.coherence(voltage[:-1], np.diff(position), sampling_rate, nperseg=length)
+        octave = np.floor(np.log2(np.maximum(frequency, frequency[1]) / frequency[-1])).astype(np.int64)
+        means = [float(np.nanmean(np.nan_to_num(value[octave == k]))) for k in range(-12, 0) if int(np.sum(octave == k)) >= 2]
+        found = (max(means, default=0.0), FOLLOWS * 16.0 / part)
+        best = max(best, found, key=lambda item: item[0] / item[1])
+    return best
+
+
+def judged(data: AxisData, ladder: Ladder, library: Library) -> Diagnosis:
+    """The verdict on a search that has ended."""
+    base, final, names = ladder.base, ladder.final, ladder.effects
+    motion = max(data.layout.rms(data.floor.motion), 1e-300)
+    left = ladder.discrepancy / motion
+    where, unit = where_base_fails(data, base), data.units.speed
+    explained, noise = ladder.explained, moved(ladder.noise, unit)
+    if names and (explained >= 1.0 - explained or final.excess < AT_FLOOR):
+        verdict: Kind = "missing_effect"
+        confidence, experiment = _confidence(ladder), _experiment(names[0], library)
+        sentence = f"Missing: {_listed(names)}. {'They explain' if len(names) > 1 else 'It explains'} {_percent(explained)} of the error's power"
+        sentence += f" ({bare(base.held_out_error, unit)} -> {moved(final.held_out_error, unit)}). {_left(data, ladder, left)}"
+        if ladder.rivals:
+            rival = ladder.rivals[0]
+            sentence += f" Runner-up {' and '.join(rival.effects)}: {moved(rival.fit.held_out_error, unit)}."
+    elif base.excess < AT_FLOOR:
+        verdict, names, explained, experiment = "nothing_missing", (), 0.0, "None is needed."
+        confidence = 1.0 - base.excess
+        sentence = f"Nothing is missing: the rigid model with delay leaves {moved(base.held_out_error, unit)}, the noise alone is {noise}."
+    else:
+        verdict, experiment = "not_in_library", _UNKNOWN
+        confidence = (1.0 - ladder.helps) * (1.0 - _hidden(left, data.floor.epsilon))
+        best = f"; at best {_listed(names)} take away {_percent(explained)}" if names and explained > 0.0 else ""
+        sentence = f"Not in the library: no effect explains what the rigid model leaves ({moved(base.held_out_error, unit)}, {_percent(left)} of the "
+        sentence += f"motion{best}; noise alone is {noise})."
+    if ladder.stopped:
+        sentence += " The search was stopped when its time was up."
+        confidence *= 0.8
+    return Diagnosis(
+        verdict=verdict,
+        effects=names if verdict == "missing_effect" else (),
+        confidence=float(confidence),
+        tolerance=left,
+        sentence=sentence,
+        ladder=ladder,
+        candidates=tuple(sorted(ladder.tried, key=lambda item: item.effect not in names)),
+        where=where,
+        next_experiment=experiment,
+        explained=explained,
+        noise=ladder.noise,
+        discrepancy=ladder.discrepancy,
+        stopped=ladder.stopped,
+        refused=ladder.refused,
+        units=data.units,
+    )
+
+
+def _confidence(ladder: Ladder) -> float:
+    """How far ahead of the next best set it is, how much larger each effect is than what is left, and whether modes leave little where they act."""
+    behind = max(min((rival.behind for rival in ladder.rivals), default=math.inf), 0.0)
+    size = min(ladder.sizes.values(), default=0.0)
+    return (1.0 - 0.5 * math.exp(-behind / AT_FLOOR)) * size / (size + 1.0) * (1.0 - ladder.astray)
+
+
+def _hidden(left: float, trusted: float) -> float:
+    """Part of all sizes that what is left could hide, on a logarithmic scale from what laws are trusted to up to the whole motion.
+
+    left, trusted: parts of the motion. Jeffreys 1946: of a size, nobody knows the order of magnitude.
+    """
+    return min(max(math.log(max(left, trusted) / trusted) / math.log(1.0 / trusted), 0.0), 1.0)
+
+
+def _left(data: AxisData, ladder: Ladder, left: float) -> str:
+    noise, beyond = (moved(value, data.units.speed) for value in (ladder.noise, ladder.discrepancy))
+    if ladder.final.excess < AT_FLOOR or not ladder.discrepancy > 0.0:
+        return f"What is left is the encoder's noise ({noise})."
+    words = "" if ladder.final.model.ahead else f", {_percent(left)} of the motion"
+    return f"What is left: {beyond}{words}, beyond the encoder's noise of {noise}{_mostly(data, ladder.final)}."
+
+
+def _mostly(data: AxisData, final: GreyboxFit) -> str:
+    """Where in frequency most of what is left lies."""
+    power = data.layout.lines * np.maximum(final.power - data.floor.noise, 0.0)
+    if not float(power.sum()) > 0.0:
+        return ""
+    edges, share = data.layout.edges(), np.cumsum(power) / power.sum()
+    low, high = (int(np.searchsorted(share, at)) for at in (0.1, 0.8))
+    return f", mostly between {edges[low]:.3g} and {edges[min(high + 1, edges.size - 1)]:.3g} Hz"
+
+
+def where_base_fails(data: AxisData, fitted: GreyboxFit) -> Comparison | None:
+    """The places where a fit fails, over the longest recording."""
+    run, step = max(zip(data.runs, data.steps, strict=True), key=lambda pair: pair[1].stop - pair[1].start)
+    try:
+        return compare_velocity(fitted.simulated[step], data.voltage[run], data.position[run], data.sampling_rate, data.units)
+    except (BadInput, ValueError):
+        return None
+
+
+def _experiment(name: str, library: Library) -> str:
+    effect = library[name]
+    return f"To tell it from {', '.join(effect.look_alikes)}: {effect.experiment}." if effect.look_alikes else f"{effect.experiment}."
+
+
+def _listed(names: Sequence[str]) -> str:
+    return " and ".join((", ".join(names[:-1]), names[-1])) if len(names) > 1 else "".join(names)
+
+
+def _percent(part: float) -> str:
+    return f"{100.0 * part:.3g} %"

@@ -1,0 +1,274 @@
+"""What the search asks: which moves promise what, how well a set of effects predicts what it has not seen, and which of two is better."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+from scipy.stats import norm, wilcoxon
+
+from xy_sysid.axis.model import AxisModel, Library
+from xy_sysid.effects import Effect, Scene
+from xy_sysid.effects._contract import Limits, in_time
+from xy_sysid.greybox.axis_data import AxisData
+from xy_sysid.greybox.floor import excess
+from xy_sysid.greybox.free_run import GreyboxFit, best_start, finish, first_excess, fit, fit_base, other_starts, scene_of, screened
+from xy_sysid.greybox.one_step import one_step_fit
+from xy_sysid.greybox.score_test import Gain, Trace, bounded
+from xy_sysid.samples.block import FloatArray
+from xy_sysid.search.beside_one_step import put_beside
+from xy_sysid.search.criteria import ALIKE, CHANCE, HOPELESS, LEAST, WIDTH
+
+NOTHING = Gain(0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """From one set of effects to another.
+
+    gain, rest: nats that the score test promises, of excess and of the whole error
+    begins: excess with which it begins, where that is known (else infinite)
+    parameters: that the new set has more; starts: first values of what is new; replaced: an effect that gives way
+    expected: every machine has it (friction): it comes first among moves that promise the same, and is tried whatever the whole error promises,
+        for to first order its trace tells little where it bends
+    """
+
+    effects: frozenset[str]
+    gain: float
+    rest: float
+    parameters: int
+    starts: tuple[tuple[str, tuple[float, ...]], ...]
+    replaced: str | None = None
+    begins: float = np.inf
+    expected: bool = False
+
+
+class FreeRunJudge:
+    """Judges by free simulation of one axis; sets are those of a library."""
+
+    def __init__(self, data: AxisData, library: Library, late: Callable[[], bool] = in_time) -> None:
+        self.data, self.library, self.late = data, library, late
+        self.reach = float(np.min(data.position)), float(np.max(data.position))
+
+    def begin(self) -> GreyboxFit:
+        """The rigid base."""
+        return fit_base(self.data, self.library)
+
+    def added(self, now: GreyboxFit, name: str) -> GreyboxFit:
+        """A fit with one more effect, unasked; a relative of the same family gives way."""
+        effect = self.library[name]
+        relative = next((own for own, _ in now.model.effects if effect.family and self.library[own].family == effect.family), None)
+        ahead = now.model.ahead
+        if effect.one_step is not None:
+            return one_step_fit(self.data, now, effect, limits=Limits(late=self.late))
+        if ahead is not None:
+            return put_beside(self.data, now, ahead, effect)
+        model = now.model if relative is None else now.model.without(relative)
+        traced = model.with_effect(name, screened(self.data, now, [effect]).traces[0].values)
+        return fit(self.data, best_start(self.data, [traced, *other_starts(self.data, now, model, name)]), late=self.late)
+
+    def moves(self, now: GreyboxFit) -> list[Move]:
+        """What may be added, alone or two at once, and what may take the place of a relative; most promising first, of each kind.
+
+        Nothing when it is late.
+        """
+        if self.late():
+            return []
+        model = now.model
+        families = {self.library[name].family: name for name, _ in model.effects if self.library[name].family}
+        open_to = [e for e in self.library.acting if e.simulable and e.name not in model]
+        screen = screened(self.data, now, open_to)
+        traces = {trace.effect: trace for trace in screen.traces}
+        own = frozenset(name for name, _ in model.effects)
+        gains = {name: screen.gain([name]) for name in screen.whitened}
+        scene = scene_of(self.data, now, self.data.first)
+        found = (self._single((now, scene), families, traces[e.name], gains.get(e.name, NOTHING)) for e in open_to)
+        singles = sorted((move for move in found if move is not None), key=lambda move: -move.gain)
+        kept = self._with_relatives(singles[: int(WIDTH)], singles)
+        kept += [move for move in singles if move not in kept and move.begins < now.excess]
+        pairs = []
+        for one, other in combinations(self._leaders(gains, families), 2):
+            if self.library[one].family and self.library[one].family == self.library[other].family:
+                continue
+            both = screen.gain((one, other))
+            if ALIKE * both.excess > max(gains[one].excess, gains[other].excess):
+                starts = tuple((name, traces[name].values) for name in sorted((one, other), key=lambda name: -gains[name].excess))
+                pairs.append(
+                    Move(
+                        effects=own | {one, other},
+                        gain=ALIKE * both.excess,
+                        rest=ALIKE * both.rest,
+                        parameters=self._count((one, other)),
+                        starts=starts,
+                    )
+                )
+        pairs.sort(key=lambda move: -move.gain)
+        return [move for move in (*kept, *pairs[: int(WIDTH)]) if not self._twice(move.effects)]
+
+    def _leaders(self, gains: Mapping[str, Gain], families: dict[str, str]) -> list[str]:
+        """What has no family, and of each family that is not in the set yet its simplest and its most promising member."""
+        members: dict[str, list[str]] = {}
+        for name in sorted(gains, key=lambda name: len(self.library[name].parameters)):
+            members.setdefault(self.library[name].family or name, []).append(name)
+        free = [names for family, names in members.items() if family not in families]
+        return [name for names in free for name in dict.fromkeys((names[0], max(names, key=lambda name: gains[name].excess)))]
+
+    def _twice(self, names: frozenset[str]) -> bool:
+        """One law is in a set twice: as itself, and as a part of what is the sum of several."""
+        sums = ((name, self.library[name].sum_of) for name in names)
+        return any(whole is not None and names & set(whole.parts) for _, whole in sums)
+
+    def _single(self, here: tuple[GreyboxFit, Scene], families: dict[str, str], trace: Trace, gain: Gain) -> Move | None:
+        now, scene = here
+        effect, own = self.library[trace.effect], frozenset(name for name, _ in now.model.effects)
+        starts = ((effect.name, trace.values),)
+        relative = families.get(effect.family) if effect.family else None
+        if relative is None:
+            begins = np.inf
+            if not own:  # the base may have been led astray so far that traces tell little
+                candidates = other_starts(self.data, now, now.model, effect.name, scene)
+                begins = min((first_excess(self.data, model) for model in candidates), default=np.inf)
+            return Move(
+                effects=own | {effect.name},
+                gain=gain.excess,
+                rest=gain.rest,
+                parameters=len(effect.parameters),
+                starts=starts,
+                begins=begins,
+                expected=effect.is_dry,
+            )
+        more = len(effect.parameters) - len(self.library[relative].parameters)
+        if more <= 0 and self.library[relative].sum_of is None:
+            return None
+        return Move(effects=own - {relative} | {effect.name}, gain=gain.excess, rest=gain.rest, parameters=more, starts=starts, replaced=relative)
+
+    def _with_relatives(self, kept: list[Move], every: list[Move]) -> list[Move]:
+        """The rest of a family of which one is among the first two: relatives share their trace."""
+        wanted = {self.library[name].family for move in kept[:2] for name, _ in move.starts} - {""}
+        return [*kept, *(move for move in every if move not in kept and self.library[move.starts[0][0]].family in wanted)]
+
+    def _count(self, names: Iterable[str]) -> int:
+        return sum(len(self.library[name].parameters) for name in names)
+
+    def brief(self, now: GreyboxFit, move: Move, hopeless: float = np.inf) -> GreyboxFit | None:
+        """The set of a move on the first stage's data; given up where it leaves more excess than ``hopeless``. None if there is no fit."""
+        try:
+            found = fit(self.data, self._started(now, move), brief=True, hopeless=hopeless, late=self.late)
+        except np.linalg.LinAlgError:
+            return None
+        return found if np.isfinite(found.excess) else None
+
+    def _started(self, now: GreyboxFit, move: Move) -> AxisModel:
+        model = now.model
+        if move.replaced is not None:
+            name, values = move.starts[0]
+            effect, old = self.library[name], dict(zip(self.library[move.replaced].names, dict(model.effects)[move.replaced], strict=True))
+            rest = model.without(move.replaced)
+            shared = [tuple(old.get(key, value) for key, value in zip(effect.names, row, strict=True)) for row in (values, effect.typical)]
+            return best_start(self.data, [rest.with_effect(name, bounded(effect, row)) for row in shared])
+        for name, values in move.starts:
+            begun = model.with_effect(name, bounded(self.library[name], values))
+            model = best_start(self.data, [begun, *other_starts(self.data, now, model, name)])
+        return model
+
+    def whole(self, found: GreyboxFit) -> GreyboxFit:
+        """The same set on all data that are not held out."""
+        return finish(self.data, found.model, found.runs, self.late)
+
+    def without(self, now: GreyboxFit, name: str, alone: Sequence[AxisModel] = ()) -> GreyboxFit | None:
+        """The same set but for one effect. alone: models of single ones of the others, one of which may have stood back for it."""
+        less = now.model.without(name)
+        starts = [less, *(less.with_effect(other, values) for model in alone for other, values in model.effects)]
+        return self.again(now, best_start(self.data, starts) if alone else less)
+
+    def instead(self, now: GreyboxFit, name: str, relative: Effect) -> GreyboxFit | None:
+        """The same set with a relative in the place of one effect."""
+        own = dict(zip(self.library[name].names, dict(now.model.effects)[name], strict=True))
+        start = tuple(own.get(key, usual) for key, usual in zip(relative.names, relative.typical, strict=True))
+        return self.again(now, now.model.without(name).with_effect(relative.name, bounded(relative, start)))
+
+    def again(self, now: GreyboxFit, model: AxisModel) -> GreyboxFit | None:
+        """A model beside one that is there: fitted wholly only where it comes near."""
+        try:
+            found = fit(self.data, model, brief=True, hopeless=now.excess + HOPELESS, late=self.late)
+            if found.excess < now.excess + HOPELESS:
+                found = finish(self.data, found.model, found.runs, self.late)
+        except np.linalg.LinAlgError:
+            return None
+        return found if np.isfinite(found.excess) else None
+
+    def idle(self, found: GreyboxFit) -> str:
+        """The effect whose size the data do not tell from none beside the others: its interval, in numbers and not in factors, holds 0."""
+        for name, _ in found.model.effects if not found.brief else ():
+            size = self.library[name].parameters[0]
+            known = found.parameter(f"{name}.{size.name}")
+            if size.positive and math.isfinite(known.high) and known.value >= math.e * known.low:
+                return name
+        return ""
+
+    def refusal(self, found: GreyboxFit) -> str:
+        """Why a fit explains nothing, whatever it leaves: in words, or empty."""
+        low, high = self.data.sampling_rate * 0.0, 0.4 * self.data.sampling_rate
+        excited = self.data.layout.edges()[:-1][self.data.floor.excited]
+        if excited.size:
+            low, high = float(excited[0]), min(high, 1.5 * float(self.data.layout.edges()[1:][self.data.floor.excited][-1]))
+        for name, values in found.model.effects:
+            effect = self.library[name]
+            if effect.plausible is not None and not effect.plausible(values):
+                return f"{name}: no machine has such values"
+            for k, (item, value) in enumerate(zip(effect.parameters, values, strict=True)):
+                edge = value >= item.high * (1.0 - 1e-6) or (k == 0 and not item.positive and value <= item.low * (1.0 + 1e-6) and item.low > 0.0)
+                if k == 0 and edge:
+                    return f"{name}: {item.name} is at its bound"
+                known = found.parameter(f"{name}.{item.name}")
+                judged = k == 0 and item.positive and not found.brief and math.isfinite(known.high)
+                if judged and known.low <= item.low * (1.0 + 1e-6):
+                    return f"{name}: {item.name} cannot be told from 0"
+                if item.unit == "m" and not item.positive and not self.reach[0] <= value <= self.reach[1]:
+                    return f"{name}: {item.name} lies outside of where the axis was"
+                if item.name == effect.mode_frequency and not low <= value <= high:
+                    return f"{name}: a mode at {value:.3g} Hz, outside of what these data excite and see ({low:.3g} to {high:.3g} Hz)"
+        limit = self.data.first / self.data.sampling_rate / 4.0
+        if found.model.delay >= 0.99 * limit:
+            return f"time_delay: {found.model.delay:.3g} s is at its bound"
+        return ""
+
+    def better(self, one: GreyboxFit, other: GreyboxFit) -> bool:
+        """One predicts the held-out windows better than the other, by more than chance: paired over windows, in the mean or in the ranks.
+
+        The ranks (Wilcoxon 1945), as a law that acts far out alone explains much in few windows, and a little in all. A fit that was given
+        up, for it was far behind, is worse.
+        """
+        if other.brief:
+            return True
+        gain = _scores(other, self.data) - _scores(one, self.data)
+        spread = float(np.std(gain, ddof=1)) / np.sqrt(max(gain.size / 1.5, 1.0)) if gain.size > 1 else 0.0
+        if float(np.mean(gain)) > CHANCE * spread:
+            return True
+        return bool(np.any(gain != 0.0)) and float(wilcoxon(gain, alternative="greater").pvalue) < norm.sf(CHANCE)
+
+    def size(self, found: GreyboxFit, before: GreyboxFit) -> float:
+        """What a fit explains of what one before it left, over what it leaves itself, as powers: of the whole beyond the noise, or over the bands."""
+        rest = self.data.floor.rest(before.power)
+        return max(rest(before.power) / rest(found.power), float(np.exp(before.excess - found.excess))) - 1.0
+
+    def rest(self, found: GreyboxFit, reference: GreyboxFit) -> float:
+        """Power of the held-out error beyond the noise over that of a reference; see ``Floor.rest``."""
+        return self.data.floor.rest(reference.power)(found.power)
+
+
+def _scores(found: GreyboxFit, data: AxisData) -> FloatArray:
+    """(windows,) excess of each held-out window."""
+    return np.array([excess(row, data.floor) for row in found.held])
+
+
+def joined(data: AxisData, found: GreyboxFit, late: Callable[[], bool] = in_time) -> GreyboxFit:
+    """One law for several that are the same; where it is not, as a load is larger than the friction, they stay."""
+    whole = found.model.joined()
+    if whole is found.model:
+        return found
+    one = finish(data, replace(whole), late=late)
+    return one if one.excess < found.excess + LEAST else found

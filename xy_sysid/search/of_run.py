@@ -1,0 +1,156 @@
+"""One call each: which effect is missing in a run, or in several of the same axis; and the rungs from the rigid model down."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, fields
+
+from xy_sysid.axis.model import STANDARD, Library
+from xy_sysid.comparison.physical_model import PhysicalModel
+from xy_sysid.errors import BadInput
+from xy_sysid.greybox.axis_data import prepare_all
+from xy_sysid.greybox.free_run import GreyboxFit
+from xy_sysid.samples.recording import Recording, Run, one_run
+from xy_sysid.search import diagnose as one
+from xy_sysid.search.diagnose import Diagnosis
+from xy_sysid.search.ladder import Ladder
+from xy_sysid.search.refine import BUDGET, MOST_EFFECTS, Effort, never
+from xy_sysid.search.refine import refine as search
+from xy_sysid.units import bare, motion, moved
+
+Data = Run | Recording | Sequence[Run | Recording]
+
+
+@dataclass(frozen=True, slots=True)
+class RefinedStep:
+    """One rung: the effect added (None for the rigid base alone) and the model with it.
+
+    held_out_error, training_error: rms, m/s, of data that no fit saw, and of those that it saw; noise_floor: what the encoder alone adds
+    """
+
+    added: str | None
+    model: PhysicalModel
+
+    @property
+    def fit(self) -> GreyboxFit:
+        """Parameters with intervals, errors, simulated velocity."""
+        assert self.model.fit is not None
+        return self.model.fit
+
+    @property
+    def held_out_error(self) -> float:
+        """m/s rms, of data that no fit saw."""
+        return self.fit.held_out_error
+
+    @property
+    def training_error(self) -> float:
+        """m/s rms, of the data of the fit."""
+        return self.fit.training_error
+
+    @property
+    def noise_floor(self) -> float:
+        """m/s rms, what the encoder's noise alone makes."""
+        return self.fit.noise_floor
+
+    def __repr__(self) -> str:
+        unit = self.model.units.speed
+        return f"<RefinedStep {self.added or 'rigid'}: held-out error {moved(self.held_out_error, unit)}, floor {bare(self.noise_floor, unit)}>"
+
+
+@dataclass(frozen=True, slots=True)
+class Refinement:
+    """The rungs from the rigid base down, to be gone through; ``ladder`` has what was tried beside them."""
+
+    steps: tuple[RefinedStep, ...]
+    ladder: Ladder
+
+    def __iter__(self) -> Iterator[RefinedStep]:
+        return iter(self.steps)
+
+    def __len__(self) -> int:
+        return len(self.steps)
+
+    def __getitem__(self, place: int) -> RefinedStep:
+        return self.steps[place]
+
+    @property
+    def model(self) -> PhysicalModel:
+        """The last one, with every effect."""
+        return self.steps[-1].model
+
+    def __repr__(self) -> str:
+        unit = self.model.units.speed
+        rungs = (f"{step.added or 'rigid'} {bare(step.held_out_error, unit)}" for step in self.steps)
+        return f"<Refinement: {' -> '.join(rungs)} {motion(unit)[1]}, floor {bare(self.steps[-1].noise_floor, unit)}>"
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosed(Diagnosis):
+    """The answer about some runs. ``sentence`` says it; ``verdict``, ``effects``, ``confidence``, ``next_experiment`` and the rest are its parts."""
+
+    runs: tuple[Run, ...] = ()
+
+    @property
+    def runner_up(self) -> str | None:
+        """The next best set of effects; None if nothing else was near."""
+        rivals = self.ladder.rivals if self.ladder is not None else ()
+        return " and ".join(rivals[0].effects) if rivals else None
+
+    def __repr__(self) -> str:
+        return f"<Diagnosis: {self.sentence} Confidence {self.confidence:.2f}.>"
+
+
+def diagnose(data: Data, library: Library = STANDARD, budget: float = BUDGET, clock: Callable[[], float] = never) -> Diagnosed:
+    """Which physical effects the rigid model misses, with evidence and runner-up; or that nothing is missing, or that none is known.
+
+    data:   a run or several of one axis, V and m; library: with effects of your own (``files.effects.library``)
+    budget: s after which the best so far is said, if ``clock`` (for example ``time.process_time``) tells the time; else it takes as
+            long as it takes, and the same data give the same answer on any machine
+    Too little data is an answer, ``not_enough_data``, and no error. Raises BadInput for runs that do not belong together.
+    """
+    runs = runs_together(data)
+    found = one.diagnose_all(runs[0].sampling_rate, [(run.voltage, run.position) for run in runs], library, budget, clock, runs[0].units)
+    values = {item.name: getattr(found, item.name) for item in fields(found)}
+    return Diagnosed(**values, runs=runs)
+
+
+def refine(
+    data: Data,
+    add: Iterable[str] = (),
+    auto: bool = True,
+    library: Library = STANDARD,
+    budget: float = BUDGET,
+    clock: Callable[[], float] = never,
+) -> Refinement:
+    """Add effects, fit everything together, and see the error on held-out data fall: a step for the rigid base and one for each effect.
+
+    add:  effects to add first, in this order, unasked; auto: go on until nothing promises more; the rest as for ``diagnose``
+    Raises BadInput for too little data, or for a name that is unknown or in every model.
+    """
+    runs, names = runs_together(data), (add,) if isinstance(add, str) else tuple(add)
+    for name in names:
+        if library[name].category == "base":
+            raise BadInput("add", name, "an effect that is not in every model already", "Leave it out.")
+    prepared = prepare_all(runs[0].sampling_rate, [(run.voltage, run.position) for run in runs], units=runs[0].units)
+    ladder = search(prepared, library, names, Effort(most=MOST_EFFECTS if auto else 0, budget=budget, clock=clock))
+    digests = tuple(run.digest for run in runs)
+    steps = tuple(
+        RefinedStep(step.added, PhysicalModel(model=step.fit.model, axis=runs[0].axis, data=digests, units=runs[0].units, fit=step.fit))
+        for step in ladder.steps
+    )
+    return Refinement(steps, ladder)
+
+
+def runs_together(data: Data) -> tuple[Run, ...]:
+    """One or several runs of the same axis."""
+    runs = tuple(one_run(item) for item in (data if isinstance(data, Sequence) else (data,)))
+    if not runs:
+        raise BadInput("data", "empty", "a run, or several of one axis", "Give at least one.")
+    for what, values in (
+        ("sampling rate", [f"{run.sampling_rate:g} Hz" for run in runs]),
+        ("axis", [run.axis for run in runs]),
+        ("units", ["/".join(reversed(run.units)) for run in runs]),
+    ):
+        if len(set(values)) > 1:
+            raise BadInput(f"{what} of the runs", " and ".join(dict.fromkeys(values)), "one and the same", "Give runs of one axis.")
+    return runs

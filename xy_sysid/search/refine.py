@@ -1,0 +1,390 @@
+"""Add effects, refit everything together, and watch the error on held-out data fall: the search, and what it comes to.
+
+First sets of effects by free simulation (``best_first``); then simpler sets where they do as well; then, if what is left could be a
+gap, one-step prediction against the best simulation with the same freedom.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Generator, Iterable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from itertools import chain
+
+import numpy as np
+
+from xy_sysid.axis.model import STANDARD, Library
+from xy_sysid.effects._contract import Limits
+from xy_sysid.errors import BadInput
+from xy_sysid.greybox.axis_data import AxisData
+from xy_sysid.greybox.free_run import GreyboxFit
+from xy_sysid.greybox.one_step import error_without
+from xy_sysid.greybox.whitened import whitened_rms
+from xy_sysid.search.beside_one_step import grown
+from xy_sysid.search.best_first import Judge, Node, Search
+from xy_sysid.search.criteria import FILTERED, FREE, HOPELESS, LEAST, WORTH
+from xy_sysid.search.judge import FreeRunJudge, joined
+from xy_sysid.search.ladder import Candidate, Ladder, Rival, Step
+
+MOST_EFFECTS = 4
+BUDGET = 10.0  # s of processor time for one axis
+RIVALS = 6
+
+
+@dataclass(frozen=True, slots=True)
+class Trying:
+    """A set of effects that is about to be fitted."""
+
+    effects: tuple[str, ...]
+
+
+def never() -> float:
+    """A clock that stands still: no budget ever ends."""
+    return 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Effort:
+    """How far a search goes.
+
+    most: effects, besides those given; budget: s of processor time as ``clock`` tells it, after which it says the best it has
+    size: what an effect must explain to be added, over what is left unexplained, as powers
+    """
+
+    most: int = MOST_EFFECTS
+    budget: float = BUDGET
+    clock: Callable[[], float] = never
+    size: float = WORTH
+
+
+def refine(data: AxisData, library: Library = STANDARD, given: Iterable[str] = (), effort: Effort | None = None) -> Ladder:
+    """Add effects until nothing promises more; ``given`` are added first, in their order, unasked. See ``refine_steps``."""
+    steps = refine_steps(data, library, given, effort)
+    while True:
+        try:
+            next(steps)
+        except StopIteration as end:
+            ladder: Ladder = end.value
+            return ladder
+
+
+def refine_steps(
+    data: AxisData, library: Library = STANDARD, given: Iterable[str] = (), effort: Effort | None = None
+) -> Generator[Trying, None, Ladder]:
+    """The same, step by step: yields what is being tried, returns what it came to."""
+    kept, effort = tuple(given), effort or Effort()
+    until = math.inf  # what is given is fitted wholly
+    judge = FreeRunJudge(data, library, lambda: effort.clock() > until)
+    fixed = _Fixed.of(judge, kept)
+    until = effort.clock() + effort.budget  # from here on: on a fresh machine the laws have been compiled by now
+    ahead = fixed.steps[-1].fit.model.ahead
+    if ahead is not None or effort.most == 0:
+        return _given_alone(data, judge, fixed)
+    search: Search[GreyboxFit] = Search(judge=judge, clock=effort.clock, budget=FREE * effort.budget, most=effort.most + len(kept), least=effort.size)
+    for names in search.steps(fixed.steps[-1].fit, frozenset(kept)):
+        yield Trying(tuple(sorted(names)))
+    settled = _Settling(judge, search, frozenset(kept))
+    while settled.step():
+        yield Trying(tuple(sorted(settled.now.effects)))
+    final, search.stopped = settled.now, search.stopped or judge.late()
+    if not judge.late() and final.effects > frozenset(kept):
+        for names in search.rivals(final.effects):
+            yield Trying(tuple(sorted(names)))
+    filtered = None
+    if final.fit.excess >= LEAST and not kept:
+        for effect in library.acting:
+            if effect.one_step is None:
+                continue
+            if judge.late():
+                search.stopped = True
+                break
+            yield Trying((effect.name,))
+            filtered = filtered or _ahead(judge, search, final, effect.name)
+    return _ladder(judge, search, settled, fixed, filtered)
+
+
+def settle(data: AxisData, now: GreyboxFit) -> GreyboxFit:
+    """Without what is no longer needed, with simpler relatives where they do as well, and one law for several that are the same."""
+    if now.model.ahead is not None:
+        return now
+    judge = FreeRunJudge(data, now.model.library)
+    search: Search[GreyboxFit] = Search(judge=judge, clock=never, budget=BUDGET, most=MOST_EFFECTS, least=WORTH)
+    names = frozenset(name for name, _ in now.model.effects)
+    search.nodes[names] = Node(effects=names, fit=now, brief=now, parameters=sum(len(values) for _, values in now.model.effects), whole=True)
+    settling = _Settling(judge, search, frozenset())
+    while settling.step():
+        pass
+    return joined(data, settling.now.fit)
+
+
+@dataclass(frozen=True, slots=True)
+class _Fixed:
+    """Effects that were given, and their rungs."""
+
+    names: tuple[str, ...]
+    steps: tuple[Step, ...]
+
+    @staticmethod
+    def of(judge: FreeRunJudge, names: tuple[str, ...]) -> _Fixed:
+        steps = [Step(None, judge.begin())]
+        for name in names:
+            steps.append(Step(name, judge.added(steps[-1].fit, name)))
+        return _Fixed(names, tuple(steps))
+
+
+def _given_alone(data: AxisData, judge: FreeRunJudge, fixed: _Fixed) -> Ladder:
+    final = fixed.steps[-1].fit
+    base = fixed.steps[0].fit
+    noise = data.noise_floor
+    explained = _explained(data, base, final)
+    return Ladder(
+        steps=fixed.steps,
+        final=final,
+        effects=tuple(name for name, _ in final.model.effects),
+        explained=explained,
+        noise=noise,
+        discrepancy=math.sqrt(max(final.held_out_error**2 - final.noise_floor**2, 0.0)),
+    )
+
+
+def _whole(judge: Judge[GreyboxFit], node: Node[GreyboxFit]) -> GreyboxFit:
+    """The fit of a set on all data."""
+    if not node.whole or node.fit.brief:
+        node.fit, node.whole = judge.whole(node.fit), True
+    return node.fit
+
+
+class _Settling:
+    """From the best set to a simpler one, as long as what is lost could be feigned by what is left unexplained."""
+
+    def __init__(self, judge: FreeRunJudge, search: Search[GreyboxFit], kept: frozenset[str]) -> None:
+        self.judge, self.search, self.kept = judge, search, kept
+        self.now = search.best
+
+    def step(self) -> bool:
+        """Take the first simpler set that loses little; False if none does."""
+        _whole(self.judge, self.now)
+        here = self.judge.rest(self.now.fit, self.now.fit)
+        for node in chain(self._simpler_relatives(), self._tried(here), self._without(), self._without_idle()):
+            loss = self.judge.rest(node.fit, self.now.fit) - here
+            if loss < self.search.least or not self.judge.better(self.now.fit, node.fit):
+                self.now = node
+                return True
+        return False
+
+    def sizes(self) -> dict[str, float]:
+        """What each effect explains over what is left: by the best set known that has no such law, none of its family."""
+        here, found = self.judge.rest(self.now.fit, self.now.fit), {}
+        for name in self._own():
+            node = self.best_without(name)
+            found[name] = max(self.judge.rest(node.fit, self.now.fit) - here, 0.0)
+        return found
+
+    def best_without(self, name: str) -> Node[GreyboxFit]:
+        """The best of the sets that were fitted of the same effects but for one."""
+        fewer = (node for node in self.search.nodes.values() if node.effects <= self.now.effects - {name} and not node.refused)
+        return min(fewer, key=lambda node: self.judge.rest(node.fit, self.now.fit))
+
+    def _tried(self, here: float) -> list[Node[GreyboxFit]]:
+        """The simplest other set that was tried, has fewer parameters, and comes near."""
+        library = self.judge.library
+
+        def order(node: Node[GreyboxFit]) -> tuple[int, float, int]:
+            """Of sets that do the same, friction first: every machine has it."""
+            return node.parameters, round(node.fit.excess, 1), sum(not library[name].is_dry for name in node.effects)
+
+        nodes = sorted(self.search.nodes.values(), key=order)
+        for node in nodes:
+            simpler = node.parameters < self.now.parameters and not node.refused and self.kept <= node.effects
+            if simpler and self.judge.rest(node.fit, self.now.fit) - here < self.search.least:
+                _whole(self.judge, node)
+                return [node]
+        return []
+
+    def _simpler_relatives(self) -> Iterator[Node[GreyboxFit]]:
+        """Sets with a simpler relative in the place of an effect, what came last first; each is fitted when it is asked for."""
+        library, now = self.judge.library, self.now
+        for name in self._own():
+            effect = library[name]
+            for relative in sorted(library.acting, key=lambda item: len(item.parameters)):
+                alike = effect.family and relative.family == effect.family and relative.simulable and relative.name not in now.effects
+                if alike and len(relative.parameters) < len(effect.parameters):
+                    yield from self._good(now.effects - {name} | {relative.name}, partial(self.judge.instead, now.fit, name, relative))
+
+    def _without(self) -> Iterator[Node[GreyboxFit]]:
+        """Sets without an effect, as before."""
+        for name in self._own():
+            yield from self._good(self.now.effects - {name}, partial(self.judge.without, self.now.fit, name))
+
+    def _without_idle(self) -> Iterator[Node[GreyboxFit]]:
+        """Sets that did as well with an effect in them that the data do not tell from none, without that one."""
+        for node in list(self.search.nodes.values()):
+            idle = self.judge.idle(node.fit)
+            smaller = node.effects - {idle}
+            simpler = sum(len(self.judge.library[name].parameters) for name in smaller) < self.now.parameters
+            if idle and simpler and smaller and self.kept <= smaller and node.fit.excess < self.now.fit.excess + LEAST:
+                alone = [self.search.nodes[one] for name in smaller if (one := frozenset((name,))) in self.search.nodes]
+                yield from self._good(smaller, partial(self.judge.without, node.fit, idle, [other.fit.model for other in alone]))
+
+    def _own(self) -> list[str]:
+        return [name for name, _ in reversed(self.now.fit.model.effects) if name not in self.kept]
+
+    def _good(self, effects: frozenset[str], make: Callable[[], GreyboxFit | None]) -> Iterator[Node[GreyboxFit]]:
+        node = self._node(effects, make)
+        if node is not None and not node.refused and not self.judge.idle(node.fit):
+            yield node
+
+    def _node(self, effects: frozenset[str], make: Callable[[], GreyboxFit | None]) -> Node[GreyboxFit] | None:
+        known = self.search.nodes.get(effects)
+        if known is not None and (known.whole or known.fit.excess < self.now.fit.excess + HOPELESS):
+            _whole(self.judge, known)
+            return known
+        fit = None if self.judge.late() else make()
+        if fit is None:
+            return known
+        parameters = sum(len(self.judge.library[name].parameters) for name in effects)
+        node = Node(effects=effects, fit=fit, brief=fit, parameters=parameters, whole=True, refused=self.judge.refusal(fit))
+        self.search.nodes[effects] = node
+        return node
+
+
+def _ahead(
+    judge: FreeRunJudge, search: Search[GreyboxFit], final: Node[GreyboxFit], name: str
+) -> tuple[tuple[tuple[str, GreyboxFit], ...], float] | None:
+    """Rungs of an effect that only one-step prediction can judge, if it beats the best simulation with an autoregressive error.
+
+    With it: that one's error one sample ahead, m/s.
+    """
+    data, library = judge.data, judge.library
+    if data.longest() is not data:
+        return None
+    _whole(judge, search.best)
+    later = np.arange(data.velocity.size) >= data.training
+    try:
+        bar = min(whitened_rms(node.fit.error, later) for node in (final, search.best))
+    except BadInput:  # too little data for any prediction
+        return None
+    if not FILTERED * bar > data.floor.encoder * data.sampling_rate:
+        return None
+    base = search.nodes[frozenset()].fit
+    try:
+        found = grown(data, base, library[name], library, Limits(FILTERED * bar, judge.late), judge.refusal)
+    except np.linalg.LinAlgError:
+        return None
+    last, without = found.rungs[-1][1], error_without(data, found.found)
+    if name in last.model and last.held_out_error < FILTERED * min(bar, without):
+        return found.rungs, bar
+    return None
+
+
+def _explained(data: AxisData, base: GreyboxFit, final: GreyboxFit) -> float:
+    """Part of the base's error power beyond the noise that is gone."""
+    noise = float(np.sum(data.layout.lines * data.floor.noise))
+    before, after = (float(np.sum(data.layout.lines * fit.power)) - noise for fit in (base, final))
+    return min(max(1.0 - max(after, 0.0) / before, 0.0), 1.0) if before > 0.0 else 0.0
+
+
+def _ladder(
+    judge: FreeRunJudge,
+    search: Search[GreyboxFit],
+    settled: _Settling,
+    fixed: _Fixed,
+    filtered: tuple[tuple[tuple[str, GreyboxFit], ...], float] | None,
+) -> Ladder:
+    data, node = judge.data, settled.now
+    base = fixed.steps[0].fit
+    tried = sorted(
+        (Candidate(next(iter(item.effects)), item.promised, item.fit) for item in search.nodes.values() if len(item.effects) == 1),
+        key=lambda item: item.fit.excess if item.fit else math.inf,
+    )
+    refused = tuple((tuple(sorted(item.effects)), item.refused) for item in search.nodes.values() if item.refused)
+    if filtered is not None:
+        rungs, bar = filtered
+        last = rungs[-1][1]
+        names = tuple(name for name, _ in last.model.effects)
+        noise = last.noise_floor
+        explained = 1.0 - max(last.held_out_error**2 - noise**2, 0.0) / max(bar**2 - noise**2, 1e-300)
+        return Ladder(
+            steps=(Step(None, base), *(Step(name, fit) for name, fit in rungs)),
+            final=last,
+            effects=names,
+            tried=(Candidate(rungs[0][0], 0.0, rungs[0][1]), *tried),
+            rivals=(Rival(tuple(sorted(node.effects)), node.fit, 2.0 * math.log(bar / last.held_out_error), (bar / last.held_out_error) ** 2),),
+            sizes=dict.fromkeys(names, (bar / last.held_out_error) ** 2 - 1.0),
+            refused=refused,
+            explained=explained,
+            noise=noise,
+            discrepancy=math.sqrt(max(last.held_out_error**2 - noise**2, 0.0)),
+            stopped=search.stopped,
+        )
+    final, own = joined(data, node.fit, judge.late), settled.sizes()
+    names = tuple(name for name, _ in final.model.effects)
+    sizes = {name: [own[part] for part in _parts(judge.library, name) if part in own] for name in names}
+    ordered = tuple(sorted(names, key=lambda name: -max(sizes[name], default=0.0)))
+    ordered = (*fixed.names, *(name for name in ordered if name not in fixed.names))
+    here = judge.rest(node.fit, node.fit)
+    rivals = sorted(
+        (
+            Rival(tuple(sorted(item.effects)), item.fit, item.fit.excess - node.fit.excess, judge.rest(item.fit, node.fit) / max(here, 1e-12))
+            for item in search.nodes.values()
+            if item is not node and 0 < len(item.effects) <= len(node.effects) and not item.refused and not item.effects < node.effects
+            if not _contains(judge.library, item.effects, node.effects)
+        ),
+        key=lambda item: item.behind,
+    )
+    return Ladder(
+        steps=(*fixed.steps, *_rungs(judge, search, fixed, ordered, final)),
+        final=final,
+        effects=ordered,
+        tried=tuple(tried),
+        rivals=tuple(rivals[:RIVALS]),
+        sizes={name: min(each) for name, each in sizes.items() if each},
+        astray=max((_astray(data, settled, name) for name in node.effects if judge.library[name].category == "motion"), default=0.0),
+        helps=1.0 - min(judge.rest(item.fit, base) for item in search.nodes.values() if item.whole and not item.refused),
+        refused=refused,
+        explained=_explained(data, base, final),
+        noise=data.noise_floor,
+        discrepancy=math.sqrt(max(final.held_out_error**2 - data.noise_floor**2, 0.0)),
+        stopped=search.stopped,
+    )
+
+
+def _parts(library: Library, name: str) -> tuple[str, ...]:
+    """An effect, and what it is the sum of."""
+    whole = library[name].sum_of
+    return (name,) if whole is None else (name, *whole.parts)
+
+
+def _astray(data: AxisData, settled: _Settling, name: str) -> float:
+    """Amplitude of what is left beyond the noise where a mode acts, over what it does there.
+
+    A mode is linear and does not change: what it leaves just where it acts is of another law. What dirt leaves lies elsewhere.
+    """
+    with_it, without = settled.now.fit.power, settled.best_without(name).fit.power
+    acts = np.maximum(without - with_it, 0.0)
+    weight = data.layout.lines * acts
+    left = float(np.sum(weight * np.maximum(with_it - data.floor.noise, 0.0)))
+    return min(math.sqrt(left / max(float(np.sum(weight * acts)), 1e-300)), 1.0)
+
+
+def _contains(library: Library, names: frozenset[str], others: frozenset[str]) -> bool:
+    """A set has every law of another: the very effects, or richer relatives of them."""
+    laws = set(names) | {part for name in names if (whole := library[name].sum_of) is not None for part in whole.parts}
+    families = {library[name].family: len(library[name].parameters) for name in names if library[name].family}
+    return all(name in laws or families.get(library[name].family, 0) > len(library[name].parameters) for name in others)
+
+
+def _rungs(judge: FreeRunJudge, search: Search[GreyboxFit], fixed: _Fixed, names: tuple[str, ...], final: GreyboxFit) -> list[Step]:
+    """One rung for each effect, in this order, the fits that are known already taken from memory."""
+    steps: list[Step] = []
+    now = fixed.steps[-1].fit
+    for name in names[len(fixed.names) :]:
+        so_far = frozenset(own for own, _ in now.model.effects) | {name}
+        if so_far == frozenset(own for own, _ in final.model.effects):
+            now = final
+        else:
+            known = search.nodes.get(so_far)
+            now = judge.added(now, name) if known is None or known.refused else _whole(judge, known)
+        steps.append(Step(name, now))
+    return steps

@@ -1,0 +1,8 @@
+"""What people are shown of one axis, from the rigid base to the floor.
+
+pictures: one fit as short rows of numbers
+standing: how far an axis is from being explained
+story:    step after step: begin, diagnose, add, take out
+document: a story as a JSON document
+acts:     one job on one axis' story, step by step
+"""

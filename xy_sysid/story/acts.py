@@ -1,0 +1,99 @@
+"""A job on one axis' story, step by step: the node, the replay and the page do the same."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from xy_sysid.axis.model import Library
+from xy_sysid.samples.recording import Run
+from xy_sysid.search.findings import Findings
+from xy_sysid.search.refine import MOST_EFFECTS, never
+from xy_sysid.story.story import Story, added, begin, diagnosed, next_best, pruned, removed
+from xy_sysid.units import Units, bare, moved
+
+Act = Literal["begin", "diagnose", "effects", "add_next", "auto"]
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """What is to be done with one axis.
+
+    act: ``begin`` fits the rigid model if there is no story yet, ``diagnose`` begins anew with these samples and then has ``effects`` in
+    the model, ``effects`` has them without asking what is missing, ``add_next`` adds the best one, ``auto`` all that help
+    run: of the axis; story: so far, None to begin
+    """
+
+    act: Act
+    run: Run
+    story: Story | None
+    effects: tuple[str, ...]
+    tolerance: float
+
+
+def perform(job: Job, library: Library, clock: Callable[[], float] = never) -> Iterator[tuple[str, Story | None]]:
+    """(what is being done now, None), and (what was done, the story so far) after each step. Raises BadInput for a wrong effect."""
+    u, y = job.run.voltage, job.run.position
+    story = None if job.act == "diagnose" else job.story
+    if story is None:
+        yield "fitting the rigid model", None
+        story = begin(job.run, library, job.tolerance)
+        yield "the rigid model is fitted", story
+    if not story.steps or job.act == "begin":
+        return
+    if job.act != "effects" and story.diagnosis is None:
+        yield "looking for what is missing", None
+        story = diagnosed(story, u, y, library, clock)
+        yield "diagnosed", story
+    if job.act in ("diagnose", "effects"):
+        for name in [name for name in story.effects if name not in job.effects]:
+            yield f"taking {name} out", None
+            story = removed(story, u, y, name, library)
+            yield f"without {name}", story
+        for name in [name for name in job.effects if name not in story.effects]:
+            yield f"adding {name}", None
+            story = added(story, u, y, name, library)
+            yield f"with {name}", story
+        return
+    for _ in range(MOST_EFFECTS if job.act == "auto" else 1):
+        yield "looking for the next effect", None
+        before, story = len(story.steps), next_best(story, u, y, library)
+        yield story.note or story.steps[-1].rung.label, story
+        if len(story.steps) == before:
+            break
+    if job.act == "auto" and len(story.effects) > 1:
+        yield "taking out what is not needed", None
+        story = pruned(story, u, y, library)
+        yield "done", story
+
+
+def unheard(axis: str, sampling_rate: float, seconds: float, lacking: str, tolerance: float, units: Units) -> Story:
+    """The story of an axis of which too little was heard to begin."""
+    told = Findings(
+        verdict="not_enough_data",
+        effects=(),
+        confidence=1.0,
+        tolerance=tolerance,
+        sentence=f"Not enough data: {lacking}",
+        where=(),
+        candidates=(),
+        runner_up=None,
+        look_alikes=(),
+        ladder=(),
+        next_experiment=lacking,
+        units=units,
+    )
+    return Story(axis=axis, sampling_rate=sampling_rate, seconds=seconds, tolerance=tolerance, units=units, measured=None, steps=(), diagnosis=told)
+
+
+def sentence(story: Story) -> str:
+    """What is known of the axis, in words."""
+    told = story.diagnosis.sentence if story.diagnosis is not None else "Not diagnosed yet."
+    now = story.now
+    if story.diagnosis is not None and story.diagnosis.verdict == "nothing_missing" and not story.effects:
+        return f"axis {story.axis}: {told}"
+    if now is None or not now.effects:
+        return f"axis {story.axis}: {told}{f' {story.note}' if story.note else ''}"
+    error = f"held-out error {moved(now.held_out_error, story.units.speed)} (floor {bare(now.noise_floor, story.units.speed)})"
+    return f"axis {story.axis}: {told} In the model: {', '.join(now.effects)}; {error}.{f' {story.note}' if story.note else ''}"

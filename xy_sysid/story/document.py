@@ -1,0 +1,181 @@
+"""A story as a JSON document: what ``diagnose --json`` says of an axis, the ladder, the model, and every step's pictures.
+
+docs/story.md describes it; the page, the report and the topic ``story/<axis>`` are drawn from it and from nothing else.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from xy_sysid.comparison.residual_correlation import ResidualCorrelation
+from xy_sysid.linear.transfer_function import Mode, TransferFunction
+from xy_sysid.samples.block import FloatArray
+from xy_sysid.search.findings import Rung, answer, parameters, place
+from xy_sysid.story.pictures import Binned, Measured, Pictures
+from xy_sysid.story.story import Story, StoryStep
+
+FORMAT = "xy_sysid story 1"
+DIGITS = 5
+DRAWN = 8  # newest steps that keep their pictures in the document, besides the base
+UNKNOWN: dict[str, Any] = {
+    "verdict": None, "effect": None, "effects": [], "confidence": None, "sentence": "Not diagnosed yet.",
+    "where": [], "candidates": [], "runner_up": None, "look_alikes": [], "next_experiment": "",
+}  # fmt: skip
+
+
+def document(story: Story) -> dict[str, Any]:
+    """The whole story of one axis in JSON's own types."""
+    now = story.now
+    base = story.steps[0].rung if story.steps else None
+    told = UNKNOWN if story.diagnosis is None else answer(story.diagnosis)
+    drawn = len(story.steps) - DRAWN
+    made: dict[str, Any] = {
+        "format": FORMAT,
+        "axis": story.axis,
+        "seconds": story.seconds,
+        "sampling_rate": story.sampling_rate,
+        "units": {"input": story.units.input, "output": story.units.output},
+        **told,
+        "tolerance": story.tolerance,
+        "error": {
+            "unit": story.units.speed,
+            "now": base.held_out_error if base else None,
+            "noise_floor": now.noise_floor if now else None,
+            "held_out": now.held_out_error if now else None,
+        },
+        "explained": now.explained if now else False,
+        "note": story.note,
+        "ladder": [rung_document(step.rung) for step in story.steps],
+        "model": _model(story) if now else None,
+        "measured": _measured(story.measured) if story.measured else None,
+        "steps": [step_document(step, story.sampling_rate, with_pictures=k == 0 or k >= drawn) for k, step in enumerate(story.steps)],
+    }
+    return {name: _plain(value) for name, value in made.items()}
+
+
+def rung_document(item: Rung) -> dict[str, Any]:
+    """One rung of the ladder."""
+    return {
+        "label": item.label,
+        "added": item.added,
+        "removed": item.removed,
+        "effects": list(item.effects),
+        "train_error": item.train_error,
+        "held_out_error": item.held_out_error,
+        "noise_floor": item.noise_floor,
+        "excess": item.excess,
+        "explained": item.explained,
+        "parameters": parameters(item.parameters),
+    }
+
+
+def step_document(step: StoryStep, sampling_rate: float, with_pictures: bool = True) -> dict[str, Any]:
+    """A rung with its pictures."""
+    return {**rung_document(step.rung), "pictures": _pictures(step.pictures, sampling_rate) if with_pictures else None}
+
+
+def _model(story: Story) -> dict[str, Any]:
+    last = story.steps[-1]
+    return {
+        "effects": list(last.rung.effects),
+        "parameters": parameters(last.rung.parameters),
+        "linear": _linear(last.pictures.linear),
+        "held_out_error": last.rung.held_out_error,
+        "noise_floor": last.rung.noise_floor,
+    }
+
+
+def _measured(item: Measured) -> dict[str, Any]:
+    return {
+        "frequency_response": {
+            "frequency": _row(item.frequency),
+            "magnitude_db": _row(item.magnitude),
+            "magnitude_low_db": _row(item.magnitude_low),
+            "magnitude_high_db": _row(item.magnitude_high),
+            "phase_deg": _row(item.phase),
+            "phase_low_deg": _row(item.phase_low),
+            "phase_high_deg": _row(item.phase_high),
+            "coherence": _row(item.coherence),
+            "trusted": item.trusted.tolist(),
+        },
+        "time": {
+            "time": _row(item.time),
+            "velocity_low": _row(item.velocity_low),
+            "velocity_high": _row(item.velocity_high),
+            "position": _row(item.position),
+            "held_out_from": item.held_out,
+        },
+        "zoom": {
+            "start": item.zoom_start,
+            "voltage": _row(item.zoom_voltage),
+            "velocity": _row(item.zoom_velocity),
+        },
+    }
+
+
+def _pictures(item: Pictures, sampling_rate: float) -> dict[str, Any]:
+    return {
+        "frequency_response": {"magnitude_db": _row(item.magnitude), "phase_deg": _row(item.phase)},
+        "residual": {
+            "frequency": {"frequency": _row(item.band), "error_over_floor": _row(item.band_error), "up_to": item.band_end},
+            "speed": _binned("speed", item.speed),
+            "position": _binned("position", item.place),
+            "time": _binned("time", item.time),
+            "correlation": _correlation(item.correlation, sampling_rate),
+        },
+        "failing": [place(one) for one in item.failing],
+        "time": {"velocity_low": _row(item.velocity_low), "velocity_high": _row(item.velocity_high), "position": _row(item.position)},
+        "zoom": {"velocity": _row(item.zoom_velocity)},
+        "linear": _linear(item.linear),
+    }
+
+
+def _binned(name: str, item: Binned) -> dict[str, list[float]]:
+    return {name: _row(item.centre), "error_over_floor": _row(item.over_floor), "mean_error": _row(item.mean)}
+
+
+def _correlation(item: ResidualCorrelation | None, sampling_rate: float) -> dict[str, Any] | None:
+    if item is None:
+        return None
+    return {
+        "lag": _row(item.lag / sampling_rate),
+        "autocorrelation": _row(item.autocorrelation, 3),
+        "white": item.white,
+        "shift": _row(item.shift / sampling_rate),
+        "input_correlation": _row(item.cross, 3),
+        "unrelated": item.unrelated,
+        "outside": item.outside,
+    }
+
+
+def _linear(tf: TransferFunction) -> dict[str, Any]:
+    return {
+        "numerator": _row(tf.numerator, 12),
+        "denominator": _row(tf.denominator, 12),
+        "delay": tf.delay,
+        "poles": [_root(mode) for mode in tf.pole_modes()],
+        "zeros": [_root(mode) for mode in tf.zero_modes()],
+    }
+
+
+def _root(mode: Mode) -> dict[str, float]:
+    return {"real": mode.root.real, "imag": mode.root.imag, "frequency": mode.frequency, "damping": mode.damping}
+
+
+def _row(values: FloatArray | Iterable[float], digits: int = DIGITS) -> list[float]:
+    return [float(f"{value:.{digits}g}") for value in np.asarray(values, dtype=np.float64).tolist()]
+
+
+def _plain(value: Any) -> Any:
+    """Not finite becomes null; numpy's numbers become Python's."""
+    if isinstance(value, dict):
+        return {name: _plain(item) for name, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value

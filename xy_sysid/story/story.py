@@ -1,0 +1,249 @@
+"""One axis from the rigid base to the noise floor: see where the model fails, name what is missing, add it, watch the error fall.
+
+Each function takes a story and gives the next one. A story holds plain numbers and short pictures only: it can be sent to
+another process, and written as a document (``document``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from xy_sysid.axis.model import STANDARD, AxisModel, Library, simulate
+from xy_sysid.errors import BadInput
+from xy_sysid.greybox.free_run import EPSILON, AxisData, GreyboxFit, fit, fit_base, prepare
+from xy_sysid.greybox.one_step import one_step_fit
+from xy_sysid.samples.block import FloatArray
+from xy_sysid.samples.recording import Run
+from xy_sysid.search.diagnose import diagnose_all, lacking, not_enough
+from xy_sysid.search.findings import Findings, Rung, findings, rung
+from xy_sysid.search.judge import FreeRunJudge
+from xy_sysid.search.refine import MOST_EFFECTS, Effort, never, refine, settle
+from xy_sysid.settings import unknown_name
+from xy_sysid.story.pictures import Measured, Pictures, measured, pictures
+from xy_sysid.units import Units
+
+
+@dataclass(frozen=True, slots=True)
+class StoryStep:
+    """One fit and its pictures."""
+
+    rung: Rung
+    pictures: Pictures
+
+
+@dataclass(frozen=True, slots=True)
+class Story:
+    """One axis' story.
+
+    steps: the fits so far, the rigid base first; empty if the data do not suffice (``diagnosis`` then says what lacks)
+    diagnosis: what is missing in the base, None before it was asked; tolerance: of the signal, in the noise floor
+    note: what the last act could not do; empty if it did
+    """
+
+    axis: str
+    sampling_rate: float
+    seconds: float
+    tolerance: float
+    units: Units
+    measured: Measured | None
+    steps: tuple[StoryStep, ...]
+    diagnosis: Findings | None = None
+    note: str = ""
+
+    @property
+    def now(self) -> Rung | None:
+        """The newest fit."""
+        return self.steps[-1].rung if self.steps else None
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of the effects in the model."""
+        return self.now.effects if self.now is not None else ()
+
+
+def begin(run: Run, library: Library = STANDARD, tolerance: float = EPSILON) -> Story:
+    """The rigid base, fitted to gap-free samples; without steps, but with a diagnosis, if the data do not suffice."""
+    voltage, position, sampling_rate = run.signals
+    empty = Story(
+        axis=run.axis,
+        sampling_rate=sampling_rate,
+        seconds=run.seconds,
+        tolerance=tolerance,
+        units=run.units,
+        measured=None,
+        steps=(),
+    )
+    missing = lacking(sampling_rate, [(voltage, position)])
+    if missing:
+        return replace(empty, diagnosis=findings(not_enough(missing, run.units), library))
+    data = prepare(sampling_rate, voltage, position, tolerance, run.units)
+    base = fit_base(data, library)
+    shown = measured(data, base)
+    return replace(empty, measured=shown, steps=(StoryStep(rung(base), pictures(data, base, shown)),))
+
+
+def diagnosed(story: Story, voltage: FloatArray, position: FloatArray, library: Library = STANDARD, clock: Callable[[], float] = never) -> Story:
+    """With the answer to: which effect is missing in the rigid base? The model stays what it is."""
+    found = findings(diagnose_all(story.sampling_rate, [(voltage, position)], library, clock=clock, units=story.units), library)
+    return replace(story, diagnosis=found, note="")
+
+
+def added(story: Story, voltage: FloatArray, position: FloatArray, name: str, library: Library = STANDARD) -> Story:
+    """With one more effect, everything refitted together; a relative of the same family is replaced.
+
+    Raises BadInput for a name that is unknown, in every model, or in this one.
+    """
+    allowed(name, library)
+    if name in story.effects:
+        raise BadInput("effect", repr(name), "one that is not in the model yet", f"It has {', '.join(story.effects)}.")
+    data = prepare(story.sampling_rate, voltage, position, story.tolerance, story.units)
+    now = _fit_of(story, data, library)
+    relative = next((own for own in story.effects if library[own].family and library[own].family == library[name].family), None)
+    try:
+        before = now if relative is None else fit(data, now.model.without(relative))
+        found = FreeRunJudge(data, library).added(before, name)
+    except np.linalg.LinAlgError:
+        return replace(story, note=f"{name} could not be fitted to these data.")
+    return _grown(story, data, found, name, relative)
+
+
+def removed(story: Story, voltage: FloatArray, position: FloatArray, name: str, library: Library = STANDARD) -> Story:
+    """Without one effect, the rest refitted; raises BadInput if it is not in the model."""
+    if name not in story.effects:
+        raise BadInput("effect", repr(name), ", ".join(story.effects) or "none, the model is the rigid base", "Choose one that is in the model.")
+    data = prepare(story.sampling_rate, voltage, position, story.tolerance, story.units)
+    return _grown(story, data, fit(data, _model(story, library).without(name)), None, name)
+
+
+def with_effects(story: Story, voltage: FloatArray, position: FloatArray, names: Iterable[str], library: Library = STANDARD) -> Story:
+    """With exactly these effects: what is not among them goes, what is new comes, one step each.
+
+    Raises BadInput for a name that is unknown or in every model, before anything is fitted.
+    """
+    wanted = tuple(dict.fromkeys(names))
+    for name in wanted:
+        allowed(name, library)
+    for name in story.effects:
+        if name not in wanted:
+            story = removed(story, voltage, position, name, library)
+    for name in wanted:
+        if name not in story.effects:
+            story = added(story, voltage, position, name, library)
+    return story
+
+
+def next_best(story: Story, voltage: FloatArray, position: FloatArray, library: Library = STANDARD) -> Story:
+    """With the effect that helps most now; with a note instead if nothing is left to explain, or nothing helps."""
+    if story.now is None:
+        return story
+    planned = _planned(story)
+    data = prepare(story.sampling_rate, voltage, position, story.tolerance, story.units)
+    if planned is not None:
+        return _shown(story, data, planned, library)
+    if story.now.explained:
+        return replace(story, note="Nothing is left to explain: the held-out error is at the noise floor.")
+    found = refine(data, library, story.effects, Effort(most=MOST_EFFECTS - len(story.effects)))
+    new = [step for step in found.steps if step.added is not None and step.added not in story.effects]
+    if not new:
+        return replace(story, note="No effect of the library helps any further.")
+    return _grown(story, data, new[0].fit, new[0].added, None)
+
+
+def auto(story: Story, voltage: FloatArray, position: FloatArray, library: Library = STANDARD) -> Story:
+    """Add the next best until the floor is reached or nothing helps, then take out what is no longer needed."""
+    while len(story.effects) < MOST_EFFECTS:
+        grown = next_best(story, voltage, position, library)
+        if len(grown.steps) == len(story.steps):
+            story = grown
+            break
+        story = grown
+    return pruned(story, voltage, position, library)
+
+
+def pruned(story: Story, voltage: FloatArray, position: FloatArray, library: Library = STANDARD) -> Story:
+    """Without the effects that are no longer needed, and with simpler relatives that do as well; the same story if all stay."""
+    if len(story.effects) < 2:
+        return story
+    data = prepare(story.sampling_rate, voltage, position, story.tolerance, story.units)
+    found = settle(data, _fit_of(story, data, library))
+    gone = [name for name in story.effects if name not in found.model]
+    new = [name for name, _ in found.model.effects if name not in story.effects]
+    return _grown(story, data, found, " and ".join(new) or None, " and ".join(gone)) if gone else story
+
+
+def tell(run: Run, library: Library = STANDARD) -> Story:
+    """The whole story of one axis: base, diagnosis, and every effect that it needs."""
+    story = begin(run, library)
+    u, y = run.voltage, run.position
+    return auto(diagnosed(story, u, y, library), u, y, library) if story.steps else story
+
+
+def allowed(name: str, library: Library = STANDARD) -> None:
+    """Raises BadInput, which names the effects that may be added, for a name that may not."""
+    names = [effect.name for effect in library.acting]
+    if name in library.effects and name not in names:
+        raise BadInput("effect", repr(name), ", ".join(names), "This one is part of every model; leave it out.")
+    if name not in names:
+        raise unknown_name(name, names, "effect")
+
+
+def _planned(story: Story) -> Rung | None:
+    """What the diagnosis has fitted already as the next step from here."""
+    found = story.diagnosis
+    if found is None:
+        return None
+    for here, following in zip(found.ladder, found.ladder[1:], strict=False):
+        if following.added is not None and here.effects == story.effects and here.values == story.steps[-1].rung.values:
+            return following
+    return None
+
+
+def _shown(story: Story, data: AxisData, step: Rung, library: Library) -> Story:
+    """The story with a step whose fit is known."""
+    again = _simulated(data, step, story.steps[0].rung if story.steps else step, library)
+    shown = story.measured or measured(data, again)
+    return replace(story, measured=shown, steps=(*story.steps, StoryStep(step, pictures(data, again, shown))), note="")
+
+
+def _grown(story: Story, data: AxisData, found: GreyboxFit, name: str | None, gone: str | None) -> Story:
+    assert story.measured is not None
+    step = StoryStep(rung(found, name, gone), pictures(data, found, story.measured))
+    return replace(story, steps=(*story.steps, step), note="")
+
+
+def _model(story: Story, library: Library) -> AxisModel:
+    assert story.now is not None
+    return AxisModel(gain=story.now.gain, delay=story.now.delay, pole=story.now.pole, effects=story.now.values, library=library)
+
+
+def _fit_of(story: Story, data: AxisData, library: Library) -> GreyboxFit:
+    assert story.now is not None
+    return _simulated(data, story.now, story.steps[0].rung, library)
+
+
+def _simulated(data: AxisData, step: Rung, base: Rung, library: Library) -> GreyboxFit:
+    """The fit of a step again: by one simulation, or as it was made where free simulation cannot judge it."""
+    alone = next((library[name] for name in step.effects if library[name].one_step is not None), None)
+    if alone is not None:
+        rigid = _simulated(data, base, base, library)
+        others = tuple((name, values) for name, values in step.values if name != alone.name)
+        return one_step_fit(data, replace(rigid, model=replace(rigid.model, effects=others)), alone)
+    model = AxisModel(gain=step.gain, delay=step.delay, pole=step.pole, effects=step.values, library=library)
+    simulated = simulate(model, data.sampling_rate, data.voltage, data.position)
+    return GreyboxFit(
+        model=model,
+        parameters=step.parameters,
+        training_error=step.train_error,
+        held_out_error=step.held_out_error,
+        noise_floor=step.noise_floor,
+        excess=step.excess,
+        simulated=simulated,
+        error=data.velocity - simulated,
+        runs=0,
+        converged=True,
+        held=data.layout.powers(data.held.spectrum(data.velocity - simulated)),
+        units=data.units,
+    )

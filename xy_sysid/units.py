@@ -1,0 +1,100 @@
+"""Units: what foreign ones are in SI, and those of an axis, which go with its data to wherever words are made.
+
+The models write V for whatever drives an axis and m for whatever it moves by; ``Units.of`` says what that is of this axis.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import NamedTuple
+
+SCALES = {
+    "V": ("V", 1.0),
+    "mV": ("V", 1e-3),
+    "kV": ("V", 1e3),
+    "m": ("m", 1.0),
+    "cm": ("m", 1e-2),
+    "mm": ("m", 1e-3),
+    "um": ("m", 1e-6),
+    "µm": ("m", 1e-6),
+    "μm": ("m", 1e-6),
+    "nm": ("m", 1e-9),
+    "in": ("m", 0.0254),
+    "inch": ("m", 0.0254),
+    "mA": ("A", 1e-3),
+    "deg": ("rad", math.pi / 180),
+    "mrad": ("rad", 1e-3),
+    "s": ("s", 1.0),
+    "ms": ("s", 1e-3),
+    "us": ("s", 1e-6),
+    "µs": ("s", 1e-6),
+    "μs": ("s", 1e-6),
+    "ns": ("s", 1e-9),
+}
+MOVED = ("m", "rad")  # motion is read in thousandths of these
+
+BEYOND_REASON = 1e6  # times, sigma or per cent: nobody needs to know how much more
+
+
+def told(value: float, digits: int = 3) -> str:
+    """How many times, sigma or per cent, for people; what is beyond reason is not counted."""
+    if math.isnan(value):
+        return "-"
+    return f"{value:.{digits}g}" if abs(value) < BEYOND_REASON else f"{'over' if value > 0 else 'below'} {math.copysign(BEYOND_REASON, value):.0e}"
+
+
+class Units(NamedTuple):
+    """What the input and the output of an axis are counted in."""
+
+    input: str = "V"
+    output: str = "m"
+
+    @property
+    def speed(self) -> str:
+        """Of the output's velocity."""
+        return f"{self.output}/s"
+
+    def of(self, unit: str) -> str:
+        """A unit of the models for this axis: m/s/V becomes rad/s/(N m), V/m3 becomes N m/rad3."""
+
+        def named(found: re.Match[str]) -> str:
+            name = self.input if found[2] == "V" else self.output
+            return over("", name) if found[1] else name
+
+        return MODEL_UNIT.sub(named, unit)
+
+
+USUAL = Units()
+MODEL_UNIT = re.compile(r"(/?)(?<![A-Za-z])([Vm])(?![A-Za-z])")
+
+
+def readable(unit: str) -> tuple[float, str]:
+    """Factor and unit as people read it: times and lengths in thousandths, anything else as it is."""
+    return (1e3, f"m{unit}") if unit == "s" or _counted(unit) == "m" else (1.0, unit)
+
+
+def motion(unit: str) -> tuple[float, str]:
+    """Factor and unit as people read a motion or its speed: mm and mm/s, mrad and mrad/s, counts as they are."""
+    return (1e3, f"m{unit}") if _counted(unit) in MOVED else (1.0, unit)
+
+
+def moved(value: float, unit: str, digits: int = 3) -> str:
+    """A motion or its speed with its unit: 0.33 mm/s."""
+    scale, shown = motion(unit)
+    return f"{scale * value:.{digits}g} {shown}"
+
+
+def bare(value: float, unit: str, digits: int = 3) -> str:
+    """As ``moved``, without the unit, where another figure beside it names it."""
+    return f"{motion(unit)[0] * value:.{digits}g}"
+
+
+def _counted(unit: str) -> str:
+    """What is counted, whatever it is over: the m of m/s/V."""
+    return re.split("[/^]", unit)[0]
+
+
+def over(top: str, bottom: str) -> str:
+    """One unit over another: m/V, rad/(N m)."""
+    return f"{top}/{bottom}" if bottom.isalpha() else f"{top}/({bottom})"
