@@ -237,17 +237,37 @@ def test_random_abuse_never_crashes_and_never_invents() -> None:
         assert len(heard) > 3000
 
 
-def test_a_rate_that_changes_while_the_counter_goes_on_is_read_anew() -> None:
-    """2 kHz becomes 500 Hz without a restart: that is said, nothing of both is mixed, and pairing goes on at 500 Hz."""
+@pytest.mark.parametrize("size", [1, 20, 500])
+@pytest.mark.parametrize("rate", [500.0, 1000.0, 1900.0, 1970.0, 4000.0])
+def test_a_rate_that_changes_while_the_counter_goes_on_is_read_anew(rate: float, size: int) -> None:
+    """2 kHz becomes another rate without a restart: that is said, nothing of both is mixed for long, and pairing goes on at the new one.
+
+    From 1 kHz to 4 kHz every stamp is so near the one before it that none of them alone tells it.
+    """
     machine = Machine()
-    for first in range(0, 6000, 20):
-        one = block(first) if first < 3000 else block(first, rate=500.0, shift=3000 / FS - 3000 / 500.0)
+    for first in range(0, 12_000, size):
+        one = block(first, size) if first < 3000 else block(first, size, rate=rate, shift=3000 / FS - 3000 / rate)
         machine.voltage(one)
         machine.position(one)
-    assert machine.pairer.rate == pytest.approx(500.0)
+    assert machine.pairer.rate == pytest.approx(rate)
     assert "read anew" in machine.pairer.said["restart"]
-    assert sum(len(part.voltage) for part in machine.samples if part.seq >= 3020) > 2000
+    assert sum(len(part.voltage) for part in machine.samples if part.seq >= 3020) > 5000
     assert len(machine.heard()) == len(set(machine.heard()))
+
+
+def test_jitter_stalls_and_a_clock_that_drifts_are_no_other_rate() -> None:
+    """Stamps late by up to half a period, a stall of 15 periods now and then that is caught up, and a clock that is wrong by 500 ppm."""
+    random = np.random.default_rng(4)
+    machine = Machine()
+    for first in range(0, 60_000, 20):
+        late = random.uniform(0.0, 0.5, 20) + (np.linspace(15.0, 0.0, 20) if first % 10_000 == 5000 else 0.0)
+        one = block(first, rate=FS * (1.0 + (5e-4 if first > 1000 else 0.0)), shift=0.0 if first <= 1000 else 1000 / FS * 5e-4)
+        one = Block(one.axes, one.seq, one.time + late / FS, one.values)
+        machine.voltage(one)
+        machine.position(one)
+    assert machine.pairer.counts["restart"] == 0
+    assert machine.pairer.counts["time_jump"] == 12  # six stalls, in both streams
+    assert len(machine.heard()) == 60_000
 
 
 def test_a_rate_that_one_stream_was_read_wrong_at_does_not_stay() -> None:

@@ -91,7 +91,7 @@ class Pairer:
     def _feed(self, kind: Quantity, block: Block) -> list[Samples | Gap]:
         ring = self._rings[kind]
         if block.axes == self.axes and self._next is not None and ring.follow(block, self._next, TIME_TOLERANCE):
-            return [] if self._rates_differ() else self._emit()
+            return self._go_on(kind, ring)
         columns = self._columns(kind, block)
         if columns is None or len(block) == 0:
             return []
@@ -121,9 +121,14 @@ class Pairer:
         if doubled:
             self.counts["duplicated"] += doubled
         ring.newest = max(ring.newest, int(seq[-1]))
-        if self._rates_differ():
-            return found
-        return found + self._emit()
+        return found + self._go_on(kind, ring)
+
+    def _go_on(self, kind: Quantity, ring: Ring) -> list[Samples | Gap]:
+        """What can be paired now that samples were laid in; nothing of a stream that has come to another rate."""
+        if ring.left_its_rate():
+            self._fault("restart", f"{kind}: from about counter {ring.newest} on the time does not follow {ring.rate:.6g} Hz; the rate is read anew")
+            return [self._anew(ring.newest + 1)]
+        return [] if self._rates_differ() else self._emit()
 
     def _anew(self, counter: int) -> Gap:
         """Forget both streams, their rates too."""
@@ -170,6 +175,7 @@ class Pairer:
             places = np.flatnonzero(moved)
             ring.jumping = ring.jumping + int(places.size) if places.size > len(seq) // 4 else 0
             if places.size:
+                ring.jumped()
                 self._fault("time_jump", f"{kind}: time jumps at counter {int(seq[places[0]])}", int(places.size))
             if places.size > 1 and places.size > len(seq) // 4:
                 good = np.zeros_like(good)

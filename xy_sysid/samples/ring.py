@@ -15,6 +15,7 @@ from xy_sysid.samples.block import Block, FloatArray
 from xy_sysid.samples.recording import rate_from_time
 
 RATE_SAMPLES = 200  # samples of one stream from which its rate is read
+DRIFT, DRIFT_SAMPLES = 0.01, 10 * RATE_SAMPLES  # of a period a sample, over so many samples: then the rate is another one
 
 Counters = NDArray[np.int64]
 
@@ -40,6 +41,7 @@ class Ring:
         self.behind = 0
         self.behind_next = -1
         self.jumping = 0
+        self._anchor: tuple[int, float] | None = None  # counter and offset from which on the time has to follow the rate
         self._seqs: list[FloatArray] = []
         self._times: list[FloatArray] = []
 
@@ -59,6 +61,25 @@ class Ring:
         self.newest, self.offset, self.behind = end - 1, float(block.time[-1] - (end - 1) / self.rate), 0
         self.jumping = 0
         return True
+
+    def jumped(self) -> None:
+        """What follows lies on another line of the same rate."""
+        self._anchor = None
+
+    def left_its_rate(self) -> bool:
+        """Whether the time has drifted off the learnt rate, though no stamp left the one before it by much."""
+        if self.rate is None or self.offset is None:
+            return False
+        if self._anchor is None:
+            self._anchor = self.newest, self.offset
+            return False
+        counter, offset = self._anchor
+        span = self.newest - counter
+        if abs(self.offset - offset) * self.rate > DRIFT * max(span, DRIFT_SAMPLES):
+            return True
+        if span > DRIFT_SAMPLES:
+            self._anchor = self.newest, self.offset
+        return False
 
     def put(self, seq: Counters, values: FloatArray, time: FloatArray) -> int:
         """Store what is new; the number of samples that were there already."""
@@ -95,7 +116,7 @@ class Ring:
     def clear(self) -> None:
         """Forget everything, the rate too: who comes back may be another source."""
         self.tag.fill(-1)
-        self.newest, self.offset, self.behind, self.jumping = -1, None, 0, 0
+        self.newest, self.offset, self.behind, self.jumping, self._anchor = -1, None, 0, 0, None
         self.rate, self._seqs, self._times = None, [], []
 
     def learn_rate(self, block: Block) -> None:
