@@ -23,6 +23,7 @@ from xy_sysid.settings import BallscrewSettings
 
 GO_ON = 0.005  # s between two looks whether the table must move on by itself
 LATE = 0.02  # s that a block may be late before it does
+OTHER = 0.5  # s by which the time of counter 0 must differ for a voltage to come from a source that has started again
 IDLE = 0.1  # s without voltage after which the encoder reports by itself, the motors off
 
 
@@ -77,7 +78,8 @@ class BallscrewNode(WalledNode):
             block = Block(block.axes, block.seq[late:], block.time[late:], block.values[late:])
         first = int(block.seq[0])
         if self._next is not None and first < self._next:
-            if first != 0:
+            begun = float(block.time[0] - first / self._machine.rate)
+            if first != 0 and abs(begun - self._epoch) <= OTHER:
                 self._fault("old", f"voltage from counter {first} came after {self._next}")
                 return
             self._fault("restart", "the voltage source started again; the table stays where it is")

@@ -92,6 +92,15 @@ def test_nothing_moves_before_start_and_before_the_first_position() -> None:
     assert np.array_equal(first.values[:, 0], signal(AxisExcitation(), RATE).next(N))
 
 
+def test_positions_far_ahead_of_the_voltage_are_of_another_source() -> None:
+    """A machine that still counts as the voltage of before: not taken, so that its next positions, with this voltage's counter, are."""
+    drive = Drive(settings(ramp=0.0))
+    drive.start()
+    assert not drive.see(place(36_000, [0.01]))
+    assert "ahead of the voltage by its counter" in drive.unusable
+    assert drive.see(place(139, [0.01]))
+
+
 def test_the_ramp_fades_in_smoothly() -> None:
     """Smooth ramps: a constant voltage is reached along a raised cosine in the set time."""
     drive = running(settings({"kind": "off", "offset": 2.0}, ramp=0.1))

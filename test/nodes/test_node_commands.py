@@ -117,8 +117,8 @@ def test_the_last_command_is_what_is_safe(world: World, interface: str) -> None:
     """0 for effort and velocity, a measured position for position; one number a joint at the controller's rate; then inactive."""
     control = controller(world, interface)
     heard, seen, blocks = commands(world), states(world), world.blocks("voltage" if interface == "effort" else "reference")
-    drive = excitation(world, interface, autostart=True, duration=1.5)
-    assert world.until(lambda: "inactive: the duration of 1.5 s is over" in drive.output(), 60.0), drive.output() + control.output()
+    drive = excitation(world, interface, autostart=True, duration=3.0)
+    assert world.until(lambda: "inactive: the duration of 3 s is over" in drive.output(), 60.0), drive.output() + control.output()
     world.spin(0.3)
     sent = np.array([message.data[0] for message in heard])
     assert all(len(message.data) == 1 and not message.layout.dim for message in heard)

@@ -59,6 +59,28 @@ def test_kill_9_of_the_excitation_is_what_the_drive_makes_of_it(world: World, wa
     assert (np.diff(seq) == 1).all()  # the encoder went on reporting
 
 
+def test_a_voltage_that_starts_again_is_followed_though_its_first_blocks_were_lost(world: World) -> None:
+    """The drive has moved on by itself when a source begins again, and hears it from counter 160 on: it answers with that one's counters."""
+    from std_msgs.msg import Float64MultiArray
+
+    from xy_sysid.nodes.common import DATA_QOS, to_message
+
+    positions = world.blocks("position")
+    world.start(MACHINE, {"machine": "rigid.yaml", "realtime": True, "watchdog": 0.05})
+    publisher = world.node.create_publisher(Float64MultiArray, "voltage", DATA_QOS)
+    assert world.until(lambda: publisher.get_subscription_count() == 1, 20.0)
+
+    def send(first: int) -> None:
+        seq = np.arange(first, first + 20, dtype=np.float64)
+        publisher.publish(to_message(Block(("x", "y"), seq, time.time() + (seq - first) / 2000.0, np.zeros((20, 2)))))
+
+    send(0)
+    assert world.until(lambda: bool(positions) and positions[-1].seq[-1] > 4000.0)
+    send(160)
+    assert world.until(lambda: any(block.seq[0] == 160.0 for block in positions))
+    assert world.until(lambda: 179.0 < positions[-1].seq[-1] < 2000.0)
+
+
 def test_guards_do_not_sleep_when_the_clock_is_taken_away(world: World) -> None:
     """use_sim_time is set while it drives, and nobody publishes a clock: voltage goes on, and the watchdog still sees a silent machine."""
     blocks, machine = world.blocks(), Integrator()

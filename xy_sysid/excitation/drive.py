@@ -186,8 +186,10 @@ class Drive:
             if self.settings.output == "commands":
                 return f"{old:.3g} s old by its stamp: is it stamped in ROS time, by a clock that agrees with this one?"
             return f"{old:.3g} s old by its counter, which must be that of the voltage"
-        if -old > AHEAD and self.settings.output == "commands":
-            return f"stamped {-old:.3g} s ahead: is it stamped in ROS time, by a clock that agrees with this one?"
+        if -old > AHEAD:
+            if self.settings.output == "commands":
+                return f"stamped {-old:.3g} s ahead: is it stamped in ROS time, by a clock that agrees with this one?"
+            return f"{-old:.3g} s ahead of the voltage by its counter: the machine does not follow this voltage yet, or numbers by itself"
         return ""
 
     def _speed(self, values: FloatArray, seq: FloatArray) -> FloatArray:
