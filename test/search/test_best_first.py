@@ -34,6 +34,7 @@ class Table:
     """A judge that knows what each set leaves (nats), and what each move from it promises; it writes down what it was asked.
 
     leaves: a set that is not there cannot be fitted; promises: from a set, (effects to add, gain)
+    simpler: the set with a simpler relative, for a set that has one; astray: what a set leaves if it is fitted from this other one
     """
 
     leaves: Mapping[Set, float]
@@ -41,6 +42,8 @@ class Table:
     refuses: Mapping[Set, str] = field(default_factory=dict)
     dry: Set = frozenset()
     parameters: Mapping[str, int] = field(default_factory=dict)
+    simpler: Mapping[Set, Set] = field(default_factory=dict)
+    astray: Mapping[tuple[Set, Set], float] = field(default_factory=dict)
     briefs: list[Set] = field(default_factory=list)
     wholes: list[Set] = field(default_factory=list)
 
@@ -53,6 +56,7 @@ class Table:
                 parameters=sum(self.parameters.get(name, 1) for name in added),
                 starts=tuple((name, (1.0,)) for name in sorted(added)),
                 expected=added <= self.dry,
+                simpler=self.simpler.get(now.effects | added, frozenset()),
             )
             for added, gain in self.promises.get(now.effects, ())
         ]
@@ -61,6 +65,8 @@ class Table:
         if move.effects == now.effects:  # the first set once more, so that brief fits are compared with a brief one
             return now
         self.briefs.append(move.effects)
+        if (now.effects, move.effects) in self.astray:
+            return Looked(move.effects, self.astray[now.effects, move.effects])
         return Looked(move.effects, self.leaves[move.effects]) if move.effects in self.leaves else None
 
     def whole(self, found: Looked) -> Looked:
@@ -121,6 +127,31 @@ def test_of_two_that_promise_the_same_friction_is_tried_first() -> None:
     leaves = {of(): 3.0, of("a"): 2.0, of("b"): 2.0}
     _, tried = searched(Table(leaves, promises, dry=of("b")))
     assert tried[0] == of("b")
+
+
+def test_a_simpler_relative_is_tried_before_a_richer_one_that_promises_more() -> None:
+    """Its fit is a start for the richer one that nothing has led astray; once that start is known, the richer is not begun without it."""
+    promises = {of(): all_of(("r", 2.5), ("s", 0.5)), of("s"): all_of(("r", 1.0))}
+    leaves = {of(): 3.0, of("s"): 1.0, of("r"): 2.9, of("r", "s"): 0.01}
+    _, tried = searched(Table(leaves, promises, simpler={of("r"): of("s")}))
+    assert tried == [of("s"), of("r", "s")]
+
+
+def test_a_richer_relative_is_tried_though_the_simpler_one_leads_nowhere() -> None:
+    """Alone the simpler explains nothing, so nothing goes on from there."""
+    promises = {of(): all_of(("r", 2.5), ("s", 0.5))}
+    search, tried = searched(Table({of(): 3.0, of("s"): 3.0, of("r"): 0.5}, promises, simpler={of("r"): of("s")}))
+    assert tried == [of("s"), of("r")]
+    assert search.best.effects == of("r")
+
+
+def test_a_fit_that_left_more_than_a_set_within_it_is_fitted_again_from_that() -> None:
+    """From a it went astray: a and b together cannot explain less than b alone."""
+    promises = {of(): all_of(("a", 1.0), ("b", 0.5)), of("a"): all_of(("b", 1.3)), of("b"): all_of(("a", 0.8))}
+    leaves = {of(): 3.0, of("a"): 2.0, of("b"): 1.0, of("a", "b"): 0.1}
+    search, tried = searched(Table(leaves, promises, astray={(of("a"), of("a", "b")): 1.9}))
+    assert tried == [of("a"), of("a", "b"), of("b"), of("a", "b")]
+    assert search.best.fit.excess == 0.1
 
 
 def test_the_simpler_of_two_sets_that_leave_the_same_is_best() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cache
 
 import numpy as np
 import scipy.signal
@@ -46,8 +47,7 @@ class Scene:
         return self._known[own, cutoff]
 
     def _smoothed(self, signal: FloatArray, cutoff: float) -> FloatArray:
-        share = min(2.0 * cutoff / self.sampling_rate, 0.9)
-        return np.asarray(scipy.signal.sosfiltfilt(scipy.signal.butter(2, share, output="sos"), signal), dtype=np.float64)
+        return np.asarray(scipy.signal.sosfiltfilt(_low_pass(min(2.0 * cutoff / self.sampling_rate, 0.9)), signal), dtype=np.float64)
 
     def direction(self) -> FloatArray:
         """(n,) -1..1, the direction of motion, blurred where noise hides it."""
@@ -84,17 +84,24 @@ class Scene:
         return [float(4.0 * travel / peak) for peak in best]
 
 
+@cache
+def _low_pass(share: float) -> FloatArray:
+    return np.asarray(scipy.signal.butter(2, share, output="sos"), dtype=np.float64)
+
+
 @dataclass(frozen=True, slots=True)
 class Guess:
     """A trace that an effect would leave, to first order.
 
     columns: (k, n) per unit coefficient: V against the drive, or m/s where ``at_encoder``
     read:    start values of all parameters, in order, from the k coefficients that explain the error best
+    inverse_only: a start for base and effect together, and no trace of the effect beside a base that stays
     """
 
     columns: FloatArray
     read: Callable[[FloatArray], tuple[float, ...]]
     at_encoder: bool = False
+    inverse_only: bool = False
 
 
 def columns(*signals: FloatArray) -> FloatArray:

@@ -20,12 +20,15 @@ def level(excess: float, coulomb: float, velocity: float, v: float) -> float:
 
 
 def guesses(scene: Scene) -> Iterator[Guess]:
-    """The direction of motion, evenly and near rest, for Stribeck speeds from 2 to 100 per cent of the usual one."""
+    """The direction of motion, evenly and near rest, for Stribeck speeds from 2 to 500 per cent of the usual one.
+
+    Above the usual one it bends as any drag does, and promises what it cannot keep beside a base that is not right yet.
+    """
     direction, v = scene.direction(), scene.smooth(scene.velocity, 300.0)
     usual = float(np.std(v))
-    for velocity in np.geomspace(0.02, 1.0, 8) * usual:
+    for velocity in np.concatenate((np.geomspace(0.02, 1.0, 8), np.geomspace(1.7, 5.0, 3))) * usual:
         near = direction * np.exp(-((v / velocity) ** 2))
-        yield Guess(columns(near, direction), _Reader(float(velocity)))
+        yield Guess(columns(near, direction), _Reader(float(velocity)), inverse_only=bool(velocity > usual))
 
 
 class _Reader:

@@ -80,7 +80,7 @@ def screen(effects: Iterable[Effect], scene: Scene, nuisance: FloatArray, window
     found, columns = [], {}
     for effect in effects:
         many = effect.category == "motion"
-        guesses = effect.guessed(brief if many else scene)
+        guesses = [guess for guess in effect.guessed(brief if many else scene) if not guess.inverse_only]
         space = part if many or len(guesses) > MANY else whole
         best, chosen = Trace(effect.name, 0.0, effect.typical), None
         for guess in guesses:

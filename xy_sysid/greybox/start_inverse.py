@@ -2,17 +2,21 @@
 
 The voltage is explained by acceleration, velocity and the effect's traces on the measured motion (inverse dynamic
 identification; Gautier & Khalil 1990, eq. 8), all seen through the same low-pass. Friction that the base alone takes for
-drag is told apart here.
+drag is told apart here. At rest friction takes whatever the drive gives, so that a law of friction is read from the samples
+in motion alone.
 """
 
 from __future__ import annotations
 
 import numpy as np
+from scipy.ndimage import minimum_filter1d
 
 from xy_sysid.effects import Effect, Scene
 from xy_sysid.samples.block import FloatArray
 
 CUTOFFS = (10.0, 40.0)  # Hz: slow machines move below the first, quick ones up to the second
+REST = 0.2  # part of the usual speed below which friction may be holding it
+FEW = 0.05  # part of the samples that must be in motion, else all are used
 
 
 def inverse_starts(effect: Effect, scene: Scene, samples: int) -> list[tuple[float, float, tuple[float, ...]]]:
@@ -27,10 +31,15 @@ def inverse_starts(effect: Effect, scene: Scene, samples: int) -> list[tuple[flo
         velocity = scene.smooth(scene.velocity, cutoff)[:samples]
         acceleration = np.gradient(velocity) * scene.sampling_rate
         voltage = scene.smooth(scene.voltage, cutoff)[:samples]
+        rows = np.ones_like(velocity, dtype=np.bool_)
+        around = 2 * int(0.5 * scene.sampling_rate / cutoff) + 1
+        if effect.is_dry:
+            moving = minimum_filter1d(np.abs(velocity), around) > REST * float(np.std(velocity))
+            rows = moving if float(np.mean(moving)) > FEW else rows
         best, kept = np.inf, None
         for guess in guesses:
-            rows = [acceleration, velocity, *(scene.smooth(column, cutoff)[:samples] for column in guess.columns)]
-            coefficients, left = _least(np.array(rows), voltage)
+            columns = [scene.smooth(column, cutoff)[:samples] for column in guess.columns]
+            coefficients, left = _least(np.array([acceleration, velocity, *columns])[:, rows], voltage[rows])
             if left < best and coefficients[0] * coefficients[1] > 0.0:
                 best, kept = left, (1.0 / float(coefficients[1]), float(coefficients[1] / coefficients[0]), guess.read(coefficients[2:]))
         if kept is not None:

@@ -53,6 +53,7 @@ class Node(Generic[F]):
 
     parameters: that its effects have; whole: fitted on all data; refused: why it explains nothing, or empty; promised: gain
     shown: largest gain of a move from it over what was promised; tried: moves from it that were tried; brief: excess of its brief fit
+    led_on: moves from it are waiting, or were tried
     """
 
     effects: frozenset[str]
@@ -66,6 +67,7 @@ class Node(Generic[F]):
     tried: int = 0
     leads: bool = True
     later: float = 0.0
+    led_on: bool = False
 
     @property
     def score(self) -> float:
@@ -127,7 +129,7 @@ class Search(Generic[F]):
             if self.clock() > until:
                 self.stopped = True
                 return
-            parent, move = min(open_to, key=self._order)
+            parent, move = self._simpler(*min(open_to, key=self._order))
             self.waiting.remove((parent, move))
             yield move.effects
             before = self.best.score
@@ -149,7 +151,20 @@ class Search(Generic[F]):
     def _promising(self, parent: Node[F], move: Move) -> bool:
         """It may become better than the best, and what is new may be more than what is left unexplained could feign."""
         nameable = move.expected or move.rest * parent.optimism >= _new(parent, move) * log(1.0 + self.least) or move.begins < parent.fit.excess
-        return nameable and move.effects not in self.nodes and parent.hope(move) <= self.best.score - LEAST
+        simpler = self.nodes.get(move.simpler) if move.simpler else None
+        if simpler is not None and simpler.led_on:  # from there it begins better
+            return False
+        return nameable and not self._known(parent, move) and parent.hope(move) <= self.best.score - LEAST
+
+    def _simpler(self, parent: Node[F], move: Move) -> tuple[Node[F], Move]:
+        """The move itself, or one to the simpler relative of what it brings, which comes first."""
+        first = (item for item in self.waiting if item[0] is parent and item[1].effects == move.simpler and move.simpler not in self.nodes)
+        return next(first, (parent, move))
+
+    def _known(self, parent: Node[F], move: Move) -> bool:
+        """The set was fitted. One that left more than a set which it contains went astray, and may be fitted again from that."""
+        known = self.nodes.get(move.effects)
+        return known is not None and known.fit.excess <= parent.fit.excess + LEAST
 
     def _order(self, item: tuple[Node[F], Move]) -> tuple[float, bool]:
         """What may become best first; simple and single moves are quick, and often enough; of equals what every machine has."""
@@ -159,7 +174,8 @@ class Search(Generic[F]):
     def _moves(self, node: Node[F]) -> list[tuple[Node[F], Move]]:
         if len(node.effects) >= self.most:
             return []
-        return [(node, move) for move in self.judge.moves(node.fit) if move.effects not in self.nodes and len(move.effects) <= self.most]
+        node.led_on = True
+        return [(node, move) for move in self.judge.moves(node.fit) if not self._known(node, move) and len(move.effects) <= self.most]
 
     def _fitted(self, parent: Node[F], move: Move) -> Node[F] | None:
         best, later = self.best, parent.fit.excess - parent.brief.excess  # what a whole fit will change, as it did for the parent

@@ -34,6 +34,7 @@ class Move:
     parameters: that the new set has more; starts: first values of what is new; replaced: an effect that gives way
     expected: every machine has it (friction): it comes first among moves that promise the same, and is tried whatever the whole error promises,
         for to first order its trace tells little where it bends
+    simpler: for a richer law of friction the set with the simplest in its place, else empty
     """
 
     effects: frozenset[str]
@@ -44,6 +45,7 @@ class Move:
     replaced: str | None = None
     begins: float = np.inf
     expected: bool = False
+    simpler: frozenset[str] = frozenset()
 
 
 class FreeRunJudge:
@@ -127,23 +129,39 @@ class FreeRunJudge:
         starts = ((effect.name, trace.values),)
         relative = families.get(effect.family) if effect.family else None
         if relative is None:
-            begins = np.inf
-            if not own:  # the base may have been led astray so far that traces tell little
-                candidates = other_starts(self.data, now, now.model, effect.name, scene)
-                begins = min((first_excess(self.data, model) for model in candidates), default=np.inf)
             return Move(
                 effects=own | {effect.name},
                 gain=gain.excess,
                 rest=gain.rest,
                 parameters=len(effect.parameters),
                 starts=starts,
-                begins=begins,
+                begins=np.inf if own else self._begins(now, now.model, effect, scene),
                 expected=effect.is_dry,
+                simpler=self._simplest(own, effect),
             )
         more = len(effect.parameters) - len(self.library[relative].parameters)
         if more <= 0 and self.library[relative].sum_of is None:
             return None
-        return Move(effects=own - {relative} | {effect.name}, gain=gain.excess, rest=gain.rest, parameters=more, starts=starts, replaced=relative)
+        begins = self._begins(now, now.model.without(relative), effect, scene) if len(own) == 1 else np.inf
+        return Move(
+            effects=own - {relative} | {effect.name},
+            gain=gain.excess,
+            rest=gain.rest,
+            parameters=more,
+            starts=starts,
+            replaced=relative,
+            begins=begins,
+        )
+
+    def _begins(self, now: GreyboxFit, model: AxisModel, effect: Effect, scene: Scene) -> float:
+        """Excess at starts that are read without the model: it may have been led so far astray that traces tell little."""
+        return min((first_excess(self.data, start) for start in other_starts(self.data, now, model, effect.name, scene)), default=np.inf)
+
+    def _simplest(self, own: frozenset[str], effect: Effect) -> frozenset[str]:
+        """The set with the simplest law of friction, for a richer one: without it the base takes friction for drag, and traces tell little."""
+        family = [item for item in self.library.acting if item.simulable and item.is_dry and item.family == effect.family]
+        simplest = min(family, key=lambda item: len(item.parameters), default=effect)
+        return own | {simplest.name} if len(simplest.parameters) < len(effect.parameters) else frozenset()
 
     def _with_relatives(self, kept: list[Move], every: list[Move]) -> list[Move]:
         """The rest of a family of which one is among the first two: relatives share their trace."""
@@ -168,7 +186,8 @@ class FreeRunJudge:
             effect, old = self.library[name], dict(zip(self.library[move.replaced].names, dict(model.effects)[move.replaced], strict=True))
             rest = model.without(move.replaced)
             shared = [tuple(old.get(key, value) for key, value in zip(effect.names, row, strict=True)) for row in (values, effect.typical)]
-            return best_start(self.data, [rest.with_effect(name, bounded(effect, row)) for row in shared])
+            traced = [rest.with_effect(name, bounded(effect, row)) for row in shared]
+            return best_start(self.data, traced if rest.effects else [*traced, *other_starts(self.data, now, rest, name)])
         for name, values in move.starts:
             begun = model.with_effect(name, bounded(self.library[name], values))
             model = best_start(self.data, [begun, *other_starts(self.data, now, model, name)])

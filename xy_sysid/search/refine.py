@@ -30,6 +30,7 @@ from xy_sysid.search.ladder import Candidate, Ladder, Rival, Step
 MOST_EFFECTS = 4
 BUDGET = 10.0  # s of processor time for one axis
 RIVALS = 6
+POLISH = 3  # more fits of the last set, as long as they have not ended by themselves
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +88,11 @@ def refine_steps(
     settled = _Settling(judge, search, frozenset(kept))
     while settled.step():
         yield Trying(tuple(sorted(settled.now.effects)))
-    final, search.stopped = settled.now, search.stopped or judge.late()
+    final = settled.now
+    for _ in range(POLISH):  # along a valley that bends the first fit did not come to its end
+        if not final.fit.converged and not judge.late():
+            final.fit = judge.whole(final.fit)
+    search.stopped = search.stopped or judge.late()
     if not judge.late() and final.effects > frozenset(kept):
         for names in search.rivals(final.effects):
             yield Trying(tuple(sorted(names)))
@@ -187,7 +192,7 @@ class _Settling:
         return min(fewer, key=lambda node: self.judge.rest(node.fit, self.now.fit))
 
     def _tried(self, here: float) -> list[Node[GreyboxFit]]:
-        """The simplest other set that was tried, has fewer parameters, and comes near."""
+        """The simplest other set that was tried, has fewer parameters (or as many, and friction where this has none), and comes near."""
         library = self.judge.library
 
         def order(node: Node[GreyboxFit]) -> tuple[int, float, int]:
@@ -196,7 +201,8 @@ class _Settling:
 
         nodes = sorted(self.search.nodes.values(), key=order)
         for node in nodes:
-            simpler = node.parameters < self.now.parameters and not node.refused and self.kept <= node.effects
+            alike = node.parameters == self.now.parameters and order(node) < order(self.now) and node.fit.excess < self.now.fit.excess + LEAST
+            simpler = (alike or node.parameters < self.now.parameters) and not node.refused and self.kept <= node.effects
             if simpler and self.judge.rest(node.fit, self.now.fit) - here < self.search.least:
                 _whole(self.judge, node)
                 return [node]
