@@ -221,7 +221,7 @@ class _Settling:
     def _without(self) -> Iterator[Node[GreyboxFit]]:
         """Sets without an effect, as before."""
         for name in self._own():
-            yield from self._good(self.now.effects - {name}, partial(self.judge.without, self.now.fit, name))
+            yield from self._less(self.now, name)
 
     def _without_idle(self) -> Iterator[Node[GreyboxFit]]:
         """Sets that did as well with an effect in them that the data do not tell from none, without that one."""
@@ -230,16 +230,34 @@ class _Settling:
             smaller = node.effects - {idle}
             simpler = sum(len(self.judge.library[name].parameters) for name in smaller) < self.now.parameters
             if idle and simpler and smaller and self.kept <= smaller and node.fit.excess < self.now.fit.excess + LEAST:
-                alone = [self.search.nodes[one] for name in smaller if (one := frozenset((name,))) in self.search.nodes]
-                yield from self._good(smaller, partial(self.judge.without, node.fit, idle, [other.fit.model for other in alone]))
+                yield from self._less(node, idle)
+
+    def _less(self, node: Node[GreyboxFit], name: str) -> Iterator[Node[GreyboxFit]]:
+        """A set without one effect, begun from what there is of the others, and from what each was alone: one may have stood back."""
+        smaller = node.effects - {name}
+        alone = [self.search.nodes[one].fit.model for other in smaller if (one := frozenset((other,))) in self.search.nodes]
+        yield from self._good(smaller, partial(self.judge.without, node.fit, name, alone))
 
     def _own(self) -> list[str]:
         return [name for name, _ in reversed(self.now.fit.model.effects) if name not in self.kept]
 
     def _good(self, effects: frozenset[str], make: Callable[[], GreyboxFit | None]) -> Iterator[Node[GreyboxFit]]:
+        """The set, if it stands; for an effect in it that the data do not tell from none, each of its relatives that was tried alone."""
         node = self._node(effects, make)
-        if node is not None and not node.refused and not self.judge.idle(node.fit):
+        if node is None or node.refused:
+            return
+        idle = self.judge.idle(node.fit)
+        if not idle:
             yield node
+            return
+        library, less = self.judge.library, node.fit.model.without(idle)
+        for relative in library.acting:
+            alone, others = self.search.nodes.get(frozenset((relative.name,))), effects - {idle} | {relative.name}
+            simpler = sum(len(library[name].parameters) for name in others) < self.now.parameters
+            if alone is not None and simpler and relative.name not in effects and relative.family and relative.family == library[idle].family:
+                other = self._node(others, partial(self.judge.again, node.fit, less.with_effect(*alone.fit.model.effects[0])))
+                if other is not None and not other.refused and not self.judge.idle(other.fit):
+                    yield other
 
     def _node(self, effects: frozenset[str], make: Callable[[], GreyboxFit | None]) -> Node[GreyboxFit] | None:
         known = self.search.nodes.get(effects)
