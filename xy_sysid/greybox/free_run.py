@@ -31,7 +31,6 @@ __all__ = [
     "finish",
     "fit",
     "fit_base",
-    "fit_instead",
     "fit_with",
     "look",
     "loosened",
@@ -122,22 +121,6 @@ def fit_with(
         values = (starts or {}).get(name)
         model = _begun(data, base, model, name) if values is None else model.with_effect(name, bounded(model.library[name], values))
     return fit(data, model, brief, hopeless)
-
-
-def fit_instead(data: AxisData, base: GreyboxFit, own: str, name: str, brief: bool = False, hopeless: float = np.inf) -> GreyboxFit:
-    """The model of ``base`` with the effect ``name`` in the place of its relative ``own``, all refitted together.
-
-    Where ``own`` is the sum of others and one of these is the relative, the rest of them stay.
-    """
-    library = base.model.library
-    model = base.model if library[own].family == library[name].family and not library[own].sum_of else base.model.taken_apart(own)
-    place = next(key for key, _ in model.effects if library[key].family == library[name].family)
-    known = dict(zip(library[place].names, dict(model.effects)[place], strict=True))
-    rest, effect = model.without(place), library[name]
-    starts = (look(data, base, [effect])[0].values, effect.typical)
-    shared = [tuple(known.get(key, value) for key, value in zip(effect.names, start, strict=True)) for start in starts]
-    candidates = [rest.with_effect(name, bounded(effect, values)) for values in shared]
-    return fit(data, min(candidates, key=lambda candidate: first_excess(data, candidate)), brief, hopeless)
 
 
 def _begun(data: AxisData, base: GreyboxFit, model: AxisModel, name: str) -> AxisModel:

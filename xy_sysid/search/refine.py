@@ -7,10 +7,8 @@ gap, one-step prediction against the best simulation with the same freedom.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable
 from dataclasses import dataclass
-from functools import partial
-from itertools import chain
 
 import numpy as np
 
@@ -22,10 +20,11 @@ from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.greybox.one_step import error_without
 from xy_sysid.greybox.whitened import whitened_rms
 from xy_sysid.search.beside_one_step import grown
-from xy_sysid.search.best_first import Judge, Node, Search
-from xy_sysid.search.criteria import FILTERED, FREE, HOPELESS, LEAST, WORTH
+from xy_sysid.search.best_first import Node, Search
+from xy_sysid.search.criteria import FILTERED, FREE, LEAST, WORTH
 from xy_sysid.search.judge import FreeRunJudge, joined
 from xy_sysid.search.ladder import Candidate, Ladder, Rival, Step
+from xy_sysid.search.simplify import Simplifying, whole
 
 MOST_EFFECTS = 4
 BUDGET = 10.0  # s of processor time for one axis
@@ -85,7 +84,7 @@ def refine_steps(
     search: Search[GreyboxFit] = Search(judge=judge, clock=effort.clock, budget=FREE * effort.budget, most=effort.most + len(kept), least=effort.size)
     for names in search.steps(fixed.steps[-1].fit, frozenset(kept)):
         yield Trying(tuple(sorted(names)))
-    settled = _Settling(judge, search, frozenset(kept))
+    settled = Simplifying(judge, search, frozenset(kept))
     while settled.step():
         yield Trying(tuple(sorted(settled.now.effects)))
     final = settled.now
@@ -117,7 +116,7 @@ def settle(data: AxisData, now: GreyboxFit) -> GreyboxFit:
     search: Search[GreyboxFit] = Search(judge=judge, clock=never, budget=BUDGET, most=MOST_EFFECTS, least=WORTH)
     names = frozenset(name for name, _ in now.model.effects)
     search.nodes[names] = Node(effects=names, fit=now, brief=now, parameters=sum(len(values) for _, values in now.model.effects), whole=True)
-    settling = _Settling(judge, search, frozenset())
+    settling = Simplifying(judge, search, frozenset())
     while settling.step():
         pass
     return joined(data, settling.now.fit)
@@ -153,126 +152,6 @@ def _given_alone(data: AxisData, judge: FreeRunJudge, fixed: _Fixed) -> Ladder:
     )
 
 
-def _whole(judge: Judge[GreyboxFit], node: Node[GreyboxFit]) -> GreyboxFit:
-    """The fit of a set on all data."""
-    if not node.whole or node.fit.brief:
-        node.fit, node.whole = judge.whole(node.fit), True
-    return node.fit
-
-
-class _Settling:
-    """From the best set to a simpler one, as long as what is lost could be feigned by what is left unexplained."""
-
-    def __init__(self, judge: FreeRunJudge, search: Search[GreyboxFit], kept: frozenset[str]) -> None:
-        self.judge, self.search, self.kept = judge, search, kept
-        self.now = search.best
-
-    def step(self) -> bool:
-        """Take the first simpler set that loses little; False if none does."""
-        _whole(self.judge, self.now)
-        here = self.judge.rest(self.now.fit, self.now.fit)
-        for node in chain(self._simpler_relatives(), self._tried(here), self._without(), self._without_idle()):
-            loss = self.judge.rest(node.fit, self.now.fit) - here
-            if loss < self.search.least or not self.judge.better(self.now.fit, node.fit):
-                self.now = node
-                return True
-        return False
-
-    def sizes(self) -> dict[str, float]:
-        """What each effect explains over what is left: by the best set known that has no such law, none of its family."""
-        here, found = self.judge.rest(self.now.fit, self.now.fit), {}
-        for name in self._own():
-            node = self.best_without(name)
-            found[name] = max(self.judge.rest(node.fit, self.now.fit) - here, 0.0)
-        return found
-
-    def best_without(self, name: str) -> Node[GreyboxFit]:
-        """The best of the sets that were fitted of the same effects but for one."""
-        fewer = (node for node in self.search.nodes.values() if node.effects <= self.now.effects - {name} and not node.refused)
-        return min(fewer, key=lambda node: self.judge.rest(node.fit, self.now.fit))
-
-    def _tried(self, here: float) -> list[Node[GreyboxFit]]:
-        """The simplest other set that was tried, has fewer parameters (or as many, and friction where this has none), and comes near."""
-        library = self.judge.library
-
-        def order(node: Node[GreyboxFit]) -> tuple[int, float, int]:
-            """Of sets that do the same, friction first: every machine has it."""
-            return node.parameters, round(node.fit.excess, 1), sum(not library[name].is_dry for name in node.effects)
-
-        nodes = sorted(self.search.nodes.values(), key=order)
-        for node in nodes:
-            alike = node.parameters == self.now.parameters and order(node) < order(self.now) and node.fit.excess < self.now.fit.excess + LEAST
-            simpler = (alike or node.parameters < self.now.parameters) and not node.refused and self.kept <= node.effects
-            if simpler and self.judge.rest(node.fit, self.now.fit) - here < self.search.least:
-                _whole(self.judge, node)
-                return [node]
-        return []
-
-    def _simpler_relatives(self) -> Iterator[Node[GreyboxFit]]:
-        """Sets with a simpler relative in the place of an effect, what came last first; each is fitted when it is asked for."""
-        library, now = self.judge.library, self.now
-        for name in self._own():
-            effect = library[name]
-            for relative in sorted(library.acting, key=lambda item: len(item.parameters)):
-                alike = effect.family and relative.family == effect.family and relative.simulable and relative.name not in now.effects
-                if alike and len(relative.parameters) < len(effect.parameters):
-                    yield from self._good(now.effects - {name} | {relative.name}, partial(self.judge.instead, now.fit, name, relative))
-
-    def _without(self) -> Iterator[Node[GreyboxFit]]:
-        """Sets without an effect, as before."""
-        for name in self._own():
-            yield from self._less(self.now, name)
-
-    def _without_idle(self) -> Iterator[Node[GreyboxFit]]:
-        """Sets that did as well with an effect in them that the data do not tell from none, without that one."""
-        for node in list(self.search.nodes.values()):
-            idle = self.judge.idle(node.fit)
-            smaller = node.effects - {idle}
-            simpler = sum(len(self.judge.library[name].parameters) for name in smaller) < self.now.parameters
-            if idle and simpler and smaller and self.kept <= smaller and node.fit.excess < self.now.fit.excess + LEAST:
-                yield from self._less(node, idle)
-
-    def _less(self, node: Node[GreyboxFit], name: str) -> Iterator[Node[GreyboxFit]]:
-        """A set without one effect, begun from what there is of the others, and from what each was alone: one may have stood back."""
-        smaller = node.effects - {name}
-        alone = [self.search.nodes[one].fit.model for other in smaller if (one := frozenset((other,))) in self.search.nodes]
-        yield from self._good(smaller, partial(self.judge.without, node.fit, name, alone))
-
-    def _own(self) -> list[str]:
-        return [name for name, _ in reversed(self.now.fit.model.effects) if name not in self.kept]
-
-    def _good(self, effects: frozenset[str], make: Callable[[], GreyboxFit | None]) -> Iterator[Node[GreyboxFit]]:
-        """The set, if it stands; for an effect in it that the data do not tell from none, each of its relatives that was tried alone."""
-        node = self._node(effects, make)
-        if node is None or node.refused:
-            return
-        idle = self.judge.idle(node.fit)
-        if not idle:
-            yield node
-            return
-        library, less = self.judge.library, node.fit.model.without(idle)
-        for relative in library.acting:
-            alone, others = self.search.nodes.get(frozenset((relative.name,))), effects - {idle} | {relative.name}
-            simpler = sum(len(library[name].parameters) for name in others) < self.now.parameters
-            if alone is not None and simpler and relative.name not in effects and relative.family and relative.family == library[idle].family:
-                other = self._node(others, partial(self.judge.again, node.fit, less.with_effect(*alone.fit.model.effects[0])))
-                if other is not None and not other.refused and not self.judge.idle(other.fit):
-                    yield other
-
-    def _node(self, effects: frozenset[str], make: Callable[[], GreyboxFit | None]) -> Node[GreyboxFit] | None:
-        known = self.search.nodes.get(effects)
-        if known is not None and (known.whole or known.fit.excess < self.now.fit.excess + HOPELESS):
-            _whole(self.judge, known)
-            return known
-        fit = None if self.judge.late() else make()
-        if fit is None:
-            return known
-        parameters = sum(len(self.judge.library[name].parameters) for name in effects)
-        node = Node(effects=effects, fit=fit, brief=fit, parameters=parameters, whole=True, refused=self.judge.refusal(fit))
-        self.search.nodes[effects] = node
-        return node
-
-
 def _ahead(
     judge: FreeRunJudge, search: Search[GreyboxFit], final: Node[GreyboxFit], name: str
 ) -> tuple[tuple[tuple[str, GreyboxFit], ...], float] | None:
@@ -283,7 +162,7 @@ def _ahead(
     data, library = judge.data, judge.library
     if data.longest() is not data:
         return None
-    _whole(judge, search.best)
+    whole(judge, search.best)
     later = np.arange(data.velocity.size) >= data.training
     try:
         bar = min(whitened_rms(node.fit.error, later) for node in (final, search.best))
@@ -312,7 +191,7 @@ def _explained(data: AxisData, base: GreyboxFit, final: GreyboxFit) -> float:
 def _ladder(
     judge: FreeRunJudge,
     search: Search[GreyboxFit],
-    settled: _Settling,
+    settled: Simplifying,
     fixed: _Fixed,
     filtered: tuple[tuple[tuple[str, GreyboxFit], ...], float] | None,
 ) -> Ladder:
@@ -380,7 +259,7 @@ def _parts(library: Library, name: str) -> tuple[str, ...]:
     return (name,) if whole is None else (name, *whole.parts)
 
 
-def _astray(data: AxisData, settled: _Settling, name: str) -> float:
+def _astray(data: AxisData, settled: Simplifying, name: str) -> float:
     """Amplitude of what is left beyond the noise where a mode acts, over what it does there.
 
     A mode is linear and does not change: what it leaves just where it acts is of another law. What dirt leaves lies elsewhere.
@@ -409,6 +288,6 @@ def _rungs(judge: FreeRunJudge, search: Search[GreyboxFit], fixed: _Fixed, names
             now = final
         else:
             known = search.nodes.get(so_far)
-            now = judge.added(now, name) if known is None or known.refused else _whole(judge, known)
+            now = judge.added(now, name) if known is None or known.refused else whole(judge, known)
         steps.append(Step(name, now))
     return steps

@@ -1,0 +1,135 @@
+"""From the best set that the search knows to the simplest that does the same: fewer effects, simpler relatives, one law for several.
+
+What is lost on the way could be feigned by what is left unexplained, or be chance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import partial
+from itertools import chain
+
+from xy_sysid.greybox.free_run import GreyboxFit
+from xy_sysid.search.best_first import Judge, Node, Search
+from xy_sysid.search.criteria import HOPELESS, LEAST
+from xy_sysid.search.judge import FreeRunJudge
+
+
+def whole(judge: Judge[GreyboxFit], node: Node[GreyboxFit]) -> GreyboxFit:
+    """The fit of a set on all data."""
+    if not node.whole or node.fit.brief:
+        node.fit, node.whole = judge.whole(node.fit), True
+    return node.fit
+
+
+class Simplifying:
+    """From the best set to a simpler one, as long as what is lost could be feigned by what is left unexplained."""
+
+    def __init__(self, judge: FreeRunJudge, search: Search[GreyboxFit], kept: frozenset[str]) -> None:
+        self.judge, self.search, self.kept = judge, search, kept
+        self.now = search.best
+
+    def step(self) -> bool:
+        """Take the first simpler set that loses little; False if none does."""
+        whole(self.judge, self.now)
+        here = self.judge.rest(self.now.fit, self.now.fit)
+        for node in chain(self._simpler_relatives(), self._tried(here), self._without(), self._without_idle()):
+            loss = self.judge.rest(node.fit, self.now.fit) - here
+            if loss < self.search.least or not self.judge.better(self.now.fit, node.fit):
+                self.now = node
+                return True
+        return False
+
+    def sizes(self) -> dict[str, float]:
+        """What each effect explains over what is left: by the best set known that has no such law, none of its family."""
+        here, found = self.judge.rest(self.now.fit, self.now.fit), {}
+        for name in self._own():
+            node = self.best_without(name)
+            found[name] = max(self.judge.rest(node.fit, self.now.fit) - here, 0.0)
+        return found
+
+    def best_without(self, name: str) -> Node[GreyboxFit]:
+        """The best of the sets that were fitted of the same effects but for one."""
+        fewer = (node for node in self.search.nodes.values() if node.effects <= self.now.effects - {name} and not node.refused)
+        return min(fewer, key=lambda node: self.judge.rest(node.fit, self.now.fit))
+
+    def _tried(self, here: float) -> list[Node[GreyboxFit]]:
+        """The simplest other set that was tried, has fewer parameters (or as many, and friction where this has none), and comes near."""
+        library = self.judge.library
+
+        def order(node: Node[GreyboxFit]) -> tuple[int, float, int]:
+            """Of sets that do the same, friction first: every machine has it."""
+            return node.parameters, round(node.fit.excess, 1), sum(not library[name].is_dry for name in node.effects)
+
+        nodes = sorted(self.search.nodes.values(), key=order)
+        for node in nodes:
+            alike = node.parameters == self.now.parameters and order(node) < order(self.now) and node.fit.excess < self.now.fit.excess + LEAST
+            simpler = (alike or node.parameters < self.now.parameters) and not node.refused and self.kept <= node.effects
+            if simpler and self.judge.rest(node.fit, self.now.fit) - here < self.search.least:
+                whole(self.judge, node)
+                return [node]
+        return []
+
+    def _simpler_relatives(self) -> Iterator[Node[GreyboxFit]]:
+        """Sets with a simpler relative in the place of an effect, what came last first; each is fitted when it is asked for."""
+        library, now = self.judge.library, self.now
+        for name in self._own():
+            effect = library[name]
+            for relative in sorted(library.acting, key=lambda item: len(item.parameters)):
+                alike = effect.family and relative.family == effect.family and relative.simulable and relative.name not in now.effects
+                if alike and len(relative.parameters) < len(effect.parameters):
+                    yield from self._good(now.effects - {name} | {relative.name}, partial(self.judge.instead, now.fit, name, relative))
+
+    def _without(self) -> Iterator[Node[GreyboxFit]]:
+        """Sets without an effect, as before."""
+        for name in self._own():
+            yield from self._less(self.now, name)
+
+    def _without_idle(self) -> Iterator[Node[GreyboxFit]]:
+        """Sets that did as well with an effect in them that the data do not tell from none, without that one."""
+        for node in list(self.search.nodes.values()):
+            idle = self.judge.idle(node.fit)
+            smaller = node.effects - {idle}
+            simpler = sum(len(self.judge.library[name].parameters) for name in smaller) < self.now.parameters
+            if idle and simpler and smaller and self.kept <= smaller and node.fit.excess < self.now.fit.excess + LEAST:
+                yield from self._less(node, idle)
+
+    def _less(self, node: Node[GreyboxFit], name: str) -> Iterator[Node[GreyboxFit]]:
+        """A set without one effect, begun from what there is of the others, and from what each was alone: one may have stood back."""
+        smaller = node.effects - {name}
+        alone = [self.search.nodes[one].fit.model for other in smaller if (one := frozenset((other,))) in self.search.nodes]
+        yield from self._good(smaller, partial(self.judge.without, node.fit, name, alone))
+
+    def _own(self) -> list[str]:
+        return [name for name, _ in reversed(self.now.fit.model.effects) if name not in self.kept]
+
+    def _good(self, effects: frozenset[str], make: Callable[[], GreyboxFit | None]) -> Iterator[Node[GreyboxFit]]:
+        """The set, if it stands; for an effect in it that the data do not tell from none, each of its relatives that was tried alone."""
+        node = self._node(effects, make)
+        if node is None or node.refused:
+            return
+        idle = self.judge.idle(node.fit)
+        if not idle:
+            yield node
+            return
+        library, less = self.judge.library, node.fit.model.without(idle)
+        for relative in library.acting:
+            alone, others = self.search.nodes.get(frozenset((relative.name,))), effects - {idle} | {relative.name}
+            simpler = sum(len(library[name].parameters) for name in others) < self.now.parameters
+            if alone is not None and simpler and relative.name not in effects and relative.family and relative.family == library[idle].family:
+                other = self._node(others, partial(self.judge.again, node.fit, less.with_effect(*alone.fit.model.effects[0])))
+                if other is not None and not other.refused and not self.judge.idle(other.fit):
+                    yield other
+
+    def _node(self, effects: frozenset[str], make: Callable[[], GreyboxFit | None]) -> Node[GreyboxFit] | None:
+        known = self.search.nodes.get(effects)
+        if known is not None and (known.whole or known.fit.excess < self.now.fit.excess + HOPELESS):
+            whole(self.judge, known)
+            return known
+        fit = None if self.judge.late() else make()
+        if fit is None:
+            return known
+        parameters = sum(len(self.judge.library[name].parameters) for name in effects)
+        node = Node(effects=effects, fit=fit, brief=fit, parameters=parameters, whole=True, refused=self.judge.refusal(fit))
+        self.search.nodes[effects] = node
+        return node
