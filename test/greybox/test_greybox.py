@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 from functools import cache
 
@@ -15,7 +16,7 @@ from xy_sim.parts import PARTS
 from xy_sysid.axis.model import STANDARD, AxisModel, simulate
 from xy_sysid.errors import BadInput
 from xy_sysid.excitation.lockstep import drive
-from xy_sysid.greybox.floor import count_size, encoder_noise
+from xy_sysid.greybox.floor import bands, count_size, encoder_noise
 from xy_sysid.greybox.free_run import AxisData, GreyboxFit, fit_base, fit_with, look, prepare
 from xy_sysid.greybox.one_step import one_step_fit
 from xy_sysid.samples.block import FloatArray
@@ -206,3 +207,12 @@ def test_a_parameter_that_nothing_shows_has_no_interval() -> None:
     found = fit_with(data, machine_base("none"), ["saturation"], {"saturation": (50.0,)})
     assert found.parameter("saturation.limit").high == np.inf
     assert found.parameter("gain").high < 0.0971
+
+
+def test_a_trial_that_runs_away_has_infinite_power_and_warns_nobody() -> None:
+    """Squares beyond what a number holds are no message on somebody's terminal."""
+    layout = bands(RATE, 4096)
+    spectrum = np.full((3, layout.band.size), 1e200 + 0.0j)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert np.isinf(layout.power(spectrum)).all() and np.isinf(layout.powers(spectrum)).all()

@@ -57,13 +57,15 @@ class Bands:
 
     def power(self, spectrum: ComplexArray) -> FloatArray:
         """(count,) variance per sample that each band would have if its density held up to Nyquist, m^2/s^2."""
-        lines = np.mean(spectrum.real**2 + spectrum.imag**2, axis=0)
+        with np.errstate(over="ignore", invalid="ignore"):  # a trial model that runs away has no end of it
+            lines = np.mean(spectrum.real**2 + spectrum.imag**2, axis=0)
         return np.asarray(np.bincount(self.band, lines, self.count) / self.lines)
 
     def powers(self, spectrum: ComplexArray) -> FloatArray:
         """(windows, count): the same of each window."""
-        lines = spectrum.real**2 + spectrum.imag**2
-        return np.asarray(np.add.reduceat(lines, np.searchsorted(self.band, np.arange(self.count)), axis=1) / self.lines)
+        with np.errstate(over="ignore", invalid="ignore"):
+            lines = spectrum.real**2 + spectrum.imag**2
+            return np.asarray(np.add.reduceat(lines, np.searchsorted(self.band, np.arange(self.count)), axis=1) / self.lines)
 
     @property
     def lines(self) -> FloatArray:

@@ -167,8 +167,10 @@ def first_excess(data: AxisData, model: AxisModel) -> float:
 
 
 def _first_power(data: AxisData, model: AxisModel) -> FloatArray:
+    """Power by band of what a model leaves of the first stage's data; infinite for one that runs away."""
     run, values, _ = _problem(data, model, data.first, COARSE)
-    return data.layout.power(data.brief.spectrum(data.velocity[: data.first] - run(values)))
+    power = data.layout.power(data.brief.spectrum(data.velocity[: data.first] - run(values)))
+    return np.where(np.isfinite(power), power, np.inf)
 
 
 def look(data: AxisData, fitted: GreyboxFit, effects: Iterable[Effect]) -> list[Trace]:
