@@ -44,10 +44,7 @@ LONG = [name for pair in zip(LIVE, COMPUTING, strict=True) for name in pair]
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Long files first, one that waits and one that computes in turn: two workers end at the same time, and neither starves the other.
-
-    xdist would put files with many tests first (--no-loadscope-reorder in the Makefile), which leaves the longest for the end.
-    """
+    """Long files first, one that waits and one that computes in turn: two workers end at the same time, and neither starves the other."""
     root = Path(__file__).parent
     place = {name: number for number, name in enumerate(LONG)}
     items.sort(key=lambda item: place.get(item.path.relative_to(root).as_posix(), len(place)))
