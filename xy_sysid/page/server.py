@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import warnings
 import webbrowser
 from collections.abc import Callable
 from contextlib import closing
@@ -43,6 +44,7 @@ def serve(session: Session, host: str, port: int, token: str, browse: bool, say:
             ws_max_size=1 << 22,
             lifespan="on",
         )
+        warnings.filterwarnings("ignore", message="The `websockets` implementation is deprecated")  # that is no matter of who sees the page
         uvicorn.Server(config).run(sockets=[place])
 
 
