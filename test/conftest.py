@@ -44,7 +44,7 @@ LONG = [name for pair in zip(LIVE, COMPUTING, strict=True) for name in pair]
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Long files first, one that waits and one that computes in turn: two workers end at the same time, and neither starves the other."""
+    """Long files first, one that waits and one that computes in turn; with several workers xdist puts files with many tests before them."""
     root = Path(__file__).parent
     place = {name: number for number, name in enumerate(LONG)}
     items.sort(key=lambda item: place.get(item.path.relative_to(root).as_posix(), len(place)))

@@ -159,7 +159,7 @@ class FreeRunJudge:
 
     def _simplest(self, own: frozenset[str], effect: Effect) -> frozenset[str]:
         """The set with the simplest law of friction, for a richer one: without it the base takes friction for drag, and traces tell little."""
-        family = [item for item in self.library.acting if item.simulable and item.is_dry and item.family == effect.family]
+        family = [item for item in self.library.acting if effect.family and item.family == effect.family and item.simulable and item.is_dry]
         simplest = min(family, key=lambda item: len(item.parameters), default=effect)
         return own | {simplest.name} if len(simplest.parameters) < len(effect.parameters) else frozenset()
 
