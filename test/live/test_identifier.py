@@ -17,7 +17,7 @@ from xy_sysid.live.replay import replay
 from xy_sysid.samples.block import Block
 from xy_sysid.samples.pairing import Quantity
 from xy_sysid.samples.recording import Recording
-from xy_sysid.settings import IdentifierSettings, build
+from xy_sysid.settings import IdentifierSettings
 
 SETTINGS = IdentifierSettings()
 
@@ -213,9 +213,3 @@ def test_a_source_that_comes_back_at_another_rate_starts_new_spectra(size: int) 
     assert identifier.sampling_rate == 250.0
     assert 5 <= identifier.windows["x"] <= 14
     assert "came back at 250 Hz, before it was 500 Hz" in identifier.sentences["rate_changed"]
-
-
-def test_a_response_that_needs_the_reference_is_refused_and_not_taken_for_h1() -> None:
-    """Live it hears voltage and position alone; offline it works."""
-    with pytest.raises(BadInput, match="xy-sysid fit REC --set response=joint_input_output"):
-        Identifier(build(IdentifierSettings, {"response": "joint_input_output"}), ("x",))

@@ -107,9 +107,42 @@ def test_a_robot_with_a_forward_controller_is_identified_and_its_effect_named(wo
         if "Not enough data" not in answer.message:
             break
         world.spin(5.0)
-    assert answer.success and "coulomb_friction" in answer.message, answer.message
+    assert answer.success and "coulomb_friction" in answer.message, f"{answer.message}\n{robot.output()}"
     robot.send(signal.SIGINT)
     assert robot.wait(30.0) == 130
+
+
+def test_a_servo_under_load_is_identified_in_closed_loop_while_data_come_in(world: World) -> None:
+    """A position controller that a load disturbs: the identifier with the reference as instrument holds the joint's gain; H1 is off by 10 %."""
+    closed = {
+        "axes": '["x"]',
+        "source": "joint_state",
+        "joint_topic": "/joint_states",
+        "joints": '["x=pan-1"]',
+        "effort_as_voltage": True,
+        "effort_lag": 1,
+        "input_unit": '"N m"',
+        "output_unit": "rad",
+        "length": 256,
+        "band_low": 2.0,
+        "band_high": 60.0,
+        "min_coherence": 0.1,
+        "numerator_order": 0,
+        "denominator_order": 2,
+    }
+    controller(world, "position", load=1.0)
+    world.start("xy_sysid.nodes.identifier", closed | {"response": "joint_input_output"})
+    plain = ("-r", "__ns:=/plain", "-r", "reference:=/xy/reference")
+    world.start("xy_sysid.nodes.identifier", closed | {"response": "h1"}, arguments=plain)
+    right, biased = world.statuses(), world.statuses("/plain/metrics")
+    assert world.until(lambda: bool(value(right, "streams", "newest reference") and value(biased, "streams", "samples paired")), 60.0)
+    assert "reference" in next(status.message for status in right if status.name == "streams")
+    drive = excitation(world, "position", autostart=True, **{"x.rms": 0.03, "x.slow": 0.0})
+    assert world.until(lambda: int(value(right, "axis x", "windows") or 0) >= 40, 90.0), drive.output()
+    assert world.until(lambda: int(value(biased, "axis x", "windows") or 0) >= 40, 30.0)
+    low, high = (float(value(right, "axis x", key)) for key in ("gain 95 % low", "gain 95 % high"))
+    assert low <= 3.0 <= high and high - low < 3.0
+    assert abs(float(value(biased, "axis x", "gain (rad/s/(N m))")) / 3.0 - 1.0) > 0.1
 
 
 @pytest.mark.parametrize("interface", ["effort", "velocity", "position"])

@@ -112,7 +112,8 @@ def test_the_failing_picture_comes_by_itself_and_every_number_follows_the_story(
     tab.page.wait_for_timeout(2500)  # some more of the travel
     tab.press("diagnose")
     tab.until(lambda: "Missing: coulomb friction" in tab.verdict() and tab.filled() == ["Add coulomb friction"], 90)
-    assert len(tab.ladder()) == 1 and tab.ladder()[0] > 4 and tab.headline().startswith("Something is missing: ")
+    tab.until(lambda: tab.headline().startswith("Something is missing: ") and len(tab.ladder()) == 1, 5, "the headline is stale")
+    assert tab.ladder()[0] > 4
     tab.press("named")
     tab.until(lambda: tab.headline().startswith("Explained: ") and tab.over_floor() < 2 and len(tab.ladder()) == 2, 60)
     tab.until(lambda: tab.fact("worst place").startswith("nowhere"), 5, "the tiles are stale")

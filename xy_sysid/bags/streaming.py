@@ -6,7 +6,6 @@ import itertools
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
@@ -15,11 +14,10 @@ from xy_sysid.bags.reading import Bag
 from xy_sysid.bags.stride import Batch, Indices, Reader, Stretch, doubles, stamps
 from xy_sysid.errors import BadInput
 from xy_sysid.jit import compiled
-from xy_sysid.samples.block import Block, FloatArray, unpack
+from xy_sysid.samples.block import Block, FloatArray, StreamName, unpack
 from xy_sysid.samples.joint_states import JointCounter, joints_of
 from xy_sysid.units import Units
 
-StreamName = Literal["voltage", "position", "reference"]
 VOLTAGE, POSITION, REFERENCE = "/xy/voltage", "/xy/position", "/xy/reference"
 PIECE = 2000  # samples; the rings that pair them hold sixteen times as many
 AFTER_ODD = 2  # messages after one whose counter went back that come one by one, until the pairer has decided what that meant

@@ -68,7 +68,8 @@ def replay(
         joints, lag = tuple(joint or given(settings.joints)), effort_lag or settings.effort_lag
         wanted = Topics(effort_as_voltage=effort or settings.effort_as_voltage, joints=joints, effort_lag=lag, **names)
         heard = stream_blocks(bag, wanted, notes=notes, about=units.append)
-        blocks = (item for item in heard if item[0] in QUANTITIES)
+        wanted_streams = QUANTITIES if settings.response == "h1" else (*QUANTITIES, "reference")
+        blocks = (item for item in heard if item[0] in wanted_streams)
         kind, first = next(blocks, (None, None))
         if kind is None or first is None:
             raise BadRecording(bag, "holds no samples", "Give a bag with voltage and position.")

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from xy_sysid.bags.reading import Bag
-from xy_sysid.bags.streaming import StreamName, Topics, choose, pieces, units
+from xy_sysid.bags.streaming import Topics, choose, pieces, units
 from xy_sysid.errors import BadInput
 from xy_sysid.imports.given import in_units
 from xy_sysid.imports.paired_streams import LATE, Stream, cut, gather, hollow, is_jitter, pair, steady
 from xy_sysid.imports.reading import Reading
-from xy_sysid.samples.block import Block
+from xy_sysid.samples.block import Block, StreamName
 from xy_sysid.samples.recording import Recording
 
 WHOLE = 1 << 40  # samples; blocks as long as they come

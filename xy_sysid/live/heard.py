@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from xy_sysid.live.messages import ERROR, OK, STALE, WARN
-from xy_sysid.samples.pairing import Quantity
+from xy_sysid.samples.block import StreamName
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,14 +18,16 @@ class Heard:
     refused:   why the newest refused message was refused, empty if none was; refusals: how many were since the start
     stamps:    why stamped samples cannot be counted, empty if they can
     sentences: what the pairing says, by reason
+    streams:   that are listened to
     """
 
-    silent: tuple[Quantity, ...]
+    silent: tuple[StreamName, ...]
     paired: int
     refused: str
     refusals: int
     stamps: str
     sentences: Mapping[str, str]
+    streams: tuple[StreamName, ...] = ("voltage", "position")
 
 
 def verdict(heard: Heard, well: str) -> tuple[int, str]:

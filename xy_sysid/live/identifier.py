@@ -7,19 +7,23 @@ sample counter, and a fit falls due after a set number of seconds of data, never
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from xy_sysid.errors import BadInput
+from xy_sysid.response.closed_loop import LoopTransformer, RunningLoop, joint_input_output
 from xy_sysid.response.frf import FrequencyResponse
 from xy_sysid.response.h1 import H1Options, frequency_response
 from xy_sysid.response.spectra import RunningSpectra, State, Transformer
 from xy_sysid.response.window_check import window_fault
 from xy_sysid.response.windows import Window, Windower, WindowShape
-from xy_sysid.samples.block import Block, Samples
-from xy_sysid.samples.pairing import RATE_TOLERANCE, Gap, Pairer, Quantity
+from xy_sysid.samples.block import Block, Samples, StreamName
+from xy_sysid.samples.pairing import QUANTITIES, RATE_TOLERANCE, Gap, Pairer
 from xy_sysid.samples.rate import StampLine
+from xy_sysid.samples.reference import ReferenceHold
 from xy_sysid.settings import IdentifierSettings
 from xy_sysid.units import USUAL, Units
 
@@ -64,14 +68,12 @@ class Identifier:
     def __init__(self, settings: IdentifierSettings, axes: tuple[str, ...], units: Units = USUAL) -> None:
         if not axes:
             raise BadInput("axes", "empty", "one name or more", "Name the axes, for example x and y.")
-        if settings.response != "h1":
-            act = "Record with the reference, and use it offline: xy-sysid fit REC --set response=joint_input_output."
-            raise BadInput("response", settings.response, "h1 while data come in", act)
         self.settings = settings
         self.axes = axes
         self._units = units
         self._shape = WindowShape.of(settings.window, settings.length, settings.overlap)
-        self._transform = Transformer(self._shape, settings.differenced)
+        self._loop = settings.response == "joint_input_output"
+        self._transform: Callable[[Window], list[Any]] = (LoopTransformer if self._loop else Transformer)(self._shape, settings.differenced)
         self.reset()
 
     def reset(self) -> None:
@@ -79,9 +81,10 @@ class Identifier:
         self._pairer: Pairer | None = None
         self._rate: float | None = None
         self._line = StampLine()
-        self._windower = Windower(self._shape, len(self.axes), int(self.settings.differenced))
-        self._main: dict[str, RunningSpectra] = {}
-        self._recent: dict[str, RunningSpectra] = {}
+        self._hold = ReferenceHold(self.axes, self.settings.reorder) if self._loop else None
+        self._windower = Windower(self._shape, len(self.axes), int(self.settings.differenced), self._loop)
+        self._main: dict[str, RunningSpectra | RunningLoop] = {}
+        self._recent: dict[str, RunningSpectra | RunningLoop] = {}
         self._used: Counter[str] = Counter()
         self._dropped: dict[str, Counter[str]] = {axis: Counter() for axis in self.axes}
         self._counts: Counter[str] = Counter()
@@ -107,12 +110,13 @@ class Identifier:
     @property
     def faults(self) -> dict[str, int]:
         """What was wrong with the streams, counted by reason."""
-        return dict(self._counts + (self._pairer.counts if self._pairer else Counter()))
+        sources = (self._pairer.counts if self._pairer else Counter[str](), self._hold.counts if self._hold else Counter[str]())
+        return dict(sum(sources, self._counts.copy()))
 
     @property
     def sentences(self) -> dict[str, str]:
         """The newest sentence for each reason."""
-        return (self._pairer.said if self._pairer else {}) | self._said
+        return (self._hold.said if self._hold else {}) | (self._pairer.said if self._pairer else {}) | self._said
 
     @property
     def windows(self) -> dict[str, int]:
@@ -125,18 +129,26 @@ class Identifier:
         return {axis: dict(self._dropped[axis]) for axis in self.axes}
 
     @property
-    def waiting(self) -> dict[Quantity, int]:
+    def waiting(self) -> dict[StreamName, int]:
         """Newest counter of each stream; -1 is silence."""
-        return self._pairer.waiting if self._pairer else {"voltage": -1, "position": -1}
+        paired = self._pairer.waiting if self._pairer else dict.fromkeys(QUANTITIES, -1)
+        streams: dict[StreamName, int] = {kind: paired[kind] for kind in QUANTITIES}
+        return streams | ({"reference": self._hold.newest} if self._hold else {})
 
-    def feed(self, kind: Quantity, block: Block) -> list[FitRequest]:
-        """Take one block of one stream; the fits that fall due, in order."""
-        if self._pairer is None:
-            self._pairer = Pairer(self.axes, self.settings.reorder)
+    def feed(self, kind: StreamName, block: Block) -> list[FitRequest]:
+        """Take one block of one stream; the fits that fall due, in order. The reference counts in closed loop alone."""
         requests: list[FitRequest] = []
-        for event in self._pairer.feed(kind, block):
+        for event in self._events(kind, block):
             requests += self._gap(event) if isinstance(event, Gap) else self.take(event)
         return requests
+
+    def _events(self, kind: StreamName, block: Block) -> list[Samples | Gap]:
+        if kind == "reference":
+            return self._hold.hear(block) if self._hold else []
+        if self._pairer is None:
+            self._pairer = Pairer(self.axes, self.settings.reorder)
+        paired = self._pairer.feed(kind, block)
+        return paired if self._hold is None else [event for one in paired for event in self._hold.take(one)]
 
     def take(self, samples: Samples, sampling_rate: float | None = None) -> list[FitRequest]:
         """Take samples that are paired already; windows of samples without a known rate are counted and dropped."""
@@ -199,8 +211,11 @@ class Identifier:
         memory = self.settings.memory
         forget = float(np.exp(-self._shape.hop / rate / memory)) if memory > 0 else 1.0
         for axis in self.axes:
-            self._main[axis] = RunningSpectra(self._shape, forget, self.settings.sliding)
-            self._recent[axis] = RunningSpectra(self._shape, sliding=self.settings.alarm_windows)
+            self._main[axis] = self._running(forget, self.settings.sliding)
+            self._recent[axis] = self._running(1.0, self.settings.alarm_windows)
+
+    def _running(self, forget: float, sliding: int) -> Any:
+        return (RunningLoop if self._loop else RunningSpectra)(self._shape, forget, sliding)
 
     def request(self, seq: int, rate: float) -> FitRequest:
         """What there is to fit now."""
@@ -217,20 +232,18 @@ class Identifier:
             )
         return FitRequest(number=self._number, seq=seq, seconds=self._samples / rate, sampling_rate=rate, axes=axes, faults=self.faults)
 
-    def _frf(self, running: RunningSpectra, rate: float) -> FrequencyResponse:
+    def _frf(self, running: RunningSpectra | RunningLoop, rate: float) -> FrequencyResponse:
         settings = self.settings
-        return frequency_response(
-            running.get(),
-            self._shape,
-            rate,
-            H1Options(
-                differenced=settings.differenced,
-                band=(settings.band_low, settings.band_high),
-                min_coherence=settings.min_coherence,
-                units=self._units,
-                rate_error=self._line.error,
-            ),
+        options = H1Options(
+            differenced=settings.differenced,
+            band=(settings.band_low, settings.band_high),
+            min_coherence=settings.min_coherence,
+            units=self._units,
+            rate_error=self._line.error,
         )
+        if isinstance(running, RunningLoop):
+            return joint_input_output(running.get(), self._shape, rate, options)
+        return frequency_response(running.get(), self._shape, rate, options)
 
     def state(self) -> State:
         """Everything learnt, as named arrays, to go on after a restart."""
@@ -238,7 +251,7 @@ class Identifier:
         state: State = {
             "version": np.array([STATE_VERSION], dtype=np.float64),
             "axes": np.array(self.axes),
-            "key": np.array([settings.window, str(settings.length), str(settings.overlap), str(settings.differenced)]),
+            "key": np.array([settings.window, str(settings.length), str(settings.overlap), str(settings.differenced), *self._method]),
             "numbers": np.array([self._rate or 0.0, self._samples, self._number], dtype=np.float64),
             "clock": np.array([self._line.rate or 0.0, self._line.error], dtype=np.float64),
             "used": np.array([self._used[axis] for axis in self.axes], dtype=np.float64),
@@ -247,6 +260,11 @@ class Identifier:
             for axis, running in group.items():
                 state.update({f"{name}/{axis}/{key}": value for key, value in running.state().items()})
         return state
+
+    @property
+    def _method(self) -> tuple[str, ...]:
+        """What states of output over input, the first method, do not name."""
+        return (self.settings.response,) if self._loop else ()
 
     def restore(self, state: State) -> None:
         """Go on from a saved state; raises BadInput if it was made with other axes or windows."""

@@ -6,13 +6,12 @@ from collections.abc import Iterable, Iterator
 
 from xy_sysid.live.fitter import LiveFitter, Update
 from xy_sysid.live.identifier import Identifier
-from xy_sysid.samples.block import Block
-from xy_sysid.samples.pairing import Quantity
+from xy_sysid.samples.block import Block, StreamName
 from xy_sysid.settings import IdentifierSettings
 
 
 def replay(
-    blocks: Iterable[tuple[Quantity, Block]], settings: IdentifierSettings, axes: tuple[str, ...], identifier: Identifier | None = None
+    blocks: Iterable[tuple[StreamName, Block]], settings: IdentifierSettings, axes: tuple[str, ...], identifier: Identifier | None = None
 ) -> Iterator[Update]:
     """Updates in order, lazily; pass an ``identifier`` of your own to read its counters afterwards."""
     identifier = identifier or Identifier(settings, axes)

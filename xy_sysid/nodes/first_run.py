@@ -31,7 +31,8 @@ from xy_sysid.settings import ExcitationSettings, build, knobs
 
 TRIES = 5  # of a push whose messages did not all come
 REST, FORTH = 0.12, 0.15  # s at 0 V before, between and after, and s of each push
-ANSWER = 10.0  # s for an answer of the excitation
+ANSWER = 10.0  # s for an answer of the excitation,
+ASKED = 3  # times, as long as a node is there
 APPEARS = 60.0  # s until the excitation is there
 NODE = "excitation"
 
@@ -158,6 +159,17 @@ class Conductor:
             self._executor.spin_once(timeout_sec=0.01)
 
     def _call(self, kind: Any, service: str, request: Any) -> Any:
+        """The answer; asked again if none came, as discovery loses answers while it is half done. A change of state is asked for once."""
+        for _ in range(1 if kind is ChangeState else ASKED):
+            answer = self._ask(kind, service, request)
+            if answer is not None or self._is_over():
+                break
+        if answer is None:
+            raise BadInput("excitation", f"no answer to {service}", "a node excitation in the run file that lives", "Look at its lines above.")
+        return answer
+
+    def _ask(self, kind: Any, service: str, request: Any) -> Any:
+        """The answer, or None if it did not come in time."""
         client = self._node.create_client(kind, f"{NODE}/{service}")
         until = time.monotonic() + APPEARS
         while not client.service_is_ready() and time.monotonic() < until and not self._is_over():
@@ -168,8 +180,6 @@ class Conductor:
             self._executor.spin_once(timeout_sec=0.01)
         answer = future.result() if future.done() else None
         self._node.destroy_client(client)
-        if answer is None:
-            raise BadInput("excitation", f"no answer to {service}", "a node excitation in the run file that lives", "Look at its lines above.")
         return answer
 
     def _settings(self) -> ExcitationSettings:

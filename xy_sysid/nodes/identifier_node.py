@@ -24,15 +24,14 @@ from xy_sysid.nodes.convert import array_to_ros, status_to_ros
 from xy_sysid.nodes.diagnostics import Diagnostics
 from xy_sysid.nodes.streams import AXES, Streams, answered, declare_axes
 from xy_sysid.processes.fit_thread import FitWorker
-from xy_sysid.samples.block import Block
-from xy_sysid.samples.pairing import Quantity
+from xy_sysid.samples.block import Block, StreamName
 from xy_sysid.settings import IdentifierSettings
 
 PUBLISH_PERIOD = 0.05  # s between two looks for finished fits
 HEARTBEAT = 1.0  # s between two statuses of the streams
 # Changing one of these starts the spectra anew; the topics' names and types are fixed when the node starts.
 SHAPES_SPECTRA = ("window", "length", "overlap", "differenced", "memory", "sliding", "alarm_windows", "reorder")
-FIXED = ("source", "effort_as_voltage", "joints", "joint_topic", "effort_lag", "input_unit", "output_unit", "state_file", "save_every")
+FIXED = ("response", "source", "effort_as_voltage", "joints", "joint_topic", "effort_lag", "input_unit", "output_unit", "state_file", "save_every")
 
 
 class IdentifierNode(WalledNode):
@@ -66,7 +65,7 @@ class IdentifierNode(WalledNode):
 
     # data
 
-    def _feed(self, kind: Quantity, block: Block) -> None:
+    def _feed(self, kind: StreamName, block: Block) -> None:
         for request in self._identifier.feed(kind, block):
             self._worker.ask(request)
 
@@ -90,7 +89,7 @@ class IdentifierNode(WalledNode):
     def _beat(self) -> None:
         """What is heard of the streams, once a second, whether or not there is anything to fit."""
         heard = self._streams.heard(self._identifier.samples, self._identifier.sentences)
-        level, text = verdict(heard, "voltage and position are heard")
+        level, text = verdict(heard, f"{', '.join(heard.streams[:-1])} and {heard.streams[-1]} are heard")
         if self.wall.told:
             level, text = max(level, WARN), f"{text}; {self.wall.told}"
         if self._worker.skipped:

@@ -16,9 +16,9 @@ from xy_sysid.live.heard import Heard
 from xy_sysid.live.messages import topic_of
 from xy_sysid.nodes.common import DATA_QOS, declare_fixed, from_message, overrides
 from xy_sysid.nodes.hearing import Ear
-from xy_sysid.samples.block import Block
+from xy_sysid.samples.block import Block, StreamName
 from xy_sysid.samples.joint_states import JointCounter, joints_of
-from xy_sysid.samples.pairing import QUANTITIES, Quantity
+from xy_sysid.samples.pairing import QUANTITIES
 from xy_sysid.settings import DiagnoserSettings, IdentifierSettings, given
 from xy_sysid.units import USUAL
 
@@ -48,9 +48,9 @@ class Streams:
     """
 
     def __init__(
-        self, node: Node, axes: tuple[str, ...], settings: IdentifierSettings | DiagnoserSettings, feed: Callable[[Quantity, Block], None]
+        self, node: Node, axes: tuple[str, ...], settings: IdentifierSettings | DiagnoserSettings, feed: Callable[[Any, Block], None]
     ) -> None:
-        """settings: source, effort_as_voltage, joints; feed: gets every block. Raises BadInput for joints that name no axis."""
+        """settings: source, effort_as_voltage, joints; feed: gets every block and its stream. Raises BadInput for joints that name no axis."""
         source, effort = settings.source, settings.effort_as_voltage
         self._lag = settings.effort_lag
         self._names = tuple(joints_of(axes, given(settings.joints)).values())
@@ -60,7 +60,9 @@ class Streams:
         self.refused, self.refusals = "", 0
         self._node, self._axes, self._effort, self._give = node, axes, effort, feed
         self._joints = JointCounter(axes, with_voltage=not effort)
-        self._heard = dict.fromkeys(QUANTITIES, 0)
+        closed = isinstance(settings, IdentifierSettings) and settings.response == "joint_input_output"
+        self._streams: tuple[StreamName, ...] = (*QUANTITIES, "reference") if closed else QUANTITIES
+        self._heard = dict.fromkeys(self._streams, 0)
         self._before = dict(self._heard)
         self._paired = 0  # samples, at the last look
         self._by_stamp = source == "joint_state"
@@ -70,13 +72,16 @@ class Streams:
             Ear(node, Float64MultiArray, "position", self._on_position, DATA_QOS)
         if source == "blocks" or not effort:
             Ear(node, Float64MultiArray, "voltage", self._on_voltage, DATA_QOS)
+        if closed:
+            Ear(node, Float64MultiArray, "reference", self._on_reference, DATA_QOS)
 
     def heard(self, samples: int, sentences: Mapping[str, str]) -> Heard:
         """What came since the last call; samples: paired since the start; sentences: what the pairing says, by reason."""
-        silent = tuple(kind for kind in QUANTITIES if self._heard[kind] == self._before[kind])
+        silent = tuple(kind for kind in self._streams if self._heard[kind] == self._before[kind])
         paired, self._paired = samples - self._paired, samples
         self._before = dict(self._heard)
         return Heard(
+            streams=self._streams,
             silent=silent,
             paired=max(paired, 0),
             refused=self.refused,
@@ -91,7 +96,10 @@ class Streams:
     def _on_position(self, message: Float64MultiArray) -> None:
         self._on_block("position", message)
 
-    def _on_block(self, kind: Quantity, message: Float64MultiArray) -> None:
+    def _on_reference(self, message: Float64MultiArray) -> None:
+        self._on_block("reference", message)
+
+    def _on_block(self, kind: StreamName, message: Float64MultiArray) -> None:
         self._heard[kind] += 1
         try:
             block = from_message(message)

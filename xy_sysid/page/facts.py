@@ -156,6 +156,7 @@ REASONS = {
     "time_jump": "time jumped",
     "restart": "source restarted",
     "overrun": "came too fast",
+    "no_reference": "without reference",
     "frozen": "encoder frozen",
     "leap": "encoder leapt",
 }

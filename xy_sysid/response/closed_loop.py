@@ -22,8 +22,8 @@ import numpy as np
 from xy_sysid.response.batch_spectra import batch_spectra
 from xy_sysid.response.frf import FrequencyResponse
 from xy_sysid.response.h1 import NOISE_SMOOTHING, H1Options, divisor, frequency_response, smoothed
-from xy_sysid.response.spectra import Spectra
-from xy_sysid.response.windows import WindowShape
+from xy_sysid.response.spectra import RunningSpectra, Spectra, State, Transformer, WindowSpectrum, of_pair
+from xy_sysid.response.windows import Window, WindowShape
 from xy_sysid.samples.block import FloatArray
 
 SURE = 0.2  # relative error of reference -> input up to which a quotient by it has the spread that is told, and no bias to speak of
@@ -48,6 +48,59 @@ def loop_spectra(runs: list[tuple[int, FloatArray, FloatArray, FloatArray]], sha
         input=batch_spectra([(seq, r[cut], u[cut]) for seq, r, u, _ in runs], shape, False),
         between=batch_spectra([(seq, u, y) for seq, _, u, y in runs], shape, differenced),
     )
+
+
+@dataclass(frozen=True, slots=True)
+class LoopWindow:
+    """Spectra of one axis in one window, of the same three pairs."""
+
+    output: WindowSpectrum
+    input: WindowSpectrum
+    between: WindowSpectrum
+
+
+class LoopTransformer:
+    """Turns windows with a reference into the spectra of the three pairs."""
+
+    def __init__(self, shape: WindowShape, differenced: bool) -> None:
+        self._differenced = differenced
+        self._lines = Transformer(shape, differenced).lines
+
+    def __call__(self, window: Window) -> list[LoopWindow]:
+        """One for each axis of the window."""
+        output = np.diff(window.position, axis=0) if self._differenced else window.position
+        signals = zip(*(self._lines(values) for values in (window.reference, window.voltage, output)), strict=True)
+        return [LoopWindow(of_pair(window.index, r, y), of_pair(window.index, r, u), of_pair(window.index, u, y)) for r, u, y in signals]
+
+
+class RunningLoop:
+    """update(window) and get(), as ``RunningSpectra``, of the three pairs."""
+
+    def __init__(self, shape: WindowShape, forget: float = 1.0, sliding: int = 0) -> None:
+        """See ``RunningSpectra``."""
+        self._output, self._input, self._between = (RunningSpectra(shape, forget, sliding) for _ in range(3))
+
+    def update(self, window: LoopWindow) -> None:
+        """Take one more window."""
+        self._output.update(window.output)
+        self._input.update(window.input)
+        self._between.update(window.between)
+
+    def get(self) -> LoopSpectra:
+        """The spectra so far."""
+        return LoopSpectra(output=self._output.get(), input=self._input.get(), between=self._between.get())
+
+    def state(self) -> State:
+        """Everything needed to go on later, as arrays."""
+        return {f"{name}/{key}": value for name, one in self._parts() for key, value in one.state().items()}
+
+    def restore(self, state: State) -> None:
+        """Go on from a state of the same shape."""
+        for name, one in self._parts():
+            one.restore({key.removeprefix(f"{name}/"): value for key, value in state.items() if key.startswith(f"{name}/")})
+
+    def _parts(self) -> tuple[tuple[str, RunningSpectra], ...]:
+        return (("output", self._output), ("input", self._input), ("between", self._between))
 
 
 def joint_input_output(spectra: LoopSpectra, shape: WindowShape, sampling_rate: float, options: H1Options) -> FrequencyResponse:

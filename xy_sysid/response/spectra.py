@@ -94,11 +94,16 @@ class Transformer:
     def __call__(self, window: Window) -> list[WindowSpectrum]:
         """One spectrum for each axis of the window."""
         output = np.diff(window.position, axis=0) if self.differenced else window.position
-        inputs, outputs = self._transform(window.voltage), self._transform(output)
-        return [WindowSpectrum(window.index, _power(x), _power(y), y * x.conj()) for x, y in zip(inputs, outputs, strict=True)]
+        return [of_pair(window.index, x, y) for x, y in zip(self.lines(window.voltage), self.lines(output), strict=True)]
 
-    def _transform(self, values: FloatArray) -> ComplexArray:
+    def lines(self, values: FloatArray) -> ComplexArray:
+        """(axes, lines) of (length, axes) samples of one signal."""
         return np.asarray(fft.rfft(_tapered(values, self._taper)), dtype=np.complex128)
+
+
+def of_pair(index: int, x: ComplexArray, y: ComplexArray) -> WindowSpectrum:
+    """Spectra of a window from the lines of both signals, (lines,) each."""
+    return WindowSpectrum(index, _power(x), _power(y), y * x.conj())
 
 
 def _power(z: ComplexArray) -> FloatArray:

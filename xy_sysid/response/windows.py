@@ -6,7 +6,7 @@ any chunking, and an observer that starts late sees the same windows as one that
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
@@ -92,21 +92,24 @@ class Window:
     index:    its place on the grid; it starts at sample index * hop
     voltage:  (length, axes)
     position: (length + extra, axes), extra = 1 where the position is to be differenced
+    reference: (length, axes) where the windows hold one, else (length, 0)
     """
 
     index: int
     voltage: FloatArray
     position: FloatArray
+    reference: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
 
 
 class Windower:
     """Feeds on runs of samples, gives windows; a step in the counter ends a run and what it had not filled."""
 
-    def __init__(self, shape: WindowShape, axes: int, extra: int) -> None:
+    def __init__(self, shape: WindowShape, axes: int, extra: int, reference: bool = False) -> None:
+        """extra: samples of position that a window needs more; reference: whether samples come with one, and windows hold it."""
         self.shape = shape
         self._extra = extra
         self._axes = axes
-        self._store = np.empty((0, 2 * axes))
+        self._store = np.empty((0, (3 if reference else 2) * axes))
         self._start = 0
         self._filled = 0
 
@@ -124,8 +127,9 @@ class Windower:
         index = -(-self._start // self.shape.hop)
         while index * self.shape.hop + need <= self._next:
             a = index * self.shape.hop - self._start
-            rows = self._store[a : a + need]
-            found.append(Window(index, rows[: self.shape.length, : self._axes].copy(), rows[:, self._axes :].copy()))
+            rows, inside = self._store[a : a + need], slice(self.shape.length)
+            u, y, r = slice(self._axes), slice(self._axes, 2 * self._axes), slice(2 * self._axes, None)
+            found.append(Window(index, rows[inside, u].copy(), rows[:, y].copy(), rows[inside, r].copy()))
             index += 1
         self._drop_before(index * self.shape.hop)
         return found
@@ -141,11 +145,13 @@ class Windower:
     def _append(self, samples: Samples) -> None:
         end = self._filled + len(samples)
         if end > self._store.shape[0]:
-            grown = np.empty((max(end, 2 * self._store.shape[0], 4 * self.shape.length), 2 * self._axes))
+            grown = np.empty((max(end, 2 * self._store.shape[0], 4 * self.shape.length), self._store.shape[1]))
             grown[: self._filled] = self._store[: self._filled]
             self._store = grown
         self._store[self._filled : end, : self._axes] = samples.voltage
-        self._store[self._filled : end, self._axes :] = samples.position
+        self._store[self._filled : end, self._axes : 2 * self._axes] = samples.position
+        if self._store.shape[1] > 2 * self._axes:
+            self._store[self._filled : end, 2 * self._axes :] = samples.reference
         self._filled = end
 
     def _drop_before(self, seq: int) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from xy_sysid.errors import BadInput
 
 FloatArray = NDArray[np.float64]
 SEQ, TIME = "seq", "time"
+StreamName = Literal["voltage", "position", "reference"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,15 +52,23 @@ class Samples:
     voltage:  (n, axes)
     position: (n, axes)
     time:     (n,) stamps of the position, s, where they are known
+    reference: (n, axes) what a controller was told at that time, where it is asked for
     """
 
     seq: int
     voltage: FloatArray
     position: FloatArray
     time: FloatArray | None = None
+    reference: FloatArray | None = None
 
     def __len__(self) -> int:
         return int(self.voltage.shape[0])
+
+    def rows(self, first: int, last: int) -> Samples:
+        """The samples from the ``first`` to before the ``last`` of these."""
+        part = slice(first, last)
+        time, reference = (None if values is None else values[part] for values in (self.time, self.reference))
+        return Samples(seq=self.seq + first, voltage=self.voltage[part], position=self.position[part], time=time, reference=reference)
 
 
 def columns(axes: Sequence[str]) -> str:
