@@ -102,10 +102,13 @@ def test_a_robot_with_a_forward_controller_is_identified_and_its_effect_named(wo
     assert "rad" in gain and "N m" in gain, gain
     delay = float(value(statuses, "axis x", "delay (s)"))
     assert 0.001 < delay < 0.005  # the machine's own is 2.3 ms; friction bends the response
-    for _ in range(24):  # a busy test machine loses samples, and six seconds without a gap are needed
+    for _ in range(24):  # a busy test machine misses cycles: six seconds without a gap are needed, and the watchdog may end the drive
         answer = world.call(Trigger, "/xy/diagnoser/diagnose", Trigger.Request(), 120.0)
-        if "Not enough data" not in answer.message:
+        if "coulomb_friction" in answer.message:
             break
+        if world.state("excitation") == "inactive":
+            assert "inactive: " in robot.output(), robot.output()  # with the reason
+            assert world.transition("excitation", "activate"), robot.output()
         world.spin(5.0)
     assert answer.success and "coulomb_friction" in answer.message, f"{answer.message}\n{robot.output()}"
     robot.send(signal.SIGINT)
@@ -138,8 +141,8 @@ def test_a_servo_under_load_is_identified_in_closed_loop_while_data_come_in(worl
     assert world.until(lambda: bool(value(right, "streams", "newest reference") and value(biased, "streams", "samples paired")), 60.0)
     assert "reference" in next(status.message for status in right if status.name == "streams")
     drive = excitation(world, "position", autostart=True, **{"x.rms": 0.03, "x.slow": 0.0})
-    assert world.until(lambda: int(value(right, "axis x", "windows") or 0) >= 40, 90.0), drive.output()
-    assert world.until(lambda: int(value(biased, "axis x", "windows") or 0) >= 40, 30.0)
+    assert world.until(lambda: int(value(right, "axis x", "windows") or 0) >= 30, 90.0), drive.output()
+    assert world.until(lambda: int(value(biased, "axis x", "windows") or 0) >= 30, 30.0)
     low, high = (float(value(right, "axis x", key)) for key in ("gain 95 % low", "gain 95 % high"))
     assert low <= 3.0 <= high and high - low < 3.0
     assert abs(float(value(biased, "axis x", "gain (rad/s/(N m))")) / 3.0 - 1.0) > 0.1
