@@ -100,7 +100,7 @@ class Tab:
         """Let the browser work until it is done; it may take PATIENCE times the seconds."""
         end = time.monotonic() + PATIENCE * seconds
         while not done():
-            assert time.monotonic() < end, f"{why or 'waited in vain'}: {self.verdict()!r}; messages: {self.notices()}"
+            assert time.monotonic() < end, f"{why or 'waited in vain'}: {self.headline()!r}, {self.verdict()!r}; messages: {self.notices()}"
             self.page.wait_for_timeout(50)
 
     def verdict(self) -> str:

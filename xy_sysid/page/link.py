@@ -11,7 +11,7 @@ import queue
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import rclpy
@@ -35,6 +35,7 @@ from xy_sysid.page.topics_state import TopicsState
 WATCHERS = ("page", "page_stop", "demo")  # nodes that only look on
 LOOK = 0.5  # s between two looks at the graph and the lifecycle
 PATIENCE = 5.0  # s for an answer of a node
+AGAIN = 2  # times that parameters are asked for or set once more without an answer
 TABLES = ("frf", "transfer_function", "comparison")
 STOP_AGAIN = 0.5  # s after which STOP is sent again while nobody has confirmed it
 STOP_LOOK = 0.05  # s between two looks whether the excitation has said that it stands
@@ -48,12 +49,32 @@ Told = Callable[[bool, str], None]  # whether an order was done, and the node's 
 
 @dataclass(frozen=True, slots=True)
 class _Question:
-    """A call of a service: its type and name, what is asked, and how the answer is read: whether it was done, and the node's sentence."""
+    """A call of a service: its type and name, what is asked, and how the answer is read: whether it was done, and the node's sentence.
+
+    again: how often it is asked once more if no answer comes, as a computer under load loses some; of what may be done twice only
+    """
 
     kind: Any
     service: str
     request: Any
     read: Callable[[Any], tuple[bool, str]]
+    again: int = 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Asked:
+    """A question that was asked, for how many s and until when an answer is waited for, and the future that brings it."""
+
+    question: _Question
+    told: Told
+    patience: float
+    until: float
+    future: Any
+
+    @property
+    def node(self) -> str:
+        """Whom."""
+        return self.question.service.partition("/")[0]
 
 
 class Link:
@@ -111,7 +132,7 @@ class Link:
         def order(line: _Line) -> None:
             kind: Any = Parameter
             request = SetParameters.Request(parameters=[kind(name, value=value).to_parameter_msg() for name, value in values.items()])
-            line.call(_Question(SetParameters, f"{node}/set_parameters", request, _all_set), told)
+            line.call(_Question(kind=SetParameters, service=f"{node}/set_parameters", request=request, read=_all_set, again=AGAIN), told)
 
         self._orders.put(order)
 
@@ -122,7 +143,8 @@ class Link:
             give({name: parameter_value_to_python(value) for name, value in zip(names, answer.values, strict=False)})
             return True, ""
 
-        question = _Question(GetParameters, f"{node}/get_parameters", GetParameters.Request(names=names), read)
+        request = GetParameters.Request(names=names)
+        question = _Question(kind=GetParameters, service=f"{node}/get_parameters", request=request, read=read, again=AGAIN)
         self._orders.put(lambda line: line.call(question, told))
 
     # the watch
@@ -195,7 +217,7 @@ class _Line:
         self._executor.add_node(self._node)
         self._clients: dict[str, Any] = {}
         self._topics: set[str] = set()
-        self._waiting: list[tuple[float, Any, str, Told]] = []
+        self._waiting: list[_Asked] = []
         around = self.wall.around
         self._node.create_subscription(DiagnosticArray, "metrics", around(self._on_statuses), 100)
         self._node.create_subscription(DiagnosticArray, "diagnosis", around(self._on_diagnosis), LATCHED_QOS)
@@ -218,8 +240,9 @@ class _Line:
     def abandon(self) -> None:
         """Give it up; whoever waits for an answer is told."""
         self._ended.set()
-        for _, _, service, told in self._waiting:
-            told(False, f"{service.partition('/')[0]} could not be asked: the link to the nodes was lost")
+        for asked in self._waiting:
+            if not self._once_more(asked):
+                asked.told(False, f"{asked.node} could not be asked: the link to the nodes was lost")
         self._waiting.clear()
 
     def call(self, question: _Question, told: Told, patience: float = PATIENCE, since: float = 0.0) -> None:
@@ -232,12 +255,12 @@ class _Line:
                 _later(0.1, lambda: self._orders.put(lambda line: line.call(question, told, patience, since)))
             return
         future = client.call_async(question.request)
-        entry = (time.monotonic() + patience, future, question.service, told)
-        self._waiting.append(entry)
+        asked = _Asked(question=question, told=told, patience=patience, until=time.monotonic() + patience, future=future)
+        self._waiting.append(asked)
 
         def done(answered: Any) -> None:
-            if entry in self._waiting:
-                self._waiting.remove(entry)
+            if asked in self._waiting:
+                self._waiting.remove(asked)
                 told(*question.read(answered.result()))
 
         future.add_done_callback(self.wall.around(done))
@@ -287,10 +310,19 @@ class _Line:
             with self.wall:
                 self._orders.get()(self)
         now = time.monotonic()
-        for entry in [entry for entry in self._waiting if entry[0] < now]:
-            self._waiting.remove(entry)
-            entry[1].cancel()
-            entry[3](False, f"{entry[2].partition('/')[0]} did not answer in time")
+        for asked in [asked for asked in self._waiting if asked.until < now]:
+            self._waiting.remove(asked)
+            asked.future.cancel()
+            if not self._once_more(asked):
+                asked.told(False, f"{asked.node} did not answer in time")
+
+    def _once_more(self, asked: _Asked) -> bool:
+        """Ask again if that may be done, whichever line there is then."""
+        question = replace(asked.question, again=asked.question.again - 1)
+        if question.again < 0:
+            return False
+        self._orders.put(lambda line: line.call(question, asked.told, asked.patience))
+        return True
 
     def _client(self, kind: Any, service: str) -> Any:
         if service not in self._clients:

@@ -17,6 +17,8 @@ from xy_sysid.page.topics_state import TopicsState
 NODE = "diagnoser"
 LONG = 600.0  # s that a diagnosis may take
 SETTLES = 3.0  # s after an answer in which the diagnoser begins, or has said what it has done
+LOST = 10.0  # s without an answer and without work of the diagnoser after which it is asked again,
+AGAIN = 2  # times
 ENOUGH = 10.0  # s of data with which the rigid model is fitted unasked, so that the first picture shows where it fails
 SERVICES = {"diagnose": "diagnose", "next": "add_next", "auto": "auto", "reset": "reset_model"}
 AXIS = re.compile(r"axis (\S+): (.*)")
@@ -32,6 +34,7 @@ class Live:
         self.title, self.heard, self.link, self._say = "live", heard, link, say
         self._job: OrderState | None = None
         self._asked = 0
+        self._again = 0
         self._settled = (math.inf, 0)  # when the last order was answered, and the stamp then
         self._enough = ENOUGH
         self._numbers = itertools.count(1)
@@ -58,6 +61,9 @@ class Live:
         at, stamp = self._settled
         if self._job is not None and (time.monotonic() - at > SETTLES or (self._news() != stamp and math.isfinite(at))):
             self._job = None
+        if self._job is not None and self._again and time.monotonic() - self._job.begun > LOST * (AGAIN + 1 - self._again):
+            self._again -= 1  # idle, and no answer: a question that was lost, as on a computer under load
+            self.link.trigger(f"{NODE}/{SERVICES[self._job.order.act]}", self._told, LONG)
         return self._job
 
     def begin(self) -> None:
@@ -98,6 +104,7 @@ class Live:
             self.link.trigger(f"{NODE}/{SERVICES[act]}", self._told, LONG)
         else:
             raise BadInput("order", act, ", ".join(("add", "remove", *SERVICES)), "Record a bag and open it for that.")
+        self._again = AGAIN if act in SERVICES else 0
         self._job, self._settled = OrderState(Order(next(self._numbers), act, axis, argument), time.monotonic(), None, True), (math.inf, 0)
         self._asked += 1
 

@@ -1,0 +1,85 @@
+"""Orders of the page that get lost on the way, as on a computer under load: asked again, never twice what must be done once."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from helpers.ros_tools import World, needs_ros, world_in
+
+from xy_sysid.page.live import Live
+from xy_sysid.page.topics_state import TopicsState
+
+
+@pytest.fixture
+def world(tmp_path: Path) -> Iterator[World]:
+    with world_in(tmp_path) as made:
+        yield made
+
+
+class Deaf:
+    """A link whose orders get lost."""
+
+    def __init__(self) -> None:
+        self.asked: list[str] = []
+
+    def trigger(self, service: str, told: Any, patience: float = 0.0) -> None:
+        self.asked.append(service)
+        self.told = told
+
+
+def test_a_diagnosis_that_nobody_heard_of_is_asked_for_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Idle for ten seconds after Diagnose: asked once more, twice at most; never while the diagnoser works, and not after its answer."""
+    now = [1000.0]
+    monkeypatch.setattr("xy_sysid.page.live.time.monotonic", lambda: now[0])
+    heard, deaf = TopicsState(), Deaf()
+    heard.graph({"diagnoser"}, now[0])
+    link: Any = deaf
+    page = Live(heard, link, lambda words, done: None)
+    page.ask("diagnose", "x")
+    page.job("x")
+    assert deaf.asked == ["diagnoser/diagnose"]
+    heard.doing("axis x: tries them all", now[0])
+    now[0] += 11.0
+    assert page.job("x") is not None and len(deaf.asked) == 1
+    heard.doing("idle", now[0])
+    for _ in range(9):
+        page.job("x")
+        now[0] += 5.0
+    assert deaf.asked == 3 * ["diagnoser/diagnose"]
+    page.ask("diagnose", "x")
+    deaf.told(True, "axis x: found")
+    now[0] += 100.0
+    assert page.job("x") is None and len(deaf.asked) == 4
+
+
+@needs_ros
+def test_parameters_whose_answer_is_lost_are_set_again(world: World, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Over DDS: a node that is silent for longer than an answer may take is asked again, and the order counts as done."""
+    from rcl_interfaces.msg import SetParametersResult
+    from rcl_interfaces.srv import SetParameters
+
+    from xy_sysid.page.link import PATIENCE, Link
+
+    heard: list[float] = []
+
+    def answer(request: Any, response: Any) -> Any:
+        heard.append(request.parameters[0].value.double_value)
+        if len(heard) == 1:
+            time.sleep(PATIENCE + 0.5)
+        response.results = [SetParametersResult(successful=True)]
+        return response
+
+    world.node.create_service(SetParameters, "/xy/diagnoser/set_parameters", answer)
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(world.domain))
+    link = Link(TopicsState())
+    told: list[tuple[bool, str]] = []
+    try:
+        link.set_parameters("diagnoser", {"tolerance": 0.02}, lambda done, words: told.append((done, words)))
+        assert world.until(lambda: bool(told), 20.0)
+        assert told == [(True, "")] and heard == [0.02, 0.02]
+    finally:
+        link.close()
