@@ -12,6 +12,18 @@ from scipy import signal
 
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import Recording
+from xy_sysid.settings import IdentifierSettings
+
+JOINT = IdentifierSettings(
+    response="joint_input_output",
+    length=1024,
+    band_low=0.5,
+    band_high=50.0,
+    min_coherence=0.1,
+    numerator_order=0,
+    denominator_order=2,
+)
+H1 = JOINT.model_copy(update={"response": "h1"})
 
 
 @dataclass(frozen=True)

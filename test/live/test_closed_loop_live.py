@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.servo import Servo
+from helpers.servo import H1, JOINT, Servo
 from scipy import signal
 
 from xy_sysid.errors import BadInput
@@ -23,17 +23,6 @@ from xy_sysid.settings import IdentifierSettings
 
 SERVO = Servo()
 ROWS = 20_000
-JOINT = IdentifierSettings(
-    response="joint_input_output",
-    length=1024,
-    band_low=0.5,
-    band_high=50.0,
-    min_coherence=0.1,
-    numerator_order=0,
-    denominator_order=2,
-    refit=5.0,
-)
-H1 = JOINT.model_copy(update={"response": "h1"})
 Streams = Iterator[tuple[StreamName, Block]]
 
 

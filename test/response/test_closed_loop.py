@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.cli_tools import cli
-from helpers.servo import Servo, multisine
+from helpers.servo import H1, JOINT, Servo, multisine
 from scipy import signal
 
 from xy_sysid.errors import BadInput
@@ -17,19 +17,8 @@ from xy_sysid.fitting.structure import structure_from
 from xy_sysid.imports import save
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import Recording
-from xy_sysid.settings import IdentifierSettings
 
 SERVO = Servo()
-JOINT = IdentifierSettings(
-    response="joint_input_output",
-    length=1024,
-    band_low=0.5,
-    band_high=50.0,
-    min_coherence=0.1,
-    numerator_order=0,
-    denominator_order=2,
-)
-H1 = JOINT.model_copy(update={"response": "h1"})
 
 
 def noise(rows: int) -> FloatArray:

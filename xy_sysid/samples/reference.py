@@ -64,10 +64,6 @@ class ReferenceHold:
             self._latest = float(event.time[0])  # of its first sample, so that a block as long as that has time for its reference
         return self._decided()
 
-    def reset(self) -> None:
-        """Forget what waits, after a gap of the clock."""
-        self._waiting.clear()
-
     def _decided(self) -> list[Samples | Gap]:
         found: list[Samples | Gap] = []
         newest = float(self._time[-1]) if self._time.size else -np.inf
