@@ -276,15 +276,16 @@ def killed_nodes(count: int, folder: Path) -> Iterator[Found]:
         tab.wait_for_selector("#stop", timeout=60_000)
         here.processes["identifier"].send_signal(signal.SIGKILL)
         begun = time.monotonic()
-        lost = False
+        lost, words = False, ""
         while time.monotonic() - begun < 20.0 and not lost:
             here.monitor.spin(0.2)
-            lost = "lost" in str(tab.locator("[data-part=nodes]").first.text_content())
+            words = str(tab.locator("[data-part=nodes]").first.text_content())
+            lost = "lost" in words or "does not answer" in words
         told = time.monotonic() - begun
         found = here.stop("with a dead identifier")
         good = lost and found.outcome == "zero volts"
-        note = f"the tab says after {told:.0f} s that the identifier is lost"
-        yield Found("zero volts" if good else "not told", found.seconds, note=note if good else f"{note}; {found.note}")
+        note = f"the tab says after {told:.0f} s that the identifier does not answer"
+        yield Found("zero volts" if good else "not told", found.seconds, note=note if good else f"{words!r}; {found.note}")
 
 
 def _needed(work: Callable[[int, Path], Iterator[Found]]) -> Callable[[int, Path], Iterator[Found]]:

@@ -99,6 +99,30 @@ def test_a_body_without_a_length_ends_where_it_becomes_too_large() -> None:
     assert sum(taken) <= LARGEST
 
 
+@pytest.mark.parametrize("kind", ["http", "websocket"])
+def test_who_has_gone_before_anybody_listened_ends_in_silence_but_a_stop_is_obeyed(kind: str) -> None:
+    """The library behind a page's WebSocket raises KeyError of such a line; POST /stop goes through whoever waits for its answer."""
+    reached: list[str] = []
+
+    async def application(scope: Any, receive: Any, send: Any) -> None:
+        reached.append(f"{scope['path']} {(await receive())['type']}")
+
+    async def gone() -> dict[str, Any]:
+        return {"type": f"{kind}.disconnect"}
+
+    async def nowhere(message: Any) -> None:
+        return None
+
+    for path in ("/_nicegui_ws/socket.io/", "/stop"):
+        headers = [(b"host", b"127.0.0.1:8080"), (b"x-requested-with", b"xy_sysid")]
+        asyncio.run(
+            Guard(application, rules("127.0.0.1"))(
+                {"type": kind, "method": "POST", "path": path, "query_string": b"", "headers": headers}, gone, nowhere
+            )
+        )
+    assert reached == [f"/stop {kind}.disconnect"]
+
+
 def test_odd_headers_do_not_break_it() -> None:
     """Broken names and cookies are no names and no cookies."""
     assert name_of("[[[") == "" and cookie_of("=;=\xff;") == "" and name_of("Host:notaport") == "host"

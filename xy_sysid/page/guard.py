@@ -14,6 +14,8 @@ from xy_sysid.page.access import HEADERS, LARGEST, Access, Answer, judge, set_co
 
 PAGE = "<!DOCTYPE html><html lang=en><meta charset=utf-8><title>xy_sysid</title><body style='font-family:sans-serif'><h1>xy_sysid</h1><p>{}</p>"
 NONSENSE = 1003  # close code for data that cannot be understood
+TALK = "/_nicegui_ws/"  # where pages talk with their server
+GONE = ("http.disconnect", "websocket.disconnect")  # who asked has gone before anybody listened: the application cannot bear that
 REFUSED = 4403  # close code of a WebSocket that is not let in
 
 
@@ -31,12 +33,25 @@ class Guard:
         headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]}
         answer = judge(self._access, headers, scope.get("query_string", b"").decode("latin-1"))
         if answer.status == 200:
-            await self._app(scope, (_bounded if scope["type"] == "http" else _understood)(receive), _careful(send))
+            first = await receive()
+            if first["type"] not in GONE or not scope["path"].startswith(TALK):  # a STOP is obeyed, whether or not who sent it is still there
+                heard = _from(first, receive)
+                await self._app(scope, (_bounded if scope["type"] == "http" else _understood)(heard), _careful(send))
         elif scope["type"] == "websocket":
             await receive()
             await send({"type": "websocket.close", "code": REFUSED, "reason": answer.words[:100]})
         else:
             await _answer(answer, send)
+
+
+def _from(first: Message, receive: Receive) -> Receive:
+    """The message that was looked at, and all that follow."""
+    waiting = [first]
+
+    async def receiving() -> Message:
+        return waiting.pop() if waiting else await receive()
+
+    return receiving
 
 
 def _bounded(receive: Receive) -> Receive:
