@@ -123,6 +123,30 @@ def test_who_has_gone_before_anybody_listened_ends_in_silence_but_a_stop_is_obey
     assert reached == [f"/stop {kind}.disconnect"]
 
 
+@pytest.mark.parametrize(("kind", "told"), [("http", ("http.response.start", 400)), ("websocket", ("websocket.close", 1003))])
+def test_a_page_whose_session_has_ended_is_told_so_and_other_errors_are_not_hidden(kind: str, told: tuple[str, int]) -> None:
+    """The library raises KeyError of a session that was closed a moment ago; of our own address nothing is swallowed."""
+    sent: list[Any] = []
+
+    async def application(scope: Any, receive: Any, send: Any) -> None:
+        raise KeyError("Session is disconnected")
+
+    async def receive() -> dict[str, Any]:
+        return {"type": f"{kind}.request" if kind == "http" else "websocket.connect"}
+
+    async def send(message: Any) -> None:
+        sent.append(message)
+
+    def asked(path: str) -> None:
+        scope = {"type": kind, "method": "POST", "path": path, "query_string": b"", "headers": [(b"host", b"127.0.0.1:8080")]}
+        asyncio.run(Guard(application, rules("127.0.0.1"))(scope, receive, send))
+
+    asked("/_nicegui_ws/socket.io/")
+    assert (sent[0]["type"], sent[0].get("status", sent[0].get("code"))) == told
+    with pytest.raises(KeyError):
+        asked("/")
+
+
 def test_odd_headers_do_not_break_it() -> None:
     """Broken names and cookies are no names and no cookies."""
     assert name_of("[[[") == "" and cookie_of("=;=\xff;") == "" and name_of("Host:notaport") == "host"

@@ -36,12 +36,30 @@ class Guard:
             first = await receive()
             if first["type"] not in GONE or not scope["path"].startswith(TALK):  # a STOP is obeyed, whether or not who sent it is still there
                 heard = _from(first, receive)
-                await self._app(scope, (_bounded if scope["type"] == "http" else _understood)(heard), _careful(send))
+                await self._answered(scope, (_bounded if scope["type"] == "http" else _understood)(heard), _careful(send))
         elif scope["type"] == "websocket":
             await receive()
             await send({"type": "websocket.close", "code": REFUSED, "reason": answer.words[:100]})
         else:
             await _answer(answer, send)
+
+    async def _answered(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """What the application says; to a page whose session has ended meanwhile, that it has: it begins another by itself."""
+        told: list[Message] = []
+
+        async def sending(message: Message) -> None:
+            told.append(message)
+            await send(message)
+
+        try:
+            await self._app(scope, receive, sending)
+        except KeyError:
+            if not scope["path"].startswith(TALK):
+                raise
+            if not told and scope["type"] == "websocket":
+                await send({"type": "websocket.close", "code": NONSENSE})
+            elif not told:
+                await _answer(Answer(400, "This session has ended: load the page again."), send)
 
 
 def _from(first: Message, receive: Receive) -> Receive:
