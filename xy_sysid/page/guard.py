@@ -45,6 +45,9 @@ class Guard:
 
     async def _answered(self, scope: Scope, receive: Receive, send: Send) -> None:
         """What the application says; to a page whose session has ended meanwhile, that it has: it begins another by itself."""
+        if not scope["path"].startswith(TALK):
+            await self._app(scope, receive, send)
+            return
         told: list[Message] = []
 
         async def sending(message: Message) -> None:
@@ -53,9 +56,7 @@ class Guard:
 
         try:
             await self._app(scope, receive, sending)
-        except KeyError:
-            if not scope["path"].startswith(TALK):
-                raise
+        except* KeyError:  # alone, or in a group of the tasks between
             if not told and scope["type"] == "websocket":
                 await send({"type": "websocket.close", "code": NONSENSE})
             elif not told:
