@@ -115,7 +115,7 @@ def test_a_robot_with_a_forward_controller_is_identified_and_its_effect_named(wo
 
 
 def test_a_servo_under_load_is_identified_in_closed_loop_while_data_come_in(world: World) -> None:
-    """A position controller that a load disturbs: the identifier with the reference as instrument holds the joint's gain; H1 is off by 10 %."""
+    """A position controller that a load disturbs: the reference as instrument gives the joint's gain within its error; H1 is off by 10 %."""
     closed = {
         "axes": '["x"]',
         "source": "joint_state",
@@ -132,7 +132,7 @@ def test_a_servo_under_load_is_identified_in_closed_loop_while_data_come_in(worl
         "numerator_order": 0,
         "denominator_order": 2,
     }
-    controller(world, "position", load=1.0)
+    controller(world, "position", load=0.7)
     world.start("xy_sysid.nodes.identifier", closed | {"response": "joint_input_output"})
     plain = ("-r", "__ns:=/plain", "-r", "reference:=/xy/reference")
     world.start("xy_sysid.nodes.identifier", closed | {"response": "h1"}, arguments=plain)
@@ -142,8 +142,8 @@ def test_a_servo_under_load_is_identified_in_closed_loop_while_data_come_in(worl
     drive = excitation(world, "position", autostart=True, **{"x.rms": 0.03, "x.slow": 0.0})
     assert world.until(lambda: int(value(right, "axis x", "windows") or 0) >= 30, 90.0), drive.output()
     assert world.until(lambda: int(value(biased, "axis x", "windows") or 0) >= 30, 30.0)
-    low, high = (float(value(right, "axis x", key)) for key in ("gain 95 % low", "gain 95 % high"))
-    assert low <= 3.0 <= high and high - low < 4.0
+    low, gain, high = (float(value(right, "axis x", key)) for key in ("gain 95 % low", "gain (rad/s/(N m))", "gain 95 % high"))
+    assert abs(gain - 3.0) < 3.5 / 3.92 * (high - low) and high - low < 6.0, (low, gain, high)  # 3.5 standard errors: one in 2000 is further off
     assert abs(float(value(biased, "axis x", "gain (rad/s/(N m))")) / 3.0 - 1.0) > 0.1
 
 

@@ -140,6 +140,8 @@ def test_post_stop_is_answered_from_the_machines_state(world: World, tmp_path: P
     """The page's server: no 'stopped' while nobody has confirmed it, and with an excitation zero volts and its own word."""
     from std_msgs.msg import Bool
 
+    from xy_sysid.nodes.common import LATCHED_QOS
+
     blocks = world.blocks()
     server = Server(tmp_path, ROS_DOMAIN_ID=str(world.domain), ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST")
     try:
@@ -156,8 +158,7 @@ def test_post_stop_is_answered_from_the_machines_state(world: World, tmp_path: P
         process = world.start(EXCITATION, {"watchdog": 2.0, "ramp": 0.0})
         assert world.transition("excitation", "configure")
         assert world.until(lambda: "STOP is on" in process.output(), 10.0)  # still on, from before the excitation was there
-        release = world.node.create_publisher(Bool, "stop", 10)
-        assert world.until(lambda: release.get_subscription_count() > 0)
+        release = world.node.create_publisher(Bool, "stop", LATCHED_QOS)  # as the page's: who hears it late hears it, too
         release.publish(Bool(data=False))
         assert world.until(lambda: "STOP is released" in process.output(), 5.0) and world.transition("excitation", "activate")
         assert world.until(lambda: len(blocks) > 10 and bool(blocks[-1].values.any()))
