@@ -183,8 +183,7 @@ def test_the_report_opens_in_a_browser_without_a_network(folder: Path, page: str
         ink = tab.evaluate("getComputedStyle(document.querySelector('#ladder-0 .xtick text')).fill")
         assert ink == ("rgb(36, 41, 47)" if mode == "light" else "rgb(215, 220, 225)")
         tab.emulate_media(color_scheme="dark" if mode == "light" else "light")
-        tab.wait_for_timeout(300)
-        assert tab.evaluate("getComputedStyle(document.querySelector('#ladder-0 .xtick text')).fill") != ink
+        tab.wait_for_function("ink => getComputedStyle(document.querySelector('#ladder-0 .xtick text')).fill != ink", arg=ink, timeout=20_000)
 
 
 PRINTED = 688  # px that both A4 and letter have between margins of 14 mm

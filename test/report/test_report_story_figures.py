@@ -100,7 +100,7 @@ def test_failing_bands_are_shaded_and_named() -> None:
     place = next(item for item in story()["steps"][0]["pictures"]["failing"] if item["kind"] == "frequency" and item["to"] > 1.0)
     shades = [item for item in figure.layout.shapes if item.type == "rect"]
     assert shades[0].x1 == pytest.approx(place["to"])
-    assert f"{number(place['error_over_floor'], 2)} × floor" in words_in(figure)
+    assert f"{number(place['error_over_floor'], 3)} × floor" in words_in(figure)
     assert not [item for item in story_figures.residual(story()).layout.shapes if item.type == "rect"]
 
 
@@ -134,11 +134,13 @@ def test_the_measured_response_is_in_millimetres() -> None:
 
 
 def test_candidates_are_ranked_by_what_they_leave() -> None:
-    """Bars rise from top to bottom, the taken one is named, and each tells its evidence."""
+    """Bars rise from top to bottom, the named one says so, and each tells its evidence; figures of short bars stand beside them."""
     bars = story_figures.candidates(story()).data[0]
     rounded = [float(f"{value:.2g}") for value in bars.x]
     assert rounded == sorted(rounded)
-    assert [text for text in bars.text if text.endswith("taken")] and all("%" in text for text in bars.hovertext)
+    end = float(story_figures.candidates(story()).layout.xaxis.range[1]) / 1.04
+    assert [place == "inside" for place in bars.textposition] == [error > 0.5 * end for error in bars.x]
+    assert [text for text in bars.text if text.endswith("named")] and all("%" in text for text in bars.hovertext)
 
 
 def test_before_and_after_lie_over_each_other() -> None:

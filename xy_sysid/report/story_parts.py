@@ -78,7 +78,7 @@ def shade(figure: go.Figure, places: list[Mapping[str, Any]], ends: tuple[float,
         left, right = (np.log10([low, high]) if log else np.array([low, high])) + (np.log10(scale) if log else 0.0)
         where = (middle - left) / max(right - left, 1e-300) if log else (middle / scale - low) / max(high - low, 1e-300)
         anchor = "left" if where < 0.25 else "right" if where > 0.75 else "center"
-        text = f"fails: {number(float(item['error_over_floor']), 2)} × floor"
+        text = f"fails: {number(float(item['error_over_floor']), 3)} × floor"
         figure.add_annotation(
             text=text, x=float(middle), xref=_axis("x", at), y=1, yref=f"{_axis('y', at)} domain",
             yanchor="top", yshift=-14 * (level % 3), xanchor=anchor, showarrow=False, font={"color": FAILS, "size": 11},

@@ -127,18 +127,19 @@ def candidates(document: Document, mode: str = "light", most: int = 8) -> go.Fig
         for item in tried
     ]
     figures = [f"{number(error, 3)} {unit}{_place(item, chosen, runner)}" for item, error in zip(tried, errors, strict=True)]
-    inside = ["inside" if error > 0.5 * max(errors) else "outside" for error in errors]
+    floor, base = document["ladder"][0]["noise_floor"] * scale, float(document["error"]["now"]) * scale
+    most_left = max([base, *errors])
+    inside = ["inside" if error > 0.5 * most_left else "outside" for error in errors]
     figure.add_bar(
         x=errors, y=[words(item["effect"]) for item in tried], orientation="h", marker={"color": colours}, text=figures, textposition=inside,
         insidetextanchor="end", cliponaxis=False, hovertext=[_evidence(item) for item in tried], hoverinfo="text", showlegend=False,
     )  # fmt: skip
-    floor, base = document["ladder"][0]["noise_floor"] * scale, float(document["error"]["now"]) * scale
     for level, told, colour, dash, anchor in ((floor, "floor", FLOOR, "dot", "left"), (base, "none added", UNTRUSTED, "dash", "right")):
         figure.add_vline(x=level, line={"color": colour, "width": 1.5, "dash": dash}, row=1, col=1)
         figure.add_annotation(
             text=told, x=level, y=1, yref="y domain", yanchor="bottom", xanchor=anchor, showarrow=False, font={"color": colour, "size": 11}
         )
-    figure.update_xaxes(title_text=f"held-out error ({plain(unit)})", range=[0, 1.04 * max([base, *errors])], row=1, col=1)
+    figure.update_xaxes(title_text=f"held-out error ({plain(unit)})", range=[0, 1.04 * most_left], row=1, col=1)
     figure.update_yaxes(autorange="reversed", row=1, col=1)
     return figure
 
@@ -151,7 +152,7 @@ def _in_lines(item: Mapping[str, Any]) -> str:
 
 def _place(item: Mapping[str, Any], chosen: list[str], runner: str | None) -> str:
     if item["effect"] in chosen:
-        return " · taken" if item["effect"] == chosen[0] else " · taken later"
+        return " · named" if item["effect"] == chosen[0] else " · named beside"
     return " · runner-up" if item["effect"] == runner else ""
 
 
