@@ -34,7 +34,7 @@ class Live:
         self.title, self.heard, self.link, self._say = "live", heard, link, say
         self._job: OrderState | None = None
         self._asked = 0
-        self._again = 0
+        self._again, self._before = 0, 0  # times that a question may be asked once more; what the diagnoser had said when it was asked
         self._settled = (math.inf, 0)  # when the last order was answered, and the stamp then
         self._enough = ENOUGH
         self._numbers = itertools.count(1)
@@ -61,10 +61,18 @@ class Live:
         at, stamp = self._settled
         if self._job is not None and (time.monotonic() - at > SETTLES or (self._news() != stamp and math.isfinite(at))):
             self._job = None
-        if self._job is not None and self._again and time.monotonic() - self._job.begun > LOST * (AGAIN + 1 - self._again):
-            self._again -= 1  # idle, and no answer: a question that was lost, as on a computer under load
-            self.link.trigger(f"{NODE}/{SERVICES[self._job.order.act]}", self._told, LONG)
+        if self._job is not None and self._job.order.act in SERVICES:
+            self._look_for_losses(self._job)
         return self._job
+
+    def _look_for_losses(self, job: OrderState) -> None:
+        """The diagnoser is idle and has not answered: either the answer was lost, or the question, as on a computer under load."""
+        waited = time.monotonic() - job.begun
+        if waited > LOST and self._done() != self._before:  # it has worked: never asked for twice
+            self._job = None
+        elif self._again and waited > LOST * (AGAIN + 1 - self._again):
+            self._again -= 1
+            self.link.trigger(f"{NODE}/{SERVICES[job.order.act]}", self._told, LONG)
 
     def begin(self) -> None:
         """Have the rigid model fitted, once there are data for it and nobody has asked for more."""
@@ -104,7 +112,7 @@ class Live:
             self.link.trigger(f"{NODE}/{SERVICES[act]}", self._told, LONG)
         else:
             raise BadInput("order", act, ", ".join(("add", "remove", *SERVICES)), "Record a bag and open it for that.")
-        self._again = AGAIN if act in SERVICES else 0
+        self._again, self._before = AGAIN, self._done()
         self._job, self._settled = OrderState(Order(next(self._numbers), act, axis, argument), time.monotonic(), None, True), (math.inf, 0)
         self._asked += 1
 
@@ -128,6 +136,10 @@ class Live:
     def _news(self) -> int:
         """Grows with each story of any axis."""
         return sum(number for name, number in list(self.heard.version.items()) if name.startswith("story "))
+
+    def _done(self) -> int:
+        """Grows with each story, and with whatever the diagnoser says that it does."""
+        return self._news() + self.heard.version.get("progress", 0)
 
     def _effects(self, axis: str) -> list[str]:
         ladder = (self.document(axis) or {}).get("ladder") or [{}]
