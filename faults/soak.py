@@ -1,4 +1,4 @@
-"""python -m faults soak [--hours 24] [--speed max|X] [--minutes M]: a day of data through all nodes and the page, and what each needs.
+"""python -m faults soak [--hours 24] [--speed max|X] [--block N] [--minutes M]: a day of data through all nodes and the page, and what each needs.
 
 Machine, excitation, identifier and the page's server (with one open tab that reads what it is sent), over DDS, as fast as they go. Growth is the
 slope of a straight line through the second half of what was measured, by hour of data. docs/faults.md gets the table.
@@ -65,13 +65,13 @@ def _tab(address: str, over: threading.Event) -> None:
         made.close()
 
 
-def measure(hours: float, speed: float, minutes: float) -> tuple[float, dict[str, list[tuple[float, float, int]]], dict[str, str]]:
+def measure(hours: float, speed: float, block: int, minutes: float) -> tuple[float, dict[str, list[tuple[float, float, int]]], dict[str, str]]:
     """(h of data, by node (h of data, MB, descriptors) at each look, what the identifier says of its streams)."""
     from xy_sysid.cli.monitor import Monitor
 
     os.environ.update(ROS_DOMAIN_ID=str(os.getpid() % 90 + 10), ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST")
     surroundings = environment()
-    parameters = {"excitation": {"lockstep": "true", "speed": str(speed), "duration": str(hours * 3600.0), "patience": "60.0"}}
+    parameters = {"excitation": {"lockstep": "true", "speed": str(speed), "block": str(block), "duration": str(hours * 3600.0), "patience": "60.0"}}
     looks: dict[str, list[tuple[float, float, int]]] = {}
     with tempfile.TemporaryDirectory(prefix="soak_") as name:
         folder = Path(name)
@@ -142,11 +142,12 @@ def main(words: list[str]) -> int:
     parser = argparse.ArgumentParser(prog="faults soak", description="a day of data, with memory and descriptors of each node")
     parser.add_argument("--hours", type=float, default=24.0, help="of data")
     parser.add_argument("--speed", default="max", help="times real time, or max")
+    parser.add_argument("--block", type=int, default=20, help="samples of a message; larger ones go through faster")
     parser.add_argument("--minutes", type=float, default=1e9, help="stop after so many minutes, and draw the line on")
     parser.add_argument("-o", type=Path, default=PAGE, metavar="FILE", help="page to write (docs/faults.md)")
     asked = parser.parse_args(words)
     begun = time.monotonic()
-    data, looks, streams = measure(asked.hours, 0.0 if asked.speed == "max" else float(asked.speed), asked.minutes)
+    data, looks, streams = measure(asked.hours, 0.0 if asked.speed == "max" else float(asked.speed), asked.block, asked.minutes)
     made, flat = table(data, asked.hours, looks, streams, (time.monotonic() - begun) / 60.0)
     sys.stderr.write(made)
     before = asked.o.read_text(encoding="utf-8") if asked.o.exists() else ""

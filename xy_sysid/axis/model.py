@@ -127,7 +127,7 @@ class AxisModel:
         for effect in self.library.acting:
             if effect.sum_of is not None and all(part in own for part in effect.sum_of.parts):
                 values = effect.sum_of.joined([self._turned(part, own[part]) for part in effect.sum_of.parts])
-                if all(item.low <= value <= item.high for item, value in zip(effect.parameters, values, strict=True)):
+                if all(item.allows(value) for item, value in zip(effect.parameters, values, strict=True)):
                     kept = tuple((name, old) for name, old in self.effects if name not in effect.sum_of.parts)
                     return replace(self, effects=(*kept, (effect.name, values)))
         return self

@@ -18,18 +18,21 @@ the simulation knows at that moment (``WORDS``). So a law reads as the equation 
 from __future__ import annotations
 
 import inspect
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, ParamSpec, Protocol, TypeVar
 
 import numpy as np
 from numba.extending import register_jitable
 from numpy.typing import NDArray
 
-from xy_sysid.effects._scene import Guess, Scene
+from xy_sysid.effects._scene import USUAL_SWING, Guess, Scene
+from xy_sysid.effects._similarity import USUAL, Similarity
 from xy_sysid.errors import BadInput
 from xy_sysid.samples.block import FloatArray
 
+BEGUN = 0.05  # of its usual size at least, with which a fit begins what must not be 0
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -45,6 +48,7 @@ class Beside:
     undo: gain, delay, pole and the k numbers, and n -> voltage (n,), V; position (n + 1,), m; forces against the drive (2, n), V, at the
           motor and on the table;
           how much of a sudden change of that position the encoder shows at once
+    similar, swing: how this motion compares with the usual one, and its usual way between two reversals, m
     """
 
     start: FloatArray
@@ -53,6 +57,8 @@ class Beside:
     unit: FloatArray
     positive: NDArray[np.bool_]
     undo: Callable[[FloatArray, int], tuple[FloatArray, FloatArray, FloatArray, float]]
+    similar: Similarity = USUAL
+    swing: float = USUAL_SWING
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,7 +201,8 @@ def law(function: Callable[P, R]) -> Callable[P, R]:
 class Parameter:
     """One number of an effect.
 
-    low, high: what a fit may reach, SI; positive: fitted as a logarithm; typical: a usual size (scale of a step, tests)
+    low, high: what a fit may reach, SI; positive: fitted as a logarithm; typical: a usual size (scale of a step, tests); all three on
+    the usual machine, see ``Similarity``
     """
 
     name: str
@@ -205,6 +212,20 @@ class Parameter:
     typical: float
     meaning: str
     positive: bool = True
+
+    def on(self, similar: Similarity) -> Parameter:
+        """The same with bounds and usual size for another machine."""
+        factor = similar.factor(self.unit)
+        return replace(self, low=self.low * factor, high=self.high * factor, typical=self.typical * factor)
+
+    def allows(self, value: float) -> bool:
+        """Whether some machine may have it: a number within its bounds; of what has a unit, any number of the right sign."""
+        return self.low <= value <= self.high if not self.unit else math.isfinite(value) and (value > 0.0 or not self.positive)
+
+    @property
+    def allowed(self) -> str:
+        """The same in words."""
+        return f"{self.low:g} to {self.high:g}" if not self.unit else f"above 0 {self.unit}" if self.positive else f"a finite number of {self.unit}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -308,6 +329,10 @@ class Effect:
         """A usual size of each parameter, SI."""
         return tuple(parameter.typical for parameter in self.parameters)
 
+    def on(self, similar: Similarity) -> tuple[Parameter, ...]:
+        """Its parameters with bounds and usual sizes for another machine."""
+        return tuple(item.on(similar) for item in self.parameters)
+
     def guessed(self, scene: Scene) -> list[Guess]:
         """What it guesses from a scene; nothing without ``guesses``.
 
@@ -326,16 +351,19 @@ class Effect:
             raise BadInput(f"columns that {self.name} guesses", given, allowed, "Make them from the scene's own signals.")
         return found
 
-    def read(self, guess: Guess, coefficients: FloatArray) -> tuple[float, ...]:
-        """The values of the parameters that belong to the coefficients of a guess's columns.
+    def read(self, guess: Guess, coefficients: FloatArray, similar: Similarity) -> tuple[float, ...]:
+        """The values of the parameters that belong to the coefficients of a guess's columns, within their bounds.
 
+        What is an input or the effect's size is not smaller than a fit can begin with.
         Raises BadInput for other than one finite number each, as an effect of one's own may give.
         """
         given = tuple(guess.read(coefficients))
         if len(given) != len(self.parameters) or not all(isinstance(value, (int, float, np.number)) and np.isfinite(value) for value in given):
             said, allowed = ", ".join(str(value)[:20] for value in given), f"a number for each of {', '.join(self.names)}"
             raise BadInput(f"values that {self.name} guesses", said or "nothing", allowed, "Return them in this order.")
-        return tuple(float(value) for value in given)
+        items = self.on(similar)
+        least = [BEGUN * abs(item.typical) if item.positive and (k == 0 or "V" in item.unit) else item.low for k, item in enumerate(items)]
+        return tuple(float(min(max(value, low), item.high)) for value, low, item in zip(given, least, items, strict=True))
 
 
 def arguments(function: Law) -> tuple[str, ...]:

@@ -9,7 +9,10 @@ from functools import cache
 import numpy as np
 import scipy.signal
 
+from xy_sysid.effects._similarity import Similarity
 from xy_sysid.samples.block import FloatArray
+
+USUAL_SWING = 2e-4  # m between two reversals on the usual machine of ``Similarity``
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +40,16 @@ class Scene:
         """(n,) s since the start, at the middle of each sample."""
         return np.asarray((np.arange(self.voltage.size) + 0.5) / self.sampling_rate, dtype=np.float64)
 
+    @property
+    def similar(self) -> Similarity:
+        """How this motion compares with the usual one."""
+        return Similarity.of(self.sampling_rate, self.voltage, self.velocity)
+
+    @property
+    def swing(self) -> float:
+        """Usual way between two reversals, m."""
+        return swing(self.sampling_rate, self.smooth(self.velocity, 300.0), self.velocity)
+
     def smooth(self, signal: FloatArray, cutoff: float) -> FloatArray:
         """The signal below ``cutoff`` (Hz), without shift in time. Of the scene's own signals each is worked out once."""
         own = next((name for name in ("voltage", "velocity", "error") if signal is getattr(self, name)), None)
@@ -47,7 +60,7 @@ class Scene:
         return self._known[own, cutoff]
 
     def _smoothed(self, signal: FloatArray, cutoff: float) -> FloatArray:
-        return np.asarray(scipy.signal.sosfiltfilt(_low_pass(min(2.0 * cutoff / self.sampling_rate, 0.9)), signal), dtype=np.float64)
+        return smoothed(self.sampling_rate, signal, cutoff)
 
     def direction(self) -> FloatArray:
         """(n,) -1..1, the direction of motion, blurred where noise hides it."""
@@ -82,6 +95,18 @@ class Scene:
         peaks, _ = scipy.signal.find_peaks(np.where(inside, power, 0.0))
         best = peaks[np.argsort(power[peaks])[::-1][:count]]
         return [float(4.0 * travel / peak) for peak in best]
+
+
+def smoothed(sampling_rate: float, signal: FloatArray, cutoff: float) -> FloatArray:
+    """(n,) a signal below ``cutoff`` (Hz), without shift in time."""
+    return np.asarray(scipy.signal.sosfiltfilt(_low_pass(min(2.0 * cutoff / sampling_rate, 0.9)), signal), dtype=np.float64)
+
+
+def swing(sampling_rate: float, smooth: FloatArray, velocity: FloatArray) -> float:
+    """The way (m) between two reversals, in the mean, from a velocity (n,) and the same without its noise (m/s)."""
+    forth = np.sign(smooth[np.abs(smooth) > float(np.std(velocity - smooth))])
+    legs = 1 + int(np.count_nonzero(forth[1:] != forth[:-1]))
+    return float(np.sum(np.abs(smooth))) / sampling_rate / legs
 
 
 @cache

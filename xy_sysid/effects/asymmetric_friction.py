@@ -20,7 +20,7 @@ def guesses(scene: Scene) -> Iterator[Guess]:
     direction = scene.direction()
 
     def read(c: FloatArray) -> tuple[float, ...]:
-        even, odd = float(c[1]), max(float(c[0]), 1e-3)
+        even, odd = float(c[1]), max(float(c[0]), 1e-300)
         return (odd, min(max(even / odd, -0.95), 0.95))
 
     yield Guess(columns(direction, abs(direction)), read)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
 from xy_sysid.effects import _pole_zero_pair
 from xy_sysid.effects._contract import Effect, Parameter, law
 from xy_sysid.effects._scene import Guess, Scene
+
+SLOW = 0.25  # of the corner frequency of the base, from which on a mode is looked for
 
 
 @law
@@ -16,13 +19,18 @@ def section(split: float, frequency: float, damping: float, pole_damping: float,
 
 
 def guesses(scene: Scene) -> Iterable[Guess]:
-    """Pairs from 5 to 90 Hz."""
-    return _pole_zero_pair.guesses(scene, 5.0, 90.0)
+    """Pairs up to 90 Hz."""
+    return _pole_zero_pair.guesses(scene, _lowest(scene), 90.0)
 
 
 def joint(scene: Scene) -> Iterable[tuple[float, float, float, tuple[float, ...]]]:
     """Base and pair from the frequency response."""
-    return _pole_zero_pair.joint(scene, 5.0, 90.0)
+    return _pole_zero_pair.joint(scene, _lowest(scene), 90.0)
+
+
+def _lowest(scene: Scene) -> float:
+    """Hz: 5, and lower where the axis is slow itself."""
+    return min(5.0, SLOW * scene.pole / (2.0 * math.pi))
 
 
 EFFECT = Effect(

@@ -16,7 +16,7 @@ def level(coulomb: float) -> float:
 
 def guesses(scene: Scene) -> Iterator[Guess]:
     """The direction of motion."""
-    yield Guess(columns(scene.direction()), lambda c: (max(float(c[0]), 1e-3),))
+    yield Guess(columns(scene.direction()), lambda c: (float(c[0]),))
 
 
 EFFECT = Effect(

@@ -26,7 +26,7 @@ def guesses(scene: Scene) -> Iterator[Guess]:
     if high - low >= LEAST:
         yield Guess(
             columns(way * np.sin(scene.position), way * np.cos(scene.position)),
-            lambda c: (max(math.hypot(float(c[0]), float(c[1])), 1e-3), math.atan2(float(c[1]), float(c[0]))),
+            lambda c: (math.hypot(float(c[0]), float(c[1])), math.atan2(float(c[1]), float(c[0]))),
         )
 
 

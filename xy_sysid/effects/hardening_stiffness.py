@@ -17,7 +17,7 @@ def force(cubic: float, linear: float, x: float) -> float:
 def guesses(scene: Scene) -> Iterator[Guess]:
     """Position and its cube."""
     x = scene.position
-    yield Guess(columns(x**3, x), lambda c: (max(float(c[0]), 1.0), float(c[1])))
+    yield Guess(columns(x**3, x), lambda c: (float(c[0]), float(c[1])))
 
 
 EFFECT = Effect(

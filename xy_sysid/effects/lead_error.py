@@ -35,7 +35,7 @@ class _Reader:
         self.period = period
 
     def __call__(self, c: FloatArray) -> tuple[float, ...]:
-        return (max(math.hypot(float(c[0]), float(c[1])), 1e-8), self.period, math.atan2(float(c[1]), float(c[0])))
+        return (math.hypot(float(c[0]), float(c[1])), self.period, math.atan2(float(c[1]), float(c[0])))
 
 
 def plausible(values: Sequence[float]) -> bool:

@@ -12,7 +12,8 @@ from xy_sysid.effects._scene import Guess, Scene, columns
 from xy_sysid.jit import compiled
 from xy_sysid.samples.block import FloatArray
 
-LENGTHS = (3e-6, 10e-6, 30e-6, 100e-6)  # m
+LENGTHS = (0.015, 0.05, 0.15, 0.5)  # of the way between two reversals
+DAMPING = 0.075  # of the usual input over the usual speed
 
 
 @law
@@ -33,20 +34,23 @@ def force(coulomb: float, length: float, damping: float, bristle: float, v: floa
 
 
 def guesses(scene: Scene) -> Iterator[Guess]:
-    """Bristles that follow the measured motion, for lengths from 3 to 100 um."""
-    v = scene.smooth(scene.velocity, 300.0)
+    """Bristles that follow the measured motion, for lengths up to half of the way between two reversals."""
+    v, swing, usual = scene.smooth(scene.velocity, 300.0), scene.swing, float(np.std(scene.velocity))
+    if not swing > 0.0:
+        return
+    damping = DAMPING * float(np.std(scene.voltage)) / usual
     for length in LENGTHS:
-        yield Guess(columns(_deflection(v, 1.0 / scene.sampling_rate, length)), _Reader(length))
+        yield Guess(columns(_deflection(v, 1.0 / scene.sampling_rate, length * swing)), _Reader(length * swing, damping))
 
 
 class _Reader:
     """(coulomb, length, damping) from the coefficient at one length."""
 
-    def __init__(self, length: float) -> None:
-        self.length = length
+    def __init__(self, length: float, damping: float) -> None:
+        self.length, self.damping = length, damping
 
     def __call__(self, c: FloatArray) -> tuple[float, ...]:
-        return (max(float(c[0]), 1e-2), self.length, 2.0)
+        return (float(c[0]), self.length, self.damping)
 
 
 @compiled

@@ -10,6 +10,8 @@ import numpy as np
 from xy_sysid.effects._contract import Effect, Parameter, law
 from xy_sysid.effects._scene import Guess, Scene, columns
 
+LEAST = 0.05  # V/m on the usual machine: the softest that a fit begins with
+
 
 @law
 def force(stiffness: float, rest: float, softening: float, x: float, gain: float) -> float:
@@ -21,15 +23,12 @@ def force(stiffness: float, rest: float, softening: float, x: float, gain: float
 def guesses(scene: Scene) -> Iterator[Guess]:
     """A linear spring with its preload; and position and cube, seen from the middle of the travel."""
     x, way = scene.position, math.copysign(1.0, scene.gain)
-    yield Guess(columns(way * x, np.full_like(x, way)), lambda c: (_stiffness(c[0]), -float(c[1]) / _stiffness(c[0]), 0.0))
+    least = LEAST * scene.similar.factor("V/m")
+    yield Guess(columns(way * x, np.full_like(x, way)), lambda c: (max(float(c[0]), least), -float(c[1]) / max(float(c[0]), least), 0.0))
     low, high = np.quantile(x, [0.01, 0.99])
     middle = 0.5 * float(low + high)
     far = x - middle
-    yield Guess(columns(way * far, way * far**3), lambda c: (_stiffness(c[0]), middle, -float(c[1]) / _stiffness(c[0])))
-
-
-def _stiffness(coefficient: float) -> float:
-    return max(float(coefficient), 1e-3)
+    yield Guess(columns(way * far, way * far**3), lambda c: (max(float(c[0]), least), middle, -float(c[1]) / max(float(c[0]), least)))
 
 
 EFFECT = Effect(

@@ -38,7 +38,7 @@ class _Reader:
         self.velocity = velocity
 
     def __call__(self, c: FloatArray) -> tuple[float, ...]:
-        return (max(float(c[1]), 0.01), max(float(c[0]), 0.02), self.velocity)
+        return (float(c[1]), float(c[0]), self.velocity)
 
 
 EFFECT = Effect(

@@ -153,6 +153,6 @@ def _model(path: Path, axis: str, part: Any, library: Library) -> AxisModel:
             raise BadRecording(path, f"axis {axis} has no value of {name}.{missing[0]}", REWRITE)
         effects.append((name, tuple(values[f"{name}.{key}"] for key in library[name].names)))
         for item, value in zip(library[name].parameters, effects[-1][1], strict=True):
-            if not item.low <= value <= item.high:
-                raise BadInput(f"{path}: axis {axis}: {name}.{item.name}", value, f"{item.low:g} to {item.high:g} {item.unit}", "Correct it.")
+            if not item.allows(value):
+                raise BadInput(f"{path}: axis {axis}: {name}.{item.name}", value, item.allowed, "Correct it.")
     return AxisModel(*base, tuple(effects), library)

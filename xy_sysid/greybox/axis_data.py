@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xy_sysid.axis.model import sample_velocity
+from xy_sysid.effects._scene import smoothed, swing
+from xy_sysid.effects._similarity import Similarity
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.floor import Bands, Floor, Windows, bands, encoder_noise, floor
 from xy_sysid.samples.block import FloatArray
@@ -22,6 +24,7 @@ from xy_sysid.units import USUAL, Units
 FIRST = 28_000  # samples of the first stage of a fit
 TRAINING = 2.0 / 3.0  # of the record, for what must run through from the start (one-step prediction)
 EPSILON = 1e-3  # part of the motion to which laws and their integration are trusted
+LIKE = 0.1  # of the whole power in each excited band that the first stage must hold
 FEWEST = 256  # samples
 WINDOWS = 14.0  # window lengths that a record must hold at least; else they are made shorter
 SEEN, HELD = 3.0, 1.5  # window lengths of a block that a fit sees, and of one that is held out
@@ -73,6 +76,16 @@ class AxisData:
         """rms of the motion where it is held out over that where it is fitted."""
         held, fitted = (float(np.mean(np.abs(windows.spectrum(self.velocity)) ** 2)) for windows in (self.held, self.fitted))
         return float(np.sqrt(held / fitted)) if fitted > 0.0 else 0.0
+
+    @property
+    def similar(self) -> Similarity:
+        """How this motion compares with the one that the effects' bounds are written for."""
+        return Similarity.of(self.sampling_rate, self.voltage, self.velocity)
+
+    @property
+    def swing(self) -> float:
+        """Usual way between two reversals, m."""
+        return swing(self.sampling_rate, smoothed(self.sampling_rate, self.velocity, 300.0), self.velocity)
 
     def middle(self) -> FloatArray:
         """(n - r,) measured position at the middle of each sample, m."""
@@ -126,7 +139,8 @@ def prepare_all(
     whole = Windows(layout, np.concatenate([_begins(layout.length, *span) for span in spans]))
     encoder = max(encoder_noise(sampling_rate, position) for _, position in recordings)
     fitted, held = _split(layout, spans, velocity)
-    stage = int(min(FIRST, edges[1]))
+    least = floor(whole, velocity, encoder, epsilon)
+    stage = _stage(whole, velocity, least, int(edges[1]))
     brief = fitted.before(stage)
     if brief.begins.size < 2:
         stage, brief = int(edges[1]), fitted.before(int(edges[1]))
@@ -142,9 +156,21 @@ def prepare_all(
         brief=brief if brief.begins.size else fitted,
         training=int(TRAINING * velocities[0].size),
         first=stage if brief.begins.size else velocity.size,
-        floor=floor(whole, velocity, encoder, epsilon),
+        floor=least,
         units=units,
     )
+
+
+def _stage(whole: Windows, velocity: FloatArray, least: Floor, most: int) -> int:
+    """Samples of the first stage: as many as it takes that what is excited in the whole is excited there, too (a sweep takes its time)."""
+    stage = min(FIRST, most)
+    powers = whole.layout.powers(whole.spectrum(velocity))[:, least.excited]
+    while stage < most:
+        seen = powers[whole.begins + whole.layout.length <= stage]
+        if seen.shape[0] and np.all(seen.mean(axis=0) > LIKE * powers.mean(axis=0)):
+            break
+        stage = min(2 * stage, most)
+    return stage
 
 
 def loosened(data: AxisData, epsilon: float) -> AxisData:

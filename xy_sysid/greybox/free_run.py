@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from xy_sysid.axis.model import FINE, STANDARD, AxisModel, Library, simulator
+from xy_sysid.axis.loop_source import undoable
+from xy_sysid.axis.model import FINE, STANDARD, AxisModel, Library, simulator, undoer
 from xy_sysid.effects import Effect, Parameter, Scene
 from xy_sysid.effects._contract import in_time
 from xy_sysid.errors import BadInput
@@ -119,7 +120,7 @@ def fit_with(
     model = base.model
     for name in names:
         values = (starts or {}).get(name)
-        model = _begun(data, base, model, name) if values is None else model.with_effect(name, bounded(model.library[name], values))
+        model = _begun(data, base, model, name) if values is None else model.with_effect(name, bounded(model.library[name], values, data.similar))
     return fit(data, model, brief, hopeless)
 
 
@@ -137,14 +138,27 @@ def other_starts(data: AxisData, base: GreyboxFit, model: AxisModel, name: str, 
     """
     effect, scene = model.library[name], scene or scene_of(data, base, data.first)
     candidates = []
-    for gain, pole, values in inverse_starts(effect, scene, scene.velocity.size):
-        whole = replace(model, gain=gain, pole=min(max(pole, 1e-2), 1e5))
-        candidates.append(whole.with_effect(name, bounded(effect, values)))
+    pushing = [own for own, _ in model.effects if own != name and model.library[own].category == "force" and undoable(model.library[own])]
+    forces = [_force(data, model, own, scene.velocity.size) for own in pushing]
+    for start in inverse_starts(effect, scene, scene.velocity.size, forces):
+        whole = replace(model, gain=start.gain, pole=min(max(start.pole, 1e-2), 1e5))
+        for own, size in zip(pushing, start.sizes, strict=True):
+            values = dict(model.effects)[own]
+            whole = whole.with_effect(own, bounded(model.library[own], (values[0] * min(max(size, 0.3), 3.0), *values[1:]), data.similar))
+        candidates.append(whole.with_effect(name, start.values))
     if effect.joint is not None:
         for gain, later, pole, values in effect.joint(scene):
             whole = replace(model, gain=gain, delay=max(base.model.delay + later, 0.0), pole=min(max(pole, 1e-2), 1e5))
-            candidates.append(whole.with_effect(name, bounded(effect, values)))
+            candidates.append(whole.with_effect(name, bounded(effect, values, data.similar)))
     return candidates
+
+
+def _force(data: AxisData, model: AxisModel, name: str, samples: int) -> FloatArray:
+    """(samples,) V, what one effect of a model pushes against the drive on the measured motion."""
+    run = data.runs[0]
+    undo = undoer(model.library, [name], data.sampling_rate, data.voltage[run], data.position[run])
+    against = undo(np.array([model.gain, model.delay, model.pole, *dict(model.effects)[name]]), samples)[2]
+    return np.asarray(against.sum(axis=0))
 
 
 def best_start(data: AxisData, candidates: list[AxisModel]) -> AxisModel:
@@ -282,13 +296,20 @@ def _problem(data: AxisData, model: AxisModel, samples: int, fine: float = FINE)
     def simulated(values: FloatArray) -> FloatArray:
         return runs[0](values) if len(runs) == 1 else np.concatenate([one(values) for one in runs])
 
-    items = [item for name in names for item in model.library[name].parameters]
+    items = [item for name in names for item in model.library[name].on(data.similar)]
     values = np.array([model.gain, model.delay, model.pole, *(value for _, row in model.effects for value in row)])
     scale = Scale(
         np.array([-np.inf, 0.0, 1e-2, *(item.low for item in items)]),
         np.array([np.inf, max(data.first / data.sampling_rate / 4.0, model.delay), 1e5, *(item.high for item in items)]),
         np.array([False, False, True, *(item.positive for item in items)]),
-        np.array([abs(model.gain) or 1.0, 20.0 / data.sampling_rate, 1.0, *(unit_of(item) for item in items)]),
+        np.array(
+            [
+                abs(model.gain) or 1.0,
+                20.0 / data.sampling_rate,
+                1.0,
+                *(max(unit_of(item), abs(value)) for item, value in zip(items, values[3:].tolist(), strict=True)),
+            ]
+        ),
     )
     return simulated, values, scale
 

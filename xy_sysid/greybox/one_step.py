@@ -137,14 +137,16 @@ def noise_of(data: AxisData) -> float:
 def as_beside(data: AxisData, library: Library, others: Others) -> Beside:
     """Effects with start values, ready to be fitted and taken out of the recording."""
     names = [name for name, _ in others]
-    items = [item for name in names for item in library[name].parameters]
+    items = [item for name in names for item in library[name].on(data.similar)]
     return Beside(
-        start=np.array([value for name, values in others for value in bounded(library[name], values)]),
+        start=np.array([value for name, values in others for value in bounded(library[name], values, data.similar)]),
         low=np.array([item.low for item in items]),
         high=np.array([item.high for item in items]),
         unit=np.array([unit_of(item) for item in items]),
         positive=np.array([item.positive for item in items], dtype=np.bool_),
         undo=undoer(library, names, data.sampling_rate, data.voltage, data.position),
+        similar=data.similar,
+        swing=data.swing,
     )
 
 
@@ -156,10 +158,10 @@ def _result(data: AxisData, library: Library, effect: Effect, names: Sequence[st
     worse = held if found.too_small else error_without(data, found)
     told = held < CLEAN * noise_floor and worse > LITTLE_BETTER * held
     far = max(held / (AT_NOISE * noise_floor), 0.0 if told else BETTER * held / worse)
-    rows: list[tuple[str, tuple[float, ...], tuple[float, ...]]] = [(effect.name, bounded(effect, found.values), found.spread)]
+    rows: list[tuple[str, tuple[float, ...], tuple[float, ...]]] = [(effect.name, bounded(effect, found.values, data.similar), found.spread)]
     for law, its, errors in found.dry.rows():
         if its[0] > TELLING * float(np.std(data.voltage)) and its[0] > 5.0 * errors[0]:
-            rows.append((law.name, bounded(law, its), errors))
+            rows.append((law.name, bounded(law, its, data.similar), errors))
     values, spread = iter(found.beside[0]), iter(found.beside[1])
     rows += [(name, tuple(next(values) for _ in library[name].names), tuple(next(spread) for _ in library[name].names)) for name in names]
     gain, delay, pole = found.base
@@ -169,7 +171,7 @@ def _result(data: AxisData, library: Library, effect: Effect, names: Sequence[st
         for key, unit, value, s in zip(("gain", "delay", "pole"), ("m/s/V", "s", "rad/s"), found.base, found.base_spread, strict=True)
     ]
     for name, own, errors in rows:
-        model = model.with_effect(name, bounded(library[name], own))
+        model = model.with_effect(name, bounded(library[name], own, data.similar))
         estimates += [
             Estimate(name=f"{name}.{item.name}", value=value, unit=data.units.of(item.unit), low=value - Z95 * s, high=value + Z95 * s)
             for item, value, s in zip(library[name].parameters, own, errors, strict=True)

@@ -14,6 +14,7 @@ import scipy.signal
 from numpy.typing import NDArray
 
 from xy_sysid.effects import Effect, Guess, Scene
+from xy_sysid.effects._similarity import Similarity
 from xy_sysid.greybox.floor import Floor, Windows, excess, tolerance
 from xy_sysid.greybox.start_rigid import mean_velocity_filter
 from xy_sysid.samples.block import FloatArray
@@ -77,16 +78,16 @@ def screen(effects: Iterable[Effect], scene: Scene, nuisance: FloatArray, window
     whole = _Prepared(scene.error, nuisance, windows, weight)
     brief = replace_scene(scene, short)
     part = _Prepared(brief.error, nuisance[:, : brief.error.size], windows.before(brief.error.size), weight) if short < scene.error.size else whole
-    found, columns = [], {}
+    found, columns, similar = [], {}, scene.similar
     for effect in effects:
         many = effect.category == "motion"
         guesses = [guess for guess in effect.guessed(brief if many else scene) if not guess.inverse_only]
         space = part if many or len(guesses) > MANY else whole
-        best, chosen = Trace(effect.name, 0.0, effect.typical), None
+        best, chosen = Trace(effect.name, 0.0, tuple(item.typical for item in effect.on(similar))), None
         for guess in guesses:
             share, coefficients, white = space.share(_through_base(guess, scene, space.samples))
             if share > best.share:
-                best, chosen = Trace(effect.name, share, bounded(effect, effect.read(guess, coefficients))), white
+                best, chosen = Trace(effect.name, share, effect.read(guess, coefficients, similar)), white
         found.append(best)
         if chosen is not None:
             columns[effect.name] = (space, chosen)
@@ -110,9 +111,9 @@ def replace_scene(scene: Scene, samples: int) -> Scene:
     return replace(scene, **cut)
 
 
-def bounded(effect: Effect, values: Iterable[float]) -> tuple[float, ...]:
-    """The values, moved into the bounds of the effect's parameters."""
-    return tuple(float(min(max(value, item.low), item.high)) for value, item in zip(values, effect.parameters, strict=True))
+def bounded(effect: Effect, values: Iterable[float], similar: Similarity) -> tuple[float, ...]:
+    """The values, moved into the bounds of the effect's parameters on a machine like this."""
+    return tuple(float(min(max(value, item.low), item.high)) for value, item in zip(values, effect.on(similar), strict=True))
 
 
 def _through_base(guess: Guess, scene: Scene, samples: int) -> FloatArray:

@@ -8,7 +8,12 @@ in motion alone.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter1d
 
 from xy_sysid.effects import Effect, Scene
@@ -19,8 +24,18 @@ REST = 0.2  # part of the usual speed below which friction may be holding it
 FEW = 0.05  # part of the samples that must be in motion, else all are used
 
 
-def inverse_starts(effect: Effect, scene: Scene, samples: int) -> list[tuple[float, float, tuple[float, ...]]]:
-    """(gain m/s/V, pole rad/s, values of the parameters), one for each low-pass at most, from the first samples."""
+@dataclass(frozen=True, slots=True)
+class InverseStart:
+    """gain: m/s/V; pole: rad/s; values: of the effect's parameters; sizes: of each force beside it, over what it was."""
+
+    gain: float
+    pole: float
+    values: tuple[float, ...]
+    sizes: tuple[float, ...]
+
+
+def inverse_starts(effect: Effect, scene: Scene, samples: int, forces: Sequence[FloatArray] = ()) -> list[InverseStart]:
+    """One for each low-pass at most, from the first samples; forces: (n,) V each, of what the model has already, whose sizes are free."""
     if effect.guesses is None:
         return []
     guesses = [guess for guess in effect.guessed(scene) if not guess.at_encoder]
@@ -28,23 +43,58 @@ def inverse_starts(effect: Effect, scene: Scene, samples: int) -> list[tuple[flo
     for cutoff in CUTOFFS:
         if cutoff > 0.2 * scene.sampling_rate or not guesses:
             continue
-        velocity = scene.smooth(scene.velocity, cutoff)[:samples]
-        acceleration = np.gradient(velocity) * scene.sampling_rate
-        voltage = scene.smooth(scene.voltage, cutoff)[:samples]
-        rows = np.ones_like(velocity, dtype=np.bool_)
-        around = 2 * int(0.5 * scene.sampling_rate / cutoff) + 1
+        slow = LowPass.of(samples, scene.sampling_rate, cutoff)
+        velocity, acceleration, voltage = slow(scene.velocity), slow(scene.velocity, derived=True), slow(scene.voltage)
+        rows = slow.inside()
         if effect.is_dry:
-            moving = minimum_filter1d(np.abs(velocity), around) > REST * float(np.std(velocity))
-            rows = moving if float(np.mean(moving)) > FEW else rows
+            moving = minimum_filter1d(np.abs(velocity), 2 * int(0.5 * slow.rate / cutoff) + 1) > REST * float(np.std(velocity))
+            rows = rows & moving if float(np.mean(moving)) > FEW else rows
         best, kept = np.inf, None
+        beside = [slow(force) for force in forces]
         for guess in guesses:
-            columns = [scene.smooth(column, cutoff)[:samples] for column in guess.columns]
-            coefficients, left = _least(np.array([acceleration, velocity, *columns])[:, rows], voltage[rows])
+            columns = [slow(column) for column in guess.columns]
+            coefficients, left = _least(np.array([acceleration, velocity, *beside, *columns])[:, rows], voltage[rows])
             if left < best and coefficients[0] * coefficients[1] > 0.0:
-                best, kept = left, (1.0 / float(coefficients[1]), float(coefficients[1] / coefficients[0]), guess.read(coefficients[2:]))
+                inertia, drag, *sizes = (float(value) for value in coefficients[: 2 + len(beside)])
+                values = effect.read(guess, coefficients[2 + len(beside) :], scene.similar)
+                best, kept = left, InverseStart(1.0 / drag, drag / inertia, values, tuple(sizes))
         if kept is not None:
             found.append(kept)
     return found
+
+
+@dataclass(frozen=True, slots=True)
+class LowPass:
+    """Signals below a frequency, at a rate that just carries them: the response of a Butterworth filter forth and back, no shift in time.
+
+    lines: weight of each line of the spectrum that is kept; turn: rad/s of each; size: samples that come out; rate: Hz, of these
+    """
+
+    lines: FloatArray
+    turn: FloatArray
+    samples: int
+    size: int
+    rate: float
+
+    @staticmethod
+    def of(samples: int, sampling_rate: float, cutoff: float) -> LowPass:
+        """For the first samples of signals."""
+        kept = min(int(3.0 * cutoff / sampling_rate * samples) + 1, samples // 2)
+        frequency = np.arange(kept + 1) * sampling_rate / samples
+        lines = 1.0 / (1.0 + (frequency / cutoff) ** 4)
+        return LowPass(lines=lines, turn=2.0 * np.pi * frequency, samples=samples, size=2 * kept, rate=2 * kept * sampling_rate / samples)
+
+    def __call__(self, signal: FloatArray, derived: bool = False) -> FloatArray:
+        """(size,) of a signal (n,), or of its derivative by time."""
+        seen = scipy.fft.rfft(signal[: self.samples])[: self.lines.size] * self.lines
+        return np.asarray(scipy.fft.irfft(seen * (1j * self.turn if derived else 1.0), self.size) * (self.size / self.samples))
+
+    def inside(self) -> NDArray[np.bool_]:
+        """(size,) where the ends, which the transform takes for neighbours, do not reach."""
+        rows = np.ones(self.size, dtype=np.bool_)
+        ends = max(self.size // 50, 1)
+        rows[:ends] = rows[-ends:] = False
+        return rows
 
 
 def _least(rows: FloatArray, target: FloatArray) -> tuple[FloatArray, float]:

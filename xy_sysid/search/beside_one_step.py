@@ -18,7 +18,7 @@ from xy_sysid.effects import Effect, Guess, Scene
 from xy_sysid.effects._contract import PATIENT, Beside, Followed, Limits
 from xy_sysid.greybox.free_run import AxisData, GreyboxFit
 from xy_sysid.greybox.one_step import AT_NOISE, CLEAN, as_beside, beside, followed
-from xy_sysid.greybox.score_test import Trace, bounded
+from xy_sysid.greybox.score_test import Trace
 from xy_sysid.greybox.start_rigid import mean_velocity_filter
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.search.criteria import LEAST
@@ -180,6 +180,8 @@ def traces(data: AxisData, model: AxisModel, effect: Effect, found: Followed, ef
             unit=still,
             positive=still.astype(np.bool_),
             undo=lambda _, samples: (u[:samples], y[: samples + 1], f[:samples], through),
+            similar=own.similar,
+            swing=own.swing,
         )
 
     here = seen(recording(voltage, position, against))
@@ -210,7 +212,7 @@ def traces(data: AxisData, model: AxisModel, effect: Effect, found: Followed, ef
     target = here[skip:] - basis @ (basis.T @ here[skip:])
     best: list[Trace] = []
     for item in effects:
-        trace = Trace(item.name, 0.0, item.typical)
+        trace = Trace(item.name, 0.0, tuple(own.typical for own in item.on(scene.similar)))
         for guess in item.guessed(scene):
             columns = np.stack([change(guess, column[:n], int(item.on_table)) for column in guess.columns])
             columns = columns - (columns @ basis) @ basis.T
@@ -220,7 +222,7 @@ def traces(data: AxisData, model: AxisModel, effect: Effect, found: Followed, ef
             coefficients = np.linalg.pinv(unit @ unit.T, rcond=1e-10, hermitian=True) @ inside
             share = float(inside @ coefficients) / float(target @ target + 1e-300)
             if share > trace.share:
-                trace = Trace(item.name, share, bounded(item, item.read(guess, -coefficients / size)))
+                trace = Trace(item.name, share, item.read(guess, -coefficients / size, scene.similar))
         best.append(trace)
     return sorted(best, key=lambda trace: -trace.share)
 

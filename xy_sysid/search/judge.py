@@ -53,6 +53,7 @@ class FreeRunJudge:
 
     def __init__(self, data: AxisData, library: Library, late: Callable[[], bool] = in_time) -> None:
         self.data, self.library, self.late = data, library, late
+        self.known: tuple[GreyboxFit, float] | None = None
         self.reach = float(np.min(data.position)), float(np.max(data.position))
 
     def begin(self) -> GreyboxFit:
@@ -154,8 +155,20 @@ class FreeRunJudge:
         )
 
     def _begins(self, now: GreyboxFit, model: AxisModel, effect: Effect, scene: Scene) -> float:
-        """Excess at starts that are read without the model: it may have been led so far astray that traces tell little."""
-        return min((first_excess(self.data, start) for start in other_starts(self.data, now, model, effect.name, scene)), default=np.inf)
+        """Excess at starts that are read without the model: it may have been led so far astray that traces tell little.
+
+        It is known of the first stage; what the motion there is quieter or livelier than in the whole is taken off.
+        """
+        starts = other_starts(self.data, now, model, effect.name, scene)
+        if not starts:
+            return np.inf
+        return now.excess + min(first_excess(self.data, start) for start in starts) - self._first(now)
+
+    def _first(self, now: GreyboxFit) -> float:
+        """Excess of a fit over the first stage."""
+        if self.known is None or self.known[0] is not now:
+            self.known = now, first_excess(self.data, now.model)
+        return self.known[1]
 
     def _simplest(self, own: frozenset[str], effect: Effect) -> frozenset[str]:
         """The set with the simplest law of friction, for a richer one: without it the base takes friction for drag, and traces tell little."""
@@ -184,12 +197,12 @@ class FreeRunJudge:
         if move.replaced is not None:
             name, values = move.starts[0]
             effect, old = self.library[name], dict(zip(self.library[move.replaced].names, dict(model.effects)[move.replaced], strict=True))
-            rest = model.without(move.replaced)
-            shared = [tuple(old.get(key, value) for key, value in zip(effect.names, row, strict=True)) for row in (values, effect.typical)]
-            traced = [rest.with_effect(name, bounded(effect, row)) for row in shared]
+            rest, usual = model.without(move.replaced), tuple(item.typical for item in effect.on(self.data.similar))
+            shared = [tuple(old.get(key, value) for key, value in zip(effect.names, row, strict=True)) for row in (values, usual)]
+            traced = [rest.with_effect(name, bounded(effect, row, self.data.similar)) for row in shared]
             return best_start(self.data, traced if rest.effects else [*traced, *other_starts(self.data, now, rest, name)])
         for name, values in move.starts:
-            begun = model.with_effect(name, bounded(self.library[name], values))
+            begun = model.with_effect(name, bounded(self.library[name], values, self.data.similar))
             model = best_start(self.data, [begun, *other_starts(self.data, now, model, name)])
         return model
 
@@ -206,8 +219,8 @@ class FreeRunJudge:
     def instead(self, now: GreyboxFit, name: str, relative: Effect) -> GreyboxFit | None:
         """The same set with a relative in the place of one effect."""
         own = dict(zip(self.library[name].names, dict(now.model.effects)[name], strict=True))
-        start = tuple(own.get(key, usual) for key, usual in zip(relative.names, relative.typical, strict=True))
-        return self.again(now, now.model.without(name).with_effect(relative.name, bounded(relative, start)))
+        start = tuple(own.get(item.name, item.typical) for item in relative.on(self.data.similar))
+        return self.again(now, now.model.without(name).with_effect(relative.name, bounded(relative, start, self.data.similar)))
 
     def again(self, now: GreyboxFit, model: AxisModel) -> GreyboxFit | None:
         """A model beside one that is there: fitted wholly only where it comes near."""
@@ -238,7 +251,7 @@ class FreeRunJudge:
             effect = self.library[name]
             if effect.plausible is not None and not effect.plausible(values):
                 return f"{name}: no machine has such values"
-            for k, (item, value) in enumerate(zip(effect.parameters, values, strict=True)):
+            for k, (item, value) in enumerate(zip(effect.on(self.data.similar), values, strict=True)):
                 edge = value >= item.high * (1.0 - 1e-6) or (k == 0 and not item.positive and value <= item.low * (1.0 + 1e-6) and item.low > 0.0)
                 if k == 0 and edge:
                     return f"{name}: {item.name} is at its bound"

@@ -12,9 +12,11 @@ import numpy as np
 from xy_sysid.effects._contract import Beside, DryFriction, Followed, OneStepTask
 from xy_sysid.effects.backlash.filter_source import NAMES
 from xy_sysid.effects.backlash.innovations import Innovations, View
+from xy_sysid.effects.backlash.usual_machine import from_usual, to_usual, usual
 from xy_sysid.samples.block import FloatArray
 
-GAPS = np.geomspace(2e-6, 150e-6, 10)  # m, tried first
+GAPS = (3.0, 0.75, 1.6)  # tried first: from so many encoder noises up to so much of the way between two reversals, each so much wider
+WIDEST = 24  # gaps tried first, at most
 FLANKS = (0.4, 1500.0, 0.2, 5.0, 0.03)  # share, rate, damping, loss, guide to begin with
 RIGID = (1e-10, 0.4, 1500.0, 0.1, 0.0, 0.03)  # no gap
 SOFT = 10.0  # rad/s of the spring at least that may take the place of the gap
@@ -35,6 +37,9 @@ class Contact:
 
     def fit(self, task: OneStepTask) -> Followed:
         """See ``OneStep``."""
+        return from_usual(self._fit(to_usual(task)), task.beside.similar)
+
+    def _fit(self, task: OneStepTask) -> Followed:
         first, _, n = task.stages
         fit = Innovations(task.sampling_rate, task.base, task.noise, task.beside, task.dry.laws)
         fit.late = task.limits.late
@@ -66,7 +71,8 @@ class Contact:
 
     def innovation(self, sampling_rate: float, found: Followed, beside: Beside, samples: int) -> FloatArray:
         """See ``OneStep``."""
-        fit = Innovations(sampling_rate, found.base, found.noise, beside, found.dry.laws)
+        found = from_usual(found, beside.similar, back=True)
+        fit = Innovations(sampling_rate * beside.similar.time, found.base, found.noise, usual(beside), found.dry.laws)
         return fit.seen(fit.start(found.base, found.values, found.dry.values), View(samples, cuts=COARSE))
 
     @staticmethod
@@ -80,7 +86,7 @@ class Contact:
         if begin is not None and not begin.too_small:
             best = fit.start(base, begin.values, friction)
         else:  # nothing draws a gap open that has closed
-            starts = [fit.start(base, (gap, *FLANKS), friction) for gap in GAPS]
+            starts = [fit.start(base, (gap, *FLANKS), friction) for gap in _gaps(task.noise, task.beside.swing)]
             best = min(starts, key=lambda start: fit.size(start, loose))
         if np.isfinite(bar) and fit.size(best, true) > FAR * bar:
             return best, True
@@ -108,6 +114,13 @@ class Contact:
     def _rigid(fit: Innovations, start: FloatArray, view: View, enough: float) -> FloatArray:
         """Without a gap, by the same filter; any spring will do then."""
         return fit.softened(SOFT).solved(start, np.delete(np.arange(start.size), GAP), view, 15, enough)
+
+
+def _gaps(noise: float, swing: float) -> list[float]:
+    """Widths to begin with, m."""
+    low, high, wider = GAPS[0] * noise, max(GAPS[1] * swing, 2.0 * GAPS[0] * noise), GAPS[2]
+    count = min(int(np.ceil(np.log(high / low) / np.log(wider))) + 1, WIDEST)
+    return [float(gap) for gap in np.geomspace(low, high, count)]
 
 
 def _three(numbers: FloatArray) -> tuple[float, float, float]:

@@ -1,0 +1,62 @@
+"""How much longer, slower and stronger a motion is than the one that the effects' bounds and usual sizes are written for.
+
+An axis does the same in metres, radians or encoder counts, driven by volts, amperes or newtons, and slowly or quickly; what is said of
+it must be the same, too (similarity; Barenblatt, Scaling, 2003, ch. 1). So bounds, usual sizes and steps in an effect's file are those
+of one usual machine, and are carried over to another by the units of each parameter.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from xy_sysid.samples.block import FloatArray
+
+SPEED, VOLTAGE = 0.025, 1.0  # rms, m/s and V, of the usual machine: a ball-screw table driven with noise
+RATE = 2000.0  # Hz; a machine that is sampled faster is no quicker, one that is sampled more slowly is slower
+UNIT = re.compile(r"(V|m|s)\^?(\d*)")
+
+
+@dataclass(frozen=True, slots=True)
+class Similarity:
+    """SI units for one of the usual machine.
+
+    length: m; time: s; voltage: V
+    """
+
+    length: float = 1.0
+    time: float = 1.0
+    voltage: float = 1.0
+
+    @staticmethod
+    def of(sampling_rate: float, voltage: FloatArray, velocity: FloatArray) -> Similarity:
+        """Of a motion: (n,) V, (n,) m/s. What stands still is like the usual machine."""
+        time = max(1.0, RATE / sampling_rate)
+        speed, drive = float(np.std(velocity)) / SPEED, float(np.std(voltage)) / VOLTAGE
+        return Similarity(length=(speed or 1.0) * time, time=time, voltage=drive or 1.0)
+
+    def factor(self, unit: str) -> float:
+        """SI units for one of the usual machine, for a unit made of V, m and s; 1 for what else there is (rad, numbers).
+
+        Hz stays as it is: what a resonance is called hangs on it, however it is sampled.
+        """
+        volts, lengths, times = _powers(unit)
+        return self.voltage**volts * self.length**lengths * self.time**times
+
+
+@cache
+def _powers(unit: str) -> tuple[int, int, int]:
+    """Powers of V, m and s: V/(m/s) is (1, -1, 1)."""
+    above, _, below = unit.partition("/")
+    below = below.strip("()") if below.startswith("(") else below.replace("/", " ")  # V/m/s is V per m and per s
+    found = {"V": 0, "m": 0, "s": 0}
+    for name, power in UNIT.findall(above):
+        found[name] += int(power or 1)
+    inner = _powers(below) if below else (0, 0, 0)
+    return found["V"] - inner[0], found["m"] - inner[1], found["s"] - inner[2]
+
+
+USUAL = Similarity()
