@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -52,10 +53,14 @@ def load_bag(path: Path, reading: Reading, progress: Callable[[float], None] | N
         if source.joints is not None and not source.effort:
             notes.append("joint states are paired with the voltage by their stamps")
         if source.effort and source.said and not reading.units and "input_unit" not in bag.custom:
-            notes.append('joint states name no unit: effort is taken as V and position as m; else say for example --unit input="N m",output=rad')
+            per = "/s" if source.output == "velocity" else ""
+            usual = f"effort is taken as V and {source.output} as m{per}"
+            notes.append(f'joint states name no unit: {usual}; else say for example --unit input="N m",output=rad{per}')
         if source.effort and not source.said:
-            notes.append("joint states name no unit; effort and position are carried as they are")
+            notes.append(f"joint states name no unit; effort and {source.output} are carried as they are")
         paired = cut(pair(streams, str(path), units(bag, source), notes, bag.bad), first["position"], start, stop)
+        if source.output == "velocity":
+            paired = dataclasses.replace(paired, measured="velocity", output_unit=paired.units.speed)
         return in_units(paired, reading)
 
 
@@ -167,6 +172,7 @@ def topics(reading: Reading) -> Topics:
         effort_as_voltage=reading.effort_as_voltage,
         joints=tuple(reading.joints),
         effort_lag=reading.effort_lag,
+        output="velocity" if reading.velocity else None,
     )
 
 
