@@ -143,6 +143,11 @@ class ExcitationSettings(Settings):
         return self.output == "commands" and self.interface == "position"
 
 
+def _units(input_unit: str, output_unit: str, output: str) -> Units:
+    """Of input and position; whoever has named the unit of a velocity, rad/s, has said that of its integral."""
+    return Units(input_unit, output_unit.removesuffix("/s") if output == "velocity" else output_unit)
+
+
 class IdentifierSettings(Settings):
     """Node ``identifier``, and every offline command that estimates."""
 
@@ -171,6 +176,9 @@ class IdentifierSettings(Settings):
     alarm_windows: int = knob(5, "windows of the short memory that watches for a moved resonance", "", ge=3, le=1000)
     alarm_sigma: float = knob(4.0, "a resonance has moved when it is so many standard errors away", "", ge=1.0, le=100.0)
     source: Literal["blocks", "joint_state"] = knob("blocks", "type of the position topic")
+    output: Literal["position", "velocity"] = knob(
+        "position", "with joint_state: the field that is the output; a velocity, of drives whose position is empty, NaN or wraps, is integrated"
+    )
     effort_as_voltage: bool = knob(False, "with joint_state: take the input from `effort` instead of the voltage topic")
     joints: Names = knob([""], 'with joint_state: the joint of an axis, as "x=shoulder_pan_joint"; an axis without one is the name of its joint')
     joint_topic: str = knob("joint_states", "with joint_state: their topic; that of ros2_control is /joint_states")
@@ -178,7 +186,7 @@ class IdentifierSettings(Settings):
         0, "samples by which effort in joint states is older than its stamp; 1 where it is that of the cycle before", "", ge=0, le=100
     )
     input_unit: str = knob("V", "unit of the input, as N m of an effort; it stands in every answer")
-    output_unit: str = knob("m", "unit of the position, m or rad")
+    output_unit: str = knob("m", "unit of the position, m or rad, also where the output is a velocity")
     state_file: str = knob("", "file that keeps the spectra over a restart; empty is none")
     save_every: float = knob(10.0, "seconds between two savings of the state", "s", gt=0.0, le=3600.0)
 
@@ -196,7 +204,7 @@ class IdentifierSettings(Settings):
     @property
     def units(self) -> Units:
         """Of input and output."""
-        return Units(self.input_unit, self.output_unit)
+        return _units(self.input_unit, self.output_unit, self.output)
 
     @property
     def orders(self) -> tuple[int, int]:
@@ -219,6 +227,9 @@ class DiagnoserSettings(Settings):
     tolerance: float = knob(0.001, "part of the signal that a model may leave; real machines need 0.01 or more", "", ge=1e-6, le=0.5)
     reorder: float = knob(0.5, "how late a block may come before its samples count as lost", "s", gt=0.0, le=60.0)
     source: Literal["blocks", "joint_state"] = knob("blocks", "type of the position topic")
+    output: Literal["position", "velocity"] = knob(
+        "position", "with joint_state: the field that is the output; a velocity, of drives whose position is empty, NaN or wraps, is integrated"
+    )
     effort_as_voltage: bool = knob(False, "with joint_state: take the input from `effort` instead of the voltage topic")
     joints: Names = knob([""], 'with joint_state: the joint of an axis, as "x=shoulder_pan_joint"; an axis without one is the name of its joint')
     joint_topic: str = knob("joint_states", "with joint_state: their topic; that of ros2_control is /joint_states")
@@ -226,7 +237,7 @@ class DiagnoserSettings(Settings):
         0, "samples by which effort in joint states is older than its stamp; 1 where it is that of the cycle before", "", ge=0, le=100
     )
     input_unit: str = knob("V", "unit of the input, as N m of an effort; it stands in every answer")
-    output_unit: str = knob("m", "unit of the position, m or rad")
+    output_unit: str = knob("m", "unit of the position, m or rad, also where the output is a velocity")
     effect_files: Names = knob([""], "Python files with effects of your own; they are run")
     effects: dict[str, Names] = Field(
         default_factory=lambda: {"x": [""], "y": [""]},
@@ -236,7 +247,7 @@ class DiagnoserSettings(Settings):
     @property
     def units(self) -> Units:
         """Of input and output."""
-        return Units(self.input_unit, self.output_unit)
+        return _units(self.input_unit, self.output_unit, self.output)
 
     def chosen(self, axis: str) -> tuple[str, ...]:
         """The effects that the model of an axis is to have."""

@@ -61,15 +61,21 @@ def both(firsts: Iterable[int], rows: int = 20) -> list[tuple[str, Block]]:
     return [(kind, numbered(first, rows, scale=scale)) for first in firsts for kind, scale in (("voltage", 1.0), ("position", 1e-3))]
 
 
+NONE = np.zeros(0)
+
+
 def joint_state(
-    stamp: int, position: FloatArray, effort: FloatArray | None = None, names: tuple[str, ...] = ("x", "y"), frame: str = "base"
+    stamp: int,
+    position: FloatArray,
+    effort: FloatArray | None = None,
+    names: tuple[str, ...] = ("x", "y"),
+    frame: str = "base",
+    velocity: FloatArray = NONE,
 ) -> bytes:
     """A serialized sensor_msgs/JointState; stamp in ns."""
     types = STORE.types
     header = types["std_msgs/msg/Header"](stamp=types["builtin_interfaces/msg/Time"](sec=stamp // 10**9, nanosec=stamp % 10**9), frame_id=frame)
-    message = types[JOINT_TYPE](
-        header=header, name=list(names), position=position, velocity=np.zeros(0), effort=np.zeros(0) if effort is None else effort
-    )
+    message = types[JOINT_TYPE](header=header, name=list(names), position=position, velocity=velocity, effort=NONE if effort is None else effort)
     return bytes(STORE.serialize_cdr(message, JOINT_TYPE))
 
 

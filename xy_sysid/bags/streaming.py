@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -15,6 +15,9 @@ from xy_sysid.bags.stride import Batch, Indices, Reader, Stretch, doubles, stamp
 from xy_sysid.errors import BadInput
 from xy_sysid.jit import compiled
 from xy_sysid.samples.block import Block, FloatArray, StreamName, unpack
+from xy_sysid.samples.integral import Path as Moved
+from xy_sysid.samples.integral import integrated
+from xy_sysid.samples.joint_fields import FIELDS, PLURAL, JointOutput
 from xy_sysid.samples.joint_states import JointCounter, joints_of
 from xy_sysid.units import Units
 
@@ -30,6 +33,7 @@ OTHERS = "Name others with --topic voltage=NAME, position=NAME or joints=NAME."
 class Topics:
     """What to read of a bag: block topics of input and output, the JointState topic (found if there is one only), and its effort as the input.
 
+    output: field of the joint states that is the output; None: the velocity where no joint has a position
     joints: the joint of each axis, as x=shoulder_pan_joint; none: every joint is an axis of its name
     effort_lag: samples by which effort is older than its stamp
     """
@@ -40,6 +44,7 @@ class Topics:
     effort_as_voltage: bool = False
     joints: tuple[str, ...] = ()
     effort_lag: int = 0
+    output: JointOutput | None = None
 
 
 USUAL = Topics()
@@ -49,7 +54,7 @@ USUAL = Topics()
 class Source:
     """Where input and output come from.
 
-    topics: (name, kind) of the block topics; joints: the JointState topic or None; effort: input is its effort;
+    topics: (name, kind) of the block topics; joints: the JointState topic or None; effort: input is its effort; output: which of its fields
     said:   whether effort was asked for, rather than found as the only input there is
     axes:   axis of each joint that is read; empty is all, under their own names; lag: samples by which effort is older
     """
@@ -60,6 +65,7 @@ class Source:
     said: bool
     axes: Mapping[str, str] = field(default_factory=dict)
     lag: int = 0
+    output: JointOutput = "position"
 
 
 def choose(bag: Bag, topics: Topics) -> Source:
@@ -82,15 +88,49 @@ def choose(bag: Bag, topics: Topics) -> Source:
         inputs: tuple[tuple[str, StreamName], ...] = () if effort else ((voltage_topic, "voltage"),)
         names = tuple(pair.partition("=")[0].strip() for pair in topics.joints)
         axes = {joint: axis for axis, joint in joints_of(names, topics.joints).items()}
-        return Source(topics=(*inputs, *extra), joints=joints, effort=effort, said=effort_as_voltage, axes=axes, lag=topics.effort_lag)
+        return Source(
+            topics=(*inputs, *extra),
+            joints=joints,
+            effort=effort,
+            said=effort_as_voltage,
+            axes=axes,
+            lag=topics.effort_lag,
+            output=topics.output or _given(bag, joints, list(axes)),
+        )
     if len(blocks) < 2:
         missing = " and ".join(dict.fromkeys(name for name in (voltage_topic, position_topic) if name not in blocks))
         raise bag.bad(f"no block topic {missing}; it has {bag.listing()}", OTHERS)
     return Source(((voltage_topic, "voltage"), (position_topic, "position"), *extra), None, False, False)
 
 
+def _given(bag: Bag, topic: str, joints: Sequence[str]) -> JointOutput:
+    """Velocity, and a note, where none of the joints (none: all) has a number for a position in the whole bag, and one has a velocity."""
+    reader, moving, said = Reader(joint_layout), False, len(bag.notes)
+    for batch, _ in bag.batches([topic]):
+        for stretch in reader.stretches(batch):
+            names = stretch.layout.names if stretch.layout is not None else ()
+            columns = [place for place, name in enumerate(names) if name in joints or not joints]
+            known = [_any_numbers(batch, stretch, field, columns) for field in (0, 1)]
+            if known[0]:
+                del bag.notes[said:]
+                return "position"
+            moving |= known[1]
+    del bag.notes[said:]
+    if moving:
+        bag.notes.append(f"{topic} gives no positions; the velocity of the joints is the output")
+    return "velocity" if moving else "position"
+
+
+def _any_numbers(batch: Batch, stretch: Stretch, field: int, columns: list[int]) -> bool:
+    """Whether any of these joints has a number in one of the messages."""
+    layout = stretch.layout
+    if layout is None or not columns or layout.parts[field][1] != len(layout.names):
+        return False
+    return bool(np.isfinite(doubles(batch, stretch, field)[:, columns]).any())
+
+
 def units(bag: Bag, source: Source) -> Units:
-    """Of input and output, as the bag tells them."""
+    """Of input and position, as the bag tells them."""
     if source.effort and not source.said:
         return EFFORT_UNITS
     return Units(bag.custom.get("input_unit", "V"), bag.custom.get("output_unit", "m"))
@@ -154,6 +194,7 @@ class _Decoder:
         self.joints: tuple[str, ...] = ()
         self.from_log: bool | None = None
         self.clock: _Clock | None = None
+        self.moved: Moved | None = None  # live: velocities become positions here, else when all is known
 
     def parts(self, batch: Batch) -> list[_Part]:
         parts: list[_Part] = []
@@ -224,10 +265,12 @@ class _Decoder:
         if wanted:
             single = tuple(wanted)
         self.joints = self.joints or single
-        position, effort = layout.parts[0][1], layout.parts[2][1]
+        field = FIELDS.index(self.source.output)
+        number, effort = layout.parts[field][1], layout.parts[2][1]
         width = len(layout.names)
-        if position != width or not single or set(single) != set(self.joints) or (self.source.effort and effort != width):
-            self.skip(name, len(places), f"{width} names with {position} positions and {effort} efforts, joints {', '.join(layout.names)}")
+        if number != width or not single or set(single) != set(self.joints) or (self.source.effort and effort != width):
+            what = f"{width} names with {number} {PLURAL[self.source.output]} and {effort} efforts"
+            self.skip(name, len(places), f"{what}, joints {', '.join(layout.names)}")
             return []
         stamp = stamps(batch, stretch)
         if self.from_log is None:
@@ -236,9 +279,13 @@ class _Decoder:
         order = [layout.names.index(joint) for joint in self.joints]
         axes = tuple(wanted[joint] for joint in self.joints) if wanted else self.joints
         if self.live and self.source.effort:
-            return self.counted(axes, places, time, np.hstack((doubles(batch, stretch, 0)[:, order], doubles(batch, stretch, 2)[:, order])))
+            return self.counted(axes, places, time, np.hstack((doubles(batch, stretch, field)[:, order], doubles(batch, stretch, 2)[:, order])))
         seq = np.zeros(len(time)) if self.clock is None else self.clock.follow(time) if self.source.effort else self.clock.near(time)
-        parts = [_Part("position", places, 1, Block(axes, seq, time, doubles(batch, stretch, 0)[:, order]))]
+        values = doubles(batch, stretch, field)[:, order]
+        if self.live and self.source.output == "velocity" and self.clock is not None:
+            self.moved = self.moved or Moved(len(axes))
+            values = self.moved.add(seq, values, self.clock.period)
+        parts = [_Part("position", places, 1, Block(axes, seq, time, values))]
         if self.source.effort:
             lag = self.source.lag if self.clock is not None else 0  # while the clock is learnt, counters say nothing
             known, since = seq >= lag, lag * self.clock.period if self.clock is not None else 0.0
@@ -248,7 +295,7 @@ class _Decoder:
 
     def counted(self, axes: tuple[str, ...], places: Indices, time: FloatArray, rows: FloatArray) -> list[_Part]:
         """Positions and efforts with the numbers that they had live; a sample that was decided late stands where that was."""
-        self.counter = self.counter or JointCounter(axes, with_voltage=False)
+        self.counter = self.counter or JointCounter(axes, with_voltage=False, output=self.source.output)
         found = [(place, self.counter.add(float(at), row)) for place, at, row in zip(places.tolist(), time, rows, strict=True)]
         blocks = [(place, block) for place, block in found if block is not None]
         if not blocks:
@@ -267,6 +314,8 @@ class _Decoder:
             self.bag.notes.append(f"{name} has {', '.join(words)} twice; nobody knows which is meant, and they are left out")
         if self.from_log:
             self.bag.notes.append("the stamps of the joint states are zero; the time of recording is used")
+        if self.live and self.source.output == "velocity":
+            self.bag.notes.append(integrated())
 
 
 @compiled

@@ -26,6 +26,9 @@ Topics = Annotated[
     typer.Option("--topic", metavar="WHAT=NAME", help="topic names in a bag: voltage=..., position=... or joints=... (may be repeated)"),
 ]
 Effort = Annotated[bool, typer.Option("--effort", help="take the input from the effort of a JointState; its unit is V, or as --unit says")]
+Velocity = Annotated[
+    bool, typer.Option("--velocity", help="take the output from the velocity of a JointState; without it only where there are no positions")
+]
 Joints = Annotated[
     list[str] | None,
     typer.Option("--joint", metavar="AXIS=JOINT", help="the joint of an axis in a bag's joint states, as x=shoulder_pan_joint (may be repeated)"),

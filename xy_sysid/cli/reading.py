@@ -44,6 +44,7 @@ def reading_from(
     rate: Rate = None,
     joint: o.Joints = None,
     effort_lag: o.EffortLag = 0,
+    velocity: o.Velocity = False,
 ) -> Reading:
     """What the options of reading say; they are these parameters."""
     from xy_sysid.imports.reading import Reading, numbers, pairs
@@ -60,6 +61,7 @@ def reading_from(
         effort_as_voltage=effort,
         joints=tuple(joint or ()),
         effort_lag=effort_lag,
+        velocity=velocity,
         **o.topics_from(topic),
     )
 

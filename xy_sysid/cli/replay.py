@@ -14,6 +14,7 @@ from xy_sysid.cli.output import aside, emit, estimates, progress, say, table
 
 if TYPE_CHECKING:
     from xy_sysid.live.fitter import Update
+    from xy_sysid.samples.joint_fields import JointOutput
     from xy_sysid.search.findings import Rung
     from xy_sysid.units import Units
 
@@ -27,6 +28,7 @@ def replay(
     effort: o.Effort = False,
     joint: o.Joints = None,
     effort_lag: o.EffortLag = 0,
+    velocity: o.Velocity = False,
     diagnose: Annotated[bool, typer.Option("--diagnose", help="then name what is missing and add it, as the node diagnoser does")] = False,
     effect_file: Own = None,
     out: Annotated[Path | None, typer.Option("--out", metavar="BAG", help="write what the node would have published")] = None,
@@ -45,12 +47,14 @@ def replay(
     from xy_sysid.live.identifier import Identifier
     from xy_sysid.live.replay import replay as logic
     from xy_sysid.samples.pairing import QUANTITIES
-    from xy_sysid.settings import DiagnoserSettings, given
+    from xy_sysid.settings import DiagnoserSettings, changed, given
     from xy_sysid.story.acts import sentence as words
     from xy_sysid.story.document import document
     from xy_sysid.units import USUAL, motion
 
     settings = o.settings_from(params, set_)
+    if velocity:
+        settings = changed(settings, {"output": "velocity"})
     if out is not None and out.exists():
         raise BadRecording(out, "exists already", "Choose another name; nothing is overwritten.")
     last: Update | None = None
@@ -66,7 +70,8 @@ def replay(
         if settings.source == "joint_state":
             names.setdefault("joint_topic", settings.joint_topic if settings.joint_topic.startswith("/") else f"/xy/{settings.joint_topic}")
         joints, lag = tuple(joint or given(settings.joints)), effort_lag or settings.effort_lag
-        wanted = Topics(effort_as_voltage=effort or settings.effort_as_voltage, joints=joints, effort_lag=lag, **names)
+        output: JointOutput | None = "velocity" if settings.output == "velocity" else None
+        wanted = Topics(effort_as_voltage=effort or settings.effort_as_voltage, joints=joints, effort_lag=lag, output=output, **names)
         heard = stream_blocks(bag, wanted, notes=notes, about=units.append)
         wanted_streams = QUANTITIES if settings.response == "h1" else (*QUANTITIES, "reference")
         blocks = (item for item in heard if item[0] in wanted_streams)

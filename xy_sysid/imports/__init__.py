@@ -89,8 +89,8 @@ def sheet_of(path: Path, kind: str) -> Sheet:
 
 def _from_table(path: Path, kind: str, reading: Reading) -> Recording:
     topics = reading.voltage_topic, reading.position_topic, reading.joint_topic
-    if reading.effort_as_voltage or reading.joints or reading.effort_lag or topics != (VOLTAGE, POSITION, None):
-        raise BadInput("--topic, --effort or --joint", f"for {path}", "for a bag", "A table has columns: choose them with --map.")
+    if reading.effort_as_voltage or reading.velocity or reading.joints or reading.effort_lag or topics != (VOLTAGE, POSITION, None):
+        raise BadInput("--topic, --effort, --velocity or --joint", f"for {path}", "for a bag", "A table has columns: choose them with --map.")
     notes: list[str] = []
     if kind == "csv":
         found = sheet_table.table(sheet_of(path, kind), reading, notes)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -10,7 +11,8 @@ import numpy as np
 
 from xy_sysid.bags.reading import Bag
 from xy_sysid.bags.streaming import Topics, choose, pieces, units
-from xy_sysid.errors import BadInput
+from xy_sysid.errors import BadInput, BadRecording
+from xy_sysid.imports.even import drifts, even
 from xy_sysid.imports.given import in_units
 from xy_sysid.imports.paired_streams import LATE, Stream, cut, gather, hollow, is_jitter, pair, steady
 from xy_sysid.imports.reading import Reading
@@ -42,9 +44,9 @@ def load_bag(path: Path, reading: Reading, progress: Callable[[float], None] | N
         common = _with_numbers(bag, same, common, notes)
         streams: dict[str, Stream] = {kind: gather(kind, blocks, common, notes, bag.bad) for kind, blocks in same.items() if blocks}
         if source.effort:
+            streams |= _in_order(path, streams, source.lag, notes)
             if "reference" in streams:
                 streams["reference"] = _by_stamp(streams["reference"], streams["position"])
-            streams = _in_order(streams, notes)
             if not source.said:
                 notes.append("there is no voltage topic; the joints' effort is the input")
             if not np.any(streams["voltage"].values):
@@ -52,10 +54,14 @@ def load_bag(path: Path, reading: Reading, progress: Callable[[float], None] | N
         if source.joints is not None and not source.effort:
             notes.append("joint states are paired with the voltage by their stamps")
         if source.effort and source.said and not reading.units and "input_unit" not in bag.custom:
-            notes.append('joint states name no unit: effort is taken as V and position as m; else say for example --unit input="N m",output=rad')
+            per = "/s" if source.output == "velocity" else ""
+            usual = f"effort is taken as V and {source.output} as m{per}"
+            notes.append(f'joint states name no unit: {usual}; else say for example --unit input="N m",output=rad{per}')
         if source.effort and not source.said:
-            notes.append("joint states name no unit; effort and position are carried as they are")
+            notes.append(f"joint states name no unit; effort and {source.output} are carried as they are")
         paired = cut(pair(streams, str(path), units(bag, source), notes, bag.bad), first["position"], start, stop)
+        if source.output == "velocity":
+            paired = dataclasses.replace(paired, measured="velocity", output_unit=paired.units.speed)
         return in_units(paired, reading)
 
 
@@ -167,14 +173,32 @@ def topics(reading: Reading) -> Topics:
         effort_as_voltage=reading.effort_as_voltage,
         joints=tuple(reading.joints),
         effort_lag=reading.effort_lag,
+        output="velocity" if reading.velocity else None,
     )
 
 
-def _in_order(streams: dict[str, Stream], notes: list[str]) -> dict[str, Stream]:
-    """Joint states whose stamps jitter too much to count by, but of which none is lost, are numbered as they came."""
-    time = streams["position"].time
-    if len(time) < 2 or len(streams["voltage"].seq) != len(time) or not is_jitter(np.diff(streams["position"].seq)):
-        return streams
+def _in_order(path: Path, streams: dict[str, Stream], lag: int, notes: list[str]) -> dict[str, Stream]:
+    """Positions and efforts of one stream of joint states, placed by their stamps where its period drifts, as in a table of uneven time.
+
+    Stamps that jitter too much to count by, but of which none is lost, are numbered as they came. lag: samples by which efforts are older
+    """
+    position, voltage = streams["position"], streams["voltage"]
+    time, both = position.time, len(voltage.seq)
+    if len(time) < 2 or both != len(time) - lag:
+        return {}
+    if drifts(time):
+        try:
+            found = even(path, time[:both], voltage.values, (position.values[:both],), notes)
+        except BadRecording as problem:
+            notes.append(f"{problem.problem}; samples are numbered by their steps all the same")
+        else:
+            values = zip(("voltage", "position"), found.values, strict=True)
+            return {name: Stream(streams[name].axes, found.seq, found.time, numbers) for name, numbers in values}
+    if not is_jitter(np.diff(position.seq)):
+        return {}
     notes.append("the stamps jitter by more than half a sample; samples are numbered as they came, with even times")
-    count, even = np.arange(len(time), dtype=np.float64), steady(time)
-    return {name: Stream(stream.axes, count, even, stream.values) for name, stream in streams.items()}
+    count, instants = np.arange(len(time), dtype=np.float64), steady(time)
+    return {
+        "position": Stream(position.axes, count, instants, position.values),
+        "voltage": Stream(voltage.axes, count[:both], instants[:both], voltage.values),
+    }

@@ -24,6 +24,8 @@ LOCAL = 50  # samples over which the period is looked at
 STEADY = 0.005  # relative; a period that wanders by less is even enough: frequencies are off by no more
 BURST = 0.2  # of a period; more steps than BURSTS shorter than that are stamps that came in bursts
 BURSTS = 0.2
+STRETCH, APART = 200, 50  # samples over which a period is told from late, lost and jittering stamps; between two of them that are compared
+DRIFT = 0.02  # relative; a period that changes by more within a recording is not one
 LOST = 0.3  # of the time; in steps longer than GAP more than that is lost
 Values = tuple[FloatArray, ...]
 
@@ -76,6 +78,23 @@ def _wanders(steps: FloatArray) -> bool:
     if float(np.max(np.abs(from_line))) < 1.0:  # never a whole period off: jitter, or nothing to lose
         return False
     return float(np.max(np.abs(local))) > STEADY
+
+
+def drifts(time: FloatArray) -> bool:
+    """Whether the period itself changes, as that of an overloaded machine does; cycles that are late, lost or made up for leave it what it is."""
+    steps = np.diff(time)
+    if len(time) < 2 * STRETCH or not float(np.median(steps)) > 0:
+        return False
+    lost = np.concatenate(([0.0], np.cumsum(np.rint(steps / np.median(steps)))))
+    return all(_varies(time, count) for count in (np.arange(len(time), dtype=np.float64), lost))
+
+
+def _varies(time: FloatArray, count: FloatArray) -> bool:
+    """Whether the period by this count, each the median of many over a stretch, differs from one stretch to another."""
+    passed, counted = time[APART:] - time[:-APART], count[APART:] - count[:-APART]
+    periods, rows = passed / np.maximum(counted, 1.0), STRETCH - APART
+    local = [np.median(periods[begin : begin + rows]) for begin in range(0, len(periods) - rows + 1, STRETCH // 2)]
+    return bool(np.ptp(local) > DRIFT * np.median(local))
 
 
 def _resampled(path: Path, time: FloatArray, rate: float, held: FloatArray, smooth: Values, notes: list[str]) -> Even:

@@ -20,10 +20,15 @@ def in_units(recording: Recording, reading: Reading) -> Recording:
     u, input_unit = _side(recording, "input", recording.voltage, recording.input_unit, reading, notes)
     y, output_unit = _side(recording, "output", recording.position, recording.output_unit, reading, notes)
     r = None if recording.reference is None else _side(recording, "reference", recording.reference, recording.output_unit, reading, [])[0]
-    measured: Sensed = output_unit.quantity if output_unit.quantity in ("velocity", "acceleration") else "position"
+    measured: Sensed = output_unit.quantity if output_unit.quantity in ("velocity", "acceleration") else recording.measured
     return dataclasses.replace(
         recording, voltage=u, position=y, reference=r, input_unit=input_unit.name, output_unit=output_unit.name, measured=measured, notes=tuple(notes)
     )
+
+
+def _meant(text: str, measured: Sensed) -> str:
+    """The unit that is meant: of a velocity that of its position may be said, rad for rad/s."""
+    return f"{text}/s" if measured == "velocity" and unit_of(text).quantity == "position" else text
 
 
 def _side(recording: Recording, role: str, values: FloatArray, text: str, reading: Reading, notes: list[str]) -> tuple[FloatArray, Unit]:
@@ -34,7 +39,7 @@ def _side(recording: Recording, role: str, values: FloatArray, text: str, readin
     for place, axis in enumerate(recording.axes):
         told: list[str] = []
         one, own = scaled(values[:, place], reading.unit(role, axis) or text, reading.scale(role, axis), f"the {role} of {axis}", told)
-        one, unit = to_si(one, own, f"the {role}", told)
+        one, unit = to_si(one, own if role == "input" else _meant(own, recording.measured), f"the {role}", told)
         notes += [note for note in told if note not in notes]
         columns.append(one)
         units.append(unit)

@@ -1,9 +1,4 @@
-"""Velocity or acceleration --> position, so that everything that works on positions works on them.
-
-A velocity v becomes the position whose mean velocity from each sample to the next is exactly v, sample by sample: noise of v
-stays white. What was measured at an instant then stands for the step after it, so a delay found from it contains half a
-sample (a whole one where the drive itself differences its encoder over the last sample), which a note says.
-"""
+"""Velocity or acceleration --> position, so that everything that works on positions works on them, by the law of ``samples.integral``."""
 
 from __future__ import annotations
 
@@ -12,6 +7,7 @@ import dataclasses
 import numpy as np
 
 from xy_sysid.samples.block import FloatArray
+from xy_sysid.samples.integral import integral, integrated
 from xy_sysid.samples.recording import Recording
 
 
@@ -22,19 +18,15 @@ def as_position(recording: Recording) -> Recording:
     unit = recording.output_unit
     notes = list(recording.notes)
     values = recording.position
-    half = 0.5e3 / recording.sampling_rate
     if recording.measured == "acceleration":
         values = _integral(recording, values - values.mean(axis=0))
         values = _without_line(recording, values)
         notes.append(
             f"the output is an acceleration ({unit}): it is integrated twice, without its mean and slow drift, so a constant load "
-            f"cannot be seen; a delay found from it contains a whole sample ({2 * half:.3g} ms)"
+            f"cannot be seen; a delay found from it contains a whole sample ({1e3 / recording.sampling_rate:.3g} ms)"
         )
     else:
-        notes.append(
-            f"the output is a velocity ({unit}): it is integrated, so positions count from 0; "
-            f"a delay found from it contains half a sample ({half:.3g} ms), or a whole one if the drive differences its encoder"
-        )
+        notes.append(integrated(unit, recording.sampling_rate))
     measured = _integral(recording, values)
     reference = None if recording.reference is None else _integral(recording, recording.reference)
     if recording.measured == "acceleration":
@@ -45,9 +37,7 @@ def as_position(recording: Recording) -> Recording:
 
 
 def _integral(recording: Recording, values: FloatArray) -> FloatArray:
-    """Sum of values / rate up to before each sample; over a gap the last value is held."""
-    lasting = np.diff(recording.seq).astype(np.float64)[:, None] / recording.sampling_rate
-    return np.concatenate((np.zeros((1, values.shape[1])), np.cumsum(values[:-1] * lasting, axis=0)))
+    return integral(values, np.diff(recording.seq) / recording.sampling_rate)
 
 
 def _without_line(recording: Recording, values: FloatArray) -> FloatArray:

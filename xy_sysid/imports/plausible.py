@@ -21,6 +21,7 @@ HUGE = 1e100  # a number beyond it has no square, let alone the square of its de
 SLOW = 3.0  # Hz; slower sampling is asked about
 FAR, FAST = 20.0, 50.0  # m and m/s; longer or faster axes are asked about
 TURNING = 3000.0  # rad/s, 30,000 turns a minute
+TURN, NEARLY = 2 * np.pi, 0.5  # rad; a step that is a turn within so much, where others are smaller than that, is an angle that wraps
 TINY = {"m": 1e-8, "rad": 1e-8, "V": 1e-6, "A": 1e-6}  # a signal that moves less in all is asked about
 ROUGH = 0.5  # steps over spread; a position is smoother than that, noise is not
 SMOOTHER = 0.25  # of the output's roughness; an input that is that much smoother may be a position
@@ -183,6 +184,10 @@ def _of_size(recording: Recording, y: FloatArray, size: float) -> list[str]:
             found.append(f"the output moves over {size:.4g} m at {speed:.3g} m/s: is it in mm or counts? Say --unit output=mm, or --scale")
         if recording.output_unit == "rad" and speed > TURNING:
             found.append(f"the output turns at {speed:.3g} rad/s: is it in deg or counts? Say --unit output=deg, or --scale")
+        turns = int(np.sum(np.abs(np.abs(np.diff(y)) - TURN) < NEARLY))
+        if recording.output_unit == "rad" and turns and step < NEARLY:
+            often = "once" if turns == 1 else f"{turns} times"
+            found.append(f"the output leaps by a whole turn {often}, as an angle that wraps: unwrap it, or of joint states say --velocity")
     largest = float(np.max(np.abs(y)))
     apart = float(np.spacing(largest))
     if apart > COARSE * step and step > 0 and largest > 10 * size:

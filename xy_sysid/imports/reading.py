@@ -30,6 +30,7 @@ class Reading:
     voltage_topic, position_topic: block topics of a bag; joint_topic: its JointState topic, found if there is one only
     effort_as_voltage: take the joints' effort as the input, even if there is a voltage topic
     joints:  the joint of each axis, as x=shoulder_pan_joint; effort_lag: samples by which effort is older than its stamp
+    velocity: take the joints' velocity as the output, even if there are positions
     """
 
     columns: Mapping[str, str] = field(default_factory=dict)
@@ -45,6 +46,7 @@ class Reading:
     effort_as_voltage: bool = False
     joints: Sequence[str] = ()
     effort_lag: int = 0
+    velocity: bool = False
 
     def __post_init__(self) -> None:
         if not self.start >= 0 or (self.stop is not None and not self.stop > self.start):

@@ -122,8 +122,8 @@ class Diagnoser:
                     sampling_rate=heard.sampling_rate,
                     voltage=heard.voltage[:, column].copy(),
                     position=heard.position[:, column].copy(),
-                    input_unit=self._settings.input_unit,
-                    output_unit=self._settings.output_unit,
+                    input_unit=self._settings.units.input,
+                    output_unit=self._settings.units.output,
                 )
             self._under_way, self.doing = axis, f"axis {axis}: {request.act}"
             return Job(

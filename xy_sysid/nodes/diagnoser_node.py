@@ -24,7 +24,7 @@ from xy_sysid.nodes.common import LATCHED_QOS, WalledNode, declare
 from xy_sysid.nodes.convert import array_to_ros, status_to_ros, statuses_to_ros
 from xy_sysid.nodes.diagnostics import Diagnostics
 from xy_sysid.nodes.later import LaterTrigger
-from xy_sysid.nodes.streams import AXES, Streams, answered, declare_axes
+from xy_sysid.nodes.streams import AXES, HEARING, Streams, answered, declare_axes
 from xy_sysid.processes.story_process import StoryWorker
 from xy_sysid.settings import DiagnoserSettings, given
 from xy_sysid.story.acts import Act
@@ -34,7 +34,7 @@ from xy_sysid.story.story import Story, allowed
 LOOK = 0.1  # s between two looks for news
 HEARTBEAT = 1.0  # s between two statuses in metrics
 ACTS: tuple[Act, ...] = ("begin", "diagnose", "add_next", "auto")  # services
-FIXED = ("source", "effort_as_voltage", "joints", "joint_topic", "effort_lag", "input_unit", "output_unit", "effect_files")
+FIXED = (*HEARING, "effect_files")
 
 
 class DiagnoserNode(WalledNode):

@@ -22,7 +22,7 @@ from xy_sysid.live.messages import WARN, StatusMessage, topic_of
 from xy_sysid.nodes.common import LATCHED_QOS, WalledNode, declare
 from xy_sysid.nodes.convert import array_to_ros, status_to_ros
 from xy_sysid.nodes.diagnostics import Diagnostics
-from xy_sysid.nodes.streams import AXES, Streams, answered, declare_axes
+from xy_sysid.nodes.streams import AXES, HEARING, Streams, answered, declare_axes
 from xy_sysid.processes.fit_thread import FitWorker
 from xy_sysid.samples.block import Block, StreamName
 from xy_sysid.settings import IdentifierSettings
@@ -31,7 +31,7 @@ PUBLISH_PERIOD = 0.05  # s between two looks for finished fits
 HEARTBEAT = 1.0  # s between two statuses of the streams
 # Changing one of these starts the spectra anew; the topics' names and types are fixed when the node starts.
 SHAPES_SPECTRA = ("window", "length", "overlap", "differenced", "memory", "sliding", "alarm_windows", "reorder")
-FIXED = ("response", "source", "effort_as_voltage", "joints", "joint_topic", "effort_lag", "input_unit", "output_unit", "state_file", "save_every")
+FIXED = ("response", *HEARING, "state_file", "save_every")
 
 
 class IdentifierNode(WalledNode):

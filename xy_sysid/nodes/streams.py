@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-import numpy as np
 from rclpy.node import Node
 from rclpy.qos import HistoryPolicy, QoSProfile
 from sensor_msgs.msg import JointState
@@ -17,6 +16,8 @@ from xy_sysid.live.messages import topic_of
 from xy_sysid.nodes.common import DATA_QOS, declare_fixed, from_message, overrides
 from xy_sysid.nodes.hearing import Ear
 from xy_sysid.samples.block import Block, StreamName
+from xy_sysid.samples.integral import integrated
+from xy_sysid.samples.joint_fields import JointReader
 from xy_sysid.samples.joint_states import JointCounter, joints_of
 from xy_sysid.samples.pairing import QUANTITIES
 from xy_sysid.settings import DiagnoserSettings, IdentifierSettings, given
@@ -24,6 +25,7 @@ from xy_sysid.units import USUAL
 
 JOINT_QOS = QoSProfile(depth=20_000, history=HistoryPolicy.KEEP_LAST)  # ten seconds of single samples at 2 kHz
 AXES = "axes"
+HEARING = ("source", "output", "effort_as_voltage", "joints", "joint_topic", "effort_lag", "input_unit", "output_unit")  # fixed from the start
 
 
 def declare_axes(node: Node) -> tuple[str, ...]:
@@ -50,16 +52,18 @@ class Streams:
     def __init__(
         self, node: Node, axes: tuple[str, ...], settings: IdentifierSettings | DiagnoserSettings, feed: Callable[[Any, Block], None]
     ) -> None:
-        """settings: source, effort_as_voltage, joints; feed: gets every block and its stream. Raises BadInput for joints that name no axis."""
+        """settings: source, output, effort_as_voltage, joints, ...; feed: gets every block and its stream. Raises BadInput for joints of no axis."""
         source, effort = settings.source, settings.effort_as_voltage
         self._lag = settings.effort_lag
-        self._names = tuple(joints_of(axes, given(settings.joints)).values())
+        self._reader = JointReader(joints_of(axes, given(settings.joints)), settings.output, effort)
         if effort and settings.units == USUAL:
             words = "joint states name no unit: effort is taken as V and position as m; set input_unit and output_unit, for example to N m and rad"
             node.get_logger().warning(words)
+        if source == "joint_state" and settings.output == "velocity":
+            node.get_logger().info(integrated(settings.units.speed))
         self.refused, self.refusals = "", 0
         self._node, self._axes, self._effort, self._give = node, axes, effort, feed
-        self._joints = JointCounter(axes, with_voltage=not effort)
+        self._joints = JointCounter(axes, with_voltage=not effort, output=settings.output)
         closed = isinstance(settings, IdentifierSettings) and settings.response == "joint_input_output"
         self._streams: tuple[StreamName, ...] = (*QUANTITIES, "reference") if closed else QUANTITIES
         self._heard = dict.fromkeys(self._streams, 0)
@@ -114,23 +118,17 @@ class Streams:
         self._heard["position"] += 1
         if self._effort:
             self._heard["voltage"] += 1
-        missing = [name for name in self._names if name not in message.name]
-        places = [] if missing else [message.name.index(name) for name in self._names]
-        effort = self._effort
-        if missing or len(message.position) != len(message.name) or (effort and len(message.effort) != len(message.name)):
-            what = f"joints {', '.join(message.name)}" if missing else "a position" + (" and an effort" if effort else "") + " for some joints only"
-            self._refuse(
-                f'joint_states: {what}; expected {", ".join(self._names)}. Set the parameter joints, for example to ["{self._axes[0]}=NAME"].'
-            )
+        wrong = self._reader.wrong(message)
+        if wrong:
+            self._refuse(wrong)
             return
         time = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
-        row = [message.position[k] for k in places] + ([message.effort[k] for k in places] if effort else [])
-        block = self._joints.add(time, np.array(row, dtype=np.float64))
+        block = self._joints.add(time, self._reader.row(message))
         if block is None:
             return
         number = len(self._axes)
         self._give("position", Block(self._axes, block.seq, block.time, block.values[:, :number]))
-        if effort:
+        if self._effort:
             known = block.seq >= self._lag
             self._give("voltage", Block(self._axes, block.seq[known] - self._lag, block.time[known], block.values[known, number:]))
 

@@ -12,6 +12,8 @@ import numpy as np
 
 from xy_sysid.errors import BadInput
 from xy_sysid.samples.block import Block, FloatArray
+from xy_sysid.samples.integral import Path
+from xy_sysid.samples.joint_fields import JointOutput
 from xy_sysid.samples.ring import RATE_SAMPLES
 from xy_sysid.samples.stamp_counter import StampCounter
 
@@ -58,9 +60,13 @@ def usual_step(times: FloatArray) -> float:
 class JointCounter:
     """add(time, row) -> a block of one or more counted samples, or None while the rate is not known yet."""
 
-    def __init__(self, axes: tuple[str, ...], with_voltage: bool) -> None:
-        """with_voltage: counters come from ``see_voltage``; otherwise from the stamps alone."""
+    def __init__(self, axes: tuple[str, ...], with_voltage: bool, output: JointOutput = "position") -> None:
+        """with_voltage: counters come from ``see_voltage``; otherwise from the stamps alone.
+
+        output: what the first ``axes`` numbers of each row are; velocities become positions
+        """
         self._axes = axes
+        self._path = Path(len(axes)) if output == "velocity" else None
         self._with_voltage = with_voltage
         self._rate: float | None = None
         self._anchor: tuple[float, float] | None = None  # (time, counter)
@@ -132,7 +138,7 @@ class JointCounter:
             self._stamps.append(time)
 
     def add(self, time: float, row: FloatArray) -> Block | None:
-        """One sample, (axes,) at its stamp in s; a stamp that does not advance the counter gives None."""
+        """One sample at its stamp in s, (axes,) or more numbers; a stamp that does not advance the counter gives None."""
         self._watch(time)
         if not np.isfinite(time):
             return None
@@ -197,7 +203,11 @@ class JointCounter:
                     rows.append(row_of_it)
         if not seqs:
             return None
-        return Block(self._axes, np.array(seqs), np.array(times), np.array(rows))
+        block = Block(self._axes, np.array(seqs), np.array(times), np.array(rows))
+        if self._path is not None and self._counter is not None:
+            moved = block.values[:, : len(self._axes)]
+            moved[:] = self._path.add(block.seq, moved, self._counter.period)
+        return block
 
     def _place(self, number: int, instant: float) -> float:
         """The counter of a sample: its number, or that of the voltage sample at the same instant; the same distance as long as it fits."""

@@ -1,0 +1,59 @@
+"""Velocity --> position: the one whose mean velocity from each sample to the next is exactly what was measured, so that noise stays white.
+
+What was measured at an instant then stands for the step after it, so a delay found from it contains half a sample (a whole
+one where the drive itself differences its encoder over the last sample), which ``integrated`` says.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from xy_sysid.samples.block import FloatArray
+
+FAR = 1e9  # of any unit; beyond it a position becomes coarse in a double, and begins anew
+
+
+def integral(values: FloatArray, lasting: FloatArray, start: FloatArray | float = 0.0) -> FloatArray:
+    """(n, axes) sum of (n, axes) values up to before each sample, from ``start`` on. lasting: (n - 1,) s from each to the next.
+
+    Over a gap the last value is held.
+    """
+    first = np.broadcast_to(start, (1, values.shape[1]))
+    return np.asarray(np.cumsum(np.concatenate((first, values[:-1] * lasting[:, None])), axis=0))
+
+
+def integrated(unit: str = "", rate: float | None = None) -> str:
+    """What is to be known of a velocity that was integrated. unit: its own; rate: Hz; where they are known."""
+    named, half = f" ({unit})" if unit else "", "" if rate is None else f" ({0.5e3 / rate:.3g} ms)"
+    return (
+        f"the output is a velocity{named}: it is integrated, so positions count from 0; "
+        f"a delay found from it contains half a sample{half}, or a whole one if the drive differences its encoder"
+    )
+
+
+class Path:
+    """add(seq, velocity, period) -> positions, for samples that come in one by one or in blocks of any length."""
+
+    def __init__(self, axes: int) -> None:
+        self._place, self._velocity, self._seq = np.zeros(axes), np.zeros(axes), np.nan
+
+    def add(self, seq: FloatArray, velocity: FloatArray, period: float) -> FloatArray:
+        """(n, axes) positions. seq: (n,) counters; velocity: (n, axes); period: s of one sample.
+
+        A row with anything that is no number stays without one, and leaves no trace in what follows; neither does one that
+        would lead beyond ``FAR``, after which positions count from 0 again. A counter that goes back adds nothing.
+        """
+        found = np.full(velocity.shape, np.nan)
+        rows = np.flatnonzero(np.isfinite(velocity).all(axis=1) & np.isfinite(seq))
+        while rows.size:
+            before = seq[rows[0]] if np.isnan(self._seq) else self._seq
+            lasting = np.maximum(np.diff(seq[rows], prepend=before), 0.0) * period
+            places = integral(np.concatenate((self._velocity[None, :], velocity[rows])), lasting, self._place)[1:]
+            beyond = np.flatnonzero((np.abs(places) > FAR).any(axis=1))
+            near = rows[: beyond[0]] if beyond.size else rows
+            found[near] = places[: near.size]
+            last = rows[min(near.size, rows.size - 1)]
+            self._seq = float(seq[last])
+            self._place, self._velocity = (0.0 * places[0], 0.0 * places[0]) if beyond.size else (places[-1], velocity[last].copy())
+            rows = rows[near.size + 1 :]
+        return found

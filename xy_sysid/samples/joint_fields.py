@@ -1,0 +1,91 @@
+"""Which numbers of a joint state are taken (sensor_msgs/JointState), and in words why a message gives none.
+
+Drivers leave fields empty, or fill them with NaN, that they do not know: of a wheel often the position, of many drives the effort.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal, Protocol
+
+import numpy as np
+
+from xy_sysid.samples.block import FloatArray
+
+JointOutput = Literal["position", "velocity"]
+JointField = Literal["position", "velocity", "effort"]
+FIELDS: tuple[JointField, JointField, JointField] = ("position", "velocity", "effort")  # in the order of the message
+PLURAL = {"position": "positions", "velocity": "velocities", "effort": "efforts"}
+INSTEAD: dict[JointField, JointOutput] = {"position": "velocity", "velocity": "position"}
+
+
+class JointMessage(Protocol):
+    """The fields of a joint state; the last three may be empty."""
+
+    @property
+    def name(self) -> Sequence[str]:
+        """Of the joints."""
+
+    @property
+    def position(self) -> Sequence[float]:
+        """Of each joint, m or rad."""
+
+    @property
+    def velocity(self) -> Sequence[float]:
+        """Of each joint, m/s or rad/s."""
+
+    @property
+    def effort(self) -> Sequence[float]:
+        """Of each joint, N or N m."""
+
+
+class JointReader:
+    """wrong(message) -> why it gives nothing, empty if it does; row(message) -> (wanted fields x joints,) numbers."""
+
+    def __init__(self, joints: dict[str, str], output: JointOutput, effort: bool) -> None:
+        """joints: the joint of each axis; output: the field that is the output; effort: whether the effort is wanted, too."""
+        self._axis, self._names = next(iter(joints)), tuple(joints.values())
+        self._wanted: tuple[JointField, ...] = (output, "effort") if effort else (output,)
+        self._known: set[JointField] = set()  # fields that have had numbers for all joints; NaN in between is a fault of single samples
+
+    def wrong(self, message: JointMessage) -> str:
+        """What is lacking, and what to do about it."""
+        missing = [name for name in self._names if name not in message.name]
+        if missing:
+            expected = f"joints {', '.join(message.name)}; expected {', '.join(self._names)}"
+            return f'joint_states: {expected}. Set the parameter joints, for example to ["{self._axis}=NAME"].'
+        for field in self._wanted:
+            lack = self._lack(message, field)
+            if lack:
+                return f"joint_states: {lack}{self._advice(message, field)}"
+        return ""
+
+    def row(self, message: JointMessage) -> FloatArray:
+        """The output of each joint, and then the effort of each, if it is wanted."""
+        return np.concatenate([self._numbers(message, field) for field in self._wanted])
+
+    def _numbers(self, message: JointMessage, field: JointField) -> FloatArray:
+        values = getattr(message, field)
+        return np.array([values[message.name.index(name)] for name in self._names], dtype=np.float64)
+
+    def _lack(self, message: JointMessage, field: JointField) -> str:
+        """Empty if there are numbers."""
+        number = len(getattr(message, field))
+        if number != len(message.name):
+            return f"{PLURAL[field]} are {'empty' if number == 0 else f'{number} for {len(message.name)} joints'}"
+        if field not in self._known:
+            there = np.isfinite(self._numbers(message, field))
+            if not there.all():
+                nameless = ", ".join(name for name, known in zip(self._names, there, strict=True) if not known)
+                return f"{PLURAL[field]} of {nameless} are NaN"
+            self._known.add(field)
+        return ""
+
+    def _advice(self, message: JointMessage, field: JointField) -> str:
+        other = INSTEAD.get(field)
+        if other is None:
+            return "; this driver gives none. Set effort_as_voltage to false: the command, as blocks on voltage, is then the input."
+        values = getattr(message, other)
+        if len(values) == len(message.name) and np.isfinite(self._numbers(message, other)).all():
+            return f"; this driver gives {other}. Set output to {other}."
+        return f"; expected one for each of {', '.join(self._names)}. The driver must give them."
