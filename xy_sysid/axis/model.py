@@ -109,14 +109,6 @@ class AxisModel:
         """The model without this effect."""
         return replace(self, effects=tuple(item for item in self.effects if item[0] != name))
 
-    def taken_apart(self, name: str) -> AxisModel:
-        """The same model with an effect written as those that it is the sum of."""
-        whole = self.library[name].sum_of
-        if whole is None or any(part in self for part in whole.parts):
-            return self
-        parts = zip(whole.parts, whole.apart(dict(self.effects)[name]), strict=True)
-        return replace(self, effects=(*self.without(name).effects, *((part, self._turned(part, values)) for part, values in parts)))
-
     def _turned(self, name: str, values: tuple[float, ...]) -> tuple[float, ...]:
         """A size in the sense of the motion, where friction acts, as one in the sense of the drive, where a force does; and the way back."""
         return (-values[0], *values[1:]) if self.gain < 0.0 and self.library[name].category == "force" else values

@@ -232,11 +232,10 @@ class Parameter:
 class Sum:
     """One law written as several effects.
 
-    parts: their names; apart: the effect's values -> values of each part; joined: the way back
+    parts: their names; joined: values of each part -> the effect's values
     """
 
     parts: tuple[str, ...]
-    apart: Callable[[Sequence[float]], tuple[tuple[float, ...], ...]]
     joined: Callable[[Sequence[Sequence[float]]], tuple[float, ...]]
 
 

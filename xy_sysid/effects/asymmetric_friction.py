@@ -26,14 +26,8 @@ def guesses(scene: Scene) -> Iterator[Guess]:
     yield Guess(columns(direction, abs(direction)), read)
 
 
-def apart(values: Sequence[float]) -> tuple[tuple[float, ...], ...]:
-    """Mean level, and a load that makes the difference."""
-    coulomb, asymmetry = values
-    return (coulomb,), (coulomb * asymmetry,)
-
-
 def joined(values: Sequence[Sequence[float]]) -> tuple[float, ...]:
-    """The way back."""
+    """The mean level, and the load that makes the difference."""
     (coulomb,), (load,) = values
     return coulomb, load / coulomb
 
@@ -55,5 +49,5 @@ EFFECT = Effect(
     functions={"level": level},
     guesses=guesses,
     family="dry_friction",
-    sum_of=Sum(("coulomb_friction", "constant_load"), apart, joined),
+    sum_of=Sum(("coulomb_friction", "constant_load"), joined),
 )
