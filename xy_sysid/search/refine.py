@@ -76,8 +76,10 @@ def refine_steps(
     kept, effort = tuple(given), effort or Effort()
     until = math.inf  # what is given is fitted wholly
     judge = FreeRunJudge(data, library, lambda: effort.clock() > until)
+    begun = effort.clock()
     fixed = _Fixed.of(judge, kept)
-    until = effort.clock() + effort.budget  # from here on: on a fresh machine the laws have been compiled by now
+    first = min(effort.clock() - begun, 0.1 * effort.budget)  # at most: on a fresh machine the laws have been compiled by now
+    until = effort.clock() + effort.budget - 2.0 * first  # the first fit counts, and the one in hand when the time is up takes as long
     ahead = fixed.steps[-1].fit.model.ahead
     if ahead is not None or effort.most == 0:
         return _given_alone(data, judge, fixed)
