@@ -110,13 +110,15 @@ def measure(hours: float, speed: float, block: int, minutes: float) -> tuple[flo
             monitor.close()
 
 
-def table(data: float, hours: float, looks: dict[str, list[tuple[float, float, int]]], streams: dict[str, str], minutes: float) -> tuple[str, bool]:
+def table(
+    data: float, asked: argparse.Namespace, looks: dict[str, list[tuple[float, float, int]]], streams: dict[str, str], minutes: float
+) -> tuple[str, bool]:
     """The section of the page, and whether everything is flat."""
     lines = [
         "## Soak",
         "",
-        f"`python -m faults soak`: {data:.2f} h of data (two axes, 2 kHz) in {minutes:.0f} min through simulated machine, excitation and "
-        f"identifier over DDS, with the page and an open tab. Measured; the column of {hours:.0f} h is the slope of the second half, drawn on.",
+        f"`python -m faults soak --block {asked.block}`: {data:.2f} h of data (two axes, 2 kHz) in {minutes:.0f} min through simulated machine, excitation and "
+        f"identifier over DDS, with the page and an open tab. Measured; the column of {asked.hours:.0f} h is the slope of the second half, drawn on.",
         "",
         "| node | MB at a fifth | MB at the end | descriptors at a fifth, end | MB an hour of data, second half | MB more in 24 h |",
         "|---|---|---|---|---|---|",
@@ -148,7 +150,7 @@ def main(words: list[str]) -> int:
     asked = parser.parse_args(words)
     begun = time.monotonic()
     data, looks, streams = measure(asked.hours, 0.0 if asked.speed == "max" else float(asked.speed), asked.block, asked.minutes)
-    made, flat = table(data, asked.hours, looks, streams, (time.monotonic() - begun) / 60.0)
+    made, flat = table(data, asked, looks, streams, (time.monotonic() - begun) / 60.0)
     sys.stderr.write(made)
     before = asked.o.read_text(encoding="utf-8") if asked.o.exists() else ""
     facts = before.partition("\nRun on ")[2].partition("\n")[0]
