@@ -159,9 +159,9 @@ def _measured(case: Case, machine: Machine, fs: float, u: Any, y: Any, found: Di
         return final.held_out_error / final.noise_floor, errors, inside
     if not case.truth or case.dirt > 0.0:  # the best fit of a dirty axis does not begin at the truth
         return None, errors, inside
-    model = final.model
+    model, data = final.model, prepare(fs, np.asarray(u), np.asarray(y), EPSILON)
     for name in case.truth:
         known = [values.get(f"{name}.{key}", old) for key, old in zip(STANDARD[name].names, dict(model.effects)[name], strict=True)]
-        model = model.with_effect(name, bounded(STANDARD[name], known))
-    best = fit(prepare(fs, np.asarray(u), np.asarray(y), EPSILON), model)
+        model = model.with_effect(name, bounded(STANDARD[name], known, data.similar))
+    best = fit(data, model)
     return final.held_out_error / best.held_out_error, errors, inside

@@ -110,15 +110,17 @@ def measure(hours: float, speed: float, block: int, minutes: float) -> tuple[flo
             monitor.close()
 
 
-def table(
-    data: float, asked: argparse.Namespace, looks: dict[str, list[tuple[float, float, int]]], streams: dict[str, str], minutes: float
-) -> tuple[str, bool]:
+Looks = dict[str, list[tuple[float, float, int]]]
+
+
+def table(data: float, asked: argparse.Namespace, looks: Looks, streams: dict[str, str], minutes: float) -> tuple[str, bool]:
     """The section of the page, and whether everything is flat."""
     lines = [
         "## Soak",
         "",
-        f"`python -m faults soak --block {asked.block}`: {data:.2f} h of data (two axes, 2 kHz) in {minutes:.0f} min through simulated machine, excitation and "
-        f"identifier over DDS, with the page and an open tab. Measured; the column of {asked.hours:.0f} h is the slope of the second half, drawn on.",
+        f"`python -m faults soak --block {asked.block}`: {data:.2f} h of data (two axes, 2 kHz) in {minutes:.0f} min through simulated machine, "
+        f"excitation and identifier over DDS, with the page and an open tab. "
+        f"Measured; the column of {asked.hours:.0f} h is the slope of the second half, drawn on.",
         "",
         "| node | MB at a fifth | MB at the end | descriptors at a fifth, end | MB an hour of data, second half | MB more in 24 h |",
         "|---|---|---|---|---|---|",
