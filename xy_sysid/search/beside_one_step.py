@@ -17,7 +17,7 @@ from xy_sysid.axis.model import AxisModel, Library
 from xy_sysid.effects import Effect, Guess, Scene
 from xy_sysid.effects._contract import PATIENT, Beside, Followed, Limits
 from xy_sysid.greybox.free_run import AxisData, GreyboxFit
-from xy_sysid.greybox.one_step import AT_NOISE, CLEAN, as_beside, beside, followed
+from xy_sysid.greybox.one_step import AT_NOISE, CLEAN, as_beside, beside, error_without, followed
 from xy_sysid.greybox.score_test import Trace
 from xy_sysid.greybox.start_rigid import mean_velocity_filter
 from xy_sysid.samples.block import FloatArray
@@ -66,6 +66,8 @@ def grown(
     on = replace(limits, bar=None)
     fit, found = _settled(data, effect, fit, found, on)
     rungs = [(effect.name, fit)]
+    if fit.held_out_error > LITTLE_LESS * error_without(data, found):  # without it the same filter does as well: nothing beside it makes it one
+        return Grown(tuple(rungs), found)
     while len(rungs) <= MOST and not limits.late():
         fit = rungs[-1][1]
         explains = fit.excess == 0.0

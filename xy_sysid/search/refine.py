@@ -19,9 +19,9 @@ from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.greybox.one_step import error_without
 from xy_sysid.greybox.whitened import whitened_rms
-from xy_sysid.search.beside_one_step import grown
-from xy_sysid.search.best_first import Node, Search
-from xy_sysid.search.criteria import FILTERED, FREE, LEAST, WORTH
+from xy_sysid.search.beside_one_step import Grown, grown
+from xy_sysid.search.best_first import FEW, Node, Search
+from xy_sysid.search.criteria import AT_FLOOR, FILTERED, FREE, LEAST, WORTH
 from xy_sysid.search.judge import FreeRunJudge, joined
 from xy_sysid.search.ladder import Candidate, Ladder, Rival, Step
 from xy_sysid.search.simplify import Simplifying, whole
@@ -29,6 +29,7 @@ from xy_sysid.search.simplify import Simplifying, whole
 MOST_EFFECTS = 4
 BUDGET = 10.0  # s of processor time for one axis
 RIVALS = 6
+Filtered = tuple[tuple[tuple[str, GreyboxFit], ...], float]
 POLISH = 3  # more fits of the last set, as long as they have not ended by themselves
 
 
@@ -84,9 +85,14 @@ def refine_steps(
     if ahead is not None or effort.most == 0:
         return _given_alone(data, judge, fixed)
     search: Search[GreyboxFit] = Search(judge=judge, clock=effort.clock, budget=FREE * effort.budget, most=effort.most + len(kept), least=effort.size)
+    across = None if kept else _Ahead(judge, search)
     for names in search.steps(fixed.steps[-1].fit, frozenset(kept)):
         yield Trying(tuple(sorted(names)))
+        if across is not None and len(search.nodes) > FEW and across.explains():
+            break
     settled = Simplifying(judge, search, frozenset(kept))
+    if across is not None and across.found is not None:
+        return _ladder(judge, search, settled, fixed, across.found)
     while settled.step():
         yield Trying(tuple(sorted(settled.now.effects)))
     final = settled.now
@@ -97,17 +103,11 @@ def refine_steps(
     if not judge.late() and final.effects > frozenset(kept):
         for names in search.rivals(final.effects):
             yield Trying(tuple(sorted(names)))
-    filtered = None
-    if final.fit.excess >= LEAST and not kept:
-        for effect in library.acting:
-            if effect.one_step is None:
-                continue
-            if judge.late():
-                search.stopped = True
-                break
-            yield Trying((effect.name,))
-            filtered = filtered or _ahead(judge, search, final, effect.name)
-    return _ladder(judge, search, settled, fixed, filtered)
+    if final.fit.excess >= LEAST and across is not None:
+        for name in across.names:
+            yield Trying((name,))
+            across.look(name, final)
+    return _ladder(judge, search, settled, fixed, across.found if across is not None else None)
 
 
 def settle(data: AxisData, now: GreyboxFit) -> GreyboxFit:
@@ -154,33 +154,57 @@ def _given_alone(data: AxisData, judge: FreeRunJudge, fixed: _Fixed) -> Ladder:
     )
 
 
-def _ahead(
-    judge: FreeRunJudge, search: Search[GreyboxFit], final: Node[GreyboxFit], name: str
-) -> tuple[tuple[tuple[str, GreyboxFit], ...], float] | None:
-    """Rungs of an effect that only one-step prediction can judge, if it beats the best simulation with an autoregressive error.
+class _Ahead:
+    """Effects that only one-step prediction can judge. Each is fitted once, and taken if it beats the best simulation with an autoregressive error.
 
-    With it: that one's error one sample ahead, m/s.
+    found: rungs, and that simulation's error one sample ahead, m/s
     """
-    data, library = judge.data, judge.library
-    if data.longest() is not data:
-        return None
-    whole(judge, search.best)
-    later = np.arange(data.velocity.size) >= data.training
-    try:
-        bar = min(whitened_rms(node.fit.error, later) for node in (final, search.best))
-    except BadInput:  # too little data for any prediction
-        return None
-    if not FILTERED * bar > data.floor.encoder * data.sampling_rate:
-        return None
-    base = search.nodes[frozenset()].fit
-    try:
-        found = grown(data, base, library[name], library, Limits(FILTERED * bar, judge.late), judge.refusal)
-    except np.linalg.LinAlgError:
-        return None
-    last, without = found.rungs[-1][1], error_without(data, found.found)
-    if name in last.model and last.held_out_error < FILTERED * min(bar, without):
-        return found.rungs, bar
-    return None
+
+    def __init__(self, judge: FreeRunJudge, search: Search[GreyboxFit]) -> None:
+        self.judge, self.search = judge, search
+        whole_record = judge.data.longest() is judge.data
+        self.names = tuple(effect.name for effect in judge.library.acting if effect.one_step is not None and whole_record)
+        self.fitted: dict[str, Grown] = {}
+        self.found: Filtered | None = None
+        self.asked = False
+
+    def explains(self) -> bool:
+        """Whether one of them explains the axis down to the noise: then simulations need not be tried on. Worked out once, in the middle of these."""
+        if self.asked or self.search.best.fit.excess < AT_FLOOR:
+            return False
+        self.asked = True
+        for name in self.names:
+            self.look(name, self.search.best)
+        if self.found is not None and self.found[0][-1][1].excess > 0.0:
+            self.found = None
+        return self.found is not None
+
+    def look(self, name: str, best: Node[GreyboxFit]) -> None:
+        """Take it if it beats a set, and the best of all."""
+        if self.found is not None:
+            return
+        data, library = self.judge.data, self.judge.library
+        whole(self.judge, self.search.best)
+        later = np.arange(data.velocity.size) >= data.training
+        try:
+            bar = min(whitened_rms(node.fit.error, later) for node in (best, self.search.best))
+        except BadInput:  # too little data for any prediction
+            return
+        if not FILTERED * bar > data.floor.encoder * data.sampling_rate:
+            return
+        if name not in self.fitted:
+            if self.judge.late():
+                self.search.stopped = True
+                return
+            base = self.search.nodes[frozenset()].fit
+            try:
+                self.fitted[name] = grown(data, base, library[name], library, Limits(FILTERED * bar, self.judge.late), self.judge.refusal)
+            except np.linalg.LinAlgError:
+                return
+        fitted = self.fitted[name]
+        last, without = fitted.rungs[-1][1], error_without(data, fitted.found)
+        if name in last.model and last.held_out_error < FILTERED * min(bar, without):
+            self.found = fitted.rungs, bar
 
 
 def _explained(data: AxisData, base: GreyboxFit, final: GreyboxFit) -> float:
@@ -195,7 +219,7 @@ def _ladder(
     search: Search[GreyboxFit],
     settled: Simplifying,
     fixed: _Fixed,
-    filtered: tuple[tuple[tuple[str, GreyboxFit], ...], float] | None,
+    filtered: Filtered | None,
 ) -> Ladder:
     data, node = judge.data, settled.now
     base = fixed.steps[0].fit
