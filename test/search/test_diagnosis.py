@@ -8,6 +8,7 @@ from dataclasses import replace
 from functools import partial
 from itertools import count
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,10 +19,13 @@ from helpers.simulated import recorded
 from xy_sim.parts import PARTS
 from xy_sysid.axis.model import STANDARD, Library
 from xy_sysid.cli import run
-from xy_sysid.effects import EFFECTS
-from xy_sysid.greybox.axis_data import prepare
+from xy_sysid.effects import EFFECTS, Effect
+from xy_sysid.greybox.axis_data import AxisData, prepare
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.imports import save
+from xy_sysid.search import refine as refining
+from xy_sysid.search.beside_one_step import grown
+from xy_sysid.search.best_first import FEW
 from xy_sysid.search.criteria import AT_FLOOR
 from xy_sysid.search.diagnose import diagnose, judged
 from xy_sysid.search.judge import FreeRunJudge
@@ -251,3 +255,28 @@ def test_a_spring_beside_friction_is_not_taken_for_a_pendulum_and_bumps() -> Non
     assert found.verdict == "missing_effect"
     assert len(found.effects) == 2 and "coulomb_friction" in found.effects, found.sentence
     assert {EFFECTS[name].family for name in found.effects} == {"spring", "dry_friction"}, found.sentence
+
+
+@pytest.mark.parametrize("effect", ["backlash", "base_resonance+thermal_viscosity"])
+def test_a_gap_is_asked_for_early_and_once(effect: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that explains the axis ends the simulations; one that does not is not fitted again."""
+    asked: list[str] = []
+    fitted = grown
+
+    def counted(data: AxisData, base: GreyboxFit, gap: Effect, *others: Any) -> Any:
+        asked.append(gap.name)
+        return fitted(data, base, gap, *others)
+
+    monkeypatch.setattr(refining, "grown", counted)
+    data = prepare(2000.0, *recorded(effect, seconds=20.0).axis("x"))
+    steps, tried = refining.refine_steps(data), []
+    while True:
+        try:
+            tried.append(next(steps).effects)
+        except StopIteration as end:
+            found = end.value
+            break
+    assert asked == ["backlash"]
+    assert ("backlash" in found.effects) == (effect == "backlash")
+    if effect == "backlash":
+        assert tried.index(("backlash",)) == len(tried) - 1 <= FEW + 1

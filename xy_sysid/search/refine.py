@@ -1,7 +1,8 @@
 """Add effects, refit everything together, and watch the error on held-out data fall: the search, and what it comes to.
 
-First sets of effects by free simulation (``best_first``); then simpler sets where they do as well; then, if what is left could be a
-gap, one-step prediction against the best simulation with the same freedom.
+First sets of effects by free simulation (``best_first``); then simpler sets where they do as well. What free simulation cannot judge, a
+gap, is tried by one-step prediction against the best simulation with the same freedom: after the first sets, where a gap that explains the
+axis ends the search, and else in the end.
 """
 
 from __future__ import annotations
@@ -88,10 +89,13 @@ def refine_steps(
     across = None if kept else _Ahead(judge, search)
     for names in search.steps(fixed.steps[-1].fit, frozenset(kept)):
         yield Trying(tuple(sorted(names)))
-        if across is not None and len(search.nodes) > FEW and across.explains():
-            break
+        if across is not None and across.due:
+            yield Trying(across.names)
+            if across.explains():
+                break
     settled = Simplifying(judge, search, frozenset(kept))
     if across is not None and across.found is not None:
+        search.stopped = judge.late()
         return _ladder(judge, search, settled, fixed, across.found)
     while settled.step():
         yield Trying(tuple(sorted(settled.now.effects)))
@@ -168,10 +172,13 @@ class _Ahead:
         self.found: Filtered | None = None
         self.asked = False
 
+    @property
+    def due(self) -> bool:
+        """After the first simulations, where these leave something, once."""
+        return bool(self.names) and not self.asked and len(self.search.nodes) > FEW and self.search.best.fit.excess >= AT_FLOOR
+
     def explains(self) -> bool:
-        """Whether one of them explains the axis down to the noise: then simulations need not be tried on. Worked out once, in the middle of these."""
-        if self.asked or self.search.best.fit.excess < AT_FLOOR:
-            return False
+        """Whether one of them explains the axis down to the noise: then no more simulations need to be tried."""
         self.asked = True
         for name in self.names:
             self.look(name, self.search.best)
