@@ -35,6 +35,7 @@ class Table:
 
     leaves: a set that is not there cannot be fitted; promises: from a set, (effects to add, gain)
     simpler: the set with a simpler relative, for a set that has one; astray: what a set leaves if it is fitted from this other one
+    lost: what two sets have come to helps no fit of both
     """
 
     leaves: Mapping[Set, float]
@@ -44,7 +45,9 @@ class Table:
     parameters: Mapping[str, int] = field(default_factory=dict)
     simpler: Mapping[Set, Set] = field(default_factory=dict)
     astray: Mapping[tuple[Set, Set], float] = field(default_factory=dict)
+    lost: bool = False
     briefs: list[Set] = field(default_factory=list)
+    mergers: list[tuple[Set, Set]] = field(default_factory=list)
     wholes: list[Set] = field(default_factory=list)
 
     def moves(self, now: Looked) -> list[Move]:
@@ -68,6 +71,11 @@ class Table:
         if (now.effects, move.effects) in self.astray:
             return Looked(move.effects, self.astray[now.effects, move.effects])
         return Looked(move.effects, self.leaves[move.effects]) if move.effects in self.leaves else None
+
+    def merged(self, now: Looked, others: Looked) -> Looked | None:
+        effects = now.effects | others.effects
+        self.mergers.append((now.effects, others.effects))
+        return Looked(effects, self.leaves[effects]) if effects in self.leaves and not self.lost else None
 
     def whole(self, found: Looked) -> Looked:
         self.wholes.append(found.effects)
@@ -152,6 +160,17 @@ def test_a_fit_that_left_more_than_a_set_within_it_is_fitted_again_from_that() -
     search, tried = searched(Table(leaves, promises, astray={(of("a"), of("a", "b")): 1.9}))
     assert tried == [of("a"), of("a", "b"), of("b"), of("a", "b")]
     assert search.best.fit.excess == 0.1
+
+
+@pytest.mark.parametrize("lost", [False, True])
+def test_a_fit_that_gains_little_of_its_promise_is_begun_again_from_where_the_new_effect_was_alone(lost: bool) -> None:
+    """The base of the one, the values of both; where that helps no more, the first fit stays."""
+    promises = {of(): all_of(("a", 1.5), ("b", 1.4)), of("b"): all_of(("a", 1.0)), of("a"): all_of(("b", 0.1))}
+    leaves = {of(): 3.0, of("a"): 2.5, of("b"): 1.5, of("a", "b"): 0.1}
+    judge = Table(leaves, promises, astray={(of("b"), of("a", "b")): 1.4}, lost=lost)
+    search, _ = searched(judge)
+    assert judge.mergers == [(of("a"), of("b"))]
+    assert search.best.fit.excess == (1.4 if lost else 0.1)
 
 
 def test_the_simpler_of_two_sets_that_leave_the_same_is_best() -> None:

@@ -37,6 +37,9 @@ class Judge(Protocol[F]):
     def brief(self, now: F, move: Move, hopeless: float = inf) -> F | None:
         """A quick fit."""
 
+    def merged(self, now: F, others: F) -> F | None:
+        """A quick fit of one set with the effects of another, from what either has come to."""
+
     def whole(self, found: F) -> F:
         """The same on all data."""
 
@@ -162,9 +165,12 @@ class Search(Generic[F]):
         return next(first, (parent, move))
 
     def _known(self, parent: Node[F], move: Move) -> bool:
-        """The set was fitted. One that left more than a set which it contains went astray, and may be fitted again from that."""
+        """The set was fitted. One that left more than a set which it contains went astray, and may be fitted again from another."""
         known = self.nodes.get(move.effects)
-        return known is not None and known.fit.excess <= parent.fit.excess + LEAST
+        if known is None:
+            return False
+        inside = (node.fit.excess for effects, node in self.nodes.items() if effects < move.effects and not node.refused)
+        return known.fit.excess <= min(inside, default=inf) + LEAST
 
     def _order(self, item: tuple[Node[F], Move]) -> tuple[float, bool]:
         """What may become best first; simple and single moves are quick, and often enough; of equals what every machine has."""
@@ -179,7 +185,10 @@ class Search(Generic[F]):
 
     def _fitted(self, parent: Node[F], move: Move) -> Node[F] | None:
         best, later = self.best, parent.fit.excess - parent.brief.excess  # what a whole fit will change, as it did for the parent
-        brief = self.judge.brief(parent.fit, move, min(best.fit.excess - later + HOPELESS, parent.brief.excess))
+        hopeless = min(best.fit.excess - later + HOPELESS, parent.brief.excess)
+        brief = self.judge.brief(parent.fit, move, hopeless)
+        if brief is None or parent.brief.excess - brief.excess < (1.0 - ALIKE) * move.gain:
+            brief = self._merged(parent, move, brief)
         parent.tried += 1
         if brief is None:
             return None
@@ -202,8 +211,19 @@ class Search(Generic[F]):
             leads=leads,
             later=later,
         )
-        self.nodes[move.effects] = node
+        known = self.nodes.get(move.effects)
+        if known is None or node.score < known.score:
+            self.nodes[move.effects] = node
         return node
+
+    def _merged(self, parent: Node[F], move: Move, brief: F | None) -> F | None:
+        """What is new may have led the base elsewhere, so that a fit which begins from here goes astray: the better of it and of one that
+        begins where the new effects were alone."""
+        alone = self.nodes.get(move.effects - parent.effects)
+        if alone is None or alone.refused or not parent.effects or not parent.effects < move.effects:
+            return brief
+        fits = (brief, self.judge.merged(alone.fit, parent.fit))
+        return min((fit for fit in fits if fit is not None), key=lambda fit: fit.excess, default=None)
 
 
 def _new(parent: Node[F], move: Move) -> int:

@@ -192,6 +192,17 @@ class FreeRunJudge:
             return None
         return found if np.isfinite(found.excess) else None
 
+    def merged(self, now: GreyboxFit, others: GreyboxFit) -> GreyboxFit | None:
+        """The first stage's fit of one set with the effects of another, begun from the base of the one and the values of both."""
+        model = now.model
+        for name, values in others.model.effects:
+            model = model.with_effect(name, values)
+        try:
+            found = fit(self.data, model, brief=True, late=self.late)
+        except np.linalg.LinAlgError:
+            return None
+        return found if np.isfinite(found.excess) else None
+
     def _started(self, now: GreyboxFit, move: Move) -> AxisModel:
         model = now.model
         if move.replaced is not None:
