@@ -52,9 +52,31 @@ def test_a_signal_in_the_middle_of_long_work_is_its_code_without_a_traceback(
         out, err = process.communicate(timeout=120)
     finally:
         process.kill()  # nothing is left over when it does not heed
-    assert process.returncode in (code, -number) and out == b"", err  # either is the same to a shell
+    assert process.returncode in (code, -number) and out == b"", err  # before the command has begun; either is the same to a shell
     assert b"Traceback" not in err and time.monotonic() - begun < allowed(5)
     assert not (tmp_path / "out").exists()
+
+
+INTERRUPTED_IMPORT = """
+import os, signal
+from xy_sysid import cli
+def run(words):
+    try:
+        exec("os.kill(os.getpid(), int(words[0]))\\nwhile True: pass")
+    except KeyboardInterrupt:
+        return 143 if words[0] == "15" else 130
+cli.run = run
+cli.main()
+"""
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_in_the_middle_of_an_import_is_its_code(number: signal.Signals, code: int, tmp_path: Path) -> None:
+    """Every dataclass is made by an exec; ``python -m`` ends by SIGINT after an interrupt in one, caught or not, and whatever it was."""
+    (tmp_path / "interrupted.py").write_text(INTERRUPTED_IMPORT)
+    command = [*COMMAND[:-1], "interrupted", str(number.value)]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, env=bare(), check=False, timeout=60)
+    assert (done.returncode, done.stderr) == (code, b"")
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Sequence
 from typing import TextIO
 
-from xy_sysid.cli.interrupt import Interrupts, deaf
+from xy_sysid.cli.interrupt import Interrupts
 
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")  # results repeat bit for bit with one thread, and small matrices gain nothing from two
@@ -130,7 +130,7 @@ def _nowhere() -> TextIO:
 
 def main() -> None:
     """Entry point of the console script."""
-    atexit.register(deaf)  # the first is the last to be called: then the exit code stands
+    atexit.register(_interrupts.leave)  # the first is the last to be called: then the exit code stands
     sys.stdout = sys.stdout or _nowhere()
     sys.stderr = sys.stderr or _nowhere()
     for stream in (sys.stdout, sys.stderr):
@@ -138,4 +138,5 @@ def main() -> None:
             stream.reconfigure(errors="backslashreplace")  # a file's name may hold what the terminal cannot show
     with _interrupts:
         code = run(sys.argv[1:])
-    sys.exit(_ended(code))
+    _interrupts.code = _ended(code)
+    sys.exit(_interrupts.code)

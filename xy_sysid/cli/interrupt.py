@@ -6,6 +6,7 @@ it is printed and forgotten, and the command would go on for ever.
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 from types import FrameType, TracebackType
@@ -13,17 +14,15 @@ from types import FrameType, TracebackType
 AGAIN = 0.2  # s from an interrupt to the next, as long as it is not on its way through the program
 
 
-def deaf() -> None:
-    """What comes from now on changes nothing: all is done and said, and the interpreter only tidies up."""
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, signal.SIG_IGN)
-
-
 class Interrupts:
-    """Within it, SIGINT and SIGTERM raise KeyboardInterrupt until it is left. came: one did; terminated: a SIGTERM was one of them."""
+    """Within it, SIGINT and SIGTERM raise KeyboardInterrupt until it is left.
+
+    came: one did; terminated: a SIGTERM was one of them; code: the exit code, once it is known
+    """
 
     def __init__(self) -> None:
         self.terminated, self.came = False, False
+        self.code: int | None = None
 
     def __enter__(self) -> None:
         self._hook = sys.unraisablehook
@@ -37,6 +36,17 @@ class Interrupts:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         sys.unraisablehook = self._hook
+
+    def leave(self) -> None:
+        """What comes from now on changes nothing: all is done and said, and the interpreter only tidies up.
+
+        After an interrupt it does not even that: one that came in the middle of an ``exec`` (every dataclass is made by one) would make
+        ``python -m`` end by SIGINT, whatever the exit code and whoever caught the interrupt.
+        """
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.SIG_IGN)
+        if self.came and self.code is not None:
+            os._exit(self.code)
 
     def _first(self, number: int, frame: FrameType | None) -> None:
         self.came = True
