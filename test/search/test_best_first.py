@@ -50,7 +50,7 @@ class Table:
     mergers: list[tuple[Set, Set]] = field(default_factory=list)
     wholes: list[Set] = field(default_factory=list)
 
-    def moves(self, now: Looked) -> list[Move]:
+    def moves(self, now: Looked, brief: Looked) -> list[Move]:
         return [
             Move(
                 effects=now.effects | added,
@@ -278,7 +278,7 @@ def test_what_is_left_unexplained_could_feign_is_not_tried() -> None:
     """The gain is small against the whole error, though it is something in excess."""
 
     class Faint(Table):
-        def moves(self, now: Looked) -> list[Move]:
+        def moves(self, now: Looked, brief: Looked) -> list[Move]:
             return [Move(of("a"), 0.5, 0.01, 1, (("a", (1.0,)),))]
 
     judge = Faint({of(): 2.0, of("a"): 1.0}, {})
@@ -290,7 +290,7 @@ def test_what_every_machine_has_is_tried_though_the_whole_error_promises_little(
     """Friction that bends shows little to first order, and may explain much."""
 
     class Rough(Table):
-        def moves(self, now: Looked) -> list[Move]:
+        def moves(self, now: Looked, brief: Looked) -> list[Move]:
             return [Move(of("a"), 0.5, 0.01, 1, (("a", (1.0,)),), expected=True)] if not now.effects else []
 
     search: Search[Looked] = Search(Rough({of(): 2.0, of("a"): 1.0}, {}), never, 10.0, 4, 0.7)

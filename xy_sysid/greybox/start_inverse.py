@@ -38,22 +38,25 @@ def inverse_starts(effect: Effect, scene: Scene, samples: int, forces: Sequence[
     """One for each low-pass at most, from the first samples; forces: (n,) V each, of what the model has already, whose sizes are free."""
     if effect.guesses is None:
         return []
-    guesses = [guess for guess in effect.guessed(scene) if not guess.at_encoder]
+    cutoffs = [cutoff for cutoff in CUTOFFS if cutoff <= 0.2 * scene.sampling_rate]
+    guesses = [guess for guess in effect.guessed(scene) if not guess.at_encoder] if cutoffs else []
+    if not guesses:
+        return []
+    seen_velocity, seen_voltage = (scipy.fft.rfft(signal[:samples]) for signal in (scene.velocity, scene.voltage))
+    seen_forces = [scipy.fft.rfft(force[:samples]) for force in forces]
+    seen_columns = [scipy.fft.rfft(guess.columns[:, :samples], axis=1) for guess in guesses]
     found = []
-    for cutoff in CUTOFFS:
-        if cutoff > 0.2 * scene.sampling_rate or not guesses:
-            continue
+    for cutoff in cutoffs:
         slow = LowPass.of(samples, scene.sampling_rate, cutoff)
-        velocity, acceleration, voltage = slow(scene.velocity), slow(scene.velocity, derived=True), slow(scene.voltage)
+        velocity, acceleration, voltage = slow(seen_velocity), slow(seen_velocity, derived=True), slow(seen_voltage)
         rows = slow.inside()
         if effect.is_dry:
             moving = minimum_filter1d(np.abs(velocity), 2 * int(0.5 * slow.rate / cutoff) + 1) > REST * float(np.std(velocity))
             rows = rows & moving if float(np.mean(moving)) > FEW else rows
         best, kept = np.inf, None
-        beside = [slow(force) for force in forces]
-        for guess in guesses:
-            columns = [slow(column) for column in guess.columns]
-            coefficients, left = _least(np.array([acceleration, velocity, *beside, *columns])[:, rows], voltage[rows])
+        beside = [slow(force) for force in seen_forces]
+        for guess, columns in zip(guesses, seen_columns, strict=True):
+            coefficients, left = _least(np.array([acceleration, velocity, *beside, *slow(columns)])[:, rows], voltage[rows])
             if left < best and coefficients[0] * coefficients[1] > 0.0:
                 inertia, drag, *sizes = (float(value) for value in coefficients[: 2 + len(beside)])
                 values = effect.read(guess, coefficients[2 + len(beside) :], scene.similar)
@@ -84,10 +87,10 @@ class LowPass:
         lines = 1.0 / (1.0 + (frequency / cutoff) ** 4)
         return LowPass(lines=lines, turn=2.0 * np.pi * frequency, samples=samples, size=2 * kept, rate=2 * kept * sampling_rate / samples)
 
-    def __call__(self, signal: FloatArray, derived: bool = False) -> FloatArray:
-        """(size,) of a signal (n,), or of its derivative by time."""
-        seen = scipy.fft.rfft(signal[: self.samples])[: self.lines.size] * self.lines
-        return np.asarray(scipy.fft.irfft(seen * (1j * self.turn if derived else 1.0), self.size) * (self.size / self.samples))
+    def __call__(self, seen: NDArray[np.complex128], derived: bool = False) -> FloatArray:
+        """(..., size) of signals whose spectra (..., lines) are ``rfft`` of the samples, or of their derivatives by time."""
+        kept = seen[..., : self.lines.size] * self.lines
+        return np.asarray(scipy.fft.irfft(kept * (1j * self.turn if derived else 1.0), self.size) * (self.size / self.samples))
 
     def inside(self) -> NDArray[np.bool_]:
         """(size,) where the ends, which the transform takes for neighbours, do not reach."""

@@ -31,8 +31,8 @@ F = TypeVar("F", bound=Judged)
 class Judge(Protocol[F]):
     """What the search asks; see ``judge.FreeRunJudge``."""
 
-    def moves(self, now: F) -> Sequence[Move]:
-        """What may be done next."""
+    def moves(self, now: F, brief: F) -> Sequence[Move]:
+        """What may be done next from a set. brief: its quick fit."""
 
     def brief(self, now: F, move: Move, hopeless: float = inf) -> F | None:
         """A quick fit."""
@@ -181,7 +181,7 @@ class Search(Generic[F]):
         if len(node.effects) >= self.most:
             return []
         node.led_on = True
-        return [(node, move) for move in self.judge.moves(node.fit) if not self._known(node, move) and len(move.effects) <= self.most]
+        return [(node, move) for move in self.judge.moves(node.fit, node.brief) if not self._known(node, move) and len(move.effects) <= self.most]
 
     def _fitted(self, parent: Node[F], move: Move) -> Node[F] | None:
         best, later = self.best, parent.fit.excess - parent.brief.excess  # what a whole fit will change, as it did for the parent
@@ -196,7 +196,8 @@ class Search(Generic[F]):
         parameters = parent.parameters + move.parameters
         least = (1.0 + self.least) ** _new(parent, move)
         leads = self.judge.size(brief, parent.brief) >= least - 1.0
-        whole = brief.excess + later + PRICE * parameters < best.score - LEAST if leads else move.rest >= log(least)
+        slow = move.rest >= log(least) and brief.excess < parent.brief.excess + LEAST  # else it went astray
+        whole = brief.excess + later + PRICE * parameters < best.score - LEAST if leads else slow
         found = self.judge.whole(brief) if whole else brief
         if whole and not leads:  # what acts slowly does not show in a brief fit, but promised a name on all data
             leads = self.judge.size(found, parent.fit) >= least - 1.0

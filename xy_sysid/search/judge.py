@@ -48,12 +48,20 @@ class Move:
     simpler: frozenset[str] = frozenset()
 
 
+@dataclass(frozen=True, slots=True)
+class _Here:
+    """A fit, the same set's on the first stage's data, and these data as its effects see them."""
+
+    fit: GreyboxFit
+    brief: GreyboxFit
+    scene: Scene
+
+
 class FreeRunJudge:
     """Judges by free simulation of one axis; sets are those of a library."""
 
     def __init__(self, data: AxisData, library: Library, late: Callable[[], bool] = in_time) -> None:
         self.data, self.library, self.late = data, library, late
-        self.known: tuple[GreyboxFit, float] | None = None
         self.reach = float(np.min(data.position)), float(np.max(data.position))
 
     def begin(self) -> GreyboxFit:
@@ -73,10 +81,10 @@ class FreeRunJudge:
         traced = model.with_effect(name, screened(self.data, now, [effect]).traces[0].values)
         return fit(self.data, best_start(self.data, [traced, *other_starts(self.data, now, model, name)]), late=self.late)
 
-    def moves(self, now: GreyboxFit) -> list[Move]:
+    def moves(self, now: GreyboxFit, brief: GreyboxFit) -> list[Move]:
         """What may be added, alone or two at once, and what may take the place of a relative; most promising first, of each kind.
 
-        Nothing when it is late.
+        Nothing when it is late. brief: the same set on the first stage's data.
         """
         if self.late():
             return []
@@ -87,8 +95,8 @@ class FreeRunJudge:
         traces = {trace.effect: trace for trace in screen.traces}
         own = frozenset(name for name, _ in model.effects)
         gains = {name: screen.gain([name]) for name in screen.whitened}
-        scene = scene_of(self.data, now, self.data.first)
-        found = (self._single((now, scene), families, traces[e.name], gains.get(e.name, NOTHING)) for e in open_to)
+        here = _Here(now, brief, scene_of(self.data, now, self.data.first))
+        found = (self._single(here, families, traces[e.name], gains.get(e.name, NOTHING)) for e in open_to)
         singles = sorted((move for move in found if move is not None), key=lambda move: -move.gain)
         kept = self._with_relatives(singles[: int(WIDTH)], singles)
         kept += [move for move in singles if move not in kept and move.begins < now.excess]
@@ -124,9 +132,9 @@ class FreeRunJudge:
         sums = ((name, self.library[name].sum_of) for name in names)
         return any(whole is not None and names & set(whole.parts) for _, whole in sums)
 
-    def _single(self, here: tuple[GreyboxFit, Scene], families: dict[str, str], trace: Trace, gain: Gain) -> Move | None:
-        now, scene = here
-        effect, own = self.library[trace.effect], frozenset(name for name, _ in now.model.effects)
+    def _single(self, here: _Here, families: dict[str, str], trace: Trace, gain: Gain) -> Move | None:
+        model = here.fit.model
+        effect, own = self.library[trace.effect], frozenset(name for name, _ in model.effects)
         starts = ((effect.name, trace.values),)
         relative = families.get(effect.family) if effect.family else None
         if relative is None:
@@ -136,14 +144,14 @@ class FreeRunJudge:
                 rest=gain.rest,
                 parameters=len(effect.parameters),
                 starts=starts,
-                begins=np.inf if own else self._begins(now, now.model, effect, scene),
+                begins=self._begins(here, model, effect) if not own or effect.joint is not None else np.inf,
                 expected=effect.is_dry,
                 simpler=self._simplest(own, effect),
             )
         more = len(effect.parameters) - len(self.library[relative].parameters)
         if more <= 0 and self.library[relative].sum_of is None:
             return None
-        begins = self._begins(now, now.model.without(relative), effect, scene) if len(own) == 1 else np.inf
+        begins = self._begins(here, model.without(relative), effect) if len(own) == 1 else np.inf
         return Move(
             effects=own - {relative} | {effect.name},
             gain=gain.excess,
@@ -154,21 +162,15 @@ class FreeRunJudge:
             begins=begins,
         )
 
-    def _begins(self, now: GreyboxFit, model: AxisModel, effect: Effect, scene: Scene) -> float:
+    def _begins(self, here: _Here, model: AxisModel, effect: Effect) -> float:
         """Excess at starts that are read without the model: it may have been led so far astray that traces tell little.
 
         It is known of the first stage; what the motion there is quieter or livelier than in the whole is taken off.
         """
-        starts = other_starts(self.data, now, model, effect.name, scene)
+        starts = other_starts(self.data, here.fit, model, effect.name, here.scene)
         if not starts:
             return np.inf
-        return now.excess + min(first_excess(self.data, start) for start in starts) - self._first(now)
-
-    def _first(self, now: GreyboxFit) -> float:
-        """Excess of a fit over the first stage."""
-        if self.known is None or self.known[0] is not now:
-            self.known = now, first_excess(self.data, now.model)
-        return self.known[1]
+        return here.fit.excess + min(first_excess(self.data, start) for start in starts) - here.brief.excess
 
     def _simplest(self, own: frozenset[str], effect: Effect) -> frozenset[str]:
         """The set with the simplest law of friction, for a richer one: without it the base takes friction for drag, and traces tell little."""
