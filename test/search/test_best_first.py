@@ -225,6 +225,14 @@ def test_only_what_is_near_the_best_is_fitted_wholly() -> None:
     assert search.nodes[of("a")].whole and not search.nodes[of("b")].whole
 
 
+@pytest.mark.parametrize(("left", "wholes"), [(3.0, [of("a")]), (3.1, [])])
+def test_what_acts_slowly_is_fitted_on_all_data_unless_it_went_astray(left: float, wholes: list[Set]) -> None:
+    """A brief fit does not show it, though all data promise it; one that leaves more than the set which it contains is another matter."""
+    judge = Table({of(): 3.0, of("a"): left}, {of(): all_of(("a", 1.0))})
+    searched(judge)
+    assert judge.wholes == wholes
+
+
 def test_it_goes_on_from_the_best_only() -> None:
     """What leads away from a worse set is not asked for."""
     promises = {of(): all_of(("a", 1.0), ("b", 0.9)), of("a"): all_of(("c", 0.5)), of("b"): all_of(("d", 5.0))}

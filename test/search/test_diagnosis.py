@@ -257,6 +257,16 @@ def test_a_spring_beside_friction_is_not_taken_for_a_pendulum_and_bumps() -> Non
     assert {EFFECTS[name].family for name in found.effects} == {"spring", "dry_friction"}, found.sentence
 
 
+def test_a_lag_beside_friction_begins_where_the_base_gives_way() -> None:
+    """The base has taken it for a delay, so that its trace promises little; with the delay given back it begins far below."""
+    data = prepare(2000.0, *recorded("constant_load+coulomb_friction+amplifier_lag", seconds=30.0).axis("x"))
+    judge = FreeRunJudge(data, STANDARD)
+    now = judge.added(judge.added(judge.begin(), "coulomb_friction"), "constant_load")
+    moves = {tuple(name for name, _ in move.starts): move for move in judge.moves(now, now)}
+    lag = moves["amplifier_lag",]
+    assert now.excess - lag.begins > 5.0 * lag.gain
+
+
 @pytest.mark.parametrize("effect", ["backlash", "base_resonance+thermal_viscosity"])
 def test_a_gap_is_asked_for_early_and_once(effect: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """One that explains the axis ends the simulations; one that does not is not fitted again."""

@@ -46,7 +46,7 @@ def diagnose(
         def work(name: str) -> Diagnosis:
             bar.update(task, description=f"diagnosing axis {name}")
             runs = runs_of(recordings, name)
-            found = logic(runs[0].sampling_rate, [(run.voltage, run.position) for run in runs], known, budget, time.process_time, runs[0].units)
+            found = logic(runs[0].sampling_rate, [(run.voltage, run.position) for run in runs], known, budget, time.thread_time, runs[0].units)
             bar.advance(task)
             return found
 

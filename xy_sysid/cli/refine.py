@@ -72,7 +72,7 @@ def refine(
             runs = runs_of(recordings, name)
             run = runs[0]
             data = prepare_all(run.sampling_rate, [(one.voltage, one.position) for one in runs], tolerance, run.units)
-            found = logic(data, known, tuple(add or ()), Effort(MOST_EFFECTS if auto else 0, budget, time.process_time))
+            found = logic(data, known, tuple(add or ()), Effort(MOST_EFFECTS if auto else 0, budget, time.thread_time))
             if not found.final.model.ahead and len(runs) == 1:  # free simulation says nothing about those
                 found = replace(found, final=settled(data, found.final)) if simulate_alone else found
                 alone[name] = open_loop(run.sampling_rate, run.position, found.final.simulated)

@@ -104,7 +104,7 @@ def diagnose(data: Data, library: Library = STANDARD, budget: float = BUDGET, cl
     """Which physical effects the rigid model misses, with evidence and runner-up; or that nothing is missing, or that none is known.
 
     data:   a run or several of one axis, V and m; library: with effects of your own (``files.effects.library``)
-    budget: s after which the best so far is said, if ``clock`` (for example ``time.process_time``) tells the time; else it takes as
+    budget: s after which the best so far is said, if ``clock`` (for example ``time.thread_time``) tells the time; else it takes as
             long as it takes, and the same data give the same answer on any machine
     Too little data is an answer, ``not_enough_data``, and no error. Raises BadInput for runs that do not belong together.
     """
