@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import exp, inf
 
 import pytest
@@ -103,9 +103,9 @@ class Ticking:
         return self.now
 
 
-def searched(judge: Table, clock: object = None, budget: float = 10.0, most: int = 4) -> tuple[Search[Looked], list[Set]]:
+def searched(judge: Table, clock: object = None, budget: float = 10.0, most: int = 4, least: float = LEAST) -> tuple[Search[Looked], list[Set]]:
     """A search from the empty set, gone to its end, and what it said it would try."""
-    search: Search[Looked] = Search(judge, clock if callable(clock) else never, budget, most, LEAST)
+    search: Search[Looked] = Search(judge, clock if callable(clock) else never, budget, most, least)
     return search, list(search.steps(Looked(of(), judge.leaves[of()])))
 
 
@@ -160,6 +160,22 @@ def test_a_fit_that_left_more_than_a_set_within_it_is_fitted_again_from_that() -
     search, tried = searched(Table(leaves, promises, astray={(of("a"), of("a", "b")): 1.9}))
     assert tried == [of("a"), of("a", "b"), of("b"), of("a", "b")]
     assert search.best.fit.excess == 0.1
+
+
+@pytest.mark.parametrize("gone_astray", [2.9, None])
+def test_what_went_astray_is_fitted_again_though_little_is_promised_there(gone_astray: float | None) -> None:
+    """Two effects with a threshold each show little beside one another to first order; the promise of both together still stands."""
+
+    class Faint(Table):
+        def moves(self, now: Looked, brief: Looked) -> list[Move]:
+            return [replace(move, rest=move.gain) for move in super().moves(now, brief)]
+
+    promises = {of(): all_of(("ab", 1.5), ("a", 1.0)), of("a"): all_of(("b", 0.1))}
+    leaves = {of(): 3.0, of("a"): 1.0, of("a", "b"): 0.1}
+    if gone_astray is None:
+        promises[of()] = all_of(("a", 1.0))
+    search, _ = searched(Faint(leaves, promises, astray={(of(), of("a", "b")): gone_astray or 0.0}), least=0.7)
+    assert search.best.fit.excess == (1.0 if gone_astray is None else 0.1)
 
 
 @pytest.mark.parametrize("lost", [False, True])

@@ -153,7 +153,8 @@ class Search(Generic[F]):
 
     def _promising(self, parent: Node[F], move: Move) -> bool:
         """It may become better than the best, and what is new may be more than what is left unexplained could feign."""
-        nameable = move.expected or move.rest * parent.optimism >= _new(parent, move) * log(1.0 + self.least) or move.begins < parent.fit.excess
+        promised = move.rest * parent.optimism >= _new(parent, move) * log(1.0 + self.least)
+        nameable = promised or move.expected or move.begins < parent.fit.excess or move.effects in self.nodes  # which then went astray
         simpler = self.nodes.get(move.simpler) if move.simpler else None
         if simpler is not None and simpler.led_on:  # from there it begins better
             return False

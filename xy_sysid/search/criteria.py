@@ -53,7 +53,9 @@ HOPELESS = _number("hopeless", 1.5, "nats", "more than the best so far after the
 CHANCE = _number("chance", 2.0, "standard errors", "a gain on the held-out windows that is real: the usual one in twenty")
 SIZE = _number("size", 0.7, "1", "an effect explains at least so much of what is left unexplained, else what no law explains could feign it")
 WORTH = _number("worth adding", 0.25, "1", "the same for an effect that is added without being named: real machines have small effects, too")
-FREE = _number("free", 0.6, "1", "part of the budget for free simulation; the rest is for what only one-step prediction can judge")
+FREE = _number(
+    "free", 0.8, "1", "part of the budget for new sets; the rest is for simpler ones, rivals, and the rungs of the ladder: mostly below 1.5 s"
+)
 FILTERED = _number(
     "one step ahead", 0.75, "1", "innovation of a filter over that of the best simulation with an autoregressive error, to be worth a name"
 )
