@@ -103,7 +103,8 @@ def test_two_joints_of_any_name_go_through_every_node_the_page_and_the_bag(world
         assert " mrad/s" in answer.message and " mm/s" not in answer.message
         assert world.until(lambda: bool(newest(told, "axis joint-2")) and {"joint-2", "pan"} <= set(heard.stories))
         if newest(statuses, "excitation").get("state") == "stopped":
-            halted.append("in the end")
+            driving()
+            world.spin(15.0)  # the last part of a bag, by which its fits are judged, is of an axis that moves
         named = newest(told, "axis joint-2")
         assert "error now (rad/s)" in named and not [key for key in named if "m/s" in key.replace("rad/s", "") or "V" in key]
     finally:
