@@ -104,7 +104,7 @@ def test_two_joints_of_any_name_go_through_every_node_the_page_and_the_bag(world
         assert world.until(lambda: bool(newest(told, "axis joint-2")) and {"joint-2", "pan"} <= set(heard.stories))
         if newest(statuses, "excitation").get("state") == "stopped":
             driving()
-            world.spin(15.0)  # the last part of a bag, by which its fits are judged, is of an axis that moves
+            world.spin(15.0)  # so that the bag has enough of an axis that moves
         named = newest(told, "axis joint-2")
         assert "error now (rad/s)" in named and not [key for key in named if "m/s" in key.replace("rad/s", "") or "V" in key]
     finally:
