@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 import pytest
-from helpers.stories import data, told
+from helpers.stories import RATE, data, told
 
 from xy_sysid.page.plot import plain
 from xy_sysid.report.figure_data import table
 from xy_sysid.report.headline import detail, headline, next_act
 from xy_sysid.report.story_failure import failure, failure_words
+from xy_sysid.samples.recording import Run
 from xy_sysid.story.document import document
 from xy_sysid.story.story import Story, removed
 
@@ -43,7 +44,7 @@ def test_the_headline_goes_from_missing_over_adding_to_explained() -> None:
 
 def test_taking_the_effect_out_makes_the_headline_fall_back() -> None:
     """After Remove the model is rigid again and something is missing again, with the same act as before."""
-    back = document(removed(told(), *data(), "coulomb_friction"))
+    back = document(removed(told(), Run("x", RATE, *data()), "coulomb_friction"))
     assert headline(back).startswith("Something is missing: ") and next_act(back) == ("add", "coulomb_friction")
 
 

@@ -82,24 +82,23 @@ def test_the_pictures_show_where_the_base_fails_and_that_it_no_longer_does() -> 
 
 def test_effects_come_and_go_by_name() -> None:
     """One step each; with_effects takes out what is not wanted and keeps the order; next_best and auto find by themselves."""
-    u, y = data()
-    story = begin(Run("x", RATE, u, y))
-    wrong = with_effects(story, u, y, ["cogging"])
+    run = Run("x", RATE, *data())
+    story = begin(run)
+    wrong = with_effects(story, run, ["cogging"])
     assert [step.rung.label for step in wrong.steps] == ["rigid, with delay", "with cogging"]
-    right = with_effects(wrong, u, y, ["coulomb_friction"])
+    right = with_effects(wrong, run, ["coulomb_friction"])
     assert [step.rung.label for step in right.steps[2:]] == ["without cogging", "with coulomb_friction"]
     assert right.effects == ("coulomb_friction",) and right.now is not None and right.now.explained
-    assert next_best(story, u, y).effects == ("coulomb_friction",)
-    done = auto(story, u, y)
+    assert next_best(story, run).effects == ("coulomb_friction",)
+    done = auto(story, run)
     assert done.effects == ("coulomb_friction",)
-    assert "Nothing is left to explain" in next_best(done, u, y).note
-    assert removed(done, u, y, "coulomb_friction").effects == ()
+    assert "Nothing is left to explain" in next_best(done, run).note
+    assert removed(done, run, "coulomb_friction").effects == ()
 
 
 def test_a_relative_replaces_its_own() -> None:
     """Two laws of the same dry friction are not added to each other."""
-    u, y = data()
-    story = added(told(), u, y, "stribeck_friction")
+    story = added(told(), Run("x", RATE, *data()), "stribeck_friction")
     assert story.effects == ("stribeck_friction",)
     assert story.steps[-1].rung.label == "stribeck_friction instead of coulomb_friction"
 
@@ -110,7 +109,7 @@ def test_a_relative_replaces_its_own() -> None:
 def test_a_wrong_name_is_refused_in_one_line(name: str, words: str) -> None:
     """Unknown, in every model, in this model already."""
     with pytest.raises(BadInput, match=words):
-        added(told(), *data(), name)
+        added(told(), Run("x", RATE, *data()), name)
 
 
 def test_backlash_is_told_one_sample_ahead() -> None:
@@ -131,7 +130,8 @@ def test_without_enough_data_the_story_says_what_lacks() -> None:
     made = document(story)
     assert made["verdict"] == "not_enough_data" and "the input does not move" in made["sentence"]
     assert made["steps"] == [] and made["measured"] is None and made["model"] is None
-    assert document(diagnosed(begin(Run("x", RATE, *data())), *data()))["verdict"] == "missing_effect"
+    run = Run("x", RATE, *data())
+    assert document(diagnosed(begin(run), run))["verdict"] == "missing_effect"
 
 
 def test_the_linear_part_has_resonances_and_lags_and_leaves_friction_out() -> None:

@@ -32,8 +32,8 @@ def diagnose(
 ) -> None:
     """Name the physical effect that the rigid model of each axis misses, with evidence, or say that none is known."""
     from xy_sysid.files.effects import library
-    from xy_sysid.search.diagnose import diagnose_all as logic
     from xy_sysid.search.findings import answer, findings
+    from xy_sysid.search.of_run import diagnose as logic
 
     begun = time.perf_counter()
     known = library(effect_file or [])
@@ -45,8 +45,7 @@ def diagnose(
 
         def work(name: str) -> Diagnosis:
             bar.update(task, description=f"diagnosing axis {name}")
-            runs = runs_of(recordings, name)
-            found = logic(runs[0].sampling_rate, [(run.voltage, run.position) for run in runs], known, budget, time.thread_time, runs[0].units)
+            found = logic(runs_of(recordings, name), known, budget, time.thread_time)
             bar.advance(task)
             return found
 

@@ -48,10 +48,10 @@ def refine(
     from xy_sysid.errors import BadInput
     from xy_sysid.files.effects import library
     from xy_sysid.files.models import write_axis_mat, write_axis_models
-    from xy_sysid.greybox.axis_data import prepare_all
+    from xy_sysid.greybox.axis_data import prepare
     from xy_sysid.greybox.open_loop import open_loop, settled
+    from xy_sysid.search.of_run import refined
     from xy_sysid.search.refine import MOST_EFFECTS, Effort
-    from xy_sysid.search.refine import refine as logic
 
     if not add and not auto:
         raise BadInput("refine", "without --add and --auto", "--add NAME, or --auto", "Say what to do.")
@@ -70,11 +70,12 @@ def refine(
         def work(name: str) -> Ladder:
             bar.update(task, description=f"refining axis {name}")
             runs = runs_of(recordings, name)
-            run = runs[0]
-            data = prepare_all(run.sampling_rate, [(one.voltage, one.position) for one in runs], tolerance, run.units)
-            found = logic(data, known, tuple(add or ()), Effort(MOST_EFFECTS if auto else 0, budget, time.thread_time))
+            run, effort = runs[0], Effort(MOST_EFFECTS if auto else 0, budget, time.thread_time)
+            found = refined(runs, tuple(add or ()), known, effort, tolerance).ladder
             if not found.final.model.ahead and len(runs) == 1:  # free simulation says nothing about those
-                found = replace(found, final=settled(data, found.final)) if simulate_alone else found
+                if simulate_alone:
+                    data = prepare(run.sampling_rate, run.voltage, run.position, tolerance, run.units)
+                    found = replace(found, final=settled(data, found.final))
                 alone[name] = open_loop(run.sampling_rate, run.position, found.final.simulated)
             bar.advance(task)
             return found

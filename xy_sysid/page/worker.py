@@ -56,11 +56,11 @@ class Desk:
             self._perform(order, Job(act="begin", run=run, story=None, effects=(), tolerance=EPSILON))
             story = self._stories[order.axis]
         if order.act == "diagnose":  # the data are the same as before: the model stays what it is
-            self._keep(order, diagnosed(story, run.voltage, run.position, self._library, time.thread_time))
+            self._keep(order, diagnosed(story, run, self._library, time.thread_time))
         elif order.act == "add":
-            self._keep(order, added(story, run.voltage, run.position, order.argument, self._library))
+            self._keep(order, added(story, run, order.argument, self._library))
         elif order.act == "remove":
-            self._keep(order, removed(story, run.voltage, run.position, order.argument, self._library))
+            self._keep(order, removed(story, run, order.argument, self._library))
         elif order.act in ("next", "auto"):
             self._perform(order, Job(act=ACTS[order.act], run=run, story=story, effects=story.effects, tolerance=EPSILON))
 

@@ -94,14 +94,13 @@ def _studied(recording: Recording, axis: str, settings: IdentifierSettings, peri
 def told(recording: Recording, axis: str, library: Library = STANDARD, tell: Tell = lambda stage: None) -> Mapping[str, Any]:
     """The document of the whole story of an axis, of at most LONGEST. Raises BadInput for samples that cannot be judged."""
     run = recording.run(axis).until(LONGEST)
-    u, y = run.voltage, run.position
     tell(STAGES[1])
     story = begin(run, library)
     if story.steps:
         tell(STAGES[2])
-        story = diagnosed(story, u, y, library)
+        story = diagnosed(story, run, library)
         tell(STAGES[3])
-        story = auto(story, u, y, library)
+        story = auto(story, run, library)
     return document(story)
 
 

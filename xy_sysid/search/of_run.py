@@ -9,7 +9,7 @@ from xy_sysid.axis.model import STANDARD, Library
 from xy_sysid.comparison.physical_model import PhysicalModel
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.axis_data import prepare_all
-from xy_sysid.greybox.free_run import GreyboxFit
+from xy_sysid.greybox.free_run import EPSILON, GreyboxFit
 from xy_sysid.samples.recording import Recording, Run, one_run
 from xy_sysid.search import diagnose as one
 from xy_sysid.search.diagnose import Diagnosis
@@ -127,12 +127,17 @@ def refine(
     add:  effects to add first, in this order, unasked; auto: go on until nothing promises more; the rest as for ``diagnose``
     Raises BadInput for too little data, or for a name that is unknown or in every model.
     """
-    runs, names = runs_together(data), (add,) if isinstance(add, str) else tuple(add)
+    return refined(data, (add,) if isinstance(add, str) else tuple(add), library, Effort(MOST_EFFECTS if auto else 0, budget, clock))
+
+
+def refined(data: Data, names: tuple[str, ...], library: Library, effort: Effort, tolerance: float = EPSILON) -> Refinement:
+    """``refine`` with another effort, or another part of the signal that a model at the floor may leave."""
+    runs = runs_together(data)
     for name in names:
         if library[name].category == "base":
             raise BadInput("add", name, "an effect that is not in every model already", "Leave it out.")
-    prepared = prepare_all(runs[0].sampling_rate, [(run.voltage, run.position) for run in runs], units=runs[0].units)
-    ladder = search(prepared, library, names, Effort(most=MOST_EFFECTS if auto else 0, budget=budget, clock=clock))
+    prepared = prepare_all(runs[0].sampling_rate, [(run.voltage, run.position) for run in runs], tolerance, runs[0].units)
+    ladder = search(prepared, library, names, effort)
     digests = tuple(run.digest for run in runs)
     steps = tuple(
         RefinedStep(step.added, PhysicalModel(model=step.fit.model, axis=runs[0].axis, data=digests, units=runs[0].units, fit=step.fit))

@@ -34,37 +34,37 @@ class Job:
 
 def perform(job: Job, library: Library, clock: Callable[[], float] = never) -> Iterator[tuple[str, Story | None]]:
     """(what is being done now, None), and (what was done, the story so far) after each step. Raises BadInput for a wrong effect."""
-    u, y = job.run.voltage, job.run.position
+    run = job.run
     story = None if job.act == "diagnose" else job.story
     if story is None:
         yield "fitting the rigid model", None
-        story = begin(job.run, library, job.tolerance)
+        story = begin(run, library, job.tolerance)
         yield "the rigid model is fitted", story
     if not story.steps or job.act == "begin":
         return
     if job.act != "effects" and story.diagnosis is None:
         yield "looking for what is missing", None
-        story = diagnosed(story, u, y, library, clock)
+        story = diagnosed(story, run, library, clock)
         yield "diagnosed", story
     if job.act in ("diagnose", "effects"):
         for name in [name for name in story.effects if name not in job.effects]:
             yield f"taking {name} out", None
-            story = removed(story, u, y, name, library)
+            story = removed(story, run, name, library)
             yield f"without {name}", story
         for name in [name for name in job.effects if name not in story.effects]:
             yield f"adding {name}", None
-            story = added(story, u, y, name, library)
+            story = added(story, run, name, library)
             yield f"with {name}", story
         return
     for _ in range(MOST_EFFECTS if job.act == "auto" else 1):
         yield "looking for the next effect", None
-        before, story = len(story.steps), next_best(story, u, y, library)
+        before, story = len(story.steps), next_best(story, run, library)
         yield story.note or story.steps[-1].rung.label, story
         if len(story.steps) == before:
             break
     if job.act == "auto" and len(story.effects) > 1:
         yield "taking out what is not needed", None
-        story = pruned(story, u, y, library)
+        story = pruned(story, run, library)
         yield "done", story
 
 

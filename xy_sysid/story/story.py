@@ -15,11 +15,11 @@ from xy_sysid.axis.model import STANDARD, AxisModel, Library, simulate
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.free_run import EPSILON, AxisData, GreyboxFit, fit, fit_base, prepare
 from xy_sysid.greybox.one_step import one_step_fit
-from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import Run
-from xy_sysid.search.diagnose import diagnose_all, lacking, not_enough
+from xy_sysid.search.diagnose import lacking, not_enough
 from xy_sysid.search.findings import Findings, Rung, findings, rung
 from xy_sysid.search.judge import FreeRunJudge
+from xy_sysid.search.of_run import diagnose
 from xy_sysid.search.refine import MOST_EFFECTS, Effort, never, refine, settle
 from xy_sysid.settings import unknown_name
 from xy_sysid.story.pictures import Measured, Pictures, measured, pictures
@@ -85,13 +85,12 @@ def begin(run: Run, library: Library = STANDARD, tolerance: float = EPSILON) -> 
     return replace(empty, measured=shown, steps=(StoryStep(rung(base), pictures(data, base, shown)),))
 
 
-def diagnosed(story: Story, voltage: FloatArray, position: FloatArray, library: Library = STANDARD, clock: Callable[[], float] = never) -> Story:
+def diagnosed(story: Story, run: Run, library: Library = STANDARD, clock: Callable[[], float] = never) -> Story:
     """With the answer to: which effect is missing in the rigid base? The model stays what it is."""
-    found = findings(diagnose_all(story.sampling_rate, [(voltage, position)], library, clock=clock, units=story.units), library)
-    return replace(story, diagnosis=found, note="")
+    return replace(story, diagnosis=findings(diagnose(run, library, clock=clock), library), note="")
 
 
-def added(story: Story, voltage: FloatArray, position: FloatArray, name: str, library: Library = STANDARD) -> Story:
+def added(story: Story, run: Run, name: str, library: Library = STANDARD) -> Story:
     """With one more effect, everything refitted together; a relative of the same family is replaced.
 
     Raises BadInput for a name that is unknown, in every model, or in this one.
@@ -99,7 +98,7 @@ def added(story: Story, voltage: FloatArray, position: FloatArray, name: str, li
     allowed(name, library)
     if name in story.effects:
         raise BadInput("effect", repr(name), "one that is not in the model yet", f"It has {', '.join(story.effects)}.")
-    data = prepare(story.sampling_rate, voltage, position, story.tolerance, story.units)
+    data = prepare(run.sampling_rate, run.voltage, run.position, story.tolerance, run.units)
     now = _fit_of(story, data, library)
     relative = next((own for own in story.effects if library[own].family and library[own].family == library[name].family), None)
     try:
@@ -110,15 +109,15 @@ def added(story: Story, voltage: FloatArray, position: FloatArray, name: str, li
     return _grown(story, data, found, name, relative)
 
 
-def removed(story: Story, voltage: FloatArray, position: FloatArray, name: str, library: Library = STANDARD) -> Story:
+def removed(story: Story, run: Run, name: str, library: Library = STANDARD) -> Story:
     """Without one effect, the rest refitted; raises BadInput if it is not in the model."""
     if name not in story.effects:
         raise BadInput("effect", repr(name), ", ".join(story.effects) or "none, the model is the rigid base", "Choose one that is in the model.")
-    data = prepare(story.sampling_rate, voltage, position, story.tolerance, story.units)
+    data = prepare(run.sampling_rate, run.voltage, run.position, story.tolerance, run.units)
     return _grown(story, data, fit(data, _model(story, library).without(name)), None, name)
 
 
-def with_effects(story: Story, voltage: FloatArray, position: FloatArray, names: Iterable[str], library: Library = STANDARD) -> Story:
+def with_effects(story: Story, run: Run, names: Iterable[str], library: Library = STANDARD) -> Story:
     """With exactly these effects: what is not among them goes, what is new comes, one step each.
 
     Raises BadInput for a name that is unknown or in every model, before anything is fitted.
@@ -128,19 +127,19 @@ def with_effects(story: Story, voltage: FloatArray, position: FloatArray, names:
         allowed(name, library)
     for name in story.effects:
         if name not in wanted:
-            story = removed(story, voltage, position, name, library)
+            story = removed(story, run, name, library)
     for name in wanted:
         if name not in story.effects:
-            story = added(story, voltage, position, name, library)
+            story = added(story, run, name, library)
     return story
 
 
-def next_best(story: Story, voltage: FloatArray, position: FloatArray, library: Library = STANDARD) -> Story:
+def next_best(story: Story, run: Run, library: Library = STANDARD) -> Story:
     """With the effect that helps most now; with a note instead if nothing is left to explain, or nothing helps."""
     if story.now is None:
         return story
     planned = _planned(story)
-    data = prepare(story.sampling_rate, voltage, position, story.tolerance, story.units)
+    data = prepare(run.sampling_rate, run.voltage, run.position, story.tolerance, run.units)
     if planned is not None:
         return _shown(story, data, planned, library)
     if story.now.explained:
@@ -152,22 +151,22 @@ def next_best(story: Story, voltage: FloatArray, position: FloatArray, library: 
     return _grown(story, data, new[0].fit, new[0].added, None)
 
 
-def auto(story: Story, voltage: FloatArray, position: FloatArray, library: Library = STANDARD) -> Story:
+def auto(story: Story, run: Run, library: Library = STANDARD) -> Story:
     """Add the next best until the floor is reached or nothing helps, then take out what is no longer needed."""
     while len(story.effects) < MOST_EFFECTS:
-        grown = next_best(story, voltage, position, library)
+        grown = next_best(story, run, library)
         if len(grown.steps) == len(story.steps):
             story = grown
             break
         story = grown
-    return pruned(story, voltage, position, library)
+    return pruned(story, run, library)
 
 
-def pruned(story: Story, voltage: FloatArray, position: FloatArray, library: Library = STANDARD) -> Story:
+def pruned(story: Story, run: Run, library: Library = STANDARD) -> Story:
     """Without the effects that are no longer needed, and with simpler relatives that do as well; the same story if all stay."""
     if len(story.effects) < 2:
         return story
-    data = prepare(story.sampling_rate, voltage, position, story.tolerance, story.units)
+    data = prepare(run.sampling_rate, run.voltage, run.position, story.tolerance, run.units)
     found = settle(data, _fit_of(story, data, library))
     gone = [name for name in story.effects if name not in found.model]
     new = [name for name, _ in found.model.effects if name not in story.effects]
@@ -177,8 +176,7 @@ def pruned(story: Story, voltage: FloatArray, position: FloatArray, library: Lib
 def tell(run: Run, library: Library = STANDARD) -> Story:
     """The whole story of one axis: base, diagnosis, and every effect that it needs."""
     story = begin(run, library)
-    u, y = run.voltage, run.position
-    return auto(diagnosed(story, u, y, library), u, y, library) if story.steps else story
+    return auto(diagnosed(story, run, library), run, library) if story.steps else story
 
 
 def allowed(name: str, library: Library = STANDARD) -> None:
