@@ -113,7 +113,7 @@ def test_friction_that_differs_between_directions_is_found_beside_backlash() -> 
     """Coulomb friction is in the filter already; a law with two levels takes its place, no load on the table."""
     data, base = machine("backlash=30e-6", "asymmetric_friction=0.3,coulomb=0.2")
     start = fit_with(data, base, ["coulomb_friction"], brief=True)
-    rungs = grown(data, start, EFFECTS["backlash"], STANDARD).rungs
+    rungs = grown(data, start, EFFECTS["backlash"]).rungs
     name, last = rungs[-1]
     assert [rungs[0][0], name, len(rungs)] == ["backlash", "asymmetric_friction", 2]
     assert last.excess == 0.0
@@ -126,7 +126,7 @@ def test_a_load_on_the_table_is_told_from_friction_that_differs_between_directio
     """Across a gap the motor feels the one and not the other; both numbers are right."""
     data, base = machine("backlash=30e-6", "constant_load=0.15", "coulomb_friction=0.2")
     start = fit_with(data, base, ["coulomb_friction"], brief=True)
-    rungs = grown(data, start, EFFECTS["backlash"], STANDARD).rungs
+    rungs = grown(data, start, EFFECTS["backlash"]).rungs
     assert [name for name, _ in rungs] == ["backlash", "constant_load"]
     last = rungs[-1][1]
     assert last.excess == 0.0
@@ -138,7 +138,7 @@ def test_a_load_on_the_table_is_told_from_friction_that_differs_between_directio
 def test_nothing_is_put_beside_backlash_that_stands_alone() -> None:
     """One rung."""
     data, base = machine("backlash=30e-6")
-    assert [name for name, _ in grown(data, base, EFFECTS["backlash"], STANDARD).rungs] == ["backlash"]
+    assert [name for name, _ in grown(data, base, EFFECTS["backlash"]).rungs] == ["backlash"]
 
 
 def test_a_dead_zone_can_be_added_to_backlash_by_name() -> None:

@@ -8,9 +8,9 @@ from math import exp, inf
 
 import pytest
 
-from xy_sysid.search.best_first import FEW, Search
+from xy_sysid.search.best_first import Search
+from xy_sysid.search.criteria import FEWEST, PRICE
 from xy_sysid.search.criteria import LEAST as SMALLEST
-from xy_sysid.search.criteria import PRICE
 from xy_sysid.search.judge import Move
 
 Set = frozenset[str]
@@ -339,9 +339,9 @@ def test_promises_that_are_not_kept_are_believed_less() -> None:
     """After a few tries from a set that brought nothing, moves of small promise are left alone; they are tried where tries bring much."""
     moves = [(of(name), 0.03) for name in "abcdefgh"]
     _, tried = searched(Table({of(): 2.0, **{names: 2.0 for names, _ in moves}}, {of(): moves}))
-    assert len(tried) == FEW
+    assert len(tried) == FEWEST
     _, tried = searched(Table({of(): 2.0, **{names: 1.9 for names, _ in moves}}, {of(): moves}))
-    assert len(tried) > FEW
+    assert len(tried) > FEWEST
 
 
 def test_the_budget_stops_it_and_that_is_said() -> None:

@@ -13,7 +13,6 @@ from xy_sysid.search import criteria
 
 SEARCH = ROOT / "xy_sysid" / "search"
 MOST = 17
-IN_WORK = ("beside_one_step.py", "best_first.py", "refine.py")  # these still hold some; take them off when they no longer do
 
 
 def bare_numbers(path: Path) -> list[str]:
@@ -67,12 +66,7 @@ def _is_number(item: ast.Assign) -> bool:
 def test_no_other_module_of_the_search_holds_a_number_of_its_own(path: Path) -> None:
     """A number that steers stands in criteria.py, with its reason."""
     numbers = bare_numbers(path)
-    if path.name == "criteria.py":
-        return
-    if path.name in IN_WORK:
-        assert numbers, f"{path.name} holds none any more: take it off the list"
-        pytest.skip(f"still holds {', '.join(numbers)}")
-    assert not numbers, f"{path.name} holds {', '.join(numbers)}: put them into criteria.py"
+    assert not numbers or path.name == "criteria.py", f"{path.name} holds {', '.join(numbers)}: put them into criteria.py"
 
 
 def test_the_page_of_the_search_has_the_table() -> None:

@@ -25,8 +25,7 @@ from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.imports import save
 from xy_sysid.search import refine as refining
 from xy_sysid.search.beside_one_step import grown
-from xy_sysid.search.best_first import FEW
-from xy_sysid.search.criteria import AT_FLOOR
+from xy_sysid.search.criteria import AT_FLOOR, FEWEST
 from xy_sysid.search.diagnose import diagnose, judged
 from xy_sysid.search.judge import FreeRunJudge
 from xy_sysid.search.refine import Effort, refine
@@ -289,4 +288,4 @@ def test_a_gap_is_asked_for_early_and_once(effect: str, monkeypatch: pytest.Monk
     assert asked == ["backlash"]
     assert ("backlash" in found.effects) == (effect == "backlash")
     if effect == "backlash":
-        assert tried.index(("backlash",)) == len(tried) - 1 <= FEW + 1
+        assert tried.index(("backlash",)) == len(tried) - 1 <= FEWEST + 1

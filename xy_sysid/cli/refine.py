@@ -50,8 +50,9 @@ def refine(
     from xy_sysid.files.models import write_axis_mat, write_axis_models
     from xy_sysid.greybox.axis_data import prepare
     from xy_sysid.greybox.open_loop import open_loop, settled
+    from xy_sysid.search.criteria import MOST_EFFECTS
     from xy_sysid.search.of_run import refined
-    from xy_sysid.search.refine import MOST_EFFECTS, Effort
+    from xy_sysid.search.refine import Effort
 
     if not add and not auto:
         raise BadInput("refine", "without --add and --auto", "--add NAME, or --auto", "Say what to do.")

@@ -6,12 +6,12 @@ gain, delay or pole would do is projected out first.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 import scipy.signal
-from numpy.typing import NDArray
 
 from xy_sysid.effects import Effect, Guess, Scene
 from xy_sysid.effects._similarity import Similarity
@@ -35,28 +35,31 @@ class Trace:
 class Screen:
     """The score test of several effects on one error, alone or together.
 
-    traces: largest share first; whitened: (k, m) columns of each effect's best trace; error: (m,) whitened error
-    band: (m,) band of each number; power: (bands,) of the error; least: as it was given
+    traces: largest share first; rows: of each effect in what follows, the columns of its best trace
+    inner: (bands, k, k) products of all columns in each band; seen: (bands, k) of the columns with the error; error: (bands,) of it with
+    itself, whitened; power: (bands,) of the error; least: as it was given; rest: its ``Floor.rest`` of this power
     """
 
     traces: tuple[Trace, ...]
-    whitened: Mapping[str, FloatArray]
+    rows: Mapping[str, tuple[int, ...]]
+    inner: FloatArray
+    seen: FloatArray
     error: FloatArray
-    band: NDArray[np.int64]
     power: FloatArray
     least: Floor
+    rest: Callable[[FloatArray], float]
 
     def gain(self, names: Iterable[str]) -> Gain:
         """What effects take away to first order, each with its best trace: linear algebra alone."""
-        rows = np.concatenate([self.whitened[name] for name in names])
-        coefficients = np.linalg.pinv(rows @ rows.T, rcond=1e-8, hermitian=True) @ (rows @ self.error)
-        left = self.error - coefficients @ rows
-        size = self.power.size
-        before = np.bincount(self.band, self.error**2, size)  # 0 in bands that are not excited: nobody knows what happens there
-        ratio = np.where(before > 0.0, np.bincount(self.band, left**2, size) / np.maximum(before, 1e-300), 1.0)
+        rows = np.array([row for name in names for row in self.rows[name]], dtype=np.int64)
+        inner, seen = self.inner[:, rows[:, None], rows], self.seen[:, rows]
+        coefficients = np.linalg.pinv(inner.sum(axis=0), rcond=1e-8, hermitian=True) @ seen.sum(axis=0)
+        left = self.error - 2.0 * seen @ coefficients + np.einsum("bij,i,j->b", inner, coefficients, coefficients)
+        # 0 in bands that are not excited: nobody knows what happens there
+        ratio = np.where(self.error > 0.0, np.maximum(left, 0.0) / np.maximum(self.error, 1e-300), 1.0)
         after = self.power * np.minimum(ratio, 1.0)
-        rest = self.least.rest(self.power)
-        return Gain(excess(self.power, self.least) - excess(after, self.least), float(np.log(max(rest(self.power), 1e-12) / max(rest(after), 1e-12))))
+        rest = float(np.log(max(self.rest(self.power), 1e-12) / max(self.rest(after), 1e-12)))
+        return Gain(excess(self.power, self.least) - excess(after, self.least), rest)
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,15 +95,30 @@ def screen(effects: Iterable[Effect], scene: Scene, nuisance: FloatArray, window
         if chosen is not None:
             columns[effect.name] = (space, chosen)
     common = part if any(space is part for space, _ in columns.values()) else whole
-    rows = {name: white if space is common else common.first_of(space, white) for name, (space, white) in columns.items()}
+    names = list(columns)
+    every = [white if space is common else common.first_of(space, white) for space, white in columns.values()]
+    ends = np.cumsum([0, *(len(rows) for rows in every)])
+    inner = _by_band(np.concatenate([*every, common.error[None, :]]), common.windows)
+    left = windows.layout.power(common.windows.spectrum(scene.error))
     return Screen(
         traces=tuple(sorted(found, key=lambda trace: -trace.share)),
-        whitened=rows,
-        error=common.error,
-        band=np.tile(np.tile(windows.layout.band, 2), common.windows.begins.size),
-        power=windows.layout.power(common.windows.spectrum(scene.error)),
+        rows={name: tuple(range(begin, end)) for name, begin, end in zip(names, ends, ends[1:], strict=False)},
+        inner=inner[:, :-1, :-1],
+        seen=inner[:, :-1, -1],
+        error=inner[:, -1, -1],
+        power=left,
         least=least,
+        rest=least.rest(left),
     )
+
+
+def _by_band(rows: FloatArray, windows: Windows) -> FloatArray:
+    """(bands, k, k) products of rows (k, m) with each other in each band; m: windows, real and imaginary part, lines."""
+    layout = windows.layout
+    each = rows.reshape(len(rows), windows.begins.size * 2, layout.band.size)
+    begins = np.append(np.searchsorted(layout.band, np.arange(layout.count)), layout.band.size)
+    parts = (each[:, :, first:last].reshape(len(rows), -1) for first, last in pairwise(begins))
+    return np.stack([part @ part.T for part in parts])
 
 
 def replace_scene(scene: Scene, samples: int) -> Scene:

@@ -11,10 +11,8 @@ from dataclasses import dataclass, field
 from math import inf, log
 from typing import Generic, Protocol, TypeVar
 
-from xy_sysid.search.criteria import ALIKE, HOPELESS, LATER, LEAST, OPTIMISM, PRICE, SIMPLE_FIRST
+from xy_sysid.search.criteria import ALIKE, FEWEST, HOPELESS, LATER, LEAST, OPTIMISM, PRICE, SIMPLE_FIRST
 from xy_sysid.search.judge import Move
-
-FEW = 3  # tries from a set after which it is known what its promises are worth
 
 
 class Judged(Protocol):
@@ -82,7 +80,7 @@ class Node(Generic[F]):
     def optimism(self) -> float:
         """How many times more than promised a move from here may gain."""
         most = LATER if self.effects else OPTIMISM
-        return most if self.tried < FEW else min(LATER * self.shown, most)
+        return most if self.tried < FEWEST else min(LATER * self.shown, most)
 
     def hope(self, move: Move) -> float:
         """The score that a move may reach."""

@@ -16,9 +16,9 @@ from xy_sysid.errors import BadInput
 from xy_sysid.greybox.axis_data import AxisData, prepare_all
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.samples.block import FloatArray
-from xy_sysid.search.criteria import AT_FLOOR, FEWEST, FOLLOWS, SIZE, STILL
+from xy_sysid.search.criteria import AT_FLOOR, BUDGET, FEWEST, FOLLOWS, SIZE, STILL
 from xy_sysid.search.ladder import Candidate, Ladder
-from xy_sysid.search.refine import BUDGET, Effort, never, refine
+from xy_sysid.search.refine import Effort, never, refine
 from xy_sysid.units import USUAL, Units, bare, moved
 
 Kind = Literal["missing_effect", "nothing_missing", "not_in_library", "not_enough_data"]

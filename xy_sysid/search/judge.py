@@ -94,11 +94,11 @@ class FreeRunJudge:
         screen = screened(self.data, now, open_to)
         traces = {trace.effect: trace for trace in screen.traces}
         own = frozenset(name for name, _ in model.effects)
-        gains = {name: screen.gain([name]) for name in screen.whitened}
+        gains = {name: screen.gain([name]) for name in screen.rows}
         here = _Here(now, brief, scene_of(self.data, now, self.data.first))
         found = (self._single(here, families, traces[e.name], gains.get(e.name, NOTHING)) for e in open_to)
         singles = sorted((move for move in found if move is not None), key=lambda move: -move.gain)
-        kept = self._with_relatives(singles[: int(WIDTH)], singles)
+        kept = self._with_relatives(singles[:WIDTH], singles)
         kept += [move for move in singles if move not in kept and move.begins < now.excess]
         pairs = []
         for one, other in combinations(self._leaders(gains, families), 2):
@@ -117,7 +117,7 @@ class FreeRunJudge:
                     )
                 )
         pairs.sort(key=lambda move: -move.gain)
-        return [move for move in (*kept, *pairs[: int(WIDTH)]) if not self._twice(move.effects)]
+        return [move for move in (*kept, *pairs[:WIDTH]) if not self._twice(move.effects)]
 
     def _leaders(self, gains: Mapping[str, Gain], families: dict[str, str]) -> list[str]:
         """What has no family, and of each family that is not in the set yet its simplest and its most promising member."""

@@ -20,18 +20,14 @@ from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.greybox.one_step import error_without
 from xy_sysid.greybox.whitened import whitened_rms
-from xy_sysid.search.beside_one_step import Grown, grown
-from xy_sysid.search.best_first import FEW, Node, Search
-from xy_sysid.search.criteria import AT_FLOOR, FILTERED, FREE, LEAST, WORTH
+from xy_sysid.search.beside_one_step import Grown, Wanted, grown
+from xy_sysid.search.best_first import Node, Search
+from xy_sysid.search.criteria import AT_FLOOR, BUDGET, FEWEST, FILTERED, FREE, LEAST, MOST_EFFECTS, WIDTH, WORTH
 from xy_sysid.search.judge import FreeRunJudge, joined
 from xy_sysid.search.ladder import Candidate, Ladder, Rival, Step
 from xy_sysid.search.simplify import Simplifying, whole
 
-MOST_EFFECTS = 4
-BUDGET = 10.0  # s of processor time for one axis
-RIVALS = 6
 Filtered = tuple[tuple[tuple[str, GreyboxFit], ...], float]
-POLISH = 3  # more fits of the last set, as long as they have not ended by themselves
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +96,7 @@ def refine_steps(
     while settled.step():
         yield Trying(tuple(sorted(settled.now.effects)))
     final = settled.now
-    for _ in range(POLISH):  # along a valley that bends the first fit did not come to its end
+    for _ in range(FEWEST):  # along a valley that bends the first fit did not come to its end
         if not final.fit.converged and not judge.late():
             final.fit = judge.whole(final.fit)
     search.stopped = search.stopped or judge.late()
@@ -175,7 +171,7 @@ class _Ahead:
     @property
     def due(self) -> bool:
         """After the first simulations, where these leave something, once."""
-        return bool(self.names) and not self.asked and len(self.search.nodes) > FEW and self.search.best.fit.excess >= AT_FLOOR
+        return bool(self.names) and not self.asked and len(self.search.nodes) > FEWEST and self.search.best.fit.excess >= AT_FLOOR
 
     def explains(self) -> bool:
         """Whether one of them explains the axis down to the noise: then no more simulations need to be tried."""
@@ -205,7 +201,8 @@ class _Ahead:
                 return
             base = self.search.nodes[frozenset()].fit
             try:
-                self.fitted[name] = grown(data, base, library[name], library, Limits(FILTERED * bar, self.judge.late), self.judge.refusal)
+                wanted = Wanted(Limits(FILTERED * bar, self.judge.late), self.search.least, self.judge.refusal)
+                self.fitted[name] = grown(data, base, library[name], wanted)
             except np.linalg.LinAlgError:
                 return
         fitted = self.fitted[name]
@@ -274,7 +271,7 @@ def _ladder(
         final=final,
         effects=ordered,
         tried=tuple(tried),
-        rivals=tuple(rivals[:RIVALS]),
+        rivals=tuple(rivals[:WIDTH]),
         sizes={name: min(each) for name, each in sizes.items() if each},
         astray=max((_astray(data, settled, name) for name in node.effects if judge.library[name].category == "motion"), default=0.0),
         helps=1.0 - min(judge.rest(item.fit, base) for item in search.nodes.values() if item.whole and not item.refused),

@@ -16,11 +16,12 @@ from xy_sysid.errors import BadInput
 from xy_sysid.greybox.free_run import EPSILON, AxisData, GreyboxFit, fit, fit_base, prepare
 from xy_sysid.greybox.one_step import one_step_fit
 from xy_sysid.samples.recording import Run
+from xy_sysid.search.criteria import MOST_EFFECTS
 from xy_sysid.search.diagnose import lacking, not_enough
 from xy_sysid.search.findings import Findings, Rung, findings, rung
 from xy_sysid.search.judge import FreeRunJudge
 from xy_sysid.search.of_run import diagnose
-from xy_sysid.search.refine import MOST_EFFECTS, Effort, never, refine, settle
+from xy_sysid.search.refine import Effort, never, refine, settle
 from xy_sysid.settings import unknown_name
 from xy_sysid.story.pictures import Measured, Pictures, measured, pictures
 from xy_sysid.units import Units

@@ -1,0 +1,117 @@
+"""What an effect would explain of the innovations of a one-step prediction, to first order: a score test, as ``score_test`` is for free simulation.
+
+The filter is run with a little of each trace put in; what changes is what the effect would explain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+import scipy.signal
+
+from xy_sysid.axis.model import AxisModel
+from xy_sysid.effects import Effect, Guess, Scene
+from xy_sysid.effects._contract import Beside, Followed
+from xy_sysid.greybox.free_run import AxisData
+from xy_sysid.greybox.one_step import as_beside, beside
+from xy_sysid.greybox.score_test import Trace
+from xy_sysid.greybox.start_rigid import mean_velocity_filter
+from xy_sysid.samples.block import FloatArray
+
+SMALL = 0.02  # of the rms voltage or velocity: how much of a trace is put in to see what it does
+
+
+def traces(data: AxisData, model: AxisModel, effect: Effect, found: Followed, effects: Iterable[Effect]) -> list[Trace]:
+    """How much of the innovations' power each effect beside would explain, to first order, best first, with start values."""
+    assert effect.one_step is not None
+    library, fs, n = model.library, data.sampling_rate, data.first
+    names = [name for name, _ in beside(model, effect)[1]]
+    pairs = (
+        zip(names, np.split(np.array(found.beside[0]), np.cumsum([len(library[name].names) for name in names])[:-1]), strict=True) if names else ()
+    )
+    own = as_beside(data, library, [(name, tuple(values)) for name, values in pairs])
+    numbers = np.array([*found.base, *found.beside[0]])
+    voltage, position, against, through = own.undo(numbers, n)
+    still = np.zeros(0)
+
+    def seen(by: Beside, what: Followed = found) -> FloatArray:
+        assert effect.one_step is not None
+        return effect.one_step.innovation(fs, what, by, n)
+
+    def recording(u: FloatArray, y: FloatArray, f: FloatArray) -> Beside:
+        return Beside(
+            start=still,
+            low=still,
+            high=still,
+            unit=still,
+            positive=still.astype(np.bool_),
+            undo=lambda _, samples: (u[:samples], y[: samples + 1], f[:samples], through),
+            similar=own.similar,
+            swing=own.swing,
+        )
+
+    here = seen(recording(voltage, position, against))
+    skip = min(int(0.5 * fs), n // 4)
+    error = _missing_velocity(data, found, here)
+    scene = Scene(
+        sampling_rate=fs,
+        gain=found.base[0],
+        pole=found.base[2],
+        voltage=_late(voltage, found.base[1] * fs),
+        velocity=data.velocity[:n],
+        position=0.5 * (position[1:] + position[:-1]),
+        error=error,
+    )
+
+    def change(guess: Guess, column: FloatArray, side: int) -> FloatArray:
+        size = SMALL * float(np.std(data.velocity if guess.at_encoder else voltage)) / (float(np.std(column)) + abs(float(np.mean(column))) + 1e-300)
+        put = size * column
+        other = recording(voltage, position - np.concatenate(([0.0], np.cumsum(put))) / fs, against) if guess.at_encoder else None
+        both = against.copy()
+        both[side] += put
+        return (seen(other or recording(voltage, position, both)) - here)[skip:] / size
+
+    nuisance = np.stack(
+        [(seen(recording(*own.undo(moved, n)[:3]), replace(found, base=tuple(moved[:3]))) - here)[skip:] for moved in _moved(numbers)]
+    )
+    basis = np.linalg.qr(nuisance.T)[0]
+    target = here[skip:] - basis @ (basis.T @ here[skip:])
+    best: list[Trace] = []
+    for item in effects:
+        trace = Trace(item.name, 0.0, tuple(own.typical for own in item.on(scene.similar)))
+        for guess in item.guessed(scene):
+            columns = np.stack([change(guess, column[:n], int(item.on_table)) for column in guess.columns])
+            columns = columns - (columns @ basis) @ basis.T
+            size = np.linalg.norm(columns, axis=1) + 1e-300
+            unit = columns / size[:, None]
+            inside = unit @ target
+            coefficients = np.linalg.pinv(unit @ unit.T, rcond=1e-10, hermitian=True) @ inside
+            share = float(inside @ coefficients) / float(target @ target + 1e-300)
+            if share > trace.share:
+                trace = Trace(item.name, share, item.read(guess, -coefficients / size, scene.similar))
+        best.append(trace)
+    return sorted(best, key=lambda trace: -trace.share)
+
+
+def _moved(numbers: FloatArray) -> list[FloatArray]:
+    found = []
+    for k in range(3):
+        moved = numbers.copy()
+        moved[k] *= 1.001
+        found.append(moved)
+    return found
+
+
+def _missing_velocity(data: AxisData, found: Followed, innovation: FloatArray) -> FloatArray:
+    """(n,) m/s: what the forces that the innovations tell of would do to the base. Right but for its size and a short delay."""
+    gain, _, pole = found.base
+    b, a = mean_velocity_filter(gain, pole, data.sampling_rate)
+    force = innovation * found.noise * data.sampling_rate**2 / (gain * pole)
+    return np.asarray(scipy.signal.lfilter(b, a, force))
+
+
+def _late(voltage: FloatArray, samples: float) -> FloatArray:
+    whole = int(samples + 0.5)
+    return np.concatenate((np.zeros(whole), voltage))[: voltage.size]
