@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from functools import lru_cache
 
 import numpy as np
 import scipy.signal
@@ -73,6 +74,17 @@ def joint(scene: Scene, low: float, high: float) -> Iterator[tuple[float, float,
     Three poles and two zeros, by linear least squares with weights worked out again (Sanathanan & Koerner 1963), for delays
     on a grid; the pair must lie between ``low`` and ``high`` (Hz).
     """
+    found = _of_response(scene)
+    if found is None:
+        return
+    gain, delay, pole, (split, bottom, *dampings) = found
+    if low <= bottom <= high:
+        yield gain, delay, pole, (split, bottom, *dampings)
+
+
+@lru_cache(maxsize=1)
+def _of_response(scene: Scene) -> tuple[float, float, float, tuple[float, ...]] | None:
+    """What ``joint`` gives, for a pair anywhere: once for all effects that are one."""
     f, response, weight = _response(scene)
     scale = 2.0 * math.pi * float(np.sqrt(f[0] * f[-1]))
     s = 2j * math.pi * f / scale
@@ -92,19 +104,19 @@ def joint(scene: Scene, low: float, high: float) -> Iterator[tuple[float, float,
         if cost < best:
             best, chosen = cost, (float(delay), found)
     if chosen is None:
-        return
+        return None
     delay, c = chosen
     zeros, poles = np.roots(c[:3]) * scale, np.roots([1.0, *c[3:]]) * scale
     real = poles[np.abs(poles.imag) < 1e-9 * np.abs(poles)]
     pair_of = poles[poles.imag > 1e-9 * np.abs(poles)]
     zero_of = zeros[zeros.imag > 0.0]
     if real.size != 1 or pair_of.size != 1 or zero_of.size != 1 or real[0].real >= 0.0:
-        return
+        return None
     bottom, top = float(abs(zero_of[0])) / (2.0 * math.pi), float(abs(pair_of[0])) / (2.0 * math.pi)
-    if not low <= bottom <= high or top <= bottom:
-        return
+    if top <= bottom:
+        return None
     dampings = [max(-float(root.real) / float(abs(root)), 1e-3) for root in (zero_of[0], pair_of[0])]
-    yield float(c[2] / c[5]), delay, -float(real[0].real), (top / bottom - 1.0, bottom, dampings[0], dampings[1])
+    return float(c[2] / c[5]), delay, -float(real[0].real), (top / bottom - 1.0, bottom, dampings[0], dampings[1])
 
 
 def _response(scene: Scene) -> tuple[FloatArray, NDArray[np.complex128], FloatArray]:

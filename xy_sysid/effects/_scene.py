@@ -15,9 +15,9 @@ from xy_sysid.samples.block import FloatArray
 USUAL_SWING = 2e-4  # m between two reversals on the usual machine of ``Similarity``
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """One axis in motion, with the base model's view of it.
+    """One axis in motion, with the base model's view of it; each is its own, so that what is worked out of it can be kept.
 
     sampling_rate: Hz; gain: m/s/V; pole: rad/s of the base
     voltage:  (n,) what arrives at the amplifier (delayed), mean over each sample, V

@@ -192,16 +192,16 @@ def look(data: AxisData, fitted: GreyboxFit, effects: Iterable[Effect]) -> list[
     return list(screened(data, fitted, effects).traces)
 
 
-def screened(data: AxisData, fitted: GreyboxFit, effects: Iterable[Effect]) -> Screen:
-    """The score test of effects on what a fit leaves, alone and together."""
-    run, values, scale = _problem(data, fitted.model, data.velocity.size, COARSE)
+def screened(data: AxisData, fitted: GreyboxFit, effects: Iterable[Effect], scene: Scene | None = None) -> Screen:
+    """The score test of effects on what a fit leaves of the first stage's data, alone and together; scene: of these, if it is known."""
+    run, values, scale = _problem(data, fitted.model, data.first, COARSE)
     inner = scale.inner(values)
     here, nuisance = run(values), []
     for k in range(values.size):
         moved = inner.copy()
         moved[k] += 1e-4
         nuisance.append(run(scale.outer(moved)) - here)
-    return screen(effects, scene_of(data, fitted, data.velocity.size), np.array(nuisance), data.fitted, data.floor, data.first)
+    return screen(effects, scene or scene_of(data, fitted, data.first), np.array(nuisance), data.brief, data.floor)
 
 
 def scene_of(data: AxisData, fitted: GreyboxFit, samples: int) -> Scene:

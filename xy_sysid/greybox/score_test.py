@@ -7,7 +7,7 @@ gain, delay or pole would do is projected out first.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -18,8 +18,6 @@ from xy_sysid.effects._similarity import Similarity
 from xy_sysid.greybox.floor import Floor, Windows, excess, tolerance
 from xy_sysid.greybox.start_rigid import mean_velocity_filter
 from xy_sysid.samples.block import FloatArray
-
-MANY = 5  # traces of one effect; more are looked at on the first part of the data only
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,42 +68,35 @@ class Gain:
     rest: float
 
 
-def screen(effects: Iterable[Effect], scene: Scene, nuisance: FloatArray, windows: Windows, least: Floor, short: int) -> Screen:
+def screen(effects: Iterable[Effect], scene: Scene, nuisance: FloatArray, windows: Windows, least: Floor) -> Screen:
     """The best trace of each effect.
 
-    nuisance: (k, n) change of the model's velocity per unit of each parameter that it has already;
-    short: samples to which the guesses of effects with many of them are confined.
+    nuisance: (k, n) change of the model's velocity per unit of each parameter that it has already; windows: of the scene that are looked at
     """
     power = tolerance(windows.layout, windows.spectrum(scene.error), least)
-    weight = (least.excited / np.sqrt(power))[windows.layout.band]
-    whole = _Prepared(scene.error, nuisance, windows, weight)
-    brief = replace_scene(scene, short)
-    part = _Prepared(brief.error, nuisance[:, : brief.error.size], windows.before(brief.error.size), weight) if short < scene.error.size else whole
-    found, columns, similar = [], {}, scene.similar
+    space = _Prepared(scene.error, nuisance, windows, (least.excited / np.sqrt(power))[windows.layout.band])
+    found, rows, columns = [], {}, [space.error[None, :]]
     for effect in effects:
-        many = effect.category == "motion"
-        guesses = [guess for guess in effect.guessed(brief if many else scene) if not guess.inverse_only]
-        space = part if many or len(guesses) > MANY else whole
-        best, chosen = Trace(effect.name, 0.0, tuple(item.typical for item in effect.on(similar))), None
-        for guess in guesses:
-            share, coefficients, white = space.share(_through_base(guess, scene, space.samples))
+        best, chosen = Trace(effect.name, 0.0, tuple(item.typical for item in effect.on(scene.similar))), None
+        for guess in effect.guessed(scene):
+            if guess.inverse_only:
+                continue
+            share, coefficients, white = space.share(_through_base(guess, scene))
             if share > best.share:
-                best, chosen = Trace(effect.name, share, effect.read(guess, coefficients, similar)), white
+                best, chosen = Trace(effect.name, share, effect.read(guess, coefficients, scene.similar)), white
         found.append(best)
         if chosen is not None:
-            columns[effect.name] = (space, chosen)
-    common = part if any(space is part for space, _ in columns.values()) else whole
-    names = list(columns)
-    every = [white if space is common else common.first_of(space, white) for space, white in columns.values()]
-    ends = np.cumsum([0, *(len(rows) for rows in every)])
-    inner = _by_band(np.concatenate([*every, common.error[None, :]]), common.windows)
-    left = windows.layout.power(common.windows.spectrum(scene.error))
+            begin = sum(map(len, columns))
+            rows[effect.name] = tuple(range(begin, begin + len(chosen)))
+            columns.append(chosen)
+    inner = _by_band(np.concatenate(columns), windows)
+    left = windows.layout.power(windows.spectrum(scene.error))
     return Screen(
         traces=tuple(sorted(found, key=lambda trace: -trace.share)),
-        rows={name: tuple(range(begin, end)) for name, begin, end in zip(names, ends, ends[1:], strict=False)},
-        inner=inner[:, :-1, :-1],
-        seen=inner[:, :-1, -1],
-        error=inner[:, -1, -1],
+        rows=rows,
+        inner=inner,
+        seen=inner[:, :, 0],
+        error=inner[:, 0, 0],
         power=left,
         least=least,
         rest=least.rest(left),
@@ -121,32 +112,23 @@ def _by_band(rows: FloatArray, windows: Windows) -> FloatArray:
     return np.stack([part @ part.T for part in parts])
 
 
-def replace_scene(scene: Scene, samples: int) -> Scene:
-    """The first samples of a scene."""
-    if samples >= scene.error.size:
-        return scene
-    cut = {name: getattr(scene, name)[:samples] for name in ("voltage", "velocity", "position", "error")}
-    return replace(scene, **cut)
-
-
 def bounded(effect: Effect, values: Iterable[float], similar: Similarity) -> tuple[float, ...]:
     """The values, moved into the bounds of the effect's parameters on a machine like this."""
     return tuple(float(min(max(value, item.low), item.high)) for value, item in zip(values, effect.on(similar), strict=True))
 
 
-def _through_base(guess: Guess, scene: Scene, samples: int) -> FloatArray:
-    columns = guess.columns[:, :samples]
+def _through_base(guess: Guess, scene: Scene) -> FloatArray:
     if guess.at_encoder:
-        return columns
+        return guess.columns
     b, a = mean_velocity_filter(scene.gain, scene.pole, scene.sampling_rate)
-    return np.asarray(-scipy.signal.lfilter(b, a, columns, axis=1))
+    return np.asarray(-scipy.signal.lfilter(b, a, guess.columns, axis=1))
 
 
 class _Prepared:
-    """The error over the first samples, whitened, with the nuisance projected out."""
+    """The error, whitened, with the nuisance projected out."""
 
     def __init__(self, error: FloatArray, nuisance: FloatArray, windows: Windows, weight: FloatArray) -> None:
-        self.samples, self.windows, self.weight = error.size, windows, weight
+        self.windows, self.weight = windows, weight
         self.basis = np.linalg.qr(np.stack([self._white(row) for row in nuisance], axis=1))[0]
         self.error = self._clean(self._white(error))
         self.power = float(self.error @ self.error) + 1e-300
@@ -157,10 +139,6 @@ class _Prepared:
 
     def _clean(self, values: FloatArray) -> FloatArray:
         return np.asarray(values - (values @ self.basis) @ self.basis.T)
-
-    def first_of(self, other: _Prepared, white: FloatArray) -> FloatArray:
-        """Columns of longer data, cut to these windows."""
-        return np.stack([self._clean(row[: self.error.size]) for row in white])
 
     def share(self, columns: FloatArray) -> tuple[float, FloatArray, FloatArray]:
         """Part of the error's power explained, the coefficients, and the whitened columns."""

@@ -91,11 +91,11 @@ class FreeRunJudge:
         model = now.model
         families = {self.library[name].family: name for name, _ in model.effects if self.library[name].family}
         open_to = [e for e in self.library.acting if e.simulable and e.name not in model]
-        screen = screened(self.data, now, open_to)
+        here = _Here(now, brief, scene_of(self.data, now, self.data.first))
+        screen = screened(self.data, now, open_to, here.scene)
         traces = {trace.effect: trace for trace in screen.traces}
         own = frozenset(name for name, _ in model.effects)
         gains = {name: screen.gain([name]) for name in screen.rows}
-        here = _Here(now, brief, scene_of(self.data, now, self.data.first))
         found = (self._single(here, families, traces[e.name], gains.get(e.name, NOTHING)) for e in open_to)
         singles = sorted((move for move in found if move is not None), key=lambda move: -move.gain)
         kept = self._with_relatives(singles[:WIDTH], singles)
