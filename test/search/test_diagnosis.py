@@ -21,13 +21,14 @@ from xy_sysid.axis.model import STANDARD, Library
 from xy_sysid.cli import run
 from xy_sysid.effects import EFFECTS, Effect
 from xy_sysid.greybox.axis_data import AxisData, prepare
-from xy_sysid.greybox.free_run import GreyboxFit
+from xy_sysid.greybox.free_run import GreyboxFit, fit_with
 from xy_sysid.imports import save
 from xy_sysid.search import refine as refining
 from xy_sysid.search.beside_one_step import grown
 from xy_sysid.search.criteria import AT_FLOOR, FEWEST
 from xy_sysid.search.diagnose import diagnose, judged
 from xy_sysid.search.judge import FreeRunJudge
+from xy_sysid.search.ladder import Rival, Step
 from xy_sysid.search.refine import Effort, refine
 
 
@@ -216,6 +217,32 @@ def test_not_in_the_library_is_said_less_surely_the_more_is_left() -> None:
     assert sure[0] == 1.0 > sure[1] > sure[2] > 0.0
     helped = judged(data, replace(nothing, discrepancy=0.0, helps=0.3), STANDARD)
     assert helped.verdict == "not_in_library" and helped.confidence == pytest.approx(0.7)
+
+
+def test_what_two_sets_share_is_named_and_what_they_differ_in_is_not() -> None:
+    """A tie between a load and cogging beside friction: friction alone is told, and the load as what may be; a rival of friction itself counts."""
+    data = prepare(2000.0, *recorded("coulomb_friction", seconds=20.0).axis("x"))
+    alone = refine(data)
+    both = fit_with(data, alone.final, ["constant_load"])
+    tie = Rival(("coulomb_friction", "cogging"), both, 0.0)
+    ladder = replace(
+        alone,
+        steps=(*alone.steps, Step("constant_load", both)),
+        final=both,
+        effects=("coulomb_friction", "constant_load"),
+        rivals=(tie, *alone.rivals),
+        sizes={"coulomb_friction": 100.0, "constant_load": 5.0},
+    )
+    found = judged(data, ladder, STANDARD)
+    assert found.effects == ("coulomb_friction",)
+    assert found.confidence > 0.9
+    assert "Perhaps constant_load beside it" in found.sentence
+    assert found.ladder is not None
+    assert found.ladder.final is alone.final
+    assert tie not in found.ladder.rivals
+    unsure = judged(data, replace(ladder, rivals=(Rival(("cogging",), both, 0.0),)), STANDARD)
+    assert unsure.effects == ("coulomb_friction", "constant_load")  # nothing is surer than not: all are told
+    assert unsure.confidence < 0.5
 
 
 def test_effects_come_in_the_order_of_what_each_would_cost() -> None:

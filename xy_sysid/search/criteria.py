@@ -58,9 +58,7 @@ WORTH = _number("worth adding", 0.25, "1", "the same for an effect that is added
 FREE = _number(
     "free", 0.8, "1", "part of the budget for new sets; the rest is for simpler ones, rivals, and the rungs of the ladder: mostly below 1.5 s"
 )
-FILTERED = _number(
-    "one step ahead", 0.75, "1", "innovation of a filter over that of the best simulation with an autoregressive error, to be worth a name"
-)
+FILTERED = (1.0 + SIZE) ** -0.5  # innovation of a filter over that of the best simulation with an autoregressive error: the same size
 AT_FLOOR = _number(
     "at the floor",
     0.15,

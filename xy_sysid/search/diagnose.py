@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -17,7 +17,7 @@ from xy_sysid.greybox.axis_data import AxisData, prepare_all
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.search.criteria import AT_FLOOR, BUDGET, FEWEST, FOLLOWS, SIZE, STILL
-from xy_sysid.search.ladder import Candidate, Ladder
+from xy_sysid.search.ladder import Candidate, Ladder, contains, part_explained
 from xy_sysid.search.refine import Effort, never, refine
 from xy_sysid.units import USUAL, Units, bare, moved
 
@@ -171,6 +171,7 @@ def _coherence(sampling_rate: float, voltage: FloatArray, position: FloatArray) 
 
 def judged(data: AxisData, ladder: Ladder, library: Library) -> Diagnosis:
     """The verdict on a search that has ended."""
+    every, (ladder, sure) = ladder.effects, _surest(data, ladder)
     base, final, names = ladder.base, ladder.final, ladder.effects
     motion = max(data.layout.rms(data.floor.motion), 1e-300)
     left = ladder.discrepancy / motion
@@ -178,9 +179,11 @@ def judged(data: AxisData, ladder: Ladder, library: Library) -> Diagnosis:
     explained, noise = ladder.explained, moved(ladder.noise, unit)
     if names and (explained >= 1.0 - explained or final.excess < AT_FLOOR):
         verdict: Kind = "missing_effect"
-        confidence, experiment = _confidence(ladder), _experiment(names[0], library)
+        confidence, experiment = sure, _experiment(names[0], library)
         sentence = f"Missing: {_listed(names)}. {'They explain' if len(names) > 1 else 'It explains'} {_percent(explained)} of the error's power"
         sentence += f" ({bare(base.held_out_error, unit)} -> {moved(final.held_out_error, unit)}). {_left(data, ladder, left)}"
+        if len(every) > len(names):
+            sentence += f" Perhaps {_listed(every[len(names) :])} beside {'them' if len(names) > 1 else 'it'}, which is less sure than not."
         if ladder.rivals:
             rival = ladder.rivals[0]
             sentence += f" Runner-up {' and '.join(rival.effects)}: {moved(rival.fit.held_out_error, unit)}."
@@ -216,11 +219,44 @@ def judged(data: AxisData, ladder: Ladder, library: Library) -> Diagnosis:
     )
 
 
-def _confidence(ladder: Ladder) -> float:
-    """How far ahead of the next best set it is, how much larger each effect is than what is left, and whether modes leave little where they act."""
-    behind = max(min((rival.behind for rival in ladder.rivals), default=math.inf), 0.0)
-    size = min(ladder.sizes.values(), default=0.0)
-    return (1.0 - 0.5 * math.exp(-behind / AT_FLOOR)) * size / (size + 1.0) * (1.0 - ladder.astray)
+def _surest(data: AxisData, ladder: Ladder) -> tuple[Ladder, float]:
+    """The ladder down to where its effects are surer than not, and the confidence in these.
+
+    Where two sets do the same, what they share is sure, and what they differ in is not. If nothing is surer than not, all are told.
+    """
+    for count in range(len(ladder.effects), 0, -1):
+        names = ladder.effects[:count]
+        confidence = _confidence(ladder, names)
+        fit = ladder.final if names == ladder.effects else ladder.steps[count].fit
+        explained = ladder.explained if fit is ladder.final else part_explained(data, ladder.base, fit)
+        if confidence < 0.5 or explained < 0.5:
+            continue
+        if fit is ladder.final:
+            return ladder, confidence
+        library, behind = fit.model.library, fit.excess - ladder.final.excess
+        rivals = (rival for rival in ladder.rivals if not contains(library, frozenset(rival.effects), frozenset(names)))
+        told = replace(
+            ladder,
+            steps=ladder.steps[: count + 1],
+            final=fit,
+            effects=names,
+            rivals=tuple(replace(rival, behind=rival.behind - behind) for rival in rivals),
+            explained=explained,
+            discrepancy=math.sqrt(max(fit.held_out_error**2 - data.noise_floor**2, 0.0)),
+        )
+        return told, confidence
+    return ladder, _confidence(ladder, ladder.effects)
+
+
+def _confidence(ladder: Ladder, names: tuple[str, ...]) -> float:
+    """How far ahead of the next best set without these effects theirs is, how much larger each is than what is left, and whether modes
+    leave little where they act."""
+    library = ladder.final.model.library
+    rivals = (rival for rival in ladder.rivals if not contains(library, frozenset(rival.effects), frozenset(names)))
+    behind = max(min((rival.behind for rival in rivals), default=math.inf), 0.0)
+    size = min((ladder.sizes[name] for name in names if name in ladder.sizes), default=0.0)
+    astray = ladder.astray if any(library[name].category == "motion" for name in names) else 0.0
+    return (1.0 - 0.5 * math.exp(-behind / AT_FLOOR)) * size / (size + 1.0) * (1.0 - astray)
 
 
 def _hidden(left: float, trusted: float) -> float:

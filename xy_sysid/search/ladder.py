@@ -5,6 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+
+from xy_sysid.axis.model import Library
+from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit
 
 
@@ -27,12 +31,11 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Rival:
-    """Another set of effects that was tried, and how much more it leaves than the one that was taken: nats of excess, and as powers."""
+    """Another set of effects that was tried, and how much more it leaves than the one that was taken: nats of excess."""
 
     effects: tuple[str, ...]
     fit: GreyboxFit
     behind: float
-    leaves: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,3 +70,17 @@ class Ladder:
     def base(self) -> GreyboxFit:
         """The rigid base."""
         return self.steps[0].fit
+
+
+def part_explained(data: AxisData, base: GreyboxFit, final: GreyboxFit) -> float:
+    """Part of the base's error power beyond the noise that is gone."""
+    noise = float(np.sum(data.layout.lines * data.floor.noise))
+    before, after = (float(np.sum(data.layout.lines * fit.power)) - noise for fit in (base, final))
+    return min(max(1.0 - max(after, 0.0) / before, 0.0), 1.0) if before > 0.0 else 0.0
+
+
+def contains(library: Library, names: frozenset[str], others: frozenset[str]) -> bool:
+    """A set has every law of another: the very effects, or richer relatives of them."""
+    laws = set(names) | {part for name in names if (whole := library[name].sum_of) is not None for part in whole.parts}
+    families = {library[name].family: len(library[name].parameters) for name in names if library[name].family}
+    return all(name in laws or families.get(library[name].family, 0) > len(library[name].parameters) for name in others)

@@ -22,9 +22,9 @@ from xy_sysid.greybox.one_step import error_without
 from xy_sysid.greybox.whitened import whitened_rms
 from xy_sysid.search.beside_one_step import Grown, Wanted, grown
 from xy_sysid.search.best_first import Node, Search
-from xy_sysid.search.criteria import AT_FLOOR, BUDGET, FEWEST, FILTERED, FREE, LEAST, MOST_EFFECTS, WIDTH, WORTH
+from xy_sysid.search.criteria import AT_FLOOR, BUDGET, FEWEST, FILTERED, FREE, LEAST, MOST_EFFECTS, WORTH
 from xy_sysid.search.judge import FreeRunJudge, joined
-from xy_sysid.search.ladder import Candidate, Ladder, Rival, Step
+from xy_sysid.search.ladder import Candidate, Ladder, Rival, Step, contains, part_explained
 from xy_sysid.search.simplify import Simplifying, whole
 
 Filtered = tuple[tuple[tuple[str, GreyboxFit], ...], float]
@@ -143,7 +143,7 @@ def _given_alone(data: AxisData, judge: FreeRunJudge, fixed: _Fixed) -> Ladder:
     final = fixed.steps[-1].fit
     base = fixed.steps[0].fit
     noise = data.noise_floor
-    explained = _explained(data, base, final)
+    explained = part_explained(data, base, final)
     return Ladder(
         steps=fixed.steps,
         final=final,
@@ -211,13 +211,6 @@ class _Ahead:
             self.found = fitted.rungs, bar
 
 
-def _explained(data: AxisData, base: GreyboxFit, final: GreyboxFit) -> float:
-    """Part of the base's error power beyond the noise that is gone."""
-    noise = float(np.sum(data.layout.lines * data.floor.noise))
-    before, after = (float(np.sum(data.layout.lines * fit.power)) - noise for fit in (base, final))
-    return min(max(1.0 - max(after, 0.0) / before, 0.0), 1.0) if before > 0.0 else 0.0
-
-
 def _ladder(
     judge: FreeRunJudge,
     search: Search[GreyboxFit],
@@ -243,7 +236,7 @@ def _ladder(
             final=last,
             effects=names,
             tried=(Candidate(rungs[0][0], 0.0, rungs[0][1]), *tried),
-            rivals=(Rival(tuple(sorted(node.effects)), node.fit, 2.0 * math.log(bar / last.held_out_error), (bar / last.held_out_error) ** 2),),
+            rivals=(Rival(tuple(sorted(node.effects)), node.fit, 2.0 * math.log(bar / last.held_out_error)),),
             sizes=dict.fromkeys(names, (bar / last.held_out_error) ** 2 - 1.0),
             refused=refused,
             explained=explained,
@@ -256,13 +249,12 @@ def _ladder(
     sizes = {name: [own[part] for part in _parts(judge.library, name) if part in own] for name in names}
     ordered = tuple(sorted(names, key=lambda name: -max(sizes[name], default=0.0)))
     ordered = (*fixed.names, *(name for name in ordered if name not in fixed.names))
-    here = judge.rest(node.fit, node.fit)
     rivals = sorted(
         (
-            Rival(tuple(sorted(item.effects)), item.fit, item.fit.excess - node.fit.excess, judge.rest(item.fit, node.fit) / max(here, 1e-12))
+            Rival(tuple(sorted(item.effects)), item.fit, item.fit.excess - node.fit.excess)
             for item in search.nodes.values()
             if item is not node and 0 < len(item.effects) <= len(node.effects) and not item.refused and not item.effects < node.effects
-            if not _contains(judge.library, item.effects, node.effects)
+            if not contains(judge.library, item.effects, node.effects)
         ),
         key=lambda item: item.behind,
     )
@@ -271,12 +263,12 @@ def _ladder(
         final=final,
         effects=ordered,
         tried=tuple(tried),
-        rivals=tuple(rivals[:WIDTH]),
+        rivals=tuple(rivals),
         sizes={name: min(each) for name, each in sizes.items() if each},
         astray=max((_astray(data, settled, name) for name in node.effects if judge.library[name].category == "motion"), default=0.0),
         helps=1.0 - min(judge.rest(item.fit, base) for item in search.nodes.values() if item.whole and not item.refused),
         refused=refused,
-        explained=_explained(data, base, final),
+        explained=part_explained(data, base, final),
         noise=data.noise_floor,
         discrepancy=math.sqrt(max(final.held_out_error**2 - data.noise_floor**2, 0.0)),
         stopped=search.stopped,
@@ -299,13 +291,6 @@ def _astray(data: AxisData, settled: Simplifying, name: str) -> float:
     weight = data.layout.lines * acts
     left = float(np.sum(weight * np.maximum(with_it - data.floor.noise, 0.0)))
     return min(math.sqrt(left / max(float(np.sum(weight * acts)), 1e-300)), 1.0)
-
-
-def _contains(library: Library, names: frozenset[str], others: frozenset[str]) -> bool:
-    """A set has every law of another: the very effects, or richer relatives of them."""
-    laws = set(names) | {part for name in names if (whole := library[name].sum_of) is not None for part in whole.parts}
-    families = {library[name].family: len(library[name].parameters) for name in names if library[name].family}
-    return all(name in laws or families.get(library[name].family, 0) > len(library[name].parameters) for name in others)
 
 
 def _rungs(judge: FreeRunJudge, search: Search[GreyboxFit], fixed: _Fixed, names: tuple[str, ...], final: GreyboxFit) -> list[Step]:
