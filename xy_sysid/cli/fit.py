@@ -13,7 +13,7 @@ from xy_sysid.cli.provenance import provenance
 from xy_sysid.cli.reading import chosen, each, named, read, reads
 
 if TYPE_CHECKING:
-    from xy_sysid.fitting import Fit, Structure
+    from xy_sysid.fitting import Fit
     from xy_sysid.fitting.of_recording import AxisEstimate
     from xy_sysid.fitting.verdicts import Validation
     from xy_sysid.imports.reading import Reading
@@ -36,35 +36,22 @@ def fit(
     json: o.Json = False,
 ) -> None:
     """Transfer function with delay of each axis, 95 % intervals, and whether it can be trusted."""
-    import numpy as np
-
-    from xy_sysid.errors import BadInput
     from xy_sysid.files import linear_models
-    from xy_sysid.fitting.of_recording import FIXED, estimate, judged, split, with_orders
-    from xy_sysid.fitting.verdicts import validate
+    from xy_sysid.fitting.of_recording import estimate, split
+    from xy_sysid.fitting.of_run import Method, fit_response
 
     settings = o.settings_from(params, set_)
     o.model_file(model, force)
     o.output_file("--mat", mat)
     samples = o.period_from(period)
-    _structure(settings, weighting, domain)  # refuses what makes no sense, before any work is done
-    estimator = _estimator(method)
+    way = Method(method, weighting, domain)
+    way.structure(settings)  # refuses what makes no sense, before any work is done
     recording = read(recs, reading, json)
     training, unseen = split(recording, held_out)
 
     def work(name: str) -> tuple[AxisEstimate, Fit, Validation]:
         found = estimate(training, name, settings, samples)
-        judged(found.frf)
-        try:
-            with np.errstate(all="ignore"):  # what overflows ends in a figure that the verdicts judge
-                ours, choice = with_orders(found.frf, settings) if domain == "s" and method not in FIXED else (settings, None)
-                if choice is not None and (method, weighting) == ("best", "sigma"):
-                    result = choice.fit
-                else:
-                    result = estimator(found.frf, _structure(ours, weighting, domain))
-                return found, result, validate(result, found.frf, unseen.run(name).signals if len(unseen) else None, choice=choice)
-        except (np.linalg.LinAlgError, ZeroDivisionError):
-            raise BadInput("fit", "beyond what numbers can hold", "orders that the data determine", "Lower them or widen the band.") from None
+        return found, *fit_response(found.frf, settings, way, unseen.run(name).signals if len(unseen) else None)
 
     done, problems = each(chosen(recording, reading.axes), work)
     fits = {name: result for name, (_, result, _) in done.items()}
@@ -81,30 +68,6 @@ def fit(
         _show(*parts)
     for name, text in problems.items():
         say(f"axis {name}: no model. {text}")
-
-
-def _structure(settings: Any, weighting: str, domain: str) -> Structure:
-    from dataclasses import replace
-    from typing import get_args
-
-    from xy_sysid.errors import BadInput
-    from xy_sysid.fitting.structure import Weighting, structure_from
-
-    values: dict[str, Any] = {"weighting": weighting, "domain": domain}
-    for name, allowed in (("weighting", get_args(Weighting)), ("domain", ("s", "z"))):
-        if values[name] not in allowed:
-            raise BadInput(f"--{name}", repr(values[name]), ", ".join(allowed), "Choose one of these.")
-    return replace(structure_from(settings), **values)
-
-
-def _estimator(method: str) -> Any:
-    from xy_sysid.errors import BadInput
-    from xy_sysid.fitting import ESTIMATORS, identify
-
-    known = {"best": identify, **ESTIMATORS}
-    if method not in known:
-        raise BadInput("--method", repr(method), ", ".join(known), "Choose one of these.")
-    return known[method]
 
 
 def answer(found: AxisEstimate, result: Fit, verdicts: Validation) -> dict[str, Any]:

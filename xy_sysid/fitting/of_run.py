@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -11,8 +11,8 @@ from xy_sysid.errors import BadInput
 from xy_sysid.fitting import ESTIMATORS, Fit, identify
 from xy_sysid.fitting.of_recording import FIXED, estimate, judged, with_orders
 from xy_sysid.fitting.result import Interval
-from xy_sysid.fitting.structure import structure_from
-from xy_sysid.fitting.verdicts import Verdict, validate
+from xy_sysid.fitting.structure import Structure, Weighting, structure_from
+from xy_sysid.fitting.verdicts import HeldOut, Validation, Verdict, validate
 from xy_sysid.linear.simulate import simulate
 from xy_sysid.linear.transfer_function import TransferFunction
 from xy_sysid.response.frf import FrequencyResponse
@@ -101,19 +101,50 @@ def fit(response: FrequencyResponse, method: str = "best", **settings: Any) -> L
     Source: Pintelon & Schoukens, System Identification, 2nd ed., ch. 9 and 10.
     Raises BadInput for a response without uncertainty, or orders beyond what numbers can hold.
     """
+    found, validation = fit_response(response, changed(IdentifierSettings(), settings), Method(method))
+    known = (response.origin.data,) if response.origin.data else ()
+    return LinearModel(tf=found.tf, hold=found.structure.hold, axis=response.origin.axis, data=known, fit=found, verdicts=validation.verdicts)
+
+
+@dataclass(frozen=True, slots=True)
+class Method:
+    """How a transfer function is fitted.
+
+    estimator: best (maximum likelihood), lls, iwls, nlls, ml, or nllsfdi
+    weighting: of a line's error: sigma, relative (1/|FRF|) or uniform; domain: s (continuous) or z (discrete)
+    Raises BadInput for anything else.
+    """
+
+    estimator: str = "best"
+    weighting: str = "sigma"
+    domain: str = "s"
+
+    def __post_init__(self) -> None:
+        known = {"method": ("best", *ESTIMATORS), "weighting": get_args(Weighting), "domain": ("s", "z")}
+        for (name, allowed), value in zip(known.items(), (self.estimator, self.weighting, self.domain), strict=True):
+            if value not in allowed:
+                raise BadInput(name, repr(value), ", ".join(allowed), "Choose one of these.")
+
+    def structure(self, settings: IdentifierSettings) -> Structure:
+        """The model family. Raises BadInput for what makes no sense together."""
+        values: dict[str, Any] = {"weighting": self.weighting, "domain": self.domain}
+        return replace(structure_from(settings), **values)
+
+
+def fit_response(
+    response: FrequencyResponse, settings: IdentifierSettings, method: Method | None = None, unseen: HeldOut | None = None
+) -> tuple[Fit, Validation]:
+    """The fit and what speaks for it; unseen: samples that no fit saw, for the check in time. Raises BadInput as ``fit``."""
     judged(response)
-    if method != "best" and method not in ESTIMATORS:
-        raise BadInput("method", repr(method), ", ".join(("best", *ESTIMATORS)), "Choose one of these.")
-    chosen = changed(IdentifierSettings(), settings)
+    method, choice = method or Method(), None
     try:
         with np.errstate(all="ignore"):  # what overflows ends in a figure that the verdicts judge
-            chosen, choice = with_orders(response, chosen) if method not in FIXED else (chosen, None)
-            if choice is not None and method == "best":
+            if method.domain == "s" and method.estimator not in FIXED:
+                settings, choice = with_orders(response, settings)
+            if choice is not None and (method.estimator, method.weighting) == ("best", "sigma"):
                 found = choice.fit
             else:
-                found = {"best": identify, **ESTIMATORS}[method](response, structure_from(chosen))
-            verdicts = validate(found, response, choice=choice).verdicts
+                found = {"best": identify, **ESTIMATORS}[method.estimator](response, method.structure(settings))
+            return found, validate(found, response, unseen, choice=choice)
     except (np.linalg.LinAlgError, ZeroDivisionError):
         raise BadInput("fit", "beyond what numbers can hold", "orders that the data determine", "Lower them or widen the band.") from None
-    known = (response.origin.data,) if response.origin.data else ()
-    return LinearModel(tf=found.tf, hold=found.structure.hold, axis=response.origin.axis, data=known, fit=found, verdicts=verdicts)
