@@ -142,14 +142,16 @@ def test_a_servo_under_load_is_identified_in_closed_loop_while_data_come_in(worl
     drive = excitation(world, "position", autostart=True, **{"x.rms": 0.03, "x.slow": 0.0})
     assert world.until(lambda: int(value(right, "axis x", "windows") or 0) >= 30, 90.0), drive.output()
     assert world.until(lambda: int(value(biased, "axis x", "windows") or 0) >= 30, 30.0)
-    low, gain, high = (float(value(right, "axis x", key)) for key in ("gain 95 % low", "gain (rad/s/(N m))", "gain 95 % high"))
+    wanted = ("gain 95 % low", "gain (rad/s/(N m))", "gain 95 % high")
+    assert world.until(lambda: all(value(right, "axis x", key) for key in wanted) and bool(value(biased, "axis x", wanted[1])), 30.0)
+    low, gain, high = (float(value(right, "axis x", key)) for key in wanted)
     assert abs(gain - 3.0) < 3.5 / 3.92 * (high - low) and high - low < 6.0, (low, gain, high)  # 3.5 standard errors: one in 2000 is further off
     assert abs(float(value(biased, "axis x", "gain (rad/s/(N m))")) / 3.0 - 1.0) > 0.1
 
 
 @pytest.mark.parametrize("interface", ["effort", "velocity", "position"])
 def test_the_last_command_is_what_is_safe(world: World, interface: str) -> None:
-    """0 for effort and velocity, a measured position for position; one number a joint at the controller's rate; then inactive."""
+    """0 for effort and velocity, a measured position for position; one number a joint, counted at the controller's rate; then inactive."""
     control = controller(world, interface)
     heard, seen, blocks = commands(world), states(world), world.blocks("voltage" if interface == "effort" else "reference")
     drive = excitation(world, interface, autostart=True, duration=3.0)
@@ -158,7 +160,9 @@ def test_the_last_command_is_what_is_safe(world: World, interface: str) -> None:
     sent = np.array([message.data[0] for message in heard])
     assert all(len(message.data) == 1 and not message.layout.dim for message in heard)
     seq = np.concatenate([block.seq for block in blocks])
-    assert len(seq) > 100 and blocks[0].axes == ("x",) and np.abs(np.median(np.diff(np.concatenate([b.time for b in blocks]))) * RATE - 1.0) < 0.02
+    stamps = np.concatenate([block.time for block in blocks])  # a busy machine misses cycles: seq counts them, too
+    assert len(seq) > 100 and blocks[0].axes == ("x",)
+    assert np.median(np.diff(seq) / np.diff(stamps)) == pytest.approx(RATE, rel=0.02)
     assert set(sent[-3:]) == {sent[-1]} and np.std(sent) > 0
     places = {message.position[message.name.index("pan-1")] for message in seen}
     assert sent[-1] == 0.0 if interface != "position" else sent[-1] in places

@@ -129,7 +129,7 @@ def test_an_encoder_that_freezes_is_told_and_ends_at_zero_volts(world: World) ->
         return Block(block.axes, block.seq, block.time, true.values if len(blocks) < 100 else frozen)
 
     world.machine(answer)
-    process = world.start(EXCITATION, {**PUSH, "x.offset": 2.0})
+    process = world.start(EXCITATION, {**PUSH, "x.offset": 2.0, "watchdog": 10.0})  # this process is the machine, and may be slow itself
     activate(world)
     assert world.until(lambda: "inactive: x: the position " in process.output(), 20.0), process.output()
     assert world.until(lambda: world.state("excitation") == "inactive", 3.0) and not blocks[-1].values.any()
