@@ -76,4 +76,4 @@ FEWEST = _number(
     "after which it is known what its promises are worth",
 )
 MOST_EFFECTS = _number("most effects", 4, "1", "in a model: with more, real machines were explained no better on windows that no fit saw")
-BUDGET = _number("budget", 10.0, "s", "of processor time for one axis, if nothing else is said: what people wait for")
+BUDGET = 10.0  # s of processor time for one axis, where nobody says another (--budget): no criterion, but what people wait for
