@@ -58,10 +58,10 @@ def grown(data: AxisData, base: GreyboxFit, effect: Effect, wanted: Wanted | Non
     return Grown(tuple(rungs), found)
 
 
-Tried = tuple[str, GreyboxFit, Followed]
+_Tried = tuple[str, GreyboxFit, Followed]
 
 
-def _better(data: AxisData, now: GreyboxFit, effect: Effect, found: Followed, wanted: Wanted) -> Tried | None:
+def _better(data: AxisData, now: GreyboxFit, effect: Effect, found: Followed, wanted: Wanted) -> _Tried | None:
     """The best fit with one more beside, None if none is worth it.
 
     First what its trace promises; then, if that does not explain the axis, laws of dry friction that say more than the one that the filter
@@ -75,7 +75,7 @@ def _better(data: AxisData, now: GreyboxFit, effect: Effect, found: Followed, wa
     promising = [trace for trace in seen if _size(now, 1.0 - OPTIMISM * trace.share) >= _least(trace.effect, effect, wanted)]
     if now.excess > 0.0 and not promising:  # something acts, and what is slow promises little
         promising = [trace for trace in seen if trace.effect not in effect.suspects]
-    tried: list[Tried] = []
+    tried: list[_Tried] = []
 
     def tried_with(trace: Trace) -> None:
         fit, its = followed(data, now, effect, [_start(trace, library, found)], found, on)
