@@ -75,5 +75,5 @@ FEWEST = _number(
     "tones of an input, bands that it excites, held-out windows that move (twice as many to fit): less, and any law fits; tries from a set "
     "after which it is known what its promises are worth",
 )
-MOST_EFFECTS = _number("most effects", 4, "1", "in a model: with more, real machines were explained no better on windows that no fit saw")
+MOST_EFFECTS = _number("most effects", 4, "1", "in a model: the blind sets have three at most, and of the real machines one takes four")
 BUDGET = 10.0  # s of processor time for one axis, where nobody says another (--budget): no criterion, but what people wait for
