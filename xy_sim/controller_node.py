@@ -3,7 +3,8 @@
 Same topics, types, quality of service and order of things as a controller manager: each period of the steady clock it reads the
 joints (position, and the effort of the period before), publishes ``joint_states`` with the ROS time of the reading, takes the newest
 command whose size fits, and writes an effort. A velocity or position command goes through a loop of its own, as in a drive. The machine
-moves by the clock: a cycle that comes late is left out, and finds the machine where the last effort has brought it meanwhile.
+moves by the clock: a cycle that comes late is left out, and finds the machine where the last effort has brought it meanwhile. Like a
+controller manager it asks for real-time priority, and goes on without where that is not allowed.
 
     python -m xy_sim.controller_node --ros-args -p machine:=joint.yaml -p joints:="[shoulder-pan]" -p interface:=position
 """
@@ -11,10 +12,12 @@ moves by the clock: a cycle that comes late is left out, and finds the machine w
 from __future__ import annotations
 
 import array
+import os
 import sys
 import threading
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from rclpy.node import Node
@@ -29,6 +32,7 @@ from xy_sysid.nodes.run import run_node
 from xy_sysid.samples.block import FloatArray
 
 INTERFACES = ("effort", "velocity", "position")
+PRIORITY = 50  # of SCHED_FIFO, as ros2_control_node asks for
 
 
 class ControllerNode(Node):
@@ -76,6 +80,8 @@ class ControllerNode(Node):
         self._command = np.array(message.data, dtype=np.float64)
 
     def _manage(self) -> None:
+        if not in_real_time():
+            self.get_logger().warning("no real-time priority: on a busy computer cycles are missed")
         begun, cycle, missed = time.monotonic(), 0, 0
         while not self._over.is_set():
             self._cycle(missed)
@@ -142,6 +148,16 @@ class ControllerNode(Node):
         """None."""
         self._over.set()
         self._thread.join()
+
+
+def in_real_time() -> bool:
+    """Ask for real-time priority for every thread of this process, as none can go on without the interpreter; False where it is not allowed."""
+    try:
+        for thread in Path("/proc/self/task").iterdir():
+            os.sched_setscheduler(int(thread.name), os.SCHED_FIFO, os.sched_param(PRIORITY))
+    except (OSError, AttributeError):  # no right to it, or no Linux
+        return False
+    return True
 
 
 def main() -> int:
