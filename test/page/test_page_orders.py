@@ -30,6 +30,10 @@ class Deaf:
         self.asked.append(service)
         self.told = told
 
+    def set_parameters(self, node: str, values: dict[str, Any], told: Any) -> None:
+        self.asked += [f"{node} {name}: {', '.join(value)}" for name, value in values.items()]
+        self.told = told
+
 
 def test_a_diagnosis_that_nobody_heard_of_is_asked_for_again(monkeypatch: pytest.MonkeyPatch) -> None:
     """Idle for ten seconds after an order: asked once more, twice at most; never once the diagnoser has worked, whose answer was lost then."""
@@ -54,6 +58,31 @@ def test_a_diagnosis_that_nobody_heard_of_is_asked_for_again(monkeypatch: pytest
     deaf.told(True, "axis x: found")
     now[0] += 100.0
     assert page.job("x") is None and len(deaf.asked) == 5
+
+
+def test_effects_that_the_diagnoser_does_not_begin_with_are_set_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Set and answered, and nothing follows: set once more, twice at most, then it is said; never once the diagnoser has begun."""
+    now = [1000.0]
+    monkeypatch.setattr("xy_sysid.page.live.time.monotonic", lambda: now[0])
+    heard, deaf, said = TopicsState(), Deaf(), []
+    heard.graph({"diagnoser"}, now[0])
+    link: Any = deaf
+    page = Live(heard, link, lambda words, done: said.append(words))
+    page.ask("add", "x", "coulomb_friction")
+    for _ in range(3):
+        deaf.told(True, "")
+        now[0] += 3.5
+        page.job("x")
+    assert deaf.asked == 3 * ["diagnoser effects.x: coulomb_friction"]
+    assert page.job("x") is None
+    assert said == ["the diagnoser has the effects that are wanted, and does nothing; press Diagnose"]
+    page.ask("add", "x", "coulomb_friction")
+    deaf.told(True, "")
+    heard.doing("axis x: adding coulomb_friction", now[0])
+    heard.doing("idle", now[0])
+    now[0] += 3.5
+    assert page.job("x") is None
+    assert len(deaf.asked) == 4 and len(said) == 1
 
 
 @needs_ros

@@ -38,6 +38,7 @@ class Live:
         self._settled = (math.inf, 0)  # when the last order was answered, and the stamp then
         self._enough = ENOUGH
         self._numbers = itertools.count(1)
+        self._wanted: dict[str, list[str]] = {}
 
     def axes(self) -> tuple[str, ...]:
         """Axes of which something was heard."""
@@ -60,10 +61,21 @@ class Live:
             return OrderState(order=Order(0, "diagnose", own), begun=since, part=None, running=True, said=said.replace("_", " "))
         at, stamp = self._settled
         if self._job is not None and (time.monotonic() - at > SETTLES or (self._news() != stamp and math.isfinite(at))):
-            self._job = None
+            self._set_again_or_end()
         if self._job is not None and self._job.order.act in SERVICES:
             self._look_for_losses(self._job)
         return self._job
+
+    def _set_again_or_end(self) -> None:
+        """The effects are set. Where the diagnoser has not begun with them they are set once more, which it does nothing about if it has them."""
+        if self._done() != self._before:
+            self._job = None
+        elif self._again:
+            self._again -= 1
+            self._settled = math.inf, 0
+            self.link.set_parameters(NODE, self._wanted, self._set)
+        else:
+            self._told(False, "the diagnoser has the effects that are wanted, and does nothing; press Diagnose")
 
     def _look_for_losses(self, job: OrderState) -> None:
         """The diagnoser is idle and has not answered: either the answer was lost, or the question, as on a computer under load."""
@@ -107,7 +119,8 @@ class Live:
             if act == "add" and (argument in effects or not argument):
                 raise BadInput("effect", repr(argument), "one that is not in the model yet", "Choose another.")
             wanted = [*effects, argument] if act == "add" else [name for name in effects if name != argument]
-            self.link.set_parameters(NODE, {f"effects.{axis}": wanted or [""]}, self._set)
+            self._wanted = {f"effects.{axis}": wanted or [""]}
+            self.link.set_parameters(NODE, self._wanted, self._set)
         elif act in SERVICES:
             self.link.trigger(f"{NODE}/{SERVICES[act]}", self._told, LONG)
         else:
