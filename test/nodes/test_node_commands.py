@@ -146,7 +146,11 @@ def test_a_servo_under_load_is_identified_in_closed_loop_while_data_come_in(worl
     assert world.until(lambda: all(value(right, "axis x", key) for key in wanted) and bool(value(biased, "axis x", wanted[1])), 30.0)
     low, gain, high = (float(value(right, "axis x", key)) for key in wanted)
     assert abs(gain - 3.0) < 3.5 / 3.92 * (high - low) and high - low < 6.0, (low, gain, high)  # 3.5 standard errors: one in 2000 is further off
-    assert abs(float(value(biased, "axis x", "gain (rad/s/(N m))")) / 3.0 - 1.0) > 0.1
+
+    def off() -> bool:  # H1 wanders as the load does: now and then it comes by the truth, and goes on
+        return abs(float(value(biased, "axis x", wanted[1])) / 3.0 - 1.0) > 0.1
+
+    assert world.until(off, 10.0), value(biased, "axis x", wanted[1])
 
 
 @pytest.mark.parametrize("interface", ["effort", "velocity", "position"])
