@@ -224,7 +224,8 @@ def _surest(data: AxisData, ladder: Ladder) -> tuple[Ladder, float]:
 
     Where two sets do the same, what they share is sure, and what they differ in is not. If nothing is surer than not, all are told.
     """
-    for count in range(len(ladder.effects), 0, -1):
+    together = ladder.final.model.ahead is not None  # judged one sample ahead, as one: a rung may have brought two of them
+    for count in range(len(ladder.effects), len(ladder.effects) - 1 if together else 0, -1):
         names = ladder.effects[:count]
         confidence = _confidence(ladder, names)
         fit = ladder.final if names == ladder.effects else ladder.steps[count].fit
