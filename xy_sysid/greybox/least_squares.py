@@ -18,7 +18,6 @@ from xy_sysid.greybox.floor import Bands, Floor, Windows, tolerance
 from xy_sysid.samples.block import FloatArray
 
 TRUSTED = 0.25  # a step whose fall differs by less than this part from the one expected needs no new derivatives
-LAW = 3e-4  # part of the motion in a band to which laws and their integration are trusted; tuned on development draws
 STEP = 1e-4  # of a logarithm, or of a parameter's scale: far above rounding, far below what bends
 
 
@@ -148,12 +147,12 @@ def solve(run: Callable[[FloatArray], FloatArray], target: Target, scale: Scale,
                     converged = True
                     break
     noise = _covariance(normal)
-    power = tolerance(layout, error, least)
-    repeats = 1.0 + (1.0 - least.power / power) * (windows.begins.size - 1)
+    beyond = np.maximum(layout.power(error) - least.noise, 0.0)
+    repeats = 1.0 + (windows.begins.size - 1) * layout.lines * beyond / tolerance(layout, error, least)
     covariance = _that_repeats(change * weight, np.sqrt(repeats)[layout.band], noise)
     return Solution(
         values=scale.outer(inner),
-        covariance=covariance + _of_the_law(change * weight, measured * weight, layout, noise),
+        covariance=covariance + _of_the_law(change * weight, least.epsilon * measured * weight, layout, noise),
         cost=cost,
         runs=runs,
         converged=converged,
@@ -180,10 +179,11 @@ def _covariance(normal: FloatArray) -> FloatArray:
 
 
 def _that_repeats(change: NDArray[np.complex128], times: FloatArray, noise: FloatArray) -> FloatArray:
-    """(k, k) covariance where what is left unexplained in a band is the same mistake in every window: it does not average out over them.
+    """(k, k) covariance where what is left in a band beyond the encoder's noise is one mistake, as harmful as one of its size can be.
 
-    Noise does. change: (k, windows, lines), whitened; times: (lines,) square root of how many windows say the same; noise: (k, k) covariance if
-    every window were independent. The sandwich of White 1982 (eq. 3.2), with windows as clusters of one common error (Kennedy & O'Hagan 2001).
+    Noise averages out over lines and windows, such a mistake does not. change: (k, windows, lines), whitened; times: (lines,) square root
+    of how many of them say the same; noise: (k, k) covariance if each were independent. The sandwich of White 1982 (eq. 3.2), with bands as
+    clusters of one common error (Kennedy & O'Hagan 2001).
     """
     seen = np.isfinite(np.diag(noise))
     if not np.any(seen):
@@ -197,11 +197,11 @@ def _that_repeats(change: NDArray[np.complex128], times: FloatArray, noise: Floa
 def _of_the_law(change: NDArray[np.complex128], motion: NDArray[np.complex128], layout: Bands, noise: FloatArray) -> FloatArray:
     """(k, k) what laws and integration that are not exact add to the covariance, however long the record.
 
-    In each band the model's motion may be off by one common complex factor of size LAW. change, motion: whitened, (k, windows, lines) and
-    (windows, lines).
+    In each band the model's motion may be off by one common complex factor. change: (k, windows, lines), whitened; motion: (windows, lines),
+    whitened, times that factor's size.
     """
     lines = np.einsum("kwl,wl->kl", change.conj(), motion)
-    pulls = np.stack([np.bincount(layout.band, part, layout.count) for row in lines for part in (row.real, row.imag)]) * LAW
+    pulls = np.stack([np.bincount(layout.band, part, layout.count) for row in lines for part in (row.real, row.imag)])
     pulls = pulls.reshape(lines.shape[0], -1)
     seen = np.isfinite(np.diag(noise))
     found = np.zeros_like(noise)
