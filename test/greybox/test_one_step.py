@@ -75,7 +75,7 @@ def test_cogging_and_a_load_are_forces_against_the_drive() -> None:
 
 
 def test_asymmetric_friction_is_coulomb_friction_under_a_load() -> None:
-    """The same motion to rounding, and joined they give the same numbers."""
+    """The same motion to rounding, joined they give the same numbers, and taken apart it gives theirs."""
     whole = AxisModel(*BASE).with_effect("asymmetric_friction", (0.2, 0.4))
     parts = AxisModel(*BASE).with_effect("coulomb_friction", (0.2,)).with_effect("constant_load", (0.08,))
     u = noise()
@@ -83,6 +83,8 @@ def test_asymmetric_friction_is_coulomb_friction_under_a_load() -> None:
     ((name, values),) = parts.joined().effects
     assert name == "asymmetric_friction"
     assert values == pytest.approx((0.2, 0.4))
+    assert {part: pytest.approx(row) for part, row in whole.apart("asymmetric_friction").effects} == dict(parts.effects)
+    assert parts.apart("coulomb_friction") is parts
 
 
 def test_it_is_so_of_a_drive_that_is_wired_the_other_way_round_too() -> None:
@@ -92,6 +94,7 @@ def test_it_is_so_of_a_drive_that_is_wired_the_other_way_round_too() -> None:
     parts, u = AxisModel(-gain, delay, pole).with_effect("coulomb_friction", (0.2,)).with_effect("constant_load", (-0.08,)), noise()
     assert simulate(whole, RATE, u, np.zeros_like(u)) == pytest.approx(simulate(parts, RATE, u, np.zeros_like(u)), abs=1e-12)
     assert dict(parts.joined().effects)["asymmetric_friction"] == pytest.approx((0.2, 0.4))
+    assert dict(whole.apart("asymmetric_friction").effects)["constant_load"] == pytest.approx((-0.08,))
 
 
 def test_a_load_larger_than_the_friction_is_not_called_asymmetric_friction() -> None:

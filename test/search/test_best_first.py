@@ -8,7 +8,7 @@ from math import exp, inf
 
 import pytest
 
-from xy_sysid.search.best_first import Search
+from xy_sysid.search.best_first import Node, Search
 from xy_sysid.search.criteria import FEWEST, PRICE
 from xy_sysid.search.criteria import LEAST as SMALLEST
 from xy_sysid.search.judge import Move
@@ -36,6 +36,7 @@ class Table:
     leaves: a set that is not there cannot be fitted; promises: from a set, (effects to add, gain)
     simpler: the set with a simpler relative, for a set that has one; astray: what a set leaves if it is fitted from this other one
     lost: what two sets have come to helps no fit of both
+    slowly: from a set, (effects to add, gain) that only all data show; briefly: what a set leaves of the first stage's data, where that differs
     """
 
     leaves: Mapping[Set, float]
@@ -46,11 +47,19 @@ class Table:
     simpler: Mapping[Set, Set] = field(default_factory=dict)
     astray: Mapping[tuple[Set, Set], float] = field(default_factory=dict)
     lost: bool = False
+    slowly: Mapping[Set, Sequence[tuple[Set, float]]] = field(default_factory=dict)
+    briefly: Mapping[Set, float] = field(default_factory=dict)
     briefs: list[Set] = field(default_factory=list)
     mergers: list[tuple[Set, Set]] = field(default_factory=list)
     wholes: list[Set] = field(default_factory=list)
 
     def moves(self, now: Looked, brief: Looked) -> list[Move]:
+        return self.promised(now, self.promises)
+
+    def slow_moves(self, now: Looked, brief: Looked) -> list[Move]:
+        return self.promised(now, self.slowly)
+
+    def promised(self, now: Looked, promises: Mapping[Set, Sequence[tuple[Set, float]]]) -> list[Move]:
         return [
             Move(
                 effects=now.effects | added,
@@ -61,7 +70,7 @@ class Table:
                 expected=added <= self.dry,
                 simpler=self.simpler.get(now.effects | added, frozenset()),
             )
-            for added, gain in self.promises.get(now.effects, ())
+            for added, gain in promises.get(now.effects, ())
         ]
 
     def brief(self, now: Looked, move: Move, hopeless: float = inf) -> Looked | None:
@@ -70,7 +79,9 @@ class Table:
         self.briefs.append(move.effects)
         if (now.effects, move.effects) in self.astray:
             return Looked(move.effects, self.astray[now.effects, move.effects])
-        return Looked(move.effects, self.leaves[move.effects]) if move.effects in self.leaves else None
+        if move.effects not in self.leaves:
+            return None
+        return Looked(move.effects, self.briefly.get(move.effects, self.leaves[move.effects]))
 
     def merged(self, now: Looked, others: Looked) -> Looked | None:
         effects = now.effects | others.effects
@@ -79,7 +90,7 @@ class Table:
 
     def whole(self, found: Looked) -> Looked:
         self.wholes.append(found.effects)
-        return found
+        return Looked(found.effects, self.leaves[found.effects]) if found.effects in self.briefly else found
 
     def refusal(self, found: Looked) -> str:
         return self.refuses.get(found.effects, "")
@@ -170,8 +181,8 @@ def test_what_went_astray_is_fitted_again_though_little_is_promised_there(gone_a
         def moves(self, now: Looked, brief: Looked) -> list[Move]:
             return [replace(move, rest=move.gain) for move in super().moves(now, brief)]
 
-    promises = {of(): all_of(("ab", 1.5), ("a", 1.0)), of("a"): all_of(("b", 0.1))}
-    leaves = {of(): 3.0, of("a"): 1.0, of("a", "b"): 0.1}
+    promises = {of(): all_of(("ab", 1.5), ("a", 1.0)), of("a"): all_of(("b", 0.1), ("c", 0.2))}
+    leaves = {of(): 3.0, of("a"): 1.0, of("a", "b"): 0.1, of("a", "c"): 1.0}
     if gone_astray is None:
         promises[of()] = all_of(("a", 1.0))
     search, _ = searched(Faint(leaves, promises, astray={(of(), of("a", "b")): gone_astray or 0.0}), least=0.7)
@@ -308,6 +319,43 @@ def test_what_is_left_unexplained_could_feign_is_not_tried() -> None:
     judge = Faint({of(): 2.0, of("a"): 1.0}, {})
     search: Search[Looked] = Search(judge, never, 10.0, 4, 0.7)
     assert list(search.steps(Looked(of(), 2.0))) == []
+
+
+def test_beside_what_explains_most_the_next_best_promise_is_tried_once_though_it_is_small() -> None:
+    """First order sees a part of what an effect changes beside laws that bend; what promises less than that one stays."""
+
+    class Bent(Table):
+        def moves(self, now: Looked, brief: Looked) -> list[Move]:
+            return [replace(move, rest=0.1) if now.effects else move for move in super().moves(now, brief)]
+
+    promises = {of(): all_of(("a", 2.0)), of("a"): all_of(("b", 0.1), ("c", 0.2))}
+    leaves = {of(): 4.0, of("a"): 2.0, of("a", "b"): 1.9, of("a", "c"): 0.0}
+    search: Search[Looked] = Search(Bent(leaves, promises), never, 10.0, 4, 0.7)
+    assert list(search.steps(Looked(of(), 4.0))) == [of("a"), of("a", "c")]
+    search = Search(Bent(leaves | {of("a", "c"): 2.0}, promises), never, 10.0, 4, 0.7)
+    assert list(search.steps(Looked(of(), 4.0))) == [of("a"), of("a", "c")]
+
+
+def test_what_acts_slowly_is_looked_for_on_all_data_where_these_leave_more_than_their_beginning() -> None:
+    """The first stage is explained and promises nothing more; the whole record is not."""
+    slowly = {of("a"): all_of(("b", 1.0))}
+    judge = Table({of(): 4.0, of("a"): 2.0, of("a", "b"): 0.0}, {of(): all_of(("a", 2.0))}, slowly=slowly, briefly={of("a"): 0.1})
+    search, tried = searched(judge)
+    assert tried == [of("a"), of("a", "b")] and search.best.effects == of("a", "b")
+    alike = Table({of(): 4.0, of("a"): 2.0, of("a", "b"): 0.0}, {of(): all_of(("a", 2.0))}, slowly=slowly)
+    assert searched(alike)[1] == [of("a")]
+
+
+def test_it_goes_on_from_a_simpler_set_that_was_found_beside_it() -> None:
+    """What a set promises that it never asked about is tried, and nothing is asked twice."""
+    promises = {of(): all_of(("a", 2.0)), of("c"): all_of(("d", 1.5))}
+    judge = Table({of(): 4.0, of("a"): 2.0, of("c"): 2.0, of("c", "d"): 0.0}, promises)
+    search, _ = searched(judge)
+    found = Looked(of("c"), 2.0)
+    simpler = Node(effects=of("c"), fit=found, brief=found, parameters=1, whole=True)
+    search.nodes[of("c")] = simpler
+    assert list(search.steps_from(simpler)) == [of("c", "d")]
+    assert list(search.steps_from(simpler)) == [] and search.best.effects == of("c", "d")
 
 
 def test_what_every_machine_has_is_tried_though_the_whole_error_promises_little() -> None:

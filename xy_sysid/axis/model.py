@@ -124,6 +124,14 @@ class AxisModel:
                     return replace(self, effects=(*kept, (effect.name, values)))
         return self
 
+    def apart(self, name: str) -> AxisModel:
+        """The same model with the parts of an effect in its place, if it is the sum of several."""
+        whole, own = self.library[name].sum_of, dict(self.effects)
+        if whole is None:
+            return self
+        parts = zip(whole.parts, whole.apart(own.pop(name)), strict=True)
+        return replace(self, effects=(*own.items(), *((part, self._turned(part, values)) for part, values in parts)))
+
     def values(self) -> dict[str, float]:
         """Every parameter by ``gain``, ``delay``, ``pole``, ``effect.parameter``."""
         own = {f"{name}.{key}": value for name, row in self.effects for key, value in zip(self.library[name].names, row, strict=True)}

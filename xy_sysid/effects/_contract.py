@@ -232,11 +232,12 @@ class Parameter:
 class Sum:
     """One law written as several effects.
 
-    parts: their names; joined: values of each part -> the effect's values
+    parts: their names; joined: values of each part -> the effect's values; apart: the way back
     """
 
     parts: tuple[str, ...]
     joined: Callable[[Sequence[Sequence[float]]], tuple[float, ...]]
+    apart: Callable[[Sequence[float]], tuple[tuple[float, ...], ...]]
 
 
 @dataclass(frozen=True, slots=True)

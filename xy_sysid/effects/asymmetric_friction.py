@@ -32,6 +32,12 @@ def joined(values: Sequence[Sequence[float]]) -> tuple[float, ...]:
     return coulomb, load / coulomb
 
 
+def apart(values: Sequence[float]) -> tuple[tuple[float, ...], ...]:
+    """The friction both ways, and the load."""
+    coulomb, asymmetry = values
+    return (coulomb,), (asymmetry * coulomb,)
+
+
 EFFECT = Effect(
     name="asymmetric_friction",
     law="F = coulomb (1 + asymmetry sign(v)) sign(v)",
@@ -49,5 +55,5 @@ EFFECT = Effect(
     functions={"level": level},
     guesses=guesses,
     family="dry_friction",
-    sum_of=Sum(("coulomb_friction", "constant_load"), joined),
+    sum_of=Sum(("coulomb_friction", "constant_load"), joined, apart),
 )

@@ -193,15 +193,17 @@ def look(data: AxisData, fitted: GreyboxFit, effects: Iterable[Effect]) -> list[
 
 
 def screened(data: AxisData, fitted: GreyboxFit, effects: Iterable[Effect], scene: Scene | None = None) -> Screen:
-    """The score test of effects on what a fit leaves of the first stage's data, alone and together; scene: of these, if it is known."""
-    run, values, scale = _problem(data, fitted.model, data.first, COARSE)
+    """The score test of effects on what a fit leaves, alone and together; scene: of the first stage's data (None), or of all."""
+    scene = scene or scene_of(data, fitted, data.first)
+    samples = scene.velocity.size
+    run, values, scale = _problem(data, fitted.model, samples, COARSE)
     inner = scale.inner(values)
     here, nuisance = run(values), []
     for k in range(values.size):
         moved = inner.copy()
         moved[k] += 1e-4
         nuisance.append(run(scale.outer(moved)) - here)
-    return screen(effects, scene or scene_of(data, fitted, data.first), np.array(nuisance), data.brief, data.floor)
+    return screen(effects, scene, np.array(nuisance), data.brief if samples == data.first else data.fitted, data.floor)
 
 
 def scene_of(data: AxisData, fitted: GreyboxFit, samples: int) -> Scene:

@@ -32,6 +32,9 @@ class Judge(Protocol[F]):
     def moves(self, now: F, brief: F) -> Sequence[Move]:
         """What may be done next from a set. brief: its quick fit."""
 
+    def slow_moves(self, now: F, brief: F) -> Sequence[Move]:
+        """The same by what only all data show."""
+
     def brief(self, now: F, move: Move, hopeless: float = inf) -> F | None:
         """A quick fit."""
 
@@ -54,7 +57,7 @@ class Node(Generic[F]):
 
     parameters: that its effects have; whole: fitted on all data; refused: why it explains nothing, or empty; promised: gain
     shown: largest gain of a move from it over what was promised; tried: moves from it that were tried; brief: excess of its brief fit
-    led_on: moves from it are waiting, or were tried
+    led_on: moves from it are waiting, or were tried; asked_last: and what may be there though none of them promises enough
     """
 
     effects: frozenset[str]
@@ -69,6 +72,7 @@ class Node(Generic[F]):
     leads: bool = True
     later: float = 0.0
     led_on: bool = False
+    asked_last: bool = False
 
     @property
     def score(self) -> float:
@@ -82,6 +86,10 @@ class Node(Generic[F]):
         most = LATER if self.effects else OPTIMISM
         return most if self.tried < FEWEST else min(LATER * self.shown, most)
 
+    def is_slow(self, least: float) -> bool:
+        """All data leave more than the first stage's, enough for an effect that acts slowly or far out."""
+        return self.fit.excess - self.brief.excess >= log(1.0 + least)
+
     def hope(self, move: Move) -> float:
         """The score that a move may reach."""
         left = min(self.fit.excess - move.gain * self.optimism, move.begins)
@@ -94,7 +102,7 @@ class Search(Generic[F]):
 
     clock: s of processor time; budget: s until it stops; most: effects; least: what one must explain over what is left unexplained
     nodes: every set that was fitted
-    stopped: the budget ended it, not that nothing promised anything any more
+    stopped: the budget ended it, not that nothing promised anything any more; until: when it does, s of the clock
     """
 
     judge: Judge[F]
@@ -105,6 +113,7 @@ class Search(Generic[F]):
     nodes: dict[frozenset[str], Node[F]] = field(default_factory=dict)
     waiting: list[tuple[Node[F], Move]] = field(default_factory=list)
     stopped: bool = False
+    until: float = inf
 
     @property
     def best(self) -> Node[F]:
@@ -113,7 +122,7 @@ class Search(Generic[F]):
 
     def steps(self, start: F, effects: frozenset[str] = frozenset()) -> Iterator[frozenset[str]]:
         """Search; yields each set that is about to be fitted."""
-        until = self.clock() + self.budget
+        self.until = self.clock() + self.budget
         first = Node(
             effects=effects,
             fit=start,
@@ -122,12 +131,17 @@ class Search(Generic[F]):
             whole=True,
         )
         self.nodes[effects] = first
-        self.waiting = self._moves(first)
+        yield from self.steps_from(first)
+
+    def steps_from(self, start: Node[F]) -> Iterator[frozenset[str]]:
+        """Search on from a set, unless that was done."""
+        if not start.led_on and start.fit.excess >= LEAST:
+            self.waiting += self._moves(start)
         while self.best.fit.excess >= LEAST:
-            open_to = [item for item in self.waiting if self._promising(*item)]
+            open_to = [item for item in self.waiting if self._promising(*item)] or self._last()
             if not open_to:
                 return
-            if self.clock() > until:
+            if self.clock() > self.until:
                 self.stopped = True
                 return
             parent, move = self._simpler(*min(open_to, key=self._order))
@@ -149,6 +163,21 @@ class Search(Generic[F]):
                 yield move.effects
                 self._fitted(parent, move)
 
+    def _last(self) -> list[tuple[Node[F], Move]]:
+        """Where nothing promises enough: what all data show of the best set, if they show what its brief fit does not; else, once, what
+        promises most beside it, as beside laws that bend first order sees a part of what it changes."""
+        best = self.best
+        if best.asked_last:
+            return []
+        best.asked_last = True
+        if best.is_slow(self.least):
+            slow = [(best, move) for move in self.judge.slow_moves(best.fit, best.brief) if len(move.effects) <= self.most]
+            self.waiting += slow
+            best.tried, best.shown = 0, 0.0  # what the first stage's promises were worth says nothing of these
+            return [item for item in slow if self._promising(*item)]
+        items = [item for item in self.waiting if item[0] is best and best.effects and item[1].gain >= LEAST and not self._known(*item)]
+        return sorted(items, key=lambda item: -item[1].gain)[:1]
+
     def _promising(self, parent: Node[F], move: Move) -> bool:
         """It may become better than the best, and what is new may be more than what is left unexplained could feign."""
         promised = move.rest * parent.optimism >= _new(parent, move) * log(1.0 + self.least)
@@ -164,9 +193,10 @@ class Search(Generic[F]):
         return next(first, (parent, move))
 
     def _known(self, parent: Node[F], move: Move) -> bool:
-        """The set was fitted. One that left more than a set which it contains went astray, and may be fitted again from another."""
+        """The set was fitted. One that left more than a set which it contains went astray, and may be fitted again from another; one of which
+        there is a brief fit alone is not known where all data show more."""
         known = self.nodes.get(move.effects)
-        if known is None:
+        if known is None or (parent.is_slow(self.least) and not known.whole):
             return False
         inside = (node.fit.excess for effects, node in self.nodes.items() if effects < move.effects and not node.refused)
         return known.fit.excess <= min(inside, default=inf) + LEAST
@@ -195,7 +225,8 @@ class Search(Generic[F]):
         parameters = parent.parameters + move.parameters
         least = (1.0 + self.least) ** _new(parent, move)
         leads = self.judge.size(brief, parent.brief) >= least - 1.0
-        slow = move.rest >= log(least) and brief.excess < parent.brief.excess + LEAST  # else it went astray
+        astray = brief.excess >= parent.brief.excess + LEAST and not parent.is_slow(self.least)
+        slow = move.rest >= log(least) and not astray
         whole = brief.excess + later + PRICE * parameters < best.score - LEAST if leads else slow
         found = self.judge.whole(brief) if whole else brief
         if whole and not leads:  # what acts slowly does not show in a brief fit, but promised a name on all data
@@ -228,4 +259,4 @@ class Search(Generic[F]):
 
 def _new(parent: Node[F], move: Move) -> int:
     """How many effects a move brings, each of which must be worth a name."""
-    return len(move.effects - parent.effects)
+    return len(move.effects - parent.effects) - len(move.stays)

@@ -35,6 +35,7 @@ class Move:
     expected: every machine has it (friction): it comes first among moves that promise the same, and is tried whatever the whole error promises,
         for to first order its trace tells little where it bends
     simpler: for a richer law of friction the set with the simplest in its place, else empty
+    stays: parts of what is replaced that stay beside what takes its place, with their values
     """
 
     effects: frozenset[str]
@@ -46,11 +47,12 @@ class Move:
     begins: float = np.inf
     expected: bool = False
     simpler: frozenset[str] = frozenset()
+    stays: tuple[tuple[str, tuple[float, ...]], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class _Here:
-    """A fit, the same set's on the first stage's data, and these data as its effects see them."""
+    """A fit, the same set's on the first stage's data, and the data that are looked at as its effects see them."""
 
     fit: GreyboxFit
     brief: GreyboxFit
@@ -84,14 +86,21 @@ class FreeRunJudge:
     def moves(self, now: GreyboxFit, brief: GreyboxFit) -> list[Move]:
         """What may be added, alone or two at once, and what may take the place of a relative; most promising first, of each kind.
 
-        Nothing when it is late. brief: the same set on the first stage's data.
+        Nothing when it is late. brief: the same set on the first stage's data, which are looked at.
         """
+        return self._promised(now, brief, self.data.first)
+
+    def slow_moves(self, now: GreyboxFit, brief: GreyboxFit) -> list[Move]:
+        """The same by what is left of all data: several times as long to ask, and for what acts slowly or far out."""
+        return self._promised(now, brief, self.data.velocity.size)
+
+    def _promised(self, now: GreyboxFit, brief: GreyboxFit, samples: int) -> list[Move]:
         if self.late():
             return []
         model = now.model
         families = {self.library[name].family: name for name, _ in model.effects if self.library[name].family}
         open_to = [e for e in self.library.acting if e.simulable and e.name not in model]
-        here = _Here(now, brief, scene_of(self.data, now, self.data.first))
+        here = _Here(now, brief, scene_of(self.data, now, samples))
         screen = screened(self.data, now, open_to, here.scene)
         traces = {trace.effect: trace for trace in screen.traces}
         own = frozenset(name for name, _ in model.effects)
@@ -151,22 +160,33 @@ class FreeRunJudge:
         more = len(effect.parameters) - len(self.library[relative].parameters)
         if more <= 0 and self.library[relative].sum_of is None:
             return None
-        begins = self._begins(here, model.without(relative), effect) if len(own) == 1 else np.inf
+        stays = self._stays(model, relative) if more > 0 else ()
+        rest = model.without(relative)
+        for name, values in stays:
+            rest = rest.with_effect(name, values)
         return Move(
-            effects=own - {relative} | {effect.name},
+            effects=frozenset(name for name, _ in rest.effects) | {effect.name},
             gain=gain.excess,
             rest=gain.rest,
-            parameters=more,
+            parameters=more + self._count(name for name, _ in stays),
             starts=starts,
             replaced=relative,
-            begins=begins,
+            begins=self._begins(here, rest, effect) if len(own) == 1 else np.inf,
+            stays=stays,
         )
+
+    def _stays(self, model: AxisModel, replaced: str) -> tuple[tuple[str, tuple[float, ...]], ...]:
+        """The parts of a sum that its relatives do not have, with their values."""
+        family = self.library[replaced].family
+        return tuple((name, values) for name, values in model.apart(replaced).effects if name not in model and self.library[name].family != family)
 
     def _begins(self, here: _Here, model: AxisModel, effect: Effect) -> float:
         """Excess at starts that are read without the model: it may have been led so far astray that traces tell little.
 
-        It is known of the first stage; what the motion there is quieter or livelier than in the whole is taken off.
+        It is known of the first stage, where that is looked at; what the motion there is quieter or livelier than in the whole is taken off.
         """
+        if here.scene.velocity.size > self.data.first:
+            return np.inf
         starts = other_starts(self.data, here.fit, model, effect.name, here.scene)
         if not starts:
             return np.inf
@@ -211,6 +231,8 @@ class FreeRunJudge:
             name, values = move.starts[0]
             effect, old = self.library[name], dict(zip(self.library[move.replaced].names, dict(model.effects)[move.replaced], strict=True))
             rest, usual = model.without(move.replaced), tuple(item.typical for item in effect.on(self.data.similar))
+            for part, size in move.stays:
+                rest = rest.with_effect(part, size)
             shared = [tuple(old.get(key, value) for key, value in zip(effect.names, row, strict=True)) for row in (values, usual)]
             traced = [rest.with_effect(name, bounded(effect, row, self.data.similar)) for row in shared]
             return best_start(self.data, traced if rest.effects else [*traced, *other_starts(self.data, now, rest, name)])

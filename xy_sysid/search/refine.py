@@ -93,8 +93,14 @@ def refine_steps(
     if across is not None and across.found is not None:
         search.stopped = judge.late()
         return _ladder(judge, search, settled, fixed, across.found)
-    while settled.step():
-        yield Trying(tuple(sorted(settled.now.effects)))
+    while True:
+        while settled.step():
+            yield Trying(tuple(sorted(settled.now.effects)))
+        if settled.now.led_on or settled.now.fit.excess < LEAST:
+            break
+        for names in search.steps_from(settled.now):
+            yield Trying(tuple(sorted(names)))
+        settled = Simplifying(judge, search, frozenset(kept))
     final = settled.now
     for _ in range(FEWEST):  # along a valley that bends the first fit did not come to its end
         if not final.fit.converged and not judge.late():
