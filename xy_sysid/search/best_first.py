@@ -117,8 +117,8 @@ class Search(Generic[F]):
 
     @property
     def best(self) -> Node[F]:
-        """The set with the least score."""
-        return min(self.nodes.values(), key=lambda node: (node.score, not node.whole))
+        """The set with the least score, of those whose last effects explain what is asked of them."""
+        return min((node for node in self.nodes.values() if node.leads), key=lambda node: (node.score, not node.whole))
 
     def steps(self, start: F, effects: frozenset[str] = frozenset()) -> Iterator[frozenset[str]]:
         """Search; yields each set that is about to be fitted."""
@@ -175,8 +175,8 @@ class Search(Generic[F]):
             self.waiting += slow
             best.tried, best.shown = 0, 0.0  # what the first stage's promises were worth says nothing of these
             return [item for item in slow if self._promising(*item)]
-        items = [item for item in self.waiting if item[0] is best and best.effects and item[1].gain >= LEAST and not self._known(*item)]
-        return sorted(items, key=lambda item: -item[1].gain)[:1]
+        beside = [(node, move) for node, move in self.waiting if node is best and best.effects and _new(node, move) == 1 and move.gain >= LEAST]
+        return sorted((item for item in beside if not self._known(*item)), key=lambda item: -item[1].gain)[:1]
 
     def _promising(self, parent: Node[F], move: Move) -> bool:
         """It may become better than the best, and what is new may be more than what is left unexplained could feign."""
