@@ -41,7 +41,10 @@ def told(value: float, digits: int = 3) -> str:
     """How many times, sigma or per cent, for people; what is beyond reason is not counted."""
     if math.isnan(value):
         return "-"
-    return f"{value:.{digits}g}" if abs(value) < BEYOND_REASON else f"{'over' if value > 0 else 'below'} {math.copysign(BEYOND_REASON, value):.0e}"
+    if abs(value) >= BEYOND_REASON:
+        return f"{'over' if value > 0 else 'below'} {math.copysign(BEYOND_REASON, value):.0e}"
+    text = f"{value:.{digits}g}"
+    return f"{float(text):.0f}" if "e+" in text else text
 
 
 class Units(NamedTuple):

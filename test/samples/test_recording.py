@@ -31,6 +31,20 @@ def test_the_run_of_an_axis_is_its_longest_stretch_without_a_gap() -> None:
     assert run.signals[0] is run.voltage and run.signals[1] is run.position and run.signals[2] == RATE
 
 
+def test_ends_at_which_an_axis_is_not_driven_and_stands_are_left_out() -> None:
+    """Whoever starts a bag early and stops it late; a second of each end stays, and what still moves, or waits in the middle."""
+    rest, noise = np.zeros(4000), np.random.default_rng(0)
+    drive = noise.standard_normal(3000)
+    u = np.concatenate((rest, drive, rest, drive, rest))
+    y = 1e-6 * noise.standard_normal(u.size) + np.cumsum(u) / RATE
+    found = Recording.from_arrays(RATE, u, y)
+    assert found.run("x").rows == slice(3000, 15000)
+    moving = Recording.from_arrays(RATE, u, y + np.where(np.arange(u.size) > 14000, np.arange(u.size) - 14000.0, 0.0) / RATE)
+    assert moving.run("x").rows == slice(3000, u.size)
+    still = Recording.from_arrays(RATE, rest, rest + 1.0)
+    assert still.run("x").rows == slice(0, rest.size)
+
+
 def test_an_axis_that_is_not_there_and_a_recording_without_samples_are_told() -> None:
     """One line that names what is allowed; no empty answer."""
     with pytest.raises(BadInput, match="x, y"):

@@ -97,9 +97,8 @@ def compare(
         item, line, split = judged.where, judged.check, splits[name]
         size = f"{moved(item.error, item.unit, 4)}, noise floor {moved(item.noise_floor, item.unit, 4)}, up to {item.band_end:.4g} Hz"
         times = item.error / max(item.noise_floor, 1e-300)
-        say(
-            f"axis {name}: the error is {times:.3g} times the noise floor ({size})." if item.places else f"axis {name}: {item.sentence} Error {size}."
-        )
+        fails = f"the error is {told(times)} times the noise floor ({size})." if item.places else f"{item.sentence} Error {size}."
+        say(f"axis {name}: {fails}")
         if line is not None:
             say(f"  {frequency_sentence(line, item)}")
         if split is not None:

@@ -133,6 +133,11 @@ def _of_time(recording: Recording) -> list[str]:
             f"{len(gaps)} gap{'s' if len(gaps) > 1 else ''} in the samples, the longest of {most} ({most / rate:.4g} s) after {where:.6g} s; "
             f"the longest stretch without one lasts {longest:.4g} s"
         )
+    most_rows = max(run.stop - run.start for run in runs)
+    for axis in recording.axes:
+        idle = (most_rows - len(recording.run(axis))) / rate
+        if idle > 0.0:
+            found.append(f"axis {axis} is not driven and stands for {idle:.4g} s at its ends, which are left out")
     return found
 
 

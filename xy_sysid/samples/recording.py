@@ -15,6 +15,8 @@ from xy_sysid.errors import BadInput
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import SCALES, Units
 
+STANDS = 0.02  # part of the longest way of a second: an axis that goes less far, and is not driven, stands
+
 
 @dataclass(frozen=True, slots=True)
 class Origin:
@@ -216,11 +218,16 @@ class Recording:
         return self.voltage[:, column], self.position[:, column]
 
     def run(self, axis: str) -> Run:
-        """The longest stretch of one axis without a gap, the first of several; raises BadInput if there is no such axis, or no sample."""
+        """The longest stretch of one axis without a gap, the first of several, without the ends at which it is not driven and stands.
+
+        Raises BadInput if there is no such axis, or no sample.
+        """
         u, y = self.axis(axis)
         if len(self) == 0:
             raise BadInput("number of samples", 0, "1 or more", "Record for longer, or choose another part.")
-        rows = max(self.runs(), key=lambda part: part.stop - part.start)
+        whole = max(self.runs(), key=lambda part: part.stop - part.start)
+        driven = _driven(u[whole], y[whole], round(self.sampling_rate))
+        rows = slice(whole.start + driven.start, whole.start + driven.stop)
         return Run(
             axis=axis,
             sampling_rate=self.sampling_rate,
@@ -230,6 +237,17 @@ class Recording:
             input_unit=self.input_unit,
             output_unit=self.output_unit,
         )
+
+
+def _driven(voltage: FloatArray, position: FloatArray, second: int) -> slice:
+    """The samples (n,) without the seconds at either end in which the input is one and the same and the output stands; one second of each stays."""
+    begins = np.arange(0, max(voltage.size - second, 0) + 1, max(second, 1))
+    ways, inputs = (np.array([np.ptp(signal[at : at + second]) for at in begins]) for signal in (position, voltage))
+    lively = np.flatnonzero((inputs > 0.0) | (ways > STANDS * ways.max(initial=0.0)))
+    if lively.size == 0:
+        return slice(0, voltage.size)
+    first, last = int(begins[max(lively[0] - 1, 0)]), int(lively[-1]) + 2
+    return slice(first, int(begins[last]) if last < begins.size else voltage.size)
 
 
 def _rate(value: Any) -> float:
