@@ -356,6 +356,10 @@ def test_it_goes_on_from_a_simpler_set_that_was_found_beside_it() -> None:
     search.nodes[of("c")] = simpler
     assert list(search.steps_from(simpler)) == [of("c", "d")]
     assert list(search.steps_from(simpler)) == [] and search.best.effects == of("c", "d")
+    assert simpler.led_on and not search.goes_on(simpler)
+    search, _ = searched(judge, most=1)
+    full = Node(effects=of("c"), fit=found, brief=found, parameters=1, whole=True)
+    assert not search.goes_on(full) and list(search.steps_from(full)) == []
 
 
 def test_what_every_machine_has_is_tried_though_the_whole_error_promises_little() -> None:

@@ -135,7 +135,7 @@ class Search(Generic[F]):
 
     def steps_from(self, start: Node[F]) -> Iterator[frozenset[str]]:
         """Search on from a set, unless that was done."""
-        if not start.led_on and start.fit.excess >= LEAST:
+        if self.goes_on(start):
             self.waiting += self._moves(start)
         while self.best.fit.excess >= LEAST:
             open_to = [item for item in self.waiting if self._promising(*item)] or self._last()
@@ -151,6 +151,10 @@ class Search(Generic[F]):
             node = self._fitted(parent, move)
             if node is not None and node.whole and node.leads and node.score < before - LEAST and node.fit.excess >= LEAST:
                 self.waiting += self._moves(node)
+
+    def goes_on(self, node: Node[F]) -> bool:
+        """Whether there may be moves from a set that were not asked for yet."""
+        return not node.led_on and node.fit.excess >= LEAST and len(node.effects) < self.most
 
     def rivals(self, taken: frozenset[str], most: int = 2) -> Iterator[frozenset[str]]:
         """Fit what promised as much as the last effect of a set that was taken, and was not tried as it did well; yields as ``steps``."""

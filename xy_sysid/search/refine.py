@@ -96,7 +96,7 @@ def refine_steps(
     while True:
         while settled.step():
             yield Trying(tuple(sorted(settled.now.effects)))
-        if settled.now.led_on or settled.now.fit.excess < LEAST:
+        if not search.goes_on(settled.now):
             break
         for names in search.steps_from(settled.now):
             yield Trying(tuple(sorted(names)))
