@@ -11,6 +11,7 @@ import pytest
 from helpers.ros_tools import World, needs_ros, world_in
 
 from xy_sysid.page.live import Live
+from xy_sysid.page.orders import Wish
 from xy_sysid.page.topics_state import TopicsState
 
 
@@ -112,3 +113,29 @@ def test_parameters_whose_answer_is_lost_are_set_again(world: World, monkeypatch
         assert told == [(True, "")] and heard == [0.02, 0.02]
     finally:
         link.close()
+
+
+def test_what_is_clicked_while_something_is_being_done_comes_after_it_once() -> None:
+    """The last click counts, for the axis that is shown; it is said what comes."""
+    wish = Wish()
+    assert wish.words == "" and wish.taken("x") is None
+    wish.keep("x", "diagnose")
+    wish.keep("x", "add", "coulomb_friction")
+    assert wish.words == "; then adding coulomb friction"
+    assert wish.taken("x") == ("add", "coulomb_friction") and wish.taken("x") is None
+    wish.keep("x", "next")
+    assert wish.taken("y") is None and wish.taken("x") is None
+
+
+def test_a_click_on_its_way_when_the_button_is_disabled_is_heeded() -> None:
+    """What the browser sent before it knew: the server does not drop it."""
+    from nicegui import Client, ui
+    from nicegui.page import page
+
+    from xy_sysid.page.buttons import heeded
+
+    with Client(page("/nowhere")):
+        button, plain = heeded(ui.button("Diagnose")), ui.button("Diagnose")
+        button.set_enabled(False)
+        plain.set_enabled(False)
+        assert plain.is_ignoring_events and not button.is_ignoring_events

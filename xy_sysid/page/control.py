@@ -7,6 +7,7 @@ import time
 from nicegui import run, ui
 
 from xy_sysid.errors import XySysidError
+from xy_sysid.page.buttons import heeded
 from xy_sysid.page.facts import dropped_words, seconds_text
 from xy_sysid.page.session import Session
 from xy_sysid.page.settings_form import SettingsForm
@@ -34,9 +35,11 @@ class Control:
             self._nodes = ui.element("div").classes("stack").style("gap:.2rem").props("role=status aria-live=polite data-part=nodes")
             self._state = ui.label("").props("data-part=lifecycle")
             with ui.element("div").classes("buttons"):
-                self._configure = ui.button("Configure", on_click=lambda: self._go("configure")).props("outline dense no-caps data-act=configure")
-                self._activate = ui.button("Activate", on_click=self._ask_activate).props("outline dense no-caps data-act=activate")
-                self._reset = ui.button("Forget what was heard", on_click=self._forget).props("flat dense no-caps data-act=forget")
+                self._configure = heeded(
+                    ui.button("Configure", on_click=lambda: self._go("configure")).props("outline dense no-caps data-act=configure")
+                )
+                self._activate = heeded(ui.button("Activate", on_click=self._ask_activate).props("outline dense no-caps data-act=activate"))
+                self._reset = heeded(ui.button("Forget what was heard", on_click=self._forget).props("flat dense no-caps data-act=forget"))
             self._windows = ui.element("div").classes("rows small").props("data-part=windows")
             with ui.expansion("Excitation").classes("w-full").props("dense data-part=excitation"):
                 self._settings = ui.element("div").classes("stack")

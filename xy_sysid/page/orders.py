@@ -35,6 +35,27 @@ class Order:
         return DOING[self.act].format(self.argument.replace("_", " "))
 
 
+@dataclass
+class Wish:
+    """What was clicked while something else was being done, the last of it; it is taken once, if its axis is still the one that is shown."""
+
+    _kept: tuple[str, OrderKind, str] | None = None
+
+    def keep(self, axis: str, act: OrderKind, argument: str = "") -> None:
+        """Note it until it is taken."""
+        self._kept = axis, act, argument
+
+    def taken(self, axis: str) -> tuple[OrderKind, str] | None:
+        """Act and argument, if there is a wish for this axis; then there is none any more."""
+        kept, self._kept = self._kept, None
+        return kept[1:] if kept is not None and kept[0] == axis else None
+
+    @property
+    def words(self) -> str:
+        """What comes next, behind what is being done."""
+        return "" if self._kept is None else f"; then {DOING[self._kept[1]].format(self._kept[2].replace('_', ' '))}"
+
+
 @dataclass(frozen=True, slots=True)
 class Reading:
     """How a recording is read. load: arguments of ``imports.load``; words: the same for a command; effect_files: effects of one's own."""

@@ -10,10 +10,11 @@ from typing import Any
 from nicegui import ui
 
 from xy_sysid.errors import XySysidError
+from xy_sysid.page.buttons import heeded
 from xy_sysid.page.document_words import candidate_rows, ladder_words, look_alike_lines, model_effects, spaced, step_names, verdict_words
 from xy_sysid.page.downloads import Downloads
 from xy_sysid.page.facts import seconds_text
-from xy_sysid.page.orders import OrderKind, Source
+from xy_sysid.page.orders import OrderKind, Source, Wish
 from xy_sysid.page.plot import Plot
 from xy_sysid.page.session import Session
 from xy_sysid.report import story_figures as draw
@@ -35,6 +36,7 @@ class StoryCard:
         self._shown: object = None
         self._filled: object = None
         self._named = ""
+        self._wish = Wish()
         self._buttons: dict[str, ui.button] = {}
         with ui.element("section").classes("card story").props('aria-label="story"') as self.head:
             self._headline = ui.label("").classes("headline").props("role=heading aria-level=2 aria-live=polite data-part=headline")
@@ -48,7 +50,7 @@ class StoryCard:
             with ui.element("div").classes("buttons").props("role=status aria-live=polite") as self._busy:
                 ui.spinner(size="1.2em")
                 self._doing = ui.label("").classes("grow")
-                ui.button("Cancel", on_click=lambda: source.cancel(self._axis)).props("outline dense data-act=cancel")
+                ui.button("Cancel", on_click=self._cancel).props("outline dense data-act=cancel")
         with ui.element("section").classes("card evidence").props('aria-label="steps and evidence"') as self.body:
             self._ladder = Plot("Each step adds one effect. Held-out error counts; no model can pass the dotted noise floor.", "ladder")
             self._model = ui.element("div").classes("stack").style("gap:.3rem")
@@ -84,9 +86,13 @@ class StoryCard:
         own = job is not None and job.order.axis == axis and (job.running or self._source.live)
         if job is not None:
             waits = "" if own else "waits: " if not self._source.live else f"axis {job.order.axis}: "
-            self._doing.set_text(f"{waits}{job.words} ({seconds_text(time.monotonic() - job.begun)})")
+            self._doing.set_text(f"{waits}{job.words} ({seconds_text(time.monotonic() - job.begun)}){self._wish.words}")
         self._headline.set_text(headline(document, spaced(job.words) if job is not None and own else ""))
         able = job is None and self._source.ready(axis)
+        wish = self._wish.taken(axis) if able else None
+        if wish is not None:
+            self._ask(*wish)
+            able = False
         for button in self._buttons.values():
             button.set_enabled(able)
         self._fill(document, able and not quiet)
@@ -110,7 +116,7 @@ class StoryCard:
             await self._before_after.show(self._session, (*key, "pair", first, last), draw.before_after, document, first, last)
 
     def _button(self, act: str, text: str, meaning: str, do: Callable[[], None]) -> None:
-        button = ui.button(text, on_click=do).props(f"outline dense no-caps data-act={act}")
+        button = heeded(ui.button(text, on_click=do).props(f"outline dense no-caps data-act={act}"))
         with button:
             ui.tooltip(meaning).props("delay=700")
         self._buttons[act] = button
@@ -134,10 +140,18 @@ class StoryCard:
         self._ask("add", self._named)
 
     def _ask(self, act: OrderKind, argument: str = "") -> None:
+        """Ask for it, or note it until what is being done has ended: the click may have been on its way when that began."""
+        if self._source.job(self._axis) is not None:
+            self._wish.keep(self._axis, act, argument)
+            return
         try:
             self._source.ask(act, self._axis, argument)
         except XySysidError as problem:
             self._session.say(str(problem))
+
+    def _cancel(self) -> None:
+        self._wish = Wish()
+        self._source.cancel(self._axis)
 
     def _write(self, document: dict[str, Any] | None) -> None:
         self._verdict.set_text(spaced(detail(document)) if document else self._source.words(self._axis))
@@ -174,8 +188,10 @@ class StoryCard:
         self._last.set_options(steps, value=self._pair[1])
 
     def _row_button(self, text: str, act: OrderKind, name: str) -> None:
-        button = ui.button(text, on_click=lambda: self._ask(act, name)).props(
-            f'outline dense no-caps aria-label="{text} {_words(name)}" data-{act}={name}'
+        button = heeded(
+            ui.button(text, on_click=lambda: self._ask(act, name)).props(
+                f'outline dense no-caps aria-label="{text} {_words(name)}" data-{act}={name}'
+            )
         )
         button.set_enabled(self._source.job(self._axis) is None)
 
