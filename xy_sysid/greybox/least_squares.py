@@ -147,8 +147,10 @@ def solve(run: Callable[[FloatArray], FloatArray], target: Target, scale: Scale,
                     converged = True
                     break
     noise = _covariance(normal)
-    beyond = np.maximum(layout.power(error) - least.noise, 0.0)
-    repeats = 1.0 + (windows.begins.size - 1) * layout.lines * beyond / tolerance(layout, error, least)
+    with np.errstate(over="ignore", invalid="ignore"):  # of a model that runs away all is one mistake
+        beyond = layout.lines * np.maximum(layout.power(error) - least.noise, 0.0)
+        share = np.nan_to_num(beyond / tolerance(layout, error, least), nan=1.0, posinf=1.0)
+    repeats = 1.0 + (windows.begins.size - 1) * share
     covariance = _that_repeats(change * weight, np.sqrt(repeats)[layout.band], noise)
     return Solution(
         values=scale.outer(inner),
