@@ -32,12 +32,36 @@ RUN = zlib.crc32(os.environ.get("PYTEST_XDIST_TESTRUNUID", str(os.getpid())).enc
 WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
 WORKERS = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
 
+SHARED = Path("/dev/shm")
+
 _count = itertools.count()
 
 
 def new_domain() -> int:
-    """A DDS domain that no other test of this run, in this worker or beside it, and hardly one of another run, uses."""
-    return (RUN + next(_count) * WORKERS + WORKER) % 100 + 1
+    """A DDS domain that no other test of this run, in this worker or beside it, and hardly one of another run, uses.
+
+    One in which no killed process of an earlier run has left its mailboxes: who comes after it writes into some that nobody reads.
+    """
+    for _ in range(100 // WORKERS):
+        domain = (RUN + next(_count) * WORKERS + WORKER) % 100 + 1
+        if not left_behind(domain):
+            return domain
+    clean(domain)
+    return domain
+
+
+def left_behind(domain: int) -> list[Path]:
+    """The mailboxes in shared memory (ports of Fast DDS) of a domain: of those who are in it, and of those who were killed there."""
+    first = 7400 + 250 * domain
+    names = {f"fastrtps_port{port}" for port in range(first, first + 250)}
+    ports = [path for path in SHARED.glob("*fastrtps_port*") if path.name.removeprefix("sem.").removesuffix("_el").removesuffix("_mutex") in names]
+    return sorted(ports)
+
+
+def clean(domain: int) -> None:
+    """Take away what those who were killed in a domain left, when nobody is in it any more."""
+    for path in left_behind(domain):
+        path.unlink(missing_ok=True)
 
 
 class NodeProcess:
@@ -227,6 +251,7 @@ def world_in(folder: Path) -> Iterator[World]:
             yield world
         finally:
             world.close()
+            clean(world.domain)
     finally:
         if before is None:
             del os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"]

@@ -316,3 +316,10 @@ def test_a_gap_is_asked_for_early_and_once(effect: str, monkeypatch: pytest.Monk
     assert ("backlash" in found.effects) == (effect == "backlash")
     if effect == "backlash":
         assert tried.index(("backlash",)) == len(tried) - 1 <= FEWEST + 1
+
+
+def test_a_gap_beside_a_large_force_is_asked_for_with_that_force() -> None:
+    """Cogging that a simulation without the gap has found stands beside it: alone, the gap does not do better than the cogging."""
+    found = refining.refine(prepare(2000.0, *recorded("backlash=14e-6+coulomb_friction=0.08+cogging=0.5,per_revolution=4").axis("x")))
+    assert set(found.effects) == {"backlash", "coulomb_friction", "cogging"}
+    assert [step.added for step in found.steps][:2] == [None, "cogging"] and found.final.excess == 0.0

@@ -226,7 +226,7 @@ class Recording:
         if len(self) == 0:
             raise BadInput("number of samples", 0, "1 or more", "Record for longer, or choose another part.")
         whole = max(self.runs(), key=lambda part: part.stop - part.start)
-        driven = _driven(u[whole], y[whole], round(self.sampling_rate))
+        driven = _driven(u[whole], y[whole], max(round(self.sampling_rate), 1))
         rows = slice(whole.start + driven.start, whole.start + driven.stop)
         return Run(
             axis=axis,
@@ -241,7 +241,7 @@ class Recording:
 
 def _driven(voltage: FloatArray, position: FloatArray, second: int) -> slice:
     """The samples (n,) without the seconds at either end in which the input is one and the same and the output stands; one second of each stays."""
-    begins = np.arange(0, max(voltage.size - second, 0) + 1, max(second, 1))
+    begins = np.arange(0, max(voltage.size - second, 0) + 1, second)
     ways, inputs = (np.array([np.ptp(signal[at : at + second]) for at in begins]) for signal in (position, voltage))
     lively = np.flatnonzero((inputs > 0.0) | (ways > STANDS * ways.max(initial=0.0)))
     if lively.size == 0:

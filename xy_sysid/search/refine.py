@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from xy_sysid.axis.loop_source import undoable
 from xy_sysid.axis.model import STANDARD, Library
 from xy_sysid.effects._contract import Limits
 from xy_sysid.errors import BadInput
@@ -170,18 +171,26 @@ class _Ahead:
         self.judge, self.search = judge, search
         whole_record = judge.data.longest() is judge.data
         self.names = tuple(effect.name for effect in judge.library.acting if effect.one_step is not None and whole_record)
-        self.fitted: dict[str, Grown] = {}
+        self.fitted: dict[tuple[str, frozenset[str]], Grown] = {}
         self.found: Filtered | None = None
-        self.asked = False
+        self.asked: list[frozenset[str]] = []
 
     @property
     def due(self) -> bool:
-        """After the first simulations, where these leave something, once."""
-        return bool(self.names) and not self.asked and len(self.search.nodes) > FEWEST and self.search.best.fit.excess >= AT_FLOOR
+        """After the first simulations, where these leave something, once; and once more beside forces that are found later."""
+        best = self.search.best
+        if not self.names or len(self.search.nodes) <= FEWEST or best.fit.excess < AT_FLOOR:
+            return False
+        return not self.asked or (len(self.asked) == 1 and best.effects not in self.asked and self._forces(best))
+
+    def _forces(self, node: Node[GreyboxFit]) -> bool:
+        """A filter can have all effects of a set beside the gap, and there are some."""
+        effects = [self.judge.library[name] for name in node.effects]
+        return bool(effects) and all(undoable(effect) and effect.category != "motion" for effect in effects)
 
     def explains(self) -> bool:
         """Whether one of them explains the axis down to the noise: then no more simulations need to be tried."""
-        self.asked = True
+        self.asked.append(self.search.best.effects)
         for name in self.names:
             self.look(name, self.search.best)
         if self.found is not None and self.found[0][-1][1].excess > 0.0:
@@ -192,7 +201,7 @@ class _Ahead:
         """Take it if it beats a set, and the best of all."""
         if self.found is not None:
             return
-        data, library = self.judge.data, self.judge.library
+        data = self.judge.data
         whole(self.judge, self.search.best)
         later = np.arange(data.velocity.size) >= data.training
         try:
@@ -201,20 +210,34 @@ class _Ahead:
             return
         if not FILTERED * bar > data.floor.encoder * data.sampling_rate:
             return
-        if name not in self.fitted:
+        for node in self._begins(best):
+            fitted = self._fitted(name, node, FILTERED * bar)
+            if fitted is None:
+                return
+            last, without = fitted.rungs[-1][1], error_without(data, fitted.found)
+            if name in last.model and last.held_out_error < FILTERED * min(bar, without):
+                own = node.fit.model.effects
+                self.found = (*((force, node.fit) for force, _ in own), *fitted.rungs), bar
+                return
+
+    def _begins(self, best: Node[GreyboxFit]) -> list[Node[GreyboxFit]]:
+        """The rigid base, and the best set if a filter can have all of it: a large force beside a gap hides it."""
+        rigid = self.search.nodes[frozenset()]
+        return [rigid, best] if self._forces(best) else [rigid]
+
+    def _fitted(self, name: str, node: Node[GreyboxFit], bar: float) -> Grown | None:
+        """The effect and what is beside it, beginning from a set; each is fitted once. None if it is too late, or there is no fit."""
+        key = name, node.effects
+        if key not in self.fitted:
             if self.judge.late():
                 self.search.stopped = True
-                return
-            base = self.search.nodes[frozenset()].fit
+                return None
             try:
-                wanted = Wanted(Limits(FILTERED * bar, self.judge.late), self.search.least, self.judge.refusal)
-                self.fitted[name] = grown(data, base, library[name], wanted)
+                wanted = Wanted(Limits(bar, self.judge.late), self.search.least, self.judge.refusal)
+                self.fitted[key] = grown(self.judge.data, whole(self.judge, node), self.judge.library[name], wanted)
             except np.linalg.LinAlgError:
-                return
-        fitted = self.fitted[name]
-        last, without = fitted.rungs[-1][1], error_without(data, fitted.found)
-        if name in last.model and last.held_out_error < FILTERED * min(bar, without):
-            self.found = fitted.rungs, bar
+                return None
+        return self.fitted[key]
 
 
 def _ladder(
