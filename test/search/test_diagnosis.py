@@ -323,3 +323,4 @@ def test_a_gap_beside_a_large_force_is_asked_for_with_that_force() -> None:
     found = refining.refine(prepare(2000.0, *recorded("backlash=14e-6+coulomb_friction=0.08+cogging=0.5,per_revolution=4").axis("x")))
     assert set(found.effects) == {"backlash", "coulomb_friction", "cogging"}
     assert [step.added for step in found.steps][:2] == [None, "cogging"] and found.final.excess == 0.0
+    assert [one.effect for one in found.tried].count("cogging") == 1 and found.tried[0].effect == "backlash"

@@ -216,9 +216,14 @@ class _Ahead:
                 return
             last, without = fitted.rungs[-1][1], error_without(data, fitted.found)
             if name in last.model and last.held_out_error < FILTERED * min(bar, without):
-                own = node.fit.model.effects
-                self.found = (*((force, node.fit) for force, _ in own), *fitted.rungs), bar
+                self.found = (*self._up_to(node), *fitted.rungs), bar
                 return
+
+    def _up_to(self, node: Node[GreyboxFit]) -> list[tuple[str, GreyboxFit]]:
+        """Rungs up to a set, of the fits that are known."""
+        names = [name for name, _ in node.fit.model.effects]
+        known = [(names[count], self.search.nodes.get(frozenset(names[: count + 1]))) for count in range(len(names))]
+        return [(name, whole(self.judge, found)) for name, found in known if found is not None]
 
     def _begins(self, best: Node[GreyboxFit]) -> list[Node[GreyboxFit]]:
         """The rigid base, and the best set if a filter can have all of it: a large force beside a gap hides it."""
@@ -264,7 +269,7 @@ def _ladder(
             steps=(Step(None, base), *(Step(name, fit) for name, fit in rungs)),
             final=last,
             effects=names,
-            tried=(Candidate(rungs[0][0], 0.0, rungs[0][1]), *tried),
+            tried=(next(Candidate(name, 0.0, fit) for name, fit in rungs if fit.model.ahead is not None), *tried),
             rivals=(Rival(tuple(sorted(node.effects)), node.fit, 2.0 * math.log(bar / last.held_out_error)),),
             sizes=dict.fromkeys(names, (bar / last.held_out_error) ** 2 - 1.0),
             refused=refused,
