@@ -183,11 +183,13 @@ class World:
 
         self.node.create_subscription(Float64MultiArray, "voltage", play, DATA_QOS)
 
-    def call(self, kind: Any, name: str, request: Any, seconds: float = 10.0) -> Any:
-        """The answer of a service."""
-        answer = self._try(kind, name, request, seconds)
-        assert answer is not None, f"no answer from {name}"
-        return answer
+    def call(self, kind: Any, name: str, request: Any, seconds: float = 10.0, times: int = 1) -> Any:
+        """The answer of a service. times: that what may be asked again is asked, as an answer gets lost on a link that has only half come up."""
+        for _ in range(times):
+            answer = self._try(kind, name, request, seconds)
+            if answer is not None:
+                return answer
+        raise AssertionError(f"no answer from {name}")
 
     def _try(self, kind: Any, name: str, request: Any, seconds: float) -> Any:
         if name not in self._clients:
@@ -229,7 +231,7 @@ class World:
 
         parameter: Any = Parameter
         request = SetParameters.Request(parameters=[parameter(name, value=value).to_parameter_msg()])
-        result = self.call(SetParameters, f"/xy/{node}/set_parameters", request).results[0]
+        result = self.call(SetParameters, f"/xy/{node}/set_parameters", request, times=3).results[0]
         return bool(result.successful), str(result.reason)
 
     def close(self) -> None:

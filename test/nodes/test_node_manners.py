@@ -150,7 +150,7 @@ def test_descriptors_say_what_may_be_set(world: World) -> None:
     names = {"identifier": ["source", "window", "overlap", "axes", "input_unit"], "excitation": ["x.kind", "x.rms", "output", "rate", "axes"]}
     found: dict[str, Any] = {}
     for node, asked in names.items():
-        answer = world.call(DescribeParameters, f"/xy/{node}/describe_parameters", DescribeParameters.Request(names=asked), 40.0)
+        answer = world.call(DescribeParameters, f"/xy/{node}/describe_parameters", DescribeParameters.Request(names=asked), times=3)
         found |= {f"{node} {item.name}": item for item in answer.descriptors}
     assert found["identifier source"].additional_constraints == "one of blocks, joint_state" and found["identifier source"].read_only
     assert found["identifier input_unit"].read_only and found["identifier axes"].read_only and found["excitation axes"].read_only

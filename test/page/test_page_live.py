@@ -148,7 +148,7 @@ def test_settings_are_checked_and_reach_the_node(scene: Scene) -> None:
     tab.until(lambda: "applied" in str(told.text_content()), 10)
     from rcl_interfaces.srv import GetParameters
 
-    answer = world.call(GetParameters, "/xy/excitation/get_parameters", GetParameters.Request(names=["x.rms"]))
+    answer = world.call(GetParameters, "/xy/excitation/get_parameters", GetParameters.Request(names=["x.rms"]), times=3)
     assert answer.values[0].double_value == 0.5
 
 
