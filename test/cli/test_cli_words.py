@@ -49,6 +49,15 @@ def test_candidates_are_ranked_by_what_each_leaves(dry: Path) -> None:
     assert rows[0][0] == "coulomb_friction" and left == sorted(left)
 
 
+def test_what_is_judged_one_sample_ahead_takes_no_part_of_a_simulations_error(tmp_path: Path) -> None:
+    """Its column has a dash, not 0 % beside a sentence that says nearly all."""
+    made = tmp_path / "gap.npz"
+    assert cli("simulate", made, "--machine", "rigid.yaml", "--effect", "backlash", "--duration", "8").code == 0
+    said = cli("diagnose", made, "--axis", "x").out
+    rows = [line.split() for line in said.splitlines() if "one sample ahead)" in line]
+    assert [row[0] for row in rows] == ["backlash"] and rows[0][-1] == "-", said
+
+
 def test_an_interval_shows_what_it_is_worth() -> None:
     """Never twice the same number, never what cannot be: a delay or a friction below zero."""
     assert estimate("delay", (0.0016667, 0.00166665, 0.00166675), "s") == ("delay", "1.666700", "1.666650 .. 1.666750", "ms")

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from xy_sysid.axis.resonant_loop import inner
+from xy_sysid.jit import compiled
 from xy_sysid.samples.block import FloatArray
 
 
-@inner
+@compiled
 def along(x: FloatArray, i: int, part: float) -> float:
     """Position a part (0..1) of the way from sample i to the next, m: on the parabola with the mean of both second differences."""
     straight: float = x[i] + part * (x[i + 1] - x[i])

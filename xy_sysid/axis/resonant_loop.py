@@ -21,16 +21,11 @@ A state is a row (x, v, q_0 .. q_(m-1), force), (m + 3,); its generator carries 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import ParamSpec, TypeVar
 
 import numpy as np
-from numba.extending import register_jitable
 
+from xy_sysid.jit import compiled
 from xy_sysid.samples.block import FloatArray
-
-P = ParamSpec("P")
-R = TypeVar("R")
 
 FINE = 1e5  # Hz at which a section is asked for its roots: far above any resonance, so that none is folded back
 TERMS = 10  # of power series within a sub-step; as STIFF is 0.5, the first that is left out is below 1e-10
@@ -38,13 +33,7 @@ STIFF = 0.5  # longest sub-step times the fastest rate
 CUTS = 0.004  # s: most sub-steps of a piece over the rate asked for, Hz, however stiff a trial is: a first round must not last minutes
 
 
-def inner(function: Callable[P, R]) -> Callable[P, R]:
-    """The same function, callable from Python and from the compiled loop."""
-    made: Callable[P, R] = register_jitable(function)
-    return made
-
-
-@inner
+@compiled
 def roots(c1: float, c2: float, rate: float) -> tuple[float, float]:
     """a0, a1 of sigma^2 + a1 sigma + a0, sigma = s / rate, for z^2 + c1 z + c2 at FINE, z = exp(s / FINE); nan if there is none."""
     if not c2 > 0.0:
@@ -57,7 +46,7 @@ def roots(c1: float, c2: float, rate: float) -> tuple[float, float]:
     return (middle * middle + turn) * scale * scale, -2.0 * middle * scale
 
 
-@inner
+@compiled
 def times(first: FloatArray, second: FloatArray) -> FloatArray:
     """Product of two polynomials, lowest power first."""
     product = np.zeros(first.size + second.size - 1)
@@ -67,7 +56,7 @@ def times(first: FloatArray, second: FloatArray) -> FloatArray:
     return product
 
 
-@inner
+@compiled
 def generator(gain: float, pole: float, top: FloatArray, bottom: FloatArray, rate: float) -> FloatArray:
     """(m + 3, m + 3) rate of change of a state, 1/s.
 
@@ -89,7 +78,7 @@ def generator(gain: float, pole: float, top: FloatArray, bottom: FloatArray, rat
     return made
 
 
-@inner
+@compiled
 def resting(moving: FloatArray) -> FloatArray:
     """The generator while friction holds v at zero."""
     made = moving.copy()
@@ -97,7 +86,7 @@ def resting(moving: FloatArray) -> FloatArray:
     return made
 
 
-@inner
+@compiled
 def fastest(pole: float, bottom: FloatArray, rate: float) -> float:
     """Upper bound of the rates of the whole system, rad/s, within a factor of 2 (Fujiwara 1916)."""
     found = pole / rate
@@ -107,7 +96,7 @@ def fastest(pole: float, bottom: FloatArray, rate: float) -> float:
     return found * rate
 
 
-@inner
+@compiled
 def product(a: FloatArray, b: FloatArray) -> FloatArray:
     """a b of two square matrices."""
     n = a.shape[0]
@@ -119,7 +108,7 @@ def product(a: FloatArray, b: FloatArray) -> FloatArray:
     return made
 
 
-@inner
+@compiled
 def exponential(a: FloatArray, h: float) -> FloatArray:
     """exp(a h) by scaling and squaring."""
     n, norm = a.shape[0], 0.0
@@ -136,7 +125,7 @@ def exponential(a: FloatArray, h: float) -> FloatArray:
     return made
 
 
-@inner
+@compiled
 def ahead(by: FloatArray, state: FloatArray, force: float) -> float:
     """Speed at the end of a sub-step under a constant force."""
     n = state.size
@@ -146,7 +135,7 @@ def ahead(by: FloatArray, state: FloatArray, force: float) -> float:
     return total
 
 
-@inner
+@compiled
 def step(by: FloatArray, state: FloatArray, force: float, spare: FloatArray) -> float:
     """Moves the state on by a sub-step; returns the distance, m."""
     n = state.size
@@ -162,7 +151,7 @@ def step(by: FloatArray, state: FloatArray, force: float, spare: FloatArray) -> 
     return distance
 
 
-@inner
+@compiled
 def tug(moving: FloatArray, state: FloatArray) -> float:
     """What the hanging masses add to the force at this instant, V."""
     n = state.size
@@ -172,7 +161,7 @@ def tug(moving: FloatArray, state: FloatArray) -> float:
     return total
 
 
-@inner
+@compiled
 def unfold(a: FloatArray, state: FloatArray, force: float, series: FloatArray) -> None:
     """series (TERMS, m + 3): the state as powers of time, from now on."""
     n = state.size
@@ -187,7 +176,7 @@ def unfold(a: FloatArray, state: FloatArray, force: float, series: FloatArray) -
             series[k, i] = total / k
 
 
-@inner
+@compiled
 def follow(series: FloatArray, t: float, state: FloatArray) -> float:
     """The state after ``t`` s of its series; returns the distance, m."""
     for i in range(state.size):
@@ -199,7 +188,7 @@ def follow(series: FloatArray, t: float, state: FloatArray) -> float:
     return distance
 
 
-@inner
+@compiled
 def crossing(powers: FloatArray, h: float) -> float:
     """Where a polynomial (TERMS,), lowest power first, changes its sign between 0 and ``h``: Newton's way, held by halving."""
     low, high, rising = 0.0, h, powers[0] < 0.0
@@ -223,7 +212,7 @@ def crossing(powers: FloatArray, h: float) -> float:
     return min(max(t, 0.0), h)
 
 
-@inner
+@compiled
 def stop(
     moving: FloatArray, still: FloatArray, state: FloatArray, push: float, force: float, forth: float, back: float, h: float, series: FloatArray
 ) -> float:
@@ -248,7 +237,7 @@ def stop(
     return moved + follow(series, h - gone, state)
 
 
-@inner
+@compiled
 def hold(
     moving: FloatArray,
     still: FloatArray,

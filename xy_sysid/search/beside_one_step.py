@@ -40,6 +40,12 @@ class Grown:
     found: Followed
 
 
+def told_apart(effect: Effect) -> bool:
+    """A filter can have it beside a gap, and tell it from one. A resonance it cannot: together with a gap it explains too much
+    (cogging at small amplitude, friction that bends)."""
+    return undoable(effect) and effect.category != "motion"
+
+
 def grown(data: AxisData, base: GreyboxFit, effect: Effect, wanted: Wanted | None = None) -> Grown:
     """Rungs: the effect with what the base has beside it, then one more beside it at each."""
     wanted = wanted or Wanted()
@@ -69,8 +75,7 @@ def _better(data: AxisData, now: GreyboxFit, effect: Effect, found: Followed, wa
     """
     library, on = now.model.library, replace(wanted.limits, bar=None)
     known = {name for name, _ in beside(now.model, effect)[1]} | {name for name, _ in now.model.effects}
-    # a resonance is not tried: together with a gap it explains too much (cogging at small amplitude, friction that bends)
-    open_to = [e for e in library.acting if undoable(e) and e.simulable and e.name not in known and e.category != "motion"]
+    open_to = [law for law in library.acting if told_apart(law) and law.simulable and law.name not in known]
     seen = traces(data, now.model, effect, found, [*open_to, *_uneven(effect, library, found)])
     promising = [trace for trace in seen if _size(now, 1.0 - OPTIMISM * trace.share) >= _least(trace.effect, effect, wanted)]
     if now.excess > 0.0 and not promising:  # something acts, and what is slow promises little

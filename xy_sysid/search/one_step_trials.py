@@ -1,0 +1,101 @@
+"""Effects that only one-step prediction can judge, such as a gap: when they are tried, from which sets, and whether they win."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from xy_sysid.effects._contract import Limits
+from xy_sysid.errors import BadInput
+from xy_sysid.greybox.free_run import GreyboxFit
+from xy_sysid.greybox.one_step import error_without
+from xy_sysid.greybox.whitened import whitened_rms
+from xy_sysid.search.beside_one_step import Grown, Wanted, grown, told_apart
+from xy_sysid.search.best_first import Node, Search
+from xy_sysid.search.criteria import AT_FLOOR, FEWEST, FILTERED
+from xy_sysid.search.judge import FreeRunJudge
+from xy_sysid.search.simplify import whole
+
+Filtered = tuple[tuple[tuple[str, GreyboxFit], ...], float]
+
+
+class OneStepTrials:
+    """Each is fitted once from a set, and taken if it beats the best simulation with an autoregressive error.
+
+    found: rungs, and that simulation's error one sample ahead, m/s
+    """
+
+    def __init__(self, judge: FreeRunJudge, search: Search[GreyboxFit]) -> None:
+        self.judge, self.search = judge, search
+        whole_record = judge.data.longest() is judge.data
+        self.names = tuple(effect.name for effect in judge.library.acting if effect.one_step is not None and whole_record)
+        self.fitted: dict[tuple[str, frozenset[str]], Grown] = {}
+        self.found: Filtered | None = None
+        self.asked: list[frozenset[str]] = []
+
+    @property
+    def due(self) -> bool:
+        """After the first simulations, where these leave something, once; and once more beside forces that are found later."""
+        best = self.search.best
+        if not self.names or len(self.search.nodes) <= FEWEST or best.fit.excess < AT_FLOOR:
+            return False
+        return not self.asked or (len(self.asked) == 1 and best.effects not in self.asked and self._forces(best))
+
+    def _forces(self, node: Node[GreyboxFit]) -> bool:
+        """A filter can have all effects of a set beside the gap, and there are some."""
+        return bool(node.effects) and all(told_apart(self.judge.library[name]) for name in node.effects)
+
+    def explains(self) -> bool:
+        """Whether one of them explains the axis down to the noise: then no more simulations need to be tried."""
+        self.asked.append(self.search.best.effects)
+        for name in self.names:
+            self.look(name, self.search.best)
+        if self.found is not None and self.found[0][-1][1].excess > 0.0:
+            self.found = None
+        return self.found is not None
+
+    def look(self, name: str, best: Node[GreyboxFit]) -> None:
+        """Take it if it beats a set, and the best of all."""
+        if self.found is not None:
+            return
+        data = self.judge.data
+        whole(self.judge, self.search.best)
+        later = np.arange(data.velocity.size) >= data.training
+        try:
+            bar = min(whitened_rms(node.fit.error, later) for node in (best, self.search.best))
+        except BadInput:  # too little data for any prediction
+            return
+        if not FILTERED * bar > data.floor.encoder * data.sampling_rate:
+            return
+        for node in self._begins(best):
+            fitted = self._fitted(name, node, FILTERED * bar)
+            if fitted is None:
+                return
+            last, without = fitted.rungs[-1][1], error_without(data, fitted.found)
+            if name in last.model and last.held_out_error < FILTERED * min(bar, without):
+                self.found = (*self._up_to(node), *fitted.rungs), bar
+                return
+
+    def _up_to(self, node: Node[GreyboxFit]) -> list[tuple[str, GreyboxFit]]:
+        """Rungs up to a set, of the fits that are known."""
+        names = [name for name, _ in node.fit.model.effects]
+        known = [(names[count], self.search.nodes.get(frozenset(names[: count + 1]))) for count in range(len(names))]
+        return [(name, whole(self.judge, found)) for name, found in known if found is not None]
+
+    def _begins(self, best: Node[GreyboxFit]) -> list[Node[GreyboxFit]]:
+        """The rigid base, and the best set if a filter can have all of it: a large force beside a gap hides it."""
+        rigid = self.search.nodes[frozenset()]
+        return [rigid, best] if self._forces(best) else [rigid]
+
+    def _fitted(self, name: str, node: Node[GreyboxFit], bar: float) -> Grown | None:
+        """The effect and what is beside it, beginning from a set; each is fitted once. None if it is too late, or there is no fit."""
+        key = name, node.effects
+        if key not in self.fitted:
+            if self.judge.late():
+                self.search.stopped = True
+                return None
+            try:
+                wanted = Wanted(Limits(bar, self.judge.late), self.search.least, self.judge.refusal)
+                self.fitted[key] = grown(self.judge.data, whole(self.judge, node), self.judge.library[name], wanted)
+            except np.linalg.LinAlgError:
+                return None
+        return self.fitted[key]

@@ -1,0 +1,146 @@
+"""From the fits of a search to its ladder: one rung for each effect, rivals, sizes, and what no effect explains."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from xy_sysid.axis.model import Library
+from xy_sysid.greybox.axis_data import AxisData
+from xy_sysid.greybox.free_run import GreyboxFit
+from xy_sysid.search.best_first import Search
+from xy_sysid.search.judge import FreeRunJudge, joined
+from xy_sysid.search.ladder import Candidate, Ladder, Rival, Step, contains, part_explained
+from xy_sysid.search.one_step_trials import Filtered
+from xy_sysid.search.simplify import Simplifying, whole
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """Effects that were given, and their rungs."""
+
+    names: tuple[str, ...]
+    steps: tuple[Step, ...]
+
+    @staticmethod
+    def of(judge: FreeRunJudge, names: tuple[str, ...]) -> Given:
+        steps = [Step(None, judge.begin())]
+        for name in names:
+            steps.append(Step(name, judge.added(steps[-1].fit, name)))
+        return Given(names, tuple(steps))
+
+
+def ladder_of_given(data: AxisData, judge: FreeRunJudge, given: Given) -> Ladder:
+    """The ladder of these effects alone: nothing is searched."""
+    final = given.steps[-1].fit
+    base = given.steps[0].fit
+    noise = data.noise_floor
+    explained = part_explained(data, base, final)
+    return Ladder(
+        steps=given.steps,
+        final=final,
+        effects=tuple(name for name, _ in final.model.effects),
+        explained=explained,
+        noise=noise,
+        discrepancy=math.sqrt(max(final.held_out_error**2 - final.noise_floor**2, 0.0)),
+    )
+
+
+def ladder_of_search(
+    judge: FreeRunJudge,
+    search: Search[GreyboxFit],
+    settled: Simplifying,
+    given: Given,
+    filtered: Filtered | None,
+) -> Ladder:
+    """The ladder of the set that was settled on, or of what one-step prediction found instead."""
+    data, node = judge.data, settled.now
+    base = given.steps[0].fit
+    tried = sorted(
+        (Candidate(next(iter(item.effects)), item.promised, item.fit) for item in search.nodes.values() if len(item.effects) == 1),
+        key=lambda item: item.fit.excess if item.fit else math.inf,
+    )
+    refused = tuple((tuple(sorted(item.effects)), item.refused) for item in search.nodes.values() if item.refused)
+    if filtered is not None:
+        rungs, bar = filtered
+        last = rungs[-1][1]
+        names = tuple(name for name, _ in last.model.effects)
+        noise = last.noise_floor
+        explained = 1.0 - max(last.held_out_error**2 - noise**2, 0.0) / max(bar**2 - noise**2, 1e-300)
+        return Ladder(
+            steps=(Step(None, base), *(Step(name, fit) for name, fit in rungs)),
+            final=last,
+            effects=names,
+            tried=(next(Candidate(name, 0.0, fit) for name, fit in rungs if fit.model.ahead is not None), *tried),
+            rivals=(Rival(tuple(sorted(node.effects)), node.fit, 2.0 * math.log(bar / last.held_out_error)),),
+            sizes=dict.fromkeys(names, (bar / last.held_out_error) ** 2 - 1.0),
+            refused=refused,
+            explained=explained,
+            noise=noise,
+            discrepancy=math.sqrt(max(last.held_out_error**2 - noise**2, 0.0)),
+            stopped=search.stopped,
+        )
+    final, own = joined(data, node.fit, judge.late), settled.sizes()
+    names = tuple(name for name, _ in final.model.effects)
+    sizes = {name: [own[part] for part in _parts(judge.library, name) if part in own] for name in names}
+    ordered = tuple(sorted(names, key=lambda name: -max(sizes[name], default=0.0)))
+    ordered = (*given.names, *(name for name in ordered if name not in given.names))
+    rivals = sorted(
+        (
+            Rival(tuple(sorted(item.effects)), item.fit, item.fit.excess - node.fit.excess)
+            for item in search.nodes.values()
+            if item is not node and 0 < len(item.effects) <= len(node.effects) and not item.refused and not item.effects < node.effects
+            if not contains(judge.library, item.effects, node.effects)
+        ),
+        key=lambda item: item.behind,
+    )
+    return Ladder(
+        steps=(*given.steps, *_rungs(judge, search, given, ordered, final)),
+        final=final,
+        effects=ordered,
+        tried=tuple(tried),
+        rivals=tuple(rivals),
+        sizes={name: min(each) for name, each in sizes.items() if each},
+        astray=max((_astray(data, settled, name) for name in node.effects if judge.library[name].category == "motion"), default=0.0),
+        helps=1.0 - min(judge.rest(item.fit, base) for item in search.nodes.values() if item.whole and not item.refused),
+        refused=refused,
+        explained=part_explained(data, base, final),
+        noise=data.noise_floor,
+        discrepancy=math.sqrt(max(final.held_out_error**2 - data.noise_floor**2, 0.0)),
+        stopped=search.stopped,
+    )
+
+
+def _parts(library: Library, name: str) -> tuple[str, ...]:
+    """An effect, and what it is the sum of."""
+    whole = library[name].sum_of
+    return (name,) if whole is None else (name, *whole.parts)
+
+
+def _astray(data: AxisData, settled: Simplifying, name: str) -> float:
+    """Amplitude of what is left beyond the noise where a mode acts, over what it does there.
+
+    A mode is linear and does not change: what it leaves just where it acts is of another law. What dirt leaves lies elsewhere.
+    """
+    with_it, without = settled.now.fit.power, settled.best_without(name).fit.power
+    acts = np.maximum(without - with_it, 0.0)
+    weight = data.layout.lines * acts
+    left = float(np.sum(weight * np.maximum(with_it - data.floor.noise, 0.0)))
+    return min(math.sqrt(left / max(float(np.sum(weight * acts)), 1e-300)), 1.0)
+
+
+def _rungs(judge: FreeRunJudge, search: Search[GreyboxFit], given: Given, names: tuple[str, ...], final: GreyboxFit) -> list[Step]:
+    """One rung for each effect, in this order, the fits that are known already taken from memory."""
+    steps: list[Step] = []
+    now = given.steps[-1].fit
+    for name in names[len(given.names) :]:
+        so_far = frozenset(own for own, _ in now.model.effects) | {name}
+        if so_far == frozenset(own for own, _ in final.model.effects):
+            now = final
+        else:
+            known = search.nodes.get(so_far)
+            now = judge.added(now, name) if known is None or known.refused else whole(judge, known)
+        steps.append(Step(name, now))
+    return steps
