@@ -3,7 +3,7 @@
 
 PYTHON ?=
 ARGS ?=
-JOBS ?= 2
+JOBS ?= 3
 VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
@@ -12,7 +12,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check -qq install --no-compile
 FITS := import ensurepip, sys, venv; sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 14))
 
 .DEFAULT_GOAL := help
-.PHONY: help install demo test faults soak test-busy lint types unit docs bench blind pictures clean
+.PHONY: help install demo test faults soak test-busy lint types unit laws docs bench blind pictures clean
 
 help: ## this text
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 18
@@ -35,7 +35,9 @@ $(INSTALLED): constraints.txt setup.py
 demo: $(INSTALLED) ## watch a simulated XY table being identified live (ARGS="--help" for more)
 	@$(BIN)/xy-sysid demo $(ARGS)
 
-test: lint types unit ## style, types and every test
+test: $(INSTALLED) ## style, types and every test
+	@$(MAKE) --no-print-directory -j 2 lint types laws
+	@$(MAKE) --no-print-directory unit
 
 lint: $(INSTALLED) ## style
 	@$(BIN)/ruff check .
@@ -44,8 +46,11 @@ lint: $(INSTALLED) ## style
 types: $(INSTALLED) ## types
 	@$(BIN)/mypy
 
-unit: $(INSTALLED) ## every test (ARGS="-k words" for some), two files at a time (JOBS=0: one after the other)
+unit: $(INSTALLED) ## every test (ARGS="-k words" for some), three files at a time, as many wait (JOBS=0: one after the other)
 	@$(PYTEST) $(ARGS)
+
+laws: $(INSTALLED) # compiled here once, and not by each of the tests' workers
+	@OPENBLAS_NUM_THREADS=1 $(BIN)/python -c "import xy_sysid as xy; xy.diagnose(xy.simulate(10, hidden=7, seed=1).run('x'))"
 
 docs: $(VENV)/.docs ## the documentation site in build/site (index.html); a broken link is an error
 	@$(BIN)/python -m xy_sysid.files.architecture_doc --write

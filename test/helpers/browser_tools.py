@@ -98,8 +98,18 @@ class Tab:
 
     def until(self, done: Callable[[], object], seconds: float = 20.0, why: str = "") -> None:
         """Let the browser work until it is done; it may take PATIENCE times the seconds."""
+        from playwright.sync_api import Error
+
+        def seen() -> bool:
+            try:
+                return bool(done())
+            except Error as error:  # the page is being loaded again, as it does by itself after its connection was lost
+                if "context was destroyed" not in str(error):
+                    raise
+                return False
+
         end = time.monotonic() + PATIENCE * seconds
-        while not done():
+        while not seen():
             assert time.monotonic() < end, f"{why or 'waited in vain'}: {self.headline()!r}, {self.verdict()!r}; messages: {self.notices()}"
             self.page.wait_for_timeout(50)
 

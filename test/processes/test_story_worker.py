@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 
 import pytest
+from helpers.busy import PATIENCE
 from helpers.simulated import recorded
 
 from xy_sysid.processes.story_process import JobNews, StoryWorker
@@ -29,7 +30,7 @@ def job(effects: tuple[str, ...] = ()) -> Job:
 def until(worker: StoryWorker, done: Callable[[JobNews], bool]) -> list[JobNews]:
     """News up to the one that does."""
     heard: list[JobNews] = []
-    end = time.monotonic() + 60.0
+    end = time.monotonic() + PATIENCE * 60.0
     while time.monotonic() < end:
         heard += worker.news()
         if any(done(item) for item in heard):

@@ -23,13 +23,13 @@ from xy_sysid.effects import EFFECTS, Effect
 from xy_sysid.greybox.axis_data import AxisData, prepare
 from xy_sysid.greybox.free_run import GreyboxFit, fit_with
 from xy_sysid.imports import save
-from xy_sysid.search import refine as refining
+from xy_sysid.search import one_step_trials
 from xy_sysid.search.beside_one_step import grown
 from xy_sysid.search.criteria import AT_FLOOR, FEWEST
 from xy_sysid.search.diagnose import diagnose, judged
 from xy_sysid.search.judge import FreeRunJudge
 from xy_sysid.search.ladder import Rival, Step
-from xy_sysid.search.refine import Effort, refine
+from xy_sysid.search.refine import Effort, refine, refine_steps
 
 
 @pytest.mark.parametrize("effect", ["coulomb_friction", "cogging", "dead_zone", "constant_load", "saturation", "lead_error"])
@@ -303,9 +303,9 @@ def test_a_gap_is_asked_for_early_and_once(effect: str, monkeypatch: pytest.Monk
         asked.append(gap.name)
         return fitted(data, base, gap, *others)
 
-    monkeypatch.setattr(refining, "grown", counted)
+    monkeypatch.setattr(one_step_trials, "grown", counted)
     data = prepare(2000.0, *recorded(effect, seconds=20.0).axis("x"))
-    steps, tried = refining.refine_steps(data), []
+    steps, tried = refine_steps(data), []
     while True:
         try:
             tried.append(next(steps).effects)
@@ -320,7 +320,7 @@ def test_a_gap_is_asked_for_early_and_once(effect: str, monkeypatch: pytest.Monk
 
 def test_a_gap_beside_a_large_force_is_asked_for_with_that_force() -> None:
     """Cogging that a simulation without the gap has found stands beside it: alone, the gap does not do better than the cogging."""
-    found = refining.refine(prepare(2000.0, *recorded("backlash=14e-6+coulomb_friction=0.08+cogging=0.5,per_revolution=4").axis("x")))
+    found = refine(prepare(2000.0, *recorded("backlash=14e-6+coulomb_friction=0.08+cogging=0.5,per_revolution=4").axis("x")))
     assert set(found.effects) == {"backlash", "coulomb_friction", "cogging"}
     assert [step.added for step in found.steps][:2] == [None, "cogging"] and found.final.excess == 0.0
     assert [one.effect for one in found.tried].count("cogging") == 1 and found.tried[0].effect == "backlash"

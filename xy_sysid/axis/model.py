@@ -54,6 +54,10 @@ class Library:
             self._undoing = build_undoing(self.acting)
         return self._undoing
 
+    def looped(self, active: Iterable[Effect]) -> Library:
+        """Whose loop these effects run in: the built-in library's, which the disk has, unless one of them is of another make."""
+        return STANDARD if all(STANDARD.effects.get(effect.name) is effect for effect in active) else self
+
     def extended(self, effects: Iterable[Effect]) -> Library:
         """A library with more effects; raises BadInput for a name that is taken."""
         added = list(effects)
@@ -151,6 +155,7 @@ def simulator(
     u = np.ascontiguousarray(voltage[:-1], dtype=np.float64)
     x = np.ascontiguousarray(position, dtype=np.float64)
     chosen = [library[name] for name in active]
+    library = library.looped(chosen)
     row = np.ones(len(library.places))
     where = np.array([library.places[name] for name in (*BASE, *(f"{effect.name}.{key}" for effect in chosen for key in effect.names))])
     names = [effect.name for effect in library.acting]
@@ -178,9 +183,10 @@ def undoer(
     resonances and the scale's errors (n + 1,), m, the forces against the drive (2, n), at the motor and on the table, V, and how
     much of a sudden change of that position the encoder shows at once.
     """
+    chosen = [library[name] for name in active]
+    library = library.looped(chosen)
     members = [effect for effect in library.acting if undoable(effect)]
     places, names = slots(members), [effect.name for effect in members]
-    chosen = [library[name] for name in active]
     row, on = np.ones(len(places)), np.zeros(len(names), dtype=np.uint8)
     on[[names.index(effect.name) for effect in chosen]] = 1
     where = np.array([places[name] for name in (*BASE, *(f"{effect.name}.{key}" for effect in chosen for key in effect.names))])

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.imports.paired_streams import is_jitter, steady
@@ -144,4 +143,6 @@ def _means(time: FloatArray, held: FloatArray, instants: FloatArray, period: flo
 
 
 def _between(time: FloatArray, values: FloatArray, instants: FloatArray) -> FloatArray:
+    from scipy.interpolate import CubicSpline  # only what is uneven pays for it
+
     return np.asarray(CubicSpline(time, values, axis=0)(instants))

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg
-import scipy.signal
 
 from xy_sysid.errors import BadInput
 from xy_sysid.linear.any_model import AnyModel

@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import signal
 
 from xy_sysid.samples.block import FloatArray
 
@@ -33,6 +32,8 @@ def friction_hint(u: FloatArray, y: FloatArray, sampling_rate: float) -> Frictio
     step = max(int(0.25 / PART_OF_RATE), 1)
     if u.shape[0] < ENOUGH * step or float(np.ptp(y)) == 0.0:
         return None
+    from scipy import signal
+
     taps = signal.firwin(8 * step + 1, PART_OF_RATE * sampling_rate, fs=sampling_rate)
 
     def low(values: FloatArray) -> FloatArray:
