@@ -30,7 +30,7 @@ def job(effects: tuple[str, ...] = ()) -> Job:
 def until(worker: StoryWorker, done: Callable[[JobNews], bool]) -> list[JobNews]:
     """News up to the one that does."""
     heard: list[JobNews] = []
-    end = time.monotonic() + PATIENCE * 60.0
+    end = time.monotonic() + PATIENCE * 120.0  # stories are told at the lowest priority
     while time.monotonic() < end:
         heard += worker.news()
         if any(done(item) for item in heard):
