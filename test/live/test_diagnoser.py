@@ -144,6 +144,22 @@ def test_cancelling_answers_everybody_and_keeps_the_stories() -> None:
     assert diagnoser.cancel() == "nothing was running" and not diagnoser.busy
 
 
+def test_a_diagnosis_that_is_asked_for_twice_is_made_once() -> None:
+    """A lost answer is asked for again while the first is under way; after what was heard is forgotten, a question is another one."""
+    diagnoser = Diagnoser(DiagnoserSettings(minimum=1.0), AXES)
+    send(diagnoser, 0, 8000)
+    number = diagnoser.ask("diagnose")
+    assert diagnoser.start() is not None and diagnoser.ask("diagnose") == number
+    diagnoser.finish("lost")
+    assert diagnoser.start() is not None and diagnoser.ask("diagnose") == number, "of the second axis, too"
+    diagnoser.reset()
+    assert diagnoser.ask("diagnose") != number
+    diagnoser.cancel()
+    send(diagnoser, 8000, 16_000)
+    first = diagnoser.ask("add_next")
+    assert diagnoser.start() is not None and diagnoser.ask("add_next") != first, "twice the next effect is two effects"
+
+
 @pytest.mark.parametrize("names", [[""], [], ["", " "]])
 def test_an_empty_name_is_no_effect(names: list[str]) -> None:
     """ROS parameter files know no empty lists."""

@@ -33,6 +33,7 @@ class _Request:
     number: int
     act: Act
     axes: deque[str]
+    whole: tuple[str, ...]  # all axes that were asked for; none after what was heard has been forgotten
     told: list[str] = field(default_factory=list)
     done: bool = True
 
@@ -55,6 +56,8 @@ class Diagnoser:
 
     def reset(self) -> None:
         """Forget what was heard; stories stay."""
+        for request in self._queue:
+            request.whole = ()
         self.hearing = Newest(self.axes, self._settings.memory, self._settings.minimum, self._settings.reorder)
         self._next_time = self._settings.interval
 
@@ -79,13 +82,14 @@ class Diagnoser:
                 self.ask("diagnose")
 
     def ask(self, act: Act, axes: Iterable[str] | None = None) -> int:
-        """Queue a request, for all axes or some; its number. One like it that has not begun is joined."""
-        chosen = deque(self.axes if axes is None else axes)
-        for waiting in list(self._queue)[1:]:
-            if waiting.act == act and waiting.axes == chosen:
-                return waiting.number
+        """Queue a request, for all axes or some; its number. One like it that has not begun is joined, and a diagnosis that is under way,
+        too: who asks twice, as where answers get lost, has it once."""
+        chosen = self.axes if axes is None else tuple(axes)
+        for place, known in enumerate(self._queue):
+            if known.act == act and known.whole == chosen and (place > 0 or act == "diagnose"):
+                return known.number
         self._number += 1
-        self._queue.append(_Request(self._number, act, chosen))
+        self._queue.append(_Request(number=self._number, act=act, axes=deque(chosen), whole=chosen))
         return self._number
 
     def have(self, axis: str, effects: tuple[str, ...]) -> None:
