@@ -42,12 +42,9 @@ class WindowShape:
 
 @lru_cache(maxsize=8)
 def _taper(name: str, length: int) -> FloatArray:
-    if name == "hann" and length > 1:  # nearly always: scipy.signal is half a second of a command's start
-        values = 0.5 + 0.5 * np.cos(np.linspace(-np.pi, np.pi, length + 1))[:-1]
-    else:
-        from scipy.signal import get_window
+    from scipy.signal import get_window  # here, as it takes half a second to import, and who is refused does not need it
 
-        values = np.asarray(get_window(name, length, fftbins=True), dtype=np.float64)
+    values = np.asarray(get_window(name, length, fftbins=True), dtype=np.float64)
     values.setflags(write=False)
     return values
 
