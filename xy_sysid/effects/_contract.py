@@ -320,6 +320,11 @@ class Effect:
         return self.category in ("friction", "bristle")
 
     @property
+    def is_behind(self) -> bool:
+        """True for what changes the motion behind the base, on its way to the encoder: its traces are velocities, not forces."""
+        return self.category in ("motion", "encoder")
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of the parameters."""
         return tuple(parameter.name for parameter in self.parameters)

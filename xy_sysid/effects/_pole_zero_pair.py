@@ -51,8 +51,9 @@ def guesses(scene: Scene, low: float, high: float) -> Iterator[Guess]:
         w = 2.0 * math.pi * float(frequency)
         c = w / math.tan(0.5 * w / scene.sampling_rate)  # s = c (z - 1) / (z + 1), exact at the pair
         a = np.array([c * c + 2.0 * _DAMPING * w * c + w * w, 2.0 * (w * w - c * c), c * c - 2.0 * _DAMPING * w * c + w * w])
-        traces = [scipy.signal.lfilter(b, a, model) for b in (c * c * np.array([1.0, -2.0, 1.0]), c * w * np.array([1.0, 0.0, -1.0]))]
-        yield Guess(columns(*traces), _Reader(float(frequency)), at_encoder=True)
+        poles = scipy.signal.lfilter([1.0], a, model)  # and both numerators of what they make
+        once, twice = np.append(0.0, poles[:-1]), np.concatenate(((0.0, 0.0), poles[:-2]))
+        yield Guess(columns(c * c * (poles - 2.0 * once + twice), c * w * (poles - twice)), _Reader(float(frequency)))
 
 
 class _Reader:
@@ -89,23 +90,22 @@ def _of_response(scene: Scene) -> tuple[float, float, float, tuple[float, ...]] 
     scale = 2.0 * math.pi * float(np.sqrt(f[0] * f[-1]))
     s = 2j * math.pi * f / scale
     box = np.sinc(f / scene.sampling_rate) ** 2  # held input, mean output
-    best, chosen = np.inf, None
-    for delay in np.arange(-4.0, 4.01, 0.25) / scene.sampling_rate:
-        target = response * np.exp(s * scale * delay) / box
-        denominator = np.ones_like(target)
-        for _ in range(6):
-            row = weight / (np.abs(target) * np.abs(denominator))
-            matrix = np.stack([s**2, s, s**0, -target * s**2, -target * s, -target], axis=1) * row[:, None]
-            right = target * s**3 * row
-            found = np.linalg.lstsq(np.vstack((matrix.real, matrix.imag)), np.concatenate((right.real, right.imag)), rcond=None)[0]
-            denominator = s**3 + found[3] * s**2 + found[4] * s + found[5]
-        model = (found[0] * s**2 + found[1] * s + found[2]) / denominator
-        cost = float(np.sum((weight * np.abs(1.0 - model / target)) ** 2))
-        if cost < best:
-            best, chosen = cost, (float(delay), found)
-    if chosen is None:
+    delays = np.arange(-4.0, 4.01, 0.25) / scene.sampling_rate
+    if f.size < 4:  # as many complex lines as the six numbers need, and one
         return None
-    delay, c = chosen
+    target = response * np.exp(np.outer(delays, s * scale)) / box
+    powers = np.stack([s**2, s, s**0], axis=1)
+    matrix = np.concatenate((np.broadcast_to(powers, (delays.size, *powers.shape)), -target[:, :, None] * powers), axis=2)
+    right, denominator, found = target * s**3, np.ones_like(target), np.zeros((delays.size, 6))
+    for _ in range(6):
+        row = (weight / (np.abs(target) * np.abs(denominator)))[:, :, None]
+        both, wanted = matrix * row, right[:, :, None] * row
+        q, r = np.linalg.qr(np.concatenate((both.real, both.imag), axis=1))
+        found = np.linalg.solve(r, q.transpose(0, 2, 1) @ np.concatenate((wanted.real, wanted.imag), axis=1))[:, :, 0]
+        denominator = s**3 + found[:, 3:] @ powers.T
+    misfit = np.sum((weight * np.abs(1.0 - found[:, :3] @ powers.T / denominator / target)) ** 2, axis=1)
+    best = int(np.argmin(misfit))
+    delay, c = float(delays[best]), found[best]
     zeros, poles = np.roots(c[:3]) * scale, np.roots([1.0, *c[3:]]) * scale
     real = poles[np.abs(poles.imag) < 1e-9 * np.abs(poles)]
     pair_of = poles[poles.imag > 1e-9 * np.abs(poles)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 import scipy.signal
@@ -45,7 +45,7 @@ class Scene:
     @property
     def similar(self) -> Similarity:
         """How this motion compares with the usual one."""
-        return Similarity.of(self.sampling_rate, self.voltage, self.velocity)
+        return _similar(self)
 
     @property
     def swing(self) -> float:
@@ -101,6 +101,11 @@ class Scene:
         return [float(FINER * travel / peak) for peak in best]
 
 
+@lru_cache(maxsize=1)
+def _similar(scene: Scene) -> Similarity:
+    return Similarity.of(scene.sampling_rate, scene.voltage, scene.velocity)
+
+
 def smoothed(sampling_rate: float, signal: FloatArray, cutoff: float) -> FloatArray:
     """(n,) a signal below ``cutoff`` (Hz), without shift in time."""
     return np.asarray(scipy.signal.sosfiltfilt(_low_pass(min(2.0 * cutoff / sampling_rate, 0.9)), signal), dtype=np.float64)
@@ -122,14 +127,13 @@ def _low_pass(share: float) -> FloatArray:
 class Guess:
     """A trace that an effect would leave, to first order.
 
-    columns: (k, n) per unit coefficient: V against the drive, or m/s where ``at_encoder``
+    columns: (k, n) per unit coefficient: V against the drive, or m/s of an effect that acts behind the base (``Effect.is_behind``)
     read:    start values of all parameters, in order, from the k coefficients that explain the error best
     inverse_only: a start for base and effect together, and no trace of the effect beside a base that stays
     """
 
     columns: FloatArray
     read: Callable[[FloatArray], tuple[float, ...]]
-    at_encoder: bool = False
     inverse_only: bool = False
 
 

@@ -25,7 +25,7 @@ def guesses(scene: Scene) -> Iterator[Guess]:
     for period in scene.periods(e * v, v * v):
         angle = 2.0 * math.pi * scene.position / period
         rate = 2.0 * math.pi / period * v
-        yield Guess(columns(rate * np.cos(angle), -rate * np.sin(angle)), _Reader(period), at_encoder=True)
+        yield Guess(columns(rate * np.cos(angle), -rate * np.sin(angle)), _Reader(period))
 
 
 class _Reader:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import scipy.fft
@@ -46,15 +47,6 @@ class Bands:
         first = np.searchsorted(self.band, np.arange(self.count))
         return np.append(self.frequency[first], self.frequency[-1])
 
-    def spectrum(self, signal: FloatArray) -> ComplexArray:
-        """(windows, lines) of a signal (n,) in m/s; squares add up to those of the samples, m^2/s^2."""
-        hop = self.length // 2
-        if signal.size < self.length:
-            signal = np.concatenate((signal, np.zeros(self.length - signal.size)))
-        taper = np.sqrt(2.0 / 0.75 / self.length) * np.sin(np.pi * (np.arange(self.length) + 0.5) / self.length) ** 2
-        windows = np.lib.stride_tricks.sliding_window_view(signal, self.length)[::hop]
-        return np.asarray(scipy.fft.rfft(windows * taper, axis=1)[:, : self.band.size])
-
     def power(self, spectrum: ComplexArray) -> FloatArray:
         """(count,) variance per sample that each band would have if its density held up to Nyquist, m^2/s^2."""
         with np.errstate(over="ignore", invalid="ignore"):  # a trial model that runs away has no end of it
@@ -85,13 +77,12 @@ class Windows:
     begins: NDArray[np.int64]
 
     def spectrum(self, signal: FloatArray) -> ComplexArray:
-        """(windows, lines) of a signal (n,) in m/s; see ``Bands.spectrum``."""
+        """(..., windows, lines) of signals (..., n) in m/s; squares add up to those of the samples, m^2/s^2."""
         length = self.layout.length
-        if signal.size < length:
-            signal = np.concatenate((signal, np.zeros(length - signal.size)))
-        taper = np.sqrt(2.0 / 0.75 / length) * np.sin(np.pi * (np.arange(length) + 0.5) / length) ** 2
-        cut = np.lib.stride_tricks.sliding_window_view(signal, length)[self.begins]
-        return np.asarray(scipy.fft.rfft(cut * taper, axis=1)[:, : self.layout.band.size])
+        if signal.shape[-1] < length:
+            signal = np.concatenate((signal, np.zeros((*signal.shape[:-1], length - signal.shape[-1]))), axis=-1)
+        cut = np.lib.stride_tricks.sliding_window_view(signal, length, axis=-1)[..., self.begins, :]
+        return np.asarray(scipy.fft.rfft(cut * _taper(length))[..., : self.layout.band.size])
 
     def before(self, samples: int) -> Windows:
         """Those that end within the first samples."""
@@ -101,6 +92,12 @@ class Windows:
     def end(self) -> int:
         """Sample after the last of them."""
         return int(self.begins[-1]) + self.layout.length if self.begins.size else 0
+
+
+@cache
+def _taper(length: int) -> FloatArray:
+    """(length,) of von Hann, with which squares of a spectrum add up to those of the samples."""
+    return np.asarray(np.sqrt(2.0 / 0.75 / length) * np.sin(np.pi * (np.arange(length) + 0.5) / length) ** 2)
 
 
 def bands(sampling_rate: float, samples: int, count: int = 36) -> Bands:

@@ -12,7 +12,7 @@ import numpy as np
 import scipy.signal
 
 from xy_sysid.axis.model import AxisModel
-from xy_sysid.effects import Effect, Guess, Scene
+from xy_sysid.effects import Effect, Scene
 from xy_sysid.effects._contract import Beside, Followed
 from xy_sysid.greybox.free_run import AxisData
 from xy_sysid.greybox.one_step import as_beside, beside
@@ -65,12 +65,12 @@ def traces(data: AxisData, model: AxisModel, effect: Effect, found: Followed, ef
         error=error,
     )
 
-    def change(guess: Guess, column: FloatArray, side: int) -> FloatArray:
-        size = SMALL * float(np.std(data.velocity if guess.at_encoder else voltage)) / (float(np.std(column)) + abs(float(np.mean(column))) + 1e-300)
+    def change(item: Effect, column: FloatArray) -> FloatArray:
+        size = SMALL * float(np.std(data.velocity if item.is_behind else voltage)) / (float(np.std(column)) + abs(float(np.mean(column))) + 1e-300)
         put = size * column
-        other = recording(voltage, position - np.concatenate(([0.0], np.cumsum(put))) / fs, against) if guess.at_encoder else None
+        other = recording(voltage, position - np.concatenate(([0.0], np.cumsum(put))) / fs, against) if item.is_behind else None
         both = against.copy()
-        both[side] += put
+        both[int(item.on_table)] += put
         return (seen(other or recording(voltage, position, both)) - here)[skip:] / size
 
     nuisance = np.stack(
@@ -82,12 +82,12 @@ def traces(data: AxisData, model: AxisModel, effect: Effect, found: Followed, ef
     for item in effects:
         trace = Trace(item.name, 0.0, tuple(own.typical for own in item.on(scene.similar)))
         for guess in item.guessed(scene):
-            columns = np.stack([change(guess, column[:n], int(item.on_table)) for column in guess.columns])
+            columns = np.stack([change(item, column[:n]) for column in guess.columns])
             columns = columns - (columns @ basis) @ basis.T
             size = np.linalg.norm(columns, axis=1) + 1e-300
             unit = columns / size[:, None]
             inside = unit @ target
-            coefficients = np.linalg.pinv(unit @ unit.T, rcond=1e-10, hermitian=True) @ inside
+            coefficients = np.linalg.lstsq(unit @ unit.T, inside, rcond=1e-10)[0]
             share = float(inside @ coefficients) / float(target @ target + 1e-300)
             if share > trace.share:
                 trace = Trace(item.name, share, item.read(guess, -coefficients / size, scene.similar))

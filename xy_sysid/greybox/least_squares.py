@@ -17,7 +17,7 @@ from xy_sysid.effects._contract import in_time
 from xy_sysid.greybox.floor import Bands, Floor, Windows, tolerance
 from xy_sysid.samples.block import FloatArray
 
-TRUSTED = 0.25  # a step whose fall differs by less than this part from the one expected needs no new derivatives
+TRUSTED = 0.75  # a step whose fall differs by less than this part from the one expected needs no new derivatives (Fletcher 1971)
 STEP = 1e-4  # of a logarithm, or of a parameter's scale: far above rounding, far below what bends
 
 

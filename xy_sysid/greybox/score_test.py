@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 import scipy.signal
 
-from xy_sysid.effects import Effect, Guess, Scene
+from xy_sysid.effects import Effect, Scene
 from xy_sysid.effects._similarity import Similarity
 from xy_sysid.greybox.floor import Floor, Windows, excess, tolerance
 from xy_sysid.greybox.start_rigid import mean_velocity_filter
@@ -51,7 +51,7 @@ class Screen:
         """What effects take away to first order, each with its best trace: linear algebra alone."""
         rows = np.array([row for name in names for row in self.rows[name]], dtype=np.int64)
         inner, seen = self.inner[:, rows[:, None], rows], self.seen[:, rows]
-        coefficients = np.linalg.pinv(inner.sum(axis=0), rcond=1e-8, hermitian=True) @ seen.sum(axis=0)
+        coefficients = np.linalg.lstsq(inner.sum(axis=0), seen.sum(axis=0), rcond=1e-8)[0]
         left = self.error - 2.0 * seen @ coefficients + np.einsum("bij,i,j->b", inner, coefficients, coefficients)
         # 0 in bands that are not excited: nobody knows what happens there
         ratio = np.where(self.error > 0.0, np.maximum(left, 0.0) / np.maximum(self.error, 1e-300), 1.0)
@@ -81,7 +81,7 @@ def screen(effects: Iterable[Effect], scene: Scene, nuisance: FloatArray, window
         for guess in effect.guessed(scene):
             if guess.inverse_only:
                 continue
-            share, coefficients, white = space.share(_through_base(guess, scene))
+            share, coefficients, white = space.share(guess.columns if effect.is_behind else _through_base(guess.columns, scene))
             if share > best.share:
                 best, chosen = Trace(effect.name, share, effect.read(guess, coefficients, scene.similar)), white
         found.append(best)
@@ -117,11 +117,10 @@ def bounded(effect: Effect, values: Iterable[float], similar: Similarity) -> tup
     return tuple(float(min(max(value, item.low), item.high)) for value, item in zip(values, effect.on(similar), strict=True))
 
 
-def _through_base(guess: Guess, scene: Scene) -> FloatArray:
-    if guess.at_encoder:
-        return guess.columns
+def _through_base(forces: FloatArray, scene: Scene) -> FloatArray:
+    """(k, n) V against the drive -> m/s."""
     b, a = mean_velocity_filter(scene.gain, scene.pole, scene.sampling_rate)
-    return np.asarray(-scipy.signal.lfilter(b, a, guess.columns, axis=1))
+    return np.asarray(-scipy.signal.lfilter(b, a, forces, axis=1))
 
 
 class _Prepared:
@@ -129,22 +128,23 @@ class _Prepared:
 
     def __init__(self, error: FloatArray, nuisance: FloatArray, windows: Windows, weight: FloatArray) -> None:
         self.windows, self.weight = windows, weight
-        self.basis = np.linalg.qr(np.stack([self._white(row) for row in nuisance], axis=1))[0]
-        self.error = self._clean(self._white(error))
+        self.basis = np.linalg.qr(self._white(nuisance).T)[0]
+        self.error = self._clean(self._white(error[None, :]))[0]
         self.power = float(self.error @ self.error) + 1e-300
 
-    def _white(self, signal: FloatArray) -> FloatArray:
-        values = self.windows.spectrum(signal) * self.weight
-        return np.concatenate((values.real, values.imag), axis=1).ravel()
+    def _white(self, signals: FloatArray) -> FloatArray:
+        """(k, n) -> (k, m)"""
+        values = self.windows.spectrum(signals) * self.weight
+        return np.concatenate((values.real, values.imag), axis=-1).reshape(len(signals), -1)
 
     def _clean(self, values: FloatArray) -> FloatArray:
         return np.asarray(values - (values @ self.basis) @ self.basis.T)
 
     def share(self, columns: FloatArray) -> tuple[float, FloatArray, FloatArray]:
         """Part of the error's power explained, the coefficients, and the whitened columns."""
-        white = np.stack([self._clean(self._white(row)) for row in columns])
+        white = self._clean(self._white(columns))
         size = np.linalg.norm(white, axis=1) + 1e-300
         white /= size[:, None]
         seen = white @ self.error
-        coefficients = np.linalg.pinv(white @ white.T, rcond=1e-10, hermitian=True) @ seen
+        coefficients = np.linalg.lstsq(white @ white.T, seen, rcond=1e-10)[0]
         return float(seen @ coefficients) / self.power, np.asarray(coefficients / size), white

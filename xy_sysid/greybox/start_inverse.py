@@ -36,10 +36,10 @@ class InverseStart:
 
 def inverse_starts(effect: Effect, scene: Scene, samples: int, forces: Sequence[FloatArray] = ()) -> list[InverseStart]:
     """One for each low-pass at most, from the first samples; forces: (n,) V each, of what the model has already, whose sizes are free."""
-    if effect.guesses is None:
+    if effect.guesses is None or effect.is_behind:
         return []
     cutoffs = [cutoff for cutoff in CUTOFFS if cutoff <= 0.2 * scene.sampling_rate]
-    guesses = [guess for guess in effect.guessed(scene) if not guess.at_encoder] if cutoffs else []
+    guesses = effect.guessed(scene) if cutoffs else []
     if not guesses:
         return []
     seen_velocity, seen_voltage = (scipy.fft.rfft(signal[:samples]) for signal in (scene.velocity, scene.voltage))
@@ -104,6 +104,6 @@ def _least(rows: FloatArray, target: FloatArray) -> tuple[FloatArray, float]:
     """Coefficients (k,) of rows (k, n) that explain the target (n,) best, and the squares left."""
     size = np.linalg.norm(rows, axis=1) + 1e-300
     unit = rows / size[:, None]
-    coefficients = np.linalg.pinv(unit @ unit.T, rcond=1e-12, hermitian=True) @ (unit @ target)
+    coefficients = np.linalg.lstsq(unit @ unit.T, unit @ target, rcond=1e-12)[0]
     left = target - coefficients @ unit
     return np.asarray(coefficients / size), float(left @ left)
