@@ -52,7 +52,7 @@ ALIKE = _number(
     "part of a promise from which another is as good: one effect against two at once (on EMPS 0.6 is too little), a rival against what was taken",
 )
 HOPELESS = _number("hopeless", 1.5, "nats", "more than the best so far after the first steps of a fit: none that left so much ended better")
-CHANCE = _number("chance", 2.0, "standard errors", "a gain on the held-out windows that is real: the usual one in twenty")
+CHANCE = _number("chance", 2.0, "standard errors", "a gain on the held-out windows, or a coherence, that is real: the usual one in twenty")
 SIZE = _number("size", 0.7, "1", "an effect explains at least so much of what is left unexplained, else what no law explains could feign it")
 WORTH = _number("worth adding", 0.25, "1", "the same for an effect that is added without being named: real machines have small effects, too")
 FREE = _number(
@@ -66,7 +66,6 @@ AT_FLOOR = _number(
     "what leaves less is explained (clean exact axes stay below 0.02, the weakest effect of the standard set has 0.3); the doubt that a rival "
     "leaves falls with it: a tie is half a confidence",
 )
-FOLLOWS = _number("follows", 0.15, "1", "coherence, mean over an octave of 16 windows: of unrelated signals it is below 0.08")
 STILL = _number("still", 0.1, "1", "part of the liveliest motion below which a window stands")
 FEWEST = _number(
     "fewest",

@@ -16,7 +16,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.greybox.axis_data import AxisData, prepare_all
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.samples.block import FloatArray
-from xy_sysid.search.criteria import AT_FLOOR, BUDGET, FEWEST, FOLLOWS, SIZE, STILL
+from xy_sysid.search.criteria import AT_FLOOR, BUDGET, CHANCE, FEWEST, SIZE, STILL
 from xy_sysid.search.ladder import Candidate, Ladder, contains, part_explained
 from xy_sysid.search.refine import Effort, never, refine
 from xy_sysid.units import USUAL, Units, bare, moved
@@ -155,7 +155,11 @@ def _tones(voltage: FloatArray) -> float:
 
 
 def _coherence(sampling_rate: float, voltage: FloatArray, position: FloatArray) -> tuple[float, float]:
-    """The best of all octaves' mean coherence of input and velocity, and the least that is not chance, for the best length of window."""
+    """The best of all octaves' mean coherence of input and velocity, and the least that is not chance, for the best length of window.
+
+    Of unrelated signals it is one over the number of windows, and spreads as much (Carter, Knapp & Nuttall 1973); an octave has two lines
+    at least.
+    """
     best = (0.0, 1.0)
     for part in (16, 8):
         length = int(2 ** np.floor(np.log2(voltage.size / part)))
@@ -164,7 +168,7 @@ def _coherence(sampling_rate: float, voltage: FloatArray, position: FloatArray) 
         frequency, value = scipy.signal.coherence(voltage[:-1], np.diff(position), sampling_rate, nperseg=length)
         octave = np.floor(np.log2(np.maximum(frequency, frequency[1]) / frequency[-1])).astype(np.int64)
         means = [float(np.nanmean(np.nan_to_num(value[octave == k]))) for k in range(-12, 0) if int(np.sum(octave == k)) >= 2]
-        found = (max(means, default=0.0), FOLLOWS * 16.0 / part)
+        found = (max(means, default=0.0), (1.0 + CHANCE / math.sqrt(2.0)) / part)
         best = max(best, found, key=lambda item: item[0] / item[1])
     return best
 
