@@ -67,6 +67,7 @@ def test_an_interval_shows_what_it_is_worth() -> None:
     assert estimate("gain", (1.0, float("nan"), float("nan")), "V")[1:3] == ("1", "-")
     name, value, span, unit = estimate("numerator_0", (1.57e7, -4.2e6, 3.55e7), "")
     assert (name, unit) == ("numerator_0", "") and value == "1.6e7" and span == "-0.4e7 .. 3.5e7"
+    assert estimate("hardening_stiffness.cubic", (2.1e7, 0.0, 4.4e7), "V/m3")[2] == "0 .. 4.4e7"
 
 
 @pytest.mark.parametrize(("typed", "kind"), [("chirp", "sweep"), ("sine", "stepped_sine"), ("white", "noise"), ("binary", "prbs")])

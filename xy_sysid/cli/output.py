@@ -106,7 +106,8 @@ def estimate(name: str, figures: tuple[float, float, float], unit: str) -> tuple
         return name, f"{value:.5g}" if math.isfinite(value) else "-", "-", shown
     middle, first, last, power = (part.replace("−", "-") for part in interval_parts(value, low, high))
     power = f"e{exponent}" if power and (exponent := POWER.sub("", power.translate(PLAIN))) else ""
-    return name, middle + power, f"{first}{power} .. {last}{power}", shown
+    whole, begin, end = (part + power if float(part) or not power else "0" for part in (middle, first, last))
+    return name, whole, f"{begin} .. {end}", shown
 
 
 def progress() -> Progress:
