@@ -136,7 +136,7 @@ def test_with_use_sim_time_samples_are_stamped_by_the_clock_topic(world: World) 
     blocks, statuses = world.blocks(), world.statuses()
     world.start(IDENTIFIER, {**QUICK, "reorder": 2.0, "use_sim_time": True})  # a busy machine's blocks come late
     assert world.until(lambda: bool(newest(statuses, "streams")), 30.0)
-    world.start(EXCITATION, {"use_sim_time": True, "autostart": True, "duration": 3.0, "watchdog": 5.0})
+    world.start(EXCITATION, {"use_sim_time": True, "autostart": True, "duration": 8.0, "watchdog": 5.0})
     assert world.until(lambda: newest(statuses, "excitation").get("state") == "stopped", 60.0)
     assert begun < blocks[0].time[0] < begun + now[0] / 1000
     assert world.until(lambda: int(newest(statuses, "streams").get("samples paired", "0")) > 4000), newest(statuses, "streams")

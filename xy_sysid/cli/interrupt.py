@@ -38,14 +38,14 @@ class Interrupts:
         sys.unraisablehook = self._hook
 
     def leave(self) -> None:
-        """What comes from now on changes nothing: all is done and said, and the interpreter only tidies up.
+        """All is done and said, and others' last acts are behind: end, with nothing more to be interrupted.
 
-        After an interrupt it does not even that: one that came in the middle of an ``exec`` (every dataclass is made by one) would make
-        ``python -m`` end by SIGINT, whatever the exit code and whoever caught the interrupt.
+        To free piece by piece what numba and scipy hold would take a third of a second; and an interrupt that came in the middle of an
+        ``exec`` (every dataclass is made by one) would make ``python -m`` end by SIGINT, whatever the exit code and whoever caught it.
         """
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, signal.SIG_IGN)
-        if self.came and self.code is not None:
+        if self.code is not None:
             os._exit(self.code)
 
     def _first(self, number: int, frame: FrameType | None) -> None:

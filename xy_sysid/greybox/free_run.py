@@ -40,8 +40,8 @@ __all__ = [
     "screened",
 ]
 
-BRIEF = (Round(6, 1e-2), Round(6, 3e-3), Round(8, 1e-4))  # weights are worked out before each round
-LONG = (Round(4, 1e-3), Round(6, 1e-5))
+BRIEF = (Round(6, 1e-2, 0.75), Round(6, 3e-3, 0.75), Round(8, 1e-4, 0.25))  # weights are worked out before each round; the last ends in the valley
+LONG = (Round(4, 1e-3, 0.75), Round(6, 1e-5, 0.25))
 COARSE, MIDDLING = 2000.0, 4000.0  # Hz: sub-steps of first rounds (errors up to 3e-3 of the motion) and of brief fits (6e-4)
 Z95 = 1.959964
 
@@ -230,7 +230,7 @@ def fit(data: AxisData, start: AxisModel, brief: bool = False, hopeless: float =
     left = data.layout.power(data.brief.spectrum(velocity - run(found.values)))
     if not (late() or (brief and excess(left, data.floor) > hopeless)):
         run, _, _ = _problem(data, start, data.first, MIDDLING)
-        more = solve(run, target, scale, found.values, Schedule(BRIEF[1:], late))
+        more = solve(run, target, scale, found.values, Schedule(BRIEF[1:], late), found.change)
         found = replace(more, runs=found.runs + more.runs)
     if not brief:
         return finish(data, _model(start, found.values), found.runs, late)

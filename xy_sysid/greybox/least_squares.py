@@ -17,16 +17,20 @@ from xy_sysid.effects._contract import in_time
 from xy_sysid.greybox.floor import Bands, Floor, Windows, tolerance
 from xy_sysid.samples.block import FloatArray
 
-TRUSTED = 0.75  # a step whose fall differs by less than this part from the one expected needs no new derivatives (Fletcher 1971)
 STEP = 1e-4  # of a logarithm, or of a parameter's scale: far above rounding, far below what bends
 
 
 @dataclass(frozen=True, slots=True)
 class Round:
-    """Steps with one set of weights. iterations: the most; enough: relative fall of the cost below which it ends."""
+    """Steps with one set of weights.
+
+    iterations: the most; enough: relative fall of the cost below which it ends; trusted: a step whose fall differs by less than this part
+    from the one expected needs no new derivatives (Fletcher 1971 has 0.75 and 0.25)
+    """
 
     iterations: int
     enough: float
+    trusted: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,13 +63,17 @@ class Scale:
 
 @dataclass(frozen=True, slots=True)
 class Solution:
-    """values: (k,) parameters; covariance: (k, k) of the solver's coordinates; cost: whitened; runs: simulations done."""
+    """values: (k,) parameters; covariance: (k, k) of the solver's coordinates; cost: whitened; runs: simulations done.
+
+    change: (k, windows, lines) derivatives of the error, as last known
+    """
 
     values: FloatArray
     covariance: FloatArray
     cost: float
     runs: int
     converged: bool
+    change: NDArray[np.complex128]
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,10 +85,17 @@ class Target:
     least: Floor
 
 
-def solve(run: Callable[[FloatArray], FloatArray], target: Target, scale: Scale, start: FloatArray, schedule: Schedule) -> Solution:
+def solve(
+    run: Callable[[FloatArray], FloatArray],
+    target: Target,
+    scale: Scale,
+    start: FloatArray,
+    schedule: Schedule,
+    known: NDArray[np.complex128] | None = None,
+) -> Solution:
     """The parameters that explain a target best.
 
-    run: parameters -> velocity (n,); schedule: the weights are worked out before each round.
+    run: parameters -> velocity (n,); schedule: the weights are worked out before each round; known: derivatives, nearly, as of ``Solution``
     """
     windows, least, layout = target.windows, target.least, target.windows.layout
     measured = windows.spectrum(target.velocity)
@@ -107,8 +122,8 @@ def solve(run: Callable[[FloatArray], FloatArray], target: Target, scale: Scale,
     error = left(inner)
     size = inner.size
     normal, cost, converged = np.eye(size), np.inf, False
-    change = slopes(inner, error, np.zeros((size, *error.shape), dtype=np.complex128))
-    exact = True
+    change = slopes(inner, error, np.zeros((size, *error.shape), dtype=np.complex128)) if known is None else known
+    exact = known is None
     for stage in schedule.rounds:
         power = tolerance(layout, error, least)
         weight = np.sqrt(1.0 / power)[layout.band]
@@ -130,7 +145,7 @@ def solve(run: Callable[[FloatArray], FloatArray], target: Target, scale: Scale,
             if np.isfinite(new) and new < cost:
                 fall, gone = (cost - new) / cost, trial - inner
                 hoped = -float(2.0 * slope @ gone + gone @ normal @ gone)
-                if abs((cost - new) - hoped) < TRUSTED * hoped:
+                if abs((cost - new) - hoped) < stage.trusted * hoped:
                     change, exact = _updated(change, gone, diagonal, found - error), False
                 else:
                     change, exact = slopes(trial, found, change), True
@@ -158,6 +173,7 @@ def solve(run: Callable[[FloatArray], FloatArray], target: Target, scale: Scale,
         cost=cost,
         runs=runs,
         converged=converged,
+        change=change,
     )
 
 
