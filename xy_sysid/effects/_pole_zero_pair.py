@@ -87,12 +87,12 @@ def joint(scene: Scene, low: float, high: float) -> Iterator[tuple[float, float,
 def _of_response(scene: Scene) -> tuple[float, float, float, tuple[float, ...]] | None:
     """What ``joint`` gives, for a pair anywhere: once for all effects that are one."""
     f, response, weight = _response(scene)
+    if f.size < 4:  # three lines hold the six numbers, more judge them
+        return None
     scale = 2.0 * math.pi * float(np.sqrt(f[0] * f[-1]))
     s = 2j * math.pi * f / scale
     box = np.sinc(f / scene.sampling_rate) ** 2  # held input, mean output
-    delays = np.arange(-4.0, 4.01, 0.25) / scene.sampling_rate
-    if f.size < 4:  # as many complex lines as the six numbers need, and one
-        return None
+    delays = np.arange(-4.0, 4.01, 0.25) / scene.sampling_rate  # all at once
     target = response * np.exp(np.outer(delays, s * scale)) / box
     powers = np.stack([s**2, s, s**0], axis=1)
     matrix = np.concatenate((np.broadcast_to(powers, (delays.size, *powers.shape)), -target[:, :, None] * powers), axis=2)
@@ -101,10 +101,12 @@ def _of_response(scene: Scene) -> tuple[float, float, float, tuple[float, ...]] 
         row = (weight / (np.abs(target) * np.abs(denominator)))[:, :, None]
         both, wanted = matrix * row, right[:, :, None] * row
         q, r = np.linalg.qr(np.concatenate((both.real, both.imag), axis=1))
-        found = np.linalg.solve(r, q.transpose(0, 2, 1) @ np.concatenate((wanted.real, wanted.imag), axis=1))[:, :, 0]
+        found = (np.linalg.pinv(r) @ (q.transpose(0, 2, 1) @ np.concatenate((wanted.real, wanted.imag), axis=1)))[:, :, 0]
         denominator = s**3 + found[:, 3:] @ powers.T
     misfit = np.sum((weight * np.abs(1.0 - found[:, :3] @ powers.T / denominator / target)) ** 2, axis=1)
-    best = int(np.argmin(misfit))
+    if not np.isfinite(misfit).any():
+        return None
+    best = int(np.nanargmin(misfit))
     delay, c = float(delays[best]), found[best]
     zeros, poles = np.roots(c[:3]) * scale, np.roots([1.0, *c[3:]]) * scale
     real = poles[np.abs(poles.imag) < 1e-9 * np.abs(poles)]
