@@ -17,20 +17,16 @@ from xy_sysid.effects._contract import in_time
 from xy_sysid.greybox.floor import Bands, Floor, Windows, tolerance
 from xy_sysid.samples.block import FloatArray
 
+TRUSTED = 0.25  # a step whose fall differs by less than this part from the one expected needs no new derivatives; with 0.75 long valleys take longer
 STEP = 1e-4  # of a logarithm, or of a parameter's scale: far above rounding, far below what bends
 
 
 @dataclass(frozen=True, slots=True)
 class Round:
-    """Steps with one set of weights.
-
-    iterations: the most; enough: relative fall of the cost below which it ends; trusted: a step whose fall differs by less than this part
-    from the one expected needs no new derivatives (Fletcher 1971 has 0.75 and 0.25)
-    """
+    """Steps with one set of weights. iterations: the most; enough: relative fall of the cost below which it ends."""
 
     iterations: int
     enough: float
-    trusted: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,7 +141,7 @@ def solve(
             if np.isfinite(new) and new < cost:
                 fall, gone = (cost - new) / cost, trial - inner
                 hoped = -float(2.0 * slope @ gone + gone @ normal @ gone)
-                if abs((cost - new) - hoped) < stage.trusted * hoped:
+                if abs((cost - new) - hoped) < TRUSTED * hoped:
                     change, exact = _updated(change, gone, diagonal, found - error), False
                 else:
                     change, exact = slopes(trial, found, change), True
