@@ -143,9 +143,17 @@ def test_settings_are_checked_and_reach_the_node(scene: Scene) -> None:
         field.fill(typed)
         tab.page.locator("[data-apply=x]").click()
         tab.until(functools.partial(says, words), 5, words)
-    field.fill("0.5")
-    tab.page.locator("[data-apply=x]").click()
-    tab.until(lambda: "applied" in str(told.text_content()), 10)
+
+    def applied() -> bool:
+        """A page that was loaded again, as after a stall of the machine, has forgotten what was typed."""
+        if not field.is_visible():
+            tab.page.locator("[data-part=excitation]").click()
+        if field.input_value() != "0.5":
+            field.fill("0.5")
+            tab.page.locator("[data-apply=x]").click()
+        return says("applied")
+
+    tab.until(applied, 10)
     from rcl_interfaces.srv import GetParameters
 
     answer = world.call(GetParameters, "/xy/excitation/get_parameters", GetParameters.Request(names=["x.rms"]), times=3)
@@ -200,8 +208,9 @@ def test_stop_really_makes_the_excitation_inactive(scene: Scene, way: str) -> No
     scene.lifecycle("nothing moves before Activate")
     tab.until(lambda: "stopped: the excitation is" in tab.notices(), 10)
     assert world.state("excitation") == "inactive" and scene.silent()
-    if way == "button":
-        tab.page.get_by_role("button", name="Cancel").last.click()
+    cancel = tab.page.get_by_role("button", name="Cancel").last
+    if way == "button" and cancel.is_visible():  # a page that was loaded again has no dialog
+        cancel.click()
 
 
 def test_a_lost_node_is_named(scene: Scene) -> None:
