@@ -261,7 +261,7 @@ class Effect:
     family:      effects of one family replace one another
     order:       place among the effects of its category, in the direction of the signal
     simulable:   False if free simulation cannot judge it
-    plausible:   False for values that no machine has, though each is within its bounds
+    refusal:     why values explain nothing on a travel between two positions (m), though each is within its bounds: in words, or empty
     one_step:    then this does: fits the effect by one-step prediction (see ``contact.Contact``)
     sum_of:      other effects that together are the very same law, if there are and motor and table are one
     on_table:    True for a force that acts on the table: across a gap the motor does not feel it
@@ -288,7 +288,7 @@ class Effect:
     order: int = 0
     simulable: bool = True
     one_step: OneStep | None = None
-    plausible: Callable[[Sequence[float]], bool] | None = None
+    refusal: Callable[[Sequence[float], tuple[float, float]], str] | None = None
     sum_of: Sum | None = None
     on_table: bool = False
     rubs: str = ""

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from xy_sysid.effects._contract import Effect, Parameter, law
 from xy_sysid.effects._scene import Guess, Scene, columns
 from xy_sysid.samples.block import FloatArray
+
+PARTS = (0.5, 0.75, 1.1, 1.6)  # periods on the travel, of a wave that does not repeat there
+LEAST = 0.5  # periods on the travel: within less a wave is a spring, which softens
 
 
 @law
@@ -19,11 +22,25 @@ def force(amplitude: float, period: float, phase: float, x: float) -> float:
 
 
 def guesses(scene: Scene) -> Iterator[Guess]:
-    """Sine and cosine of the lengths at which the missing force repeats along the travel."""
+    """Sine and cosine of the lengths at which the missing force repeats along the travel; and of longer ones, of which the travel is a
+    part: beside a base that stays these explain anything, as polynomials do."""
     missing = scene.missing_force()
     for period in scene.periods(missing, np.ones_like(missing)):
-        angle = 2.0 * math.pi * scene.position / period
-        yield Guess(columns(np.sin(angle), np.cos(angle)), _Reader(period))
+        yield _wave(scene, period)
+    travel = float(np.ptp(scene.position))
+    for part in PARTS if travel > 0.0 else ():
+        yield _wave(scene, travel / part, inverse_only=True)
+
+
+def _wave(scene: Scene, period: float, inverse_only: bool = False) -> Guess:
+    angle = 2.0 * math.pi * scene.position / period
+    return Guess(columns(np.sin(angle), np.cos(angle)), _Reader(period), inverse_only)
+
+
+def refusal(values: Sequence[float], between: tuple[float, float]) -> str:
+    """A wave of which too little is seen is a spring."""
+    seen = (between[1] - between[0]) / values[1]
+    return f"only {seen:.2g} of its period are within the travel, at least {LEAST:g} are needed" if seen < LEAST else ""
 
 
 class _Reader:
@@ -40,7 +57,7 @@ EFFECT = Effect(
     name="cogging",
     law="F = amplitude sin(2 pi x / period + phase)",
     meaning="magnets against slots, and the current sensor's ripple",
-    validity="at least 3 periods within the travel; one harmonic",
+    validity=f"at least {LEAST:g} periods within the travel (within less it is a spring that softens), better 3; one harmonic",
     source="Hanselman, Brushless Permanent Magnet Motor Design, 2nd ed., 2003, ch. 5",
     category="force",
     parameters=(
@@ -49,8 +66,9 @@ EFFECT = Effect(
         Parameter("phase", "rad", -100.0, 100.0, 0.0, "phase at x = 0", positive=False),
     ),
     shows="error repeats along the travel, at all speeds with the same force",
-    look_alikes=("lead_error", "position_dependent_gain"),
+    look_alikes=("lead_error", "position_dependent_gain", "return_spring"),
     experiment="a slow traverse: cogging's error in force stays, that of a lead error shrinks with speed",
     functions={"force": force},
     guesses=guesses,
+    refusal=refusal,
 )

@@ -38,10 +38,10 @@ class _Reader:
         return (math.hypot(float(c[0]), float(c[1])), self.period, math.atan2(float(c[1]), float(c[0])))
 
 
-def plausible(values: Sequence[float]) -> bool:
+def refusal(values: Sequence[float], _: tuple[float, float]) -> str:
     """A reading that changes by less than a fifth more or less than the motion; beyond, it explains any signal by itself."""
-    amplitude, period, _ = values
-    return 2.0 * math.pi * amplitude / period < 0.2
+    slope = 2.0 * math.pi * values[0] / values[1]
+    return "" if slope < 0.2 else f"the reading would change by {100 * slope:.3g} % more or less than the motion: no encoder does"
 
 
 EFFECT = Effect(
@@ -61,5 +61,5 @@ EFFECT = Effect(
     experiment="traverse at two speeds: the error in position is the same at both",
     functions={"error": error},
     guesses=guesses,
-    plausible=plausible,
+    refusal=refusal,
 )

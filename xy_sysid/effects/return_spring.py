@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -31,6 +31,13 @@ def guesses(scene: Scene) -> Iterator[Guess]:
     yield Guess(columns(way * far, way * far**3), lambda c: (max(float(c[0]), least), middle, -float(c[1]) / max(float(c[0]), least)))
 
 
+def refusal(values: Sequence[float], between: tuple[float, float]) -> str:
+    """A spring pulls harder the farther it is stretched: what gives way on the travel is none, but a part of a wave."""
+    _, rest, softening = values
+    gives_way = 3.0 * softening * max((place - rest) ** 2 for place in between) >= 1.0
+    return "it would give way within the travel, as no spring does" if gives_way else ""
+
+
 EFFECT = Effect(
     name="return_spring",
     law="F = stiffness d (1 - softening d^2), d = x - rest",
@@ -44,10 +51,11 @@ EFFECT = Effect(
         Parameter("softening", "1/m2", -1e6, 1e6, 100.0, "part of the stiffness lost per distance squared; below 0 it stiffens", positive=False),
     ),
     shows="the axis comes back by itself; the response is flat below a low frequency; error with the sign of the position",
-    look_alikes=("hardening_stiffness", "gravity", "constant_load"),
+    look_alikes=("hardening_stiffness", "gravity", "constant_load", "cogging"),
     experiment="hold still at several places over the whole travel: the input needed is the law",
     functions={"force": force},
     guesses=guesses,
+    refusal=refusal,
     family="spring",
     on_table=True,
 )
