@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from xy_sysid.effects._contract import Effect, Parameter, law
 from xy_sysid.effects._scene import Guess, Scene, columns
+
+LEAST = 0.01  # of the spring at the middle that it must have won at the end of the travel, to be one that stiffens
 
 
 @law
@@ -18,6 +20,13 @@ def guesses(scene: Scene) -> Iterator[Guess]:
     """Position and its cube."""
     x = scene.position
     yield Guess(columns(x**3, x), lambda c: (float(c[0]), float(c[1])))
+
+
+def refusal(values: Sequence[float], between: tuple[float, float]) -> str:
+    """A spring that does not stiffen is a return spring."""
+    cubic, linear = values
+    wins = cubic * max(place**2 for place in between)
+    return "within the travel it does not stiffen: a return spring" if wins < LEAST * linear else ""
 
 
 EFFECT = Effect(
@@ -36,6 +45,7 @@ EFFECT = Effect(
     experiment="hold still at several places: the input needed is the law",
     functions={"force": force},
     guesses=guesses,
+    refusal=refusal,
     family="spring",
     on_table=True,
 )

@@ -9,24 +9,35 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from xy_sysid.effects._contract import in_time
-from xy_sysid.greybox.floor import Bands, Floor, Windows, tolerance
+from xy_sysid.greybox.floor import Bands, Floor, Windows, excess, tolerance
 from xy_sysid.samples.block import FloatArray
 
 TRUSTED = 0.25  # a step whose fall differs by less than this part from the one expected needs no new derivatives; with 0.75 long valleys take longer
 STEP = 1e-4  # of a logarithm, or of a parameter's scale: far above rounding, far below what bends
 
 
+Counts = Literal["alike", "what is wrong", "as likely"]
+
+
 @dataclass(frozen=True, slots=True)
 class Round:
-    """Steps with one set of weights. iterations: the most; enough: relative fall of the cost below which it ends."""
+    """Steps with one set of weights. iterations: the most; enough: relative fall of the cost below which it ends.
+
+    counts: which parts of the error. "alike": all lines, so that the largest error is taken away first, which is slow motion;
+    "what is wrong": each band by the part of its power above the floor, or by what chance makes of that; "as likely": by the likelihood.
+    Where friction stops an axis, what a parameter changes is linear in it up to a frequency that falls as the step grows: high bands,
+    in which nothing is wrong, would hold back every large step (as in waveform inversion: Bunks et al., Geophysics 60, 1995)
+    """
 
     iterations: int
     enough: float
+    counts: Counts = "as likely"
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,8 +132,8 @@ def solve(
     change = slopes(inner, error, np.zeros((size, *error.shape), dtype=np.complex128)) if known is None else known
     exact = known is None
     for stage in schedule.rounds:
-        power = tolerance(layout, error, least)
-        weight = np.sqrt(1.0 / power)[layout.band]
+        before = inner, error, change, exact
+        weight = _weight(target, error, stage.counts)
         cost = _cost(error * weight)
         damping, converged, fresh = 1e-3, False, False
         for _ in range(stage.iterations):
@@ -133,7 +144,7 @@ def solve(
             if schedule.late():
                 break
             diagonal = np.maximum(np.diag(normal), 1e-12 * float(np.max(np.diag(normal))) + 1e-300)
-            move = -np.linalg.solve(normal + damping * np.diag(diagonal), slope)
+            move = _move(normal + damping * np.diag(diagonal), slope, scale, scale.outer(inner))
             move *= min(1.0, 2.0 / float(np.max(np.abs(move)) + 1e-300))
             trial = scale.inner(scale.outer(inner + move))
             found = left(trial)
@@ -157,6 +168,8 @@ def solve(
                 if damping > 1e6:
                     converged = True
                     break
+        if stage.counts != "as likely" and _judged(target, error) > _judged(target, before[1]):
+            inner, error, change, exact = before  # a step aside
     noise = _covariance(normal)
     with np.errstate(over="ignore", invalid="ignore"):  # of a model that runs away all is one mistake
         beyond = layout.lines * np.maximum(layout.power(error) - least.noise, 0.0)
@@ -171,6 +184,40 @@ def solve(
         converged=converged,
         change=change,
     )
+
+
+def _move(normal: FloatArray, slope: FloatArray, scale: Scale, values: FloatArray) -> FloatArray:
+    """(k,) step of the solver's coordinates; a parameter at a bound that would leave it stays there, and the others move without it."""
+    free = np.ones(values.size, dtype=np.bool_)
+    move = np.zeros(values.size)
+    for _ in range(values.size):
+        move = np.zeros(values.size)
+        move[free] = -np.linalg.solve(normal[np.ix_(free, free)], slope[free])
+        leaves = ((values <= scale.low) & (move < 0.0)) | ((values >= scale.high) & (move > 0.0))
+        if not np.any(leaves) or np.all(leaves | ~free):
+            break
+        free &= ~leaves
+    return np.where(free, move, 0.0)
+
+
+def _judged(target: Target, error: NDArray[np.complex128]) -> float:
+    """Excess of an error (windows, lines), infinite for that of a model that runs away."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        found = excess(target.windows.layout.power(error), target.least)
+    return found if np.isfinite(found) else np.inf
+
+
+def _weight(target: Target, error: NDArray[np.complex128], counts: Counts) -> FloatArray:
+    """(lines,) by which an error (windows, lines) is multiplied."""
+    layout, least = target.windows.layout, target.least
+    with np.errstate(over="ignore", invalid="ignore"):  # of a model that runs away
+        power, own = tolerance(layout, error, least), layout.power(error)
+        if counts == "alike":
+            power = np.full_like(power, float(layout.lines @ own) / float(layout.lines.sum()))
+        elif counts == "what is wrong":
+            chance = 1.0 / np.sqrt(layout.lines * target.windows.begins.size)
+            power = power / np.maximum(1.0 - least.power / np.maximum(own, 1e-300), chance)
+        return np.asarray(np.sqrt(1.0 / np.maximum(power, 1e-300))[layout.band])
 
 
 def _updated(change: NDArray[np.complex128], gone: FloatArray, size: FloatArray, moved: NDArray[np.complex128]) -> NDArray[np.complex128]:

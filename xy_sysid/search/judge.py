@@ -12,7 +12,7 @@ from scipy.stats import norm, wilcoxon
 
 from xy_sysid.axis.model import AxisModel, Library
 from xy_sysid.effects import Effect, Scene
-from xy_sysid.effects._contract import Limits, Parameter, in_time
+from xy_sysid.effects._contract import Limits, in_time
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.floor import excess
 from xy_sysid.greybox.free_run import GreyboxFit, best_start, finish, first_excess, fit, fit_base, other_starts, scene_of, screened
@@ -268,9 +268,13 @@ class FreeRunJudge:
         return found if np.isfinite(found.excess) else None
 
     def idle(self, found: GreyboxFit) -> str:
-        """The effect whose size the data do not tell from none beside the others, or empty."""
-        names = (name for name, _ in found.model.effects if _may_be_none(self.library[name].on(self.data.similar)[0], found, name))
-        return next(names, "")
+        """The effect whose size the data do not tell from none beside the others: its interval, in numbers and not in factors, holds 0."""
+        for name, _ in found.model.effects if not found.brief else ():
+            size = self.library[name].parameters[0]
+            known = found.parameter(f"{name}.{size.name}")
+            if size.positive and math.isfinite(known.high) and known.value >= math.e * known.low:
+                return name
+        return ""
 
     def refusal(self, found: GreyboxFit) -> str:
         """Why a fit explains nothing, whatever it leaves: in words, or empty."""
@@ -287,7 +291,9 @@ class FreeRunJudge:
                 edge = value >= item.high * (1.0 - 1e-6) or (k == 0 and not item.positive and value <= item.low * (1.0 + 1e-6) and item.low > 0.0)
                 if k == 0 and edge:
                     return f"{name}: {item.name} is at its bound"
-                if k == 0 and _may_be_none(item, found, name):
+                known = found.parameter(f"{name}.{item.name}")
+                judged = k == 0 and item.positive and not found.brief and math.isfinite(known.high)
+                if judged and known.low <= item.low * (1.0 + 1e-6):
                     return f"{name}: {item.name} cannot be told from 0"
                 if item.name == effect.mode_frequency and not low <= value <= high:
                     return f"{name}: a mode at {value:.3g} Hz, outside of what these data excite and see ({low:.3g} to {high:.3g} Hz)"
@@ -318,16 +324,6 @@ class FreeRunJudge:
     def rest(self, found: GreyboxFit, reference: GreyboxFit) -> float:
         """Power of the held-out error beyond the noise over that of a reference; see ``Floor.rest``."""
         return self.data.floor.rest(reference.power)(found.power)
-
-
-def _may_be_none(item: Parameter, found: GreyboxFit, name: str) -> bool:
-    """A size that is at its least, or whose interval, in numbers and not in factors, holds 0."""
-    known, least = found.parameter(f"{name}.{item.name}"), item.low * (1.0 + 1e-6)
-    if not item.positive or found.brief:
-        return False
-    in_numbers = found.model.ahead is not None
-    holds_none = known.low <= least if in_numbers else known.value >= math.e * known.low
-    return known.value <= least or (math.isfinite(known.high) and holds_none)
 
 
 def _scores(found: GreyboxFit, data: AxisData) -> FloatArray:

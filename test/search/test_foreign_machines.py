@@ -1,0 +1,93 @@
+"""The answer on machines of another make: with a controller around them, with springs off their rest, on a part of a wave."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from helpers.foreign import Joint, driven
+
+from xy_sysid.axis.model import STANDARD
+from xy_sysid.effects import EFFECTS
+from xy_sysid.search.diagnose import Diagnosis, diagnose
+
+SLIDE = Joint(fs=1000.0, seconds=40.0, count=1e-6, mass=0.1, drag=10.0, shake=1.0, band=(0.5, 60.0))
+LINEAR_MOTOR = Joint(
+    fs=2000.0,
+    seconds=30.0,
+    count=1e-6,
+    mass=8.0,
+    drag=20.0,
+    coulomb=10.0,
+    cogging=6.0,
+    period=0.03,
+    moves=(0.2, 0.8, 8.0),
+    control=(8e4, 1500.0),
+    shake=4.0,
+)
+
+
+def of(joint: Joint, seed: int = 1) -> Diagnosis:
+    """The answer for a machine."""
+    return diagnose(joint.fs, *driven(joint, seed))
+
+
+def values(found: Diagnosis) -> dict[str, tuple[float, ...]]:
+    """Of each effect of the last model."""
+    assert found.ladder is not None
+    return dict(found.ladder.final.model.effects)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_linear_motor_in_closed_loop_has_cogging_and_friction(seed: int) -> None:
+    """It stops and starts at each move, so that what friction changes is linear in its size at low frequencies alone."""
+    found = of(LINEAR_MOTOR, seed)
+    assert set(found.effects) == {"coulomb_friction", "cogging"}, found.sentence
+    assert found.confidence > 0.9
+    amplitude, period, _ = values(found)["cogging"]
+    assert (amplitude, period) == pytest.approx((6.0, 0.03), rel=0.01)
+    assert values(found)["coulomb_friction"][0] == pytest.approx(10.0, rel=0.01)
+
+
+@pytest.mark.parametrize("coulomb", [0.0, 0.2])
+def test_a_spring_whose_rest_is_far_off_is_one_spring(coulomb: float) -> None:
+    """A valve's: preloaded by five times its travel, which the drive holds."""
+    found = of(replace(SLIDE, spring=100.0, rest=-0.05, offset=5.0, coulomb=coulomb))
+    assert set(found.effects) == {"return_spring"} | ({"coulomb_friction"} if coulomb else set()), found.sentence
+    force = STANDARD["return_spring"].functions["force"]
+    here, beyond = (force(*values(found)["return_spring"], place, 1.0) for place in (0.0, 1e-3))  # far from its rest, nobody can tell where it softens
+    assert (here, (beyond - here) / 1e-3) == pytest.approx((5.0, 100.0), rel=0.02)
+
+
+def test_a_spring_that_does_not_stiffen_is_not_said_to() -> None:
+    """A flexure at its rest: hardening stiffness with nothing that hardens has fewer parameters, and is the wrong name."""
+    found = of(replace(SLIDE, spring=100.0, coulomb=0.2))
+    assert set(found.effects) == {"return_spring", "coulomb_friction"}, found.sentence
+    assert found.confidence > 0.9
+
+
+def test_a_part_of_a_wave_is_no_spring_that_gives_way() -> None:
+    """A controller moves the axis over three quarters of a period."""
+    drive, position = driven(replace(SLIDE, cogging=2.0, period=0.02, moves=(0.0075, 0.1, 1.0), control=(2000.0, 20.0), shake=0.3), 3)
+    assert 0.6 < np.ptp(position) / 0.02 < 0.9
+    found = diagnose(1000.0, drive, position)
+    assert found.effects == ("cogging",), found.sentence
+    assert values(found)["cogging"][1] == pytest.approx(0.02, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("effect", "inside", "outside"),
+    [
+        ("return_spring", (100.0, 0.0, 1000.0), (100.0, 0.0, 4000.0)),  # softening d^2 < 1/3 at d = 10 mm
+        ("cogging", (1.0, 0.03, 0.0), (1.0, 0.05, 0.0)),  # half a period on 20 mm
+        ("hardening_stiffness", (1e5, 100.0), (1e3, 100.0)),
+        ("lead_error", (1e-5, 0.01, 0.0), (1e-3, 0.01, 0.0)),
+    ],
+)
+def test_values_outside_of_where_a_law_holds_are_refused_in_words(effect: str, inside: tuple[float, ...], outside: tuple[float, ...]) -> None:
+    """On a travel of 20 mm: what is said names the limit, and is empty within it."""
+    refusal = STANDARD[effect].refusal
+    assert refusal is not None and EFFECTS[effect].refusal is refusal
+    assert refusal(inside, (-0.01, 0.01)) == ""
+    assert len(refusal(outside, (-0.01, 0.01)).split()) > 4
