@@ -56,7 +56,8 @@ def test_a_spring_whose_rest_is_far_off_is_one_spring(coulomb: float) -> None:
     found = of(replace(SLIDE, spring=100.0, rest=-0.05, offset=5.0, coulomb=coulomb))
     assert set(found.effects) == {"return_spring"} | ({"coulomb_friction"} if coulomb else set()), found.sentence
     force = STANDARD["return_spring"].functions["force"]
-    here, beyond = (force(*values(found)["return_spring"], place, 1.0) for place in (0.0, 1e-3))  # far from its rest, nobody can tell where it softens
+    own = values(found)["return_spring"]
+    here, beyond = force(*own, 0.0, 1.0), force(*own, 1e-3, 1.0)  # far from its rest, nobody can tell where it softens
     assert (here, (beyond - here) / 1e-3) == pytest.approx((5.0, 100.0), rel=0.02)
 
 
