@@ -89,19 +89,21 @@ def refine_steps(
     while True:
         while settled.step():
             yield Trying(tuple(sorted(settled.now.effects)))
-        if not search.goes_on(settled.now):
-            break
-        for names in search.steps_from(settled.now):
-            yield Trying(tuple(sorted(names)))
+        final = settled.now
+        if search.goes_on(final):
+            for names in search.steps_from(final):
+                yield Trying(tuple(sorted(names)))
+        else:
+            for _ in range(FEWEST):  # along a valley that bends the first fit did not come to its end
+                if not final.fit.converged and not judge.late():
+                    final.fit = judge.whole(final.fit)
+            search.stopped = search.stopped or judge.late()
+            if not judge.late() and final.effects > frozenset(kept):
+                for names in search.rivals(final.effects):
+                    yield Trying(tuple(sorted(names)))
+            if search.best.score >= final.score - LEAST or search.best.effects == final.effects or judge.late():
+                break
         settled = Simplifying(judge, search, frozenset(kept))
-    final = settled.now
-    for _ in range(FEWEST):  # along a valley that bends the first fit did not come to its end
-        if not final.fit.converged and not judge.late():
-            final.fit = judge.whole(final.fit)
-    search.stopped = search.stopped or judge.late()
-    if not judge.late() and final.effects > frozenset(kept):
-        for names in search.rivals(final.effects):
-            yield Trying(tuple(sorted(names)))
     if final.fit.excess >= LEAST and across is not None:
         for name in across.names:
             yield Trying((name,))
