@@ -230,9 +230,10 @@ def fit(data: AxisData, start: AxisModel, brief: bool = False, hopeless: float =
     found = solve(run, target, scale, values, Schedule(BRIEF[:1], late))
     left = data.layout.power(data.brief.spectrum(velocity - run(found.values)))
     if not (late() or (brief and excess(left, data.floor) > hopeless)):
+        nearer = solve(run, target, scale, found.values, Schedule(BRIEF[1:-1], late), found.change)
         run, _, _ = _problem(data, start, data.first, MIDDLING)
-        more = solve(run, target, scale, found.values, Schedule(BRIEF[1:], late), found.change)
-        found = replace(more, runs=found.runs + more.runs)
+        more = solve(run, target, scale, nearer.values, Schedule(BRIEF[-1:], late), nearer.change)
+        found = replace(more, runs=found.runs + nearer.runs + more.runs)
     if not brief:
         return finish(data, _model(start, found.values), found.runs, late)
     return _result(data, start, scale, found, brief=True)
