@@ -16,6 +16,7 @@ class Joint:
     """One axis, SI units. fs: Hz, seconds: of the record; count: of the encoder
 
     mass, drag, coulomb, load: of what moves; spring, rest: pulls to a place; cogging, period: along the travel
+    breaks: friction at rest beyond that in motion, of which a part is left up to speeds of ``fades``
     moves: (largest place, speed, acceleration) of random moves that a controller (stiffness, damping) follows, or None
     shake: rms, and band (Hz), of noise in the drive, around ``offset``
     """
@@ -31,6 +32,8 @@ class Joint:
     rest: float = 0.0
     cogging: float = 0.0
     period: float = 1.0
+    breaks: float = 0.0
+    fades: float = 1.0
     moves: tuple[float, float, float] | None = None
     control: tuple[float, float] = (0.0, 0.0)
     shake: float = 0.0
@@ -46,7 +49,9 @@ def driven(joint: Joint, seed: int) -> tuple[FloatArray, FloatArray]:
     shake = joint.offset + joint.shake * noise / noise.std()
     wanted = _moves(random, n, joint.fs, *joint.moves) if joint.moves else np.zeros(n)
     inner = max(4, int(20000 / joint.fs))
-    forces = np.array([joint.mass, joint.drag, joint.coulomb, joint.load, joint.spring, joint.rest, joint.cogging, joint.period])
+    forces = np.array(
+        [joint.mass, joint.drag, joint.coulomb, joint.load, joint.spring, joint.rest, joint.cogging, joint.period, joint.breaks, joint.fades]
+    )
     return _run(wanted, shake, joint.fs, inner, forces, np.array([*joint.control, joint.count]))
 
 
@@ -65,7 +70,7 @@ def _moves(random: np.random.Generator, n: int, fs: float, far: float, speed: fl
 
 @compiled
 def _run(wanted: FloatArray, shake: FloatArray, fs: float, inner: int, forces: FloatArray, seen: FloatArray) -> tuple[FloatArray, FloatArray]:
-    mass, drag, coulomb, load, spring, rest, cogging, period = forces
+    mass, drag, coulomb, load, spring, rest, cogging, period, breaks, fades = forces
     stiffness, damping, count = seen
     h, x, v, speed, held = 1.0 / fs / inner, wanted[0], 0.0, 0.0, 0.0
     drive, shown = np.empty(wanted.size), np.empty(wanted.size)
@@ -77,7 +82,7 @@ def _run(wanted: FloatArray, shake: FloatArray, fs: float, inner: int, forces: F
         drive[i] = stiffness * (wanted[i] - shown[i]) + damping * (ahead - speed) + shake[i]
         for _ in range(inner):
             push = held - drag * v - load - spring * (x - rest) - cogging * np.sin(2.0 * np.pi * x / period)
-            new, stops = v + h * push / mass, h * coulomb / mass
+            new, stops = v + h * push / mass, h * (coulomb + breaks * np.exp(-((v / fades) ** 2))) / mass
             new = new - stops if new > stops else new + stops if new < -stops else 0.0
             x += 0.5 * h * (v + new)
             v = new

@@ -26,6 +26,18 @@ LINEAR_MOTOR = Joint(
     control=(8e4, 1500.0),
     shake=4.0,
 )
+ROBOT = Joint(
+    fs=500.0,
+    seconds=60.0,
+    count=2e-5,
+    mass=0.3,
+    drag=0.4,
+    coulomb=0.6,
+    breaks=0.3,
+    fades=0.05,
+    moves=(1.2, 2.0, 10.0),
+    control=(120.0, 6.0),
+)
 
 
 def of(joint: Joint, seed: int = 1) -> Diagnosis:
@@ -48,6 +60,15 @@ def test_a_linear_motor_in_closed_loop_has_cogging_and_friction(seed: int) -> No
     amplitude, period, _ = values(found)["cogging"]
     assert (amplitude, period) == pytest.approx((6.0, 0.03), rel=0.01)
     assert values(found)["coulomb_friction"][0] == pytest.approx(10.0, rel=0.01)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_robots_joint_that_breaks_away_has_stribeck_friction(seed: int) -> None:
+    """Moves and pauses alone, without noise in the drive; what was settled on first may be another law of friction."""
+    found = of(ROBOT, seed)
+    assert found.effects == ("stribeck_friction",), found.sentence
+    assert found.confidence > 0.9
+    assert values(found)["stribeck_friction"] == pytest.approx((0.6, 0.3, 0.05), rel=0.02)
 
 
 @pytest.mark.parametrize("coulomb", [0.0, 0.2])

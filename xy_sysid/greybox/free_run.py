@@ -40,7 +40,7 @@ __all__ = [
     "screened",
 ]
 
-# weights are worked out before each round: the largest errors first, then all that is wrong, in the end the likelihood
+# weights are worked out before each round: the likelihood, the largest error, what is wrong anywhere, and in the end the likelihood again
 BRIEF = (Round(6, 1e-2), Round(6, 1e-2, "alike"), Round(6, 3e-3, "what is wrong"), Round(8, 1e-4))
 LONG = (Round(4, 1e-3), Round(6, 1e-5))
 COARSE, MIDDLING = 2000.0, 4000.0  # Hz: sub-steps of first rounds (errors up to 3e-3 of the motion) and of brief fits (6e-4)

@@ -1,8 +1,8 @@
 """Levenberg-Marquardt on the whitened error in velocity.
 
-Levenberg 1944, Marquardt 1963; first plain least squares, then whitening by the error's own power, worked out again a few times:
-iteratively reweighted least squares towards the Whittle likelihood. Derivatives are forward differences of the simulation, taken anew only when a
-step did not do what they promised, and else brought up to date with what it did (Broyden 1965).
+Levenberg 1944, Marquardt 1963; whitening by the error's own power, worked out again a few times: iteratively reweighted
+least squares towards the Whittle likelihood, with plain least squares on the way (``Round``). Derivatives are forward differences of the
+simulation, taken anew only when a step did not do what they promised, and else brought up to date with what it did (Broyden 1965).
 """
 
 from __future__ import annotations

@@ -98,10 +98,11 @@ def refine_steps(
                 if not final.fit.converged and not judge.late():
                     final.fit = judge.whole(final.fit)
             search.stopped = search.stopped or judge.late()
+            best = search.best
             if not judge.late() and final.effects > frozenset(kept):
                 for names in search.rivals(final.effects):
                     yield Trying(tuple(sorted(names)))
-            if search.best.score >= final.score - LEAST or search.best.effects == final.effects or judge.late():
+            if search.best is best or search.best.score >= final.score - LEAST:
                 break
         settled = Simplifying(judge, search, frozenset(kept))
     if final.fit.excess >= LEAST and across is not None:

@@ -11,7 +11,7 @@ from itertools import chain
 
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.search.best_first import Judge, Node, Search
-from xy_sysid.search.criteria import HOPELESS, LEAST
+from xy_sysid.search.criteria import HOPELESS, LEAST, PRICE
 from xy_sysid.search.judge import FreeRunJudge
 
 
@@ -86,12 +86,14 @@ class Simplifying:
             yield from self._less(self.now, name)
 
     def _without_idle(self) -> Iterator[Node[GreyboxFit]]:
-        """Sets that did as well with an effect in them that the data do not tell from none, without that one."""
+        """Sets that did as well with an effect in them that the data do not tell from none, or so much better that it pays, without that one."""
         for node in list(self.search.nodes.values()):
             idle = self.judge.idle(node.fit)
             smaller = node.effects - {idle}
-            simpler = sum(len(self.judge.library[name].parameters) for name in smaller) < self.now.parameters
-            if idle and simpler and smaller and self.kept <= smaller and node.fit.excess < self.now.fit.excess + LEAST:
+            parameters = sum(len(self.judge.library[name].parameters) for name in smaller)
+            simpler = parameters < self.now.parameters and node.fit.excess < self.now.fit.excess + LEAST
+            pays = node.fit.excess + PRICE * parameters < self.now.score - LEAST
+            if idle and (simpler or pays) and smaller and self.kept <= smaller:
                 yield from self._less(node, idle)
 
     def _less(self, node: Node[GreyboxFit], name: str) -> Iterator[Node[GreyboxFit]]:
