@@ -28,14 +28,18 @@ class Simplifying:
     def __init__(self, judge: FreeRunJudge, search: Search[GreyboxFit], kept: frozenset[str]) -> None:
         self.judge, self.search, self.kept = judge, search, kept
         self.now = search.best
+        self.left: set[frozenset[str]] = set()
 
     def step(self) -> bool:
         """Take the first simpler set that loses little; False if none does."""
         whole(self.judge, self.now)
         here = self.judge.rest(self.now.fit, self.now.fit)
         for node in chain(self._simpler_relatives(), self._tried(here), self._without(), self._without_idle()):
+            if node.effects == self.now.effects or node.effects in self.left:  # from what was left nothing leads back
+                continue
             loss = self.judge.rest(node.fit, self.now.fit) - here
             if loss < self.search.least or not self.judge.better(self.now.fit, node.fit):
+                self.left.add(self.now.effects)
                 self.now = node
                 return True
         return False
