@@ -112,20 +112,21 @@ def test_the_failing_picture_comes_by_itself_and_every_number_follows_the_story(
     tab.page.wait_for_timeout(2500)  # some more of the travel
     tab.press("diagnose")
     tab.until(lambda: "Missing: coulomb friction" in tab.verdict() and tab.filled() == ["Add coulomb friction"], 90)
-    tab.until(lambda: tab.headline().startswith("Something is missing: ") and len(tab.ladder()) == 1, 5, "the headline is stale")
+    tab.until(lambda: tab.headline().startswith("Something is missing: ") and len(tab.ladder()) == 1, 40, "the headline is stale")
     assert tab.ladder()[0] > 4
     tab.press("named")
     tab.until(lambda: tab.headline().startswith("Explained: ") and tab.over_floor() < 2 and len(tab.ladder()) == 2, 60)
-    tab.until(lambda: tab.fact("worst place").startswith("nowhere"), 5, "the tiles are stale")
+    tab.until(lambda: tab.fact("worst place").startswith("nowhere"), 40, "the tiles are stale")
     assert tab.ladder()[1] < 1.2 and "at the noise floor" in tab.verdict() and tab.fact("held-out error").startswith("0.3")
     assert tab.page.locator("[aria-label='linear fit, live']:visible").count() == 0
     tab.page.get_by_role("button", name="linear fit").click()
-    tab.until(lambda: tab.page.locator(".fact.unsure[aria-label=gain]").count() == 1 and tab.fact("held-out error") == "", 5)
+    tab.until(lambda: tab.page.locator("[aria-label='linear fit, live']:visible").count() == 1, 60, "the linear fit is not shown")
+    tab.until(lambda: tab.page.locator(".fact.unsure[aria-label=gain]").count() == 1 and tab.fact("held-out error") == "", 60, "no linear fit")
     assert "fails" in str(tab.page.locator("[aria-label='linear fit, live']").text_content())
     tab.page.locator("[data-remove=coulomb_friction]:enabled").first.click()
     tab.until(lambda: tab.headline().startswith("Something is missing: ") and tab.over_floor() > 4, 40, "stale after Remove")
     tab.press("reset")
-    tab.until(lambda: len(tab.ladder()) == 1 and tab.headline().startswith("Something is missing: "), 10, "stale after Start over")
+    tab.until(lambda: len(tab.ladder()) == 1 and tab.headline().startswith("Something is missing: "), 40, "stale after Start over")
     assert tab.filled() == ["Add coulomb friction"]
 
 
