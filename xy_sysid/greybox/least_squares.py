@@ -21,7 +21,6 @@ from xy_sysid.samples.block import FloatArray
 TRUSTED = 0.25  # a step whose fall differs by less than this part from the one expected needs no new derivatives; with 0.75 long valleys take longer
 STEP = 1e-4  # of a logarithm, or of a parameter's scale: far above rounding, far below what bends
 
-
 Counts = Literal["alike", "what is wrong", "as likely"]
 
 
@@ -213,7 +212,7 @@ def _weight(target: Target, error: NDArray[np.complex128], counts: Counts) -> Fl
     with np.errstate(over="ignore", invalid="ignore"):  # of a model that runs away
         power, own = tolerance(layout, error, least), layout.power(error)
         if counts == "alike":
-            power = np.full_like(power, float(layout.lines @ own) / float(layout.lines.sum()))
+            power = np.full_like(power, float(layout.lines @ np.maximum(own, least.power)) / float(layout.lines.sum()))
         elif counts == "what is wrong":
             chance = 1.0 / np.sqrt(layout.lines * target.windows.begins.size)
             power = power / np.maximum(1.0 - least.power / np.maximum(own, 1e-300), chance)
