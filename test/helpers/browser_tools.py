@@ -162,6 +162,13 @@ class Tab:
         held, floor = self.curves("The error ladder", "held-out error", "noise floor")
         return [a / b for a, b in zip(held[::2], floor[::2], strict=True)]
 
+    @contextmanager
+    def unheard(self) -> Iterator[None]:
+        """Of what is typed meanwhile nothing reaches the server, as when a connection breaks."""
+        self.page.evaluate("() => { socket.kept = socket.emit; socket.emit = (what, ...rest) => what === 'event' ? 0 : socket.kept(what, ...rest); }")
+        yield
+        self.page.evaluate("() => { socket.emit = socket.kept; }")
+
     def press(self, act: str) -> None:
         """A button by what it does."""
         self.page.locator(f"[data-act={act}]").first.click()

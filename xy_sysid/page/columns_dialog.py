@@ -10,6 +10,7 @@ from nicegui import run, ui
 
 from xy_sysid.errors import BadInput, XySysidError
 from xy_sysid.imports.reading import Reading as FileReading
+from xy_sysid.page.fields import take_over
 from xy_sysid.page.orders import Reading
 from xy_sysid.page.session import Session
 
@@ -125,9 +126,10 @@ class ColumnsDialog:
             }
         self._rows.append(row)
 
-    def _open(self) -> None:
-        axes = [AxisColumns(**{name: _text(element.value) for name, element in row.items()}) for row in self._rows]
+    async def _open(self) -> None:
         try:
+            await take_over([self._rate, *(field for row in self._rows for field in row.values())])
+            axes = [AxisColumns(**{name: _text(element.value) for name, element in row.items()}) for row in self._rows]
             reading = reading_of(_text(self._time.value), self._rate.value or None, axes, self._session.reading)
             self._session.open(self._session.shelf.find(self._name), self._name, reading)
         except XySysidError as problem:

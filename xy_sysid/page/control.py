@@ -9,6 +9,7 @@ from nicegui import run, ui
 from xy_sysid.errors import XySysidError
 from xy_sysid.page.buttons import heeded
 from xy_sysid.page.facts import dropped_words, seconds_text
+from xy_sysid.page.fields import take_over
 from xy_sysid.page.session import Session
 from xy_sysid.page.settings_form import SettingsForm
 
@@ -173,9 +174,10 @@ class Control:
         self._open.set_enabled(recorder.last is not None and not recorder.running)
         self._told.set_text(recorder.words() or f"Bags go to the folder {self._session.shelf.folder.name}.")
 
-    def _record(self) -> None:
+    async def _record(self) -> None:
         session = self._session
         try:
+            await take_over([self._name])
             session.recorder.start(session.shelf.new(str(self._name.value or "").strip()), session.namespace)
         except XySysidError as problem:
             session.say(str(problem))

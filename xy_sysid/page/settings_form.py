@@ -6,7 +6,8 @@ from typing import Any
 
 from nicegui import ui
 
-from xy_sysid.errors import BadInput
+from xy_sysid.errors import BadInput, XySysidError
+from xy_sysid.page.fields import take_over
 from xy_sysid.page.session import Session
 from xy_sysid.settings import AxisExcitation, Knob, changed, knobs
 from xy_sysid.units import USUAL, Units
@@ -120,10 +121,11 @@ class SettingsForm:
                 self._fields[item.name].update()
                 self._tips[item.name].set_text(f"{item.meaning}; {limits(item, units)}")
 
-    def _apply(self) -> None:
+    async def _apply(self) -> None:
         try:
+            await take_over(self._fields.values())
             wanted = changes(self._now, {name: field.value for name, field in self._fields.items()})
-        except BadInput as problem:
+        except XySysidError as problem:
             self._said = (str(problem), False)
             return
         if not wanted:
