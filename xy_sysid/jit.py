@@ -25,8 +25,9 @@ REORDERED = frozenset({"contract", "reassoc", "arcp", "nsz"})
 
 def compiled(function: Callable[P, R], exact: bool = True) -> Callable[P, R]:
     """The same function, compiled. Results repeat bit for bit on one machine: strict IEEE arithmetic, or, if not exact, sums and
-    products in an order that the compiler chooses, up to twice as fast (infinities and what is not a number stay what they are)."""
-    return cast("Callable[P, R]", numba.njit(cache=True, fastmath=False if exact else set(REORDERED))(function))
+    products in an order that the compiler chooses, up to twice as fast (infinities and what is not a number stay what they are).
+    Other threads go on meanwhile."""
+    return cast("Callable[P, R]", numba.njit(cache=True, nogil=True, fastmath=False if exact else set(REORDERED))(function))
 
 
 class TextLoader(importlib.abc.InspectLoader):
@@ -74,4 +75,4 @@ def compiled_text(text: Callable[[str], str], names: Mapping[str, object], parts
     try:
         return compiled(function, exact)
     except RuntimeError:  # no folder that numba may write to: compile for this process only
-        return cast("Callable[..., Any]", numba.njit(fastmath=False if exact else set(REORDERED))(function))
+        return cast("Callable[..., Any]", numba.njit(nogil=True, fastmath=False if exact else set(REORDERED))(function))

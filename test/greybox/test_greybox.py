@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import warnings
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
@@ -16,6 +16,7 @@ from xy_sim.parts import PARTS
 from xy_sysid.axis.model import STANDARD, AxisModel, simulate
 from xy_sysid.errors import BadInput
 from xy_sysid.excitation.lockstep import drive
+from xy_sysid.greybox import least_squares
 from xy_sysid.greybox.floor import bands, count_size, encoder_noise
 from xy_sysid.greybox.free_run import AxisData, GreyboxFit, fit_base, fit_with, look, prepare
 from xy_sysid.greybox.one_step import one_step_fit
@@ -41,7 +42,7 @@ MACHINES = {"gravity": ("joint.yaml", {"travel_min": -2.9, "travel_max": 2.9, "b
 LOOSE = {"hardening_stiffness.linear", "presliding_hysteresis.damping"}  # next to zero, or next to unseen
 
 
-@cache
+@functools.cache
 def voltage(seconds: float, seed: int = 5) -> FloatArray:
     """Band noise of 1 V rms up to 300 Hz, and slow waves that make the axis travel."""
     n = int(seconds * RATE) + 1
@@ -83,7 +84,7 @@ def test_a_drive_that_is_wired_the_other_way_round_meets_the_same_spring(name: s
         assert found.parameter(key).value == pytest.approx(truth.values()[key], rel=0.05), key
 
 
-@cache
+@functools.cache
 def machine_data(name: str, seconds: float = 30.0) -> AxisData:
     """The rigid machine of the other package, or its joint, with one effect of its default size."""
     file, excite = MACHINES.get(name, ("rigid.yaml", {}))
@@ -94,7 +95,7 @@ def machine_data(name: str, seconds: float = 30.0) -> AxisData:
     return prepare(recording.sampling_rate, *recording.axis("x"))
 
 
-@cache
+@functools.cache
 def machine_base(name: str) -> GreyboxFit:
     return fit_base(machine_data(name))
 
@@ -174,6 +175,17 @@ def test_the_same_data_give_the_same_fit_bit_for_bit() -> None:
     """No hidden randomness."""
     data = machine_data("none")
     assert fit_base(data).parameters == fit_base(data).parameters
+
+
+def test_a_fit_is_the_same_on_one_core_and_on_three(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Derivatives are worked out on all cores at once: bit for bit as one after the other, with effects that have states of their own."""
+    _, data = own("presliding_hysteresis", 8.0)
+    fits = []
+    for cores in (1, 3):
+        monkeypatch.setattr(least_squares, "_cores", functools.partial(int, cores))
+        fits.append(fit_with(data, fit_base(data), ["presliding_hysteresis"]))
+    assert fits[0].model == fits[1].model and fits[0].runs == fits[1].runs
+    assert np.array_equal(fits[0].error, fits[1].error)
 
 
 def test_data_that_cannot_be_fitted_are_refused() -> None:

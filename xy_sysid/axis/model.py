@@ -145,7 +145,7 @@ class AxisModel:
 def simulator(
     library: Library, active: Iterable[str], sampling_rate: float, voltage: FloatArray, position: FloatArray, fine: float = FINE
 ) -> Callable[[FloatArray], FloatArray]:
-    """A function from parameters to the simulated velocity (n - 1,), m/s, for many runs on the same data.
+    """A function from parameters to the simulated velocity (n - 1,), m/s, for many runs on the same data, several at once too.
 
     Its argument is a row: gain, delay, pole, then each active effect's parameters, in the order of ``active``.
     voltage, position: (n,) V and m; the voltage of sample k is held to k + 1; fine: Hz, sub-steps for what heeds speed
@@ -156,13 +156,14 @@ def simulator(
     x = np.ascontiguousarray(position, dtype=np.float64)
     chosen = [library[name] for name in active]
     library = library.looped(chosen)
-    row = np.ones(len(library.places))
+    ones = np.ones(len(library.places))
     where = np.array([library.places[name] for name in (*BASE, *(f"{effect.name}.{key}" for effect in chosen for key in effect.names))])
     names = [effect.name for effect in library.acting]
     sizes = [(names.index(effect.name), library.places[f"{effect.name}.{effect.names[0]}"]) for effect in chosen]
     kernel = library.kernel
 
     def run(parameters: FloatArray) -> FloatArray:
+        row = ones.copy()
         row[where] = parameters
         on = np.zeros(len(names), dtype=np.uint8)
         for place, size in sizes:

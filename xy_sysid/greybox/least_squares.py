@@ -7,7 +7,9 @@ simulation, taken anew only when a step did not do what they promised, and else 
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Literal
 
@@ -101,28 +103,31 @@ def solve(
 ) -> Solution:
     """The parameters that explain a target best.
 
-    run: parameters -> velocity (n,); schedule: the weights are worked out before each round; known: derivatives, nearly, as of ``Solution``
+    run: parameters -> velocity (n,), called from several threads at once; schedule: the weights are worked out before each round;
+    known: derivatives, nearly, as of ``Solution``
     """
     windows, least, layout = target.windows, target.least, target.windows.layout
     measured = windows.spectrum(target.velocity)
-    runs = 0
+    runs = 1
 
     def left(inner: FloatArray) -> NDArray[np.complex128]:
-        nonlocal runs
-        runs += 1
         return np.asarray(measured - windows.spectrum(run(scale.outer(inner))))
 
     def slopes(inner: FloatArray, error: NDArray[np.complex128], old: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """New ones, as far as there is time."""
-        taken = old.copy()
-        for k in range(inner.size):
+        """New ones, as far as there is time; on all cores, as a simulation leaves the interpreter to others."""
+        nonlocal runs
+        runs += inner.size
+
+        def slope(k: int) -> NDArray[np.complex128]:
             if schedule.late():
-                break
+                return np.asarray(old[k])
             step = STEP if scale.outer(inner)[k] < scale.high[k] else -STEP
             moved = inner.copy()
             moved[k] += step
-            taken[k] = (left(moved) - error) / step
-        return taken
+            return np.asarray((left(moved) - error) / step)
+
+        with ThreadPoolExecutor(min(inner.size, _cores())) as pool:
+            return np.array(list(pool.map(slope, range(inner.size))))
 
     inner = scale.inner(start)
     error = left(inner)
@@ -146,7 +151,7 @@ def solve(
             move = _move(normal + damping * np.diag(diagonal), slope, scale, scale.outer(inner))
             move *= min(1.0, 2.0 / float(np.max(np.abs(move)) + 1e-300))
             trial = scale.inner(scale.outer(inner + move))
-            found = left(trial)
+            found, runs = left(trial), runs + 1
             new = _cost(found * weight)
             if np.isfinite(new) and new < cost:
                 fall, gone = (cost - new) / cost, trial - inner
@@ -183,6 +188,11 @@ def solve(
         converged=converged,
         change=change,
     )
+
+
+def _cores() -> int:
+    """How many this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _move(normal: FloatArray, slope: FloatArray, scale: Scale, values: FloatArray) -> FloatArray:
