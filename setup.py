@@ -34,7 +34,7 @@ setup(
         (f"share/{NAME}/launch", files("launch/*.py")),
     ],
     zip_safe=False,
-    install_requires=["numpy", "scipy", "numba", "rosbags", "pydantic>=2", "typer", "rich", "plotly", "joblib", "pyyaml", ISAL],
+    install_requires=["numpy", "scipy", "numba", "rosbags", "pydantic>=2", "typer", "rich", "plotly", "threadpoolctl", "pyyaml", ISAL],
     extras_require={
         "ros": [
             f"ros-jazzy-rclpy[fastrtps]==7.1.6; {ROS_WHEELS}",
@@ -44,7 +44,7 @@ setup(
         "figures": ["matplotlib"],
         "control": ["control"],
         "docs": ["mkdocs-material", "mkdocstrings[python]"],
-        "bench": ["scikit-rf", "pyFRF", "threadpoolctl"],
+        "bench": ["scikit-rf", "pyFRF"],
         "test": [
             "matplotlib",
             "nicegui>=3.13,<4",
@@ -58,7 +58,7 @@ setup(
             "types-PyYAML",
             "types-setuptools",
             "pre-commit",
-            "threadpoolctl",
+            "joblib",
             "control",
             "colcon-core",
             "colcon-ros",

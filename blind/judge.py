@@ -69,9 +69,9 @@ def run(case: Case, folder: Path | None = None) -> Judged:
     recording = recorded(case, folder)
     machine, seen = case.exact(), recording.seen
     u, y = recording.voltage, recording.position
-    begun = time.thread_time()
-    found = diagnose(recording.rate, u, y, clock=time.thread_time)
-    seconds = time.thread_time() - begun
+    begun = time.process_time()
+    found = diagnose(recording.rate, u, y, clock=time.process_time)
+    seconds = time.process_time() - begun
     named = found.effects if found.verdict == "missing_effect" else ()
     one = len(case.truth) == 1 and not case.nuisance
     if not case.known:

@@ -30,6 +30,11 @@ def compiled(function: Callable[P, R], exact: bool = True) -> Callable[P, R]:
     return cast("Callable[P, R]", numba.njit(cache=True, nogil=True, fastmath=False if exact else set(REORDERED))(function))
 
 
+def cores() -> int:
+    """How many threads may calculate at once: those that this process may use, or the environment's NUMBA_NUM_THREADS."""
+    return int(vars(numba.config)["NUMBA_NUM_THREADS"])  # its module of settings declares none of them
+
+
 class TextLoader(importlib.abc.InspectLoader):
     """A module whose source is a text in memory and whose names are given; file: where numba's cache is to be kept beside."""
 

@@ -182,7 +182,7 @@ def test_a_fit_is_the_same_on_one_core_and_on_three(monkeypatch: pytest.MonkeyPa
     _, data = own("presliding_hysteresis", 8.0)
     fits = []
     for cores in (1, 3):
-        monkeypatch.setattr(least_squares, "_cores", functools.partial(int, cores))
+        monkeypatch.setattr(least_squares, "cores", functools.partial(int, cores))
         fits.append(fit_with(data, fit_base(data), ["presliding_hysteresis"]))
     assert fits[0].model == fits[1].model and fits[0].runs == fits[1].runs
     assert np.array_equal(fits[0].error, fits[1].error)

@@ -45,7 +45,7 @@ def diagnose(
 
         def work(name: str) -> Diagnosis:
             bar.update(task, description=f"diagnosing axis {name}")
-            found = logic(runs_of(recordings, name), known, budget, time.thread_time)
+            found = logic(runs_of(recordings, name), known, budget, time.process_time)
             bar.advance(task)
             return found
 

@@ -71,7 +71,7 @@ def refine(
         def work(name: str) -> Ladder:
             bar.update(task, description=f"refining axis {name}")
             runs = runs_of(recordings, name)
-            run, effort = runs[0], Effort(MOST_EFFECTS if auto else 0, budget, time.thread_time)
+            run, effort = runs[0], Effort(MOST_EFFECTS if auto else 0, budget, time.process_time)
             found = refined(runs, tuple(add or ()), known, effort, tolerance).ladder
             if not found.final.model.ahead and len(runs) == 1:  # free simulation says nothing about those
                 if simulate_alone:

@@ -7,7 +7,6 @@ simulation, taken anew only when a step did not do what they promised, and else 
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 
 from xy_sysid.effects._contract import in_time
 from xy_sysid.greybox.floor import Bands, Floor, Windows, excess, tolerance
+from xy_sysid.jit import cores
 from xy_sysid.samples.block import FloatArray
 
 TRUSTED = 0.25  # a step whose fall differs by less than this part from the one expected needs no new derivatives; with 0.75 long valleys take longer
@@ -126,7 +126,7 @@ def solve(
             moved[k] += step
             return np.asarray((left(moved) - error) / step)
 
-        with ThreadPoolExecutor(min(inner.size, _cores())) as pool:
+        with ThreadPoolExecutor(min(inner.size, cores())) as pool:
             return np.array(list(pool.map(slope, range(inner.size))))
 
     inner = scale.inner(start)
@@ -188,11 +188,6 @@ def solve(
         converged=converged,
         change=change,
     )
-
-
-def _cores() -> int:
-    """How many this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _move(normal: FloatArray, slope: FloatArray, scale: Scale, values: FloatArray) -> FloatArray:

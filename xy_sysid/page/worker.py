@@ -56,7 +56,7 @@ class Desk:
             self._perform(order, Job(act="begin", run=run, story=None, effects=(), tolerance=EPSILON))
             story = self._stories[order.axis]
         if order.act == "diagnose":  # the data are the same as before: the model stays what it is
-            self._keep(order, diagnosed(story, run, self._library, time.thread_time))
+            self._keep(order, diagnosed(story, run, self._library, time.process_time))
         elif order.act == "add":
             self._keep(order, added(story, run, order.argument, self._library))
         elif order.act == "remove":
@@ -68,7 +68,7 @@ class Desk:
         """Each step is shown as it comes."""
         from xy_sysid.story.acts import perform
 
-        for _, made in perform(job, self._library, time.thread_time):
+        for _, made in perform(job, self._library, time.process_time):
             if made is not None:
                 self._keep(order, made)
 

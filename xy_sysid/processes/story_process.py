@@ -131,7 +131,7 @@ def work(pipe: Connection, effect_files: tuple[str, ...]) -> None:
         while True:
             number, job = pipe.recv()
             try:
-                for doing, story in perform(job, known, time.thread_time):
+                for doing, story in perform(job, known, time.process_time):
                     text = "" if story is None else json.dumps(document(story), allow_nan=False, separators=(",", ":"))
                     pipe.send(JobNews(number, doing, story, text))
                 pipe.send(JobNews(number, "", ended=True))

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
 
+from threadpoolctl import threadpool_limits
+
 from xy_sysid.axis.model import STANDARD, Library
 from xy_sysid.comparison.physical_model import PhysicalModel
 from xy_sysid.errors import BadInput
@@ -105,12 +107,13 @@ def diagnose(data: Data, library: Library = STANDARD, budget: float = BUDGET, cl
     """Which physical effects the rigid model misses, with evidence and runner-up; or that nothing is missing, or that none is known.
 
     data:   a run or several of one axis, V and m; library: with effects of your own (``files.effects.library``)
-    budget: s after which the best so far is said, if ``clock`` (for example ``time.thread_time``) tells the time; else it takes as
+    budget: s after which the best so far is said, if ``clock`` (for example ``time.process_time``) tells the time; else it takes as
             long as it takes, and the same data give the same answer on any machine
     Too little data is an answer, ``not_enough_data``, and no error. Raises BadInput for runs that do not belong together.
     """
     runs = runs_together(data)
-    found = one.diagnose_all(runs[0].sampling_rate, [(run.voltage, run.position) for run in runs], library, budget, clock, runs[0].units)
+    with threadpool_limits(1, "blas"):  # as in commands and nodes
+        found = one.diagnose_all(runs[0].sampling_rate, [(run.voltage, run.position) for run in runs], library, budget, clock, runs[0].units)
     values = {item.name: getattr(found, item.name) for item in fields(found)}
     return Diagnosed(**values, runs=runs)
 
@@ -137,8 +140,9 @@ def refined(data: Data, names: tuple[str, ...], library: Library, effort: Effort
     for name in names:
         if library[name].category == "base":
             raise BadInput("add", name, "an effect that is not in every model already", "Leave it out.")
-    prepared = prepare_all(runs[0].sampling_rate, [(run.voltage, run.position) for run in runs], tolerance, runs[0].units)
-    ladder = search(prepared, library, names, effort)
+    with threadpool_limits(1, "blas"):
+        prepared = prepare_all(runs[0].sampling_rate, [(run.voltage, run.position) for run in runs], tolerance, runs[0].units)
+        ladder = search(prepared, library, names, effort)
     digests = tuple(run.digest for run in runs)
     steps = tuple(
         RefinedStep(step.added, PhysicalModel(model=step.fit.model, axis=runs[0].axis, data=digests, units=runs[0].units, fit=step.fit))
