@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import os
 import sqlite3
+import time
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
@@ -149,12 +150,14 @@ def test_settings_are_checked_and_reach_the_node(scene: Scene) -> None:
         """A page that was loaded again, as after a stall of the machine, has forgotten what was typed."""
         if not field.is_visible():
             tab.page.locator("[data-part=excitation]").click()
-        if field.input_value() != "0.5":
+        if field.input_value() != "0.5" or time.monotonic() > pressed[-1] + 20.0:  # a press, too, is lost with a connection
             field.fill("0.5")
             tab.page.locator("[data-apply=x]").click()
-        return says("applied")
+            pressed.append(time.monotonic())
+        return says("applied") or (len(pressed) > 2 and says("nothing was changed"))
 
-    tab.until(applied, 10)
+    pressed = [time.monotonic()]
+    tab.until(applied, 20)
     from rcl_interfaces.srv import GetParameters
 
     answer = world.call(GetParameters, "/xy/excitation/get_parameters", GetParameters.Request(names=["x.rms"]), times=3)

@@ -10,7 +10,7 @@ from nicegui import run, ui
 
 from xy_sysid.errors import BadInput, XySysidError
 from xy_sysid.imports.reading import Reading as FileReading
-from xy_sysid.page.fields import take_over
+from xy_sysid.page.fields import on_press, typed
 from xy_sysid.page.orders import Reading
 from xy_sysid.page.session import Session
 
@@ -100,12 +100,12 @@ class ColumnsDialog:
             ui.table(columns=heads, rows=[dict(zip(HEADS, _cells(one), strict=True)) for one in found.columns]).props("dense flat").classes("columns")
             with ui.element("div").classes("buttons"):
                 self._time = self._column("time", time)
-                self._rate = ui.number("or rate (Hz)", value=None, min=0).props('outlined dense data-pick="rate"')
+                self._rate = typed(ui.number("or rate (Hz)", value=None, min=0)).props('outlined dense data-pick="rate"')
             self._axes = ui.element("div").classes("stack")
             for one in axes:
                 self._add(one)
             with ui.element("div").classes("buttons"):
-                ui.button("Open", on_click=self._open).props('unelevated data-pick="open"')
+                on_press(ui.button("Open").props('unelevated data-pick="open"'), self._typed, self._open)
                 ui.button("Another axis", on_click=lambda: self._add(AxisColumns("", "", ""))).props("flat")
                 ui.button("Cancel", on_click=self._dialog.close).props("flat")
         self._dialog.on("hide", self._dialog.delete)
@@ -118,17 +118,23 @@ class ColumnsDialog:
     def _add(self, one: AxisColumns) -> None:
         with self._axes, ui.element("div").classes("buttons"):
             row = {
-                "axis": ui.input("axis", value=one.axis).props('outlined dense data-pick="axis"').classes("narrow"),
+                "axis": typed(ui.input("axis", value=one.axis)).props('outlined dense data-pick="axis"').classes("narrow"),
                 "input": self._column("input", one.input),
-                "input_unit": ui.input("its unit", placeholder="V, A, N m ...").props('outlined dense data-pick="input-unit"').classes("narrow"),
+                "input_unit": typed(ui.input("its unit", placeholder="V, A, N m ..."))
+                .props('outlined dense data-pick="input-unit"')
+                .classes("narrow"),
                 "output": self._column("output", one.output),
-                "output_unit": ui.input("its unit", placeholder="mm, rad, m/s ...").props('outlined dense data-pick="output-unit"').classes("narrow"),
+                "output_unit": typed(ui.input("its unit", placeholder="mm, rad, m/s ..."))
+                .props('outlined dense data-pick="output-unit"')
+                .classes("narrow"),
             }
         self._rows.append(row)
 
-    async def _open(self) -> None:
+    def _typed(self) -> list[Any]:
+        return [self._rate, *(field for row in self._rows for field in row.values())]
+
+    def _open(self) -> None:
         try:
-            await take_over([self._rate, *(field for row in self._rows for field in row.values())])
             axes = [AxisColumns(**{name: _text(element.value) for name, element in row.items()}) for row in self._rows]
             reading = reading_of(_text(self._time.value), self._rate.value or None, axes, self._session.reading)
             self._session.open(self._session.shelf.find(self._name), self._name, reading)

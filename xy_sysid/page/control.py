@@ -9,7 +9,7 @@ from nicegui import run, ui
 from xy_sysid.errors import XySysidError
 from xy_sysid.page.buttons import heeded
 from xy_sysid.page.facts import dropped_words, seconds_text
-from xy_sysid.page.fields import take_over
+from xy_sysid.page.fields import on_press, typed
 from xy_sysid.page.session import Session
 from xy_sysid.page.settings_form import SettingsForm
 
@@ -158,11 +158,11 @@ class Control:
     # record
 
     def _bag(self) -> None:
-        self._name = (
-            ui.input("name of the bag", value=f"xy_{time.strftime('%Y-%m-%d_%H-%M-%S')}").props("outlined dense data-part=bag").style("width:100%")
-        )
+        self._name = typed(ui.input("name of the bag", value=f"xy_{time.strftime('%Y-%m-%d_%H-%M-%S')}"))
+        self._name.props("outlined dense data-part=bag").style("width:100%")
         with ui.element("div").classes("buttons"):
-            self._begin = ui.button("Record", on_click=self._record).props("outline dense no-caps data-act=record")
+            self._begin = ui.button("Record").props("outline dense no-caps data-act=record")
+            on_press(self._begin, lambda: [self._name], self._record)
             self._end = ui.button("Finish", on_click=self._finish).props("outline dense no-caps data-act=finish")
             self._open = ui.button("Open it", on_click=self._show).props("outline dense no-caps data-act=open-bag")
         self._told = ui.label("").classes("soft small")
@@ -174,10 +174,9 @@ class Control:
         self._open.set_enabled(recorder.last is not None and not recorder.running)
         self._told.set_text(recorder.words() or f"Bags go to the folder {self._session.shelf.folder.name}.")
 
-    async def _record(self) -> None:
+    def _record(self) -> None:
         session = self._session
         try:
-            await take_over([self._name])
             session.recorder.start(session.shelf.new(str(self._name.value or "").strip()), session.namespace)
         except XySysidError as problem:
             session.say(str(problem))

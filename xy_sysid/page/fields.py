@@ -1,36 +1,36 @@
-"""What a field shows is what counts: text that was typed while the connection was away has never reached the page's server."""
+"""What a field shows is what counts: it goes with the press of a button, as text typed while the connection was away never reached the server."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, TypeVar
 
 from nicegui import ui
+from nicegui.events import GenericEventArguments
 
-from xy_sysid.errors import XySysidError
-
-WAIT = 5.0  # s for the browser to answer
-READ = """return Object.fromEntries(%s.map(id => {
-    const field = getElement(id), box = field && ((field.$refs && field.$refs.qRef) || field).nativeEl;
-    return [id, box ? box.value : null];
-}))"""
+F = TypeVar("F", ui.input, ui.number)
+SHOWN = "() => emit(Object.fromEntries([...document.querySelectorAll('input[data-typed]')].map(box => [box.dataset.typed, box.value])))"
 
 
-async def take_over(fields: Iterable[Any]) -> None:
-    """Give text and number fields the values that the browser shows in them; others have only values that the server gave.
+def typed(field: F) -> F:
+    """The same field, whose text goes with every press of ``on_press``."""
+    field.props(f"data-typed={field.id}")
+    return field
 
-    Called in the browser's context. Raises XySysidError when the browser does not answer.
-    """
-    typed: dict[str, Any] = {str(field.id): field for field in fields if isinstance(field, (ui.input, ui.number))}
-    try:
-        shown = await ui.run_javascript(READ % json.dumps([int(one) for one in typed]), timeout=WAIT)
-    except TimeoutError:
-        raise XySysidError(f"The browser did not answer within {WAIT:g} s, so that what it shows is not known. Press again.") from None
-    for one, text in shown.items():
+
+def on_press(button: ui.button, fields: Callable[[], Iterable[Any]], act: Callable[[], object]) -> None:
+    """Do something at a press of a button, when those of the fields that are ``typed`` have the values that the browser shows in them."""
+
+    def pressed(event: GenericEventArguments) -> None:
+        take_over(fields(), event.args)
+        act()
+
+    button.on("click", pressed, js_handler=SHOWN)
+
+
+def take_over(fields: Iterable[Any], shown: Mapping[str, str]) -> None:
+    """shown: text of typed fields, by their number."""
+    for field in fields:
+        text = shown.get(str(field.id))
         if text is not None:
-            typed[one].set_value(_number(text) if isinstance(typed[one], ui.number) else text)
-
-
-def _number(text: str) -> float | None:
-    return float(text) if text else None
+            field.set_value((float(text) if text else None) if isinstance(field, ui.number) else text)

@@ -6,8 +6,8 @@ from typing import Any
 
 from nicegui import ui
 
-from xy_sysid.errors import BadInput, XySysidError
-from xy_sysid.page.fields import take_over
+from xy_sysid.errors import BadInput
+from xy_sysid.page.fields import on_press, typed
 from xy_sysid.page.session import Session
 from xy_sysid.settings import AxisExcitation, Knob, changed, knobs
 from xy_sysid.units import USUAL, Units
@@ -72,7 +72,7 @@ class SettingsForm:
                 for item in rest:
                     self._field(item)
             with ui.element("div").classes("buttons"):
-                ui.button("Apply", on_click=self._apply).props(f"outline dense no-caps data-apply={axis}")
+                on_press(ui.button("Apply").props(f"outline dense no-caps data-apply={axis}"), self._fields.values, self._apply)
                 ui.button("As the node has it", on_click=self.read).props("flat dense no-caps")
                 self._told = ui.label("").classes("small").props(f"role=status aria-live=polite data-told={axis}")
         self._said = ("", True)
@@ -89,7 +89,7 @@ class SettingsForm:
         if item.choices:
             made: Any = ui.select(list(item.choices), label=labelled(item), value=item.value)
         else:
-            made = ui.number(labelled(item), value=item.value)  # no min and max: a wrong value is refused in words, not silently changed
+            made = typed(ui.number(labelled(item), value=item.value))  # no min and max: a wrong value is refused in words, not silently changed
         made.props(f"outlined dense data-knob={self._axis}.{item.name}")
         with made:
             self._tips[item.name] = ui.tooltip(f"{item.meaning}; {limits(item)}")
@@ -121,11 +121,10 @@ class SettingsForm:
                 self._fields[item.name].update()
                 self._tips[item.name].set_text(f"{item.meaning}; {limits(item, units)}")
 
-    async def _apply(self) -> None:
+    def _apply(self) -> None:
         try:
-            await take_over(self._fields.values())
             wanted = changes(self._now, {name: field.value for name, field in self._fields.items()})
-        except XySysidError as problem:
+        except BadInput as problem:
             self._said = (str(problem), False)
             return
         if not wanted:
