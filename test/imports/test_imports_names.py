@@ -62,7 +62,11 @@ def test_headers_in_any_case_and_spelling(tmp_path: Path, time: str, voltage: st
         ("x position command", "reference", "x", ""),
         ("current_A", "input", "", "A"),
         ("voltage_a", "input", "a", ""),
+        ("current_a", "input", "a", ""),
         ("speed_rpm", "output", "", "rpm"),
+        ("speed RPM", "output", "", "rpm"),
+        ("torque_nm", "input", "", "Nm"),
+        ("effort_Nm", "input", "", "Nm"),
         ("joint1_effort", "input", "joint1", ""),
     ],
 )
@@ -141,6 +145,33 @@ def test_a_row_for_each_joint(tmp_path: Path) -> None:
     assert (recording.axes, recording.input_unit, recording.output_unit, len(recording)) == (("shoulder", "elbow_2"), "A", "rad", len(T))
     np.testing.assert_allclose(recording.position[:, 1], 2 * Y)
     assert load(tmp_path / "data.csv", axes=["elbow_2"]).axes == ("elbow_2",)
+
+
+def echoed(path: Path, joints: Sequence[str], groups: Sequence[Sequence[FloatArray]]) -> Path:
+    """What ros2 topic echo --csv prints of joint states: each field after the other, an empty cell for an empty array."""
+    rows = []
+    for k, at in enumerate(T):
+        stamp = 1_700_000_000_987_654_321 + round(at * 1e9)
+        fields = [[stamp // 10**9, stamp % 10**9, ""], joints, *([repr(float(one[k])) for one in group] or [""] for group in groups)]
+        rows.append(",".join(str(cell) for field in fields for cell in field))
+    file = path / "echo.csv"
+    file.write_text("\n".join(rows) + "\n", "utf-8")
+    return file
+
+
+def test_what_topic_echo_prints_of_joint_states_needs_no_names(tmp_path: Path) -> None:
+    """Two joints with all they have; one without velocities, whose empty array is an empty cell; the time is that of the stamps."""
+    both = load(echoed(tmp_path, ("left", "right"), [(Y, 2.0 * Y), (U, U), (U, 3.0 * U)]))
+    assert both.axes == ("left", "right") and both.sampling_rate == pytest.approx(RATE, rel=1e-9)
+    np.testing.assert_allclose(both.voltage, np.column_stack((U, 3.0 * U)))
+    np.testing.assert_allclose(both.position, np.column_stack((Y, 2.0 * Y)), atol=1e-15)
+    one = load(echoed(tmp_path, ("slider",), [(Y,), (), (U,)]))
+    assert one.axes == ("slider",) and one.measured == "position"
+    np.testing.assert_allclose(one.voltage[:, 0], U)
+    speeds = load(echoed(tmp_path, ("slider",), [(), (Y,), (U,)]))
+    assert speeds.measured == "velocity"
+    with pytest.raises(BadRecording, match="slider_position"):
+        load(echoed(tmp_path, ("slider",), [(Y,), (), ()]))  # nothing that drives
 
 
 def test_rows_of_their_own_for_input_and_output(tmp_path: Path) -> None:

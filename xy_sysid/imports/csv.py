@@ -1,6 +1,7 @@
 """CSV --> columns, and a recording --> CSV.
 
 The first row names the columns, with the unit in brackets where it is not SI: ``x_position[mm]`` or ``x_position (mm)``.
+What ``ros2 topic echo --csv`` prints has no such row (``imports.echoed``).
 Columns are separated by comma, semicolon or tab; with the last two the decimal sign may be a comma.
 """
 
@@ -11,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from xy_sysid.errors import BadRecording
+from xy_sysid.imports.echoed import joint_states, stamped
 from xy_sysid.imports.foreign_units import unit_of
 from xy_sysid.imports.limits import MOST_COLUMNS
 from xy_sysid.imports.names import header
@@ -41,7 +43,11 @@ def sheet(path: Path) -> Sheet:
     cells = _cells(head, separator)
     while len(cells) > 1 and not cells[-1]:
         cells.pop()
-    if all(_is_number(cell, separator) for cell in cells):
+    joints = joint_states(cells) if separator == "," else None
+    if joints is not None:
+        names = [(name, "") for name in joints]
+        notes.append("rows without names are read as ros2 topic echo --csv prints sensor_msgs/JointState")
+    elif all(_is_number(cell, separator) for cell in cells):
         notes.append("the first row holds numbers and no names; the columns are called by their numbers from 1 on")
         names = [(str(number), "") for number in range(1, len(cells) + 1)]
     else:
@@ -50,7 +56,7 @@ def sheet(path: Path) -> Sheet:
     if not text.endswith(("\n", "\r")):
         rows = _whole(rows, separator, len(names), notes)
     columns, bad = _columns(path, rows, separator, names)
-    return Sheet(path=path, columns=columns, notes=tuple(notes), bad=bad)
+    return Sheet(path=path, columns=columns if joints is None else stamped(columns), notes=tuple(notes), bad=bad)
 
 
 def _separator(line: str) -> str:

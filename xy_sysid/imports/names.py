@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from xy_sysid.imports.foreign_units import KNOWN, Quantity, unit_of
+from xy_sysid.imports.foreign_units import DRIVES, FOLDED, KNOWN, Quantity, unit_of
 from xy_sysid.imports.sheet import spoken
 
 HEADER = re.compile(r"^\s*(?P<name>.*?)\s*(?:[\[\(]\s*(?P<unit>[^\]\)]*?)\s*[\]\)])?\s*$")
@@ -108,14 +108,17 @@ def _hits(word: str) -> list[tuple[str, Quantity, int]]:
 
 
 def _unit(name: str, unit: str, words: list[str]) -> tuple[str, list[str]]:
-    """A unit at the end of a name (time_ms, pos_mm, speed_rpm) where it fits what stands before it."""
+    """A unit at the end of a name (time_ms, pos_mm, speed_rpm, torque_nm) where it fits what stands before it."""
     last = re.split(r"[\s_.\-/]+", name.strip())[-1]
-    if unit or last not in KNOWN or len(words) < 2 or words[-1] != last.casefold():
+    if unit or len(words) < 2 or words[-1] != last.casefold():
         return unit, words
-    fits = KNOWN[last].quantity
     before = [hit for word in words[:-1] for hit in _hits(word)]
-    if any(quantity == fits or (role == "input" and quantity == "command" and fits != "time") for role, quantity, _ in before):
-        return last, words[:-1]
+    spellings = [last, *FOLDED.get(last.casefold(), [])] if len(last) > 1 else [last]  # a single letter may be an axis
+    for spelling in spellings:
+        fits = KNOWN[spelling].quantity if spelling in KNOWN else "unknown"
+        drives = {"command": fits != "time", "unknown": fits in DRIVES}  # of an effort nothing is known but that it drives
+        if fits != "unknown" and any(quantity == fits or (role == "input" and drives.get(quantity, False)) for role, quantity, _ in before):
+            return spelling, words[:-1]
     return unit, words
 
 
