@@ -19,9 +19,6 @@ if TYPE_CHECKING:
     from xy_sysid.imports.reading import Reading
     from xy_sysid.response.distortion import Distortion
 
-KINDS = ("", ".db3", ".mcap", ".csv", ".txt", ".tsv", ".npz", ".mat")  # endings of recordings
-
-
 Inputs = Annotated[
     list[Path],
     typer.Argument(
@@ -110,8 +107,10 @@ def compare(
 
 def _model_last(given: list[Path]) -> tuple[list[Path], Path | None]:
     """Recordings, and the model after them: a last argument that no recording is called like."""
+    from xy_sysid.imports import TABLES
+
     *first, last = given
-    is_model = bool(first) and last.suffix.lower() not in KINDS and not last.is_dir()
+    is_model = bool(first) and last.suffix.lower() not in ("", ".db3", ".mcap", *TABLES) and not last.is_dir()
     return (first, last) if is_model else (given, None)
 
 

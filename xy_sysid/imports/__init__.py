@@ -38,7 +38,7 @@ from xy_sysid.samples.recording import Recording
 
 ROWS = 20  # samples in one message of a bag that is written here
 KINDS = "a rosbag2 folder, .db3, .mcap, .csv, .mat, .npz"
-TABLES = (".csv", ".txt", ".tsv", ".npz", ".mat")
+TABLES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".lvm", ".prn", ".log", ".npz", ".mat")
 CSV_COPIES = 2  # bytes in memory for one in the file
 
 __all__ = ["Reading", "blocks", "kind_of", "load", "save", "sheet_of", "writer_of"]

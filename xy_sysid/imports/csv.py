@@ -1,8 +1,7 @@
 """CSV --> columns, and a recording --> CSV.
 
 The first row names the columns, with the unit in brackets where it is not SI: ``x_position[mm]`` or ``x_position (mm)``.
-What ``ros2 topic echo --csv`` prints has no such row (``imports.echoed``).
-Columns are separated by comma, semicolon or tab; with the last two the decimal sign may be a comma.
+Columns are separated by comma, semicolon, tab or blanks; but for the first the decimal sign may be a comma (``imports.text_table``).
 """
 
 from __future__ import annotations
@@ -12,72 +11,30 @@ from pathlib import Path
 import numpy as np
 
 from xy_sysid.errors import BadRecording
-from xy_sysid.imports.echoed import joint_states, stamped
-from xy_sysid.imports.foreign_units import unit_of
+from xy_sysid.imports.echoed import stamped
 from xy_sysid.imports.limits import MOST_COLUMNS
-from xy_sysid.imports.names import header
 from xy_sysid.imports.sheet import Column, Sheet
+from xy_sysid.imports.text_table import BLANKS, MISSING, Names, Rows, cells_of, is_number, number_of, text_table
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import Recording, rate_from_time
 
-MISSING = ("", "nan", "na", "n/a", "null", "none", "-", "inf", "-inf")
 EXAMPLE = "Name the columns like time,x_voltage,x_position[mm] in the first row."
 LOOK = 200  # rows before the last one that show how its numbers are written
-Rows = list[tuple[int, str]]
-Names = list[tuple[str, str]]  # with their units
 
 
 def sheet(path: Path) -> Sheet:
     """The columns of a file; what is not a number is told when its column is used."""
     text = _text(path)
     notes: list[str] = []
-    rows = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip() and not line.lstrip().startswith("#")]
-    if not rows:
+    found = text_table(text, notes)
+    if not found.names:
         raise BadRecording(path, "the file holds no rows", EXAMPLE)
-    rows = _without_titles(rows, notes)
-    head = rows[0][1]
-    separator = _separator(head)
-    if head.count(separator) >= MOST_COLUMNS:
-        problem = f"its first row has {head.count(separator) + 1} cells, and {MOST_COLUMNS} columns are read at most"
+    if len(found.names) > MOST_COLUMNS:
+        problem = f"its first row has {len(found.names)} cells, and {MOST_COLUMNS} columns are read at most"
         raise BadRecording(path, problem, "Give a file with one column per signal.")
-    cells = _cells(head, separator)
-    while len(cells) > 1 and not cells[-1]:
-        cells.pop()
-    joints = joint_states(cells) if separator == "," else None
-    if joints is not None:
-        names = [(name, "") for name in joints]
-        notes.append("rows without names are read as ros2 topic echo --csv prints sensor_msgs/JointState")
-    elif all(_is_number(cell, separator) for cell in cells):
-        notes.append("the first row holds numbers and no names; the columns are called by their numbers from 1 on")
-        names = [(str(number), "") for number in range(1, len(cells) + 1)]
-    else:
-        names, rows = [header(cell) for cell in cells], rows[1:]
-        names, rows = _with_units(names, rows, separator)
-    if not text.endswith(("\n", "\r")):
-        rows = _whole(rows, separator, len(names), notes)
-    columns, bad = _columns(path, rows, separator, names)
-    return Sheet(path=path, columns=columns if joints is None else stamped(columns), notes=tuple(notes), bad=bad)
-
-
-def _separator(line: str) -> str:
-    return max(";\t,", key=line.count) if any(sign in line for sign in ";\t,") else ","
-
-
-def _without_titles(rows: Rows, notes: list[str]) -> Rows:
-    """Without lines of one cell before a table of several columns: titles, dates, remarks."""
-    many = [len(_cells(line, _separator(line))) > 1 for _, line in rows[:LOOK]]
-    first = many.index(True) if any(many) else 0
-    if first:
-        notes.append(f"row {rows[0][0]} to {rows[first - 1][0]} are no columns ({rows[0][1][:40]!r}); they are left out")
-    return rows[first:]
-
-
-def _with_units(names: Names, rows: Rows, separator: str) -> tuple[Names, Rows]:
-    """Units from a row of their own below the names."""
-    cells = _cells(rows[0][1], separator)[: len(names)] if rows else []
-    if len(cells) < len(names) or any(_is_number(cell, separator) or unit_of(cell).quantity == "unknown" for cell in cells if cell) or not any(cells):
-        return names, rows
-    return [(name, unit or cell) for (name, unit), cell in zip(names, cells, strict=True)], rows[1:]
+    rows = found.rows if text.endswith(("\n", "\r")) else _whole(found.rows, found.separator, len(found.names), notes)
+    columns, bad = _columns(path, rows, found.separator, found.names)
+    return Sheet(path=path, columns=stamped(columns) if found.stamped else columns, notes=tuple(notes), bad=bad)
 
 
 def _text(path: Path) -> str:
@@ -93,42 +50,15 @@ def _text(path: Path) -> str:
     raise BadRecording(path, "not a text file", "Save it as CSV in UTF-8.")
 
 
-def _cells(line: str, separator: str) -> list[str]:
-    """The cells of a row; a separator within quotes belongs to its cell."""
-    if '"' not in line:
-        return [cell.strip() for cell in line.split(separator)]
-    cells, part, quoted = [], "", False
-    for sign in line:
-        quoted ^= sign == '"'
-        if sign == separator and not quoted:
-            cells.append(part)
-            part = ""
-        elif sign != '"':
-            part += sign
-    return [cell.strip() for cell in (*cells, part)]
-
-
-def _number(cell: str, separator: str) -> float:
-    """Its number, not a number where it says so; raises ValueError."""
-    return np.nan if cell.lower() in MISSING else float(cell.replace(",", ".") if separator != "," else cell)
-
-
-def _is_number(cell: str, separator: str) -> bool:
-    try:
-        return bool(np.isfinite(_number(cell, separator)))
-    except ValueError:
-        return False
-
-
 def _whole(rows: Rows, separator: str, width: int, notes: list[str]) -> Rows:
     """The rows without the last, if the file ends inside it: too few cells, or a number shorter than the others are written."""
     if not rows:
         return rows
     number, line = rows[-1]
-    cells = _cells(line, separator)
-    before = [_cells(text, separator) for _, text in rows[-1 - LOOK : -1]]
+    cells = cells_of(line, separator)
+    before = [cells_of(text, separator) for _, text in rows[-1 - LOOK : -1]]
     least = min((_digits(one[width - 1]) for one in before if len(one) >= width), default=0)
-    cut = len(cells) < width or (not _is_number(cells[width - 1], separator) and bool(before) and _is_number(before[-1][-1], separator))
+    cut = len(cells) < width or (not is_number(cells[width - 1], separator) and bool(before) and is_number(before[-1][-1], separator))
     if cut or _digits(cells[width - 1]) < least:
         notes.append(f"the file ends inside row {number} ({line[-20:]!r}); that row is left out")
         return rows[:-1]
@@ -147,7 +77,7 @@ def _columns(path: Path, rows: Rows, separator: str, names: Names) -> tuple[tupl
     table = _quick(rows, separator, width)
     if table is not None:
         return tuple(Column(name, unit, table[:, place]) for place, (name, unit) in enumerate(names)), {}
-    cells = [_cells(line, separator) for _, line in rows]
+    cells = [cells_of(line, separator) for _, line in rows]
     for (number, _), row in zip(rows, cells, strict=True):
         if len(row) < width or any(row[width:]):
             raise BadRecording(path, f"row {number} has {len(row)} columns, the first row {width}", "Give every row the same columns.")
@@ -157,12 +87,12 @@ def _columns(path: Path, rows: Rows, separator: str, names: Names) -> tuple[tupl
         texts = [row[place] for row in cells]
         first = next((text for text in texts if text.lower() not in MISSING), "")
         values = np.full(len(texts), np.nan)
-        if first and not _is_number(first, separator):
+        if first and not is_number(first, separator):
             columns.append(Column(name, unit, values, tuple(texts)))
             continue
         for at, text in enumerate(texts):
             try:
-                values[at] = _number(text, separator)
+                values[at] = number_of(text, separator)
             except ValueError:
                 bad.setdefault(name, f"row {rows[at][0]}, column {name!r}: {text[:40]!r} is not a number")
         columns.append(Column(name, unit, values))
@@ -175,7 +105,7 @@ def _quick(rows: Rows, separator: str, width: int) -> FloatArray | None:
         return np.empty((0, width))
     try:
         text = (line.replace(",", ".") if separator != "," else line for _, line in rows)
-        table = np.loadtxt(text, delimiter=separator, ndmin=2, comments=None)
+        table = np.loadtxt(text, delimiter=None if separator == BLANKS else separator, ndmin=2, comments=None)
     except (ValueError, IndexError):
         return None
     return np.asarray(table) if table.shape == (len(rows), width) else None

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 
 from xy_sysid.errors import BadInput, BadRecording
+from xy_sysid.imports import instants
 from xy_sysid.imports.foreign_units import COUNTS, MOTIONS, Unit, to_si, unit_of
 from xy_sysid.imports.names import meaning, usual_unit
 from xy_sysid.imports.reading import Reading
@@ -68,7 +68,7 @@ def _time(sheet: Sheet, roles: Roles, reading: Reading, notes: list[str]) -> tup
         return None, sheet.fs
     values, unit = roles.time.values, reading.unit("time") or roles.time.unit
     if roles.time.words:
-        return _dates(sheet, roles.time), sheet.fs
+        return instants.seconds(sheet.path, roles.time), sheet.fs
     if not unit:
         known = meaning(roles.time.name, "")
         unit = "" if known is None else known.unit
@@ -89,19 +89,6 @@ def in_seconds(path: Path, values: FloatArray, unit: str, notes: list[str]) -> F
     if found.quantity != "time":
         raise BadRecording(path, f"the unit {unit!r} of the time is none of time", "Give s, ms, us, ns, min or h with --unit time=...")
     return seconds
-
-
-def _dates(sheet: Sheet, column: Column) -> FloatArray:
-    """Seconds from dates like 2026-03-01T12:00:00.001, counted from the first."""
-    found: list[datetime] = []
-    for number, text in enumerate(column.words, 1):
-        try:
-            one = datetime.fromisoformat(text)
-        except ValueError:
-            act = "Give seconds, or dates like 2026-03-01T12:00:00.001."
-            raise BadRecording(sheet.path, f"the time {column.name!r} is {text[:40]!r} in sample {number}", act) from None
-        found.append(one if one.tzinfo else one.replace(tzinfo=UTC))
-    return np.array([(one - found[0]).total_seconds() for one in found])
 
 
 def _values(sheet: Sheet, role: str, columns: Found, axes: tuple[str, ...], reading: Reading, notes: list[str]) -> tuple[FloatArray, Unit]:

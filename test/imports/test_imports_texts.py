@@ -1,0 +1,98 @@
+"""Text files as instruments and programs write them: what stands above the table, what parts its cells, how they tell the time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers.table_making import RATE, T, U, Y
+
+from xy_sysid.errors import BadRecording
+from xy_sysid.imports import load
+from xy_sysid.samples.recording import Recording
+
+TEKTRONIX = "Model,MSO54\nWaveform Type,ANALOG\nHorizontal Units,s\nSample Interval,1e-3\n\n"
+LABVIEW = (
+    "LabVIEW Measurement\t\nWriter_Version\t2\nSeparator\tTab\n***End_of_Header***\t\n\nChannels\t2\t\nSamples\t4\t4\n"
+    "Y_Unit_Label\tVolts\tVolts\nX0\t0.0\t0.0\nDelta_X\t0.001\t0.001\n***End_of_Header***\t\t\n"
+)
+
+
+def written(path: Path, above: str, separator: str = ",", time: Callable[[float], object] = repr, ending: str = "log.csv") -> Path:
+    """A file with T, U and Y below what stands above them."""
+    rows = (separator.join((str(time(float(t))), repr(float(u)), repr(float(y)))) for t, u, y in zip(T, U, Y, strict=True))
+    file = path / ending
+    file.write_text(above + "\n".join(rows) + "\n", "utf-8")
+    return file
+
+
+def assert_read(recording: Recording) -> None:
+    """It holds what was written."""
+    assert recording.axes == ("x",) and recording.sampling_rate == pytest.approx(RATE, rel=1e-6)
+    np.testing.assert_allclose(recording.voltage[:, 0], U, rtol=1e-12)
+    np.testing.assert_allclose(recording.position[:, 0], Y, rtol=1e-12, atol=1e-18)
+
+
+@pytest.mark.parametrize(
+    ("above", "separator", "ending"),
+    [
+        ("time voltage position\n", " ", "log.txt"),
+        ("  Time (s)   Motor Voltage (V)   Encoder position (m)\n", "   ", "log.dat"),
+        ("time,voltage,position\n[s],[V],[m]\n", ",", "log.csv"),
+        (TEKTRONIX + "TIME,VOLTAGE,POSITION\n", ",", "log.csv"),
+        (TEKTRONIX + "time,voltage,position\ns,V,m\n", ",", "log.csv"),
+        (LABVIEW + "time\tVoltage\tPosition\tComment\n", "\t", "log.lvm"),
+        ("A title, with a comma\nand a remark\ntime;voltage;position\n", ";", "log.csv"),
+    ],
+)
+def test_a_table_is_found_below_what_stands_above_it(tmp_path: Path, above: str, separator: str, ending: str) -> None:
+    """Blanks between cells, units in brackets, what oscilloscopes and LabVIEW write first; what is left out is noted."""
+    recording = load(written(tmp_path, above, separator, ending=ending))
+    assert_read(recording)
+    assert any("are no columns" in note for note in recording.notes) == (above.count("\n") > 2)
+
+
+def test_what_numpy_writes_is_read(tmp_path: Path) -> None:
+    """savetxt: blanks, and the names in a remark or nowhere."""
+    table = np.column_stack((T, U, Y))
+    np.savetxt(tmp_path / "named.txt", table, header="t u y")
+    np.savetxt(tmp_path / "plain.txt", table)
+    assert_read(load(tmp_path / "named.txt"))
+    assert_read(load(tmp_path / "plain.txt", columns={"time": "1", "input": "2", "output": "3"}))
+
+
+@pytest.mark.parametrize(
+    "time",
+    [
+        lambda t: f"{t:.3f} sec",
+        lambda t: f"{1e3 * t:.1f}ms",
+        lambda t: f"10:{int(t // 60) + 7:02d}:{t % 60:06.3f}",
+        lambda t: f"{int(t // 60)}:{t % 60:06.3f}",
+        lambda t: f"23.11.2026 10:00:{t:06.3f}",
+        lambda t: f"11/23/2026 1:00:{t:06.3f} PM",
+        lambda t: f"{'24' if t >= 0.1 else '23'}.11.2026 {'00:00' if t >= 0.1 else '23:59'}:{(t + 59.9) % 60:06.3f}",
+        lambda t: f"{'12' if t >= 0.1 else '11'}:{'00' if t >= 0.1 else '59'}:{(t + 59.9) % 60:06.3f} {'AM' if t >= 0.1 else 'PM'}",
+    ],
+    ids=["seconds", "milliseconds", "clock", "minutes", "date", "afternoon", "midnight by date", "midnight by clock"],
+)
+def test_times_in_words_are_understood(tmp_path: Path, time: Callable[[float], object]) -> None:
+    """With a unit, as a clock reads, after a date of any fashion, past midnight."""
+    assert_read(load(written(tmp_path, "Time,voltage,position\n", time=time)))
+
+
+def test_words_that_are_no_time_are_named(tmp_path: Path) -> None:
+    """The first of them, and what is allowed."""
+    with pytest.raises(BadRecording, match=r"the time 'Time' is 'soon' in sample 4\. Give seconds, times like 12:00:00\.001, or dates"):
+        load(written(tmp_path, "Time,voltage,position\n", time=lambda t: "soon" if round(1000 * t) == 3 else f"{t} s"))
+
+
+def test_a_bad_cell_near_the_beginning_is_no_title(tmp_path: Path) -> None:
+    """Rows above it are data: they are not left out, and the cell is named."""
+    file = written(tmp_path, "time,voltage,position\n")
+    lines = file.read_text("utf-8").splitlines()
+    lines[3] = lines[3].replace(lines[3].split(",")[1], "broken")
+    file.write_text("\n".join(lines) + "\n", "utf-8")
+    with pytest.raises(BadRecording, match="row 4, column 'voltage': 'broken' is not a number"):
+        load(file)
