@@ -65,6 +65,10 @@ def test_headers_in_any_case_and_spelling(tmp_path: Path, time: str, voltage: st
         ("current_a", "input", "a", ""),
         ("speed_rpm", "output", "", "rpm"),
         ("speed RPM", "output", "", "rpm"),
+        ("i_q [A]", "input", "", "A"),
+        ("Axis1.SetTorque [%]", "input", "axis1", "%"),
+        ("POS_FBK", "output", "", ""),
+        ("phi (rad)", "output", "", "rad"),
         ("torque_nm", "input", "", "Nm"),
         ("effort_Nm", "input", "", "Nm"),
         ("joint1_effort", "input", "joint1", ""),
@@ -145,6 +149,18 @@ def test_a_row_for_each_joint(tmp_path: Path) -> None:
     assert (recording.axes, recording.input_unit, recording.output_unit, len(recording)) == (("shoulder", "elbow_2"), "A", "rad", len(T))
     np.testing.assert_allclose(recording.position[:, 1], 2 * Y)
     assert load(tmp_path / "data.csv", axes=["elbow_2"]).axes == ("elbow_2",)
+
+
+@pytest.mark.parametrize(("force", "way"), [("F [N]", "x [m]"), ("F", "x"), ("I_motor [A]", "slide [m]"), ("u", "x")])
+def test_units_and_symbols_of_physics_tell_a_role_where_no_name_does(tmp_path: Path, force: str, way: str) -> None:
+    """F and x, or any name whose unit is that of a drive, or of a motion."""
+    assert_the_axis(load(csv_of(tmp_path, {"t": T, force: U, way: Y, "supply [V]": U * 0.0 + 24.0})))
+
+
+def test_two_that_a_unit_alone_would_take_are_asked_about(tmp_path: Path) -> None:
+    """Both have a unit of drives, and no name."""
+    with pytest.raises(BadRecording, match=r"'one' and 'two' may both be the input. Choose one with --map input='one'"):
+        load(csv_of(tmp_path, {"t": T, "one [A]": U, "two [A]": U, "position": Y}))
 
 
 def echoed(path: Path, joints: Sequence[str], groups: Sequence[Sequence[FloatArray]]) -> Path:

@@ -8,30 +8,34 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from xy_sysid.imports.foreign_units import DRIVES, FOLDED, KNOWN, Quantity, unit_of
+from xy_sysid.imports.foreign_units import DRIVES, FOLDED, KNOWN, MOTIONS, Quantity, unit_of
 from xy_sysid.imports.sheet import spoken
 
 HEADER = re.compile(r"^\s*(?P<name>.*?)\s*(?:[\[\(]\s*(?P<unit>[^\]\)]*?)\s*[\]\)])?\s*$")
-TIME = "time t zeit timestamp stamp tijd temps tiempo tempo clock elapsed"
+TIME = "time t zeit timestamp stamp tijd temps tiempo tempo clock elapsed seconds"
 INPUTS: tuple[tuple[Quantity, str], ...] = (
     ("voltage", "voltage volt volts spannung spanning u uin vin"),
     ("command", "input inp command cmd control ctrl duty pwm drive stellgrösse stellgroesse"),
-    ("current", "current curr amps strom stroom"),
+    ("current", "current curr amps iq strom stroom"),
     ("torque", "torque moment drehmoment tau"),
     ("force", "force kraft kracht"),
     ("unknown", "effort"),
 )
 OUTPUTS: tuple[tuple[Quantity, str], ...] = (
-    ("position", "position pos posi positie posizione posicion lage weg angle winkel hoek theta encoder enc displacement output out y q"),
+    ("position", "position pos posi positie posizione posicion lage weg angle winkel hoek theta phi encoder enc displacement output out y q"),
     ("velocity", "velocity vel speed geschwindigkeit drehzahl snelheid omega"),
     ("acceleration", "acceleration accel acc beschleunigung versnelling"),
 )
-REFERENCE = "reference ref setpoint target desired des demand demanded commanded soll sollwert r"
+REFERENCE = "reference ref set setpoint target desired des demand demanded commanded soll sollwert r"
 ASKED = ("command", "cmd", *REFERENCE.split())
 OTHER = "error err fehler noise status state temperature temp bus supply limit diff id index flag mode sigma unit"
-FILLERS = "motor actual act measured meas ist value val signal sig raw filtered data feedback fb joint joints states the axis achse in of root model"
-ANGLES = "angle winkel hoek theta omega drehzahl"
+FILLERS = (
+    "motor actual act measured meas ist value val signal sig raw filtered data feedback fb fbk joint joints states the axis achse in of root model"
+)
+ANGLES = "angle winkel hoek theta phi omega drehzahl"
 LETTERS = ("t", "u", "y", "r", "q")  # roles of one letter give way to a word: y_position is of the axis y
+QUADRATURE = re.compile(r"(?<![a-zA-Z])[iI]_[qQ](?![a-zA-Z])")
+SYMBOLS = {"V": "input", "F": "input", "I": "input", "i": "input", "x": "output"}  # of physics: a role where nothing else has it
 LONG = 5  # letters from which a word counts inside a longer one: motorvoltage
 
 
@@ -60,7 +64,7 @@ def header(cell: str) -> tuple[str, str]:
 
 def meaning(name: str, unit: str) -> Meaning | None:
     """What a name and a unit say, None where they say nothing."""
-    words = [piece for word in spoken(name) for piece in _pieces(word)]
+    words = _words(name)
     unit, words = _unit(name, unit, words)
     if any(word in OTHER.split() for word in words):
         return None
@@ -85,6 +89,19 @@ def meaning(name: str, unit: str) -> Meaning | None:
         quantity = measured
     later = asked and role == "input" and quantity != "command"  # what was measured is likelier than what was asked for
     return Meaning(role=role, quantity=quantity, axis="_".join(rest), unit=unit, rank=2 * rank + later)
+
+
+def by_unit(name: str, unit: str) -> str:
+    """input, output or nothing: what a column may be whose name says nothing, by its unit, or by being a symbol of physics."""
+    if any(word in OTHER.split() for word in spoken(name)):
+        return ""
+    quantity = unit_of(unit).quantity if unit else "unknown"
+    return SYMBOLS.get(name, "") if quantity == "unknown" else "input" if quantity in DRIVES else "output" if quantity in MOTIONS else ""
+
+
+def _words(name: str) -> list[str]:
+    """Small, numbers apart; i_q, the current that turns a motor, is one."""
+    return [piece for word in spoken(QUADRATURE.sub("iq", name)) for piece in _pieces(word)]
 
 
 def _pieces(word: str) -> list[str]:
@@ -124,7 +141,7 @@ def _unit(name: str, unit: str, words: list[str]) -> tuple[str, list[str]]:
 
 def usual_unit(name: str, found: Meaning) -> str:
     """The unit of a column that names none; duty and pwm are parts of full scale."""
-    words = [piece for word in spoken(name) for piece in _pieces(word)]
+    words = _words(name)
     if found.quantity in MOVED:
         return MOVED[found.quantity][any(word in ANGLES.split() for word in words)]
     return "FS" if any(word in ("duty", "pwm") for word in words) else USUAL.get(found.quantity, "s")

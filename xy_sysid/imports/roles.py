@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from xy_sysid.errors import BadRecording
-from xy_sysid.imports.names import Meaning, meaning
+from xy_sysid.imports.names import Meaning, by_unit, meaning
 from xy_sysid.imports.reading import Reading
 from xy_sysid.imports.sheet import Column, Sheet, spoken
 
@@ -58,6 +58,7 @@ def assigned(sheet: Sheet, reading: Reading, notes: list[str]) -> Roles:
             if not any(what == role or what.endswith(f".{role}") for what in reading.columns):
                 found[role], free = _by_words(sheet, meanings, role, notes) or found[role], True
     for role in ("input", "output"):
+        found[role] = found[role] or _by_unit(sheet, meanings, role)
         if not found[role]:
             raise BadRecording(sheet.path, f"no {WORDS[role]} {sheet.kind}; {sheet.names()}", EXAMPLE)
     pairs = _named(sheet, found, notes)
@@ -137,6 +138,15 @@ def _by_words(sheet: Sheet, meanings: Mapping[str, Meaning], role: str, notes: l
         if others and role != "reference":
             notes.append(f"{best[0].name!r} is taken as the {role}, not {', '.join(map(repr, others))}; choose with --map")
     return found
+
+
+def _by_unit(sheet: Sheet, meanings: Mapping[str, Meaning], role: str) -> Found:
+    """The column whose unit alone says that it has a role; raises BadRecording if there are several."""
+    columns = [column for column in sheet.columns if column.name not in meanings and not column.words and by_unit(column.name, column.unit) == role]
+    if len(columns) > 1:
+        names = " and ".join(repr(column.name) for column in columns)
+        raise BadRecording(sheet.path, f"{names} may both be the {role}", f"Choose one with --map {role}={columns[0].name!r}.")
+    return {"": sheet.usable(columns[0])} if columns else {}
 
 
 def _named(sheet: Sheet, found: dict[str, Found], notes: list[str]) -> dict[str, Found]:
