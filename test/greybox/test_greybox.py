@@ -196,6 +196,8 @@ def test_data_that_cannot_be_fitted_are_refused() -> None:
         prepare(RATE, np.zeros(1000), np.full(1000, np.nan))
     with pytest.raises(BadInput, match="one and the same"):
         prepare(RATE, np.zeros(1000), np.zeros(900))
+    with pytest.raises(BadInput, match=r"sampling rate is 0\.0005 Hz; allowed: 3 Hz or more. Check the unit of time"):
+        prepare(0.0005, np.zeros(1000), np.zeros(1000))  # microseconds taken for seconds: sub-steps without end
 
 
 def test_friction_is_told_from_drag_where_the_base_alone_is_led_astray() -> None:

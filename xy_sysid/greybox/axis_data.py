@@ -19,6 +19,7 @@ from xy_sysid.effects._similarity import Similarity
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.floor import Bands, Floor, Windows, bands, encoder_noise, floor
 from xy_sysid.samples.block import FloatArray
+from xy_sysid.samples.recording import SLOWEST
 from xy_sysid.units import USUAL, Units
 
 FIRST = 28_000  # samples of the first stage of a fit
@@ -121,7 +122,11 @@ def prepare(sampling_rate: float, voltage: FloatArray, position: FloatArray, eps
 def prepare_all(
     sampling_rate: float, recordings: Sequence[tuple[FloatArray, FloatArray]], epsilon: float = EPSILON, units: Units = USUAL
 ) -> AxisData:
-    """Several recordings, V and m, of the same axis for one fit. Raises BadInput as ``prepare``."""
+    """Several recordings, V and m, of the same axis for one fit. Raises BadInput as ``prepare``, and for samples that are too slow."""
+    if not sampling_rate >= SLOWEST:
+        raise BadInput(
+            "sampling rate", f"{sampling_rate:.4g} Hz", f"{SLOWEST:g} Hz or more", "Check the unit of time, and whether it is a sample number."
+        )
     for voltage, position in recordings:
         if voltage.shape != position.shape or voltage.ndim != 1:
             raise BadInput("shape of voltage and position", f"{voltage.shape} and {position.shape}", "one and the same (n,)", "Give one axis.")

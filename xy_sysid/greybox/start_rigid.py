@@ -12,6 +12,7 @@ import scipy.signal
 from xy_sysid.samples.block import FloatArray
 
 POLES = np.geomspace(3.0, 5000.0, 80)  # rad/s
+FEWEST_LINES = 16.0  # samples of a window at least, where those of two seconds are fewer
 LONGEST_DELAY = 40  # samples; a drive that answers later is not identified without a start value
 
 
@@ -26,7 +27,7 @@ def mean_velocity_filter(gain: float, pole: float, sampling_rate: float) -> tupl
 
 def base_start(sampling_rate: float, voltage: FloatArray, velocity: FloatArray) -> tuple[float, float, float]:
     """(gain m/s/V, delay s, pole rad/s) from a held voltage (n,) and the mean velocity of each sample (n,)."""
-    length = int(2 ** np.floor(np.log2(min(2.0 * sampling_rate, voltage.size / 4.0))))
+    length = int(2 ** np.floor(np.log2(max(min(2.0 * sampling_rate, voltage.size / 4.0), FEWEST_LINES))))
     frequency, cross = scipy.signal.csd(voltage, velocity, sampling_rate, "hann", length)
     power = scipy.signal.welch(voltage, sampling_rate, "hann", length)[1]
     output = scipy.signal.welch(velocity, sampling_rate, "hann", length)[1]

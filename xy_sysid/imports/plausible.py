@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 from xy_sysid.errors import BadRecording
 from xy_sysid.imports.foreign_units import DRIVES, unit_of
 from xy_sysid.samples.block import FloatArray
-from xy_sysid.samples.recording import Recording
+from xy_sysid.samples.recording import SLOWEST, Recording
 
 HUGE = 1e100  # a number beyond it has no square, let alone the square of its derivative
-SLOW = 3.0  # Hz; slower sampling is asked about
 FAR, FAST = 20.0, 50.0  # m and m/s; longer or faster axes are asked about
 TURNING = 3000.0  # rad/s, 30,000 turns a minute
 TURN, NEARLY = 2 * np.pi, 0.5  # rad; a step that is a turn within so much, where others are smaller than that, is an angle that wraps
@@ -121,7 +120,7 @@ def remarks(recording: Recording, output: FloatArray) -> list[str]:
 def _of_time(recording: Recording) -> list[str]:
     rate, runs = recording.sampling_rate, recording.runs()
     found = []
-    if rate < SLOW:
+    if rate < SLOWEST:
         found.append(f"the samples are {1 / rate:.4g} s apart ({rate:.4g} Hz): is time in ms, or a sample number? Say --unit time=ms, or --rate")
     if rate > 1e6:
         found.append(f"the samples are {1e9 / rate:.4g} ns apart ({rate:.4g} Hz): is that the unit of time? Say --unit time=...")

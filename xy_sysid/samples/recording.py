@@ -16,6 +16,7 @@ from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import SCALES, Units
 
 STANDS = 0.02  # part of the longest way of a second: an axis that goes less far, and is not driven, stands
+SLOWEST = 3.0  # Hz; slower samples show no machine's axis, but a wrong unit of time
 
 
 @dataclass(frozen=True, slots=True)
