@@ -239,9 +239,11 @@ def test_joint_states_in_ros_time_are_paired_with_the_voltage_of_the_excitation(
     publisher = world.node.create_publisher(JointState, "joint_states", 1000)
     position = world.node.create_publisher(Float64MultiArray, "position", DATA_QOS)
     stamps: list[float] = []
+    sent: list[tuple[int, float]] = []
 
     def play(message: Any) -> None:
         block = from_message(message)
+        sent.extend(zip(block.seq.tolist(), block.time.tolist(), strict=True))
         for row in range(len(block)):
             stamps.append(time.time() - float(block.time[row]))
             place[:] += block.values[row] * 1e-3
@@ -262,7 +264,10 @@ def test_joint_states_in_ros_time_are_paired_with_the_voltage_of_the_excitation(
     assert newest(statuses, "streams")["level"] == "2" and newest(statuses, "streams")["samples paired"] == "0"
     late[0] = 0.0
     assert world.until(lambda: int(newest(statuses, "streams")["samples paired"]) > 500, 20.0), newest(statuses, "streams")
-    assert float(newest(statuses, "streams")["sampling rate (Hz)"]) == pytest.approx(100.0)
+    counted, times = np.array(sent).T
+    slips = float(np.ptp(times - counted / 100.0))  # s, of the excitation's own clock, where it was starved
+    rate = float(newest(statuses, "streams")["sampling rate (Hz)"])
+    assert rate == pytest.approx(100.0, rel=1e-6 + 3.0 * slips / 5.0)  # what they do to the slope of a line through 5 s
     assert abs(np.median(stamps)) < 60.0, "not ROS time"
     assert world.transition("excitation", "deactivate")
 

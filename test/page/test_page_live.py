@@ -83,7 +83,20 @@ def test_curves_converge_live(scene: Scene) -> None:
 
     linear = tab.page.get_by_role("button", name="linear fit")
     tab.until(lambda: linear.count() == 1, 40, "no story begins by itself")
-    linear.click()
+    pressed = [0.0]
+
+    def linear_is_shown() -> bool:
+        """A press that was lost with a connection is made again, as a person does."""
+        if not linear.is_visible():  # before there is a story, nothing else is shown
+            return False
+        if tab.page.locator("[aria-label='linear fit, live']:visible").count() == 1:
+            return len(pressed) > 1
+        if time.monotonic() > pressed[-1] + 10.0:
+            linear.click()
+            pressed.append(time.monotonic())
+        return False
+
+    tab.until(linear_is_shown, 40, "the linear fit is not shown")
 
     def width() -> float:
         (band,) = tab.curves("Frequency response of axis x", "95 % band")

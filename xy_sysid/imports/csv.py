@@ -14,11 +14,12 @@ from xy_sysid.errors import BadRecording
 from xy_sysid.imports.echoed import stamped
 from xy_sysid.imports.limits import MOST_COLUMNS
 from xy_sysid.imports.sheet import Column, Sheet
-from xy_sysid.imports.text_table import BLANKS, MISSING, Names, Rows, cells_of, is_number, number_of, text_table
+from xy_sysid.imports.text_table import BLANKS, MISSING, SEPARATORS, Names, Rows, cells_of, is_number, number_of, text_table
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import Recording, rate_from_time
 
 EXAMPLE = "Name the columns like time,x_voltage,x_position[mm] in the first row."
+HEADS = 10  # lines whose cells are counted before anything is made of them
 LOOK = 200  # rows before the last one that show how its numbers are written
 
 
@@ -26,12 +27,13 @@ def sheet(path: Path) -> Sheet:
     """The columns of a file; what is not a number is told when its column is used."""
     text = _text(path)
     notes: list[str] = []
+    widest = max(line.count(sign) for line in text.split("\n", HEADS)[:HEADS] for sign in SEPARATORS)
+    if widest >= MOST_COLUMNS:
+        problem = f"its first rows have up to {widest + 1} cells, and {MOST_COLUMNS} columns are read at most"
+        raise BadRecording(path, problem, "Give a file with one column per signal.")
     found = text_table(text, notes)
     if not found.names:
         raise BadRecording(path, "the file holds no rows", EXAMPLE)
-    if len(found.names) > MOST_COLUMNS:
-        problem = f"its first row has {len(found.names)} cells, and {MOST_COLUMNS} columns are read at most"
-        raise BadRecording(path, problem, "Give a file with one column per signal.")
     rows = found.rows if text.endswith(("\n", "\r")) else _whole(found.rows, found.separator, len(found.names), notes)
     columns, bad = _columns(path, rows, found.separator, found.names)
     return Sheet(path=path, columns=stamped(columns) if found.stamped else columns, notes=tuple(notes), bad=bad)

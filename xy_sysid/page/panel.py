@@ -30,6 +30,7 @@ class Panel:
         self._axes: tuple[str, ...] = ()
         self._control: Control | None = None
         self._views: dict[str, str] = {}
+        self._steps: tuple[str, int, tuple[str, ...]] = ("", 0, ())
         with ui.element("section").classes("panel").props(f'id={source.key} aria-label="{"machine" if source.live else "recording"}"') as self._root:
             with ui.element("div").classes("head"):
                 self._title = ui.label("").classes("grow").props("role=heading aria-level=2").classes("title")
@@ -84,11 +85,15 @@ class Panel:
 
     def _choose(self) -> View:
         """What is looked at; whenever the story goes on, its newest model."""
-        found = views(self._source.document(self._axis), self._source.live)
-        key = {"": self._axis, **found}
-        if key != self._views:
-            self._views = key
+        document = self._source.document(self._axis)
+        found = views(document, self._source.live)
+        goes_on = self._axis, len(document["steps"]) if document is not None else 0, tuple(found)
+        if goes_on != self._steps:
+            self._steps, self._views = goes_on, found
             self._view.set_options(found, value=next(iter(found), None))
+        elif found != self._views:  # other words for the same: what was chosen stays
+            self._views = found
+            self._view.set_options(found, value=self._view.value)
         self._model.set_visibility(len(found) > 1)
         return view_of(str(self._view.value or NOW))
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from xy_sysid.errors import BadInput
 
-TABLES = (".csv", ".tsv", ".txt", ".dat", ".npz", ".mat", ".mcap", ".db3")
+TABLES = (".csv", ".tsv", ".dat", ".npz", ".mat", ".mcap", ".db3")
 MOST = 200  # recordings listed
 DEEP = 2  # folders below the shelf that are looked into
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
