@@ -167,6 +167,13 @@ def test_a_frequency_that_is_no_parameter_is_refused() -> None:
         replace(EFFECTS["base_resonance"], mode_frequency="resonance")
 
 
+def test_what_is_fitted_as_a_logarithm_is_one_and_the_same_in_every_recording() -> None:
+    """Recordings differ by a sum, which a logarithm does not know."""
+    effect = EFFECTS["coulomb_friction"]
+    with pytest.raises(BadInput, match="per_recording is of a positive parameter"):
+        replace(effect, parameters=tuple(replace(item, per_recording=True) for item in effect.parameters))
+
+
 def test_a_law_with_an_unknown_word_is_refused() -> None:
     """The error names the argument and what is known."""
     effect = EFFECTS["constant_load"]

@@ -75,6 +75,7 @@ class AxisModel:
     """A hypothesis about an axis.
 
     gain: m/s/V; delay: s; pole: rad/s; effects: (name, parameter values in the effect's order), SI
+    per_recording: (``effect.parameter``, its value in each recording of a fit) of what differs between them; in ``effects`` is the mean
     """
 
     gain: float
@@ -82,6 +83,7 @@ class AxisModel:
     pole: float
     effects: tuple[tuple[str, tuple[float, ...]], ...] = ()
     library: Library = field(default=STANDARD, compare=False, repr=False)
+    per_recording: tuple[tuple[str, tuple[float, ...]], ...] = ()
 
     def __post_init__(self) -> None:
         for name, value, low in (("gain", self.gain, -np.inf), ("delay", self.delay, 0.0), ("pole", self.pole, 1e-9)):
@@ -107,11 +109,25 @@ class AxisModel:
     def with_effect(self, name: str, values: Iterable[float] | None = None) -> AxisModel:
         """The model with one effect added or changed (None: its typical size)."""
         chosen = self.library[name].typical if values is None else tuple(float(value) for value in values)
-        return replace(self, effects=(*((own, old) for own, old in self.effects if own != name), (name, chosen)))
+        return self._of((*((own, old) for own, old in self.effects if own != name), (name, chosen)))
 
     def without(self, name: str) -> AxisModel:
         """The model without this effect."""
-        return replace(self, effects=tuple(item for item in self.effects if item[0] != name))
+        return self._of(tuple(item for item in self.effects if item[0] != name))
+
+    def _of(self, effects: tuple[tuple[str, tuple[float, ...]], ...]) -> AxisModel:
+        """The same base with other effects; those that are as they were keep their values in each recording."""
+        same = {name for name, _ in set(effects) & set(self.effects)}
+        return replace(self, effects=effects, per_recording=tuple(item for item in self.per_recording if item[0].partition(".")[0] in same))
+
+    def in_recording(self, number: int) -> AxisModel:
+        """The model as it is in one of the recordings of its fit, counted from 0."""
+        own = {name: values[number] for name, values in self.per_recording}
+        if not own:
+            return self
+        rows = ((name, zip(self.library[name].names, row, strict=True)) for name, row in self.effects)
+        effects = tuple((name, tuple(own.get(f"{name}.{key}", value) for key, value in row)) for name, row in rows)
+        return replace(self, effects=effects, per_recording=())
 
     def _turned(self, name: str, values: tuple[float, ...]) -> tuple[float, ...]:
         """A size in the sense of the motion, where friction acts, as one in the sense of the drive, where a force does; and the way back."""
@@ -125,7 +141,7 @@ class AxisModel:
                 values = effect.sum_of.joined([self._turned(part, own[part]) for part in effect.sum_of.parts])
                 if all(item.allows(value) for item, value in zip(effect.parameters, values, strict=True)):
                     kept = tuple((name, old) for name, old in self.effects if name not in effect.sum_of.parts)
-                    return replace(self, effects=(*kept, (effect.name, values)))
+                    return self._of((*kept, (effect.name, values)))
         return self
 
     def apart(self, name: str) -> AxisModel:
@@ -134,7 +150,7 @@ class AxisModel:
         if whole is None:
             return self
         parts = zip(whole.parts, whole.apart(own.pop(name)), strict=True)
-        return replace(self, effects=(*own.items(), *((part, self._turned(part, values)) for part, values in parts)))
+        return self._of((*own.items(), *((part, self._turned(part, values)) for part, values in parts)))
 
     def values(self) -> dict[str, float]:
         """Every parameter by ``gain``, ``delay``, ``pole``, ``effect.parameter``."""

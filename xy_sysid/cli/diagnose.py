@@ -90,5 +90,8 @@ def error_cells(name: str, fit: GreyboxFit) -> tuple[str, str, str]:
 
 def parameter_table(fit: GreyboxFit) -> None:
     """Parameters of a fit, as people read them."""
-    rows = [estimate(p.name, (p.value, p.low, p.high), p.unit) for p in fit.parameters]
+    rows = []
+    for p in fit.parameters:
+        rows.append(estimate(p.name, (p.value, p.low, p.high), p.unit))
+        rows += [estimate(f"  in recording {k}", (one.value, one.low, one.high), one.unit) for k, one in enumerate(p.recordings, 1)]
     table("", ("parameter", "value", "95 % interval", "unit"), rows)

@@ -203,6 +203,7 @@ class Parameter:
 
     low, high: what a fit may reach, SI; positive: fitted as a logarithm; typical: a usual size (scale of a step, tests); all three on
     the usual machine, see ``Similarity``
+    per_recording: may differ from one recording of a machine to the next (what it carries that day): each has its own value
     """
 
     name: str
@@ -212,6 +213,7 @@ class Parameter:
     typical: float
     meaning: str
     positive: bool = True
+    per_recording: bool = False
 
     def on(self, similar: Similarity) -> Parameter:
         """The same with bounds and usual size for another machine."""
@@ -311,6 +313,9 @@ class Effect:
             for word in arguments(self.functions[name]):
                 if word not in known:
                     raise BadInput(f"effect {self.name}: argument of {name}", repr(word), ", ".join(sorted(known)), "Rename it.")
+        if any(item.per_recording and item.positive for item in self.parameters):
+            act = "Give it positive=False: recordings differ by a sum."
+            raise BadInput(f"effect {self.name}: per_recording", "of a positive parameter", "a parameter of either sign", act)
         if self.mode_frequency and self.mode_frequency not in self.names:
             raise BadInput(f"effect {self.name}: mode_frequency", repr(self.mode_frequency), ", ".join(self.names), "Name one of these.")
 

@@ -26,6 +26,7 @@ class Scene:
     velocity: (n,) measured mean velocity of each sample, m/s
     position: (n,) measured, at the middle of each sample, m
     error:    (n,) measured velocity minus the model's, m/s
+    recordings: samples of each recording that it is made of, one after the other; empty for one
     """
 
     sampling_rate: float
@@ -35,6 +36,7 @@ class Scene:
     velocity: FloatArray
     position: FloatArray
     error: FloatArray
+    recordings: tuple[int, ...] = ()
     _known: dict[tuple[str, float], FloatArray] = field(init=False, repr=False, compare=False, default_factory=dict)
 
     @property

@@ -28,7 +28,7 @@ EFFECT = Effect(
     validity="the same at every place, speed and time",
     source="Janot, Gautier & Brunot, Data set and reference models of EMPS, 2019 (offset in the inverse model); Newton's second law",
     category="force",
-    parameters=(Parameter("load", "V", -100.0, 100.0, 0.15, "input that holds it", positive=False),),
+    parameters=(Parameter("load", "V", -100.0, 100.0, 0.15, "input that holds it", positive=False, per_recording=True),),
     shows="the mean velocity differs from the model's; it drifts to one side",
     look_alikes=("asymmetric_friction", "hardening_stiffness"),
     experiment="constant speed both ways, and rest under small inputs of both signs",

@@ -18,6 +18,8 @@ base of every model is `v' = pole (gain u_eff - v)`. How to add your own: [your-
 |---|---|---|---|
 """
 
+OWN = "; each of several recordings has its own"
+
 
 def document(effects: Iterable[Effect] = EFFECTS.values()) -> str:
     """The page."""
@@ -36,7 +38,10 @@ def _cell(text: str) -> str:
 
 
 def _section(e: Effect) -> str:
-    rows = [f"| `{item.name}` | {item.unit} | {bounds(item)} | {item.typical:g} | {_cell(item.meaning)} |" for item in e.parameters]
+    rows = [
+        f"| `{item.name}` | {item.unit} | {bounds(item)} | {item.typical:g} | {_cell(item.meaning)}{OWN if item.per_recording else ''} |"
+        for item in e.parameters
+    ]
     table = "\n".join(["| parameter | unit | allowed | usual | meaning |", "|---|---|---|---|---|", *rows])
     return f"""
 ## {e.name}

@@ -19,6 +19,7 @@ from xy_sysid.files.seal import sealed
 from xy_sysid.files.unasked import free
 from xy_sysid.fitting.of_run import LinearModel
 from xy_sysid.greybox.free_run import GreyboxFit
+from xy_sysid.search.findings import parameters
 from xy_sysid.units import USUAL, Units
 
 AXIS_FORMAT = "xy_sysid axis model 1"
@@ -74,9 +75,8 @@ def axis_document(fits: Mapping[str, GreyboxFit], provenance: Mapping[str, Any])
 
 
 def _axis(fit: GreyboxFit) -> dict[str, Any]:
-    parameters = {item.name: {"value": float(item.value), "unit": item.unit, "ci95": [float(item.low), float(item.high)]} for item in fit.parameters}
     errors = {"held_out_error": float(fit.held_out_error), "noise_floor": float(fit.noise_floor)}
-    return _written(fit.model, fit.units, parameters, errors)
+    return _written(fit.model, fit.units, dict(parameters(fit.parameters)), errors)
 
 
 def _physical(item: PhysicalModel) -> dict[str, Any]:

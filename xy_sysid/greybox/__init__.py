@@ -6,6 +6,7 @@ start_rigid:     gain, delay and pole without a start value
 start_inverse:   base and effect together by linear least squares
 score_test:      how much of the error an effect would explain, to first order
 least_squares:   Levenberg-Marquardt on the whitened error in velocity
+parameters:      a model's parameters as one row: simulated, bounded, and read back with intervals
 free_run:        the fit: base alone or with chosen effects, judged on data held out
 one_step:        the fit of effects that only one-step prediction can judge
 innovation_test: the score test on the innovations of that

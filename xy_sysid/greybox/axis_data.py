@@ -22,7 +22,7 @@ from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import SLOWEST
 from xy_sysid.units import USUAL, Units
 
-FIRST = 28_000  # samples of the first stage of a fit
+FIRST = 28_000  # samples of the first stage of a fit, of all recordings together
 TRAINING = 2.0 / 3.0  # of the record, for what must run through from the start (one-step prediction)
 EPSILON = 1e-3  # part of the motion to which laws and their integration are trusted
 LIKE = 0.1  # of the whole power in each excited band that the first stage must hold
@@ -38,8 +38,9 @@ class AxisData:
 
     voltage, position: (n,) V and m, recordings one after the other; velocity: (n - r,) mean of each sample, m/s, of r recordings
     starts: sample of ``voltage`` at which each recording begins
-    fitted, held: windows of ``velocity`` that a fit sees, and that judge it; brief: those of the first stage
-    training: samples of ``velocity`` for what must run through; first: samples of the first stage
+    fitted, held: windows of ``velocity`` that a fit sees, and that judge it
+    early: samples of each recording's velocity that are in the first stage; brief: windows in these (``begun``) that a fit sees there
+    training: samples of ``velocity`` for what must run through
     units: what V and m stand for, wherever words are made of it
     """
 
@@ -53,7 +54,7 @@ class AxisData:
     held: Windows
     brief: Windows
     training: int
-    first: int
+    early: tuple[int, ...]
     floor: Floor
     units: Units = USUAL
 
@@ -71,6 +72,20 @@ class AxisData:
     def steps(self) -> tuple[slice, ...]:
         """The same of ``velocity``."""
         return tuple(slice(run.start - k, run.stop - k - 1) for k, run in enumerate(self.runs))
+
+    @property
+    def first(self) -> int:
+        """Samples of the first stage."""
+        return sum(self.early)
+
+    def counts(self, early: bool) -> tuple[int, ...]:
+        """Samples of each recording's velocity in the first stage, or in the whole."""
+        return self.early if early else tuple(step.stop - step.start for step in self.steps)
+
+    def begun(self, signal: FloatArray) -> FloatArray:
+        """(n - r,) -> (first,), or with r more (n,) as it is: the beginnings of all recordings."""
+        places = self.steps if signal.size == self.velocity.size else self.runs
+        return np.concatenate([signal[part.start : part.start + count] for part, count in zip(places, self.early, strict=True)])
 
     @property
     def moving(self) -> float:
@@ -103,7 +118,7 @@ class AxisData:
         """Every window of the first stage, fitted and held out; those held out alone where the first stage is all that there is."""
         if self.first >= self.velocity.size:
             return self.held
-        both = np.sort(np.concatenate((self.brief.begins, self.held.before(self.first).begins)))
+        both = np.sort(np.concatenate((self.brief.begins, _within(self.held, self.steps, self.early).begins)))
         return Windows(self.layout, np.unique(both))
 
     def longest(self) -> AxisData:
@@ -145,10 +160,12 @@ def prepare_all(
     encoder = max(encoder_noise(sampling_rate, position) for _, position in recordings)
     fitted, held = _split(layout, spans, velocity)
     least = floor(whole, velocity, encoder, epsilon)
-    stage = _stage(whole, velocity, least, int(edges[1]))
-    brief = fitted.before(stage)
+    steps = [slice(*span) for span in spans]
+    early = _early(whole, velocity, least, steps)
+    brief = _within(fitted, steps, early)
     if brief.begins.size < 2:
-        stage, brief = int(edges[1]), fitted.before(int(edges[1]))
+        early = tuple(step.stop - step.start for step in steps)
+        brief = fitted
     return AxisData(
         sampling_rate=sampling_rate,
         voltage=np.concatenate([voltage for voltage, _ in recordings]),
@@ -158,24 +175,36 @@ def prepare_all(
         layout=layout,
         fitted=fitted,
         held=held,
-        brief=brief if brief.begins.size else fitted,
+        brief=brief,
         training=int(TRAINING * velocities[0].size),
-        first=stage if brief.begins.size else velocity.size,
+        early=early,
         floor=least,
         units=units,
     )
 
 
-def _stage(whole: Windows, velocity: FloatArray, least: Floor, most: int) -> int:
-    """Samples of the first stage: as many as it takes that what is excited in the whole is excited there, too (a sweep takes its time)."""
-    stage = min(FIRST, most)
+def _early(whole: Windows, velocity: FloatArray, least: Floor, steps: Sequence[slice]) -> tuple[int, ...]:
+    """Samples of each recording in the first stage: as many as it takes that what the whole excites is excited there (a sweep takes its time)."""
+    sizes = np.array([step.stop - step.start for step in steps])
+    each = FIRST if len(steps) == 1 else max(FIRST // len(steps), int(SEEN * whole.layout.length))
     powers = whole.layout.powers(whole.spectrum(velocity))[:, least.excited]
-    while stage < most:
-        seen = powers[whole.begins + whole.layout.length <= stage]
+    ends = whole.begins + whole.layout.length
+    while each < sizes.max():
+        seen = powers[np.any([(step.start <= whole.begins) & (ends <= step.start + each) for step in steps], axis=0)]
         if seen.shape[0] and np.all(seen.mean(axis=0) > LIKE * powers.mean(axis=0)):
             break
-        stage = min(2 * stage, most)
-    return stage
+        each *= 2
+    return tuple(int(size) for size in np.minimum(sizes, each))
+
+
+def _within(windows: Windows, steps: Sequence[slice], early: Sequence[int]) -> Windows:
+    """The windows that end within the beginnings of the recordings, by their place in these alone."""
+    offsets = np.cumsum([0, *early[:-1]])
+    found = []
+    for step, count, offset in zip(steps, early, offsets, strict=True):
+        inside = (windows.begins >= step.start) & (windows.begins + windows.layout.length <= step.start + count)
+        found.append(windows.begins[inside] - step.start + offset)
+    return Windows(windows.layout, np.concatenate(found))
 
 
 def loosened(data: AxisData, epsilon: float) -> AxisData:

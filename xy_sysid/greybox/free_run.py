@@ -5,19 +5,20 @@ First on the first stage's data, where a step is quick, then on all windows that
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from xy_sysid.axis.loop_source import undoable
-from xy_sysid.axis.model import FINE, STANDARD, AxisModel, Library, simulator, undoer
-from xy_sysid.effects import Effect, Parameter, Scene
+from xy_sysid.axis.model import FINE, STANDARD, AxisModel, Library, undoer
+from xy_sysid.effects import Effect, Scene
 from xy_sysid.effects._contract import in_time
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.axis_data import EPSILON, AxisData, loosened, prepare, prepare_all
 from xy_sysid.greybox.floor import excess
 from xy_sysid.greybox.least_squares import Round, Scale, Schedule, Solution, Target, solve
+from xy_sysid.greybox.parameters import Estimate, estimates, model_of, problem
 from xy_sysid.greybox.score_test import Screen, Trace, bounded, screen
 from xy_sysid.greybox.start_inverse import inverse_starts
 from xy_sysid.greybox.start_rigid import base_start
@@ -44,18 +45,6 @@ __all__ = [
 BRIEF = (Round(6, 1e-2), Round(6, 1e-2, "alike"), Round(6, 3e-3, "what is wrong"), Round(8, 1e-4))
 LONG = (Round(4, 1e-3), Round(6, 1e-5))
 COARSE, MIDDLING = 2000.0, 4000.0  # Hz: sub-steps of first rounds (errors up to 3e-3 of the motion) and of brief fits (6e-4)
-Z95 = 1.959964
-
-
-@dataclass(frozen=True, slots=True)
-class Estimate:
-    """One parameter with its 95 % interval."""
-
-    name: str
-    value: float
-    unit: str
-    low: float
-    high: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +91,7 @@ class GreyboxFit:
 
 def fit_base(data: AxisData, library: Library = STANDARD) -> GreyboxFit:
     """Gain, delay and pole without a start value."""
-    gain, delay, pole = base_start(data.sampling_rate, data.voltage[: data.first], data.velocity[: data.first])
+    gain, delay, pole = base_start(data.sampling_rate, data.begun(data.voltage), data.begun(data.velocity))
     return fit(data, AxisModel(gain, delay, pole, library=library))
 
 
@@ -137,10 +126,10 @@ def other_starts(data: AxisData, base: GreyboxFit, model: AxisModel, name: str, 
 
     scene: of the base and the first stage's data, if it is known
     """
-    effect, scene = model.library[name], scene or scene_of(data, base, data.first)
+    effect, scene = model.library[name], scene or scene_of(data, base)
     candidates = []
     pushing = [own for own, _ in model.effects if own != name and model.library[own].category == "force" and undoable(model.library[own])]
-    forces = [_force(data, model, own, scene.velocity.size) for own in pushing]
+    forces = [_force(data, model, own, data.counts(early=scene.velocity.size == data.first)) for own in pushing]
     for start in inverse_starts(effect, scene, scene.velocity.size, forces):
         whole = replace(model, gain=start.gain, pole=min(max(start.pole, 1e-2), 1e5))
         for own, size in zip(pushing, start.sizes, strict=True):
@@ -154,12 +143,14 @@ def other_starts(data: AxisData, base: GreyboxFit, model: AxisModel, name: str, 
     return candidates
 
 
-def _force(data: AxisData, model: AxisModel, name: str, samples: int) -> FloatArray:
-    """(samples,) V, what one effect of a model pushes against the drive on the measured motion."""
-    run = data.runs[0]
-    undo = undoer(model.library, [name], data.sampling_rate, data.voltage[run], data.position[run])
-    against = undo(np.array([model.gain, model.delay, model.pole, *dict(model.effects)[name]]), samples)[2]
-    return np.asarray(against.sum(axis=0))
+def _force(data: AxisData, model: AxisModel, name: str, counts: Sequence[int]) -> FloatArray:
+    """(samples,) V, what one effect of a model pushes against the drive on the measured motion; counts: samples of each recording."""
+    row = np.array([model.gain, model.delay, model.pole, *dict(model.effects)[name]])
+    parts = []
+    for run, count in zip(data.runs, counts, strict=True):
+        undo = undoer(model.library, [name], data.sampling_rate, data.voltage[run], data.position[run])
+        parts.append(undo(row, count)[2].sum(axis=0))
+    return np.concatenate(parts)
 
 
 def best_start(data: AxisData, candidates: list[AxisModel]) -> AxisModel:
@@ -183,8 +174,8 @@ def first_excess(data: AxisData, model: AxisModel) -> float:
 
 def _first_power(data: AxisData, model: AxisModel) -> FloatArray:
     """Power by band of what a model leaves of the first stage's data; infinite for one that runs away."""
-    run, values, _ = _problem(data, model, data.first, COARSE)
-    power = data.layout.power(data.brief.spectrum(data.velocity[: data.first] - run(values)))
+    run, values, _ = problem(data, model, True, COARSE)
+    power = data.layout.power(data.brief.spectrum(data.begun(data.velocity) - run(values)))
     return np.where(np.isfinite(power), power, np.inf)
 
 
@@ -195,47 +186,48 @@ def look(data: AxisData, fitted: GreyboxFit, effects: Iterable[Effect]) -> list[
 
 def screened(data: AxisData, fitted: GreyboxFit, effects: Iterable[Effect], scene: Scene | None = None) -> Screen:
     """The score test of effects on what a fit leaves, alone and together; scene: of the first stage's data (None), or of all."""
-    scene = scene or scene_of(data, fitted, data.first)
-    samples = scene.velocity.size
-    run, values, scale = _problem(data, fitted.model, samples, COARSE)
+    scene = scene or scene_of(data, fitted)
+    early = scene.velocity.size == data.first
+    run, values, scale = problem(data, fitted.model, early, COARSE)
     inner = scale.inner(values)
     here, nuisance = run(values), []
     for k in range(values.size):
         moved = inner.copy()
         moved[k] += 1e-4
         nuisance.append(run(scale.outer(moved)) - here)
-    return screen(effects, scene, np.array(nuisance), data.brief if samples == data.first else data.fitted, data.floor)
+    return screen(effects, scene, np.array(nuisance), data.brief if early else data.fitted, data.floor)
 
 
-def scene_of(data: AxisData, fitted: GreyboxFit, samples: int) -> Scene:
-    """The measured motion of the first samples as effects see it."""
-    model = fitted.model
+def scene_of(data: AxisData, fitted: GreyboxFit, early: bool = True) -> Scene:
+    """The measured motion of the first stage, or of the whole, as effects see it."""
+    model, part = fitted.model, data.begun if early else np.asarray
     late = [_delayed(data.voltage[run], model.delay * data.sampling_rate)[:-1] for run in data.runs]
     return Scene(
         sampling_rate=data.sampling_rate,
         gain=model.gain,
         pole=model.pole,
-        voltage=np.concatenate(late)[:samples],
-        velocity=data.velocity[:samples],
-        position=data.middle()[:samples],
-        error=fitted.error[:samples],
+        voltage=part(np.concatenate(late)),
+        velocity=part(data.velocity),
+        position=part(data.middle()),
+        error=fitted.error if fitted.brief else part(fitted.error),
+        recordings=data.counts(early),
     )
 
 
 def fit(data: AxisData, start: AxisModel, brief: bool = False, hopeless: float = np.inf, late: Callable[[], bool] = in_time) -> GreyboxFit:
     """All parameters of a model, from where it is; brief, hopeless: see ``fit_with``; late: then the best so far is taken."""
-    run, values, scale = _problem(data, start, data.first, COARSE)
-    velocity = data.velocity[: data.first]
+    run, values, scale = problem(data, start, True, COARSE)
+    velocity = data.begun(data.velocity)
     target = Target(velocity, data.brief, data.floor)
     found = solve(run, target, scale, values, Schedule(BRIEF[:1], late))
     left = data.layout.power(data.brief.spectrum(velocity - run(found.values)))
     if not (late() or (brief and excess(left, data.floor) > hopeless)):
         nearer = solve(run, target, scale, found.values, Schedule(BRIEF[1:-1], late), found.change)
-        run, _, _ = _problem(data, start, data.first, MIDDLING)
+        run, _, _ = problem(data, start, True, MIDDLING)
         more = solve(run, target, scale, nearer.values, Schedule(BRIEF[-1:], late), nearer.change)
         found = replace(more, runs=found.runs + nearer.runs + more.runs)
     if not brief:
-        return finish(data, _model(start, found.values), found.runs, late)
+        return finish(data, model_of(start, found.values), found.runs, late)
     return _result(data, start, scale, found, brief=True)
 
 
@@ -246,33 +238,21 @@ def finish(data: AxisData, start: AxisModel, runs: int = 0, late: Callable[[], b
     """
     left = data.layout.rms(_first_power(data, start)) / max(data.layout.rms(data.floor.motion), 1e-300)
     fine = next((step for step, error in ((COARSE, 3e-3), (MIDDLING, 6e-4)) if left > 10.0 * error), FINE)
-    run, values, scale = _problem(data, start, data.velocity.size, fine)
+    run, values, scale = problem(data, start, False, fine)
     found = solve(run, Target(data.velocity, data.fitted, data.floor), scale, values, Schedule(LONG, late))
     return _result(data, start, scale, replace(found, runs=runs + found.runs))
 
 
 def _result(data: AxisData, start: AxisModel, scale: Scale, found: Solution, brief: bool = False) -> GreyboxFit:
-    model = _model(start, found.values)
-    samples = data.first if brief else data.velocity.size
-    run, _, _ = _problem(data, start, samples, MIDDLING if brief else FINE)
+    model = model_of(start, found.values)
+    run, _, _ = problem(data, start, brief, MIDDLING if brief else FINE)
     simulated = run(found.values)
-    error = data.velocity[:samples] - simulated
+    error = (data.begun(data.velocity) if brief else data.velocity) - simulated
     fitted, judging = (data.brief, data.first_windows()) if brief else (data.fitted, data.held)
     held = data.layout.powers(judging.spectrum(error))
-    inner, spread = scale.inner(found.values), Z95 * np.sqrt(np.diag(found.covariance))
-    wide = Scale(np.where(scale.positive, scale.low, -np.inf), np.full_like(scale.high, np.inf), scale.positive, scale.unit)
-    low, high = wide.outer(inner - spread), np.where(np.isinf(spread), np.inf, wide.outer(inner + spread))
-    high = np.where(scale.positive & np.isfinite(spread), np.minimum(high, np.maximum(scale.high, found.values)), high)  # no machine has more
-    low[1] = max(low[1], 0.0)  # no delay is negative
-    inner_units = ["m/s/V", "s", "rad/s", *(item.unit for name, _ in model.effects for item in model.library[name].parameters)]
-    units = [data.units.of(unit) for unit in inner_units]
-    estimates = tuple(
-        Estimate(name=name, value=value, unit=unit, low=float(min(a, b)), high=float(max(a, b)))
-        for (name, value), unit, a, b in zip(model.values().items(), units, low, high, strict=True)
-    )
     return GreyboxFit(
         model=model,
-        parameters=estimates,
+        parameters=estimates(data, model, scale, found),
         training_error=data.layout.rms(data.layout.power(fitted.spectrum(error))),
         held_out_error=data.layout.rms(held.mean(axis=0)),
         noise_floor=data.noise_floor,
@@ -285,48 +265,6 @@ def _result(data: AxisData, start: AxisModel, scale: Scale, found: Solution, bri
         brief=brief,
         units=data.units,
     )
-
-
-def _problem(data: AxisData, model: AxisModel, samples: int, fine: float = FINE) -> tuple[Callable[[FloatArray], FloatArray], FloatArray, Scale]:
-    """Simulation of the first samples in sub-steps of ``fine`` Hz, the model's parameters as a row, and how each may move."""
-    names = [name for name, _ in model.effects]
-    runs = []
-    for run, step in zip(data.runs, data.steps, strict=True):
-        length = min(samples - step.start, step.stop - step.start)
-        if length > 0:
-            part = slice(run.start, run.start + length + 1)
-            runs.append(simulator(model.library, names, data.sampling_rate, data.voltage[part], data.position[part], fine))
-
-    def simulated(values: FloatArray) -> FloatArray:
-        return runs[0](values) if len(runs) == 1 else np.concatenate([one(values) for one in runs])
-
-    items = [item for name in names for item in model.library[name].on(data.similar)]
-    values = np.array([model.gain, model.delay, model.pole, *(value for _, row in model.effects for value in row)])
-    scale = Scale(
-        np.array([-np.inf, 0.0, 1e-2, *(item.low for item in items)]),
-        np.array([np.inf, max(data.first / data.sampling_rate / 4.0, model.delay), 1e5, *(item.high for item in items)]),
-        np.array([False, False, True, *(item.positive for item in items)]),
-        np.array(
-            [
-                abs(model.gain) or 1.0,
-                20.0 / data.sampling_rate,
-                1.0,
-                *(max(unit_of(item), abs(value)) for item, value in zip(items, values[3:].tolist(), strict=True)),
-            ]
-        ),
-    )
-    return simulated, values, scale
-
-
-def unit_of(item: Parameter) -> float:
-    """Size of 1 in a solver, for a parameter that is not fitted as a logarithm."""
-    return abs(item.typical) or min(1.0, item.high - item.low)
-
-
-def _model(start: AxisModel, values: FloatArray) -> AxisModel:
-    rest = iter(values[3:].tolist())
-    effects = tuple((name, tuple(next(rest) for _ in row)) for name, row in start.effects)
-    return replace(start, gain=float(values[0]), delay=float(values[1]), pole=float(values[2]), effects=effects)
 
 
 def _delayed(voltage: FloatArray, samples: float) -> FloatArray:

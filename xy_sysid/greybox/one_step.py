@@ -18,7 +18,8 @@ from xy_sysid.effects import Effect
 from xy_sysid.effects._contract import PATIENT, Beside, DryFriction, Followed, Limits, OneStepTask, arguments
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.floor import count_size
-from xy_sysid.greybox.free_run import Z95, AxisData, Estimate, GreyboxFit, unit_of
+from xy_sysid.greybox.free_run import AxisData, GreyboxFit
+from xy_sysid.greybox.parameters import Z95, Estimate, unit_of
 from xy_sysid.greybox.score_test import bounded
 from xy_sysid.samples.block import FloatArray
 

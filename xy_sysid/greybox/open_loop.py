@@ -14,7 +14,8 @@ from scipy.optimize import least_squares
 from xy_sysid.axis.model import AxisModel, simulate, simulator
 from xy_sysid.effects import Effect
 from xy_sysid.effects._contract import arguments
-from xy_sysid.greybox.free_run import AxisData, Estimate, GreyboxFit
+from xy_sysid.greybox.free_run import AxisData, GreyboxFit
+from xy_sysid.greybox.parameters import Estimate
 from xy_sysid.samples.block import FloatArray
 
 ROUNDS = 40  # of the least squares

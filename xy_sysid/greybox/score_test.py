@@ -81,9 +81,11 @@ def screen(effects: Iterable[Effect], scene: Scene, nuisance: FloatArray, window
         for guess in effect.guessed(scene):
             if guess.inverse_only:
                 continue
-            share, coefficients, white = space.share(guess.columns if effect.is_behind else _through_base(guess.columns, scene))
+            acting = _of_each_recording(guess.columns, effect, scene)
+            share, coefficients, white = space.share(acting if effect.is_behind else _through_base(acting, scene))
             if share > best.share:
-                best, chosen = Trace(effect.name, share, effect.read(guess, coefficients, scene.similar)), white
+                mean = coefficients.reshape(-1, len(guess.columns)).mean(axis=0)
+                best, chosen = Trace(effect.name, share, effect.read(guess, mean, scene.similar)), white
         found.append(best)
         if chosen is not None:
             begin = sum(map(len, columns))
@@ -101,6 +103,15 @@ def screen(effects: Iterable[Effect], scene: Scene, nuisance: FloatArray, window
         least=least,
         rest=least.rest(left),
     )
+
+
+def _of_each_recording(columns: FloatArray, effect: Effect, scene: Scene) -> FloatArray:
+    """(k, n) columns of a trace, or (k r, n) of an effect that each of r recordings has for itself."""
+    if len(scene.recordings) < 2 or not any(item.per_recording for item in effect.parameters):
+        return columns
+    edges = np.cumsum([0, *scene.recordings])
+    number = np.arange(scene.voltage.size)
+    return np.concatenate([columns * ((number >= low) & (number < high)) for low, high in pairwise(edges)])
 
 
 def _by_band(rows: FloatArray, windows: Windows) -> FloatArray:

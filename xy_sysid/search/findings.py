@@ -11,7 +11,8 @@ from typing import Any
 
 from xy_sysid.axis.model import Library
 from xy_sysid.comparison.where_it_fails import Place
-from xy_sysid.greybox.free_run import Estimate, GreyboxFit
+from xy_sysid.greybox.free_run import GreyboxFit
+from xy_sysid.greybox.parameters import Estimate
 from xy_sysid.search.criteria import AT_FLOOR
 from xy_sysid.search.diagnose import Diagnosis, Kind
 from xy_sysid.search.ladder import Candidate, Ladder
@@ -268,5 +269,10 @@ def place(item: Place) -> dict[str, Any]:
 
 
 def parameters(items: tuple[Estimate, ...]) -> Mapping[str, Any]:
-    """Every parameter with unit and 95 % interval."""
-    return {item.name: {"value": item.value, "unit": item.unit, "ci95": [item.low, item.high]} for item in items}
+    """Every parameter with unit and 95 % interval; of what each recording has for itself the mean, and ``recordings``, one by one."""
+    return {item.name: _parameter(item) for item in items}
+
+
+def _parameter(item: Estimate) -> dict[str, Any]:
+    own = {"recordings": [_parameter(one) for one in item.recordings]} if item.recordings else {}
+    return {"value": float(item.value), "unit": item.unit, "ci95": [float(item.low), float(item.high)], **own}

@@ -88,19 +88,19 @@ class FreeRunJudge:
 
         Nothing when it is late. brief: the same set on the first stage's data, which are looked at.
         """
-        return self._promised(now, brief, self.data.first)
+        return self._promised(now, brief, early=True)
 
     def slow_moves(self, now: GreyboxFit, brief: GreyboxFit) -> list[Move]:
         """The same by what is left of all data: several times as long to ask, and for what acts slowly or far out."""
-        return self._promised(now, brief, self.data.velocity.size)
+        return self._promised(now, brief, early=False)
 
-    def _promised(self, now: GreyboxFit, brief: GreyboxFit, samples: int) -> list[Move]:
+    def _promised(self, now: GreyboxFit, brief: GreyboxFit, early: bool) -> list[Move]:
         if self.late():
             return []
         model = now.model
         families = {self.library[name].family: name for name, _ in model.effects if self.library[name].family}
         open_to = [e for e in self.library.acting if e.simulable and e.name not in model]
-        here = _Here(now, brief, scene_of(self.data, now, samples))
+        here = _Here(now, brief, scene_of(self.data, now, early))
         screen = screened(self.data, now, open_to, here.scene)
         traces = {trace.effect: trace for trace in screen.traces}
         own = frozenset(name for name, _ in model.effects)

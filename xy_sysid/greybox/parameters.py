@@ -1,0 +1,136 @@
+"""The parameters of an axis model as one row of numbers: what it simulates, how each may move, and the model and its intervals, read back.
+
+What may differ from one recording to the next (a load) stands in the row for the first recording, and behind all others what each later
+recording adds to it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from xy_sysid.axis.model import FINE, AxisModel, simulator
+from xy_sysid.effects import Parameter
+from xy_sysid.greybox.axis_data import AxisData
+from xy_sysid.greybox.least_squares import Scale, Solution
+from xy_sysid.samples.block import FloatArray
+
+Z95 = 1.959964
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """One parameter with its 95 % interval; of what each recording has for itself the mean, and ``recordings``, one by one."""
+
+    name: str
+    value: float
+    unit: str
+    low: float
+    high: float
+    recordings: tuple[Estimate, ...] = ()
+
+
+def problem(data: AxisData, model: AxisModel, early: bool, fine: float = FINE) -> tuple[Callable[[FloatArray], FloatArray], FloatArray, Scale]:
+    """Simulation of the first stage or of the whole in sub-steps of ``fine`` Hz, the model's parameters as a row, and how each may move.
+
+    The row is as of ``simulator`` for the first recording; behind it is what those after it differ by in what each has for itself.
+    """
+    names, own = [name for name, _ in model.effects], _own(model)
+    runs = []
+    for run, count in zip(data.runs, data.counts(early), strict=True):
+        part = slice(run.start, run.start + count + 1)
+        runs.append(simulator(model.library, names, data.sampling_rate, data.voltage[part], data.position[part], fine))
+
+    items = [item for name in names for item in model.library[name].on(data.similar)]
+    places = np.array(own, dtype=np.int64)
+    known = all(len(values) == len(runs) for _, values in model.per_recording)  # else it comes from other recordings
+    each = np.array([_row(model.in_recording(k) if known else model) for k in range(len(runs))])
+    first, later = each[0], each[1:, places] - each[0, places]
+    size = first.size
+
+    def simulated(values: FloatArray) -> FloatArray:
+        if len(runs) == 1:
+            return runs[0](values)
+        rows = np.repeat(values[None, :size], len(runs), axis=0)
+        rows[1:, places] += values[size:].reshape(later.shape)
+        return np.concatenate([one(row) for one, row in zip(runs, rows, strict=True)])
+
+    unit = [max(unit_of(item), abs(value)) for item, value in zip(items, first[3:].tolist(), strict=True)]
+    free, unit_later = np.full(later.size, np.inf), np.tile([unit[place - 3] for place in own], len(runs) - 1)
+    scale = Scale(
+        np.array([-np.inf, 0.0, 1e-2, *(item.low for item in items), *-free]),
+        np.array([np.inf, max(data.first / data.sampling_rate / 4.0, model.delay), 1e5, *(item.high for item in items), *free]),
+        np.array([False, False, True, *(item.positive for item in items), *np.zeros(later.size, dtype=np.bool_)]),
+        np.array([abs(model.gain) or 1.0, 20.0 / data.sampling_rate, 1.0, *unit, *unit_later]),
+    )
+    return simulated, np.concatenate((first, later.ravel())), scale
+
+
+def model_of(start: AxisModel, values: FloatArray) -> AxisModel:
+    """The model of a row of ``problem``."""
+    own, size = _own(start), _row(start).size
+    later = values[size:].reshape(-1, len(own)) if own else np.zeros((0, 0))
+    each = values[own] + np.vstack((np.zeros((1, len(own))), later))  # (recordings, own)
+    row = values[:size].copy()
+    row[own] = each.mean(axis=0)
+    rest = iter(row[3:].tolist())
+    effects = tuple((name, tuple(next(rest) for _ in old)) for name, old in start.effects)
+    model = replace(start, gain=float(row[0]), delay=float(row[1]), pole=float(row[2]), effects=effects)
+    names = list(model.values())
+    known = tuple((names[place], tuple(each[:, k].tolist())) for k, place in enumerate(own)) if each.shape[0] > 1 else ()
+    return replace(model, per_recording=known)
+
+
+def estimates(data: AxisData, model: AxisModel, scale: Scale, found: Solution) -> tuple[Estimate, ...]:
+    """Every parameter with its interval."""
+    inner, spread = scale.inner(found.values), Z95 * np.sqrt(np.diag(found.covariance))
+    wide = Scale(np.where(scale.positive, scale.low, -np.inf), np.full_like(scale.high, np.inf), scale.positive, scale.unit)
+    low, high = wide.outer(inner - spread), np.where(np.isinf(spread), np.inf, wide.outer(inner + spread))
+    high = np.where(scale.positive & np.isfinite(spread), np.minimum(high, np.maximum(scale.high, found.values)), high)  # no machine has more
+    low[1] = max(low[1], 0.0)  # no delay is negative
+    inner_units = ["m/s/V", "s", "rad/s", *(item.unit for name, _ in model.effects for item in model.library[name].parameters)]
+    units = [data.units.of(unit) for unit in inner_units]
+    every = [
+        Estimate(name=name, value=value, unit=unit, low=float(min(a, b)), high=float(max(a, b)))
+        for (name, value), unit, a, b in zip(model.values().items(), units, low, high, strict=False)
+    ]
+    own, each = _own(model), dict(model.per_recording)
+    for column, place in enumerate(own if each else ()):
+        later = np.arange(len(every) + column, inner.size, len(own))
+        rows = np.array([place, *later])
+        spread = Z95 * scale.unit[place] * _spread_of_each(found.covariance[np.ix_(rows, rows)])
+        item = every[place]
+        *parts, mean = (
+            replace(item, value=value, low=float(value - width), high=float(value + width))
+            for value, width in zip((*each[item.name], item.value), spread, strict=True)
+        )
+        every[place] = replace(mean, recordings=tuple(parts))
+    return tuple(every)
+
+
+def _spread_of_each(covariance: FloatArray) -> FloatArray:
+    """(r + 1,) standard deviation of a value in each of r recordings, and of their mean; covariance (r, r) of the first and of what others add."""
+    count = covariance.shape[0]
+    ways = np.eye(count)
+    ways[:, 0] = 1.0
+    ways = np.vstack((ways, ways.mean(axis=0)))
+    power = np.einsum("ij,jk,ik->i", ways, covariance, ways)
+    return np.asarray(np.sqrt(np.where(np.isnan(power), np.inf, np.maximum(power, 0.0))))  # nan: of what the data do not see at all
+
+
+def _own(model: AxisModel) -> list[int]:
+    """Places in the row of a model's parameters of those that may differ from one recording to the next."""
+    items = (item for name, _ in model.effects for item in model.library[name].parameters)
+    return [3 + k for k, item in enumerate(items) if item.per_recording]
+
+
+def _row(model: AxisModel) -> FloatArray:
+    """Its parameters as ``simulator`` takes them."""
+    return np.array([model.gain, model.delay, model.pole, *(value for _, row in model.effects for value in row)])
+
+
+def unit_of(item: Parameter) -> float:
+    """Size of 1 in a solver, for a parameter that is not fitted as a logarithm."""
+    return abs(item.typical) or min(1.0, item.high - item.low)
