@@ -126,54 +126,54 @@ def solve(
             moved[k] += step
             return np.asarray((left(moved) - error) / step)
 
-        with ThreadPoolExecutor(min(inner.size, cores())) as pool:
-            return np.array(list(pool.map(slope, range(inner.size))))
+        return np.array(list(pool.map(slope, range(inner.size))))
 
-    inner = scale.inner(start)
-    error = left(inner)
-    size = inner.size
-    normal, cost, converged = np.eye(size), np.inf, False
-    change = slopes(inner, error, np.zeros((size, *error.shape), dtype=np.complex128)) if known is None else known
-    exact = known is None
-    for stage in schedule.rounds:
-        before = inner, error, change, exact
-        weight = _weight(target, error, stage.counts)
-        cost = _cost(error * weight)
-        damping, converged, fresh = 1e-3, False, False
-        for _ in range(stage.iterations):
-            if not fresh:
-                columns = (change * weight).reshape(size, -1).view(np.float64)
-                normal, slope = columns @ columns.T, columns @ (error * weight).ravel().view(np.float64)
-                fresh = True
-            if schedule.late():
-                break
-            diagonal = np.maximum(np.diag(normal), 1e-12 * float(np.max(np.diag(normal))) + 1e-300)
-            move = _move(normal + damping * np.diag(diagonal), slope, scale, scale.outer(inner))
-            move *= min(1.0, 2.0 / float(np.max(np.abs(move)) + 1e-300))
-            trial = scale.inner(scale.outer(inner + move))
-            found, runs = left(trial), runs + 1
-            new = _cost(found * weight)
-            if np.isfinite(new) and new < cost:
-                fall, gone = (cost - new) / cost, trial - inner
-                hoped = -float(2.0 * slope @ gone + gone @ normal @ gone)
-                if abs((cost - new) - hoped) < TRUSTED * hoped:
-                    change, exact = _updated(change, gone, diagonal, found - error), False
+    with ThreadPoolExecutor(min(start.size, cores())) as pool:
+        inner = scale.inner(start)
+        error = left(inner)
+        size = inner.size
+        normal, cost, converged = np.eye(size), np.inf, False
+        change = slopes(inner, error, np.zeros((size, *error.shape), dtype=np.complex128)) if known is None else known
+        exact = known is None
+        for stage in schedule.rounds:
+            before = inner, error, change, exact
+            weight = _weight(target, error, stage.counts)
+            cost = _cost(error * weight)
+            damping, converged, fresh = 1e-3, False, False
+            for _ in range(stage.iterations):
+                if not fresh:
+                    columns = (change * weight).reshape(size, -1).view(np.float64)
+                    normal, slope = columns @ columns.T, columns @ (error * weight).ravel().view(np.float64)
+                    fresh = True
+                if schedule.late():
+                    break
+                diagonal = np.maximum(np.diag(normal), 1e-12 * float(np.max(np.diag(normal))) + 1e-300)
+                move = _move(normal + damping * np.diag(diagonal), slope, scale, scale.outer(inner))
+                move *= min(1.0, 2.0 / float(np.max(np.abs(move)) + 1e-300))
+                trial = scale.inner(scale.outer(inner + move))
+                found, runs = left(trial), runs + 1
+                new = _cost(found * weight)
+                if np.isfinite(new) and new < cost:
+                    fall, gone = (cost - new) / cost, trial - inner
+                    hoped = -float(2.0 * slope @ gone + gone @ normal @ gone)
+                    if abs((cost - new) - hoped) < TRUSTED * hoped:
+                        change, exact = _updated(change, gone, diagonal, found - error), False
+                    else:
+                        change, exact = slopes(trial, found, change), True
+                    inner, error, cost, fresh = trial, found, new, False
+                    damping = max(damping * 0.2, 1e-9)
+                    if fall < stage.enough:
+                        converged = True
+                        break
+                elif not exact:
+                    change, exact, fresh = slopes(inner, error, change), True, False
                 else:
-                    change, exact = slopes(trial, found, change), True
-                inner, error, cost, fresh = trial, found, new, False
-                damping = max(damping * 0.2, 1e-9)
-                if fall < stage.enough:
-                    converged = True
-                    break
-            elif not exact:
-                change, exact, fresh = slopes(inner, error, change), True, False
-            else:
-                damping *= 10.0
-                if damping > 1e6:
-                    converged = True
-                    break
-        if stage.counts != "as likely" and _judged(target, error) > _judged(target, before[1]):
-            inner, error, change, exact = before  # a step aside
+                    damping *= 10.0
+                    if damping > 1e6:
+                        converged = True
+                        break
+            if stage.counts != "as likely" and _judged(target, error) > _judged(target, before[1]):
+                inner, error, change, exact = before  # a step aside
     noise = _covariance(normal)
     with np.errstate(over="ignore", invalid="ignore"):  # of a model that runs away all is one mistake
         beyond = layout.lines * np.maximum(layout.power(error) - least.noise, 0.0)
