@@ -16,7 +16,6 @@ from xy_sysid.imports.reading import Reading
 from xy_sysid.imports.sheet import Column, Sheet
 from xy_sysid.samples.block import FloatArray
 
-EVEN = 0.01  # of the step; a column whose steps differ by less is a clock
 FEW = 8  # levels that are counted
 LARGE = 300_000_000  # bytes; a larger bag is listed without being read
 
@@ -96,7 +95,7 @@ def _listed(column: Column, role: str) -> Listed:
     finite = values[np.isfinite(values)]
     if not finite.size:
         return _row(column, None, "no numbers", role)
-    row = _row(column, float(finite[0]), _looks(values, finite), role)
+    row = _row(column, float(finite[0]), _looks(column, finite), role)
     return replace(row, low=float(finite.min()), high=float(finite.max()))
 
 
@@ -105,14 +104,13 @@ def _row(column: Column, first: float | str | None, looks: str, role: str) -> Li
     return Listed(name=column.name, unit=column.unit, rows=rows, first=first, low=None, high=None, looks=looks, role=role)
 
 
-def _looks(values: FloatArray, finite: FloatArray) -> str:
-    missing = f", {len(values) - len(finite)} missing" if len(finite) < len(values) else ""
+def _looks(column: Column, finite: FloatArray) -> str:
+    missing = f", {len(column.values) - len(finite)} missing" if len(finite) < len(column.values) else ""
+    if column.step:
+        return f"a clock: even steps of {column.step:.6g}{missing}"
     if len(finite) > 2:
         steps = np.diff(finite)
-        step = float(np.median(steps))
-        if step > 0 and float(np.max(np.abs(steps - step))) < EVEN * step:
-            return f"a clock: even steps of {step:.6g}{missing}"
-        if step > 0 and float(steps.min()) > 0:
+        if float(steps.min()) > 0:
             return f"a clock: steps of {steps.min():.4g} to {steps.max():.4g}{missing}"
     levels = len(np.unique(finite[:100_000]))
     return ("constant" if levels == 1 else f"{levels} levels" if levels <= FEW else "") + missing if levels <= FEW else missing.removeprefix(", ")

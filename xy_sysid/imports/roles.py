@@ -6,13 +6,14 @@ What the user says (``Reading.columns``) comes first, then the contract's own na
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass
 
 from xy_sysid.errors import BadRecording
 from xy_sysid.imports.names import Meaning, by_unit, meaning
 from xy_sysid.imports.reading import Reading
 from xy_sysid.imports.sheet import Column, Sheet, spoken
+from xy_sysid.samples.recording import SLOWEST
 
 CONTRACT: Mapping[str, tuple[str, ...]] = {
     "input": ("voltage", "u", "input"),
@@ -69,6 +70,9 @@ def assigned(sheet: Sheet, reading: Reading, notes: list[str]) -> Roles:
         time = sheet.usable(clocks[0]) if clocks else None
         free |= time is not None
     counters = [column for column in sheet.columns if column.name == "seq"]
+    if time is None and not counters and sheet.fs is None and reading.rate is None:
+        taken = {column.name for columns in pairs.values() for column in columns.values()}
+        time = _by_steps(sheet, {*meanings, *taken}, notes)
     joints = [column for column in sheet.columns if column.words and set(spoken(column.name)) in JOINT_WORDS]
     return Roles(
         time=time,
@@ -79,6 +83,17 @@ def assigned(sheet: Sheet, reading: Reading, notes: list[str]) -> Roles:
         references=pairs["reference"],
         guessed=free,
     )
+
+
+def _by_steps(sheet: Sheet, known: Container[str], notes: list[str]) -> Column | None:
+    """The only column that no name and no role claims and that rises evenly, by less than the slowest samples of an axis: the time, in s."""
+    rest = [column for column in sheet.columns if not column.unit and column.name not in known]
+    clocks = [column for column in rest if 0.0 < column.step < 1.0 / SLOWEST]
+    if len(clocks) != 1:
+        return None
+    name, step = clocks[0].name, clocks[0].step
+    notes.append(f"{name!r} rises by {step:.6g} from row to row: it is taken for the time, in s (another unit with --map time={name} --unit time=ms)")
+    return sheet.usable(clocks[0])
 
 
 def _contract(sheet: Sheet) -> dict[str, Found]:

@@ -6,12 +6,15 @@ import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
 from xy_sysid.errors import BadRecording
 from xy_sysid.samples.block import FloatArray
 
 WORD = re.compile(r"[^\W_]+")
 CAMEL = re.compile(r"(?<=[a-zà-ÿ0-9])(?=[A-ZÀ-Þ][a-zà-ÿ])|(?<=[a-zà-ÿ])(?=[A-ZÀ-Þ])")
 MANY = 12  # names said in one line
+EVEN = 0.01  # of the step; a column whose steps differ by less is a clock
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,6 +25,14 @@ class Column:
     unit: str
     values: FloatArray
     words: tuple[str, ...] = ()
+
+    @property
+    def step(self) -> float:
+        """By which the numbers rise evenly from row to row, as those of a clock do; 0 if they do not."""
+        finite = self.values[np.isfinite(self.values)]
+        steps = np.diff(finite)
+        step = float(np.median(steps)) if steps.size > 1 else 0.0
+        return step if step > 0.0 and float(np.max(np.abs(steps - step))) < EVEN * step else 0.0
 
 
 @dataclass(frozen=True, slots=True)
