@@ -115,3 +115,14 @@ def test_values_outside_of_where_a_law_holds_are_refused_in_words(effect: str, i
     assert refusal is not None and EFFECTS[effect].refusal is refusal
     assert refusal(inside, (-0.01, 0.01)) == ""
     assert len(refusal(outside, (-0.01, 0.01)).split()) > 4
+
+
+@pytest.mark.parametrize("cut", [3333, 4444, 6000])
+@pytest.mark.parametrize(("coulomb", "effects"), [(0.0, ()), (0.3, ("coulomb_friction",))])
+def test_a_recording_that_begins_in_motion_is_a_recording(cut: int, coulomb: float, effects: tuple[str, ...]) -> None:
+    """Cut out of a longer one, of a machine that coasts for a second: how fast it began is no effect that is missing."""
+    coasting = Joint(fs=1000.0, seconds=25.0, count=1e-6, mass=1.0, drag=1.0, coulomb=coulomb, shake=3.0, band=(0.2, 60.0))
+    drive, position = driven(coasting, 2)
+    found = diagnose(coasting.fs, drive[cut:], position[cut:])
+    assert found.effects == effects, found.sentence
+    assert found.confidence > 0.9

@@ -19,7 +19,7 @@ from xy_sysid.jit import compiled_text
 from xy_sysid.samples.block import FloatArray
 
 Undoing = Callable[[FloatArray, FloatArray, FloatArray, NDArray[np.uint8], float, FloatArray, FloatArray, FloatArray], float]
-Kernel = Callable[[FloatArray, FloatArray, FloatArray, NDArray[np.uint8], float, float, FloatArray], None]
+Kernel = Callable[[FloatArray, FloatArray, FloatArray, NDArray[np.uint8], float, float, float, FloatArray], None]
 
 
 def build(effects: Sequence[Effect]) -> Kernel:

@@ -25,10 +25,11 @@ def slots(effects: Sequence[Effect]) -> dict[str, int]:
 
 
 def text(name: str, effects: Sequence[Effect]) -> str:
-    """Source of ``name(u, x, p, on, fs, fine, out)``.
+    """Source of ``name(u, x, p, on, fs, fine, start, out)``.
 
     u: (n,) held voltage, V; x: (n + 1,) measured position, m; p: numbers in the order of ``slots``; on: (effects,) flags;
-    fs: Hz; fine: Hz, sub-steps of each of a sample's two pieces; out: (n,) receives the mean velocity of each sample, m/s.
+    fs: Hz; fine: Hz, sub-steps of each of a sample's two pieces; start: speed at the first sample, m/s;
+    out: (n,) receives the mean velocity of each sample, m/s.
     """
     return TEMPLATE.substitute(
         name=name,
@@ -246,7 +247,8 @@ def _motions(effects: Sequence[Effect]) -> str:
         lines += [
             f"if has_{effect.name} and not inside_{effect.name}:",
             f"    b0, b1, b2, a1, a2 = {_call(effect, 'section', {'fs': 'fs'})}",
-            "    first = second = 0.0",
+            "    steady = (b0 + b1 + b2) / (1.0 + a1 + a2) * start",
+            "    first, second = steady - b0 * start, b2 * start - a2 * steady",
             "    for i in range(n):",
             "        value = b0 * out[i] + first",
             "        first = b1 * out[i] - a1 * value + second",

@@ -10,7 +10,7 @@ from __future__ import annotations
 from string import Template
 
 TEMPLATE = Template("""\
-def $name(u, x, p, on, fs, fine, out):
+def $name(u, x, p, on, fs, fine, start, out):
     n = out.shape[0]
     gain, delay, pole = p[0], p[1], p[2]
 $unpack
@@ -29,7 +29,7 @@ $states
     decay_old, decay_new = math.exp(-pole * h_old), math.exp(-pole * h_new)
     spent_old, spent_new = -math.expm1(-pole * h_old) / pole, -math.expm1(-pole * h_new) / pole
     turn = math.copysign(1.0, gain)  # friction opposes motion, whatever the sign of the gain
-    v = 0.0
+    v = start
     hung = False
     top, bottom = np.ones(1), np.ones(1)
 $hang
@@ -45,6 +45,7 @@ $hang
         still_old, still_new = exponential(generator_still, h_old), exponential(generator_still, h_new)
         size = top.size + 2
         swung, spare, series = np.zeros(size), np.zeros(size), np.zeros(($terms, size))
+        swung[1], swung[2] = start, start / top[0]  # what hangs on it moves along
         for i in range(n):
             moved = 0.0
             for piece in range(2):
@@ -106,7 +107,7 @@ $level_middle
             out[i] = moved * fs
     elif not curved:
         # v runs in the direction of the voltage here; forth and back are directions of motion
-        size = abs(gain)
+        size, v = abs(gain), turn * start
         plus, minus = (fixed_forth, fixed_back) if gain > 0.0 else (fixed_back, fixed_forth)
         for i in range(n):
             moved = 0.0

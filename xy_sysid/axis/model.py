@@ -1,6 +1,7 @@
 """One axis in the time domain: a rigid base (gain, delay, pole) and any of a library's effects.
 
-The velocity is simulated from rest. What depends on position uses the measured one, so that nothing drifts. Scheme:
+The velocity is simulated from the speed with which the measured position begins. What depends on position uses the
+measured one, so that nothing drifts. Scheme:
 each sample is split where the delayed voltage changes; between, the viscous pole is integrated exactly for a constant
 force, and dry friction finds its zero crossings in time (Karnopp 1985's problem without his dead band). Laws that bend
 with speed get sub-steps (two in each piece at 2 kHz), by the midpoint rule. Resonances filter the sampled motion, unless
@@ -11,17 +12,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Protocol
 
 import numpy as np
 
 from xy_sysid.axis.loop_compile import Kernel, Undoing, build, build_undoing
 from xy_sysid.axis.loop_source import BASE, slots, undoable
+from xy_sysid.axis.start_speed import start_speed
 from xy_sysid.effects import EFFECTS, Effect
 from xy_sysid.errors import BadInput
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.settings import unknown_name
 
 FINE = 8000.0  # Hz: sub-steps of each of a sample's two pieces; LuGre bristles of 10 um and Stribeck curves of 10 mm/s need it
+FADED = 3.0  # time constants after which a wrong start is no longer seen (5 %)
+SURE = 3.0  # times its standard deviation that a start must be off to be known to be
+ROUNDS = 4  # of putting it right: friction bends what is linear in a rigid axis
 
 
 class Library:
@@ -152,18 +158,30 @@ class AxisModel:
         parts = zip(whole.parts, whole.apart(own.pop(name)), strict=True)
         return self._of((*own.items(), *((part, self._turned(part, values)) for part, values in parts)))
 
+    @property
+    def row(self) -> FloatArray:
+        """Its parameters as ``simulator`` takes them."""
+        return np.array([self.gain, self.delay, self.pole, *(value for _, values in self.effects for value in values)])
+
     def values(self) -> dict[str, float]:
         """Every parameter by ``gain``, ``delay``, ``pole``, ``effect.parameter``."""
         own = {f"{name}.{key}": value for name, row in self.effects for key, value in zip(self.library[name].names, row, strict=True)}
         return {"gain": self.gain, "delay": self.delay, "pole": self.pole, **own}
 
 
+class Simulation(Protocol):
+    """See ``simulator``."""
+
+    def __call__(self, parameters: FloatArray, start: float = 0.0) -> FloatArray: ...
+
+
 def simulator(
     library: Library, active: Iterable[str], sampling_rate: float, voltage: FloatArray, position: FloatArray, fine: float = FINE
-) -> Callable[[FloatArray], FloatArray]:
+) -> Simulation:
     """A function from parameters to the simulated velocity (n - 1,), m/s, for many runs on the same data, several at once too.
 
-    Its argument is a row: gain, delay, pole, then each active effect's parameters, in the order of ``active``.
+    Its arguments are a row: gain, delay, pole, then each active effect's parameters, in the order of ``active``; and the speed at the
+    first sample, m/s, which is none if it is not given (see ``start_of``).
     voltage, position: (n,) V and m; the voltage of sample k is held to k + 1; fine: Hz, sub-steps for what heeds speed
     """
     if voltage.shape != position.shape or voltage.ndim != 1 or voltage.size < 2:
@@ -178,14 +196,14 @@ def simulator(
     sizes = [(names.index(effect.name), library.places[f"{effect.name}.{effect.names[0]}"]) for effect in chosen]
     kernel = library.kernel
 
-    def run(parameters: FloatArray) -> FloatArray:
+    def run(parameters: FloatArray, start: float = 0.0) -> FloatArray:
         row = ones.copy()
         row[where] = parameters
         on = np.zeros(len(names), dtype=np.uint8)
         for place, size in sizes:
             on[place] = row[size] != 0.0
         out = np.empty(u.size)
-        kernel(u, x, row, on, float(sampling_rate), fine, out)
+        kernel(u, x, row, on, float(sampling_rate), fine, start, out)
         return out
 
     return run
@@ -220,10 +238,33 @@ def undoer(
 
 
 def simulate(model: AxisModel, sampling_rate: float, voltage: FloatArray, position: FloatArray) -> FloatArray:
-    """(n - 1,) mean velocity of each sample, m/s, from rest; arguments as in ``simulator``."""
-    names = [name for name, _ in model.effects]
-    run = simulator(model.library, names, sampling_rate, voltage, position)
-    return run(np.array([model.gain, model.delay, model.pole, *(value for _, values in model.effects for value in values)]))
+    """(n - 1,) mean velocity of each sample, m/s, from the speed at the first; arguments as in ``simulator``."""
+    names, start = [name for name, _ in model.effects], start_of(model, sampling_rate, voltage, position)
+    return simulator(model.library, names, sampling_rate, voltage, position)(model.row, start)
+
+
+def start_of(model: AxisModel, sampling_rate: float, voltage: FloatArray, position: FloatArray, fine: float = FINE) -> float:
+    """The speed at the first sample, m/s, with which a model explains best how a recording begins; arguments as in ``simulator``.
+
+    What is wrong with it fades with the pole. It is put right as long as that stands out of the error that follows (Gauss's method, one unknown).
+    """
+    seen, doubt = start_speed(sampling_rate, position)
+    start, low, high = (seen if abs(seen) > SURE * doubt else 0.0), seen - SURE * doubt, seen + SURE * doubt
+    fades = max(int(FADED / model.pole * sampling_rate), 2)
+    count = min(2 * fades, position.size - 1)
+    if count <= fades:
+        return start
+    velocity, fading = sample_velocity(sampling_rate, position[: count + 1]), np.exp(-model.pole * (np.arange(fades) + 0.5) / sampling_rate)
+    run = simulator(model.library, [name for name, _ in model.effects], sampling_rate, voltage[: count + 1], position[: count + 1], fine)
+    for _ in range(ROUNDS):
+        with np.errstate(all="ignore"):  # a model may run away
+            error = velocity - run(model.row, start)
+            off = float(error[:fades] @ fading / (fading @ fading))
+            known = SURE * float(np.std(error[fades:])) < abs(off) < np.inf
+        if not known:
+            break
+        start = min(max(start + off, low), high)
+    return start
 
 
 def sample_velocity(sampling_rate: float, position: FloatArray) -> FloatArray:

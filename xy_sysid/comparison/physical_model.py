@@ -56,7 +56,7 @@ class PhysicalModel:
         return f"rigid with {' and '.join(self.effects).replace('_', ' ')}" if self.effects else "rigid"
 
     def velocity(self, sampling_rate: float, voltage: FloatArray, position: FloatArray) -> FloatArray:
-        """(n - 1,) simulated mean velocity of each sample, m/s, from rest."""
+        """(n - 1,) simulated mean velocity of each sample, m/s, from the speed with which the position begins."""
         return simulate(self.model, sampling_rate, voltage, position)
 
     def __repr__(self) -> str:

@@ -227,7 +227,7 @@ def fit(data: AxisData, start: AxisModel, brief: bool = False, hopeless: float =
         more = solve(run, target, scale, nearer.values, Schedule(BRIEF[-1:], late), nearer.change)
         found = replace(more, runs=found.runs + nearer.runs + more.runs)
     if not brief:
-        return finish(data, model_of(start, found.values), found.runs, late)
+        return finish(data, model_of(data, start, found.values), found.runs, late)
     return _result(data, start, scale, found, brief=True)
 
 
@@ -244,9 +244,9 @@ def finish(data: AxisData, start: AxisModel, runs: int = 0, late: Callable[[], b
 
 
 def _result(data: AxisData, start: AxisModel, scale: Scale, found: Solution, brief: bool = False) -> GreyboxFit:
-    model = model_of(start, found.values)
-    run, _, _ = problem(data, start, brief, MIDDLING if brief else FINE)
-    simulated = run(found.values)
+    model = model_of(data, start, found.values)
+    run, values, _ = problem(data, model, brief, MIDDLING if brief else FINE)
+    simulated = run(values)
     error = (data.begun(data.velocity) if brief else data.velocity) - simulated
     fitted, judging = (data.brief, data.first_windows()) if brief else (data.fitted, data.held)
     held = data.layout.powers(judging.spectrum(error))

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares
 
-from xy_sysid.axis.model import AxisModel, simulate, simulator
+from xy_sysid.axis.model import AxisModel, simulate, simulator, start_of
 from xy_sysid.effects import Effect
 from xy_sysid.effects._contract import arguments
 from xy_sysid.greybox.free_run import AxisData, GreyboxFit
@@ -78,6 +78,7 @@ def settled(data: AxisData, fitted: GreyboxFit) -> GreyboxFit:
     low = np.array([signs[0], 0.1 * model.pole, -10.0 * speed, *(item.low for item in items)]) / size
     high = np.array([signs[1], 10.0 * model.pole, 10.0 * speed, *(item.high for item in items)]) / size
     run = simulator(model.library, [name for name, _ in model.effects], data.sampling_rate, data.voltage, data.position)
+    begun = start_of(model, data.sampling_rate, data.voltage, data.position)
     target = data.position - data.position[0]
     time = (np.arange(data.velocity.size) + 0.5) / data.sampling_rate
     far = _rms(target - _travelled(data.sampling_rate, fitted.simulated)) or 1.0
@@ -86,7 +87,7 @@ def settled(data: AxisData, fitted: GreyboxFit) -> GreyboxFit:
     def left(inner: FloatArray) -> FloatArray:
         values = inner * size
         moved = _moved(model, free, values)
-        velocity = run(np.array(list(moved.values().values()))) + values[2] * np.exp(-moved.pole * time)
+        velocity = run(moved.row, begun) + values[2] * np.exp(-moved.pole * time)
         drift = target - _travelled(data.sampling_rate, velocity)
         return np.concatenate((drift / far, (data.velocity - velocity) / fast))
 

@@ -1,7 +1,7 @@
 """The parameters of an axis model as one row of numbers: what it simulates, how each may move, and the model and its intervals, read back.
 
 What may differ from one recording to the next (a load) stands in the row for the first recording, and behind all others what each later
-recording adds to it.
+recording adds to it. The speed with which each begins is none of them: it is worked out anew wherever a fit begins.
 """
 
 from __future__ import annotations
@@ -11,13 +11,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from xy_sysid.axis.model import FINE, AxisModel, simulator
+from xy_sysid.axis.model import FINE, AxisModel, simulator, start_of
 from xy_sysid.effects import Parameter
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.least_squares import Scale, Solution
 from xy_sysid.samples.block import FloatArray
 
 Z95 = 1.959964
+BEGINS = 2000.0  # Hz: sub-steps in which a start is looked for
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,39 +40,41 @@ def problem(data: AxisData, model: AxisModel, early: bool, fine: float = FINE) -
     """
     names, own = [name for name, _ in model.effects], _own(model)
     runs = []
-    for run, count in zip(data.runs, data.counts(early), strict=True):
-        part = slice(run.start, run.start + count + 1)
-        runs.append(simulator(model.library, names, data.sampling_rate, data.voltage[part], data.position[part], fine))
-
     items = [item for name in names for item in model.library[name].on(data.similar)]
     places = np.array(own, dtype=np.int64)
-    known = all(len(values) == len(runs) for _, values in model.per_recording)  # else it comes from other recordings
-    each = np.array([_row(model.in_recording(k) if known else model) for k in range(len(runs))])
+    known = all(len(values) == len(data.runs) for _, values in model.per_recording)  # else it comes from other recordings
+    models = [model.in_recording(k) if known else model for k in range(len(data.runs))]
+    each = np.array([one.row for one in models])
+    starts: list[float] = []
+    for one, run, count in zip(models, data.runs, data.counts(early), strict=True):
+        u, y = (signal[run.start : run.start + count + 1] for signal in (data.voltage, data.position))
+        starts.append(start_of(one, data.sampling_rate, u, y, BEGINS))
+        runs.append(simulator(model.library, names, data.sampling_rate, u, y, fine))
     first, later = each[0], each[1:, places] - each[0, places]
     size = first.size
 
     def simulated(values: FloatArray) -> FloatArray:
-        if len(runs) == 1:
-            return runs[0](values)
         rows = np.repeat(values[None, :size], len(runs), axis=0)
         rows[1:, places] += values[size:].reshape(later.shape)
-        return np.concatenate([one(row) for one, row in zip(runs, rows, strict=True)])
+        parts = [one(row, speed) for one, row, speed in zip(runs, rows, starts, strict=True)]
+        return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
     unit = [max(unit_of(item), abs(value)) for item, value in zip(items, first[3:].tolist(), strict=True)]
-    free, unit_later = np.full(later.size, np.inf), np.tile([unit[place - 3] for place in own], len(runs) - 1)
+    unit_later = np.tile([unit[place - 3] for place in own], len(runs) - 1)
+    free = np.full(later.size, np.inf)
     scale = Scale(
         np.array([-np.inf, 0.0, 1e-2, *(item.low for item in items), *-free]),
         np.array([np.inf, max(data.first / data.sampling_rate / 4.0, model.delay), 1e5, *(item.high for item in items), *free]),
-        np.array([False, False, True, *(item.positive for item in items), *np.zeros(later.size, dtype=np.bool_)]),
+        np.array([False, False, True, *(item.positive for item in items), *np.zeros(free.size, dtype=np.bool_)]),
         np.array([abs(model.gain) or 1.0, 20.0 / data.sampling_rate, 1.0, *unit, *unit_later]),
     )
     return simulated, np.concatenate((first, later.ravel())), scale
 
 
-def model_of(start: AxisModel, values: FloatArray) -> AxisModel:
+def model_of(data: AxisData, start: AxisModel, values: FloatArray) -> AxisModel:
     """The model of a row of ``problem``."""
-    own, size = _own(start), _row(start).size
-    later = values[size:].reshape(-1, len(own)) if own else np.zeros((0, 0))
+    own, size, more = _own(start), start.row.size, len(data.runs) - 1
+    later = values[size:].reshape(-1, len(own)) if own else np.zeros((more, 0))
     each = values[own] + np.vstack((np.zeros((1, len(own))), later))  # (recordings, own)
     row = values[:size].copy()
     row[own] = each.mean(axis=0)
@@ -98,7 +101,7 @@ def estimates(data: AxisData, model: AxisModel, scale: Scale, found: Solution) -
     ]
     own, each = _own(model), dict(model.per_recording)
     for column, place in enumerate(own if each else ()):
-        later = np.arange(len(every) + column, inner.size, len(own))
+        later = len(every) + column + len(own) * np.arange(len(data.runs) - 1)
         rows = np.array([place, *later])
         spread = Z95 * scale.unit[place] * _spread_of_each(found.covariance[np.ix_(rows, rows)])
         item = every[place]
@@ -124,11 +127,6 @@ def _own(model: AxisModel) -> list[int]:
     """Places in the row of a model's parameters of those that may differ from one recording to the next."""
     items = (item for name, _ in model.effects for item in model.library[name].parameters)
     return [3 + k for k, item in enumerate(items) if item.per_recording]
-
-
-def _row(model: AxisModel) -> FloatArray:
-    """Its parameters as ``simulator`` takes them."""
-    return np.array([model.gain, model.delay, model.pole, *(value for _, row in model.effects for value in row)])
 
 
 def unit_of(item: Parameter) -> float:
