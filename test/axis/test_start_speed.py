@@ -27,7 +27,7 @@ def test_the_speed_of_the_first_sample_is_known_as_well_as_is_said(seed: int) ->
     for speed, acceleration in ((0.05, 0.0), (-0.2, 3.0), (0.0, 0.0)):
         found, doubt = start_speed(RATE, 0.3 + speed * time + 0.5 * acceleration * time**2 + noise)
         assert abs(found - speed) < 4.0 * doubt
-        assert doubt < 0.1 * abs(speed) + 1e-3
+        assert doubt < 0.1 * abs(speed) + 3e-3  # noise of 1 um read at 1 kHz
 
 
 def test_what_starts_from_rest_is_not_said_to_move() -> None:

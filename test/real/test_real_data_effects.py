@@ -83,7 +83,7 @@ def test_settling_keeps_what_the_fast_motion_knows_better() -> None:
     assert dict(after.model.effects)["cogging"] == dict(before.model.effects)["cogging"]
     assert after.held_out_error == before.held_out_error
     assert np.isinf(after.parameter("gain").high) and np.isfinite(after.parameter("cogging.period").high)
-    far = [open_loop(recording.sampling_rate, y, fit.simulated) for fit in (before, after)]
+    far = [open_loop(recording.sampling_rate, y, fit.simulated, fit.model.pole) for fit in (before, after)]
     assert far[1].rms < far[0].rms and far[1].worst >= far[1].rms
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -16,31 +17,32 @@ def start_speed(sampling_rate: float, position: FloatArray) -> tuple[float, floa
     """Speed at the first sample of a position (n,), and its standard deviation, m/s.
 
     The slope at the beginning of a parabola (Savitzky & Golay, Analytical Chemistry 36, 1964) through 8 samples, or 16, 32 ... as long as
-    noise leaves more doubt than that the speed changes: the slope of a straight line differs by so much.
+    noise leaves more doubt than that the motion is no parabola: a cubic's slope differs by so much.
     """
     found, doubt, count = 0.0, np.inf, SHORTEST
     while count <= min(position.size, max(LONGEST * sampling_rate, SHORTEST)):
-        slopes, spread = _slopes(count)
+        bent, cubic = (_fit(count, order) for order in (2, 3))
         begin = position[:count] - position[0]
-        straight, bent = (slopes @ begin).tolist()
-        left = begin - _parabola(count) @ begin
-        noise, change = spread * float(np.sqrt(left @ left / (count - 3))), abs(bent - straight)
-        found, doubt = bent, float(np.hypot(noise, change))
-        if noise <= change:
+        left = begin - cubic.values @ begin
+        noise = float(np.linalg.norm(bent.slope)) * float(np.sqrt(left @ left / (count - 4)))
+        found, beyond = float(bent.slope @ begin), abs(float((cubic.slope - bent.slope) @ begin))
+        doubt = float(np.hypot(noise, beyond))
+        if noise <= beyond:
             break
         count *= 2
     return found * sampling_rate, doubt * sampling_rate
 
 
-@cache
-def _slopes(count: int) -> tuple[FloatArray, float]:
-    """(2, count) what gives the slope at the first sample of a straight line and of a parabola, per sample; spread of the second for noise of 1."""
-    line, parabola = (np.linalg.pinv(np.vander(np.arange(count), order, increasing=True))[1] for order in (2, 3))
-    return np.array([line, parabola]), float(np.linalg.norm(parabola))
+@dataclass(frozen=True, slots=True)
+class _Fit:
+    """What gives a polynomial's slope at the first sample, per sample, (n,), and its values (n, n)."""
+
+    slope: FloatArray
+    values: FloatArray
 
 
 @cache
-def _parabola(count: int) -> FloatArray:
-    """(count, count) what gives the parabola itself."""
-    powers = np.vander(np.arange(count, dtype=np.float64), 3, increasing=True)
-    return np.asarray(powers @ np.linalg.pinv(powers))
+def _fit(count: int, order: int) -> _Fit:
+    powers = np.vander(np.arange(count, dtype=np.float64), order + 1, increasing=True)
+    inverse = np.linalg.pinv(powers)
+    return _Fit(inverse[1], powers @ inverse)

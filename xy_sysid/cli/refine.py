@@ -77,7 +77,7 @@ def refine(
                 if simulate_alone:
                     data = prepare(run.sampling_rate, run.voltage, run.position, tolerance, run.units)
                     found = replace(found, final=settled(data, found.final))
-                alone[name] = open_loop(run.sampling_rate, run.position, found.final.simulated)
+                alone[name] = open_loop(run.sampling_rate, run.position, found.final.simulated, found.final.model.pole)
             bar.advance(task)
             return found
 

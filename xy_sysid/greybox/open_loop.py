@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares
 
-from xy_sysid.axis.model import AxisModel, simulate, simulator, start_of
+from xy_sysid.axis.model import AxisModel, simulator, start_of
 from xy_sysid.effects import Effect
 from xy_sysid.effects._contract import arguments
 from xy_sysid.greybox.free_run import AxisData, GreyboxFit
@@ -28,37 +28,41 @@ SLOW = ("friction", "bristle", "force", "input")  # categories that decide the s
 class OpenLoop:
     """Measured minus simulated position over a whole record, from its first sample.
 
-    error: (n,) m; rms, worst: m; share: rms over the standard deviation of the measured position
+    error: (n,) m; speed: m/s by which the first sample's was off; rms, worst: m; share: rms over the standard deviation of the measured position
     """
 
     error: FloatArray
+    speed: float
     rms: float
     worst: float
     share: float
 
 
-def open_loop(sampling_rate: float, position: FloatArray, simulated: FloatArray) -> OpenLoop:
-    """What a simulated velocity (n - 1,), m/s, from rest, makes of the position (n,), m."""
-    error = position - position[0] - _travelled(sampling_rate, simulated)
+def open_loop(sampling_rate: float, position: FloatArray, simulated: FloatArray, pole: float) -> OpenLoop:
+    """What a simulated velocity (n - 1,), m/s, makes of the position (n,), m, from the input alone.
+
+    How far the speed at the first sample is off, which fades with the pole (rad/s), is estimated.
+    """
+    started = _travelled(sampling_rate, _fading(sampling_rate, pole, simulated.size))
+    drift = position - position[0] - _travelled(sampling_rate, simulated)
+    speed = float(drift @ started) / float(started @ started)
+    error = drift - speed * started
     rms, spread = _rms(error), float(np.std(position))
-    return OpenLoop(error, rms, float(np.max(np.abs(error))), rms / spread if spread > 0.0 else np.inf)
+    return OpenLoop(error, speed, rms, float(np.max(np.abs(error))), rms / spread if spread > 0.0 else np.inf)
 
 
 def from_input_alone(sampling_rate: float, position: FloatArray, simulated: FloatArray, pole: float) -> tuple[float, float]:
-    """(rms error of the position over the whole record, m; part 0..1 of the motion's power that is explained).
-
-    simulated: (n - 1,) velocity from rest, m/s; the speed at the first sample, which fades with the pole (rad/s), is estimated.
-    """
-    time = (np.arange(simulated.size) + 0.5) / sampling_rate
-    fading = np.exp(-pole * time)
-    drift = position - position[0] - _travelled(sampling_rate, simulated)
-    started = _travelled(sampling_rate, fading)
-    speed = float(drift @ started) / float(started @ started)
+    """(rms error of the position over the whole record, m; part 0..1 of the motion's power that is explained); see ``open_loop``."""
+    found = open_loop(sampling_rate, position, simulated, pole)
     measured = np.diff(position) * sampling_rate
-    left = measured - simulated - speed * fading
+    left = measured - simulated - found.speed * _fading(sampling_rate, pole, simulated.size)
     power = float(np.sum(measured**2))
     explained = 1.0 - float(np.sum(left**2)) / power if power > 0.0 else 0.0
-    return _rms(drift - speed * started), min(max(explained, 0.0), 1.0)
+    return found.rms, min(max(explained, 0.0), 1.0)
+
+
+def _fading(sampling_rate: float, pole: float, samples: int) -> FloatArray:
+    return np.asarray(np.exp(-pole * (np.arange(samples) + 0.5) / sampling_rate))
 
 
 def settled(data: AxisData, fitted: GreyboxFit) -> GreyboxFit:
@@ -72,28 +76,29 @@ def settled(data: AxisData, fitted: GreyboxFit) -> GreyboxFit:
     free = [name for name, _ in model.effects if _slow(model.library[name])]
     items = [item for name in free for item in model.library[name].parameters]
     speed = float(np.std(data.velocity)) or 1.0
+    begins = start_of(model, data.sampling_rate, data.voltage, data.position)
     start = np.array([model.gain, model.pole, 0.0, *(value for name, row in model.effects if name in free for value in row)])
     size = np.array([abs(model.gain), model.pole, speed, *(abs(item.typical) or min(1.0, item.high - item.low) for item in items)])
     signs = sorted((0.1 * model.gain, 10.0 * model.gain))
     low = np.array([signs[0], 0.1 * model.pole, -10.0 * speed, *(item.low for item in items)]) / size
     high = np.array([signs[1], 10.0 * model.pole, 10.0 * speed, *(item.high for item in items)]) / size
     run = simulator(model.library, [name for name, _ in model.effects], data.sampling_rate, data.voltage, data.position)
-    begun = start_of(model, data.sampling_rate, data.voltage, data.position)
     target = data.position - data.position[0]
-    time = (np.arange(data.velocity.size) + 0.5) / data.sampling_rate
     far = _rms(target - _travelled(data.sampling_rate, fitted.simulated)) or 1.0
     fast = _rms(fitted.error) or 1.0
 
     def left(inner: FloatArray) -> FloatArray:
         values = inner * size
         moved = _moved(model, free, values)
-        velocity = run(moved.row, begun) + values[2] * np.exp(-moved.pole * time)
+        velocity = run(moved.row, begins) + values[2] * _fading(data.sampling_rate, moved.pole, data.velocity.size)
         drift = target - _travelled(data.sampling_rate, velocity)
         return np.concatenate((drift / far, (data.velocity - velocity) / fast))
 
     inside = np.clip(start / size, low + EDGE, high - EDGE)
     found = least_squares(left, inside, bounds=(low, high), diff_step=[STEP] * size.size, max_nfev=ROUNDS)
-    return _with(data, fitted, _moved(model, free, found.x * size))
+    values = found.x * size
+    best = _moved(model, free, values)
+    return _with(data, fitted, best, run(best.row, begins))
 
 
 def _slow(effect: Effect) -> bool:
@@ -107,8 +112,7 @@ def _moved(model: AxisModel, free: list[str], values: FloatArray) -> AxisModel:
     return replace(model, gain=float(values[0]), pole=float(values[1]), effects=effects)
 
 
-def _with(data: AxisData, fitted: GreyboxFit, model: AxisModel) -> GreyboxFit:
-    simulated = simulate(model, data.sampling_rate, data.voltage, data.position)
+def _with(data: AxisData, fitted: GreyboxFit, model: AxisModel, simulated: FloatArray) -> GreyboxFit:
     values = model.values()
     estimates = tuple(
         item if item.value == values[item.name] else Estimate(name=item.name, value=values[item.name], unit=item.unit, low=-np.inf, high=np.inf)
