@@ -48,7 +48,8 @@ def open_loop(sampling_rate: float, position: FloatArray, simulated: FloatArray,
     speed = float(drift @ started) / float(started @ started)
     error = drift - speed * started
     rms, spread = _rms(error), float(np.std(position))
-    return OpenLoop(error, speed, rms, float(np.max(np.abs(error))), rms / spread if spread > 0.0 else np.inf)
+    share = rms / spread if spread > 0.0 else np.inf
+    return OpenLoop(error=error, speed=speed, rms=rms, worst=float(np.max(np.abs(error))), share=share)
 
 
 def from_input_alone(sampling_rate: float, position: FloatArray, simulated: FloatArray, pole: float) -> tuple[float, float]:
