@@ -13,8 +13,8 @@ The page, the report and this text show the same pictures. Everything here is of
 **Blue** is measured, **orange** is the model, **green** is the noise floor, **red** marks where the model fails, **grey** is not trusted.
 Where two models lie over each other, blue is before and orange after.
 Errors are those of velocity: the model is driven with the measured voltage alone, from the speed of the first sample on, so small errors
-cannot hide in a correction. *Held out* are parts of the recording, spread over it, that no fit has seen (its last third for backlash, whose filter must run
-through). The *noise floor* is what a perfect model would still be off by: the encoder's noise.
+cannot hide in a correction. *Held out* are parts of the recording, spread over it, that no fit has seen (its last third for backlash,
+whose filter must run through). The *noise floor* is what a perfect model would still be off by: the encoder's noise.
 
 ## The ladder
 
