@@ -1,6 +1,8 @@
-"""Where the axis is between two samples of its encoder."""
+"""Between two samples of the encoder: where the axis is, and in how many sub-steps it gets there."""
 
 from __future__ import annotations
+
+import math
 
 from xy_sysid.jit import compiled
 from xy_sysid.samples.block import FloatArray
@@ -14,3 +16,9 @@ def along(x: FloatArray, i: int, part: float) -> float:
         return straight
     bent: float = straight - 0.25 * part * (1.0 - part) * (x[i + 2] - x[i + 1] - x[i] + x[i - 1])
     return bent
+
+
+@compiled
+def pieces(part: float, cuts: float) -> tuple[int, int]:
+    """Sub-steps before and after the voltage changes, a part (0..1) of the sample on; none is longer than a sample / cuts."""
+    return max(math.ceil(part * cuts), 1), max(math.ceil((1.0 - part) * cuts), 1)

@@ -28,7 +28,7 @@ def text(name: str, effects: Sequence[Effect]) -> str:
     """Source of ``name(u, x, p, on, fs, fine, start, out)``.
 
     u: (n,) held voltage, V; x: (n + 1,) measured position, m; p: numbers in the order of ``slots``; on: (effects,) flags;
-    fs: Hz; fine: Hz, sub-steps of each of a sample's two pieces; start: speed at the first sample, m/s;
+    fs: Hz; fine: Hz, sub-steps of what heeds speed; start: speed at the first sample, m/s;
     out: (n,) receives the mean velocity of each sample, m/s.
     """
     return TEMPLATE.substitute(

@@ -24,8 +24,8 @@ $states
     late = delay * fs
     whole = int(late)
     part = late - whole
-    cuts = math.ceil(fine / fs) if curved else 1
-    h_old, h_new = part / fs / cuts, (1.0 - part) / fs / cuts
+    cuts_old, cuts_new = pieces(part, fine / fs if curved else 1.0)
+    h_old, h_new = part / fs / cuts_old, (1.0 - part) / fs / cuts_new
     decay_old, decay_new = math.exp(-pole * h_old), math.exp(-pole * h_new)
     spent_old, spent_new = -math.expm1(-pole * h_old) / pole, -math.expm1(-pole * h_new) / pole
     turn = math.copysign(1.0, gain)  # friction opposes motion, whatever the sign of the gain
@@ -36,11 +36,11 @@ $hang
     if hung:
         generator_moving = generator(gain, pole, top, bottom, fs)
         generator_still = resting(generator_moving)
-        stiff = math.ceil(fastest(pole, bottom, fs) / ($stiff * fs))
+        stiff = fastest(pole, bottom, fs) / ($stiff * fs)
         lighter = generator_moving[1, top.size + 1] / (gain * pole)  # without what hangs on it: sooner does it follow the friction
         wanted = fine * lighter if curved else fine
-        cuts = min(max(math.ceil(wanted / fs), stiff), math.ceil($most * fine)) if heeded or curved else 1
-        h_old, h_new = part / fs / cuts, (1.0 - part) / fs / cuts
+        cuts_old, cuts_new = pieces(part, min(max(wanted / fs, stiff), $most * fine) if heeded or curved else 1.0)
+        h_old, h_new = part / fs / cuts_old, (1.0 - part) / fs / cuts_new
         moving_old, moving_new = exponential(generator_moving, h_old), exponential(generator_moving, h_new)
         still_old, still_new = exponential(generator_still, h_old), exponential(generator_still, h_new)
         size = top.size + 2
@@ -50,9 +50,9 @@ $hang
             moved = 0.0
             for piece in range(2):
                 if piece == 0:
-                    h, moving, still, middle_of = h_old, moving_old, still_old, 0.5 * part
+                    h, cuts, moving, still, middle_of = h_old, cuts_old, moving_old, still_old, 0.5 * part
                 else:
-                    h, moving, still, middle_of = h_new, moving_new, still_new, 0.5 * (1.0 + part)
+                    h, cuts, moving, still, middle_of = h_new, cuts_new, moving_new, still_new, 0.5 * (1.0 + part)
                 if h <= 0.0:
                     continue
                 k = i - whole - 1 + piece
@@ -169,9 +169,9 @@ $pulls
             moved = 0.0
             for piece in range(2):
                 if piece == 0:
-                    h, decay, spent, middle_of = h_old, decay_old, spent_old, 0.5 * part
+                    h, cuts, decay, spent, middle_of = h_old, cuts_old, decay_old, spent_old, 0.5 * part
                 else:
-                    h, decay, spent, middle_of = h_new, decay_new, spent_new, 0.5 * (1.0 + part)
+                    h, cuts, decay, spent, middle_of = h_new, cuts_new, decay_new, spent_new, 0.5 * (1.0 + part)
                 if h <= 0.0:
                     continue
                 k = i - whole - 1 + piece

@@ -30,7 +30,7 @@ from xy_sysid.samples.block import FloatArray
 FINE = 1e5  # Hz at which a section is asked for its roots: far above any resonance, so that none is folded back
 TERMS = 10  # of power series within a sub-step; as STIFF is 0.5, the first that is left out is below 1e-10
 STIFF = 0.5  # longest sub-step times the fastest rate
-CUTS = 0.004  # s: most sub-steps of a piece over the rate asked for, Hz, however stiff a trial is: a first round must not last minutes
+CUTS = 0.004  # s: most sub-steps of a sample over the rate asked for, Hz, however stiff a trial is: a first round must not last minutes
 
 
 @compiled
