@@ -24,7 +24,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.settings import unknown_name
 
-FINE = 8000.0  # Hz: sub-steps; LuGre bristles of 10 um and Stribeck curves of 10 mm/s need it
+FINE = 16000.0  # Hz: sub-steps; LuGre bristles of 10 um and Stribeck curves of 10 mm/s need it
 FADED = 3.0  # time constants after which a wrong start is no longer seen (5 %)
 SURE = 3.0  # times its standard deviation that a start must be off to be known to be
 ROUNDS = 4  # of putting it right: friction bends what is linear in a rigid axis

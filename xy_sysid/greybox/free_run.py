@@ -5,18 +5,18 @@ First on the first stage's data, where a step is quick, then on all windows that
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from xy_sysid.axis.loop_source import undoable
-from xy_sysid.axis.model import FINE, STANDARD, AxisModel, Library, undoer
+from xy_sysid.axis.model import FINE, STANDARD, AxisModel, Library
 from xy_sysid.effects import Effect, Scene
 from xy_sysid.effects._contract import in_time
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.axis_data import EPSILON, AxisData, loosened, prepare, prepare_all
 from xy_sysid.greybox.floor import excess
+from xy_sysid.greybox.forces import force_of, pushing
 from xy_sysid.greybox.least_squares import Round, Scale, Schedule, Solution, Target, solve
 from xy_sysid.greybox.parameters import Estimate, estimates, model_of, problem
 from xy_sysid.greybox.score_test import Screen, Trace, bounded, screen
@@ -44,7 +44,8 @@ __all__ = [
 # weights are worked out before each round: the likelihood, the largest error, what is wrong anywhere, and in the end the likelihood again
 BRIEF = (Round(6, 1e-2), Round(6, 1e-2, "alike"), Round(6, 3e-3, "what is wrong"), Round(8, 1e-4))
 LONG = (Round(4, 1e-3), Round(6, 1e-5))
-COARSE, MIDDLING = 2000.0, 4000.0  # Hz: sub-steps of first rounds (errors up to 3e-3 of the motion) and of brief fits (6e-4)
+COARSE, MIDDLING = 2000.0, 4000.0  # Hz: finest sub-steps of looks and first rounds (errors up to 3e-3 of the motion), and of brief fits (6e-4)
+FAITHFUL = 0.1  # of what a model leaves: by so much may its motion change with finer sub-steps
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,11 +129,11 @@ def other_starts(data: AxisData, base: GreyboxFit, model: AxisModel, name: str, 
     """
     effect, scene = model.library[name], scene or scene_of(data, base)
     candidates = []
-    pushing = [own for own, _ in model.effects if own != name and model.library[own].category == "force" and undoable(model.library[own])]
-    forces = [_force(data, model, own, data.counts(early=scene.velocity.size == data.first)) for own in pushing]
+    beside = [own for own in pushing(model) if own != name]
+    forces = [force_of(data, model, own, data.counts(early=scene.velocity.size == data.first)) for own in beside]
     for start in inverse_starts(effect, scene, scene.velocity.size, forces):
         whole = replace(model, gain=start.gain, pole=min(max(start.pole, 1e-2), 1e5))
-        for own, size in zip(pushing, start.sizes, strict=True):
+        for own, size in zip(beside, start.sizes, strict=True):
             values = dict(model.effects)[own]
             whole = whole.with_effect(own, bounded(model.library[own], (values[0] * min(max(size, 0.3), 3.0), *values[1:]), data.similar))
         candidates.append(whole.with_effect(name, start.values))
@@ -141,16 +142,6 @@ def other_starts(data: AxisData, base: GreyboxFit, model: AxisModel, name: str, 
             whole = replace(model, gain=gain, delay=max(base.model.delay + later, 0.0), pole=min(max(pole, 1e-2), 1e5))
             candidates.append(whole.with_effect(name, bounded(effect, values, data.similar)))
     return candidates
-
-
-def _force(data: AxisData, model: AxisModel, name: str, counts: Sequence[int]) -> FloatArray:
-    """(samples,) V, what one effect of a model pushes against the drive on the measured motion; counts: samples of each recording."""
-    row = np.array([model.gain, model.delay, model.pole, *dict(model.effects)[name]])
-    parts = []
-    for run, count in zip(data.runs, counts, strict=True):
-        undo = undoer(model.library, [name], data.sampling_rate, data.voltage[run], data.position[run])
-        parts.append(undo(row, count)[2].sum(axis=0))
-    return np.concatenate(parts)
 
 
 def best_start(data: AxisData, candidates: list[AxisModel]) -> AxisModel:
@@ -216,14 +207,14 @@ def scene_of(data: AxisData, fitted: GreyboxFit, early: bool = True) -> Scene:
 
 def fit(data: AxisData, start: AxisModel, brief: bool = False, hopeless: float = np.inf, late: Callable[[], bool] = in_time) -> GreyboxFit:
     """All parameters of a model, from where it is; brief, hopeless: see ``fit_with``; late: then the best so far is taken."""
-    run, values, scale = problem(data, start, True, COARSE)
+    run, values, scale = problem(data, start, True, _steps(data, start, True, COARSE))
     velocity = data.begun(data.velocity)
     target = Target(velocity, data.brief, data.floor)
     found = solve(run, target, scale, values, Schedule(BRIEF[:1], late))
     left = data.layout.power(data.brief.spectrum(velocity - run(found.values)))
     if not (late() or (brief and excess(left, data.floor) > hopeless)):
         nearer = solve(run, target, scale, found.values, Schedule(BRIEF[1:-1], late), found.change)
-        run, _, _ = problem(data, start, True, MIDDLING)
+        run, _, _ = problem(data, start, True, _steps(data, model_of(data, start, nearer.values), True, MIDDLING))
         more = solve(run, target, scale, nearer.values, Schedule(BRIEF[-1:], late), nearer.change)
         found = replace(more, runs=found.runs + nearer.runs + more.runs)
     if not brief:
@@ -232,15 +223,35 @@ def fit(data: AxisData, start: AxisModel, brief: bool = False, hopeless: float =
 
 
 def finish(data: AxisData, start: AxisModel, runs: int = 0, late: Callable[[], bool] = in_time) -> GreyboxFit:
-    """The second stage alone, on all windows that are not held out, from a model that is nearly there.
-
-    Its sub-steps are as fine as what the model leaves asks for: they need not follow the law closer than a tenth of that.
-    """
-    left = data.layout.rms(_first_power(data, start)) / max(data.layout.rms(data.floor.motion), 1e-300)
-    fine = next((step for step, error in ((COARSE, 3e-3), (MIDDLING, 6e-4)) if left > 10.0 * error), FINE)
-    run, values, scale = problem(data, start, False, fine)
+    """The second stage alone, on all windows that are not held out, from a model that is nearly there."""
+    run, values, scale = problem(data, start, False, _steps(data, start, False, FINE))
     found = solve(run, Target(data.velocity, data.fitted, data.floor), scale, values, Schedule(LONG, late))
     return _result(data, start, scale, replace(found, runs=runs + found.runs))
+
+
+def _steps(data: AxisData, model: AxisModel, early: bool, finest: float) -> float:
+    """Hz: the longest sub-steps, a sample or halves of it, with which a model moves as with half as long.
+
+    As it does: but for a tenth of what it leaves or nobody can tell, by amplitude in the mean over the excited bands.
+    """
+    windows, measured = (data.brief, data.begun(data.velocity)) if early else (data.fitted, data.velocity)
+
+    def moved(rate: float) -> FloatArray:
+        run, values, _ = problem(data, model, early, rate)
+        return run(values)
+
+    def power(signal: FloatArray) -> FloatArray:
+        return data.layout.power(windows.spectrum(signal))[data.floor.excited]
+
+    rate = min(data.sampling_rate, finest)
+    now, least = moved(rate), data.floor.power[data.floor.excited]
+    while rate < finest:
+        finer = min(2.0 * rate, finest)
+        then = moved(finer)
+        if not np.mean(power(then - now) / (power(measured - then) + least)) > FAITHFUL**2:  # nor where both run away
+            break
+        rate, now = finer, then
+    return rate
 
 
 def _result(data: AxisData, start: AxisModel, scale: Scale, found: Solution, brief: bool = False) -> GreyboxFit:

@@ -15,6 +15,7 @@ from xy_sysid.effects import Effect, Scene
 from xy_sysid.effects._contract import Limits, in_time
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.floor import excess
+from xy_sysid.greybox.forces import taken_over
 from xy_sysid.greybox.free_run import GreyboxFit, best_start, finish, first_excess, fit, fit_base, other_starts, scene_of, screened
 from xy_sysid.greybox.one_step import one_step_fit
 from xy_sysid.greybox.score_test import Gain, Trace, bounded
@@ -248,8 +249,9 @@ class FreeRunJudge:
     def without(self, now: GreyboxFit, name: str, alone: Sequence[AxisModel] = ()) -> GreyboxFit | None:
         """The same set but for one effect. alone: models of single ones of the others, one of which may have stood back for it."""
         less = now.model.without(name)
-        starts = [less, *(less.with_effect(other, values) for model in alone for other, values in model.effects)]
-        return self.again(now, best_start(self.data, starts) if alone else less)
+        begun = (less.with_effect(other, values) for model in alone for other, values in model.effects)
+        starts = [less, taken_over(self.data, now.model, name), *begun]
+        return self.again(now, best_start(self.data, starts))
 
     def instead(self, now: GreyboxFit, name: str, relative: Effect) -> GreyboxFit | None:
         """The same set with a relative in the place of one effect."""
