@@ -14,6 +14,7 @@ from helpers.bag_making import joint_state
 from helpers.cli_tools import RIGID, cli, npz, rigid, with_one
 from scipy.io import loadmat
 
+import xy_sysid as xy
 from xy_sysid.bags import BagWriter
 from xy_sysid.bags.cdr import JOINT_TYPE
 from xy_sysid.bags.streaming import stream_blocks
@@ -45,6 +46,11 @@ def model(paper: Path) -> Path:
     path = paper.with_name("model.yaml")
     assert cli("fit", paper, "--model", path, "--mat", path.with_suffix(".mat")).code == 0
     return path
+
+
+def test_the_program_says_which_version_it_is() -> None:
+    said = cli("--version")
+    assert (said.code, said.out.strip(), said.err) == (0, f"xy-sysid {xy.__version__}", "")
 
 
 @pytest.mark.parametrize("name", ["folder", "one.db3", "one.mcap", "one.csv", "one.npz", "one.mat"])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import typer
 
 from xy_sysid.cli.columns import columns
@@ -30,5 +32,22 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        from xy_sysid import __version__
+
+        typer.echo(f"xy-sysid {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _program(
+    version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and leave.")] = False,
+) -> None:
+    pass
+
+
 for command in (demo, page, run, record, replay, simulate, columns, frf, fit, validate, compare, diagnose, refine, effects, study, report, figures):
     app.command(name=command.__name__)(command)
