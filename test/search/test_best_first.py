@@ -9,7 +9,7 @@ from math import exp, inf
 import pytest
 
 from xy_sysid.search.best_first import Node, Search
-from xy_sysid.search.criteria import FEWEST, PRICE
+from xy_sysid.search.criteria import FEWEST
 from xy_sysid.search.criteria import LEAST as SMALLEST
 from xy_sysid.search.judge import Move
 
@@ -207,13 +207,13 @@ def test_the_simpler_of_two_sets_that_leave_the_same_is_best() -> None:
     search, tried = searched(Table(leaves, promises, parameters={"a": 2}))
     assert set(tried) == {of("a"), of("b")}
     assert search.best.effects == of("b")
-    assert search.best.score == pytest.approx(1.0 + PRICE)
+    assert search.best.score == pytest.approx(1.0 + SMALLEST)
 
 
 def test_a_parameter_that_gains_less_than_its_price_is_not_taken() -> None:
     """It was tried, and the set without it stays best."""
     promises = {of(): all_of(("a", 1.0)), of("a"): all_of(("b", 0.3))}
-    leaves = {of(): 3.0, of("a"): 1.0, of("a", "b"): 1.0 - 0.5 * PRICE}
+    leaves = {of(): 3.0, of("a"): 1.0, of("a", "b"): 1.0 - 0.5 * SMALLEST}
     search, tried = searched(Table(leaves, promises))
     assert tried == [of("a"), of("a", "b")]
     assert search.best.effects == of("a")

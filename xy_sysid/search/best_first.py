@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from math import inf, log
 from typing import Generic, Protocol, TypeVar
 
-from xy_sysid.search.criteria import ALIKE, FEWEST, HOPELESS, LATER, LEAST, OPTIMISM, PRICE, SIMPLE_FIRST
+from xy_sysid.search.criteria import ALIKE, FEWEST, HOPELESS, LATER, LEAST, OPTIMISM, SIMPLE_FIRST
 from xy_sysid.search.judge import Move
 
 
@@ -78,7 +78,7 @@ class Node(Generic[F]):
     def score(self) -> float:
         """nats; less is better."""
         later = 0.0 if self.whole else self.later
-        return inf if self.refused else self.fit.excess + later + PRICE * self.parameters
+        return inf if self.refused else self.fit.excess + later + LEAST * self.parameters
 
     @property
     def optimism(self) -> float:
@@ -93,7 +93,7 @@ class Node(Generic[F]):
     def hope(self, move: Move) -> float:
         """The score that a move may reach."""
         left = min(self.fit.excess - move.gain * self.optimism, move.begins)
-        return max(left, 0.0) + PRICE * (self.parameters + move.parameters)
+        return max(left, 0.0) + LEAST * (self.parameters + move.parameters)
 
 
 @dataclass
@@ -231,7 +231,7 @@ class Search(Generic[F]):
         leads = self.judge.size(brief, parent.brief) >= least - 1.0
         astray = brief.excess >= parent.brief.excess + LEAST and not parent.is_slow(self.least)
         slow = move.rest >= log(least) and not astray
-        whole = brief.excess + later + PRICE * parameters < best.score - LEAST if leads else slow
+        whole = brief.excess + later + LEAST * parameters < best.score - LEAST if leads else slow
         found = self.judge.whole(brief) if whole else brief
         if whole and not leads:  # what acts slowly does not show in a brief fit, but promised a name on all data
             leads = self.judge.size(found, parent.fit) >= least - 1.0

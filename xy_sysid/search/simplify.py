@@ -11,7 +11,7 @@ from itertools import chain
 
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.search.best_first import Judge, Node, Search
-from xy_sysid.search.criteria import HOPELESS, LEAST, PRICE
+from xy_sysid.search.criteria import HOPELESS, LEAST
 from xy_sysid.search.judge import FreeRunJudge
 
 
@@ -96,7 +96,7 @@ class Simplifying:
             smaller = node.effects - {idle}
             parameters = sum(len(self.judge.library[name].parameters) for name in smaller)
             simpler = parameters < self.now.parameters and node.fit.excess < self.now.fit.excess + LEAST
-            pays = node.fit.excess + PRICE * parameters < self.now.score - LEAST
+            pays = node.fit.excess + LEAST * parameters < self.now.score - LEAST
             if idle and (simpler or pays) and smaller and self.kept <= smaller:
                 yield from self._less(node, idle)
 
