@@ -207,14 +207,14 @@ def scene_of(data: AxisData, fitted: GreyboxFit, early: bool = True) -> Scene:
 
 def fit(data: AxisData, start: AxisModel, brief: bool = False, hopeless: float = np.inf, late: Callable[[], bool] = in_time) -> GreyboxFit:
     """All parameters of a model, from where it is; brief, hopeless: see ``fit_with``; late: then the best so far is taken."""
-    run, values, scale = problem(data, start, True, _steps(data, start, True, COARSE))
+    run, values, scale = problem(data, start, True, sub_steps(data, start, True, COARSE))
     velocity = data.begun(data.velocity)
     target = Target(velocity, data.brief, data.floor)
     found = solve(run, target, scale, values, Schedule(BRIEF[:1], late))
     left = data.layout.power(data.brief.spectrum(velocity - run(found.values)))
     if not (late() or (brief and excess(left, data.floor) > hopeless)):
         nearer = solve(run, target, scale, found.values, Schedule(BRIEF[1:-1], late), found.change)
-        run, _, _ = problem(data, start, True, _steps(data, model_of(data, start, nearer.values), True, MIDDLING))
+        run, _, _ = problem(data, start, True, sub_steps(data, model_of(data, start, nearer.values), True, MIDDLING))
         more = solve(run, target, scale, nearer.values, Schedule(BRIEF[-1:], late), nearer.change)
         found = replace(more, runs=found.runs + nearer.runs + more.runs)
     if not brief:
@@ -224,12 +224,12 @@ def fit(data: AxisData, start: AxisModel, brief: bool = False, hopeless: float =
 
 def finish(data: AxisData, start: AxisModel, runs: int = 0, late: Callable[[], bool] = in_time) -> GreyboxFit:
     """The second stage alone, on all windows that are not held out, from a model that is nearly there."""
-    run, values, scale = problem(data, start, False, _steps(data, start, False, FINE))
+    run, values, scale = problem(data, start, False, sub_steps(data, start, False, FINE))
     found = solve(run, Target(data.velocity, data.fitted, data.floor), scale, values, Schedule(LONG, late))
     return _result(data, start, scale, replace(found, runs=runs + found.runs))
 
 
-def _steps(data: AxisData, model: AxisModel, early: bool, finest: float) -> float:
+def sub_steps(data: AxisData, model: AxisModel, early: bool, finest: float) -> float:
     """Hz: the longest sub-steps, a sample or halves of it, with which a model moves as with half as long.
 
     As it does: but for a tenth of what it leaves or nobody can tell, by amplitude in the mean over the excited bands.

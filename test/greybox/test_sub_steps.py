@@ -1,0 +1,53 @@
+"""Sub-steps of a simulation are as long as what the model leaves allows, and no longer."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from xy_sysid.axis.model import FINE, AxisModel, simulate
+from xy_sysid.greybox.axis_data import AxisData, prepare
+from xy_sysid.greybox.free_run import sub_steps
+from xy_sysid.samples.block import FloatArray
+
+RATE = 500.0
+RUBBED = AxisModel(0.1, 1.3e-3, 30.0).with_effect("stribeck_friction", (0.3, 0.2, 5e-3))
+
+
+def driven(noise: float, model: AxisModel = RUBBED) -> AxisData:
+    """40 s of a machine that the model describes, with this much noise in the reading, m."""
+    rng = np.random.default_rng(3)
+    u: FloatArray = np.repeat(rng.normal(0.0, 1.0, 1000), 20)
+    x = np.concatenate(([0.0], np.cumsum(simulate(model, RATE, u, np.zeros_like(u))) / RATE))
+    return prepare(RATE, u, x + noise * rng.standard_normal(u.size))
+
+
+def test_a_law_that_bends_takes_short_steps_where_it_is_all_that_moves_the_axis() -> None:
+    assert sub_steps(driven(1e-9), RUBBED, True, FINE) > RATE
+
+
+def test_a_noisy_reading_takes_longer_ones() -> None:
+    rates = [sub_steps(driven(noise), RUBBED, True, FINE) for noise in (1e-9, 1e-6, 1e-4)]
+    assert rates == sorted(rates, reverse=True)
+    assert rates[-1] == RATE
+
+
+@pytest.mark.parametrize("early", [True, False])
+def test_a_model_that_leaves_much_takes_one_step_a_sample(early: bool) -> None:
+    """Its law is wrong by more than steps of a sample could make it."""
+    assert sub_steps(driven(1e-9), AxisModel(0.05, 1.3e-3, 30.0).with_effect("stribeck_friction", (0.3, 0.2, 5e-3)), early, FINE) == RATE
+
+
+def test_friction_whose_stops_are_found_exactly_takes_one_step_a_sample() -> None:
+    model = AxisModel(0.1, 1.3e-3, 30.0).with_effect("coulomb_friction", (0.3,))
+    assert sub_steps(driven(1e-9, model), model, True, FINE) == RATE
+
+
+def test_steps_are_never_shorter_than_what_is_asked_for() -> None:
+    assert sub_steps(driven(1e-9), RUBBED, True, 800.0) == 800.0
+    assert sub_steps(driven(1e-9), RUBBED, True, 200.0) == 200.0
+
+
+def test_a_model_that_runs_away_ends_the_question() -> None:
+    away = AxisModel(0.1, 1.3e-3, 30.0).with_effect("hardening_stiffness", (-1e6, -1e5)).with_effect("stribeck_friction", (0.3, 0.2, 5e-3))
+    assert sub_steps(driven(1e-9), away, True, FINE) >= RATE
