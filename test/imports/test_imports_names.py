@@ -135,6 +135,25 @@ def test_a_table_without_time_needs_a_rate(tmp_path: Path) -> None:
     assert any("first row holds numbers" in note for note in found.notes)
 
 
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        *(("fs", RATE), ("Fs", RATE), ("f_s", RATE), ("rate", RATE), ("Sampling_Rate_Hz", RATE), ("SAMPLING FREQUENCY", RATE)),
+        *(("Ts", 1.0 / RATE), ("T_s", 1.0 / RATE), ("dt_s", 1.0 / RATE), ("sampleTime", 1.0 / RATE)),
+    ],
+)
+@pytest.mark.parametrize(("voltage", "position"), [("u", "y"), ("motor_voltage", "encoder_position_m")])
+def test_arrays_may_say_their_rate_or_period_in_any_spelling(tmp_path: Path, name: str, value: float, voltage: str, position: str) -> None:
+    np.savez(tmp_path / "a.npz", **{voltage: U, position: Y, name: np.array(value)})
+    assert load(tmp_path / "a.npz").sampling_rate == pytest.approx(RATE, rel=1e-12)
+
+
+def test_a_period_in_another_unit_is_not_taken_for_seconds(tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", u=U, y=Y, dt_ms=np.array(1e3 / RATE))
+    with pytest.raises(BadRecording, match="neither a time column nor a usable fs"):
+        load(tmp_path / "a.npz")
+
+
 def test_a_row_for_each_joint(tmp_path: Path) -> None:
     """Long format: a column names the joint of each row; each becomes an axis, in any order of rows."""
     names = ["shoulder", "elbow_2"]

@@ -33,8 +33,8 @@ DAMAGED = (
 )
 INPUTS, OUTPUTS, REFERENCES = ("u", "voltage", "InputData"), ("y", "position", "OutputData"), ("r", "reference")
 TIMES = ("t", "time", "SamplingInstants")
-RATES = ("fs", "Fs", "sampling_rate", "sample_rate")
-PERIODS = ("Ts", "dt", "SamplingPeriod", "sample_time")
+RATES = ("fs", "samplingrate", "samplerate", "samplingfrequency", "samplefrequency", "fsample", "rate")  # as ``_plain`` writes them
+PERIODS = ("ts", "dt", "samplingperiod", "sampleperiod", "samplingtime", "sampletime", "tsample", "samplinginterval", "sampleinterval")
 QUOTED = re.compile(r'"([^"]*)"')
 DULL = re.compile(r"Model Root|(In|Out)\d+", re.IGNORECASE)  # parts of a block's path that tell nothing
 VALUES, LABELS, UNITS = ("Data", "data", "values", "Values"), ("Name", "name", "label", "Label"), ("Unit", "unit", "Units", "units")
@@ -110,7 +110,7 @@ def table(path: Path, arrays: Arrays, reading: Reading, notes: list[str]) -> Tab
     names = np.atleast_1d(arrays["axes"]).astype(str).tolist() if "axes" in arrays else []
     axes = tuple(name.strip() for name in names) if len(names) == inputs.shape[1] else axis_names(inputs.shape[1])
     if time is None and fs is None and reading.rate is None:
-        said = next((f"fs ({arrays[name]})" for name in RATES if name in arrays), "fs")
+        said = next((f"{name} ({value})" for name, value in arrays.items() if _plain(name) in RATES), "fs")
         raise BadRecording(path, f"neither a time column nor a usable {said}", "Add t in seconds or fs in Hz, or give --rate.")
     if reading.rate is not None:
         if time is not None:
@@ -164,14 +164,20 @@ def _si(side: tuple[str, FloatArray, str], path: Path, axes: tuple[str, ...], re
 
 def _rate(path: Path, arrays: Arrays) -> float | None:
     """Hz, from a rate or a period that the file says; None if it says none that can be."""
+    plain = {_plain(name): value for name, value in arrays.items()}
     for names, invert in ((RATES, False), (PERIODS, True)):
         for name in names:
-            values = arrays.get(name)
+            values = plain.get(name)
             if values is not None and values.size == 1 and values.dtype.kind in "fiub":
                 value = float(values.ravel()[0])
                 if np.isfinite(value) and value > 0:
                     return 1.0 / value if invert else value
     return None
+
+
+def _plain(name: str) -> str:
+    """A name of a rate or a period as they are listed: Sampling_Rate_Hz is samplingrate."""
+    return re.sub(r"[_ ](hz|sec)$|(?<=\w\w)[_ ]s$|[_ ]", "", name.lower())
 
 
 def sheet(path: Path, arrays: Arrays) -> Sheet:
