@@ -144,7 +144,8 @@ def test_a_table_without_time_needs_a_rate(tmp_path: Path) -> None:
 )
 @pytest.mark.parametrize(("voltage", "position"), [("u", "y"), ("motor_voltage", "encoder_position_m")])
 def test_arrays_may_say_their_rate_or_period_in_any_spelling(tmp_path: Path, name: str, value: float, voltage: str, position: str) -> None:
-    np.savez(tmp_path / "a.npz", **{voltage: U, position: Y, name: np.array(value)})
+    arrays: dict[str, Any] = {voltage: U, position: Y, name: value}
+    np.savez(tmp_path / "a.npz", **arrays)
     assert load(tmp_path / "a.npz").sampling_rate == pytest.approx(RATE, rel=1e-12)
 
 
