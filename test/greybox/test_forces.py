@@ -41,3 +41,8 @@ def test_what_alone_pushes_by_place_leaves_the_others_as_they_are(data: AxisData
 def test_friction_is_not_taken_over_by_a_load(data: AxisData) -> None:
     model = AxisModel(0.1, 1e-3, 100.0).with_effect("coulomb_friction", (0.2,)).with_effect("constant_load", (5.0,))
     assert taken_over(data, model, "coulomb_friction") == model.without("coulomb_friction")
+
+
+def test_a_law_that_gives_no_number_takes_nothing_over(data: AxisData) -> None:
+    model = AxisModel(0.1, 1e-3, 100.0).with_effect("hardening_stiffness", (np.nan, 0.0)).with_effect("constant_load", (5.0,))
+    assert dict(taken_over(data, model, "constant_load").effects).keys() == {"hardening_stiffness"}

@@ -35,7 +35,7 @@ def force_of(data: AxisData, model: AxisModel, name: str, counts: Sequence[int])
 def taken_over(data: AxisData, model: AxisModel, name: str) -> AxisModel:
     """The model without an effect, whose force the others that push by place and time take over as well as they can.
 
-    A load beside a spring, say, is a spring that rests elsewhere. The model without it, as it was, if there are no others.
+    A load beside a spring, say, is a spring that rests elsewhere. The model without it, as it was, if there are no others, or if a law gives no number.
     """
     others = [own for own in pushing(model) if own != name]
     less = model.without(name)
@@ -60,4 +60,6 @@ def taken_over(data: AxisData, model: AxisModel, name: str) -> AxisModel:
         now = moved(values)
         return np.asarray(np.sum([force_of(data, now, own, counts) for own in others], axis=0) - wanted)
 
+    if not np.isfinite(left(begun)).all():
+        return less
     return moved(least_squares(left, begun, bounds=(low, high), x_scale="jac", max_nfev=LOOKS).x)
