@@ -35,7 +35,7 @@ def force_of(data: AxisData, model: AxisModel, name: str, counts: Sequence[int])
 def taken_over(data: AxisData, model: AxisModel, name: str) -> AxisModel:
     """The model without an effect, whose force the others that push by place and time take over as well as they can.
 
-    A load beside a spring, say, is a spring that rests elsewhere. The model without it, as it was, if there are no others, or if a law gives no number.
+    A load beside a spring, say, is a spring that rests elsewhere. If there are no others, or a law gives no number, they stay as they were.
     """
     others = [own for own in pushing(model) if own != name]
     less = model.without(name)
