@@ -36,9 +36,9 @@ app = typer.Typer(
 
 def _version(asked: bool) -> None:
     if asked:
-        from xy_sysid import __version__
+        import xy_sysid
 
-        typer.echo(f"xy-sysid {__version__}")
+        typer.echo(f"xy-sysid {xy_sysid.__version__}")
         raise typer.Exit
 
 
