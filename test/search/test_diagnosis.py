@@ -26,7 +26,7 @@ from xy_sysid.imports import save
 from xy_sysid.search import one_step_trials
 from xy_sysid.search.beside_one_step import grown
 from xy_sysid.search.criteria import AT_FLOOR, FEWEST
-from xy_sysid.search.diagnose import diagnose, judged
+from xy_sysid.search.diagnose import Diagnosis, diagnose, judged
 from xy_sysid.search.judge import FreeRunJudge
 from xy_sysid.search.ladder import Rival, Step
 from xy_sysid.search.refine import Effort, refine, refine_steps
@@ -88,13 +88,31 @@ def test_an_effect_in_the_noise_is_not_named_with_confidence(effect: str) -> Non
         assert found.confidence < 0.5
 
 
-def test_a_base_without_any_excess_is_no_division_by_zero() -> None:
-    """Excess and discrepancy exactly 0: nothing is missing, with certainty."""
-    data = prepare(2000.0, *recorded("").axis("x"))
+def nothing_left(data: AxisData) -> Diagnosis:
+    """The verdict where excess and discrepancy are exactly 0."""
     ladder = refine(data)
     base = replace(ladder.base, excess=0.0)
-    found = judged(data, replace(ladder, steps=(replace(ladder.steps[0], fit=base),), final=base, effects=(), discrepancy=0.0), STANDARD)
-    assert (found.verdict, found.confidence, found.tolerance) == ("nothing_missing", 1.0, 0.0)
+    return judged(data, replace(ladder, steps=(replace(ladder.steps[0], fit=base),), final=base, effects=(), discrepancy=0.0), STANDARD)
+
+
+def test_a_base_without_any_excess_is_no_division_by_zero() -> None:
+    """Nothing is missing, and it is said what the noise could hide."""
+    found = nothing_left(prepare(2000.0, *recorded("").axis("x")))
+    assert (found.verdict, found.tolerance) == ("nothing_missing", 0.0)
+    assert "What changes the motion by less than 0." in found.sentence
+
+
+def test_that_nothing_is_missing_is_as_sure_as_the_noise_lets_one_see() -> None:
+    """The quieter the encoder, the fewer sizes of an effect could hide; what laws are not trusted to is no effect."""
+    voltage, position = recorded("").axis("x")
+    rng = np.random.default_rng(1)
+    noises = (3e-6, 1e-6, 0.0)
+    sure = [nothing_left(prepare(2000.0, voltage, position + noise * rng.standard_normal(position.size))).confidence for noise in noises]
+    assert sure == sorted(sure)
+    assert 0.2 < sure[0] < 0.8 < sure[-1] <= 1.0
+    quiet = prepare(2000.0, voltage, position)
+    quiet = replace(quiet, floor=replace(quiet.floor, power=1e-6 * quiet.floor.power))
+    assert nothing_left(quiet).confidence == 1.0
 
 
 def test_a_clean_axis_misses_nothing() -> None:

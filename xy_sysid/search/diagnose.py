@@ -193,8 +193,10 @@ def judged(data: AxisData, ladder: Ladder, library: Library) -> Diagnosis:
             sentence += f" Runner-up {' and '.join(rival.effects)}: {moved(rival.fit.held_out_error, unit)}."
     elif base.excess < AT_FLOOR:
         verdict, names, explained, experiment = "nothing_missing", (), 0.0, "None is needed."
-        confidence = 1.0 - base.excess
+        hides = math.sqrt(math.expm1(AT_FLOOR)) * data.layout.rms(data.floor.power) / motion
+        confidence = (1.0 - base.excess) * (1.0 - _hidden(hides, data.floor.epsilon))
         sentence = f"Nothing is missing: the rigid model with delay leaves {moved(base.held_out_error, unit)}, the noise alone is {noise}."
+        sentence += f" What changes the motion by less than {_percent(hides)} could hide in it."
     else:
         verdict, experiment = "not_in_library", _UNKNOWN
         confidence = (1.0 - ladder.helps) * (1.0 - _hidden(left, data.floor.epsilon))
