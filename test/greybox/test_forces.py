@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
-from xy_sysid.axis.model import AxisModel
+from xy_sysid.axis.model import STANDARD, AxisModel
 from xy_sysid.greybox.axis_data import AxisData, prepare
-from xy_sysid.greybox.forces import force_of, pushing, taken_over
+from xy_sysid.greybox.forces import force_of, pushing, stood_in, taken_over
 
 RATE = 1000.0
 
@@ -46,3 +48,37 @@ def test_friction_is_not_taken_over_by_a_load(data: AxisData) -> None:
 def test_a_law_that_gives_no_number_takes_nothing_over(data: AxisData) -> None:
     model = AxisModel(0.1, 1e-3, 100.0).with_effect("hardening_stiffness", (np.nan, 0.0)).with_effect("constant_load", (5.0,))
     assert dict(taken_over(data, model, "constant_load").effects).keys() == {"hardening_stiffness"}
+
+
+@pytest.mark.parametrize("gain", [0.1, -0.1])
+def test_coulomb_friction_stands_in_for_stribeck_with_the_base_taking_what_falls_with_speed(data: AxisData, gain: float) -> None:
+    """Together they brake alike at every speed, and the inertia 1 / (gain pole) stays."""
+    model = AxisModel(gain, 1e-3, 100.0).with_effect("stribeck_friction", (0.25, 0.02, 0.05))
+    found = stood_in(data, model, "stribeck_friction", STANDARD["coulomb_friction"])
+    (level,) = dict(found.effects)["coulomb_friction"]
+    assert 0.25 < level < 0.28
+    assert abs(found.gain) > abs(gain) and math.copysign(1.0, found.gain) == math.copysign(1.0, gain)
+    assert found.gain * found.pole == pytest.approx(model.gain * model.pole, rel=1e-12)
+    law = STANDARD["stribeck_friction"].functions["level"]
+    for speed in (0.005, 0.01, 0.02):
+        before = law(excess=0.02, coulomb=0.25, velocity=0.05, v=speed) + speed / abs(gain)
+        assert level + speed / abs(found.gain) == pytest.approx(before, rel=3e-3)
+
+
+def test_a_level_that_is_the_same_at_all_speeds_stays(data: AxisData) -> None:
+    model = AxisModel(0.1, 1e-3, 100.0).with_effect("asymmetric_friction", (0.3, 0.0))
+    found = stood_in(data, model, "asymmetric_friction", STANDARD["coulomb_friction"])
+    assert dict(found.effects)["coulomb_friction"] == pytest.approx((0.3,), rel=1e-6)
+    assert (found.gain, found.pole) == pytest.approx((0.1, 100.0), rel=1e-6)
+
+
+def test_a_linear_spring_stands_in_for_one_that_softens_not(data: AxisData) -> None:
+    model = AxisModel(0.1, 1e-3, 100.0).with_effect("return_spring", (80.0, 0.0, 0.0))
+    cubic, linear = dict(stood_in(data, model, "return_spring", STANDARD["hardening_stiffness"]).effects)["hardening_stiffness"]
+    assert linear == pytest.approx(80.0, rel=1e-3)
+    assert abs(cubic) * 6e-3**2 < 0.1
+
+
+def test_laws_that_cannot_be_compared_begin_with_the_values_of_the_same_name(data: AxisData) -> None:
+    model = AxisModel(0.1, 1e-3, 100.0).with_effect("presliding_hysteresis", (0.3, 1e-5, 0.0))
+    assert dict(stood_in(data, model, "presliding_hysteresis", STANDARD["coulomb_friction"]).effects)["coulomb_friction"] == (0.3,)

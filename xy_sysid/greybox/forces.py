@@ -1,25 +1,29 @@
-"""What the effects of a model push against the drive on the measured motion, and how some of them push what others did.
+"""What the effects of a model push against the drive on the measured motion, and how others push what one of them did.
 
-No simulation: place and time are known, and these laws ask for nothing else.
+No simulation: place, time and speed are measured, and these laws ask for nothing else.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from xy_sysid.axis.loop_source import undoable
 from xy_sysid.axis.model import AxisModel, undoer
+from xy_sysid.effects import Effect
+from xy_sysid.effects._contract import Parameter, arguments
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.samples.block import FloatArray
 
 LOOKS = 50  # at the forces, at most: a spring's rest far outside the travel takes ten
+SPEEDS = 100  # at which levels of dry friction are compared
 
 
 def pushing(model: AxisModel) -> list[str]:
     """Effects whose force follows from place and time alone."""
-    return [name for name, _ in model.effects if model.library[name].category == "force" and undoable(model.library[name])]
+    return [name for name, _ in model.effects if _pushes(model.library[name])]
 
 
 def force_of(data: AxisData, model: AxisModel, name: str, counts: Sequence[int]) -> FloatArray:
@@ -41,25 +45,85 @@ def taken_over(data: AxisData, model: AxisModel, name: str) -> AxisModel:
     less = model.without(name)
     if not others or name not in pushing(model):
         return less
-    from scipy.optimize import least_squares  # here, as it takes a while to import, and few ask
-
     counts = data.counts(early=True)
     wanted = np.sum([force_of(data, model, own, counts) for own in (*others, name)], axis=0)
-    sizes = [len(dict(model.effects)[own]) for own in others]
-    items = [item for own in others for item in model.library[own].on(data.similar)]
-    low, high = np.array([item.low for item in items]), np.array([item.high for item in items])
-    begun = np.clip(np.concatenate([dict(model.effects)[own] for own in others]), low, high)
+    sizes = np.cumsum([len(dict(model.effects)[own]) for own in others])[:-1]
 
     def moved(values: FloatArray) -> AxisModel:
-        made, rest = less, iter(np.split(values, np.cumsum(sizes)[:-1]))
-        for own in others:
-            made = made.with_effect(own, next(rest))
+        made = less
+        for own, part in zip(others, np.split(values, sizes), strict=True):
+            made = made.with_effect(own, part)
         return made
 
     def left(values: FloatArray) -> FloatArray:
         now = moved(values)
         return np.asarray(np.sum([force_of(data, now, own, counts) for own in others], axis=0) - wanted)
 
-    if not np.isfinite(left(begun)).all():
-        return less
-    return moved(least_squares(left, begun, bounds=(low, high), x_scale="jac", max_nfev=LOOKS).x)
+    items = [item for own in others for item in model.library[own].on(data.similar)]
+    return moved(_least(left, np.concatenate([dict(model.effects)[own] for own in others]), items))
+
+
+def stood_in(data: AxisData, model: AxisModel, name: str, relative: Effect) -> AxisModel:
+    """The model with a relative in the place of an effect, which pushes as that did, as well as it can.
+
+    Parameters of one name begin with the same value, which stays where the laws are neither forces by place nor dry friction.
+    """
+    effect, less = model.library[name], model.without(name)
+    own = dict(zip(effect.names, dict(model.effects)[name], strict=True))
+    items = relative.on(data.similar)
+    begun = np.array([own.get(item.name, item.typical) for item in items])
+    if _pushes(effect) and _pushes(relative):
+        counts = data.counts(early=True)
+        wanted = force_of(data, model, name, counts)
+
+        def left(values: FloatArray) -> FloatArray:
+            return np.asarray(force_of(data, less.with_effect(relative.name, values), relative.name, counts) - wanted)
+
+    elif effect.category == relative.category == "friction" and np.any(data.velocity != 0.0):
+        return _rubbing(data, model, name, relative, begun)
+    else:
+        return less.with_effect(relative.name, np.clip(begun, [item.low for item in items], [item.high for item in items]))
+    return less.with_effect(relative.name, _least(left, begun, items))
+
+
+def _rubbing(data: AxisData, model: AxisModel, name: str, relative: Effect, begun: FloatArray) -> AxisModel:
+    """``stood_in`` of two laws of dry friction: their levels at the speeds of the measured motion, the faster the more, as their power is.
+
+    What of the old one falls or rises with the speed, the base's drag takes over, at the same inertia.
+    """
+    moving = data.velocity[data.velocity != 0.0]
+    speeds = np.quantile(moving, np.linspace(0.0, 1.0, SPEEDS))
+    size = np.abs(speeds) / float(np.max(np.abs(speeds)))
+    drag = 1.0 / abs(model.gain)  # V s/m
+    rubbed = _levels(model.library[name], np.array(dict(model.effects)[name]), speeds)
+
+    def left(values: FloatArray) -> FloatArray:
+        return np.asarray(size * (_levels(relative, values[:-1], speeds) + (values[-1] - drag) * np.abs(speeds) - rubbed))
+
+    dragged = Parameter("drag", "V s/m", 0.1 * drag, 10.0 * drag, drag, "of the base")
+    *values, more = _least(left, np.append(begun, drag), [*relative.on(data.similar), dragged])
+    slower = float(drag / more)
+    return replace(model.without(name), gain=model.gain * slower, pole=model.pole / slower).with_effect(relative.name, values)
+
+
+def _pushes(effect: Effect) -> bool:
+    return effect.category == "force" and undoable(effect)
+
+
+def _levels(effect: Effect, values: FloatArray, speeds: FloatArray) -> FloatArray:
+    """(n,) V, the level of a dry friction at each speed (m/s)."""
+    law = effect.functions["level"]
+    own, asked = dict(zip(effect.names, values.tolist(), strict=True)), arguments(law)
+    rows = [{**own, "v": speed, "direction": float(np.sign(speed))} for speed in speeds.tolist()]
+    return np.array([law(**{word: row[word] for word in asked}) for row in rows])
+
+
+def _least(left: Callable[[FloatArray], FloatArray], begun: FloatArray, items: Sequence[Parameter]) -> FloatArray:
+    """The values within the parameters' bounds that leave least; the first ones, within these, where they leave no number."""
+    from scipy.optimize import least_squares  # here, as it takes a while to import, and few ask
+
+    low, high = np.array([item.low for item in items]), np.array([item.high for item in items])
+    inside = np.clip(begun, low, high)
+    if not np.isfinite(left(inside)).all():
+        return inside
+    return np.asarray(least_squares(left, inside, bounds=(low, high), x_scale="jac", max_nfev=LOOKS).x)

@@ -15,7 +15,7 @@ from xy_sysid.effects import Effect, Scene
 from xy_sysid.effects._contract import Limits, in_time
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.floor import excess
-from xy_sysid.greybox.forces import taken_over
+from xy_sysid.greybox.forces import stood_in, taken_over
 from xy_sysid.greybox.free_run import GreyboxFit, best_start, finish, first_excess, fit, fit_base, other_starts, scene_of, screened
 from xy_sysid.greybox.one_step import one_step_fit
 from xy_sysid.greybox.score_test import Gain, Trace, bounded
@@ -257,7 +257,8 @@ class FreeRunJudge:
         """The same set with a relative in the place of one effect."""
         own = dict(zip(self.library[name].names, dict(now.model.effects)[name], strict=True))
         start = tuple(own.get(item.name, item.typical) for item in relative.on(self.data.similar))
-        return self.again(now, now.model.without(name).with_effect(relative.name, bounded(relative, start, self.data.similar)))
+        begun = now.model.without(name).with_effect(relative.name, bounded(relative, start, self.data.similar))
+        return self.again(now, best_start(self.data, [begun, stood_in(self.data, now.model, name, relative)]))
 
     def again(self, now: GreyboxFit, model: AxisModel) -> GreyboxFit | None:
         """A model beside one that is there: fitted wholly only where it comes near."""
