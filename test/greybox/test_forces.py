@@ -53,7 +53,7 @@ def test_a_law_that_gives_no_number_takes_nothing_over(data: AxisData) -> None:
 @pytest.mark.parametrize("gain", [0.1, -0.1])
 def test_coulomb_friction_stands_in_for_stribeck_with_the_base_taking_what_falls_with_speed(data: AxisData, gain: float) -> None:
     """Together they brake alike at every speed, and the inertia 1 / (gain pole) stays."""
-    model = AxisModel(gain, 1e-3, 100.0).with_effect("stribeck_friction", (0.25, 0.02, 0.05))
+    model = AxisModel(gain, 1e-3, 100.0).with_effect("stribeck_friction", (0.25, 0.02, 0.1))
     found = stood_in(data, model, "stribeck_friction", STANDARD["coulomb_friction"])
     (level,) = dict(found.effects)["coulomb_friction"]
     assert 0.25 < level < 0.28
@@ -61,7 +61,7 @@ def test_coulomb_friction_stands_in_for_stribeck_with_the_base_taking_what_falls
     assert found.gain * found.pole == pytest.approx(model.gain * model.pole, rel=1e-12)
     law = STANDARD["stribeck_friction"].functions["level"]
     for speed in (0.005, 0.01, 0.02):
-        before = law(excess=0.02, coulomb=0.25, velocity=0.05, v=speed) + speed / abs(gain)
+        before = law(excess=0.02, coulomb=0.25, velocity=0.1, v=speed) + speed / abs(gain)
         assert level + speed / abs(found.gain) == pytest.approx(before, rel=3e-3)
 
 
