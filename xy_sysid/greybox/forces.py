@@ -68,10 +68,8 @@ def stood_in(data: AxisData, model: AxisModel, name: str, relative: Effect) -> A
 
     Parameters of one name begin with the same value, which stays where the laws are neither forces by place nor dry friction.
     """
-    effect, less = model.library[name], model.without(name)
-    own = dict(zip(effect.names, dict(model.effects)[name], strict=True))
-    items = relative.on(data.similar)
-    begun = np.array([own.get(item.name, item.typical) for item in items])
+    effect, less, items = model.library[name], model.without(name), relative.on(data.similar)
+    begun = _of_one_name(model, name, items)
     if _pushes(effect) and _pushes(relative):
         counts = data.counts(early=True)
         wanted = force_of(data, model, name, counts)
@@ -80,16 +78,22 @@ def stood_in(data: AxisData, model: AxisModel, name: str, relative: Effect) -> A
             return np.asarray(force_of(data, less.with_effect(relative.name, values), relative.name, counts) - wanted)
 
     elif effect.category == relative.category == "friction" and np.any(data.velocity != 0.0):
-        return _rubbing(data, model, name, relative, begun)
+        return _rubbing(data, model, name, relative)
     else:
         return less.with_effect(relative.name, np.clip(begun, [item.low for item in items], [item.high for item in items]))
     return less.with_effect(relative.name, _least(left, begun, items))
 
 
-def _rubbing(data: AxisData, model: AxisModel, name: str, relative: Effect, begun: FloatArray) -> AxisModel:
+def _of_one_name(model: AxisModel, name: str, items: Sequence[Parameter]) -> FloatArray:
+    """A relative's first values: those of an effect's parameters of the same name, else the usual ones."""
+    own = dict(zip(model.library[name].names, dict(model.effects)[name], strict=True))
+    return np.array([own.get(item.name, item.typical) for item in items])
+
+
+def _rubbing(data: AxisData, model: AxisModel, name: str, relative: Effect, drags: tuple[float, float] = (0.1, 10.0)) -> AxisModel:
     """``stood_in`` of two laws of dry friction: their levels at the speeds of the measured motion, the faster the more, as their power is.
 
-    What of the old one falls or rises with the speed, the base's drag takes over, at the same inertia.
+    What of the old one falls or rises with the speed, the base's drag takes over, at the same inertia; drags: its bounds, times what it was.
     """
     moving = data.velocity[data.velocity != 0.0]
     speeds = np.quantile(moving, np.linspace(0.0, 1.0, SPEEDS))
@@ -100,10 +104,24 @@ def _rubbing(data: AxisData, model: AxisModel, name: str, relative: Effect, begu
     def left(values: FloatArray) -> FloatArray:
         return np.asarray(size * (_levels(relative, values[:-1], speeds) + (values[-1] - drag) * np.abs(speeds) - rubbed))
 
-    dragged = Parameter("drag", "V s/m", 0.1 * drag, 10.0 * drag, drag, "of the base")
-    *values, more = _least(left, np.append(begun, drag), [*relative.on(data.similar), dragged])
+    items = relative.on(data.similar)
+    dragged = Parameter("drag", "V s/m", drags[0] * drag, drags[1] * drag, drag, "of the base")
+    *values, more = _least(left, np.append(_of_one_name(model, name, items), drag), [*items, dragged])
     slower = float(drag / more)
     return replace(model.without(name), gain=model.gain * slower, pole=model.pole / slower).with_effect(relative.name, values)
+
+
+def braked(data: AxisData, model: AxisModel, name: str, relative: Effect) -> list[AxisModel]:
+    """The model with a richer law of dry friction in the place of a simple one, and two, four and eight times the base's drag.
+
+    All brake as the model does, as well as they can without a parameter at its bound: of a friction that falls with the speed a simple
+    law makes drag that is missing.
+    """
+    if not model.library[name].category == relative.category == "friction" or not np.any(data.velocity != 0.0):
+        return []
+    found = [_rubbing(data, model, name, relative, (times, times * 1.01)) for times in (2.0, 4.0, 8.0)]
+    low, high = (np.array([getattr(item, side) for item in relative.on(data.similar)]) for side in ("low", "high"))
+    return [one for one in found if np.all((low * 1.01 < dict(one.effects)[relative.name]) & (dict(one.effects)[relative.name] < high))]
 
 
 def _pushes(effect: Effect) -> bool:

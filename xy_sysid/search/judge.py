@@ -15,7 +15,7 @@ from xy_sysid.effects import Effect, Scene
 from xy_sysid.effects._contract import Limits, in_time
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.floor import excess
-from xy_sysid.greybox.forces import stood_in, taken_over
+from xy_sysid.greybox.forces import braked, stood_in, taken_over
 from xy_sysid.greybox.free_run import GreyboxFit, best_start, finish, first_excess, fit, fit_base, other_starts, scene_of, screened
 from xy_sysid.greybox.one_step import one_step_fit
 from xy_sysid.greybox.score_test import Gain, Trace, bounded
@@ -209,8 +209,16 @@ class FreeRunJudge:
 
     def brief(self, now: GreyboxFit, move: Move, hopeless: float = np.inf) -> GreyboxFit | None:
         """The set of a move on the first stage's data; given up where it leaves more excess than ``hopeless``. None if there is no fit."""
+        found = self._tried(self._started(now, move), hopeless)
+        if move.replaced is not None and not move.stays and (found is None or found.excess >= hopeless):
+            harder = braked(self.data, now.model, move.replaced, self.library[move.starts[0][0]])
+            again = self._tried(best_start(self.data, harder), hopeless + HOPELESS) if harder else None
+            found = min((one for one in (found, again) if one is not None), key=lambda one: one.excess, default=None)
+        return found
+
+    def _tried(self, start: AxisModel, hopeless: float) -> GreyboxFit | None:
         try:
-            found = fit(self.data, self._started(now, move), brief=True, hopeless=hopeless, late=self.late)
+            found = fit(self.data, start, brief=True, hopeless=hopeless, late=self.late)
         except np.linalg.LinAlgError:
             return None
         return found if np.isfinite(found.excess) else None
