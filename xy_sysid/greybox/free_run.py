@@ -248,7 +248,9 @@ def sub_steps(data: AxisData, model: AxisModel, early: bool, finest: float) -> f
     while rate < finest:
         finer = min(2.0 * rate, finest)
         then = moved(finer)
-        if not np.mean(power(then - now) / (power(measured - then) + least)) > FAITHFUL**2:  # nor where both run away
+        with np.errstate(over="ignore", invalid="ignore"):  # of a model that runs away, for which no step is short enough
+            apart = float(np.mean(power(then - now) / (power(measured - then) + least)))
+        if not apart > FAITHFUL**2:
             break
         rate, now = finer, then
     return rate
