@@ -63,31 +63,30 @@ def taken_over(data: AxisData, model: AxisModel, name: str) -> AxisModel:
     return moved(_least(left, np.concatenate([dict(model.effects)[own] for own in others]), items))
 
 
+def of_one_name(data: AxisData, model: AxisModel, name: str, relative: Effect) -> AxisModel:
+    """The model with a relative in the place of an effect: parameters of one name keep their value, others begin with the usual one."""
+    own = dict(zip(model.library[name].names, dict(model.effects)[name], strict=True))
+    begun = ((own.get(item.name, item.typical), item) for item in relative.on(data.similar))
+    return model.without(name).with_effect(relative.name, [min(max(value, item.low), item.high) for value, item in begun])
+
+
 def stood_in(data: AxisData, model: AxisModel, name: str, relative: Effect) -> AxisModel:
     """The model with a relative in the place of an effect, which pushes as that did, as well as it can.
 
-    Parameters of one name begin with the same value, which stays where the laws are neither forces by place nor dry friction.
+    As ``of_one_name`` where the laws are neither forces by place nor dry friction.
     """
-    effect, less, items = model.library[name], model.without(name), relative.on(data.similar)
-    begun = _of_one_name(model, name, items)
-    if _pushes(effect) and _pushes(relative):
-        counts = data.counts(early=True)
-        wanted = force_of(data, model, name, counts)
-
-        def left(values: FloatArray) -> FloatArray:
-            return np.asarray(force_of(data, less.with_effect(relative.name, values), relative.name, counts) - wanted)
-
-    elif effect.category == relative.category == "friction" and np.any(data.velocity != 0.0):
+    effect, begun = model.library[name], of_one_name(data, model, name, relative)
+    if effect.category == relative.category == "friction" and np.any(data.velocity != 0.0):
         return _rubbing(data, model, name, relative)
-    else:
-        return less.with_effect(relative.name, np.clip(begun, [item.low for item in items], [item.high for item in items]))
-    return less.with_effect(relative.name, _least(left, begun, items))
+    if not _pushes(effect) or not _pushes(relative):
+        return begun
+    counts = data.counts(early=True)
+    wanted = force_of(data, model, name, counts)
 
+    def left(values: FloatArray) -> FloatArray:
+        return np.asarray(force_of(data, begun.with_effect(relative.name, values), relative.name, counts) - wanted)
 
-def _of_one_name(model: AxisModel, name: str, items: Sequence[Parameter]) -> FloatArray:
-    """A relative's first values: those of an effect's parameters of the same name, else the usual ones."""
-    own = dict(zip(model.library[name].names, dict(model.effects)[name], strict=True))
-    return np.array([own.get(item.name, item.typical) for item in items])
+    return begun.with_effect(relative.name, _least(left, np.array(dict(begun.effects)[relative.name]), relative.on(data.similar)))
 
 
 def _rubbing(data: AxisData, model: AxisModel, name: str, relative: Effect, drags: tuple[float, float] = (0.1, 10.0)) -> AxisModel:
@@ -104,9 +103,9 @@ def _rubbing(data: AxisData, model: AxisModel, name: str, relative: Effect, drag
     def left(values: FloatArray) -> FloatArray:
         return np.asarray(size * (_levels(relative, values[:-1], speeds) + (values[-1] - drag) * np.abs(speeds) - rubbed))
 
-    items = relative.on(data.similar)
+    items, begun = relative.on(data.similar), dict(of_one_name(data, model, name, relative).effects)[relative.name]
     dragged = Parameter("drag", "V s/m", drags[0] * drag, drags[1] * drag, drag, "of the base")
-    *values, more = _least(left, np.append(_of_one_name(model, name, items), drag), [*items, dragged])
+    *values, more = _least(left, np.array([*begun, drag]), [*items, dragged])
     slower = float(drag / more)
     return replace(model.without(name), gain=model.gain * slower, pole=model.pole / slower).with_effect(relative.name, values)
 

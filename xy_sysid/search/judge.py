@@ -15,7 +15,7 @@ from xy_sysid.effects import Effect, Scene
 from xy_sysid.effects._contract import Limits, in_time
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.floor import excess
-from xy_sysid.greybox.forces import braked, stood_in, taken_over
+from xy_sysid.greybox.forces import braked, of_one_name, stood_in, taken_over
 from xy_sysid.greybox.free_run import GreyboxFit, best_start, finish, first_excess, fit, fit_base, other_starts, scene_of, screened
 from xy_sysid.greybox.one_step import one_step_fit
 from xy_sysid.greybox.score_test import Gain, Trace, bounded
@@ -216,7 +216,7 @@ class FreeRunJudge:
             found = min((one for one in (found, again) if one is not None), key=lambda one: one.excess, default=None)
         return found
 
-    def _tried(self, start: AxisModel, hopeless: float) -> GreyboxFit | None:
+    def _tried(self, start: AxisModel, hopeless: float = np.inf) -> GreyboxFit | None:
         try:
             found = fit(self.data, start, brief=True, hopeless=hopeless, late=self.late)
         except np.linalg.LinAlgError:
@@ -228,11 +228,7 @@ class FreeRunJudge:
         model = now.model
         for name, values in others.model.effects:
             model = model.with_effect(name, values)
-        try:
-            found = fit(self.data, model, brief=True, late=self.late)
-        except np.linalg.LinAlgError:
-            return None
-        return found if np.isfinite(found.excess) else None
+        return self._tried(model)
 
     def _started(self, now: GreyboxFit, move: Move) -> AxisModel:
         model = now.model
@@ -263,10 +259,8 @@ class FreeRunJudge:
 
     def instead(self, now: GreyboxFit, name: str, relative: Effect) -> GreyboxFit | None:
         """The same set with a relative in the place of one effect."""
-        own = dict(zip(self.library[name].names, dict(now.model.effects)[name], strict=True))
-        start = tuple(own.get(item.name, item.typical) for item in relative.on(self.data.similar))
-        begun = now.model.without(name).with_effect(relative.name, bounded(relative, start, self.data.similar))
-        return self.again(now, best_start(self.data, [begun, stood_in(self.data, now.model, name, relative)]))
+        starts = [make(self.data, now.model, name, relative) for make in (of_one_name, stood_in)]
+        return self.again(now, best_start(self.data, starts))
 
     def again(self, now: GreyboxFit, model: AxisModel) -> GreyboxFit | None:
         """A model beside one that is there: fitted wholly only where it comes near."""
