@@ -174,6 +174,24 @@ def test_what_is_fitted_as_a_logarithm_is_one_and_the_same_in_every_recording() 
         replace(effect, parameters=tuple(replace(item, per_recording=True) for item in effect.parameters))
 
 
+def test_a_force_that_is_no_straight_line_of_speed_is_not_taken_for_one() -> None:
+    """It would be simulated without sub-steps, and wrongly."""
+
+    def square(load: float, v: float) -> float:
+        return load * v * abs(v)
+
+    def placed(load: float, v: float, x: float) -> float:
+        return load * v * x
+
+    load = EFFECTS["constant_load"]
+    for law in (square, placed):
+        curved = replace(load, functions={"force": law})
+        with pytest.raises(BadInput, match="straight is of another law; allowed: a force in proportion to v alone"):
+            replace(curved, straight=True)
+    with pytest.raises(BadInput, match="straight is of another law"):
+        replace(EFFECTS["coulomb_friction"], straight=True)
+
+
 def test_a_law_with_an_unknown_word_is_refused() -> None:
     """The error names the argument and what is known."""
     effect = EFFECTS["constant_load"]

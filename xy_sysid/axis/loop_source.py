@@ -15,6 +15,7 @@ from xy_sysid.effects._contract import Effect, arguments
 
 BASE = ("gain", "delay", "pole")
 GAUSS = 3.0**-0.5  # of half a piece: where its two places are
+SIDES = (("forth", "+", "1.0"), ("back", "-", "-1.0"))  # of a straight line: its slope is what it gives at 1 m/s
 PLACED = 2  # iterations: an error that changes by 1 per cent of the motion is known to 1e-4 of itself after them
 
 
@@ -42,6 +43,7 @@ def text(name: str, effects: Sequence[Effect]) -> str:
         places=_places(effects),
         inputs=_inputs(effects),
         levels=_levels(effects),
+        slopes=_slopes(effects),
         states=_states(effects),
         pulls=_pulls(effects),
         advance=_advance(effects),
@@ -85,8 +87,13 @@ def undoable(effect: Effect) -> bool:
     return effect.category in ("input", "encoder", "motion") or (effect.category in ("force", "state") and not heeds_speed(effect))
 
 
+def bends(effect: Effect) -> bool:
+    """True if the law bends with speed: then it needs sub-steps."""
+    return needs_speed(effect) and not effect.straight
+
+
 def needs_speed(effect: Effect) -> bool:
-    """True if the law's value changes within a sub-step because the speed does."""
+    """True if the law's value changes within a piece of a sample because the speed does."""
     if effect.category in ("state", "bristle"):
         return True
     return effect.category in ("force", "friction") and any("v" in arguments(item) for item in effect.functions.values())
@@ -121,7 +128,8 @@ def _flags(effects: Sequence[Effect]) -> str:
     lines = [f"has_{effect.name} = on[{place}] != 0" for place, effect in enumerate(effects)]
     groups = {
         "heeded": [effect for effect in effects if heeds_speed(effect)],
-        "curved": [effect for effect in effects if needs_speed(effect)],
+        "curved": [effect for effect in effects if bends(effect)],
+        "sloped": [effect for effect in effects if effect.straight],
         "any_state": _of(effects, "state"),
         "any_pull": [effect for effect in _of(effects, "force") if not needs_speed(effect)],
         "dry": _of(effects, "friction"),
@@ -150,6 +158,17 @@ def _levels(effects: Sequence[Effect]) -> str:
             lines.append(f"    rest_{side} += {value}")
             if not needs_speed(effect):
                 lines.append(f"    fixed_{side} += {value}")
+    return _lines(1, lines)
+
+
+def _slopes(effects: Sequence[Effect]) -> str:
+    """Drag by speed, both ways, of the forces that are straight lines there, V s/m."""
+    words = {"gain": "gain", "pole": "pole"}
+    lines = []
+    for effect in effects:
+        if effect.straight:
+            lines.append(f"if has_{effect.name}:")
+            lines += [f"    slope_{side} {sign}= {_call(effect, 'force', {**words, 'v': v})}" for side, sign, v in SIDES]
     return _lines(1, lines)
 
 

@@ -1,7 +1,7 @@
 """The frame of the loop, into which ``loop_source`` writes the laws of the effects.
 
-Three ways through it: forces that are constant between switching instants, exactly; laws that bend with speed, in
-sub-steps; and an axis with resonances, with these inside (``resonant_loop``): exactly, and in sub-steps where laws heed the speed.
+Three ways through it: forces that are constant between switching instants, or straight lines of speed there, exactly; laws that
+bend with speed, in sub-steps; and an axis with resonances, with these inside (``resonant_loop``): exactly, and in sub-steps where laws heed the speed.
 The second frame takes effects out of a recording, for those that only one-step prediction can judge.
 """
 
@@ -20,12 +20,15 @@ $places
 $inputs
     rest_forth = rest_back = fixed_forth = fixed_back = 0.0
 $levels
+    slope_forth = slope_back = 0.0
+$slopes
 $states
     late = delay * fs
     whole = int(late)
     part = late - whole
     cuts_old, cuts_new = pieces(part, fine / fs if curved else 1.0)
     h_old, h_new = part / fs / cuts_old, (1.0 - part) / fs / cuts_new
+    turns = dry or sloped  # forth and back differ
     decay_old, decay_new = math.exp(-pole * h_old), math.exp(-pole * h_new)
     spent_old, spent_new = -math.expm1(-pole * h_old) / pole, -math.expm1(-pole * h_new) / pole
     turn = math.copysign(1.0, gain)  # friction opposes motion, whatever the sign of the gain
@@ -38,7 +41,7 @@ $hang
         generator_still = resting(generator_moving)
         stiff = fastest(pole, bottom, fs) / ($stiff * fs)
         lighter = generator_moving[1, top.size + 1] / (gain * pole)  # without what hangs on it: sooner does it follow the friction
-        wanted = fine * lighter if curved else fine
+        wanted = fine * lighter if curved or sloped else fine
         cuts_old, cuts_new = pieces(part, min(max(wanted / fs, stiff), $most * fine) if heeded or curved else 1.0)
         h_old, h_new = part / fs / cuts_old, (1.0 - part) / fs / cuts_new
         moving_old, moving_new = exponential(generator_moving, h_old), exponential(generator_moving, h_new)
@@ -106,16 +109,23 @@ $level_middle
                         moved += stop(generator_moving, generator_still, swung, push, force, plus, minus, h, series)
             out[i] = moved * fs
     elif not curved:
-        # v runs in the direction of the voltage here; forth and back are directions of motion
-        size, v = abs(gain), turn * start
-        plus, minus = (fixed_forth, fixed_back) if gain > 0.0 else (fixed_back, fixed_forth)
+        # v runs in the direction of the voltage here; forth and back are directions of motion, each with a drag of its own
+        v = turn * start
+        levels = (fixed_forth, fixed_back) if gain > 0.0 else (fixed_back, fixed_forth)
+        forth, back = 1.0 + gain * slope_forth, 1.0 + gain * slope_back
+        steeper = (forth, back) if gain > 0.0 else (back, forth)
+        sizes, poles = (abs(gain) / steeper[0], abs(gain) / steeper[1]), (pole * steeper[0], pole * steeper[1])
+        decays_old = (math.exp(-poles[0] * h_old), math.exp(-poles[1] * h_old))
+        decays_new = (math.exp(-poles[0] * h_new), math.exp(-poles[1] * h_new))
+        spents_old = (-math.expm1(-poles[0] * h_old) / poles[0], -math.expm1(-poles[1] * h_old) / poles[1])
+        spents_new = (-math.expm1(-poles[0] * h_new) / poles[0], -math.expm1(-poles[1] * h_new) / poles[1])
         for i in range(n):
             moved = 0.0
             for piece in range(2):
                 if piece == 0:
-                    h, decay, spent, middle_of = h_old, decay_old, spent_old, 0.5 * part
+                    h, decays, spents, middle_of = h_old, decays_old, spents_old, 0.5 * part
                 else:
-                    h, decay, spent, middle_of = h_new, decay_new, spent_new, 0.5 * (1.0 + part)
+                    h, decays, spents, middle_of = h_new, decays_new, spents_new, 0.5 * (1.0 + part)
                 if h <= 0.0:
                     continue
                 k = i - whole - 1 + piece
@@ -128,40 +138,36 @@ $level_middle
                     pull = 0.0
 $pulls
                     push = volts - pull
-                if not dry:
-                    reach = size * push
-                    moved += reach * h + (v - reach) * spent
-                    v = reach + (v - reach) * decay
+                if not turns:
+                    reach = sizes[0] * push
+                    moved += reach * h + (v - reach) * spents[0]
+                    v = reach + (v - reach) * decays[0]
                     continue
-                if v > 0.0 or (v == 0.0 and push > plus):
-                    reach = size * (push - plus)
-                    end = reach + (v - reach) * decay
-                    if end >= 0.0:
-                        moved += reach * h + (v - reach) * spent
-                        v = end
-                        continue
-                elif v < 0.0 or push < -minus:
-                    reach = size * (push + minus)
-                    end = reach + (v - reach) * decay
-                    if end <= 0.0:
-                        moved += reach * h + (v - reach) * spent
-                        v = end
-                        continue
+                if v > 0.0 or (v == 0.0 and push > levels[0]):
+                    side, way = 0, 1.0
+                elif v < 0.0 or push < -levels[1]:
+                    side, way = 1, -1.0
                 else:
+                    continue
+                reach = sizes[side] * (push - way * levels[side])
+                end = reach + (v - reach) * decays[side]
+                if way * end >= 0.0:
+                    moved += reach * h + (v - reach) * spents[side]
+                    v = end
                     continue
                 # it comes to rest within the piece: find when, then see whether it sticks or turns
-                gone = min(math.log1p(-v / reach) / pole, h)
-                moved += reach * gone + v / pole
+                gone = min(math.log1p(-v / reach) / poles[side], h)
+                moved += reach * gone + v / poles[side]
                 v = 0.0
-                if push > plus:
-                    reach = size * (push - plus)
-                elif push < -minus:
-                    reach = size * (push + minus)
+                if push > levels[0]:
+                    side, way = 0, 1.0
+                elif push < -levels[1]:
+                    side, way = 1, -1.0
                 else:
                     continue
-                left = h - gone
-                grown = -math.expm1(-pole * left)
-                moved += reach * (left - grown / pole)
+                reach, left = sizes[side] * (push - way * levels[side]), h - gone
+                grown = -math.expm1(-poles[side] * left)
+                moved += reach * (left - grown / poles[side])
                 v = reach * grown
             out[i] = turn * moved * fs
     else:

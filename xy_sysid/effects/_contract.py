@@ -266,6 +266,7 @@ class Effect:
     refusal:     why values explain nothing on a travel between two positions (m), though each is within its bounds: in words, or empty
     one_step:    then this does: fits the effect by one-step prediction (see ``contact.Contact``)
     sum_of:      other effects that together are the very same law, if there are and motor and table are one
+    straight:    True for a force in proportion to speed, forth and back each by its own: it needs no sub-steps
     on_table:    True for a force that acts on the table: across a gap the motor does not feel it
     rubs:        for ``one_step``: the effect whose dry friction it begins with where no other is given
     suspects:    names of effects whose trace in an error is a reason to try this one, too: its own trace does not tell
@@ -292,6 +293,7 @@ class Effect:
     one_step: OneStep | None = None
     refusal: Callable[[Sequence[float], tuple[float, float]], str] | None = None
     sum_of: Sum | None = None
+    straight: bool = False
     on_table: bool = False
     rubs: str = ""
     suspects: tuple[str, ...] = ()
@@ -316,8 +318,20 @@ class Effect:
         if any(item.per_recording and item.positive for item in self.parameters):
             act = "Give it positive=False: recordings differ by a sum."
             raise BadInput(f"effect {self.name}: per_recording", "of a positive parameter", "a parameter of either sign", act)
+        if self.straight and not self._is_straight():
+            act = "Leave straight out: then it is simulated in sub-steps."
+            raise BadInput(f"effect {self.name}: straight", "of another law", "a force in proportion to v alone, forth and back", act)
         if self.mode_frequency and self.mode_frequency not in self.names:
             raise BadInput(f"effect {self.name}: mode_frequency", repr(self.mode_frequency), ", ".join(self.names), "Name one of these.")
+
+    def _is_straight(self) -> bool:
+        """Whether it is a force that asks for nothing but speed and base, and is twice as large at twice the speed."""
+        words = {"v": 1.0, "gain": 1.0, "pole": 1.0, **dict(zip(self.names, self.typical, strict=True))}
+        if self.category != "force" or not {"v"} <= {*arguments(self.functions["force"])} <= {*words}:
+            return False
+        force = self.functions["force"]
+        at = {v: force(**{name: {**words, "v": v}[name] for name in arguments(force)}) for v in (-2.0, -1.0, 1.0, 2.0)}
+        return all(math.isclose(at[2.0 * way], 2.0 * at[way], rel_tol=1e-9) for way in (-1.0, 1.0))
 
     @property
     def is_dry(self) -> bool:

@@ -33,4 +33,5 @@ EFFECT = Effect(
     experiment="constant speeds both ways, slow and fast: this difference between the two inputs grows with speed, that of a load stays",
     functions={"force": force},
     guesses=guesses,
+    straight=True,
 )

@@ -9,6 +9,7 @@ from xy_sysid.effects import _pole_zero_pair
 from xy_sysid.effects._contract import Effect, Parameter, law
 from xy_sysid.effects._scene import Guess, Scene
 
+LOWEST, HIGHEST = 1.0, 90.0  # Hz
 SLOW = 0.25  # of the corner frequency of the base, from which on a mode is looked for
 
 
@@ -20,17 +21,17 @@ def section(split: float, frequency: float, damping: float, pole_damping: float,
 
 def guesses(scene: Scene) -> Iterable[Guess]:
     """Pairs up to 90 Hz."""
-    return _pole_zero_pair.guesses(scene, _lowest(scene), 90.0)
+    return _pole_zero_pair.guesses(scene, _lowest(scene), HIGHEST)
 
 
 def joint(scene: Scene) -> Iterable[tuple[float, float, float, tuple[float, ...]]]:
     """Base and pair from the frequency response."""
-    return _pole_zero_pair.joint(scene, _lowest(scene), 90.0)
+    return _pole_zero_pair.joint(scene, _lowest(scene), HIGHEST)
 
 
 def _lowest(scene: Scene) -> float:
     """Hz: 5, and lower where the axis is slow itself."""
-    return min(5.0, SLOW * scene.pole / (2.0 * math.pi))
+    return max(LOWEST, min(5.0, SLOW * scene.pole / (2.0 * math.pi)))
 
 
 EFFECT = Effect(
@@ -42,7 +43,7 @@ EFFECT = Effect(
     category="motion",
     parameters=(
         Parameter("split", "", 1e-4, 10.0, 0.04, "resonance over antiresonance, minus 1"),
-        Parameter("frequency", "Hz", 1.0, 90.0, 46.0, "antiresonance: base and table together, screw locked"),
+        Parameter("frequency", "Hz", LOWEST, HIGHEST, 46.0, "antiresonance: base and table together, screw locked"),
         Parameter("damping", "", 1e-4, 1.0, 0.015, "damping ratio of the antiresonance"),
         Parameter("pole_damping", "", 1e-4, 1.0, 0.02, "damping ratio of the resonance"),
     ),
