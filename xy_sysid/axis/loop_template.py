@@ -1,7 +1,8 @@
 """The frame of the loop, into which ``loop_source`` writes the laws of the effects.
 
 Three ways through it: forces that are constant between switching instants, or straight lines of speed there, exactly; laws that
-bend with speed, in sub-steps; and an axis with resonances, with these inside (``resonant_loop``): exactly, and in sub-steps where laws heed the speed.
+bend with speed, in sub-steps; and an axis with resonances, with these inside (``resonant_loop``): exactly, and in sub-steps where
+laws heed the speed.
 The second frame takes effects out of a recording, for those that only one-step prediction can judge.
 """
 
