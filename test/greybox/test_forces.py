@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from xy_sysid.axis.model import STANDARD, AxisModel
+from xy_sysid.effects import Scene
 from xy_sysid.greybox.axis_data import AxisData, prepare
-from xy_sysid.greybox.forces import braked, force_of, pushing, stood_in, taken_over
+from xy_sysid.greybox.forces import braked, force_of, pushing, stood_in, taken_for, taken_over
 
 RATE = 1000.0
 
@@ -70,6 +71,33 @@ def test_a_level_that_is_the_same_at_all_speeds_stays(data: AxisData) -> None:
     found = stood_in(data, model, "asymmetric_friction", STANDARD["coulomb_friction"])
     assert dict(found.effects)["coulomb_friction"] == pytest.approx((0.3,), rel=1e-6)
     assert (found.gain, found.pole) == pytest.approx((0.1, 100.0), rel=1e-6)
+
+
+def scene(data: AxisData, model: AxisModel) -> Scene:
+    """As a base sees it that explains nothing."""
+    velocity = data.begun(data.velocity)
+    position = data.begun(data.middle())
+    voltage = data.begun(data.voltage[:-1])
+    return Scene(sampling_rate=RATE, gain=model.gain, pole=model.pole, voltage=voltage, velocity=velocity, position=position, error=velocity)
+
+
+def test_a_spring_that_softens_is_taken_for_a_part_of_a_wave_that_pushes_alike(data: AxisData) -> None:
+    """Cogging of which the travel is two thirds of a period, beside a friction that stays."""
+    model = AxisModel(0.1, 1e-3, 100.0).with_effect("coulomb_friction", (0.2,)).with_effect("return_spring", (40.0, 1e-3, 6000.0))
+    found = taken_for(data, model, "return_spring", STANDARD["cogging"], scene(data, model))
+    assert found is not None
+    assert [name for name, _ in found.effects] == ["coulomb_friction", "cogging"]
+    assert (found.gain, found.pole) == (0.1, 100.0)
+    counts = data.counts(early=True)
+    wanted, pushed = force_of(data, model, "return_spring", counts), force_of(data, found, "cogging", counts)
+    assert np.std(wanted - pushed) < 0.03 * np.std(wanted)
+
+
+def test_a_law_that_leaves_no_trace_on_this_motion_is_not_what_a_spring_was_taken_for(data: AxisData) -> None:
+    """A weight that swings needs half a radian of travel; and friction is no force by place."""
+    model = AxisModel(0.1, 1e-3, 100.0).with_effect("return_spring", (40.0, 1e-3, 0.0))
+    for other in ("gravity", "coulomb_friction"):
+        assert taken_for(data, model, "return_spring", STANDARD[other], scene(data, model)) is None
 
 
 def test_a_linear_spring_stands_in_for_one_that_softens_not(data: AxisData) -> None:

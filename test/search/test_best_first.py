@@ -37,6 +37,7 @@ class Table:
     simpler: the set with a simpler relative, for a set that has one; astray: what a set leaves if it is fitted from this other one
     lost: what two sets have come to helps no fit of both
     slowly: from a set, (effects to add, gain) that only all data show; briefly: what a set leaves of the first stage's data, where that differs
+    posed: an effect, and what it may have been taken for
     """
 
     leaves: Mapping[Set, float]
@@ -49,6 +50,7 @@ class Table:
     lost: bool = False
     slowly: Mapping[Set, Sequence[tuple[Set, float]]] = field(default_factory=dict)
     briefly: Mapping[Set, float] = field(default_factory=dict)
+    posed: Mapping[str, str] = field(default_factory=dict)
     briefs: list[Set] = field(default_factory=list)
     mergers: list[tuple[Set, Set]] = field(default_factory=list)
     wholes: list[Set] = field(default_factory=list)
@@ -71,6 +73,13 @@ class Table:
                 simpler=self.simpler.get(now.effects | added, frozenset()),
             )
             for added, gain in promises.get(now.effects, ())
+        ]
+
+    def taken_for(self, now: Looked) -> list[Move]:
+        there = [(name, other) for name, other in self.posed.items() if name in now.effects]
+        return [
+            Move(effects=now.effects - {name} | {other}, gain=0.0, rest=0.0, parameters=0, starts=((other, (1.0,)),), replaced=name)
+            for name, other in there
         ]
 
     def brief(self, now: Looked, move: Move, hopeless: float = inf) -> Looked | None:
@@ -437,6 +446,35 @@ def test_a_refused_set_is_never_best() -> None:
     assert of("a") in tried and of("a", "c") not in tried
     assert search.best.effects == of("b")
     assert search.nodes[of("a")].refused == "a: size is at its bound"
+
+
+@pytest.mark.parametrize("refuses", [{}, {of("a", "spring"): "spring: it would give way"}], ids=["stands", "refused"])
+@pytest.mark.parametrize("left", [1.0, 0.0])
+def test_what_an_effect_may_have_been_taken_for_is_tried_in_its_place(refuses: Mapping[Set, str], left: float) -> None:
+    """Where the effect leads, or would if it were not refused; once; and nothing that leaves nothing asks for it."""
+    promises = {of(): all_of((("a", "spring"), 1.5)), of("a", "wave"): all_of(("b", 0.2))}
+    leaves = {of(): 4.0, of("a", "spring"): left, of("a", "wave"): 0.2, of("a", "b", "wave"): 0.0}
+    search, tried = searched(Table(leaves, promises, refuses=refuses, posed={"spring": "wave"}))
+    if left:
+        assert tried == [of("a", "spring"), of("a", "wave"), of("a", "b", "wave")]
+        assert search.best.effects == of("a", "b", "wave")
+    else:
+        assert tried == [of("a", "spring")]
+
+
+def test_what_does_not_lead_asks_for_nothing_in_its_place() -> None:
+    """One brief fit for each that leads, and none for all others."""
+    promises = {of(): all_of(("a", 1.0), (("spring",), 0.9))}
+    judge = Table({of(): 4.0, of("a"): 3.0, of("spring"): 3.2, of("wave"): 3.1}, promises, posed={"spring": "wave"})
+    assert searched(judge)[1] == [of("a"), of("spring")]
+
+
+def test_what_leaves_as_much_as_the_refused_one_that_it_was_taken_for_stands() -> None:
+    """It explains what that explained, and is not asked to explain more."""
+    refuses = {of("spring"): "spring: it would give way"}
+    judge = Table({of(): 4.0, of("spring"): 1.0, of("wave"): 1.0}, {of(): all_of((("spring",), 1.0))}, refuses=refuses, posed={"spring": "wave"})
+    search, _ = searched(judge)
+    assert search.best.effects == of("wave")
 
 
 def test_where_all_are_refused_the_start_is_best() -> None:

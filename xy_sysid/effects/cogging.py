@@ -71,4 +71,5 @@ EFFECT = Effect(
     functions={"force": force},
     guesses=guesses,
     refusal=refusal,
+    suspects=("return_spring", "hardening_stiffness"),
 )

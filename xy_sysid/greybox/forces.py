@@ -12,7 +12,7 @@ import numpy as np
 
 from xy_sysid.axis.loop_source import undoable
 from xy_sysid.axis.model import AxisModel, undoer
-from xy_sysid.effects import Effect
+from xy_sysid.effects import Effect, Scene
 from xy_sysid.effects._contract import Parameter, arguments
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.samples.block import FloatArray
@@ -78,15 +78,34 @@ def stood_in(data: AxisData, model: AxisModel, name: str, relative: Effect) -> A
     effect, begun = model.library[name], of_one_name(data, model, name, relative)
     if effect.category == relative.category == "friction" and np.any(data.velocity != 0.0):
         return _rubbing(data, model, name, relative)
-    if not _pushes(effect) or not _pushes(relative):
-        return begun
+    return _pushed_alike(data, model, name, begun, relative) if _pushes(effect) and _pushes(relative) else begun
+
+
+def taken_for(data: AxisData, model: AxisModel, name: str, other: Effect, scene: Scene) -> AxisModel | None:
+    """The model with another law in the place of an effect that pushes much the same; begun from that one of its traces on the scene which
+    comes nearest to it. None where the law leaves no trace on this motion, or neither is a force by place.
+
+    scene: of the first stage
+    """
+    traces = other.guessed(scene) if _pushes(model.library[name]) and _pushes(other) else []
+    if not traces:
+        return None
+    wanted = force_of(data, model, name, data.counts(early=True))
+    fits = [np.asarray(np.linalg.lstsq(trace.columns.T, wanted, rcond=None)[0], dtype=np.float64) for trace in traces]
+    least = min(range(len(traces)), key=lambda k: float(np.sum((wanted - fits[k] @ traces[k].columns) ** 2)))
+    begun = model.without(name).with_effect(other.name, other.read(traces[least], fits[least], data.similar))
+    return _pushed_alike(data, model, name, begun, other)
+
+
+def _pushed_alike(data: AxisData, model: AxisModel, name: str, begun: AxisModel, other: Effect) -> AxisModel:
+    """The model that is begun, with the other law's parameters such that it pushes as the effect does in the first model."""
     counts = data.counts(early=True)
     wanted = force_of(data, model, name, counts)
 
     def left(values: FloatArray) -> FloatArray:
-        return np.asarray(force_of(data, begun.with_effect(relative.name, values), relative.name, counts) - wanted)
+        return np.asarray(force_of(data, begun.with_effect(other.name, values), other.name, counts) - wanted)
 
-    return begun.with_effect(relative.name, _least(left, np.array(dict(begun.effects)[relative.name]), relative.on(data.similar)))
+    return begun.with_effect(other.name, _least(left, np.array(dict(begun.effects)[other.name]), other.on(data.similar)))
 
 
 def _rubbing(data: AxisData, model: AxisModel, name: str, relative: Effect, drags: tuple[float, float] = (0.1, 10.0)) -> AxisModel:

@@ -35,6 +35,9 @@ class Judge(Protocol[F]):
     def slow_moves(self, now: F, brief: F) -> Sequence[Move]:
         """The same by what only all data show."""
 
+    def taken_for(self, now: F) -> Sequence[Move]:
+        """What may stand in the place of an effect, whose trace is a reason to try it."""
+
     def brief(self, now: F, move: Move, hopeless: float = inf) -> F | None:
         """A quick fit."""
 
@@ -77,8 +80,13 @@ class Node(Generic[F]):
     @property
     def score(self) -> float:
         """nats; less is better."""
+        return inf if self.refused else self.allowed
+
+    @property
+    def allowed(self) -> float:
+        """The score that it would have if it were not refused."""
         later = 0.0 if self.whole else self.later
-        return inf if self.refused else self.fit.excess + later + LEAST * self.parameters
+        return self.fit.excess + later + LEAST * self.parameters
 
     @property
     def optimism(self) -> float:
@@ -149,8 +157,22 @@ class Search(Generic[F]):
             yield move.effects
             before = self.best.score
             node = self._fitted(parent, move)
-            if node is not None and node.whole and node.leads and node.score < before - LEAST and node.fit.excess >= LEAST:
-                self.waiting += self._moves(node)
+            self._lead_on(node, before)
+            if node is not None and node.leads and node.allowed < before - LEAST:
+                yield from self._taken_for(node)
+
+    def _lead_on(self, node: Node[F] | None, before: float) -> None:
+        """Go on from what is better than the best was."""
+        if node is not None and node.whole and node.leads and node.score < before - LEAST and node.fit.excess >= LEAST:
+            self.waiting += self._moves(node)
+
+    def _taken_for(self, node: Node[F]) -> Iterator[frozenset[str]]:
+        """Beside what is the best, or were it if it were not refused, try what one of its effects may have been taken for; yields as ``steps``."""
+        for move in self.judge.taken_for(node.fit) if node.fit.excess >= LEAST else ():
+            if not self._known(node, move) and self.clock() <= self.until:
+                yield move.effects
+                before = self.best.score
+                self._lead_on(self._fitted(node, move), before)
 
     def goes_on(self, node: Node[F]) -> bool:
         """Whether there may be moves from a set that were not asked for yet."""
@@ -222,13 +244,13 @@ class Search(Generic[F]):
         brief = self.judge.brief(parent.fit, move, hopeless)
         if brief is None or parent.brief.excess - brief.excess < (1.0 - ALIKE) * move.gain:
             brief = self._merged(parent, move, brief)
-        parent.tried += 1
+        parent.tried += move.gain > 0.0
         if brief is None:
             return None
         parent.shown = max(parent.shown, (parent.brief.excess - brief.excess) / move.gain if move.gain > 0.0 else 0.0)
         parameters = parent.parameters + move.parameters
         least = (1.0 + self.least) ** _new(parent, move)
-        leads = self.judge.size(brief, parent.brief) >= least - 1.0
+        leads = self.judge.size(brief, parent.brief) >= least - 1.0 or (bool(parent.refused) and brief.excess <= parent.brief.excess)
         astray = brief.excess >= parent.brief.excess + LEAST and not parent.is_slow(self.least)
         slow = move.rest >= log(least) and not astray
         whole = brief.excess + later + LEAST * parameters < best.score - LEAST if leads else slow

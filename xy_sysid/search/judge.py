@@ -15,7 +15,7 @@ from xy_sysid.effects import Effect, Scene
 from xy_sysid.effects._contract import Limits, in_time
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.floor import excess
-from xy_sysid.greybox.forces import braked, of_one_name, stood_in, taken_over
+from xy_sysid.greybox.forces import braked, of_one_name, stood_in, taken_for, taken_over
 from xy_sysid.greybox.free_run import GreyboxFit, best_start, finish, first_excess, fit, fit_base, other_starts, scene_of, screened
 from xy_sysid.greybox.one_step import one_step_fit
 from xy_sysid.greybox.score_test import Gain, Trace, bounded
@@ -128,6 +128,26 @@ class FreeRunJudge:
                 )
         pairs.sort(key=lambda move: -move.gain)
         return [move for move in (*kept, *pairs[:WIDTH]) if not self._twice(move.effects)]
+
+    def taken_for(self, now: GreyboxFit) -> list[Move]:
+        """What an effect of a set may have been taken for: laws that name it as a reason to try them, in its place, pushing as it does."""
+        model, scene = now.model, scene_of(self.data, now)
+        found = []
+        for name, _ in model.effects if not self.late() else ():
+            for other in self.library.acting:
+                begun = taken_for(self.data, model, name, other, scene) if name in other.suspects and other.name not in model else None
+                if begun is not None:
+                    found.append(
+                        Move(
+                            effects=frozenset(own for own, _ in begun.effects),
+                            gain=0.0,
+                            rest=0.0,
+                            parameters=len(other.parameters) - len(self.library[name].parameters),
+                            starts=((other.name, dict(begun.effects)[other.name]),),
+                            replaced=name,
+                        )
+                    )
+        return found
 
     def _leaders(self, gains: Mapping[str, Gain], families: dict[str, str]) -> list[str]:
         """What has no family, and of each family that is not in the set yet its simplest and its most promising member."""
