@@ -514,6 +514,28 @@ def test_a_rival_that_promised_as_much_is_fitted_in_the_end() -> None:
     assert search.best.effects == of("a") and of("b") in search.nodes
 
 
+@pytest.mark.parametrize(("from_nothing", "briefs"), [(1.0, 2), (0.6, 2), (0.1, 1)], ids=["astray", "no better", "better"])
+def test_a_rival_that_gains_nothing_is_fitted_again_from_its_simpler_relative(from_nothing: float, briefs: int) -> None:
+    """A richer law leaves no more than a simple one that is its limit: else it went astray."""
+    rich = Move(effects=of("rich"), gain=0.01, rest=0.01, parameters=2, starts=(("rich", (1.0,)),), replaced="a")
+
+    class Related(Table):
+        def moves(self, now: Looked, brief: Looked) -> list[Move]:
+            return [rich] if now.effects == of("a") else super().moves(now, brief)
+
+    judge = Related(
+        {of(): 4.0, of("a"): 0.6, of("rich"): 0.1},
+        {of(): all_of(("a", 1.0), (("rich",), 0.9))},
+        simpler={of("rich"): of("a")},
+        astray={(of(), of("rich")): from_nothing},
+    )
+    search, tried = searched(judge)
+    assert tried == [of("a")]
+    assert list(search.rivals(of("a"))) == [of("rich")]
+    assert judge.briefs.count(of("rich")) == briefs
+    assert search.best.effects == of("rich") and search.best.fit.excess == 0.1
+
+
 def test_a_rival_may_turn_out_to_be_better() -> None:
     """Then it is the best."""
     promises = {of(): all_of(("a", 1.0), ("b", 0.95))}

@@ -187,7 +187,9 @@ class Search(Generic[F]):
             if move.effects not in self.nodes and len(move.effects) <= len(taken) and move.gain > ALIKE * max(known):
                 most -= 1
                 yield move.effects
-                self._fitted(parent, move)
+                node, again = self._fitted(parent, move), self._from_simpler(move)
+                if node is not None and again is not None and node.fit.excess > again[0].fit.excess - LEAST:
+                    self._fitted(*again)
 
     def _last(self) -> list[tuple[Node[F], Move]]:
         """Where nothing promises enough: what all data show of the best set, if they show what its brief fit does not; else, once, what
@@ -217,6 +219,12 @@ class Search(Generic[F]):
         """The move itself, or one to the simpler relative of what it brings, which comes first."""
         first = (item for item in self.waiting if item[0] is parent and item[1].effects == move.simpler and move.simpler not in self.nodes)
         return next(first, (parent, move))
+
+    def _from_simpler(self, move: Move) -> tuple[Node[F], Move] | None:
+        """The move to the same set that waits where its simpler relative was fitted: what leaves more than that went astray, and may be
+        fitted again from there."""
+        at = self.nodes.get(move.simpler) if move.simpler else None
+        return next((item for item in self.waiting if item[0] is at and item[1].effects == move.effects), None)
 
     def _known(self, parent: Node[F], move: Move) -> bool:
         """The set was fitted. One that left more than a set which it contains went astray, and may be fitted again from another; one of which
