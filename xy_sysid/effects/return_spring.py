@@ -57,5 +57,6 @@ EFFECT = Effect(
     guesses=guesses,
     refusal=refusal,
     family="spring",
+    suspects=("hardening_stiffness",),
     on_table=True,
 )

@@ -18,12 +18,13 @@ from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.samples.block import FloatArray
 
 LOOKS = 50  # at the forces, at most: a spring's rest far outside the travel takes ten
+SMOOTH = 300.0  # Hz, below which a speed is seen
 SPEEDS = 100  # at which levels of dry friction are compared
 
 
 def pushing(model: AxisModel) -> list[str]:
     """Effects whose force follows from place and time alone."""
-    return [name for name, _ in model.effects if _pushes(model.library[name])]
+    return [name for name, _ in model.effects if pushes(model.library[name])]
 
 
 def force_of(data: AxisData, model: AxisModel, name: str, counts: Sequence[int]) -> FloatArray:
@@ -34,6 +35,19 @@ def force_of(data: AxisData, model: AxisModel, name: str, counts: Sequence[int])
         undo = undoer(model.library, [name], data.sampling_rate, data.voltage[run], data.position[run])
         parts.append(undo(row, count)[2].sum(axis=0))
     return np.concatenate(parts)
+
+
+def rubbing(model: AxisModel) -> list[str]:
+    """Effects whose friction follows from the speed alone."""
+    return [name for name, _ in model.effects if model.library[name].category == "friction"]
+
+
+def friction_of(scene: Scene, model: AxisModel, name: str) -> FloatArray:
+    """(n,) V, what the friction of a model pushes against the drive on the measured motion, while it moves."""
+    velocity = scene.smooth(scene.velocity, SMOOTH)
+    speeds = np.linspace(float(np.min(velocity)), float(np.max(velocity)), 2 * SPEEDS)
+    level = np.interp(velocity, speeds, _levels(model.library[name], np.array(dict(model.effects)[name]), speeds))
+    return np.asarray(np.copysign(1.0, model.gain) * scene.direction() * level)
 
 
 def taken_over(data: AxisData, model: AxisModel, name: str) -> AxisModel:
@@ -78,7 +92,7 @@ def stood_in(data: AxisData, model: AxisModel, name: str, relative: Effect) -> A
     effect, begun = model.library[name], of_one_name(data, model, name, relative)
     if effect.category == relative.category == "friction" and np.any(data.velocity != 0.0):
         return _rubbing(data, model, name, relative)
-    return _pushed_alike(data, model, name, begun, relative) if _pushes(effect) and _pushes(relative) else begun
+    return _pushed_alike(data, model, name, begun, relative) if pushes(effect) and pushes(relative) else begun
 
 
 def taken_for(data: AxisData, model: AxisModel, name: str, other: Effect, scene: Scene) -> AxisModel | None:
@@ -87,7 +101,7 @@ def taken_for(data: AxisData, model: AxisModel, name: str, other: Effect, scene:
 
     scene: of the first stage
     """
-    traces = other.guessed(scene) if _pushes(model.library[name]) and _pushes(other) else []
+    traces = other.guessed(scene) if pushes(model.library[name]) and pushes(other) else []
     if not traces:
         return None
     wanted = force_of(data, model, name, data.counts(early=True))
@@ -142,7 +156,8 @@ def braked(data: AxisData, model: AxisModel, name: str, relative: Effect) -> lis
     return [one for one in found if np.all((low * 1.01 < dict(one.effects)[relative.name]) & (dict(one.effects)[relative.name] < high))]
 
 
-def _pushes(effect: Effect) -> bool:
+def pushes(effect: Effect) -> bool:
+    """The force follows from place and time alone."""
     return effect.category == "force" and undoable(effect)
 
 

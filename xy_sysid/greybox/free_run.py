@@ -16,7 +16,7 @@ from xy_sysid.effects._contract import in_time
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.axis_data import EPSILON, AxisData, loosened, prepare, prepare_all
 from xy_sysid.greybox.floor import excess
-from xy_sysid.greybox.forces import force_of, pushing
+from xy_sysid.greybox.forces import force_of, friction_of, pushing, rubbing
 from xy_sysid.greybox.least_squares import Round, Scale, Schedule, Solution, Target, solve
 from xy_sysid.greybox.parameters import Estimate, estimates, model_of, problem
 from xy_sysid.greybox.score_test import Screen, Trace, bounded, screen
@@ -129,19 +129,26 @@ def other_starts(data: AxisData, base: GreyboxFit, model: AxisModel, name: str, 
     """
     effect, scene = model.library[name], scene or scene_of(data, base)
     candidates = []
-    beside = [own for own in pushing(model) if own != name]
+    beside, rubs = [own for own in pushing(model) if own != name], [own for own in rubbing(model) if own != name]
     forces = [force_of(data, model, own, data.counts(early=scene.velocity.size == data.first)) for own in beside]
-    for start in inverse_starts(effect, scene, scene.velocity.size, forces):
+    forces += [friction_of(scene, model, own) for own in rubs]
+    for start in inverse_starts(effect, scene, scene.velocity.size, forces, bool(rubs)):
         whole = replace(model, gain=start.gain, pole=min(max(start.pole, 1e-2), 1e5))
-        for own, size in zip(beside, start.sizes, strict=True):
-            values = dict(model.effects)[own]
-            whole = whole.with_effect(own, bounded(model.library[own], (values[0] * min(max(size, 0.3), 3.0), *values[1:]), data.similar))
+        for own, size in zip((*beside, *rubs), start.sizes, strict=True):
+            whole = whole.with_effect(own, bounded(model.library[own], _sized(model, own, min(max(size, 0.3), 3.0)), data.similar))
         candidates.append(whole.with_effect(name, start.values))
     if effect.joint is not None:
         for gain, later, pole, values in effect.joint(scene):
             whole = replace(model, gain=gain, delay=max(base.model.delay + later, 0.0), pole=min(max(pole, 1e-2), 1e5))
             candidates.append(whole.with_effect(name, bounded(effect, values, data.similar)))
     return candidates
+
+
+def _sized(model: AxisModel, name: str, times: float) -> tuple[float, ...]:
+    """The values of an effect that pushes so many times as hard: its size, and every other level of a friction."""
+    items, values = model.library[name].parameters, dict(model.effects)[name]
+    levels = [k == 0 or (model.library[name].is_dry and item.unit == items[0].unit) for k, item in enumerate(items)]
+    return tuple(value * (times if level else 1.0) for value, level in zip(values, levels, strict=True))
 
 
 def best_start(data: AxisData, candidates: list[AxisModel]) -> AxisModel:

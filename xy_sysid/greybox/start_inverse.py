@@ -34,8 +34,11 @@ class InverseStart:
     sizes: tuple[float, ...]
 
 
-def inverse_starts(effect: Effect, scene: Scene, samples: int, forces: Sequence[FloatArray] = ()) -> list[InverseStart]:
-    """One for each low-pass at most, from the first samples; forces: (n,) V each, of what the model has already, whose sizes are free."""
+def inverse_starts(effect: Effect, scene: Scene, samples: int, forces: Sequence[FloatArray] = (), rubs: bool = False) -> list[InverseStart]:
+    """One for each low-pass at most, from the first samples.
+
+    forces: (n,) V each, of what the model has already, whose sizes are free; rubs: dry friction is among them
+    """
     if effect.guesses is None or effect.is_behind:
         return []
     cutoffs = [cutoff for cutoff in CUTOFFS if cutoff <= 0.2 * scene.sampling_rate]
@@ -50,7 +53,7 @@ def inverse_starts(effect: Effect, scene: Scene, samples: int, forces: Sequence[
         slow = LowPass.of(samples, scene.sampling_rate, cutoff)
         velocity, acceleration, voltage = slow(seen_velocity), slow(seen_velocity, derived=True), slow(seen_voltage)
         rows = slow.inside()
-        if effect.is_dry:
+        if effect.is_dry or rubs:
             moving = minimum_filter1d(np.abs(velocity), 2 * int(0.5 * slow.rate / cutoff) + 1) > REST * float(np.std(velocity))
             rows = rows & moving if float(np.mean(moving)) > FEW else rows
         best, kept = np.inf, None

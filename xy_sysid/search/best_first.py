@@ -168,8 +168,9 @@ class Search(Generic[F]):
 
     def _taken_for(self, node: Node[F]) -> Iterator[frozenset[str]]:
         """Beside what is the best, or were it if it were not refused, try what one of its effects may have been taken for; yields as ``steps``."""
-        for move in self.judge.taken_for(node.fit) if node.fit.excess >= LEAST else ():
-            if not self._known(node, move) and self.clock() <= self.until:
+        for move in self.judge.taken_for(node.fit) if node.refused or node.fit.excess >= LEAST else ():
+            known = self.nodes.get(move.effects)  # what leaves more than the set that it stood in for went astray, and is fitted again
+            if (known is None or known.fit.excess > node.fit.excess + LEAST) and self.clock() <= self.until:
                 yield move.effects
                 before = self.best.score
                 self._lead_on(self._fitted(node, move), before)
@@ -258,7 +259,7 @@ class Search(Generic[F]):
         parent.shown = max(parent.shown, (parent.brief.excess - brief.excess) / move.gain if move.gain > 0.0 else 0.0)
         parameters = parent.parameters + move.parameters
         least = (1.0 + self.least) ** _new(parent, move)
-        leads = self.judge.size(brief, parent.brief) >= least - 1.0 or (bool(parent.refused) and brief.excess <= parent.brief.excess)
+        leads = self.judge.size(brief, parent.brief) >= least - 1.0 or (bool(parent.refused) and brief.excess < parent.brief.excess + LEAST)
         astray = brief.excess >= parent.brief.excess + LEAST and not parent.is_slow(self.least)
         slow = move.rest >= log(least) and not astray
         whole = brief.excess + later + LEAST * parameters < best.score - LEAST if leads else slow

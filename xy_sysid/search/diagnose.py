@@ -190,7 +190,8 @@ def judged(data: AxisData, ladder: Ladder, library: Library) -> Diagnosis:
             sentence += f" Perhaps {_listed(every[len(names) :])} beside {'them' if len(names) > 1 else 'it'}, which is less sure than not."
         if ladder.rivals:
             rival = ladder.rivals[0]
-            sentence += f" Runner-up {' and '.join(rival.effects)}: {moved(rival.fit.held_out_error, unit)}."
+            why = f" (refused, {rival.refused})" if rival.refused else ""
+            sentence += f" Runner-up {' and '.join(rival.effects)}: {moved(rival.fit.held_out_error, unit)}{why}."
     elif base.excess < AT_FLOOR:
         verdict, names, explained, experiment = "nothing_missing", (), 0.0, "None is needed."
         hides = math.sqrt(math.expm1(AT_FLOOR)) * data.layout.rms(data.floor.power) / motion

@@ -186,6 +186,8 @@ def _runner_up(ladder: Ladder) -> tuple[str, str] | None:
     if rival.behind > AT_FLOOR:
         left, right = (moved(fit.held_out_error, fit.units.speed) for fit in (rival.fit, ladder.final))
         return name, f"with {name} instead of {taken} the held-out error is {left}, not {right}."
+    if rival.refused:
+        return name, f"{name} does nearly as well as {taken}, but {rival.refused}."
     return name, f"{name} does nearly as well as {taken}: these data hardly tell them apart; the simpler is taken."
 
 

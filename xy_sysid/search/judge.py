@@ -15,7 +15,7 @@ from xy_sysid.effects import Effect, Scene
 from xy_sysid.effects._contract import Limits, in_time
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.floor import excess
-from xy_sysid.greybox.forces import braked, of_one_name, stood_in, taken_for, taken_over
+from xy_sysid.greybox.forces import braked, of_one_name, pushes, pushing, rubbing, stood_in, taken_for, taken_over
 from xy_sysid.greybox.free_run import GreyboxFit, best_start, finish, first_excess, fit, fit_base, other_starts, scene_of, screened
 from xy_sysid.greybox.one_step import one_step_fit
 from xy_sysid.greybox.score_test import Gain, Trace, bounded
@@ -174,7 +174,7 @@ class FreeRunJudge:
                 rest=gain.rest,
                 parameters=len(effect.parameters),
                 starts=starts,
-                begins=self._begins(here, model, effect) if not own or effect.joint is not None else np.inf,
+                begins=self._begins(here, model, effect) if effect.joint is not None or self._is_read(model, effect) else np.inf,
                 expected=effect.is_dry,
                 simpler=self._simplest(own, effect),
             )
@@ -200,6 +200,10 @@ class FreeRunJudge:
         """The parts of a sum that its relatives do not have, with their values."""
         family = self.library[replaced].family
         return tuple((name, values) for name, values in model.apart(replaced).effects if name not in model and self.library[name].family != family)
+
+    def _is_read(self, model: AxisModel, effect: Effect) -> bool:
+        """Starts without the model, by least squares, know all that acts: nothing, or forces by place and friction, and one more such force."""
+        return not model.effects or (pushes(effect) and len(pushing(model)) + len(rubbing(model)) == len(model.effects))
 
     def _begins(self, here: _Here, model: AxisModel, effect: Effect) -> float:
         """Excess at starts that are read without the model: it may have been led so far astray that traces tell little.
@@ -229,10 +233,12 @@ class FreeRunJudge:
 
     def brief(self, now: GreyboxFit, move: Move, hopeless: float = np.inf) -> GreyboxFit | None:
         """The set of a move on the first stage's data; given up where it leaves more excess than ``hopeless``. None if there is no fit."""
-        found = self._tried(self._started(now, move), hopeless)
+        begun = self._started(now, move)
+        found = self._tried(begun, hopeless)
         if move.replaced is not None and not move.stays and (found is None or found.excess >= hopeless):
             harder = braked(self.data, now.model, move.replaced, self.library[move.starts[0][0]])
-            again = self._tried(best_start(self.data, harder), hopeless + HOPELESS) if harder else None
+            others = [*harder, *(start for start in self._in_place(now, move) if start != begun)] if harder else []
+            again = self._tried(best_start(self.data, others), hopeless + HOPELESS) if others else None
             found = min((one for one in (found, again) if one is not None), key=lambda one: one.excess, default=None)
         return found
 
@@ -253,18 +259,25 @@ class FreeRunJudge:
     def _started(self, now: GreyboxFit, move: Move) -> AxisModel:
         model = now.model
         if move.replaced is not None:
-            name, values = move.starts[0]
-            effect, old = self.library[name], dict(zip(self.library[move.replaced].names, dict(model.effects)[move.replaced], strict=True))
-            rest, usual = model.without(move.replaced), tuple(item.typical for item in effect.on(self.data.similar))
-            for part, size in move.stays:
-                rest = rest.with_effect(part, size)
-            shared = [tuple(old.get(key, value) for key, value in zip(effect.names, row, strict=True)) for row in (values, usual)]
-            traced = [rest.with_effect(name, bounded(effect, row, self.data.similar)) for row in shared]
-            return best_start(self.data, traced if rest.effects else [*traced, *other_starts(self.data, now, rest, name)])
+            begun = self._in_place(now, move)
+            rest = begun[0].without(move.starts[0][0])
+            return best_start(self.data, begun if rest.effects else [*begun, *other_starts(self.data, now, rest, move.starts[0][0])])
         for name, values in move.starts:
-            begun = model.with_effect(name, bounded(self.library[name], values, self.data.similar))
-            model = best_start(self.data, [begun, *other_starts(self.data, now, model, name)])
+            more = model.with_effect(name, bounded(self.library[name], values, self.data.similar))
+            model = best_start(self.data, [more, *other_starts(self.data, now, model, name)])
         return model
+
+    def _in_place(self, now: GreyboxFit, move: Move) -> list[AxisModel]:
+        """The model with a relative in the place of an effect: what both have keeps its value, the rest is as its trace tells, or usual."""
+        assert move.replaced is not None
+        name, values = move.starts[0]
+        effect, model = self.library[name], now.model
+        old = dict(zip(self.library[move.replaced].names, dict(model.effects)[move.replaced], strict=True))
+        rest, usual = model.without(move.replaced), tuple(item.typical for item in effect.on(self.data.similar))
+        for part, size in move.stays:
+            rest = rest.with_effect(part, size)
+        shared = [tuple(old.get(key, value) for key, value in zip(effect.names, row, strict=True)) for row in (values, usual)]
+        return [rest.with_effect(name, bounded(effect, row, self.data.similar)) for row in shared]
 
     def whole(self, found: GreyboxFit) -> GreyboxFit:
         """The same set on all data that are not held out."""

@@ -31,11 +31,15 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Rival:
-    """Another set of effects that was tried, and how much more it leaves than the one that was taken: nats of excess."""
+    """Another set of effects that was tried, and how much more it leaves than the one that was taken: nats of excess.
+
+    refused: why it explains nothing, though it may leave as little: in words, or empty
+    """
 
     effects: tuple[str, ...]
     fit: GreyboxFit
     behind: float
+    refused: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +81,15 @@ def part_explained(data: AxisData, base: GreyboxFit, final: GreyboxFit) -> float
     noise = float(np.sum(data.layout.lines * data.floor.noise))
     before, after = (float(np.sum(data.layout.lines * fit.power)) - noise for fit in (base, final))
     return min(max(1.0 - max(after, 0.0) / before, 0.0), 1.0) if before > 0.0 else 0.0
+
+
+def taken_for(library: Library, names: frozenset[str], others: frozenset[str]) -> bool:
+    """A set differs from another only in an effect whose trace is a reason to try what stands there in the other, which is no relative."""
+    here, there = names - others, others - names
+    if not len(here) == len(there) == 1:
+        return False
+    one, other = library[min(here)], library[min(there)]
+    return one.name in other.suspects and not (one.family and one.family == other.family)
 
 
 def contains(library: Library, names: frozenset[str], others: frozenset[str]) -> bool:

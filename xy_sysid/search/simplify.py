@@ -129,7 +129,8 @@ class Simplifying:
 
     def _node(self, effects: frozenset[str], make: Callable[[], GreyboxFit | None]) -> Node[GreyboxFit] | None:
         known = self.search.nodes.get(effects)
-        if known is not None and (known.whole or known.fit.excess < self.now.fit.excess + HOPELESS):
+        went_astray = known is not None and bool(known.refused) and known.fit.excess > self.now.fit.excess + LEAST  # from elsewhere
+        if known is not None and not went_astray and (known.whole or known.fit.excess < self.now.fit.excess + HOPELESS):
             whole(self.judge, known)
             return known
         fit = None if self.judge.late() else make()
