@@ -47,5 +47,4 @@ EFFECT = Effect(
     functions={"force": force},
     guesses=guesses,
     on_table=True,
-    suspects=("return_spring", "hardening_stiffness"),
 )
