@@ -267,6 +267,7 @@ class Effect:
     one_step:    then this does: fits the effect by one-step prediction (see ``contact.Contact``)
     sum_of:      other effects that together are the very same law, if there are and motor and table are one
     straight:    True for a force in proportion to speed, forth and back each by its own: it needs no sub-steps
+    angular:     True for a law of an angle: it is tried in another's place only where the position is in rad
     on_table:    True for a force that acts on the table: across a gap the motor does not feel it
     rubs:        for ``one_step``: the effect whose dry friction it begins with where no other is given
     suspects:    names of effects whose trace in an error is a reason to try this one, too: its own trace does not tell
@@ -294,6 +295,7 @@ class Effect:
     refusal: Callable[[Sequence[float], tuple[float, float]], str] | None = None
     sum_of: Sum | None = None
     straight: bool = False
+    angular: bool = False
     on_table: bool = False
     rubs: str = ""
     suspects: tuple[str, ...] = ()

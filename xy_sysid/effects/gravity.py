@@ -47,4 +47,6 @@ EFFECT = Effect(
     functions={"force": force},
     guesses=guesses,
     on_table=True,
+    angular=True,
+    suspects=("return_spring",),
 )

@@ -135,7 +135,8 @@ class FreeRunJudge:
         found = []
         for name, _ in model.effects if not self.late() else ():
             for other in self.library.acting:
-                begun = taken_for(self.data, model, name, other, scene) if name in other.suspects and other.name not in model else None
+                asked = name in other.suspects and other.name not in model and not (other.angular and self.data.units.output != "rad")
+                begun = taken_for(self.data, model, name, other, scene) if asked else None
                 if begun is not None:
                     found.append(
                         Move(
