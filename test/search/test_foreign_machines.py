@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.foreign import Joint, driven
+from helpers.foreign import Joint, across_gap, driven
 
 from xy_sysid.axis.model import STANDARD
 from xy_sysid.effects import EFFECTS
@@ -69,6 +69,35 @@ def test_a_robots_joint_that_breaks_away_has_stribeck_friction(seed: int) -> Non
     assert found.effects == ("stribeck_friction",), found.sentence
     assert found.confidence > 0.9
     assert values(found)["stribeck_friction"] == pytest.approx((0.6, 0.3, 0.05), rel=0.02)
+
+
+def test_a_load_on_a_linear_motor_does_not_hide_its_cogging() -> None:
+    """Friction and load lead the base astray, so that the cogging's trace tells nothing; by least squares with the friction it stands out."""
+    found = of(replace(LINEAR_MOTOR, load=3.0))
+    assert set(found.effects) == {"asymmetric_friction", "cogging"}, found.sentence
+    assert found.confidence > 0.9
+    assert values(found)["cogging"][:2] == pytest.approx((6.0, 0.03), rel=0.01)
+
+
+def test_heavy_friction_does_not_hide_that_it_breaks_away() -> None:
+    """The part that breaks away is a seventh of all: the first start leads elsewhere, that of its trace does not."""
+    found = of(replace(ROBOT, coulomb=2.0))
+    assert found.effects == ("stribeck_friction",), found.sentence
+    assert values(found)["stribeck_friction"] == pytest.approx((2.0, 0.3, 0.05), rel=0.02)
+
+
+def test_a_spring_beside_friction_that_breaks_away_is_not_one_that_stiffens() -> None:
+    """Hardening stiffness beside it leaves nothing, and is refused: the return spring is tried in its place."""
+    found = of(replace(SLIDE, spring=100.0, coulomb=0.2, breaks=0.1, fades=0.01), seed=2)
+    assert set(found.effects) == {"return_spring", "stribeck_friction"}, found.sentence
+
+
+@pytest.mark.parametrize(("gap", "coulomb"), [(1e-4, 0.0), (1e-4, 0.15), (3e-5, 0.15)])
+def test_a_gap_before_a_table_that_drags_is_found(gap: float, coulomb: float) -> None:
+    """Half of the drag is the table's, as guides are; the base has taken the delay for something else."""
+    found = diagnose(2000.0, *across_gap(gap, 0.1, coulomb, 1))
+    assert set(found.effects) == {"backlash"} | ({"coulomb_friction"} if coulomb else set()), found.sentence
+    assert values(found)["backlash"][0] == pytest.approx(gap, rel=0.1)
 
 
 @pytest.mark.parametrize("coulomb", [0.0, 0.2])
