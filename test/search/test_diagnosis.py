@@ -28,7 +28,7 @@ from xy_sysid.search.beside_one_step import grown
 from xy_sysid.search.criteria import AT_FLOOR, FEWEST
 from xy_sysid.search.diagnose import Diagnosis, diagnose, judged
 from xy_sysid.search.judge import FreeRunJudge
-from xy_sysid.search.ladder import Rival, Step
+from xy_sysid.search.ladder import Rival, Step, is_taken_for
 from xy_sysid.search.refine import Effort, refine, refine_steps
 
 
@@ -261,6 +261,21 @@ def test_what_two_sets_share_is_named_and_what_they_differ_in_is_not() -> None:
     unsure = judged(data, replace(ladder, rivals=(Rival(("cogging",), both, 0.0),)), STANDARD)
     assert unsure.effects == ("coulomb_friction", "constant_load")  # nothing is surer than not: all are told
     assert unsure.confidence < 0.5
+
+
+def test_a_refused_spring_that_leaves_as_little_as_a_wave_makes_the_wave_unsure() -> None:
+    """It is no spring, but neither is it surely that wave; other refused sets, and relatives, are no rivals."""
+    wave, spring, stiff = (frozenset({"coulomb_friction", name}) for name in ("cogging", "return_spring", "hardening_stiffness"))
+    assert is_taken_for(STANDARD, spring, wave)
+    assert not is_taken_for(STANDARD, wave, spring)
+    assert not is_taken_for(STANDARD, stiff, spring)
+    assert not is_taken_for(STANDARD, frozenset({"cogging"}), wave)
+    data = prepare(2000.0, *recorded("cogging", seconds=20.0).axis("x"))
+    ladder = refine(data)
+    rival = Rival(("return_spring",), ladder.final, 0.0, "return_spring: it would give way")
+    found = judged(data, replace(ladder, rivals=(rival,)), STANDARD)
+    assert found.effects == ("cogging",) and found.confidence <= 0.5
+    assert "Runner-up return_spring" in found.sentence and "(refused, return_spring: it would give way)" in found.sentence
 
 
 def test_effects_come_in_the_order_of_what_each_would_cost() -> None:

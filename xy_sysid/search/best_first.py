@@ -222,8 +222,8 @@ class Search(Generic[F]):
         return next(first, (parent, move))
 
     def _from_simpler(self, move: Move) -> tuple[Node[F], Move] | None:
-        """The move to the same set that waits where its simpler relative was fitted: what leaves more than that went astray, and may be
-        fitted again from there."""
+        """The move to the same set that waits where its simpler relative was fitted: what leaves no less than that, which is its limit,
+        went astray, and is fitted again from there."""
         at = self.nodes.get(move.simpler) if move.simpler else None
         return next((item for item in self.waiting if item[0] is at and item[1].effects == move.effects), None)
 

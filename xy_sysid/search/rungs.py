@@ -12,7 +12,7 @@ from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.search.best_first import Search
 from xy_sysid.search.judge import FreeRunJudge, joined
-from xy_sysid.search.ladder import Candidate, Ladder, Rival, Step, contains, part_explained, taken_for
+from xy_sysid.search.ladder import Candidate, Ladder, Rival, Step, contains, is_taken_for, part_explained
 from xy_sysid.search.one_step_trials import Filtered
 from xy_sysid.search.simplify import Simplifying, whole
 
@@ -93,7 +93,7 @@ def ladder_of_search(
             for item in search.nodes.values()
             if item is not node and 0 < len(item.effects) <= len(node.effects) and not item.effects < node.effects
             if not contains(judge.library, item.effects, node.effects)
-            if not item.refused or taken_for(judge.library, item.effects, node.effects)  # it is no spring, but is it a wave?
+            if not item.refused or is_taken_for(judge.library, item.effects, node.effects)  # it is no spring, but is it a wave?
         ),
         key=lambda item: item.behind,
     )
