@@ -36,6 +36,7 @@ class Page:
             self._alarm = ui.element("div").classes("notices").props("role=alert")
             self._notices = ui.element("div").classes("notices").props("role=status aria-live=polite")
             self._empty = ui.element("div").classes("card")
+            self._empty.set_visibility(False)  # until it is known that there is nothing
             with self._empty:
                 ui.label("No recording is open. Open one of the folder in which the page was started.")
                 with ui.element("div").classes("buttons"):
