@@ -55,6 +55,34 @@ def driven(joint: Joint, seed: int) -> tuple[FloatArray, FloatArray]:
     return _run(wanted, shake, joint.fs, inner, forces, np.array([*joint.control, joint.count]))
 
 
+def across_gap(gap: float, table: float, coulomb: float, seed: int, fs: float = 2000.0) -> tuple[FloatArray, FloatArray]:
+    """(n,) drive and (n,) position of a motor of 0.1 kg, driven with noise of 1 N for 20 s, and a table behind a gap (m), which drags as it does."""
+    noise = scipy.signal.sosfilt(
+        scipy.signal.butter(2, (0.5, 100.0), "bandpass", fs=fs, output="sos"), np.random.default_rng(seed).standard_normal(40_000)
+    )
+    drive = noise / noise.std()
+    return drive, _across(drive, fs, gap, table, coulomb)
+
+
+@compiled
+def _across(drive: FloatArray, fs: float, gap: float, table: float, coulomb: float) -> FloatArray:
+    h, x, v, x2, v2, shown = 1.0 / fs / 20, 0.0, 0.0, 0.0, 0.0, np.empty(drive.size)
+    for i in range(drive.size):
+        shown[i] = np.round(x / 1e-6) * 1e-6
+        held = drive[i - 1] if i > 0 else 0.0  # one sample late
+        for _ in range(20):
+            deep = x - x2 - min(max(x - x2, -0.5 * gap), 0.5 * gap)
+            contact = 2e5 * deep + 200.0 * (v - v2) if deep != 0.0 else 0.0
+            contact = 0.0 if contact * deep < 0.0 else contact
+            v2 += h * (contact - 10.0 * v2) / table
+            x2 += h * v2
+            new, stops = v + h * (held - 10.0 * v - contact) / 0.1, h * coulomb / 0.1
+            new = new - stops if new > stops else new + stops if new < -stops else 0.0
+            x += 0.5 * h * (v + new)
+            v = new
+    return shown
+
+
 def _moves(random: np.random.Generator, n: int, fs: float, far: float, speed: float, acceleration: float) -> FloatArray:
     """Smooth moves between random places, with pauses."""
     wanted, i, place = np.zeros(n), 0, 0.0

@@ -307,6 +307,9 @@ def test_from_another_machine_a_token_is_needed(chromium: Any, folder: Path) -> 
         one.until(lambda: one.page.locator(".panel").count() == 1)
         assert "token" not in one.page.url
         assert all("httpOnly" in json.dumps(cookie) and cookie["httpOnly"] for cookie in one.context.cookies() if "token" in cookie["name"])
+        assert not one.page.get_by_text("No recording is open").is_visible()
+        one.page.get_by_role("button", name="close recording").click()
+        one.until(lambda: one.page.get_by_text("No recording is open").is_visible(), 10)
         one.close()
     finally:
         assert made.end() == 130

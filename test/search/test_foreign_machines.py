@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.foreign import Joint, driven
+from helpers.foreign import Joint, across_gap, driven
 
 from xy_sysid.axis.model import STANDARD
 from xy_sysid.effects import EFFECTS
@@ -90,6 +90,16 @@ def test_a_spring_beside_friction_that_breaks_away_is_not_one_that_stiffens() ->
     """Hardening stiffness beside it leaves nothing, and is refused: the return spring is tried in its place."""
     found = of(replace(SLIDE, spring=100.0, coulomb=0.2, breaks=0.1, fades=0.01), seed=2)
     assert set(found.effects) == {"return_spring", "stribeck_friction"}, found.sentence
+
+
+@pytest.mark.parametrize(
+    ("gap", "table", "coulomb"), [(1e-4, 0.1, 0.0), (1e-4, 0.1, 0.15), (3e-5, 0.1, 0.15), (3e-4, 0.03, 0.15), (3e-4, 0.1, 0.15), (3e-4, 0.3, 0.0)]
+)
+def test_a_gap_before_a_table_that_drags_is_found(gap: float, table: float, coulomb: float) -> None:
+    """Half of the drag is the table's, as guides are; the base has taken the delay for something else. Light tables and heavy ones."""
+    found = diagnose(2000.0, *across_gap(gap, table, coulomb, 1))
+    assert set(found.effects) == {"backlash"} | ({"coulomb_friction"} if coulomb else set()), found.sentence
+    assert values(found)["backlash"][0] == pytest.approx(gap, rel=0.1)
 
 
 @pytest.mark.parametrize("coulomb", [0.0, 0.2])

@@ -14,7 +14,7 @@ from xy_sysid.effects import Effect
 from xy_sysid.effects._contract import PATIENT, Followed, Limits
 from xy_sysid.greybox.free_run import AxisData, GreyboxFit
 from xy_sysid.greybox.innovation_test import traces
-from xy_sysid.greybox.one_step import beside, error_without, followed
+from xy_sysid.greybox.one_step import AT_NOISE, beside, error_without, followed
 from xy_sysid.greybox.score_test import Trace
 from xy_sysid.search.criteria import ALIKE, LEAST, MOST_EFFECTS, OPTIMISM, SIZE, WORTH
 
@@ -78,7 +78,7 @@ def _better(data: AxisData, now: GreyboxFit, effect: Effect, found: Followed, wa
     open_to = [law for law in library.acting if told_apart(law) and law.simulable and law.name not in known]
     seen = traces(data, now.model, effect, found, [*open_to, *_uneven(effect, library, found)])
     promising = [trace for trace in seen if _size(now, 1.0 - OPTIMISM * trace.share) >= _least(trace.effect, effect, wanted)]
-    if now.excess > 0.0 and not promising:  # something acts, and what is slow promises little
+    if now.held_out_error > AT_NOISE * now.noise_floor and not promising:  # something acts, and what is slow promises little
         promising = [trace for trace in seen if trace.effect not in effect.suspects]
     tried: list[_Tried] = []
 

@@ -15,19 +15,19 @@ from xy_sysid.effects.backlash.innovations import Innovations, View
 from xy_sysid.effects.backlash.usual_machine import from_usual, to_usual, usual
 from xy_sysid.samples.block import FloatArray
 
-GAPS = (3.0, 0.75, 1.6)  # tried first: from so many encoder noises up to so much of the way between two reversals, each so much wider
-WIDEST = 24  # gaps tried first, at most
-FLANKS = (0.4, 1500.0, 0.2, 5.0, 0.03)  # share, rate, damping, loss, guide to begin with
+GAPS = (3.0, 0.5, 3.0)  # to begin with: from so many encoder noises up to so much of the way between two reversals, each so much wider
+RACE = ((3, 2), (5, 1))  # steps that each start goes, and how many go on: what the gap does is seen once gain and pole have given way
+WIDEST = 24  # gaps to begin with, at most
+FLANKS = (0.4, 1500.0, 0.2, 5.0, 0.5)  # share, rate, damping, loss, guide to begin with
 RIGID = (1e-10, 0.4, 1500.0, 0.1, 0.0, 0.03)  # no gap
 SOFT = 10.0  # rad/s of the spring at least that may take the place of the gap
 BRIEF = 6.0  # s of the first fits
-WORTH_A_LOOK = 60.0  # innovation over noise after the first few steps above which the fit is given up
-PROMISING = 20.0  # the same after the brief fits
+PROMISING = 20.0  # innovation over noise after the brief fits above which the fit is not refined
 SEEN, LEFT = 2.5, 1.5  # encoder noises, and innovations, that a gap must have to be one
 DEAF = 12.0  # the filter is told this much more encoder noise on the way: a smoother valley
 COARSE, FINE = 3, 6  # sub-steps of a sample on the way, and in the end
-FAR, BEHIND = 8.0, 1.5  # innovation over the bar, of the best gap tried and after a first fit, at which it is given up. Development draws:
-# true gaps 0.5 to 2.4 and 0.05 to 0.9; where there is none 12 to 70 and 1.5 to 18
+BEHIND = 1.5  # innovation over the bar after a first fit, at which it is given up. Development draws, and machines of another make: true gaps
+# 0.1 to 1.1; where there is none 1.2 to 18
 CLOSED = 0.8  # innovation without a gap over that with it from which the gap is not looked for where it was
 OWN, GAP = len(NAMES), NAMES.index("gap")
 
@@ -83,19 +83,15 @@ class Contact:
         base, friction, begin = task.base, task.dry.values, task.begin
         if begin is not None:
             base, friction = begin.base, begin.dry.values if begin.dry.names == task.dry.names else friction
+        every = np.arange(fit.others.stop)
         if begin is not None and not begin.too_small:
             best = fit.start(base, begin.values, friction)
         else:  # nothing draws a gap open that has closed
-            starts = [fit.start(base, (gap, *FLANKS), friction) for gap in _gaps(task.noise, task.beside.swing)]
-            best = min(starts, key=lambda start: fit.size(start, loose))
-        if np.isfinite(bar) and fit.size(best, true) > FAR * bar:
-            return best, True
-        every = np.arange(best.size)
+            best = _raced(fit, [fit.start(base, (gap, *FLANKS), friction) for gap in _gaps(task.noise, task.beside.swing)], loose)
         best = fit.solved(best, every, loose, 15, 1e-2)
         if np.isfinite(bar) and fit.size(best, true) > BEHIND * bar:
             return best, True
-        if begin is not None or fit.size(best, loose) < WORTH_A_LOOK:
-            best = fit.solved(best, every, near, 40, 1e-3)
+        best = min(best, fit.solved(best, every, near, 40, 1e-3), key=lambda item: fit.size(item, true))  # what is not whole yet can lead astray
         if CLOSED * fit.size(best, near) > fit.softened(SOFT).size(rigid, near):  # no gap does far better: begin there
             other = fit.solved(rigid, every, near, 40, 1e-3)
             best = min(best, other, key=lambda item: fit.size(item, near))
@@ -114,6 +110,14 @@ class Contact:
     def _rigid(fit: Innovations, start: FloatArray, view: View, enough: float) -> FloatArray:
         """Without a gap, by the same filter; any spring will do then."""
         return fit.softened(SOFT).solved(start, np.delete(np.arange(start.size), GAP), view, 15, enough)
+
+
+def _raced(fit: Innovations, starts: list[FloatArray], view: View) -> FloatArray:
+    """The best of some starts: each goes a few steps, the better ones some more."""
+    every = np.arange(fit.others.stop)
+    for steps, left in RACE:
+        starts = sorted((fit.solved(start, every, view, steps, 1e-2) for start in starts), key=lambda item: fit.size(item, view))[:left]
+    return starts[0]
 
 
 def _gaps(noise: float, swing: float) -> list[float]:
