@@ -346,6 +346,11 @@ class Effect:
         return self.category in ("motion", "encoder")
 
     @property
+    def is_of_the_drag(self) -> bool:
+        """True for a force whose size is a part of the base's own drag."""
+        return self.category == "force" and {"v", "gain"} <= set(arguments(self.functions["force"]))
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of the parameters."""
         return tuple(parameter.name for parameter in self.parameters)

@@ -128,15 +128,17 @@ def other_starts(data: AxisData, base: GreyboxFit, model: AxisModel, name: str, 
     scene: of the base and the first stage's data, if it is known
     """
     effect, scene = model.library[name], scene or scene_of(data, base)
-    candidates = []
-    beside, rubs = [own for own in pushing(model) if own != name], [own for own in rubbing(model) if own != name]
-    forces = [force_of(data, model, own, data.counts(early=scene.velocity.size == data.first)) for own in beside]
-    forces += [friction_of(scene, model, own) for own in rubs]
+    candidates, known = [], _apart(model)
+    beside, rubs = [own for own in pushing(known) if own != name], [own for own in rubbing(known) if own != name]
+    forces = [force_of(data, known, own, data.counts(early=scene.velocity.size == data.first)) for own in beside]
+    forces += [friction_of(scene, known, own) for own in rubs]
     for start in inverse_starts(effect, scene, scene.velocity.size, forces, bool(rubs)):
-        whole = replace(model, gain=start.gain, pole=min(max(start.pole, 1e-2), 1e5))
+        whole = replace(known, gain=start.gain, pole=min(max(start.pole, 1e-2), 1e5))
         for own, size in zip((*beside, *rubs), start.sizes, strict=True):
-            whole = whole.with_effect(own, bounded(model.library[own], _sized(model, own, min(max(size, 0.3), 3.0)), data.similar))
-        candidates.append(whole.with_effect(name, start.values))
+            whole = whole.with_effect(own, bounded(known.library[own], _sized(known, own, size), data.similar))
+        whole = whole if known is model else whole.joined()
+        if all(own in whole for own, _ in model.effects):
+            candidates.append(whole.with_effect(name, start.values))
     if effect.joint is not None:
         for gain, later, pole, values in effect.joint(scene):
             whole = replace(model, gain=gain, delay=max(base.model.delay + later, 0.0), pole=min(max(pole, 1e-2), 1e5))
@@ -144,11 +146,21 @@ def other_starts(data: AxisData, base: GreyboxFit, model: AxisModel, name: str, 
     return candidates
 
 
+def _apart(model: AxisModel) -> AxisModel:
+    """The model with the parts of a friction that is the sum of several in its place: each has a size of its own."""
+    whole = [own for own in rubbing(model) if model.library[own].sum_of is not None]
+    return model.apart(whole[0]) if whole else model
+
+
 def _sized(model: AxisModel, name: str, times: float) -> tuple[float, ...]:
-    """The values of an effect that pushes so many times as hard: its size, and every other level of a friction."""
+    """The values of an effect that pushes so many times as hard, up to three: its size, and every other level of a friction.
+
+    What has no sign may vanish or push the other way round; the rest is not below a third.
+    """
     items, values = model.library[name].parameters, dict(model.effects)[name]
     levels = [k == 0 or (model.library[name].is_dry and item.unit == items[0].unit) for k, item in enumerate(items)]
-    return tuple(value * (times if level else 1.0) for value, level in zip(values, levels, strict=True))
+    size = min(max(times, 0.3 if items[0].positive else -3.0), 3.0)
+    return tuple(value * (size if level else 1.0) for value, level in zip(values, levels, strict=True))
 
 
 def best_start(data: AxisData, candidates: list[AxisModel]) -> AxisModel:

@@ -62,7 +62,8 @@ def inverse_starts(effect: Effect, scene: Scene, samples: int, forces: Sequence[
             coefficients, left = _least(np.array([acceleration, velocity, *beside, *slow(columns)])[:, rows], voltage[rows])
             if left < best and coefficients[0] * coefficients[1] > 0.0:
                 inertia, drag, *sizes = (float(value) for value in coefficients[: 2 + len(beside)])
-                values = effect.read(guess, coefficients[2 + len(beside) :], scene.similar)
+                part = 1.0 / (drag * scene.gain) if effect.is_of_the_drag else 1.0  # its columns are in volts of the base's drag
+                values = effect.read(guess, coefficients[2 + len(beside) :] * part, scene.similar)
                 best, kept = left, InverseStart(1.0 / drag, drag / inertia, values, tuple(sizes))
         if kept is not None:
             found.append(kept)

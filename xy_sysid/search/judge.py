@@ -203,8 +203,8 @@ class FreeRunJudge:
         return tuple((name, values) for name, values in model.apart(replaced).effects if name not in model and self.library[name].family != family)
 
     def _is_read(self, model: AxisModel, effect: Effect) -> bool:
-        """Starts without the model, by least squares, know all that acts: nothing, or forces by place and friction, and one more such force."""
-        return not model.effects or (pushes(effect) and len(pushing(model)) + len(rubbing(model)) == len(model.effects))
+        """Starts without the model, by least squares, know all that acts: nothing, or forces by place and friction, and one more force."""
+        return not model.effects or (effect.category == "force" and len(pushing(model)) + len(rubbing(model)) == len(model.effects))
 
     def _begins(self, here: _Here, model: AxisModel, effect: Effect) -> float:
         """Excess at starts that are read without the model: it may have been led so far astray that traces tell little.
@@ -344,16 +344,22 @@ class FreeRunJudge:
     def better(self, one: GreyboxFit, other: GreyboxFit) -> bool:
         """One predicts the held-out windows better than the other, by more than chance: paired over windows, in the mean or in the ranks.
 
-        The ranks (Wilcoxon 1945), as a law that acts far out alone explains much in few windows, and a little in all. A fit that was given
-        up, for it was far behind, is worse.
+        Where these are too few to tell, as in short recordings, both are fitted to them as well, and judged by the others: then every
+        window counts, each held out once. A fit that was given up, for it was far behind, is worse.
         """
         if other.brief:
             return True
         gain = _scores(other, self.data) - _scores(one, self.data)
-        spread = float(np.std(gain, ddof=1)) / np.sqrt(max(gain.size / 1.5, 1.0)) if gain.size > 1 else 0.0
-        if float(np.mean(gain)) > CHANCE * spread:
+        if _is_no_chance(gain):
             return True
-        return bool(np.any(gain != 0.0)) and float(wilcoxon(gain, alternative="greater").pvalue) < norm.sf(CHANCE)
+        if not float(np.mean(gain)) > 0.0 or self.late():
+            return False
+        data = replace(self.data, fitted=self.data.held, held=self.data.fitted)
+        try:
+            one, other = (finish(data, found.model, late=self.late) for found in (one, other))
+        except np.linalg.LinAlgError:
+            return False
+        return _is_no_chance(np.concatenate((gain, _scores(other, data) - _scores(one, data))))
 
     def size(self, found: GreyboxFit, before: GreyboxFit) -> float:
         """What a fit explains of what one before it left, over what it leaves itself, as powers: of the whole beyond the noise, or over the bands."""
@@ -363,6 +369,17 @@ class FreeRunJudge:
     def rest(self, found: GreyboxFit, reference: GreyboxFit) -> float:
         """Power of the held-out error beyond the noise over that of a reference; see ``Floor.rest``."""
         return self.data.floor.rest(reference.power)(found.power)
+
+
+def _is_no_chance(gain: FloatArray) -> bool:
+    """(windows,) gains, half overlapping, are more than chance in the mean or in the ranks.
+
+    The ranks (Wilcoxon 1945), as a law that acts far out alone explains much in few windows, and a little in all.
+    """
+    spread = float(np.std(gain, ddof=1)) / np.sqrt(max(gain.size / 1.5, 1.0)) if gain.size > 1 else 0.0
+    if float(np.mean(gain)) > CHANCE * spread:
+        return True
+    return bool(np.any(gain != 0.0)) and float(wilcoxon(gain, alternative="greater").pvalue) < norm.sf(CHANCE)
 
 
 def _scores(found: GreyboxFit, data: AxisData) -> FloatArray:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from xy_sysid.axis.model import STANDARD, Library
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit
+from xy_sysid.jit import spent_compiling
 from xy_sysid.search.best_first import Node, Search
 from xy_sysid.search.criteria import BUDGET, FEWEST, FREE, LEAST, MOST_EFFECTS, WORTH
 from xy_sysid.search.judge import FreeRunJudge, joined
@@ -39,7 +40,8 @@ def never() -> float:
 class Effort:
     """How far a search goes.
 
-    most: effects, besides those given; budget: s of processor time as ``clock`` tells it, after which it says the best it has
+    most: effects, besides those given; budget: s of processor time as ``clock`` tells it, after which it says the best it has; the time
+        in which laws are compiled, once on a machine, does not count
     size: what an effect must explain to be added, over what is left unexplained, as powers
     """
 
@@ -47,6 +49,10 @@ class Effort:
     budget: float = BUDGET
     clock: Callable[[], float] = never
     size: float = WORTH
+
+    def now(self) -> float:
+        """s of the clock without what compiling took."""
+        return self.clock() - spent_compiling()
 
 
 def refine(data: AxisData, library: Library = STANDARD, given: Iterable[str] = (), effort: Effort | None = None) -> Ladder:
@@ -66,15 +72,15 @@ def refine_steps(
     """The same, step by step: yields what is being tried, returns what it came to."""
     kept, effort = tuple(given), effort or Effort()
     until = math.inf  # what is given is fitted wholly
-    judge = FreeRunJudge(data, library, lambda: effort.clock() > until)
-    begun = effort.clock()
+    judge = FreeRunJudge(data, library, lambda: effort.now() > until)
+    begun = effort.now()
     fixed = Given.of(judge, kept)
-    first = min(effort.clock() - begun, 0.1 * effort.budget)  # at most: on a fresh machine the laws have been compiled by now
-    until = effort.clock() + effort.budget - 2.0 * first  # the first fit counts, and the one in hand when the time is up takes as long
+    first = min(effort.now() - begun, 0.1 * effort.budget)  # at most: code is read from the disk at its first use
+    until = effort.now() + effort.budget - 2.0 * first  # the first fit counts, and the one in hand when the time is up takes as long
     ahead = fixed.steps[-1].fit.model.ahead
     if ahead is not None or effort.most == 0:
         return ladder_of_given(data, judge, fixed)
-    search: Search[GreyboxFit] = Search(judge=judge, clock=effort.clock, budget=FREE * effort.budget, most=effort.most + len(kept), least=effort.size)
+    search: Search[GreyboxFit] = Search(judge=judge, clock=effort.now, budget=FREE * effort.budget, most=effort.most + len(kept), least=effort.size)
     across = None if kept else OneStepTrials(judge, search)
     for names in search.steps(fixed.steps[-1].fit, frozenset(kept)):
         yield Trying(tuple(sorted(names)))
