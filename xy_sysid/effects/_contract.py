@@ -32,6 +32,7 @@ from xy_sysid.effects._similarity import USUAL, Similarity
 from xy_sysid.errors import BadInput
 from xy_sysid.samples.block import FloatArray
 
+USUAL_WITHIN = 2.0  # factor by which sizes of real machines differ from the usual one: two of three are within it
 BEGUN = 0.05  # of its usual size at least, with which a fit begins what must not be 0
 P = ParamSpec("P")
 R = TypeVar("R")

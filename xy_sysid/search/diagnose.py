@@ -17,6 +17,7 @@ from xy_sysid.greybox.axis_data import AxisData, prepare_all
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.search.criteria import AT_FLOOR, BUDGET, CHANCE, FEWEST, SIZE, STILL
+from xy_sysid.search.equal_laws import equals, likelihood
 from xy_sysid.search.ladder import Candidate, Ladder, contains, part_explained
 from xy_sysid.search.refine import Effort, never, refine
 from xy_sysid.units import USUAL, Units, bare, moved
@@ -188,6 +189,7 @@ def judged(data: AxisData, ladder: Ladder, library: Library) -> Diagnosis:
         sentence += f" ({bare(base.held_out_error, unit)} -> {moved(final.held_out_error, unit)}). {_left(data, ladder, left)}"
         if len(every) > len(names):
             sentence += f" Perhaps {_listed(every[len(names) :])} beside {'them' if len(names) > 1 else 'it'}, which is less sure than not."
+        sentence += _also_called(final, names)
         if ladder.rivals:
             rival = ladder.rivals[0]
             why = f" (refused, {rival.refused})" if rival.refused else ""
@@ -257,14 +259,15 @@ def _surest(data: AxisData, ladder: Ladder) -> tuple[Ladder, float]:
 
 
 def _confidence(ladder: Ladder, names: tuple[str, ...]) -> float:
-    """How far ahead of the next best set without these effects theirs is, how much larger each is than what is left, and whether modes
-    leave little where they act."""
+    """How far ahead of the next best set without these effects theirs is, how much larger each is than what is left, whether modes
+    leave little where they act, and how likely the name of one is that shares its law with others."""
     library = ladder.final.model.library
     rivals = (rival for rival in ladder.rivals if not contains(library, frozenset(rival.effects), frozenset(names)))
     behind = max(min((rival.behind for rival in rivals), default=math.inf), 0.0)
     size = min((ladder.sizes[name] for name in names if name in ladder.sizes), default=0.0)
     astray = ladder.astray if any(library[name].category == "motion" for name in names) else 0.0
-    return (1.0 - 0.5 * math.exp(-behind / AT_FLOOR)) * size / (size + 1.0) * (1.0 - astray)
+    likely = math.prod(likelihood(library, name, values) for name, values in ladder.final.model.effects if name in names)
+    return (1.0 - 0.5 * math.exp(-behind / AT_FLOOR)) * size / (size + 1.0) * (1.0 - astray) * likely
 
 
 def _hidden(left: float, trusted: float) -> float:
@@ -273,6 +276,17 @@ def _hidden(left: float, trusted: float) -> float:
     left, trusted: parts of the motion. Jeffreys 1946: of a size, nobody knows the order of magnitude.
     """
     return min(max(math.log(max(left, trusted) / trusted) / math.log(1.0 / trusted), 0.0), 1.0)
+
+
+def _also_called(final: GreyboxFit, names: Sequence[str]) -> str:
+    """What has the very law of an effect that is named, and how much likelier that is."""
+    library, said = final.model.library, ""
+    for name, values in final.model.effects:
+        others = [other.name for other in equals(library, name) if other.name != name] if name in names else []
+        if others:
+            sure = _percent(round(likelihood(library, name, values), 2))
+            said += f" No data tell it from {_listed(others)}; by what is usual it is rather {name} ({sure})."
+    return said
 
 
 def _left(data: AxisData, ladder: Ladder, left: float) -> str:

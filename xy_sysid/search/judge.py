@@ -15,7 +15,7 @@ from xy_sysid.effects import Effect, Scene
 from xy_sysid.effects._contract import Limits, in_time
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.floor import excess
-from xy_sysid.greybox.forces import braked, of_one_name, pushes, pushing, rubbing, stood_in, taken_for, taken_over
+from xy_sysid.greybox.forces import braked, of_one_name, pushing, rubbing, stood_in, taken_for, taken_over
 from xy_sysid.greybox.free_run import GreyboxFit, best_start, finish, first_excess, fit, fit_base, other_starts, scene_of, screened
 from xy_sysid.greybox.one_step import one_step_fit
 from xy_sysid.greybox.score_test import Gain, Trace, bounded
@@ -284,17 +284,19 @@ class FreeRunJudge:
         """The same set on all data that are not held out."""
         return finish(self.data, found.model, found.runs, self.late)
 
-    def without(self, now: GreyboxFit, name: str, alone: Sequence[AxisModel] = ()) -> GreyboxFit | None:
-        """The same set but for one effect. alone: models of single ones of the others, one of which may have stood back for it."""
+    def without(self, now: GreyboxFit, name: str, alone: Sequence[AxisModel] = ()) -> AxisModel:
+        """Where the same set but for one effect begins. alone: models of single ones of the others, one of which may have stood back for it."""
         less = now.model.without(name)
         begun = (less.with_effect(other, values) for model in alone for other, values in model.effects)
-        starts = [less, taken_over(self.data, now.model, name), *begun]
-        return self.again(now, best_start(self.data, starts))
+        return best_start(self.data, [less, taken_over(self.data, now.model, name), *begun])
 
-    def instead(self, now: GreyboxFit, name: str, relative: Effect) -> GreyboxFit | None:
-        """The same set with a relative in the place of one effect."""
-        starts = [make(self.data, now.model, name, relative) for make in (of_one_name, stood_in)]
-        return self.again(now, best_start(self.data, starts))
+    def instead(self, now: GreyboxFit, name: str, relative: Effect) -> AxisModel:
+        """Where the same set with a relative in the place of one effect begins."""
+        return best_start(self.data, [make(self.data, now.model, name, relative) for make in (of_one_name, stood_in)])
+
+    def begins(self, now: GreyboxFit, model: AxisModel) -> float:
+        """Excess with which a model begins that differs little from that of a fit, as all data would show it."""
+        return now.excess + first_excess(self.data, model) - first_excess(self.data, now.model)
 
     def again(self, now: GreyboxFit, model: AxisModel) -> GreyboxFit | None:
         """A model beside one that is there: fitted wholly only where it comes near."""

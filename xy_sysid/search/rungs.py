@@ -11,6 +11,8 @@ from xy_sysid.axis.model import Library
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.search.best_first import Search
+from xy_sysid.search.criteria import LEAST
+from xy_sysid.search.equal_laws import is_the_same, likely_names
 from xy_sysid.search.judge import FreeRunJudge, joined
 from xy_sysid.search.ladder import Candidate, Ladder, Rival, Step, contains, is_taken_for, part_explained
 from xy_sysid.search.one_step_trials import Filtered
@@ -93,11 +95,12 @@ def ladder_of_search(
             for item in search.nodes.values()
             if item is not node and 0 < len(item.effects) <= len(node.effects) and not item.effects < node.effects
             if not contains(judge.library, item.effects, node.effects)
+            if not is_the_same(judge.library, (item.effects, item.fit), (node.effects, node.fit), LEAST)
             if not item.refused or is_taken_for(judge.library, item.effects, node.effects)  # it is no spring, but is it a wave?
         ),
         key=lambda item: item.behind,
     )
-    return Ladder(
+    ladder = Ladder(
         steps=(*given.steps, *_rungs(judge, search, given, ordered, final)),
         final=final,
         effects=ordered,
@@ -112,6 +115,7 @@ def ladder_of_search(
         discrepancy=math.sqrt(max(final.held_out_error**2 - data.noise_floor**2, 0.0)),
         stopped=search.stopped,
     )
+    return likely_names(ladder, given.names)
 
 
 def _parts(library: Library, name: str) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import chain
 
+from xy_sysid.axis.model import AxisModel
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.search.best_first import Judge, Node, Search
 from xy_sysid.search.criteria import HOPELESS, LEAST
@@ -29,6 +30,7 @@ class Simplifying:
         self.judge, self.search, self.kept = judge, search, kept
         self.now = search.best
         self.left: set[frozenset[str]] = set()
+        self.again: set[tuple[frozenset[str], frozenset[str]]] = set()
 
     def step(self) -> bool:
         """Take the first simpler set that loses little; False if none does."""
@@ -109,9 +111,9 @@ class Simplifying:
     def _own(self) -> list[str]:
         return [name for name, _ in reversed(self.now.fit.model.effects) if name not in self.kept]
 
-    def _good(self, effects: frozenset[str], make: Callable[[], GreyboxFit | None]) -> Iterator[Node[GreyboxFit]]:
+    def _good(self, effects: frozenset[str], begin: Callable[[], AxisModel]) -> Iterator[Node[GreyboxFit]]:
         """The set, if it stands; for an effect in it that the data do not tell from none, each of its relatives that was tried alone."""
-        node = self._node(effects, make)
+        node = self._node(effects, begin)
         if node is None or node.refused:
             return
         idle = self.judge.idle(node.fit)
@@ -123,18 +125,27 @@ class Simplifying:
             alone, others = self.search.nodes.get(frozenset((relative.name,))), effects - {idle} | {relative.name}
             simpler = sum(len(library[name].parameters) for name in others) < self.now.parameters
             if alone is not None and simpler and relative.name not in effects and relative.family and relative.family == library[idle].family:
-                other = self._node(others, partial(self.judge.again, node.fit, less.with_effect(*alone.fit.model.effects[0])))
+                other = self._node(others, partial(less.with_effect, *alone.fit.model.effects[0]))
                 if other is not None and not other.refused and not self.judge.idle(other.fit):
                     yield other
 
-    def _node(self, effects: frozenset[str], make: Callable[[], GreyboxFit | None]) -> Node[GreyboxFit] | None:
+    def _node(self, effects: frozenset[str], begin: Callable[[], AxisModel]) -> Node[GreyboxFit] | None:
+        """The set as it is known, or fitted from a model that begins where the best set is.
+
+        Again, once, where the known fit, from elsewhere, went astray: it leaves more than that model does without any fit, or is refused.
+        """
         known = self.search.nodes.get(effects)
-        went_astray = known is not None and bool(known.refused) and known.fit.excess > self.now.fit.excess + LEAST  # from elsewhere
-        if known is not None and not went_astray and (known.whole or known.fit.excess < self.now.fit.excess + HOPELESS):
-            whole(self.judge, known)
-            return known
-        fit = None if self.judge.late() else make()
-        if fit is None:
+        worse = known is not None and known.fit.excess > self.now.fit.excess + LEAST
+        near = known is not None and (known.whole or known.fit.excess < self.now.fit.excess + HOPELESS)
+        start = None
+        if known is not None and near:
+            start = begin() if worse and not self.judge.late() and (effects, self.now.effects) not in self.again else None
+            if start is None or not (known.refused or known.fit.excess > self.judge.begins(self.now.fit, start) + LEAST):
+                whole(self.judge, known)
+                return known
+            self.again.add((effects, self.now.effects))
+        fit = None if self.judge.late() else self.judge.again(self.now.fit, start or begin())
+        if fit is None or (known is not None and near and not fit.excess < known.fit.excess - LEAST):
             return known
         parameters = sum(len(self.judge.library[name].parameters) for name in effects)
         node = Node(effects=effects, fit=fit, brief=fit, parameters=parameters, whole=True, refused=self.judge.refusal(fit))

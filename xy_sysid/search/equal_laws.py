@@ -1,0 +1,85 @@
+"""Effects whose laws are one and the same: no data tell them apart, so the likelier name is said, and how likely it is.
+
+A base that gives and a screw that gives are the same pole-zero pair to the motor's encoder. What is usual of each (``Parameter.typical``,
+within a factor) tells which it is likely to be: a base is slow and heavy, so that its resonance lies near its antiresonance.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from xy_sysid.axis.model import AxisModel, Library
+from xy_sysid.effects import Effect
+from xy_sysid.effects._contract import USUAL_WITHIN
+from xy_sysid.greybox.free_run import GreyboxFit
+from xy_sysid.search.ladder import Candidate, Ladder, Rival, Step
+
+
+def equals(library: Library, name: str) -> list[Effect]:
+    """Effects with this one's very law, itself among them."""
+    effect = library[name]
+    alike = (other for other in library.acting if other.family == effect.family and other.names == effect.names and other.law == effect.law)
+    return list(alike) if effect.family else [effect]
+
+
+def likelihood(library: Library, name: str, values: Sequence[float]) -> float:
+    """How likely it is this effect (0..1) among those of the same law; 1 if there are no others.
+
+    Each of an effect's parameters is taken as log-normal about its usual size.
+    """
+    others = equals(library, name)
+    if len(others) == 1:
+        return 1.0
+    depth = {other.name: _depth(other, values) for other in others}
+    top = max(depth.values())
+    return math.exp(depth[name] - top) / sum(math.exp(value - top) for value in depth.values())
+
+
+def _depth(effect: Effect, values: Sequence[float]) -> float:
+    usual = (math.log(abs(value) / abs(item.typical)) / math.log(USUAL_WITHIN) for item, value in zip(effect.parameters, values, strict=True))
+    return -0.5 * sum(part**2 for part in usual)
+
+
+def likely_names(ladder: Ladder, kept: Sequence[str] = ()) -> Ladder:
+    """The ladder with the likelier name for each effect of its last model that has equals, but for those that somebody gave."""
+    library, names = ladder.final.model.library, {}
+    for name, values in ladder.final.model.effects:
+        others = [other.name for other in equals(library, name)]
+        likely = max(others, key=lambda other: likelihood(library, other, values)) if len(others) > 1 else name
+        if likely != name and name not in kept:
+            names |= {name: likely, likely: name}
+    return _renamed(ladder, names) if names else ladder
+
+
+def is_the_same(library: Library, one: tuple[frozenset[str], GreyboxFit], other: tuple[frozenset[str], GreyboxFit], least: float) -> bool:
+    """Two sets are one by their laws, and their fits leave the same within ``least`` nats: they have found the same thing."""
+    laws = [sorted(equals(library, name)[0].name for name in names) for names in (one[0], other[0])]
+    return laws[0] == laws[1] and abs(one[1].excess - other[1].excess) < least
+
+
+def _renamed(ladder: Ladder, names: Mapping[str, str]) -> Ladder:
+    """Names of effects replaced by others of the same law, wherever they stand."""
+
+    def word(name: str) -> str:
+        return names.get(name, name)
+
+    def fit(found: GreyboxFit) -> GreyboxFit:
+        parameters = (replace(item, name=".".join((word(item.name.partition(".")[0]), *item.name.split(".")[1:]))) for item in found.parameters)
+        return replace(found, model=_model(found.model, names), parameters=tuple(parameters))
+
+    return replace(
+        ladder,
+        steps=tuple(Step(step.added and word(step.added), fit(step.fit)) for step in ladder.steps),
+        final=fit(ladder.final),
+        effects=tuple(map(word, ladder.effects)),
+        tried=tuple(Candidate(word(item.effect), item.promised, item.fit and fit(item.fit)) for item in ladder.tried),
+        rivals=tuple(Rival(tuple(map(word, item.effects)), fit(item.fit), item.behind, item.refused) for item in ladder.rivals),
+        sizes={word(name): size for name, size in ladder.sizes.items()},
+        refused=tuple((tuple(map(word, effects)), why) for effects, why in ladder.refused),
+    )
+
+
+def _model(model: AxisModel, names: Mapping[str, str]) -> AxisModel:
+    return replace(model, effects=tuple((names.get(name, name), values) for name, values in model.effects))
