@@ -132,11 +132,13 @@ class Guess:
     columns: (k, n) per unit coefficient: V against the drive, or m/s of an effect that acts behind the base (``Effect.is_behind``)
     read:    start values of all parameters, in order, from the k coefficients that explain the error best
     inverse_only: a start for base and effect together, and no trace of the effect beside a base that stays
+    whole:   the law is the column as it is, once: its coefficient says how well it fits, and no size (what lies above a limit)
     """
 
     columns: FloatArray
     read: Callable[[FloatArray], tuple[float, ...]]
     inverse_only: bool = False
+    whole: bool = False
 
 
 def columns(*signals: FloatArray) -> FloatArray:

@@ -26,7 +26,7 @@ def guesses(scene: Scene) -> Iterator[Guess]:
     for lag in np.geomspace(0.2e-3, 5e-3, 6) * scene.similar.time:
         left = math.exp(-1.0 / (float(lag) * scene.sampling_rate))
         behind = scipy.signal.lfilter([1.0 - left], [1.0, -left], scene.voltage)
-        yield Guess(columns(scene.voltage - behind), _Reader(float(lag)))
+        yield Guess(columns(scene.voltage - behind), _Reader(float(lag)), whole=True)
 
 
 def joint(scene: Scene) -> Iterator[tuple[float, float, float, tuple[float, ...]]]:

@@ -21,7 +21,7 @@ def guesses(scene: Scene) -> Iterator[Guess]:
     """The part of the voltage within a zone of 3 to 100 per cent of its rms."""
     u = scene.voltage
     for width in np.geomspace(0.03, 1.0, 8) * float(np.std(u)):
-        yield Guess(columns(np.clip(u, -width, width)), _Reader(float(width)))
+        yield Guess(columns(np.clip(u, -width, width)), _Reader(float(width)), whole=True)
 
 
 class _Reader:

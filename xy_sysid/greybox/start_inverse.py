@@ -59,12 +59,16 @@ def inverse_starts(effect: Effect, scene: Scene, samples: int, forces: Sequence[
         best, kept = np.inf, None
         beside = [slow(force) for force in seen_forces]
         for guess, columns in zip(guesses, seen_columns, strict=True):
-            coefficients, left = _least(np.array([acceleration, velocity, *beside, *slow(columns)])[:, rows], voltage[rows])
+            acting = slow(columns)
+            target = voltage - acting[0] if guess.whole else voltage
+            free = acting[:0] if guess.whole else acting
+            coefficients, left = _least(np.array([acceleration, velocity, *beside, *free])[:, rows], target[rows])
+            left /= float(target[rows] @ target[rows]) + 1e-300
             if left < best and coefficients[0] * coefficients[1] > 0.0:
                 inertia, drag, *sizes = (float(value) for value in coefficients[: 2 + len(beside)])
                 part = 1.0 / (drag * scene.gain) if effect.is_of_the_drag else 1.0  # its columns are in volts of the base's drag
-                values = effect.read(guess, coefficients[2 + len(beside) :] * part, scene.similar)
-                best, kept = left, InverseStart(1.0 / drag, drag / inertia, values, tuple(sizes))
+                own = np.ones(len(acting)) if guess.whole else coefficients[2 + len(beside) :] * part
+                best, kept = left, InverseStart(1.0 / drag, drag / inertia, effect.read(guess, own, scene.similar), tuple(sizes))
         if kept is not None:
             found.append(kept)
     return found

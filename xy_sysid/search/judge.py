@@ -203,8 +203,9 @@ class FreeRunJudge:
         return tuple((name, values) for name, values in model.apart(replaced).effects if name not in model and self.library[name].family != family)
 
     def _is_read(self, model: AxisModel, effect: Effect) -> bool:
-        """Starts without the model, by least squares, know all that acts: nothing, or forces by place and friction, and one more force."""
-        return not model.effects or (effect.category == "force" and len(pushing(model)) + len(rubbing(model)) == len(model.effects))
+        """Starts without the model, by least squares, know all that acts: nothing, or forces by place and friction, and one more force
+        or what the amplifier does."""
+        return not model.effects or (effect.category in ("force", "input") and len(pushing(model)) + len(rubbing(model)) == len(model.effects))
 
     def _begins(self, here: _Here, model: AxisModel, effect: Effect) -> float:
         """Excess at starts that are read without the model: it may have been led so far astray that traces tell little.
