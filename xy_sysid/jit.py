@@ -40,7 +40,7 @@ class _Compiling(event.Listener):
 
 
 _COMPILING = _Compiling()
-event.register("numba:compile", _COMPILING)
+event.register("numba:compile", _COMPILING)  # type: ignore[no-untyped-call]
 
 
 def spent_compiling() -> float:

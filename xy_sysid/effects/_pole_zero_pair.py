@@ -92,7 +92,7 @@ def _of_response(scene: Scene) -> tuple[float, float, float, tuple[float, ...]] 
     scale = 2.0 * math.pi * float(np.sqrt(f[0] * f[-1]))
     s = 2j * math.pi * f / scale
     box = np.sinc(f / scene.sampling_rate) ** 2  # held input, mean output
-    delays = np.arange(-4.0, 4.01, 0.25) / scene.sampling_rate  # all at once
+    delays = np.arange(-12.0, 4.01, 0.25) / scene.sampling_rate  # all at once; a rigid base takes a large pair for more delay
     target = response * np.exp(np.outer(delays, s * scale)) / box
     powers = np.stack([s**2, s, s**0], axis=1)
     matrix = np.concatenate((np.broadcast_to(powers, (delays.size, *powers.shape)), -target[:, :, None] * powers), axis=2)

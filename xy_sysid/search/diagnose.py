@@ -203,9 +203,14 @@ def judged(data: AxisData, ladder: Ladder, library: Library) -> Diagnosis:
     else:
         verdict, experiment = "not_in_library", _UNKNOWN
         confidence = (1.0 - ladder.helps) * (1.0 - _hidden(left, data.floor.epsilon))
-        best = f"; at best {_listed(names)} take away {_percent(explained)}" if names and explained > 0.0 else ""
+        takes = "take" if len(names) > 1 else "takes"
+        best = f"; at best {_listed(names)} {takes} away {_percent(explained)}" if names and explained > 0.0 else ""
         sentence = f"Not in the library: no effect explains what the rigid model leaves ({moved(base.held_out_error, unit)}, {_percent(left)} of the "
         sentence += f"motion{best}; noise alone is {noise})."
+    if ladder.kept_out is not None and verdict != "nothing_missing":
+        leaves = "would leave" if len(ladder.kept_out.effects) > 1 else "alone would leave"
+        sentence += f" {_listed(ladder.kept_out.effects)} {leaves} {moved(ladder.kept_out.fit.held_out_error, unit)}, and is refused:"
+        sentence += f" {ladder.kept_out.refused}."
     if ladder.stopped:
         sentence += " The search was stopped when its time was up."
         confidence *= 0.8

@@ -44,7 +44,8 @@ def _depth(effect: Effect, values: Sequence[float]) -> float:
 
 def likely_names(ladder: Ladder, kept: Sequence[str] = ()) -> Ladder:
     """The ladder with the likelier name for each effect of its last model that has equals, but for those that somebody gave."""
-    library, names = ladder.final.model.library, {}
+    library = ladder.final.model.library
+    names: dict[str, str] = {}
     for name, values in ladder.final.model.effects:
         others = [other.name for other in equals(library, name)]
         likely = max(others, key=lambda other: likelihood(library, other, values)) if len(others) > 1 else name
@@ -69,13 +70,17 @@ def _renamed(ladder: Ladder, names: Mapping[str, str]) -> Ladder:
         parameters = (replace(item, name=".".join((word(item.name.partition(".")[0]), *item.name.split(".")[1:]))) for item in found.parameters)
         return replace(found, model=_model(found.model, names), parameters=tuple(parameters))
 
+    def rival(item: Rival) -> Rival:
+        return Rival(tuple(map(word, item.effects)), fit(item.fit), item.behind, item.refused)
+
     return replace(
         ladder,
         steps=tuple(Step(step.added and word(step.added), fit(step.fit)) for step in ladder.steps),
         final=fit(ladder.final),
         effects=tuple(map(word, ladder.effects)),
         tried=tuple(Candidate(word(item.effect), item.promised, item.fit and fit(item.fit)) for item in ladder.tried),
-        rivals=tuple(Rival(tuple(map(word, item.effects)), fit(item.fit), item.behind, item.refused) for item in ladder.rivals),
+        rivals=tuple(map(rival, ladder.rivals)),
+        kept_out=ladder.kept_out and rival(ladder.kept_out),
         sizes={word(name): size for name, size in ladder.sizes.items()},
         refused=tuple((tuple(map(word, effects)), why) for effects, why in ladder.refused),
     )

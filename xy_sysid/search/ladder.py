@@ -51,6 +51,7 @@ class Ladder:
     astray:   amplitude of what is left where a mode acts, over its own; the largest of all modes
     helps:    part (0..1) of the base's error power beyond the noise that the best of all sets takes away, be it named or not
     tried:    single effects on the base, least excess first; rivals: other sets, best first
+    kept_out: the refused set that would leave least, if that is less than what the final fit leaves
     refused:  (effects, why they explain nothing); explained: part (0..1) of the base's error power beyond the noise that is gone
     noise, discrepancy: of the held-out error, m/s rms: what the encoder adds, and what no effect explains
     stopped:  the budget ended the search
@@ -64,6 +65,7 @@ class Ladder:
     sizes: Mapping[str, float] = field(default_factory=dict)
     astray: float = 0.0
     helps: float = 0.0
+    kept_out: Rival | None = None
     refused: tuple[tuple[tuple[str, ...], str], ...] = ()
     explained: float = 0.0
     noise: float = 0.0

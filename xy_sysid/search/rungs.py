@@ -11,7 +11,7 @@ from xy_sysid.axis.model import Library
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.search.best_first import Search
-from xy_sysid.search.criteria import LEAST
+from xy_sysid.search.criteria import AT_FLOOR, LEAST
 from xy_sysid.search.equal_laws import is_the_same, likely_names
 from xy_sysid.search.judge import FreeRunJudge, joined
 from xy_sysid.search.ladder import Candidate, Ladder, Rival, Step, contains, is_taken_for, part_explained
@@ -109,6 +109,7 @@ def ladder_of_search(
         sizes={name: min(each) for name, each in sizes.items() if each},
         astray=max((_astray(data, settled, name) for name in node.effects if judge.library[name].category == "motion"), default=0.0),
         helps=1.0 - min(judge.rest(item.fit, base) for item in search.nodes.values() if item.whole and not item.refused),
+        kept_out=_kept_out(search, node.fit.excess),
         refused=refused,
         explained=part_explained(data, base, final),
         noise=data.noise_floor,
@@ -116,6 +117,13 @@ def ladder_of_search(
         stopped=search.stopped,
     )
     return likely_names(ladder, given.names)
+
+
+def _kept_out(search: Search[GreyboxFit], left: float) -> Rival | None:
+    """The refused set that would leave least, if that is clearly less than what is left."""
+    nodes = [node for node in search.nodes.values() if node.refused and node.fit.excess < left - AT_FLOOR]
+    best = min(nodes, key=lambda node: (round(node.fit.excess, 1), len(node.effects)), default=None)
+    return None if best is None else Rival(tuple(sorted(best.effects)), best.fit, best.fit.excess - left, best.refused)
 
 
 def _parts(library: Library, name: str) -> tuple[str, ...]:
