@@ -347,6 +347,16 @@ class Effect:
         return self.category in ("motion", "encoder")
 
     @property
+    def is_by_place(self) -> bool:
+        """True for a law that asks where the axis is."""
+        return any("x" in arguments(item) for item in self.functions.values())
+
+    @property
+    def repeats(self) -> bool:
+        """True for a law by place that repeats along the travel, for one of its parameters is the period; or with each turn."""
+        return self.is_by_place and ("period" in self.names or self.angular)
+
+    @property
     def is_of_the_drag(self) -> bool:
         """True for a force whose size is a part of the base's own drag."""
         return self.category == "force" and {"v", "gain"} <= set(arguments(self.functions["force"]))

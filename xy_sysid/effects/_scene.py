@@ -14,6 +14,7 @@ from xy_sysid.samples.block import FloatArray
 
 USUAL_SWING = 2e-4  # m between two reversals on the usual machine of ``Similarity``
 PLACES = 2048  # along the travel, for what repeats with it
+REPEATS = 1.5  # periods within the travel at least: what is longer acts as a polynomial, and explains anything
 FINER = 16  # parts of a period over the whole travel by which lengths differ: half a part leaves 0.3 % of a sine's power
 
 
@@ -77,10 +78,10 @@ class Scene:
         e = self.smooth(self.error, 100.0)
         return -(np.gradient(e) * self.sampling_rate / self.pole + e) / self.gain
 
-    def periods(self, numerator: FloatArray, denominator: FloatArray, count: int = 4, least: float = 1.5) -> list[float]:
+    def periods(self, numerator: FloatArray, denominator: FloatArray, count: int = 4, least: float = REPEATS) -> list[float]:
         """Lengths (m) at which numerator / denominator repeats along the travel, strongest first.
 
-        Only lengths with ``least`` periods within the travel: longer ones act as polynomials and explain anything. At each length a sine is
+        Only lengths with ``least`` periods within the travel. At each length a sine is
         fitted to the places, each counted by the denominator there (Lomb 1976; Zechmeister & Kurster 2009, eq. 5), and less towards the ends.
         """
         low, high = np.quantile(self.position, [0.01, 0.99])

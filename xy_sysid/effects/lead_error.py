@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from xy_sysid.effects._contract import Effect, Parameter, law
-from xy_sysid.effects._scene import Guess, Scene, columns
+from xy_sysid.effects._scene import REPEATS, Guess, Scene, columns
 from xy_sysid.samples.block import FloatArray
 
 
@@ -38,10 +38,12 @@ class _Reader:
         return (math.hypot(float(c[0]), float(c[1])), self.period, math.atan2(float(c[1]), float(c[0])))
 
 
-def refusal(values: Sequence[float], _: tuple[float, float]) -> str:
-    """A reading that changes by less than a fifth more or less than the motion; beyond, it explains any signal by itself."""
-    slope = 2.0 * math.pi * values[0] / values[1]
-    return "" if slope < 0.2 else f"the reading would change by {100 * slope:.3g} % more or less than the motion: no encoder does"
+def refusal(values: Sequence[float], between: tuple[float, float]) -> str:
+    """A reading that changes by less than a fifth more or less than the motion, and repeats; beyond, it explains any signal by itself."""
+    slope, repeats = 2.0 * math.pi * values[0] / values[1], (between[1] - between[0]) / values[1]
+    if slope >= 0.2:
+        return f"the reading would change by {100 * slope:.3g} % more or less than the motion: no encoder does"
+    return "" if repeats >= REPEATS else f"only {repeats:.2g} of its periods are within the travel: nobody sees whether it repeats"
 
 
 EFFECT = Effect(

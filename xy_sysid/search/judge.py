@@ -13,15 +13,16 @@ from scipy.stats import norm, wilcoxon
 from xy_sysid.axis.model import AxisModel, Library
 from xy_sysid.effects import Effect, Scene
 from xy_sysid.effects._contract import Limits, in_time
+from xy_sysid.effects._scene import smoothed
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.floor import excess
-from xy_sysid.greybox.forces import braked, of_one_name, pushing, rubbing, stood_in, taken_for, taken_over
+from xy_sysid.greybox.forces import SMOOTH, braked, of_one_name, pushing, rubbing, stood_in, taken_for, taken_over
 from xy_sysid.greybox.free_run import GreyboxFit, best_start, finish, first_excess, fit, fit_base, other_starts, scene_of, screened
 from xy_sysid.greybox.one_step import one_step_fit
 from xy_sysid.greybox.score_test import Gain, Trace, bounded
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.search.beside_one_step import put_beside
-from xy_sysid.search.criteria import ALIKE, CHANCE, HOPELESS, LEAST, WIDTH
+from xy_sysid.search.criteria import ALIKE, CHANCE, FEWEST, HOPELESS, LEAST, STILL, WIDTH
 
 NOTHING = Gain(0.0, 0.0)
 
@@ -66,6 +67,9 @@ class FreeRunJudge:
     def __init__(self, data: AxisData, library: Library, late: Callable[[], bool] = in_time) -> None:
         self.data, self.library, self.late = data, library, late
         self.reach = float(np.min(data.position)), float(np.max(data.position))
+        travel = self.reach[1] - self.reach[0]
+        way = float(np.sum(np.abs(smoothed(data.sampling_rate, data.velocity, SMOOTH)))) / data.sampling_rate
+        self.passed_once = way < (1.0 + 2.0 * STILL) * travel
 
     def begin(self) -> GreyboxFit:
         """The rigid base."""
@@ -100,7 +104,7 @@ class FreeRunJudge:
             return []
         model = now.model
         families = {self.library[name].family: name for name, _ in model.effects if self.library[name].family}
-        open_to = [e for e in self.library.acting if e.simulable and e.name not in model]
+        open_to = [e for e in self.library.acting if e.simulable and e.name not in model and (e.repeats or not (self.passed_once and e.is_by_place))]
         here = _Here(now, brief, scene_of(self.data, now, early))
         screen = screened(self.data, now, open_to, here.scene)
         traces = {trace.effect: trace for trace in screen.traces}
@@ -329,6 +333,8 @@ class FreeRunJudge:
             why = effect.refusal(values, self.reach) if effect.refusal is not None else ""
             if why:
                 return f"{name}: {why}"
+            if self.passed_once and effect.is_by_place and not self._repeats(effect, values):
+                return f"{name}: each place is passed once, so that what acts by place cannot be told from what drifts"
             for k, (item, value) in enumerate(zip(effect.on(self.data.similar), values, strict=True)):
                 edge = value >= item.high * (1.0 - 1e-6) or (k == 0 and not item.positive and value <= item.low * (1.0 + 1e-6) and item.low > 0.0)
                 if k == 0 and edge:
@@ -343,6 +349,11 @@ class FreeRunJudge:
         if found.model.delay >= 0.99 * limit:
             return f"time_delay: {found.model.delay:.3g} s is at its bound"
         return ""
+
+    def _repeats(self, effect: Effect, values: Sequence[float]) -> bool:
+        """A law by place that repeats often enough on the travel to be seen in one pass."""
+        period = values[effect.names.index("period")] if "period" in effect.names else 2.0 * math.pi
+        return effect.repeats and (self.reach[1] - self.reach[0]) / period >= FEWEST
 
     def better(self, one: GreyboxFit, other: GreyboxFit) -> bool:
         """One predicts the held-out windows better than the other, by more than chance: paired over windows, in the mean or in the ranks.
