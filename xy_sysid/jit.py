@@ -10,7 +10,6 @@ import hashlib
 import importlib.abc
 import importlib.util
 import inspect
-import time
 from collections.abc import Callable, Iterable, Mapping
 from types import CodeType, ModuleType
 from typing import Any, ParamSpec, TypeVar, cast
@@ -22,30 +21,13 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 
-class _Compiling(event.Listener):
-    """Adds up the processor time of this process while machine code is made (one function at a time: numba has a lock for that)."""
-
-    def __init__(self) -> None:
-        self.seconds, self.begun, self.depth = 0.0, 0.0, 0
-
-    def on_start(self, event: event.Event) -> None:
-        if self.depth == 0:
-            self.begun = time.process_time()
-        self.depth += 1
-
-    def on_end(self, event: event.Event) -> None:
-        self.depth -= 1
-        if self.depth == 0:
-            self.seconds += time.process_time() - self.begun
-
-
-_COMPILING = _Compiling()
-event.register("numba:compile", _COMPILING)  # type: ignore[no-untyped-call]
+_COMPILING: Any = cast("Callable[[], Any]", event.TimingListener)()
+cast("Callable[..., None]", event.register)("numba:compile", _COMPILING)
 
 
 def spent_compiling() -> float:
-    """s of processor time that this process has spent making machine code: once on a machine, and no part of any task."""
-    return _COMPILING.seconds
+    """s that this process has spent making machine code: once on a machine, and no part of any task. From the disk it comes at once."""
+    return float(_COMPILING.duration) if _COMPILING.done else 0.0
 
 
 REORDERED = frozenset({"contract", "reassoc", "arcp", "nsz"})

@@ -1,0 +1,38 @@
+"""Machine code: made once on a machine, and no part of what a search may take."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+import pytest
+from helpers.foreign import Joint, driven
+
+from xy_sysid.greybox.axis_data import prepare
+from xy_sysid.jit import spent_compiling
+from xy_sysid.search import refine as search
+
+
+def test_what_compiling_takes_is_told() -> None:
+    """A function that no disk has adds to it; calling it again adds nothing."""
+    before = spent_compiling()
+    twice = numba.njit(lambda x: x + x)
+    assert twice(np.float64(2.0)) == 4.0
+    once = spent_compiling()
+    assert once > before
+    assert twice(np.float64(3.0)) == 6.0
+    assert spent_compiling() == once
+
+
+def test_a_budget_does_not_count_what_compiling_takes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A clock that runs only while laws are compiled never ends a search: the first answer on a new machine is as whole as the second."""
+    clock = [0.0]
+
+    def compiling() -> float:
+        clock[0] += 1.0  # each look finds another second gone
+        return clock[0]
+
+    monkeypatch.setattr(search, "spent_compiling", compiling)
+    joint = Joint(fs=1000.0, seconds=20.0, count=1e-6, mass=0.1, drag=10.0, coulomb=0.2, shake=1.0, band=(0.5, 60.0))
+    found = search.refine(prepare(joint.fs, *driven(joint, 1)), effort=search.Effort(budget=10.0, clock=lambda: clock[0] + 1.0))
+    assert not found.stopped
+    assert found.effects == ("coulomb_friction",)
