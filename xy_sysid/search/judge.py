@@ -290,10 +290,12 @@ class FreeRunJudge:
         return finish(self.data, found.model, found.runs, self.late)
 
     def without(self, now: GreyboxFit, name: str, alone: Sequence[AxisModel] = ()) -> AxisModel:
-        """Where the same set but for one effect begins. alone: models of single ones of the others, one of which may have stood back for it."""
-        less = now.model.without(name)
-        begun = (less.with_effect(other, values) for model in alone for other, values in model.effects)
-        return best_start(self.data, [less, taken_over(self.data, now.model, name), *begun])
+        """Where the same set but for one effect begins: as it is, as it is read without a model, or, one of the others may have stood back
+        for it, as that was alone (models of single effects)."""
+        less, scene = now.model.without(name), scene_of(self.data, now)
+        begun = [less.with_effect(other, values) for model in alone for other, values in model.effects]
+        read = [start for other, _ in less.effects for start in other_starts(self.data, now, less.without(other), other, scene)]
+        return best_start(self.data, [less, taken_over(self.data, now.model, name), *begun, *read])
 
     def instead(self, now: GreyboxFit, name: str, relative: Effect) -> AxisModel:
         """Where the same set with a relative in the place of one effect begins."""

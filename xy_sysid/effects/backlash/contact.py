@@ -28,6 +28,10 @@ DEAF = 12.0  # the filter is told this much more encoder noise on the way: a smo
 COARSE, FINE = 3, 6  # sub-steps of a sample on the way, and in the end
 BEHIND = 1.5  # innovation over the bar after a first fit, at which it is given up. Development draws, and machines of another make: true gaps
 # 0.1 to 1.1; where there is none 1.2 to 18
+IDLE = (
+    0.9  # innovation with a gap over that without it, after the first fits, from which the gap does nothing: where there is none 0.96 to 1.03 (once
+)
+# 0.75, far above the bar), beside 3 % of dirt 0.56, else below 0.3
 CLOSED = 0.8  # innovation without a gap over that with it from which the gap is not looked for where it was
 OWN, GAP = len(NAMES), NAMES.index("gap")
 
@@ -89,7 +93,8 @@ class Contact:
         else:  # nothing draws a gap open that has closed
             best = _raced(fit, [fit.start(base, (gap, *FLANKS), friction) for gap in _gaps(task.noise, task.beside.swing)], loose)
         best = fit.solved(best, every, loose, 15, 1e-2)
-        if np.isfinite(bar) and fit.size(best, true) > BEHIND * bar:
+        idle = begin is None and fit.size(best, loose) > IDLE * fit.softened(SOFT).size(rigid, loose)
+        if np.isfinite(bar) and (idle or fit.size(best, true) > BEHIND * bar):
             return best, True
         best = min(best, fit.solved(best, every, near, 40, 1e-3), key=lambda item: fit.size(item, true))  # what is not whole yet can lead astray
         if CLOSED * fit.size(best, near) > fit.softened(SOFT).size(rigid, near):  # no gap does far better: begin there
