@@ -5,12 +5,12 @@ First on the first stage's data, where a step is quick, then on all windows that
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from xy_sysid.axis.model import FINE, STANDARD, AxisModel, Library
+from xy_sysid.axis.model import FINE, STANDARD, AxisModel, Library, undoer
 from xy_sysid.effects import Effect, Scene
 from xy_sysid.effects._contract import in_time
 from xy_sysid.errors import BadInput
@@ -130,6 +130,9 @@ def other_starts(data: AxisData, base: GreyboxFit, model: AxisModel, name: str, 
     effect, scene = model.library[name], scene or scene_of(data, base)
     candidates, known = [], _apart(model)
     beside, rubs = [own for own in pushing(known) if own != name], [own for own in rubbing(known) if own != name]
+    amplified = [own for own, _ in known.effects if known.library[own].category == "input" and own != name]
+    if amplified:
+        scene = replace(scene, voltage=_amplified(data, known, amplified, data.counts(early=scene.velocity.size == data.first)))
     forces = [force_of(data, known, own, data.counts(early=scene.velocity.size == data.first)) for own in beside]
     forces += [friction_of(scene, known, own) for own in rubs]
     for start in inverse_starts(effect, scene, scene.velocity.size, forces, bool(rubs)):
@@ -144,6 +147,22 @@ def other_starts(data: AxisData, base: GreyboxFit, model: AxisModel, name: str, 
             whole = replace(model, gain=gain, delay=max(base.model.delay + later, 0.0), pole=min(max(pole, 1e-2), 1e5))
             candidates.append(whole.with_effect(name, bounded(effect, values, data.similar)))
     return candidates
+
+
+def is_read(model: AxisModel) -> bool:
+    """Starts by least squares know all that acts in a model: forces by place, friction by speed, and what the amplifier does."""
+    known = {*pushing(model), *rubbing(model), *(name for name, _ in model.effects if model.library[name].category == "input")}
+    return all(name in known for name, _ in model.effects)
+
+
+def _amplified(data: AxisData, model: AxisModel, names: list[str], counts: Sequence[int]) -> FloatArray:
+    """(samples,) V, the delayed voltage behind some effects of the amplifier; counts: samples of each recording."""
+    row = np.array([model.gain, model.delay, model.pole, *(value for name in names for value in dict(model.effects)[name])])
+    parts = []
+    for run, count in zip(data.runs, counts, strict=True):
+        undo = undoer(model.library, names, data.sampling_rate, data.voltage[run], data.position[run])
+        parts.append(_delayed(undo(row, count)[0], model.delay * data.sampling_rate))
+    return np.concatenate(parts)
 
 
 def _apart(model: AxisModel) -> AxisModel:

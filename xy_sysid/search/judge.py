@@ -16,8 +16,8 @@ from xy_sysid.effects._contract import Limits, in_time
 from xy_sysid.effects._scene import smoothed
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.floor import excess
-from xy_sysid.greybox.forces import SMOOTH, braked, of_one_name, pushing, rubbing, stood_in, taken_for, taken_over
-from xy_sysid.greybox.free_run import GreyboxFit, best_start, finish, first_excess, fit, fit_base, other_starts, scene_of, screened
+from xy_sysid.greybox.forces import SMOOTH, braked, of_one_name, stood_in, taken_for, taken_over
+from xy_sysid.greybox.free_run import GreyboxFit, best_start, finish, first_excess, fit, fit_base, is_read, other_starts, scene_of, screened
 from xy_sysid.greybox.one_step import one_step_fit
 from xy_sysid.greybox.score_test import Gain, Trace, bounded
 from xy_sysid.samples.block import FloatArray
@@ -179,7 +179,7 @@ class FreeRunJudge:
                 rest=gain.rest,
                 parameters=len(effect.parameters),
                 starts=starts,
-                begins=self._begins(here, model, effect) if effect.joint is not None or self._is_read(model, effect) else np.inf,
+                begins=self._begins(here, model, effect) if effect.joint is not None or is_read(model) else np.inf,
                 expected=effect.is_dry,
                 simpler=self._simplest(own, effect),
             )
@@ -197,7 +197,7 @@ class FreeRunJudge:
             parameters=more + self._count(name for name, _ in stays),
             starts=starts,
             replaced=relative,
-            begins=self._begins(here, rest, effect) if len(own) == 1 else np.inf,
+            begins=self._begins(here, rest, effect) if is_read(rest) else np.inf,
             stays=stays,
         )
 
@@ -205,11 +205,6 @@ class FreeRunJudge:
         """The parts of a sum that its relatives do not have, with their values."""
         family = self.library[replaced].family
         return tuple((name, values) for name, values in model.apart(replaced).effects if name not in model and self.library[name].family != family)
-
-    def _is_read(self, model: AxisModel, effect: Effect) -> bool:
-        """Starts without the model, by least squares, know all that acts: nothing, or forces by place and friction, and one more force
-        or what the amplifier does."""
-        return not model.effects or (effect.category in ("force", "input") and len(pushing(model)) + len(rubbing(model)) == len(model.effects))
 
     def _begins(self, here: _Here, model: AxisModel, effect: Effect) -> float:
         """Excess at starts that are read without the model: it may have been led so far astray that traces tell little.
@@ -267,7 +262,7 @@ class FreeRunJudge:
         if move.replaced is not None:
             begun = self._in_place(now, move)
             rest = begun[0].without(move.starts[0][0])
-            return best_start(self.data, begun if rest.effects else [*begun, *other_starts(self.data, now, rest, move.starts[0][0])])
+            return best_start(self.data, [*begun, *other_starts(self.data, now, rest, move.starts[0][0])] if is_read(rest) else begun)
         for name, values in move.starts:
             more = model.with_effect(name, bounded(self.library[name], values, self.data.similar))
             model = best_start(self.data, [more, *other_starts(self.data, now, model, name)])
