@@ -290,7 +290,7 @@ def _also_called(final: GreyboxFit, names: Sequence[str]) -> str:
         others = [other.name for other in equals(library, name) if other.name != name] if name in names else []
         if others:
             sure = _percent(round(likelihood(library, name, values), 2))
-            said += f" No data tell it from {_listed(others)}; by what is usual it is rather {name} ({sure})."
+            said += f" No data tell {name} from {_listed(others)}: the law is one, and by what is usual it is rather the former ({sure})."
     return said
 
 

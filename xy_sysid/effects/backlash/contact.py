@@ -93,7 +93,7 @@ class Contact:
         else:  # nothing draws a gap open that has closed
             best = _raced(fit, [fit.start(base, (gap, *FLANKS), friction) for gap in _gaps(task.noise, task.beside.swing)], loose)
         best = fit.solved(best, every, loose, 15, 1e-2)
-        idle = begin is None and fit.size(best, loose) > IDLE * fit.softened(SOFT).size(rigid, loose)
+        idle = begin is None and task.beside.start.size > 0 and fit.size(best, loose) > IDLE * fit.softened(SOFT).size(rigid, loose)
         if np.isfinite(bar) and (idle or fit.size(best, true) > BEHIND * bar):
             return best, True
         best = min(best, fit.solved(best, every, near, 40, 1e-3), key=lambda item: fit.size(item, true))  # what is not whole yet can lead astray
