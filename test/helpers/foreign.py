@@ -19,6 +19,7 @@ class Joint:
     breaks: friction at rest beyond that in motion, of which a part is left up to speeds of ``fades``
     moves: (largest place, speed, acceleration) of random moves that a controller (stiffness, damping) follows, or None
     shake: rms, and band (Hz), of noise in the drive, around ``offset``
+    limit, zone: of the drive: what is larger is cut off, and so much of it in the middle does nothing
     """
 
     fs: float
@@ -39,6 +40,8 @@ class Joint:
     shake: float = 0.0
     band: tuple[float, float] = (0.5, 30.0)
     offset: float = 0.0
+    limit: float = np.inf
+    zone: float = 0.0
 
 
 def driven(joint: Joint, seed: int) -> tuple[FloatArray, FloatArray]:
@@ -52,7 +55,7 @@ def driven(joint: Joint, seed: int) -> tuple[FloatArray, FloatArray]:
     forces = np.array(
         [joint.mass, joint.drag, joint.coulomb, joint.load, joint.spring, joint.rest, joint.cogging, joint.period, joint.breaks, joint.fades]
     )
-    return _run(wanted, shake, joint.fs, inner, forces, np.array([*joint.control, joint.count]))
+    return _run(wanted, shake, joint.fs, inner, forces, np.array([*joint.control, joint.count, joint.limit, joint.zone]))
 
 
 def across_gap(gap: float, table: float, coulomb: float, seed: int, fs: float = 2000.0) -> tuple[FloatArray, FloatArray]:
@@ -99,7 +102,7 @@ def _moves(random: np.random.Generator, n: int, fs: float, far: float, speed: fl
 @compiled
 def _run(wanted: FloatArray, shake: FloatArray, fs: float, inner: int, forces: FloatArray, seen: FloatArray) -> tuple[FloatArray, FloatArray]:
     mass, drag, coulomb, load, spring, rest, cogging, period, breaks, fades = forces
-    stiffness, damping, count = seen
+    stiffness, damping, count, limit, zone = seen
     h, x, v, speed, held = 1.0 / fs / inner, wanted[0], 0.0, 0.0, 0.0
     drive, shown = np.empty(wanted.size), np.empty(wanted.size)
     for i in range(wanted.size):
@@ -114,5 +117,6 @@ def _run(wanted: FloatArray, shake: FloatArray, fs: float, inner: int, forces: F
             new = new - stops if new > stops else new + stops if new < -stops else 0.0
             x += 0.5 * h * (v + new)
             v = new
-        held = drive[i]  # one sample late
+        cut = min(max(drive[i], -limit), limit)
+        held = cut - min(max(cut, -zone), zone)  # one sample late
     return drive, shown

@@ -37,7 +37,7 @@ class Table:
     simpler: the set with a simpler relative, for a set that has one; astray: what a set leaves if it is fitted from this other one
     lost: what two sets have come to helps no fit of both
     slowly: from a set, (effects to add, gain) that only all data show; briefly: what a set leaves of the first stage's data, where that differs
-    posed: an effect, and what it may have been taken for
+    posed: an effect, and what it may have been taken for; begins: what a move to a set leaves before any fit
     """
 
     leaves: Mapping[Set, float]
@@ -51,6 +51,7 @@ class Table:
     slowly: Mapping[Set, Sequence[tuple[Set, float]]] = field(default_factory=dict)
     briefly: Mapping[Set, float] = field(default_factory=dict)
     posed: Mapping[str, str] = field(default_factory=dict)
+    begins: Mapping[tuple[Set, Set], float] = field(default_factory=dict)
     briefs: list[Set] = field(default_factory=list)
     mergers: list[tuple[Set, Set]] = field(default_factory=list)
     wholes: list[Set] = field(default_factory=list)
@@ -71,6 +72,7 @@ class Table:
                 starts=tuple((name, (1.0,)) for name in sorted(added)),
                 expected=added <= self.dry,
                 simpler=self.simpler.get(now.effects | added, frozenset()),
+                begins=self.begins.get((now.effects, now.effects | added), inf),
             )
             for added, gain in promises.get(now.effects, ())
         ]
@@ -535,6 +537,22 @@ def test_a_rival_that_gains_nothing_is_fitted_again_from_its_simpler_relative(fr
     assert list(search.rivals(of("a"))) == [of("rich")]
     assert judge.briefs.count(of("rich")) == briefs
     assert search.best.effects == of("rich") and search.best.fit.excess == 0.1
+
+
+@pytest.mark.parametrize(("begins", "fits"), [(2.0, 2), (2.99, 1), (inf, 1)])
+def test_a_set_that_left_more_than_another_way_to_it_begins_with_is_fitted_again(begins: float, fits: int) -> None:
+    """Two at once went astray from nothing; beside the first, the second begins with less than that fit ended with."""
+    promises = {of(): all_of(("ab", 3.9), ("a", 1.0)), of("a"): all_of(("b", 0.1))}
+    judge = Table(
+        {of(): 4.0, of("a"): 3.0, of("a", "b"): 0.0},
+        promises,
+        astray={(of(), of("a", "b")): 2.99},
+        begins={(of("a"), of("a", "b")): begins},
+        lost=True,
+    )
+    search, _ = searched(judge)
+    assert judge.briefs.count(of("a", "b")) == fits
+    assert search.best.effects == (of("a", "b") if fits == 2 else of("a"))
 
 
 def test_a_rival_may_turn_out_to_be_better() -> None:

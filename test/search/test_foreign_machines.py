@@ -86,6 +86,34 @@ def test_heavy_friction_does_not_hide_that_it_breaks_away() -> None:
     assert values(found)["stribeck_friction"] == pytest.approx((2.0, 0.3, 0.05), rel=0.02)
 
 
+@pytest.mark.parametrize(("breaks", "effects"), [(0.0, {"saturation", "coulomb_friction"}), (5.0, {"saturation", "stribeck_friction"})])
+def test_a_drive_that_is_at_its_limit_for_half_of_the_time_is_told_from_a_slow_axis(breaks: float, effects: set[str]) -> None:
+    """A controller asks for far more than there is; a rigid base fitted to that has nothing of the axis, so that no trace tells."""
+    joint = replace(LINEAR_MOTOR, cogging=0.0, breaks=breaks, fades=0.13, limit=60.0)
+    assert 0.2 < float(np.mean(np.abs(driven(joint, 1)[0]) > joint.limit)) < 0.6
+    found = of(joint)
+    assert set(found.effects) == effects, found.sentence
+    assert found.confidence > 0.9
+    assert values(found)["saturation"][0] == pytest.approx(60.0, rel=0.01)
+
+
+def test_a_zone_of_the_drive_in_which_nothing_happens_is_told_beside_friction() -> None:
+    """Both hold the axis at small drives; the zone takes from every drive, friction from the speed."""
+    found = of(replace(SLIDE, coulomb=0.3, zone=0.3, shake=2.0, band=(0.5, 40.0)))
+    assert set(found.effects) == {"coulomb_friction", "dead_zone"}, found.sentence
+    own = values(found)
+    assert (own["coulomb_friction"][0], own["dead_zone"][0]) == pytest.approx((0.3, 0.3), rel=0.02)
+
+
+def test_in_a_move_that_passes_each_place_once_nothing_is_named_by_place() -> None:
+    """Speeds one way, with friction that slowly changes: a drag by place would say the same, and nobody can tell."""
+    joint = Joint(fs=1000.0, seconds=20.0, count=1e-4, mass=0.1, drag=1.0, coulomb=0.3, shake=0.4, band=(0.2, 20.0), offset=2.0)
+    drive, position = driven(joint, 4)
+    assert np.all(np.diff(position[:: int(joint.fs / 5.0)]) > 0.0)
+    found = diagnose(joint.fs, drive, position + 0.01 * np.sin(2.0 * np.pi * position / 1.3 / float(np.ptp(position))))
+    assert not {name for name in found.effects if STANDARD[name].is_by_place}, found.sentence
+
+
 def test_a_spring_beside_friction_that_breaks_away_is_not_one_that_stiffens() -> None:
     """Hardening stiffness beside it leaves nothing, and is refused: the return spring is tried in its place."""
     found = of(replace(SLIDE, spring=100.0, coulomb=0.2, breaks=0.1, fades=0.01), seed=2)
