@@ -212,6 +212,7 @@ def excess(power: FloatArray, least: Floor) -> float:
     """
     used = least.excited if bool(np.any(least.excited)) else np.ones_like(least.excited)
     lowest = np.maximum(least.power, 1e-300)
-    bands = np.maximum(np.log(np.maximum(power / lowest, 1e-12)), 0.0)
+    with np.errstate(over="ignore"):  # of a model that runs away
+        bands = np.maximum(np.log(np.maximum(power / lowest, 1e-12)), 0.0)
     whole = float(np.log(max(float(np.sum((least.lines * power)[used]) / np.sum((least.lines * lowest)[used])), 1.0)))
     return 0.5 * (float(np.mean(bands[used])) + whole)

@@ -166,7 +166,8 @@ def _coherence(sampling_rate: float, voltage: FloatArray, position: FloatArray) 
         length = int(2 ** np.floor(np.log2(voltage.size / part)))
         if length < 32:
             continue
-        frequency, value = scipy.signal.coherence(voltage[:-1], np.diff(position), sampling_rate, nperseg=length)
+        with np.errstate(all="ignore"):  # of a line that holds nothing there is none
+            frequency, value = scipy.signal.coherence(voltage[:-1], np.diff(position), sampling_rate, nperseg=length)
         octave = np.floor(np.log2(np.maximum(frequency, frequency[1]) / frequency[-1])).astype(np.int64)
         means = [float(np.nanmean(np.nan_to_num(value[octave == k]))) for k in range(-12, 0) if int(np.sum(octave == k)) >= 2]
         found = (max(means, default=0.0), (1.0 + CHANCE / math.sqrt(2.0)) / part)

@@ -28,10 +28,8 @@ DEAF = 12.0  # the filter is told this much more encoder noise on the way: a smo
 COARSE, FINE = 3, 6  # sub-steps of a sample on the way, and in the end
 BEHIND = 1.5  # innovation over the bar after a first fit, at which it is given up. Development draws, and machines of another make: true gaps
 # 0.1 to 1.1; where there is none 1.2 to 18
-IDLE = (
-    0.9  # innovation with a gap over that without it, after the first fits, from which the gap does nothing: where there is none 0.96 to 1.03 (once
-)
-# 0.75, far above the bar), beside 3 % of dirt 0.56, else below 0.3
+IDLE = 0.9  # innovation with a gap over that without it, after the first fits, from which it does nothing beside forces that simulations have
+# found, for the base is right then: where there is none 0.96 to 1.03; else below 0.3, with 3 % of dirt 0.56
 CLOSED = 0.8  # innovation without a gap over that with it from which the gap is not looked for where it was
 OWN, GAP = len(NAMES), NAMES.index("gap")
 
