@@ -29,6 +29,8 @@ LIKE = 0.1  # of the whole power in each excited band that the first stage must 
 FEWEST = 256  # samples
 WINDOWS = 14.0  # window lengths that a record must hold at least; else they are made shorter
 SEEN, HELD = 3.0, 1.5  # window lengths of a block that a fit sees, and of one that is held out
+LOOK = 0.05  # s between two looks at the way that was gone: noise adds nothing to it
+ONCE = 1.2  # times the travel, which a way must be at least for places to be passed again
 SHIFTS = 4  # places tried for the blocks that are held out
 
 
@@ -102,6 +104,18 @@ class AxisData:
     def swing(self) -> float:
         """Usual way between two reversals, m."""
         return swing(self.sampling_rate, smoothed(self.sampling_rate, self.velocity, 300.0), self.velocity)
+
+    @property
+    def reach(self) -> tuple[float, float]:
+        """Least and largest position, m."""
+        return float(np.min(self.position)), float(np.max(self.position))
+
+    @property
+    def passed_once(self) -> bool:
+        """Each place is passed once: what acts there cannot be told from what drifts with time."""
+        apart = max(int(LOOK * self.sampling_rate), 1)
+        way = sum(float(np.sum(np.abs(np.diff(self.position[run][::apart])))) for run in self.runs)
+        return way < ONCE * (self.reach[1] - self.reach[0])
 
     def middle(self) -> FloatArray:
         """(n - r,) measured position at the middle of each sample, m."""

@@ -12,7 +12,7 @@ from math import inf, log
 from typing import Generic, Protocol, TypeVar
 
 from xy_sysid.search.criteria import ALIKE, FEWEST, HOPELESS, LATER, LEAST, OPTIMISM, SIMPLE_FIRST
-from xy_sysid.search.judge import Move
+from xy_sysid.search.moves import Move
 
 
 class Judged(Protocol):

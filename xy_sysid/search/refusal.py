@@ -1,0 +1,47 @@
+"""Why a fit explains nothing, whatever it leaves: a size at its bound, a place where nothing is seen, a mode that nothing excites."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from xy_sysid.axis.model import Library
+from xy_sysid.effects import Effect
+from xy_sysid.greybox.axis_data import AxisData
+from xy_sysid.greybox.free_run import GreyboxFit
+from xy_sysid.search.criteria import FEWEST
+
+
+def refusal(data: AxisData, library: Library, found: GreyboxFit) -> str:
+    """Why a fit explains nothing, whatever it leaves: in words, or empty."""
+    low, high = data.sampling_rate * 0.0, 0.4 * data.sampling_rate
+    excited = data.layout.edges()[:-1][data.floor.excited]
+    if excited.size:
+        low, high = float(excited[0]), min(high, 1.5 * float(data.layout.edges()[1:][data.floor.excited][-1]))
+    for name, values in found.model.effects:
+        effect = library[name]
+        why = effect.refusal(values, data.reach) if effect.refusal is not None else ""
+        if why:
+            return f"{name}: {why}"
+        if data.passed_once and effect.is_by_place and not _repeats(data, effect, values):
+            return f"{name}: each place is passed once, so that what acts by place cannot be told from what drifts"
+        for k, (item, value) in enumerate(zip(effect.on(data.similar), values, strict=True)):
+            edge = value >= item.high * (1.0 - 1e-6) or (k == 0 and not item.positive and value <= item.low * (1.0 + 1e-6) and item.low > 0.0)
+            if k == 0 and edge:
+                return f"{name}: {item.name} is at its bound"
+            known = found.parameter(f"{name}.{item.name}")
+            judged = k == 0 and item.positive and not found.brief and math.isfinite(known.high)
+            if judged and known.low <= item.low * (1.0 + 1e-6):
+                return f"{name}: {item.name} cannot be told from 0"
+            if item.name == effect.mode_frequency and not low <= value <= high:
+                return f"{name}: a mode at {value:.3g} Hz, outside of what these data excite and see ({low:.3g} to {high:.3g} Hz)"
+    limit = data.first / data.sampling_rate / 4.0
+    if found.model.delay >= 0.99 * limit:
+        return f"time_delay: {found.model.delay:.3g} s is at its bound"
+    return ""
+
+
+def _repeats(data: AxisData, effect: Effect, values: Sequence[float]) -> bool:
+    """A law by place that repeats often enough on the travel to be seen in one pass."""
+    period = values[effect.names.index("period")] if "period" in effect.names else 2.0 * math.pi
+    return effect.repeats and (data.reach[1] - data.reach[0]) / period >= FEWEST
