@@ -17,7 +17,8 @@ from xy_sysid.greybox.free_run import EPSILON, AxisData, GreyboxFit, fit, fit_ba
 from xy_sysid.greybox.one_step import one_step_fit
 from xy_sysid.samples.recording import Run
 from xy_sysid.search.criteria import MOST_EFFECTS
-from xy_sysid.search.diagnose import lacking, not_enough
+from xy_sysid.search.diagnose import not_enough
+from xy_sysid.search.enough_data import lacking
 from xy_sysid.search.findings import Findings, Rung, findings, rung
 from xy_sysid.search.judge import FreeRunJudge
 from xy_sysid.search.of_run import diagnose

@@ -1,0 +1,83 @@
+"""Do the data suffice to name anything? What is lacking, in words: time, motion, tones, an output that follows the input."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import scipy.signal
+
+from xy_sysid.errors import BadInput
+from xy_sysid.greybox.axis_data import AxisData, prepare_all
+from xy_sysid.samples.block import FloatArray
+from xy_sysid.search.criteria import CHANCE, FEWEST, STILL
+
+
+def lacking(sampling_rate: float, recordings: Sequence[tuple[FloatArray, FloatArray]]) -> str:
+    """What is missing in the data, in words; empty if they will do."""
+    voltage, position = max(recordings, key=lambda pair: pair[0].size)
+    if float(voltage.std()) == 0.0:
+        return "the input does not move; excite the axis."
+    if float(position.std()) == 0.0:
+        return "the output does not move; excite more, or check the encoder."
+    try:
+        data = prepare_all(sampling_rate, recordings)
+    except BadInput as problem:
+        return str(problem)
+    if data.held is data.fitted:
+        seconds = voltage.size / sampling_rate
+        return f"{seconds:.3g} s without a gap are too few windows to fit some and judge by others; record longer, better 60 s."
+    followed, least = _coherence(sampling_rate, voltage, position)
+    if followed < least:
+        return f"the output does not follow the input (coherence {followed:.2g} at best, {least:.2g} is the least); check which signals these are."
+    moving = [_moving(data, begins) for begins in (data.fitted.begins, data.held.begins)]
+    if moving[0] < 2 * FEWEST or moving[1] < FEWEST:
+        seconds = data.layout.length / sampling_rate
+        return (
+            f"the axis stands most of the time: it moves in {moving[0] + moving[1]} of {data.fitted.begins.size + data.held.begins.size} windows "
+            f"of {seconds:.2g} s; let it move for longer, in all of its directions and speeds."
+        )
+    if _tones(voltage) < FEWEST:
+        return "the input holds one tone only; use noise, a multisine over the whole band, or steps."
+    excited = int(data.floor.excited.sum())
+    if excited < FEWEST:
+        return f"only {excited} bands of frequency are excited; use noise or a multisine over the whole band."
+    return ""
+
+
+def _moving(data: AxisData, begins: np.ndarray) -> int:
+    """How many windows hold motion, against the liveliest tenth of all."""
+    every = np.concatenate((data.fitted.begins, data.held.begins))
+    length = data.layout.length
+
+    def sizes(starts: np.ndarray) -> FloatArray:
+        return np.array([float(np.std(data.velocity[start : start + length])) for start in starts])
+
+    return int(np.sum(sizes(begins) > STILL * float(np.quantile(sizes(every), 0.9))))
+
+
+def _tones(voltage: FloatArray) -> float:
+    """How many tones the input holds, at least: lines of its spectrum within 50 dB of the largest, over the width of one tone's."""
+    power = np.abs(np.fft.rfft((voltage - voltage.mean()) * scipy.signal.get_window("blackmanharris", voltage.size))) ** 2
+    return float(np.sum(power > 1e-5 * float(power.max()))) / 8.0  # the window's main lobe; its side lobes are 92 dB down
+
+
+def _coherence(sampling_rate: float, voltage: FloatArray, position: FloatArray) -> tuple[float, float]:
+    """The best of all octaves' mean coherence of input and velocity, and the least that is not chance, for the best length of window.
+
+    Of unrelated signals it is one over the number of windows, and spreads as much (Carter, Knapp & Nuttall 1973); an octave has two lines
+    at least.
+    """
+    best = (0.0, 1.0)
+    for part in (16, 8):
+        length = int(2 ** np.floor(np.log2(voltage.size / part)))
+        if length < 32:
+            continue
+        with np.errstate(all="ignore"):  # of a line that holds nothing there is none
+            frequency, value = scipy.signal.coherence(voltage[:-1], np.diff(position), sampling_rate, nperseg=length)
+        octave = np.floor(np.log2(np.maximum(frequency, frequency[1]) / frequency[-1])).astype(np.int64)
+        means = [float(np.nanmean(np.nan_to_num(value[octave == k]))) for k in range(-12, 0) if int(np.sum(octave == k)) >= 2]
+        found = (max(means, default=0.0), (1.0 + CHANCE / math.sqrt(2.0)) / part)
+        best = max(best, found, key=lambda item: item[0] / item[1])
+    return best
