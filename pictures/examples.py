@@ -143,7 +143,7 @@ EXAMPLES = (
         "base_resonance",
         (FREQUENCY, BODE, ZOOM),
         "A small notch with a peak right beside it, near 47 Hz; the error rings at that frequency in time. The same transfer function as a "
-        "compliant screw: below 90 Hz the base is named, which is a prior and not a measurement.",
+        "compliant screw: the name is the likelier by what is usual of both, which is a prior and not a measurement.",
     ),
     Example(
         "hardening_stiffness",
