@@ -27,7 +27,7 @@ def equals(library: Library, name: str) -> list[Effect]:
 def likelihood(library: Library, name: str, values: Sequence[float]) -> float:
     """How likely it is this effect (0..1) among those of the same law; 1 if there are no others.
 
-    Each of an effect's parameters is taken as log-normal about its usual size.
+    Each of an effect's positive parameters is taken as log-normal about its usual size.
     """
     others = equals(library, name)
     if len(others) == 1:
@@ -38,8 +38,8 @@ def likelihood(library: Library, name: str, values: Sequence[float]) -> float:
 
 
 def _depth(effect: Effect, values: Sequence[float]) -> float:
-    usual = (math.log(abs(value) / abs(item.typical)) / math.log(USUAL_WITHIN) for item, value in zip(effect.parameters, values, strict=True))
-    return -0.5 * sum(part**2 for part in usual)
+    pairs = ((item.typical, value) for item, value in zip(effect.parameters, values, strict=True) if item.positive)
+    return -0.5 * sum((math.log(value / typical) / math.log(USUAL_WITHIN)) ** 2 for typical, value in pairs)
 
 
 def likely_names(ladder: Ladder, kept: Sequence[str] = ()) -> Ladder:
