@@ -158,15 +158,15 @@ class FreeRunJudge:
     def better(self, one: GreyboxFit, other: GreyboxFit) -> bool:
         """One predicts the held-out windows better than the other, by more than chance: paired over windows, in the mean or in the ranks.
 
-        Where these are too few to tell, as in short recordings, both are fitted to them as well, and judged by the others: then every
-        window counts, each held out once. A fit that was given up, for it was far behind, is worse.
+        Where all of them say so and are yet too few to tell, as in short recordings, both are fitted to them as well, and judged by the others:
+        then every window counts, each held out once. A fit that was given up, for it was far behind, is worse.
         """
         if other.brief:
             return True
         gain = _scores(other, self.data) - _scores(one, self.data)
         if _is_no_chance(gain):
             return True
-        if not float(np.mean(gain)) > 0.0 or self.late():
+        if not np.all(gain > 0.0) or self.late():
             return False
         data = replace(self.data, fitted=self.data.held, held=self.data.fitted)
         try:
