@@ -228,13 +228,13 @@ class Search(Generic[F]):
         return next((item for item in self.waiting if item[0] is at and item[1].effects == move.effects), None)
 
     def _known(self, parent: Node[F], move: Move) -> bool:
-        """The set was fitted. One that left more than a set which it contains, or than the move does before any fit, went astray, and may be
+        """The set was fitted. One that left more than a set which it contains, or far more than the move does before any fit, went astray, and may be
         fitted again from another; one of which there is a brief fit alone is not known where all data show more."""
         known = self.nodes.get(move.effects)
         if known is None or (parent.is_slow(self.least) and not known.whole):
             return False
         inside = (node.fit.excess for effects, node in self.nodes.items() if effects < move.effects and not node.refused)
-        return known.fit.excess <= min((move.begins, *inside)) + LEAST
+        return known.fit.excess <= min(move.begins + HOPELESS, *(left + LEAST for left in inside), inf)
 
     def _order(self, item: tuple[Node[F], Move]) -> tuple[float, bool]:
         """What may become best first; simple and single moves are quick, and often enough; of equals what every machine has."""
