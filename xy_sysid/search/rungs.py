@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +12,7 @@ from xy_sysid.axis.model import Library
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.search.best_first import Search
-from xy_sysid.search.criteria import AT_FLOOR, LEAST
+from xy_sysid.search.criteria import ALIKE, AT_FLOOR, LEAST
 from xy_sysid.search.equal_laws import is_the_same, likely_names
 from xy_sysid.search.judge import FreeRunJudge, joined
 from xy_sysid.search.ladder import Candidate, Ladder, Rival, Step, contains, is_taken_for, part_explained
@@ -87,7 +88,7 @@ def ladder_of_search(
     final, own = joined(data, node.fit, judge.late), settled.sizes()
     names = tuple(name for name, _ in final.model.effects)
     sizes = {name: [own[part] for part in _parts(judge.library, name) if part in own] for name in names}
-    ordered = tuple(sorted(names, key=lambda name: -max(sizes[name], default=0.0)))
+    ordered = _ordered(judge.library, {name: max(each, default=0.0) for name, each in sizes.items()})
     ordered = (*given.names, *(name for name in ordered if name not in given.names))
     rivals = sorted(
         (
@@ -117,6 +118,13 @@ def ladder_of_search(
         stopped=search.stopped,
     )
     return likely_names(ladder, given.names)
+
+
+def _ordered(library: Library, sizes: Mapping[str, float]) -> tuple[str, ...]:
+    """Names, the largest size first; of what is alike to the largest dry friction first, as every machine has it."""
+    order = sorted(sizes, key=lambda name: -sizes[name])
+    alike = [name for name in order if library[name].is_dry and sizes[name] >= ALIKE * sizes[order[0]]]
+    return tuple(dict.fromkeys((*alike, *order)))
 
 
 def _kept_out(search: Search[GreyboxFit], left: float) -> Rival | None:
