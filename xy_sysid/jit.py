@@ -40,6 +40,11 @@ def compiled(function: Callable[P, R], exact: bool = True) -> Callable[P, R]:
     return cast("Callable[P, R]", numba.njit(cache=True, nogil=True, fastmath=False if exact else set(REORDERED))(function))
 
 
+def inlined(function: Callable[P, R]) -> Callable[P, R]:
+    """The same function, compiled, not exact, and written into each compiled one that calls it: for what takes less time than a call."""
+    return cast("Callable[P, R]", numba.njit(cache=True, nogil=True, fastmath=set(REORDERED), forceinline=True)(function))
+
+
 def cores() -> int:
     """How many threads may calculate at once: those that this process may use, or the environment's NUMBA_NUM_THREADS."""
     return int(vars(numba.config)["NUMBA_NUM_THREADS"])  # its module of settings declares none of them

@@ -99,6 +99,11 @@ def needs_speed(effect: Effect) -> bool:
     return effect.category in ("force", "friction") and any("v" in arguments(item) for item in effect.functions.values())
 
 
+def _asks_where(effect: Effect) -> bool:
+    """True for a force or a state whose law asks where the axis is, or when."""
+    return effect.category in ("force", "state") and any({"x", "t"} & set(arguments(item)) for item in effect.functions.values())
+
+
 def heeds_speed(effect: Effect) -> bool:
     """True if the law asks for the speed: then a resonance must be in the loop with it."""
     if effect.is_dry:
@@ -132,6 +137,7 @@ def _flags(effects: Sequence[Effect]) -> str:
         "sloped": [effect for effect in effects if effect.straight],
         "any_state": _of(effects, "state"),
         "any_pull": [effect for effect in _of(effects, "force") if not needs_speed(effect)],
+        "placed": [effect for effect in effects if _asks_where(effect)],
         "dry": _of(effects, "friction"),
         "bristled": _of(effects, "bristle"),
     }
@@ -236,8 +242,8 @@ def _bristle(effects: Sequence[Effect], hung: bool) -> str:
         forces += [flag, f"    push -= turn * {_call(effect, 'force', words('middle'))}"]
         relaxes += [flag, f"    {state} = {_call(effect, 'bend', words('0.5 * (middle + end)'))}"]
     if hung:
-        half = "middle = 0.5 * (v + ahead(moving, swung, first))"
-        move = ["moved += step(moving, swung, push, spare)", "end = swung[1]"]
+        half = "middle = 0.5 * (v + ahead(moving, piece, swung, first))"
+        move = ["moved += step(moving, piece, swung, push, spare)", "end = swung[1]"]
     else:
         half = "middle = v + 0.5 * (gain * first - v) * (1.0 - decay)"
         move = ["reach = gain * push", "end = reach + (v - reach) * decay", "moved += reach * h + (v - reach) * spent"]

@@ -45,26 +45,28 @@ $hang
         wanted = fine * lighter if curved or sloped else fine
         cuts_old, cuts_new = pieces(part, min(max(wanted / fs, stiff), $most * fine) if heeded or curved else 1.0)
         h_old, h_new = part / fs / cuts_old, (1.0 - part) / fs / cuts_new
-        moving_old, moving_new = exponential(generator_moving, h_old), exponential(generator_moving, h_new)
-        still_old, still_new = exponential(generator_still, h_old), exponential(generator_still, h_new)
         size = top.size + 2
+        moving, still = np.empty((2, size, size)), np.empty((2, size, size))  # over each piece
+        moving[0], moving[1] = exponential(generator_moving, h_old), exponential(generator_moving, h_new)
+        still[0], still[1] = exponential(generator_still, h_old), exponential(generator_still, h_new)
         swung, spare, series = np.zeros(size), np.zeros(size), np.zeros(($terms, size))
         swung[1], swung[2] = start, start / top[0]  # what hangs on it moves along
         for i in range(n):
             moved = 0.0
             for piece in range(2):
                 if piece == 0:
-                    h, cuts, moving, still, middle_of = h_old, cuts_old, moving_old, still_old, 0.5 * part
+                    h, cuts, middle_of = h_old, cuts_old, 0.5 * part
                 else:
-                    h, cuts, moving, still, middle_of = h_new, cuts_new, moving_new, still_new, 0.5 * (1.0 + part)
+                    h, cuts, middle_of = h_new, cuts_new, 0.5 * (1.0 + part)
                 if h <= 0.0:
                     continue
                 k = i - whole - 1 + piece
                 volts = held[k] if k >= 0 else 0.0
-                time = (i + middle_of) / fs
-                aside = $gauss * (middle_of if piece == 0 else 1.0 - middle_of)
-                place, near, far = along(x, i, middle_of), along(x, i, middle_of - aside), along(x, i, middle_of + aside)
-                pull = 0.0
+                time = place = near = far = pull = 0.0
+                if placed:
+                    time = (i + middle_of) / fs
+                    aside = $gauss * (middle_of if piece == 0 else 1.0 - middle_of)
+                    place, near, far = along(x, i, middle_of), along(x, i, middle_of - aside), along(x, i, middle_of + aside)
                 if any_pull:
 $pulls
                 for cut in range(cuts):
@@ -76,11 +78,14 @@ $advance
                     drag = 0.0
 $drag_start
                     push = net - drag
+                    if not heeded:
+                        moved += step(moving, piece, swung, net, spare)
+                        continue
                     if not dry and not bristled:
-                        middle = 0.5 * (v + ahead(moving, swung, push))
+                        middle = 0.5 * (v + ahead(moving, piece, swung, push))
                         drag = 0.0
 $drag_free
-                        moved += step(moving, swung, net - drag, spare)
+                        moved += step(moving, piece, swung, net - drag, spare)
                         continue
                     if v != 0.0:
                         direction = 1.0 if v > 0.0 else -1.0
@@ -93,9 +98,9 @@ $bristle_hung
                         continue
                     plus, minus = (rest_forth, rest_back) if gain > 0.0 else (rest_back, rest_forth)
                     if v == 0.0 and -minus <= push + tug(generator_moving, swung) <= plus:
-                        moved += hold(generator_moving, generator_still, still, swung, push, plus, minus, h, series, spare)
+                        moved += hold(generator_moving, generator_still, still, piece, swung, push, plus, minus, h, series, spare)
                         continue
-                    middle = 0.5 * (v + ahead(moving, swung, push - turn * direction * level))
+                    middle = 0.5 * (v + ahead(moving, piece, swung, push - turn * direction * level))
                     if middle * direction < 0.0:
                         middle = 0.0
                     drag = 0.0
@@ -104,8 +109,8 @@ $drag_middle
                     level = fixed_forth if direction > 0.0 else fixed_back
 $level_middle
                     force = push - turn * direction * level
-                    if ahead(moving, swung, force) * direction >= 0.0:
-                        moved += step(moving, swung, force, spare)
+                    if ahead(moving, piece, swung, force) * direction >= 0.0:
+                        moved += step(moving, piece, swung, force, spare)
                     else:
                         moved += stop(generator_moving, generator_still, swung, push, force, plus, minus, h, series)
             out[i] = moved * fs
@@ -183,10 +188,11 @@ $pulls
                     continue
                 k = i - whole - 1 + piece
                 volts = held[k] if k >= 0 else 0.0
-                time = (i + middle_of) / fs
-                aside = $gauss * (middle_of if piece == 0 else 1.0 - middle_of)
-                place, near, far = along(x, i, middle_of), along(x, i, middle_of - aside), along(x, i, middle_of + aside)
-                pull = 0.0
+                time = place = near = far = pull = 0.0
+                if placed:
+                    time = (i + middle_of) / fs
+                    aside = $gauss * (middle_of if piece == 0 else 1.0 - middle_of)
+                    place, near, far = along(x, i, middle_of), along(x, i, middle_of - aside), along(x, i, middle_of + aside)
                 if any_pull:
 $pulls
                 for cut in range(cuts):

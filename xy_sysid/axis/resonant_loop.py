@@ -24,12 +24,13 @@ import math
 
 import numpy as np
 
-from xy_sysid.jit import compiled
+from xy_sysid.jit import compiled, inlined
 from xy_sysid.samples.block import FloatArray
 
 FINE = 1e5  # Hz at which a section is asked for its roots: far above any resonance, so that none is folded back
 TERMS = 10  # of power series within a sub-step; as STIFF is 0.5, the first that is left out is below 1e-10
 STIFF = 0.5  # longest sub-step times the fastest rate
+ONE_MODE = 5  # numbers of a state with one resonance, the usual case, whose sums are written out
 CUTS = 0.004  # s: most sub-steps of a sample over the rate asked for, Hz, however stiff a trial is: a first round must not last minutes
 
 
@@ -125,25 +126,35 @@ def exponential(a: FloatArray, h: float) -> FloatArray:
     return made
 
 
-@compiled
-def ahead(by: FloatArray, state: FloatArray, force: float) -> float:
+@inlined
+def ahead(by: FloatArray, piece: int, state: FloatArray, force: float) -> float:
     """Speed at the end of a sub-step under a constant force."""
     n = state.size
-    total: float = by[1, n - 1] * force
+    if n == ONE_MODE:
+        only: float = by[piece, 1, 1] * state[1] + by[piece, 1, 2] * state[2] + by[piece, 1, 3] * state[3] + by[piece, 1, 4] * force
+        return only
+    total: float = by[piece, 1, n - 1] * force
     for j in range(1, n - 1):
-        total += by[1, j] * state[j]
+        total += by[piece, 1, j] * state[j]
     return total
 
 
-@compiled
-def step(by: FloatArray, state: FloatArray, force: float, spare: FloatArray) -> float:
+@inlined
+def step(by: FloatArray, piece: int, state: FloatArray, force: float, spare: FloatArray) -> float:
     """Moves the state on by a sub-step; returns the distance, m."""
     n = state.size
+    if n == ONE_MODE:
+        v, a, b = state[1], state[2], state[3]
+        for i in range(ONE_MODE - 1):
+            state[i] = by[piece, i, 1] * v + by[piece, i, 2] * a + by[piece, i, 3] * b + by[piece, i, 4] * force
+        state[ONE_MODE - 1] = force
+        covered: float = state[0]
+        return covered
     state[0], state[n - 1] = 0.0, force
     for i in range(n - 1):
         total = 0.0
         for j in range(1, n):
-            total += by[i, j] * state[j]
+            total += by[piece, i, j] * state[j]
         spare[i] = total
     for i in range(n - 1):
         state[i] = spare[i]
@@ -151,7 +162,7 @@ def step(by: FloatArray, state: FloatArray, force: float, spare: FloatArray) -> 
     return distance
 
 
-@compiled
+@inlined
 def tug(moving: FloatArray, state: FloatArray) -> float:
     """What the hanging masses add to the force at this instant, V."""
     n = state.size
@@ -242,6 +253,7 @@ def hold(
     moving: FloatArray,
     still: FloatArray,
     by: FloatArray,
+    piece: int,
     state: FloatArray,
     push: float,
     forth: float,
@@ -256,10 +268,10 @@ def hold(
     for j in range(2, n - 1):
         total = 0.0
         for k in range(2, n - 1):
-            total += by[j, k] * state[k]
+            total += by[piece, j, k] * state[k]
         after += moving[1, j] * total / moving[1, n - 1]
     if -back <= after <= forth:
-        return step(by, state, push, spare)
+        return step(by, piece, state, push, spare)
     level = forth if after > 0.0 else -back
     unfold(still, state, push, series)
     powers = np.zeros(TERMS)

@@ -380,6 +380,9 @@ class Effect:
 
         Raises BadInput for columns that are not one finite number for each sample, as an effect of one's own may give.
         """
+        return scene.kept(self.name, lambda: self._guessed(scene))
+
+    def _guessed(self, scene: Scene) -> list[Guess]:
         found = list(self.guesses(scene)) if self.guesses is not None else []
         wanted = scene.error.size
         for guess in found:

@@ -20,6 +20,7 @@ from xy_sysid.effects._scene import Guess, Scene, columns
 from xy_sysid.samples.block import FloatArray
 
 _DAMPING = 0.03  # of the first guess; real frames and screws have 0.01 to 0.1
+_LIKELY = 4  # frequencies of which the traces are worked out, of those that the spectra show
 
 
 @law
@@ -42,18 +43,47 @@ def pair(zero: float, zero_damping: float, pole: float, pole_damping: float, fs:
 
 
 def guesses(scene: Scene, low: float, high: float) -> Iterator[Guess]:
-    """Traces of pairs with poles between ``low`` and ``high`` (Hz), every 6 per cent; none where the sampling is too slow to see one."""
+    """Traces of the likeliest pairs with poles between ``low`` and ``high`` (Hz); none where the sampling is too slow to see one."""
     top = min(high, 0.35 * scene.sampling_rate)
     if top <= low:
         return
     model = scene.velocity - scene.error
-    for frequency in np.geomspace(low, top, max(int(math.log(top / low) / 0.06), 2)):
+    for frequency in _likely(scene, np.geomspace(low, top, max(int(math.log(top / low) / 0.06), 2))):
         w = 2.0 * math.pi * float(frequency)
         c = w / math.tan(0.5 * w / scene.sampling_rate)  # s = c (z - 1) / (z + 1), exact at the pair
         a = np.array([c * c + 2.0 * _DAMPING * w * c + w * w, 2.0 * (w * w - c * c), c * c - 2.0 * _DAMPING * w * c + w * w])
         poles = scipy.signal.lfilter([1.0], a, model)  # and both numerators of what they make
         once, twice = np.append(0.0, poles[:-1]), np.concatenate(((0.0, 0.0), poles[:-2]))
         yield Guess(columns(c * c * (poles - 2.0 * once + twice), c * w * (poles - twice)), _Reader(float(frequency)))
+
+
+def _likely(scene: Scene, frequencies: FloatArray) -> FloatArray:
+    """Of these frequencies (Hz) the few at which a pair would take most of the error, beside what gain, delay and pole can, by averaged
+    spectra: what bends counts there as if it were linear."""
+    f, power, cross, weight = _error_spectra(scene)
+    if f.size == 0:
+        return frequencies[: _LIKELY]
+    s, w = 2j * math.pi * f, 2.0 * math.pi * frequencies[:, None]
+    below = 1.0 / (s * s + 2.0 * _DAMPING * w * s + w * w)
+    base = np.stack((np.ones_like(s), s / abs(s[-1]), scene.pole / (s + scene.pole)))
+    columns = np.concatenate((np.broadcast_to(base, (w.size, *base.shape)), np.stack((s * s * below, w * s * below), axis=1)), axis=1)
+    columns = columns * np.sqrt(power * weight)
+    rows, seen = np.concatenate((columns.real, columns.imag), axis=2), cross * np.sqrt(weight / power)
+    inner, outer = rows @ rows.transpose(0, 2, 1), rows @ np.concatenate((seen.real, seen.imag))
+    gain = np.einsum("fj,fjk,fk->f", outer, np.linalg.pinv(inner, rcond=1e-9, hermitian=True), outer)
+    peaks = scipy.signal.find_peaks(np.concatenate(((0.0,), gain, (0.0,))))[0] - 1
+    return np.asarray(frequencies[peaks[np.argsort(gain[peaks])[::-1][:_LIKELY]]])
+
+
+@lru_cache(maxsize=1)
+def _error_spectra(scene: Scene) -> tuple[FloatArray, FloatArray, NDArray[np.complex128], FloatArray]:
+    """Frequency (Hz), power of the model's motion, its cross spectrum with the error, and weight, by which each octave counts as much."""
+    model, length = scene.velocity - scene.error, _length(scene)
+    f, power = scipy.signal.welch(model, scene.sampling_rate, "hann", length)
+    cross = scipy.signal.csd(model, scene.error, scene.sampling_rate, "hann", length)[1]
+    own = scipy.signal.welch(scene.error, scene.sampling_rate, "hann", length)[1]
+    used = (f > 0.0) & (f < 0.35 * scene.sampling_rate) & (power > 0.0) & (own > 0.0)
+    return np.asarray(f[used]), np.asarray(power[used]), np.asarray(cross[used]), np.asarray(1.0 / (own * f)[used])
 
 
 class _Reader:
@@ -92,21 +122,29 @@ def _of_response(scene: Scene) -> tuple[float, float, float, tuple[float, ...]] 
     scale = 2.0 * math.pi * float(np.sqrt(f[0] * f[-1]))
     s = 2j * math.pi * f / scale
     box = np.sinc(f / scene.sampling_rate) ** 2  # held input, mean output
-    delays = np.arange(-12.0, 4.01, 0.25) / scene.sampling_rate  # all at once; a rigid base takes a large pair for more delay
-    target = response * np.exp(np.outer(delays, s * scale)) / box
     powers = np.stack([s**2, s, s**0], axis=1)
-    matrix = np.concatenate((np.broadcast_to(powers, (delays.size, *powers.shape)), -target[:, :, None] * powers), axis=2)
-    right, denominator, found = target * s**3, np.ones_like(target), np.zeros((delays.size, 6))
-    for _ in range(6):
-        row = (weight / (np.abs(target) * np.abs(denominator)))[:, :, None]
-        both, wanted = matrix * row, right[:, :, None] * row
-        q, r = np.linalg.qr(np.concatenate((both.real, both.imag), axis=1))
-        found = (np.linalg.pinv(r) @ (q.transpose(0, 2, 1) @ np.concatenate((wanted.real, wanted.imag), axis=1)))[:, :, 0]
-        denominator = s**3 + found[:, 3:] @ powers.T
-    misfit = np.sum((weight * np.abs(1.0 - found[:, :3] @ powers.T / denominator / target)) ** 2, axis=1)
-    if not np.isfinite(misfit).any():
+
+    def fitted(delays: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(delays, 6) numerator and denominator, and (delays,) misfit, for each, s; all at once."""
+        target = response * np.exp(np.outer(delays, s * scale)) / box
+        matrix = np.concatenate((np.broadcast_to(powers, (delays.size, *powers.shape)), -target[:, :, None] * powers), axis=2)
+        right, denominator, found = target * s**3, np.ones_like(target), np.zeros((delays.size, 6))
+        for _ in range(6):
+            row = (weight / (np.abs(target) * np.abs(denominator)))[:, :, None]
+            both, wanted = matrix * row, right[:, :, None] * row
+            q, r = np.linalg.qr(np.concatenate((both.real, both.imag), axis=1))
+            found = (np.linalg.pinv(r) @ (q.transpose(0, 2, 1) @ np.concatenate((wanted.real, wanted.imag), axis=1)))[:, :, 0]
+            denominator = s**3 + found[:, 3:] @ powers.T
+        misfit = np.sum((weight * np.abs(1.0 - found[:, :3] @ powers.T / denominator / target)) ** 2, axis=1)
+        return found, np.where(np.isfinite(misfit), misfit, np.inf)
+
+    delays = np.arange(-12.0, 4.01) / scene.sampling_rate  # a rigid base takes a large pair for more delay
+    nearest = delays[int(np.argmin(fitted(delays)[1]))]
+    delays = nearest + np.arange(-0.75, 0.76, 0.25) / scene.sampling_rate
+    found, misfit = fitted(delays)
+    best = int(np.argmin(misfit))
+    if not np.isfinite(misfit[best]):
         return None
-    best = int(np.nanargmin(misfit))
     delay, c = float(delays[best]), found[best]
     zeros, poles = np.roots(c[:3]) * scale, np.roots([1.0, *c[3:]]) * scale
     real = poles[np.abs(poles.imag) < 1e-9 * np.abs(poles)]
@@ -121,9 +159,14 @@ def _of_response(scene: Scene) -> tuple[float, float, float, tuple[float, ...]] 
     return float(c[2] / c[5]), delay, -float(real[0].real), (top / bottom - 1.0, bottom, dampings[0], dampings[1])
 
 
+def _length(scene: Scene) -> int:
+    """Samples of a window: up to 2 s, four of them at least."""
+    return int(2 ** np.floor(np.log2(min(2.0 * scene.sampling_rate, scene.voltage.size / 4.0))))
+
+
 def _response(scene: Scene) -> tuple[FloatArray, NDArray[np.complex128], FloatArray]:
     """Frequency (Hz), response (m/s/V) and weight of the relative error, at the excited lines."""
-    length = int(2 ** np.floor(np.log2(min(2.0 * scene.sampling_rate, scene.voltage.size / 4.0))))
+    length = _length(scene)
     f, cross = scipy.signal.csd(scene.voltage, scene.velocity, scene.sampling_rate, "hann", length)
     power = scipy.signal.welch(scene.voltage, scene.sampling_rate, "hann", length)[1]
     output = scipy.signal.welch(scene.velocity, scene.sampling_rate, "hann", length)[1]

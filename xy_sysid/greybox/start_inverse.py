@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import scipy.fft
@@ -22,6 +23,7 @@ from xy_sysid.samples.block import FloatArray
 CUTOFFS = (10.0, 40.0)  # Hz: slow machines move below the first, quick ones up to the second
 REST = 0.2  # part of the usual speed below which friction may be holding it
 FEW = 0.05  # part of the samples that must be in motion, else all are used
+TOLD = 0.01  # part of what is left of the voltage that an effect takes away at least; of 14 s below 10 Hz chance takes half of it
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +37,7 @@ class InverseStart:
 
 
 def inverse_starts(effect: Effect, scene: Scene, samples: int, forces: Sequence[FloatArray] = (), rubs: bool = False) -> list[InverseStart]:
-    """One for each low-pass at most, from the first samples.
+    """One for each low-pass at most, from the first samples; none where the effect explains nothing.
 
     forces: (n,) V each, of what the model has already, whose sizes are free; rubs: dry friction is among them
     """
@@ -45,24 +47,23 @@ def inverse_starts(effect: Effect, scene: Scene, samples: int, forces: Sequence[
     guesses = effect.guessed(scene) if cutoffs else []
     if not guesses:
         return []
-    seen_velocity, seen_voltage = (scipy.fft.rfft(signal[:samples]) for signal in (scene.velocity, scene.voltage))
     seen_forces = [scipy.fft.rfft(force[:samples]) for force in forces]
     seen_columns = [scipy.fft.rfft(guess.columns[:, :samples], axis=1) for guess in guesses]
     found = []
     for cutoff in cutoffs:
-        slow = LowPass.of(samples, scene.sampling_rate, cutoff)
-        velocity, acceleration, voltage = slow(seen_velocity), slow(seen_velocity, derived=True), slow(seen_voltage)
+        slow, acceleration, velocity, voltage = _motion(scene, samples, cutoff)
         rows = slow.inside()
         if effect.is_dry or rubs:
             moving = minimum_filter1d(np.abs(velocity), 2 * int(0.5 * slow.rate / cutoff) + 1) > REST * float(np.std(velocity))
             rows = rows & moving if float(np.mean(moving)) > FEW else rows
-        best, kept = np.inf, None
         beside = [slow(force) for force in seen_forces]
+        known = np.array([acceleration, velocity, *beside])[:, rows]
+        best, kept = (1.0 - TOLD) * _least(known, voltage[rows])[1] / (float(voltage[rows] @ voltage[rows]) + 1e-300), None
         for guess, columns in zip(guesses, seen_columns, strict=True):
             acting = slow(columns)
             target = voltage - acting[0] if guess.whole else voltage
             free = acting[:0] if guess.whole else acting
-            coefficients, left = _least(np.array([acceleration, velocity, *beside, *free])[:, rows], target[rows])
+            coefficients, left = _least(np.concatenate((known, free[:, rows])), target[rows])
             left /= float(target[rows] @ target[rows]) + 1e-300
             if left < best and coefficients[0] * coefficients[1] > 0.0:
                 inertia, drag, *sizes = (float(value) for value in coefficients[: 2 + len(beside)])
@@ -72,6 +73,14 @@ def inverse_starts(effect: Effect, scene: Scene, samples: int, forces: Sequence[
         if kept is not None:
             found.append(kept)
     return found
+
+
+@lru_cache(maxsize=4)
+def _motion(scene: Scene, samples: int, cutoff: float) -> tuple[LowPass, FloatArray, FloatArray, FloatArray]:
+    """The low-pass, and acceleration, velocity and voltage through it: the same for all effects."""
+    slow = LowPass.of(samples, scene.sampling_rate, cutoff)
+    velocity, voltage = (scipy.fft.rfft(signal[:samples]) for signal in (scene.velocity, scene.voltage))
+    return slow, slow(velocity, derived=True), slow(velocity), slow(voltage)
 
 
 @dataclass(frozen=True, slots=True)
