@@ -151,6 +151,25 @@ def test_of_two_that_promise_the_same_the_simpler_is_tried_first() -> None:
     assert tried == [of("b"), of("a")]
 
 
+def test_what_is_known_of_a_start_weighs_as_much_as_what_is_promised() -> None:
+    """A promise far beyond what is left is no more than a promise; a start that leaves little is certain."""
+    judge = Table({of(): 9.0, of("a"): 8.9, of("b"): 2.0}, {of(): all_of(("a", 2.5), ("b", 0.2))}, begins={(of(), of("b")): 3.0}, parameters={"b": 4})
+    assert searched(judge)[1][0] == of("b")
+
+
+def test_of_a_set_that_all_data_show_anew_the_brief_fit_is_not_done_again() -> None:
+    """What it left of the first stage's data is known; what it leaves of all is asked."""
+    judge = Table(
+        {of(): 3.0, of("a"): 1.5, of("a", "b"): 0.5},
+        {of(): all_of(("a", 1.0)), of("a"): all_of(("b", 0.3))},
+        slowly={of("a"): all_of(("b", 1.0))},
+        briefly={of("a"): 1.0, of("a", "b"): 0.995},
+    )
+    search, _ = searched(judge)
+    assert judge.briefs.count(of("a", "b")) == 1 and of("a", "b") in judge.wholes
+    assert search.best.effects == of("a", "b")
+
+
 def test_of_two_that_promise_the_same_friction_is_tried_first() -> None:
     """Every machine has it."""
     promises = {of(): all_of(("a", 0.4), ("b", 0.4))}
@@ -544,13 +563,14 @@ def test_a_set_that_left_more_than_another_way_to_it_begins_with_is_fitted_again
     """Two at once went astray from nothing; beside the first, the second begins with less than that fit ended with."""
     promises = {of(): all_of(("ab", 3.9), ("a", 1.0)), of("a"): all_of(("b", 0.1))}
     judge = Table(
-        {of(): 4.0, of("a"): 3.0, of("a", "b"): 0.0},
+        {of(): 4.0, of("a"): 2.97, of("a", "b"): 0.0},
         promises,
         astray={(of(), of("a", "b")): 2.99},
-        begins={(of("a"), of("a", "b")): begins},
+        begins={(of("a"), of("a", "b")): begins, (of(), of("a", "b")): 0.5},
         lost=True,
     )
-    search, _ = searched(judge)
+    search, tried = searched(judge)
+    assert tried[0] == of("a", "b")
     assert judge.briefs.count(of("a", "b")) == fits
     assert search.best.effects == (of("a", "b") if fits == 2 else of("a"))
 

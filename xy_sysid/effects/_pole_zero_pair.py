@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from functools import lru_cache
 
 import numpy as np
+import scipy.fft
 import scipy.signal
 from numpy.typing import NDArray
 
@@ -62,7 +63,7 @@ def _likely(scene: Scene, frequencies: FloatArray) -> FloatArray:
     spectra: what bends counts there as if it were linear."""
     f, power, cross, weight = _error_spectra(scene)
     if f.size == 0:
-        return frequencies[: _LIKELY]
+        return frequencies[:_LIKELY]
     s, w = 2j * math.pi * f, 2.0 * math.pi * frequencies[:, None]
     below = 1.0 / (s * s + 2.0 * _DAMPING * w * s + w * w)
     base = np.stack((np.ones_like(s), s / abs(s[-1]), scene.pole / (s + scene.pole)))
@@ -75,15 +76,13 @@ def _likely(scene: Scene, frequencies: FloatArray) -> FloatArray:
     return np.asarray(frequencies[peaks[np.argsort(gain[peaks])[::-1][:_LIKELY]]])
 
 
-@lru_cache(maxsize=1)
 def _error_spectra(scene: Scene) -> tuple[FloatArray, FloatArray, NDArray[np.complex128], FloatArray]:
     """Frequency (Hz), power of the model's motion, its cross spectrum with the error, and weight, by which each octave counts as much."""
-    model, length = scene.velocity - scene.error, _length(scene)
-    f, power = scipy.signal.welch(model, scene.sampling_rate, "hann", length)
-    cross = scipy.signal.csd(model, scene.error, scene.sampling_rate, "hann", length)[1]
-    own = scipy.signal.welch(scene.error, scene.sampling_rate, "hann", length)[1]
+    f, seen = _spectra(scene)
+    error, model = seen[2], seen[1] - seen[2]
+    power, own, cross = _mean(model, model).real, _mean(error, error).real, _mean(model, error)
     used = (f > 0.0) & (f < 0.35 * scene.sampling_rate) & (power > 0.0) & (own > 0.0)
-    return np.asarray(f[used]), np.asarray(power[used]), np.asarray(cross[used]), np.asarray(1.0 / (own * f)[used])
+    return f[used], power[used], cross[used], (1.0 / np.where(used, own * f, 1.0))[used]
 
 
 class _Reader:
@@ -159,18 +158,26 @@ def _of_response(scene: Scene) -> tuple[float, float, float, tuple[float, ...]] 
     return float(c[2] / c[5]), delay, -float(real[0].real), (top / bottom - 1.0, bottom, dampings[0], dampings[1])
 
 
-def _length(scene: Scene) -> int:
-    """Samples of a window: up to 2 s, four of them at least."""
-    return int(2 ** np.floor(np.log2(min(2.0 * scene.sampling_rate, scene.voltage.size / 4.0))))
+@lru_cache(maxsize=1)
+def _spectra(scene: Scene) -> tuple[FloatArray, NDArray[np.complex128]]:
+    """Frequency (Hz), and (3, windows, lines) of voltage, velocity and error, each Hann window without its mean: up to 2 s, four at least."""
+    length = int(2 ** np.floor(np.log2(min(2.0 * scene.sampling_rate, scene.voltage.size / 4.0))))
+    signals = np.stack((scene.voltage, scene.velocity, scene.error))
+    cut = np.lib.stride_tricks.sliding_window_view(signals, length, axis=-1)[:, :: length // 2]
+    seen = scipy.fft.rfft((cut - cut.mean(axis=-1, keepdims=True)) * scipy.signal.get_window("hann", length))
+    return np.asarray(scipy.fft.rfftfreq(length, 1.0 / scene.sampling_rate)), np.asarray(seen)
+
+
+def _mean(one: NDArray[np.complex128], other: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """(lines,) cross spectrum of (windows, lines), in no unit."""
+    return np.asarray((one.conj() * other).mean(axis=0))
 
 
 def _response(scene: Scene) -> tuple[FloatArray, NDArray[np.complex128], FloatArray]:
     """Frequency (Hz), response (m/s/V) and weight of the relative error, at the excited lines."""
-    length = _length(scene)
-    f, cross = scipy.signal.csd(scene.voltage, scene.velocity, scene.sampling_rate, "hann", length)
-    power = scipy.signal.welch(scene.voltage, scene.sampling_rate, "hann", length)[1]
-    output = scipy.signal.welch(scene.velocity, scene.sampling_rate, "hann", length)[1]
+    f, (voltage, velocity, _) = _spectra(scene)
+    cross, power, output = _mean(voltage, velocity), _mean(voltage, voltage).real, _mean(velocity, velocity).real
     coherence = np.clip(np.abs(cross) ** 2 / np.maximum(power * output, 1e-300), 0.0, 0.9999)
     used = (f > 0.0) & (f < 0.35 * scene.sampling_rate) & (power > 1e-3 * np.max(power)) & (coherence > 0.1)
     weight = np.sqrt(coherence / (1.0 - coherence))
-    return np.asarray(f[used]), np.asarray(cross[used] / power[used]), np.asarray(weight[used])
+    return f[used], np.asarray(cross[used] / power[used]), np.asarray(weight[used])

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -34,7 +35,7 @@ ONCE = 1.2  # times the travel, which a way must be at least for places to be pa
 SHIFTS = 4  # places tried for the blocks that are held out
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class AxisData:
     """One axis without gaps, ready to be fitted, with what its data allow.
 
@@ -95,22 +96,22 @@ class AxisData:
         held, fitted = (float(np.mean(np.abs(windows.spectrum(self.velocity)) ** 2)) for windows in (self.held, self.fitted))
         return float(np.sqrt(held / fitted)) if fitted > 0.0 else 0.0
 
-    @property
+    @cached_property
     def similar(self) -> Similarity:
         """How this motion compares with the one that the effects' bounds are written for."""
         return Similarity.of(self.sampling_rate, self.voltage, self.velocity)
 
-    @property
+    @cached_property
     def swing(self) -> float:
         """Usual way between two reversals, m."""
         return swing(self.sampling_rate, smoothed(self.sampling_rate, self.velocity, 300.0), self.velocity)
 
-    @property
+    @cached_property
     def reach(self) -> tuple[float, float]:
         """Least and largest position, m."""
         return float(np.min(self.position)), float(np.max(self.position))
 
-    @property
+    @cached_property
     def passed_once(self) -> bool:
         """Each place is passed once: what acts there cannot be told from what drifts with time."""
         apart = max(int(LOOK * self.sampling_rate), 1)

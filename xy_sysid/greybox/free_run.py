@@ -245,15 +245,16 @@ def scene_of(data: AxisData, fitted: GreyboxFit, early: bool = True) -> Scene:
 
 def fit(data: AxisData, start: AxisModel, brief: bool = False, hopeless: float = np.inf, late: Callable[[], bool] = in_time) -> GreyboxFit:
     """All parameters of a model, from where it is; brief, hopeless: see ``fit_with``; late: then the best so far is taken."""
-    run, values, scale = problem(data, start, True, sub_steps(data, start, True, COARSE))
-    velocity = data.begun(data.velocity)
-    target = Target(velocity, data.brief, data.floor)
+    rate = sub_steps(data, start, True, COARSE)
+    run, values, scale = problem(data, start, True, rate)
+    target = Target(data.begun(data.velocity), data.brief, data.floor)
     found = solve(run, target, scale, values, Schedule(BRIEF[:1], late))
-    left = data.layout.power(data.brief.spectrum(velocity - run(found.values)))
-    if not (late() or (brief and excess(left, data.floor) > hopeless)):
-        nearer = solve(run, target, scale, found.values, Schedule(BRIEF[1:-1], late), found.change)
-        run, _, _ = problem(data, start, True, sub_steps(data, model_of(data, start, nearer.values), True, MIDDLING))
-        more = solve(run, target, scale, nearer.values, Schedule(BRIEF[-1:], late), nearer.change)
+    if not (late() or (brief and excess(data.layout.power(found.error), data.floor) > hopeless)):
+        nearer = solve(run, target, scale, found.values, Schedule(BRIEF[1:-1], late), found)
+        finer = sub_steps(data, model_of(data, start, nearer.values), True, MIDDLING)
+        if finer != rate:
+            run, _, _ = problem(data, start, True, finer)
+        more = solve(run, target, scale, nearer.values, Schedule(BRIEF[-1:], late), nearer)
         found = replace(more, runs=found.runs + nearer.runs + more.runs)
     if not brief:
         return finish(data, model_of(data, start, found.values), found.runs, late)

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -69,22 +70,7 @@ class Scale:
         return np.asarray(np.clip(values, self.low, self.high))
 
 
-@dataclass(frozen=True, slots=True)
-class Solution:
-    """values: (k,) parameters; covariance: (k, k) of the solver's coordinates; cost: whitened; runs: simulations done.
-
-    change: (k, windows, lines) derivatives of the error, as last known
-    """
-
-    values: FloatArray
-    covariance: FloatArray
-    cost: float
-    runs: int
-    converged: bool
-    change: NDArray[np.complex128]
-
-
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Target:
     """What is to be explained: velocity (n,) m/s, in some windows of it, down to a floor."""
 
@@ -92,23 +78,62 @@ class Target:
     windows: Windows
     least: Floor
 
+    @cached_property
+    def measured(self) -> NDArray[np.complex128]:
+        """(windows, lines) spectrum of the velocity."""
+        return self.windows.spectrum(self.velocity)
+
+
+Run = Callable[[FloatArray], FloatArray]
+
+
+@dataclass(frozen=True)
+class Solution:
+    """values: (k,) parameters; cost: whitened; runs: simulations done.
+
+    run, target: what was solved; error: (windows, lines) spectrum of what is left, m/s; change: (k, windows, lines) its derivatives by the
+    solver's coordinates, as last known; weight: (lines,) of the last round; normal: (k, k) products of the whitened derivatives
+    """
+
+    values: FloatArray
+    cost: float
+    runs: int
+    converged: bool
+    run: Run
+    target: Target
+    error: NDArray[np.complex128]
+    change: NDArray[np.complex128]
+    weight: FloatArray
+    normal: FloatArray
+
+    @cached_property
+    def covariance(self) -> FloatArray:
+        """(k, k) of the solver's coordinates."""
+        windows, least, layout = self.target.windows, self.target.least, self.target.windows.layout
+        noise, whitened = _covariance(self.normal), self.change * self.weight
+        with np.errstate(over="ignore", invalid="ignore"):  # of a model that runs away all is one mistake
+            beyond = layout.lines * np.maximum(layout.power(self.error) - least.noise, 0.0)
+            share = np.nan_to_num(beyond / tolerance(layout, self.error, least), nan=1.0, posinf=1.0)
+        repeats = 1.0 + (windows.begins.size - 1) * share
+        known = _that_repeats(whitened, np.sqrt(repeats)[layout.band], noise)
+        return known + _of_the_law(whitened, least.epsilon * self.target.measured * self.weight, layout, noise)
+
 
 def solve(
-    run: Callable[[FloatArray], FloatArray],
+    run: Run,
     target: Target,
     scale: Scale,
     start: FloatArray,
     schedule: Schedule,
-    known: NDArray[np.complex128] | None = None,
+    known: Solution | None = None,
 ) -> Solution:
     """The parameters that explain a target best.
 
     run: parameters -> velocity (n,), called from several threads at once; schedule: the weights are worked out before each round;
-    known: derivatives, nearly, as of ``Solution``
+    known: an earlier solution that ended at the start, whose derivatives hold nearly, and whose error does if it was of the same run
     """
-    windows, least, layout = target.windows, target.least, target.windows.layout
-    measured = windows.spectrum(target.velocity)
-    runs = 1
+    windows, measured = target.windows, target.measured
+    runs = 0
 
     def left(inner: FloatArray) -> NDArray[np.complex128]:
         return np.asarray(measured - windows.spectrum(run(scale.outer(inner))))
@@ -126,14 +151,18 @@ def solve(
             moved[k] += step
             return np.asarray((left(moved) - error) / step)
 
-        return np.array(list(pool.map(slope, range(inner.size))))
+        return np.array(list(each(slope, range(inner.size))))
 
     with ThreadPoolExecutor(min(start.size, cores())) as pool:
+        each = pool.map if cores() > 1 else map
         inner = scale.inner(start)
-        error = left(inner)
+        if known is not None and known.run is run:
+            error = known.error
+        else:
+            error, runs = left(inner), runs + 1
         size = inner.size
         normal, cost, converged = np.eye(size), np.inf, False
-        change = slopes(inner, error, np.zeros((size, *error.shape), dtype=np.complex128)) if known is None else known
+        change = slopes(inner, error, np.zeros((size, *error.shape), dtype=np.complex128)) if known is None else known.change
         exact = known is None
         for stage in schedule.rounds:
             before = inner, error, change, exact
@@ -174,19 +203,17 @@ def solve(
                         break
             if stage.counts != "as likely" and _judged(target, error) > _judged(target, before[1]):
                 inner, error, change, exact = before  # a step aside
-    noise = _covariance(normal)
-    with np.errstate(over="ignore", invalid="ignore"):  # of a model that runs away all is one mistake
-        beyond = layout.lines * np.maximum(layout.power(error) - least.noise, 0.0)
-        share = np.nan_to_num(beyond / tolerance(layout, error, least), nan=1.0, posinf=1.0)
-    repeats = 1.0 + (windows.begins.size - 1) * share
-    covariance = _that_repeats(change * weight, np.sqrt(repeats)[layout.band], noise)
     return Solution(
         values=scale.outer(inner),
-        covariance=covariance + _of_the_law(change * weight, least.epsilon * measured * weight, layout, noise),
         cost=cost,
         runs=runs,
         converged=converged,
+        run=run,
+        target=target,
+        error=error,
         change=change,
+        weight=weight,
+        normal=normal,
     )
 
 

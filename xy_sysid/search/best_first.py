@@ -237,9 +237,11 @@ class Search(Generic[F]):
         return known.fit.excess <= min(move.begins + HOPELESS, *(left + LEAST for left in inside), inf)
 
     def _order(self, item: tuple[Node[F], Move]) -> tuple[float, bool]:
-        """What may become best first; simple and single moves are quick, and often enough; of equals what every machine has."""
+        """What may become best first, as the mean of what it may come to at best and at worst: what is known of a start weighs as much as what
+        is promised. Simple and single moves are quick, and often enough; of equals what every machine has."""
         parent, move = item
-        return round(parent.hope(move) + SIMPLE_FIRST * move.parameters * max(_new(parent, move), 1), 1), not move.expected
+        expected = 0.5 * (parent.hope(move) + min(move.begins, parent.fit.excess))
+        return round(expected + SIMPLE_FIRST * move.parameters * max(_new(parent, move), 1), 1), not move.expected
 
     def _moves(self, node: Node[F]) -> list[tuple[Node[F], Move]]:
         if len(node.effects) >= self.most:
@@ -250,7 +252,11 @@ class Search(Generic[F]):
     def _fitted(self, parent: Node[F], move: Move) -> Node[F] | None:
         best, later = self.best, parent.fit.excess - parent.brief.excess  # what a whole fit will change, as it did for the parent
         hopeless = min(best.fit.excess - later + HOPELESS, parent.brief.excess)
-        brief = self.judge.brief(parent.fit, move, hopeless)
+        known = self.nodes.get(move.effects)
+        if known is not None and not known.whole and parent.is_slow(self.least) and known.brief.excess < parent.brief.excess + LEAST:
+            brief: F | None = known.brief  # which is as good as another: what all data show is asked
+        else:
+            brief = self.judge.brief(parent.fit, move, hopeless)
         if brief is None or parent.brief.excess - brief.excess < (1.0 - ALIKE) * move.gain:
             brief = self._merged(parent, move, brief)
         parent.tried += move.gain > 0.0
@@ -277,7 +283,6 @@ class Search(Generic[F]):
             leads=leads,
             later=later,
         )
-        known = self.nodes.get(move.effects)
         if known is None or node.score < known.score:
             self.nodes[move.effects] = node
         return node

@@ -63,7 +63,12 @@ class Contact:
 
     @staticmethod
     def _told(
-        fit: Innovations, task: OneStepTask, best: FloatArray, innovation: FloatArray, spread: FloatArray | None = None, without: FloatArray | None = None
+        fit: Innovations,
+        task: OneStepTask,
+        best: FloatArray,
+        innovation: FloatArray,
+        spread: FloatArray | None = None,
+        without: FloatArray | None = None,
     ) -> Followed:
         """What was found; of a fit that was given up there is no spread, and nothing without the gap: it does not matter any more."""
         values = fit.outer(best)
