@@ -84,7 +84,7 @@ class Target:
         return self.windows.spectrum(self.velocity)
 
 
-Run = Callable[[FloatArray], FloatArray]
+Predictor = Callable[[FloatArray], FloatArray]
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ class Solution:
     cost: float
     runs: int
     converged: bool
-    run: Run
+    run: Predictor
     target: Target
     error: NDArray[np.complex128]
     change: NDArray[np.complex128]
@@ -120,7 +120,7 @@ class Solution:
 
 
 def solve(
-    run: Run,
+    run: Predictor,
     target: Target,
     scale: Scale,
     start: FloatArray,

@@ -28,8 +28,8 @@ DEAF = 12.0  # the filter is told this much more encoder noise on the way: a smo
 COARSE, FINE = 3, 6  # sub-steps of a sample on the way, and in the end
 BEHIND = 1.5  # held-out innovation over the bar after the first fits, at which it is given up. Development draws, and machines of another make:
 # true gaps 0.1 to 1.1; where there is none 1.2 to 18
-IDLE = 0.9  # innovation with a gap over that without it, after the first fits, from which it does nothing, and must be at the bar. The same machines: gaps that were
-# found in the end 0.04 to 0.82, without one mostly 0.95 to 1.1
+IDLE = 0.9  # innovation with a gap over that without it, after the first fits, from which it does nothing, and must be at the bar. The same
+# machines: gaps that were found in the end 0.04 to 0.82, without one mostly 0.95 to 1.1
 CLOSED = 0.8  # innovation without a gap over that with it from which the gap is not looked for where it was
 OWN, GAP = len(NAMES), NAMES.index("gap")
 
