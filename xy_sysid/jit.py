@@ -41,8 +41,8 @@ def compiled(function: Callable[P, R], exact: bool = True) -> Callable[P, R]:
 
 
 def inlined(function: Callable[P, R]) -> Callable[P, R]:
-    """The same function, compiled, not exact, and written into each compiled one that calls it: for what takes less time than a call."""
-    return cast("Callable[P, R]", numba.njit(cache=True, nogil=True, fastmath=set(REORDERED), forceinline=True)(function))
+    """The same function, compiled, exact, and written into each compiled one that calls it: for what takes less time than a call."""
+    return cast("Callable[P, R]", numba.njit(cache=True, nogil=True, forceinline=True)(function))
 
 
 def cores() -> int:

@@ -35,4 +35,4 @@ def build_undoing(effects: Sequence[Effect]) -> Undoing:
 def _compiled(source: Callable[[str, Sequence[Effect]], str], effects: Sequence[Effect]) -> Callable[..., Any]:
     names = {"math": math, "np": np, **resonant_loop.LOOP, "along": interpolation.along, "pieces": interpolation.pieces, **law_names(effects)}
     parts = [*law_texts(effects), *(inspect.getsource(module) for module in (_pole_zero_pair, resonant_loop, interpolation))]
-    return compiled_text(lambda name: source(name, effects), names, parts, exact=False)
+    return compiled_text(lambda name: source(name, effects), names, parts)

@@ -131,7 +131,7 @@ def ahead(by: FloatArray, piece: int, state: FloatArray, force: float) -> float:
     """Speed at the end of a sub-step under a constant force."""
     n = state.size
     if n == ONE_MODE:
-        only: float = by[piece, 1, 1] * state[1] + by[piece, 1, 2] * state[2] + by[piece, 1, 3] * state[3] + by[piece, 1, 4] * force
+        only: float = by[piece, 1, 4] * force + by[piece, 1, 1] * state[1] + by[piece, 1, 2] * state[2] + by[piece, 1, 3] * state[3]
         return only
     total: float = by[piece, 1, n - 1] * force
     for j in range(1, n - 1):

@@ -45,6 +45,8 @@ __all__ = [
 BRIEF = (Round(6, 1e-2), Round(6, 1e-2, "alike"), Round(6, 3e-3, "what is wrong"), Round(8, 1e-4))
 LONG = (Round(4, 1e-3), Round(6, 1e-5))
 COARSE, MIDDLING = 2000.0, 4000.0  # Hz: finest sub-steps of looks and first rounds (errors up to 3e-3 of the motion), and of brief fits (6e-4)
+TOLD = 0.01  # part of what is left of the voltage that an effect takes away at least, to be simulated before any fit: of 14 s below 10 Hz chance
+# takes half of it
 FAITHFUL = 0.1  # of what a model leaves: by so much may its motion change with finer sub-steps
 
 
@@ -122,10 +124,10 @@ def _begun(data: AxisData, base: GreyboxFit, model: AxisModel, name: str) -> Axi
     return best_start(data, [traced, *other_starts(data, base, model, name)])
 
 
-def other_starts(data: AxisData, base: GreyboxFit, model: AxisModel, name: str, scene: Scene | None = None) -> list[AxisModel]:
+def other_starts(data: AxisData, base: GreyboxFit, model: AxisModel, name: str, scene: Scene | None = None, least: float = 0.0) -> list[AxisModel]:
     """The model with one more effect, from inverse identification, and from starts of base and effect together.
 
-    scene: of the base and the first stage's data, if it is known
+    scene: of the base and the first stage's data, if it is known; least: see ``inverse_starts``
     """
     effect, scene = model.library[name], scene or scene_of(data, base)
     candidates, known = [], _apart(model)
@@ -135,7 +137,7 @@ def other_starts(data: AxisData, base: GreyboxFit, model: AxisModel, name: str, 
         scene = replace(scene, voltage=_amplified(data, known, amplified, data.counts(early=scene.velocity.size == data.first)))
     forces = [force_of(data, known, own, data.counts(early=scene.velocity.size == data.first)) for own in beside]
     forces += [friction_of(scene, known, own) for own in rubs]
-    for start in inverse_starts(effect, scene, scene.velocity.size, forces, bool(rubs)):
+    for start in inverse_starts(effect, scene, scene.velocity.size, forces, bool(rubs), least):
         whole = replace(known, gain=start.gain, pole=min(max(start.pole, 1e-2), 1e5))
         for own, size in zip((*beside, *rubs), start.sizes, strict=True):
             whole = whole.with_effect(own, bounded(known.library[own], _sized(known, own, size), data.similar))

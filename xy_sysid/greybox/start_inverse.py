@@ -23,7 +23,6 @@ from xy_sysid.samples.block import FloatArray
 CUTOFFS = (10.0, 40.0)  # Hz: slow machines move below the first, quick ones up to the second
 REST = 0.2  # part of the usual speed below which friction may be holding it
 FEW = 0.05  # part of the samples that must be in motion, else all are used
-TOLD = 0.01  # part of what is left of the voltage that an effect takes away at least; of 14 s below 10 Hz chance takes half of it
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,10 +35,13 @@ class InverseStart:
     sizes: tuple[float, ...]
 
 
-def inverse_starts(effect: Effect, scene: Scene, samples: int, forces: Sequence[FloatArray] = (), rubs: bool = False) -> list[InverseStart]:
-    """One for each low-pass at most, from the first samples; none where the effect explains nothing.
+def inverse_starts(
+    effect: Effect, scene: Scene, samples: int, forces: Sequence[FloatArray] = (), rubs: bool = False, least: float = 0.0
+) -> list[InverseStart]:
+    """One for each low-pass at most, from the first samples.
 
     forces: (n,) V each, of what the model has already, whose sizes are free; rubs: dry friction is among them
+    least: part of what is left of the voltage that the effect must take away
     """
     if effect.guesses is None or effect.is_behind:
         return []
@@ -58,7 +60,7 @@ def inverse_starts(effect: Effect, scene: Scene, samples: int, forces: Sequence[
             rows = rows & moving if float(np.mean(moving)) > FEW else rows
         beside = [slow(force) for force in seen_forces]
         known = np.array([acceleration, velocity, *beside])[:, rows]
-        best, kept = (1.0 - TOLD) * _least(known, voltage[rows])[1] / (float(voltage[rows] @ voltage[rows]) + 1e-300), None
+        best, kept = (1.0 - least) * _least(known, voltage[rows])[1] / (float(voltage[rows] @ voltage[rows]) + 1e-300), None
         for guess, columns in zip(guesses, seen_columns, strict=True):
             acting = slow(columns)
             target = voltage - acting[0] if guess.whole else voltage

@@ -236,12 +236,12 @@ class Search(Generic[F]):
         inside = (node.fit.excess for effects, node in self.nodes.items() if effects < move.effects and not node.refused)
         return known.fit.excess <= min(move.begins + HOPELESS, *(left + LEAST for left in inside), inf)
 
-    def _order(self, item: tuple[Node[F], Move]) -> tuple[float, bool]:
-        """What may become best first, as the mean of what it may come to at best and at worst: what is known of a start weighs as much as what
-        is promised. Simple and single moves are quick, and often enough; of equals what every machine has."""
+    def _order(self, item: tuple[Node[F], Move]) -> tuple[bool, float, bool]:
+        """What begins with far less than there was is certain, and comes before all promises. Then what may become best; simple and single
+        moves are quick, and often enough; of equals what every machine has."""
         parent, move = item
-        expected = 0.5 * (parent.hope(move) + min(move.begins, parent.fit.excess))
-        return round(expected + SIMPLE_FIRST * move.parameters * max(_new(parent, move), 1), 1), not move.expected
+        hope = parent.hope(move) + SIMPLE_FIRST * move.parameters * max(_new(parent, move), 1)
+        return move.begins > parent.fit.excess - HOPELESS, round(hope, 1), not move.expected
 
     def _moves(self, node: Node[F]) -> list[tuple[Node[F], Move]]:
         if len(node.effects) >= self.most:

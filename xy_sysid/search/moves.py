@@ -13,7 +13,7 @@ from xy_sysid.effects import Effect, Scene
 from xy_sysid.effects._contract import in_time
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.forces import taken_for
-from xy_sysid.greybox.free_run import GreyboxFit, first_excess, is_read, other_starts, scene_of, screened
+from xy_sysid.greybox.free_run import TOLD, GreyboxFit, first_excess, is_read, other_starts, scene_of, screened
 from xy_sysid.greybox.score_test import Gain, Trace
 from xy_sysid.search.criteria import ALIKE, WIDTH
 
@@ -159,7 +159,7 @@ class Moves:
         """
         if here.scene.velocity.size > self.data.first:
             return np.inf
-        starts = other_starts(self.data, here.fit, model, effect.name, here.scene)
+        starts = other_starts(self.data, here.fit, model, effect.name, here.scene, TOLD)
         if not starts:
             return np.inf
         return here.fit.excess + min(first_excess(self.data, start) for start in starts) - here.brief.excess
