@@ -15,6 +15,7 @@ from xy_sim.machine import Machine
 from xy_sysid.axis.model import STANDARD, AxisModel, Library, simulate
 from xy_sysid.effects import EFFECTS, Effect
 from xy_sysid.effects._contract import Beside, Limits
+from xy_sysid.effects.backlash import contact
 from xy_sysid.effects.backlash.descent import Patience, descend
 from xy_sysid.effects.backlash.filter_source import NAMES
 from xy_sysid.effects.backlash.innovations import Innovations, View
@@ -187,3 +188,23 @@ def test_a_gap_that_cannot_come_near_the_best_without_it_is_given_up_soon() -> N
     data, base = machine("backlash=30e-6")
     bar = whitened_rms(base.error, held)
     assert not followed(data, base, GAP, limits=Limits(bar=bar))[1].given_up
+
+
+@pytest.mark.parametrize(("idle", "times", "given_up"), [(0.0, 100.0, False), (0.0, 0.5, True), (0.9, 0.5, True), (0.9, 100.0, False)])
+def test_what_beats_the_bar_where_nobody_fitted_goes_on_even_if_the_filter_does_as_well_without_a_gap(
+    idle: float, times: float, given_up: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The bar is the error of the held-out part, and is held against that. idle: 0 is every gap; times: bar over what the gap leaves in the end."""
+    data, base = machine("backlash=30e-6")
+    bar = times * followed(data, base, GAP)[0].held_out_error
+    monkeypatch.setattr(contact, "IDLE", idle)
+    assert followed(data, base, GAP, limits=Limits(bar=bar))[1].given_up == given_up
+
+
+def test_what_was_given_up_says_nothing_of_its_numbers() -> None:
+    """Their intervals are as wide as can be."""
+    data, base = machine("backlash=30e-6")
+    fit, found = followed(data, base, GAP, limits=Limits(bar=1e-9))
+    assert found.given_up
+    assert np.all(np.isinf(found.spread)) and np.all(np.isinf(found.base_spread))
+    assert fit.parameter("backlash.gap").high == np.inf

@@ -12,7 +12,7 @@ import pytest
 from scipy.signal import butter, sosfilt
 
 from xy_sysid.axis.model import STANDARD, AxisModel, simulate
-from xy_sysid.effects import EFFECTS, Scene
+from xy_sysid.effects import EFFECTS, Guess, Scene
 from xy_sysid.effects._contract import FUNCTIONS, WORDS
 from xy_sysid.errors import BadInput
 from xy_sysid.samples.block import FloatArray
@@ -149,6 +149,21 @@ def test_an_effect_reads_its_start_values_from_data(name: str) -> None:
         values = guess.read(np.full(guess.columns.shape[0], 0.1))
         assert len(values) == len(effect.parameters)
         assert np.all(np.isfinite(values))
+
+
+@pytest.mark.parametrize(("samples", "asked"), [(1000, 1), (2**16 + 1, 2)])
+def test_what_an_effect_guesses_of_a_short_scene_is_worked_out_once(samples: int, asked: int) -> None:
+    """Of a long one it would be a load to keep."""
+    calls: list[Scene] = []
+
+    def guesses(scene: Scene) -> list[Guess]:
+        calls.append(scene)
+        return [Guess(np.ones((1, samples)), lambda c: (1.0,))]
+
+    effect, still = replace(EFFECTS["constant_load"], guesses=guesses), np.zeros(samples)
+    scene = Scene(RATE, BASE.gain, BASE.pole, still, still, still, still)
+    assert len(effect.guessed(scene)) == len(effect.guessed(scene)) == 1
+    assert len(calls) == asked
 
 
 def test_a_weight_is_not_looked_for_where_it_is_a_load_and_a_spring() -> None:
