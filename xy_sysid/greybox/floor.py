@@ -81,8 +81,10 @@ class Windows:
         length = self.layout.length
         if signal.shape[-1] < length:
             signal = np.concatenate((signal, np.zeros((*signal.shape[:-1], length - signal.shape[-1]))), axis=-1)
-        cut = np.lib.stride_tricks.sliding_window_view(signal, length, axis=-1)[..., self.begins, :]
-        return np.asarray(scipy.fft.rfft(cut * _taper(length))[..., : self.layout.band.size])
+        cut, taper = np.empty((*signal.shape[:-1], self.begins.size, length)), _taper(length)
+        for place, begin in enumerate(self.begins.tolist()):
+            np.multiply(signal[..., begin : begin + length], taper, out=cut[..., place, :])
+        return np.asarray(scipy.fft.rfft(cut)[..., : self.layout.band.size])
 
     def before(self, samples: int) -> Windows:
         """Those that end within the first samples."""

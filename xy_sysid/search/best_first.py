@@ -267,7 +267,7 @@ class Search(Generic[F]):
         least = (1.0 + self.least) ** _new(parent, move)
         leads = self.judge.size(brief, parent.brief) >= least - 1.0 or (bool(parent.refused) and brief.excess < parent.brief.excess + LEAST)
         astray = brief.excess >= parent.brief.excess + LEAST and not parent.is_slow(self.least)
-        slow = move.rest >= log(least) and not astray
+        slow = move.rest >= log(least) and not astray and brief.excess + later < best.fit.excess + HOPELESS
         whole = brief.excess + later + LEAST * parameters < best.score - LEAST if leads else slow
         found = self.judge.whole(brief) if whole else brief
         if whole and not leads:  # what acts slowly does not show in a brief fit, but promised a name on all data

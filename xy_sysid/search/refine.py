@@ -23,6 +23,8 @@ from xy_sysid.search.one_step_trials import OneStepTrials
 from xy_sysid.search.rungs import Given, ladder_of_given, ladder_of_search
 from xy_sysid.search.simplify import Simplifying
 
+IN_HAND = 0.95  # of the budget, after which nothing new is begun: what is in hand then takes the rest
+
 
 @dataclass(frozen=True, slots=True)
 class Trying:
@@ -76,7 +78,7 @@ def refine_steps(
     begun = effort.now()
     fixed = Given.of(judge, kept)
     first = min(effort.now() - begun, 0.1 * effort.budget)  # at most: code is read from the disk at its first use
-    until = effort.now() + effort.budget - 2.0 * first  # the first fit counts, and the one in hand when the time is up takes as long
+    until = effort.now() + IN_HAND * effort.budget - first
     ahead = fixed.steps[-1].fit.model.ahead
     if ahead is not None or effort.most == 0:
         return ladder_of_given(data, judge, fixed)
