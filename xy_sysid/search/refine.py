@@ -16,14 +16,12 @@ from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.jit import spent_compiling
 from xy_sysid.search.best_first import Node, Search
-from xy_sysid.search.criteria import BUDGET, FEWEST, FREE, LEAST, MOST_EFFECTS, WORTH
+from xy_sysid.search.criteria import BUDGET, FEWEST, FREE, IN_HAND, LEAST, MOST_EFFECTS, WORTH
 from xy_sysid.search.judge import FreeRunJudge, joined
 from xy_sysid.search.ladder import Ladder
 from xy_sysid.search.one_step_trials import OneStepTrials
 from xy_sysid.search.rungs import Given, ladder_of_given, ladder_of_search
 from xy_sysid.search.simplify import Simplifying
-
-IN_HAND = 0.95  # of the budget, after which nothing new is begun: what is in hand then takes the rest
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import chain
+from math import inf
 
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.greybox.free_run import GreyboxFit
@@ -130,23 +131,33 @@ class Simplifying:
                     yield other
 
     def _node(self, effects: frozenset[str], begin: Callable[[], AxisModel]) -> Node[GreyboxFit] | None:
-        """The set as it is known, or fitted from a model that begins where the best set is.
-
-        Again, once, where the known fit, from elsewhere, went astray: it leaves more than that model does without any fit, or is refused.
-        """
+        """The set as it is known, or fitted from a model that begins where the best set is; a known fit that went astray again, once."""
         known = self.search.nodes.get(effects)
-        worse = known is not None and known.fit.excess > self.now.fit.excess + LEAST
-        near = known is not None and (known.whole or known.fit.excess < self.now.fit.excess + HOPELESS)
-        start = None
-        if known is not None and near:
-            start = begin() if worse and not self.judge.late() and (effects, self.now.effects) not in self.again else None
-            if start is None or not (known.refused or known.fit.excess > self.judge.begins(self.now.fit, start) + LEAST):
-                whole(self.judge, known)
-                return known
-            self.again.add((effects, self.now.effects))
-        fit = None if self.judge.late() else self.judge.again(self.now.fit, start or begin())
-        if fit is None or (known is not None and near and not fit.excess < known.fit.excess - LEAST):
+        if known is None or not (known.whole or known.fit.excess < self.now.fit.excess + HOPELESS):
+            start = None if self.judge.late() else begin()
+            return self._fitted(effects, start, inf) or known
+        start = self._way_back(known, begin)
+        if start is None:
+            whole(self.judge, known)
             return known
+        return self._fitted(effects, start, known.fit.excess - LEAST) or known
+
+    def _way_back(self, known: Node[GreyboxFit], begin: Callable[[], AxisModel]) -> AxisModel | None:
+        """Where a known fit begins again if it went astray from elsewhere: it leaves more than this model does without any fit, or is refused."""
+        way = known.effects, self.now.effects
+        if self.judge.late() or way in self.again or known.fit.excess <= self.now.fit.excess + LEAST:
+            return None
+        start = begin()
+        if not known.refused and known.fit.excess <= self.judge.begins(self.now.fit, start) + LEAST:
+            return None
+        self.again.add(way)
+        return start
+
+    def _fitted(self, effects: frozenset[str], start: AxisModel | None, below: float) -> Node[GreyboxFit] | None:
+        """The set fitted from a model, and remembered, if that leaves less excess than ``below``."""
+        fit = None if start is None or self.judge.late() else self.judge.again(self.now.fit, start)
+        if fit is None or fit.excess >= below:
+            return None
         parameters = sum(len(self.judge.library[name].parameters) for name in effects)
         node = Node(effects=effects, fit=fit, brief=fit, parameters=parameters, whole=True, refused=self.judge.refusal(fit))
         self.search.nodes[effects] = node
