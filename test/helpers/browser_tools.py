@@ -5,6 +5,7 @@ Import from a test module that starts with ``pytestmark = needs_browser``.
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import shutil
 import signal
@@ -172,6 +173,23 @@ class Tab:
     def press(self, act: str) -> None:
         """A button by what it does."""
         self.page.locator(f"[data-act={act}]").first.click()
+
+    def press_until(self, act: str, done: Callable[[], object], seconds: float = 20.0, why: str = "") -> None:
+        """Press, and let the browser work until it is done; again after 20 s, as a press is lost where a page is loaded again after a stall."""
+        from playwright.sync_api import TimeoutError as Late
+
+        pressed: list[float] = []
+
+        def tried() -> bool:
+            if done():
+                return True
+            if not pressed or time.monotonic() > pressed[-1] + 20.0:
+                with contextlib.suppress(Late):  # it is being loaded again just now, or at work
+                    self.page.locator(f"[data-act={act}]").first.click(timeout=5000)
+                    pressed.append(time.monotonic())
+            return False
+
+        self.until(tried, seconds, why)
 
     def wide(self) -> int:
         """Width of the content, px."""

@@ -125,12 +125,10 @@ def test_the_failing_picture_comes_by_itself_and_every_number_follows_the_story(
     tab.page.get_by_role("button", name="axis y").click()
     tab.until(lambda: tab.headline().startswith("Something is missing: ") and tab.over_floor() > 4, 40, "no failing picture")
     tab.page.wait_for_timeout(2500)  # some more of the travel
-    tab.press("diagnose")
-    tab.until(lambda: "Missing: coulomb friction" in tab.verdict() and tab.filled() == ["Add coulomb friction"], 90)
+    tab.press_until("diagnose", lambda: "Missing: coulomb friction" in tab.verdict() and tab.filled() == ["Add coulomb friction"], 90)
     tab.until(lambda: tab.headline().startswith("Something is missing: ") and len(tab.ladder()) == 1, 40, "the headline is stale")
     assert tab.ladder()[0] > 4
-    tab.press("named")
-    tab.until(lambda: tab.headline().startswith("Explained: ") and tab.over_floor() < 2 and len(tab.ladder()) == 2, 60)
+    tab.press_until("named", lambda: tab.headline().startswith("Explained: ") and tab.over_floor() < 2 and len(tab.ladder()) == 2, 60)
     tab.until(lambda: tab.fact("worst place").startswith("nowhere"), 40, "the tiles are stale")
     assert tab.ladder()[1] < 1.2 and "at the noise floor" in tab.verdict() and tab.fact("held-out error").startswith("0.3")
     assert tab.page.locator("[aria-label='linear fit, live']:visible").count() == 0
@@ -202,7 +200,7 @@ def test_a_bag_is_recorded_and_opened_beside(scene: Scene) -> None:
     tab.press("open-bag")
     tab.until(lambda: tab.page.locator(".panel").count() == 2 and "2000 Hz" in str(tab.page.locator(".panel").nth(1).text_content()), 30)
     assert not (scene.folder.parent / "elsewhere").exists()
-    tab.page.get_by_role("button", name="close recording").click()
+    tab.page.get_by_role("button", name="close recording").click(timeout=90_000)
 
 
 def recorded(bag: Path, topic: str) -> int:
