@@ -1,62 +1,39 @@
-"""A resonance's traces: of the few frequencies that the averaged spectra show, the best is the best of all."""
+"""What both resonances read of the frequency response: base and pair together."""
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
 import pytest
-from scipy.signal import lfilter
 
 from xy_sysid.axis.model import STANDARD, AxisModel, simulate
-from xy_sysid.effects import Scene, _pole_zero_pair
-from xy_sysid.greybox.free_run import AxisData, GreyboxFit, fit_base, prepare, scene_of, screened
+from xy_sysid.effects import Scene
 from xy_sysid.samples.block import FloatArray
 
-RATE = 2000.0
-BASE = AxisModel(gain=0.097, delay=1.3e-3, pole=60.0)
+RATE = 1000.0
 
 
-@cache
-def fitted(*effects: tuple[str, tuple[float, ...]]) -> tuple[AxisData, GreyboxFit]:
-    """20 s of noise below 300 Hz, an encoder of 0.1 um, and the rigid base fitted to it."""
-    random = np.random.default_rng(4)
-    voltage = np.asarray(lfilter([0.35], [1.0, -0.65], random.normal(size=40001)))
-    model = BASE
-    for name, values in effects:
-        model = model.with_effect(name, values)
-    place = np.zeros(voltage.size)  # nothing here asks where the axis is
-    velocity = simulate(model, RATE, voltage, place)
-    position = np.round(np.concatenate(((0.0,), np.cumsum(velocity) / RATE)) / 1e-7) * 1e-7
-    data = prepare(RATE, voltage, position)
-    return data, fit_base(data)
+def scene(voltage: FloatArray, velocity: FloatArray) -> Scene:
+    """As a base sees it that explains nothing."""
+    position = np.cumsum(velocity) / RATE
+    return Scene(sampling_rate=RATE, gain=1.0, pole=20.0, voltage=voltage, velocity=velocity, position=position, error=velocity)
 
 
-def everywhere(scene: Scene, frequencies: FloatArray) -> FloatArray:
-    return frequencies
+def test_base_and_pair_are_read_together_from_the_response() -> None:
+    """Of a motion with both, from a base that knows neither: each within a fifth, to begin a fit with."""
+    voltage = np.random.default_rng(2).normal(size=20_001)
+    model = AxisModel(0.5, 4e-3, 52.0).with_effect("base_resonance", (0.2, 25.0, 0.03, 0.03))
+    velocity = simulate(model, RATE, voltage, np.zeros(voltage.size))
+    joint = STANDARD["base_resonance"].joint
+    assert joint is not None
+    ((gain, delay, pole, (split, frequency, *_)),) = joint(scene(voltage[:-1], velocity))
+    assert (gain, delay, pole, split, frequency) == pytest.approx((0.5, 4e-3, 52.0, 0.2, 25.0), rel=0.2)
 
 
-@pytest.mark.parametrize(
-    ("effect", "frequency"), [("base_resonance", 12.0), ("base_resonance", 47.0), ("screw_compliance", 130.0), ("screw_compliance", 350.0)]
-)
-@pytest.mark.parametrize("beside", [(), (("coulomb_friction", (0.1,)),)], ids=["alone", "beside friction"])
-def test_the_trace_of_a_resonance_is_as_good_as_the_best_of_all_frequencies(
-    effect: str, frequency: float, beside: tuple[tuple[str, tuple[float, ...]], ...], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Found among four, with friction that the base takes for drag in the error, too."""
-    data, base = fitted((effect, (0.1, frequency, 0.03, 0.03)), *beside)
-    few = screened(data, base, [STANDARD[effect]], scene_of(data, base)).traces[0]
-    monkeypatch.setattr(_pole_zero_pair, "_likely", everywhere)
-    every = screened(data, base, [STANDARD[effect]], scene_of(data, base)).traces[0]
-    assert few.share == pytest.approx(every.share, rel=1e-9)
-    assert few.values == pytest.approx(every.values, rel=1e-9)
-    assert every.share > 0.02
-
-
-def test_a_scene_that_stands_still_shows_no_frequency() -> None:
-    """And asks for none: zeros divide nothing."""
-    still = np.zeros(4000)
-    scene = Scene(RATE, BASE.gain, BASE.pole, still, still, still, still)
-    with np.errstate(all="raise"):
-        guesses = list(_pole_zero_pair.guesses(scene, 5.0, 90.0))
-    assert all(np.isfinite(guess.columns).all() for guess in guesses)
+def test_nothing_is_read_of_signals_that_have_nothing_to_do_with_each_other() -> None:
+    """No line of the spectrum is coherent enough."""
+    voltage, velocity = np.random.default_rng(2).normal(size=(2, 80_000))
+    tone = np.sin(2.0 * np.pi * 7.0 * np.arange(80_000) / RATE)
+    for name in ("screw_compliance", "base_resonance"):
+        joint = STANDARD[name].joint
+        assert joint is not None
+        assert list(joint(scene(voltage, velocity))) == [] == list(joint(scene(tone, tone)))
