@@ -175,18 +175,22 @@ class Tab:
         self.page.locator(f"[data-act={act}]").first.click()
 
     def press_until(self, act: str, done: Callable[[], object], seconds: float = 20.0, why: str = "") -> None:
-        """Press, and let the browser work until it is done; again after 20 s, as a press is lost where a page is loaded again after a stall."""
+        """Press a button by what it does until it is done; see ``click_until``."""
+        self.click_until(self.page.locator(f"[data-act={act}]").first, done, seconds, why)
+
+    def click_until(self, what: Any, done: Callable[[], object], seconds: float = 20.0, why: str = "") -> None:
+        """Click, and let the browser work until it is done; again after 20 s, as a click is lost where a page is loaded again after a stall."""
         from playwright.sync_api import TimeoutError as Late
 
-        pressed: list[float] = []
+        clicked: list[float] = []
 
         def tried() -> bool:
             if done():
                 return True
-            if not pressed or time.monotonic() > pressed[-1] + 20.0:
+            if not clicked or time.monotonic() > clicked[-1] + 20.0:
                 with contextlib.suppress(Late):  # it is being loaded again just now, or at work
-                    self.page.locator(f"[data-act={act}]").first.click(timeout=5000)
-                    pressed.append(time.monotonic())
+                    what.click(timeout=5000)
+                    clicked.append(time.monotonic())
             return False
 
         self.until(tried, seconds, why)

@@ -200,7 +200,7 @@ def test_a_bag_is_recorded_and_opened_beside(scene: Scene) -> None:
     tab.press("open-bag")
     tab.until(lambda: tab.page.locator(".panel").count() == 2 and "2000 Hz" in str(tab.page.locator(".panel").nth(1).text_content()), 30)
     assert not (scene.folder.parent / "elsewhere").exists()
-    tab.page.get_by_role("button", name="close recording").click(timeout=90_000)
+    tab.click_until(tab.page.get_by_role("button", name="close recording"), lambda: tab.page.locator(".panel").count() == 1, why="it stays open")
 
 
 def recorded(bag: Path, topic: str) -> int:
