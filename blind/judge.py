@@ -14,10 +14,10 @@ from blind.cases import FRICTION, Case
 from blind.recordings import recorded
 from xy_sim.machine import Machine
 from xy_sysid.axis.model import STANDARD
+from xy_sysid.diagnosis.diagnose import Diagnosis, diagnose
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.free_run import EPSILON, fit, prepare
 from xy_sysid.greybox.score_test import bounded
-from xy_sysid.search.diagnose import Diagnosis, diagnose
 
 CONFIDENT = 0.9
 FAINT = 0.1  # of noise and dirt together: what changes the motion less can hardly be seen in 60 s

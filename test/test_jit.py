@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from helpers.foreign import Joint, driven
 
+from xy_sysid.diagnosis import refine as search
 from xy_sysid.greybox.axis_data import prepare
 from xy_sysid.jit import spent_compiling
-from xy_sysid.search import refine as search
 
 
 def test_what_compiling_takes_is_told() -> None:

@@ -18,7 +18,8 @@ Packages in the order of the data; each imports only from those before it.
     samples, excitation:       what arrives, and what drives the machine
     response, linear, fitting: windows and spectra to a frequency response, transfer functions, their fits and verdicts
     effects, axis, greybox:    physical effects, an axis with them in time, its fit
-    comparison, search:        where a model fails, and which effect is missing
+    comparison:                where a model fails
+    criteria, judge, search, diagnosis: which effect is missing
     story, live:               what people are shown, and the online logic
     bags, imports, files, processes: reading, writing, other processes
     nodes, report, page, cli:  what people meet
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
     from xy_sysid.cli.simulated_recording import simulate
     from xy_sysid.comparison.of_run import better, compare, validate
     from xy_sysid.comparison.physical_model import PhysicalModel
+    from xy_sysid.diagnosis.of_run import diagnose, refine
     from xy_sysid.errors import BadInput, BadRecording, MissingExtra, XySysidError
     from xy_sysid.files.effects import library
     from xy_sysid.files.models import load_model, save
@@ -48,7 +50,6 @@ if TYPE_CHECKING:
     from xy_sysid.report import plots as plot
     from xy_sysid.response.frf import FrequencyResponse
     from xy_sysid.samples.recording import Recording, Run
-    from xy_sysid.search.of_run import diagnose, refine
 
     __version__: str
 
@@ -94,7 +95,7 @@ _HOMES = {
     "files.effects": ("library",),
     "comparison.physical_model": ("PhysicalModel",),
     "comparison.of_run": ("better", "compare", "validate"),
-    "search.of_run": ("diagnose", "refine"),
+    "diagnosis.of_run": ("diagnose", "refine"),
     "imports": ("load",),
     "files.models": ("load_model", "save"),
     "cli.simulated_recording": ("simulate",),

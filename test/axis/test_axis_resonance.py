@@ -14,6 +14,7 @@ from xy_sim.effect_text import with_effects
 from xy_sim.machine import Machine
 from xy_sysid.axis.model import FINE, AxisModel, Library, simulate, simulator
 from xy_sysid.axis.resonant_loop import roots
+from xy_sysid.diagnosis.refine import refine
 from xy_sysid.effects import EFFECTS
 from xy_sysid.effects._contract import law
 from xy_sysid.excitation.lockstep import drive
@@ -21,7 +22,6 @@ from xy_sysid.greybox.free_run import AxisData, fit_base, fit_with, prepare
 from xy_sysid.linear.simulate import simulate as exact
 from xy_sysid.linear.transfer_function import TransferFunction
 from xy_sysid.samples.block import FloatArray
-from xy_sysid.search.refine import refine
 from xy_sysid.settings import AxisExcitation, ExcitationSettings, build
 
 RATE = 2000.0

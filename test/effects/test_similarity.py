@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from helpers.simulated import recorded
 
+from xy_sysid.diagnosis.diagnose import diagnose
 from xy_sysid.effects import EFFECTS
 from xy_sysid.effects._similarity import SPEED, VOLTAGE, Similarity
-from xy_sysid.search.diagnose import diagnose
 
 
 @pytest.mark.parametrize(

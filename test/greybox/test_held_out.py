@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from helpers.simulated import recorded
 
+from xy_sysid.diagnosis.diagnose import diagnose, diagnose_all
 from xy_sysid.greybox.axis_data import AxisData, prepare, prepare_all
-from xy_sysid.search.diagnose import diagnose, diagnose_all
 
 
 def noise(samples: int, seed: int = 1) -> np.ndarray:

@@ -9,9 +9,9 @@ import pytest
 from helpers.real_data import data
 
 from xy_sysid.axis.model import STANDARD
+from xy_sysid.diagnosis.diagnose import Diagnosis, diagnose
 from xy_sysid.greybox.parameters import Estimate
 from xy_sysid.imports import load
-from xy_sysid.search.diagnose import Diagnosis, diagnose
 
 
 @cache

@@ -8,10 +8,10 @@ from math import exp, inf
 
 import pytest
 
+from xy_sysid.criteria import FEWEST
+from xy_sysid.criteria import LEAST as SMALLEST
+from xy_sysid.judge.contract import Move
 from xy_sysid.search.best_first import Node, Search
-from xy_sysid.search.criteria import FEWEST
-from xy_sysid.search.criteria import LEAST as SMALLEST
-from xy_sysid.search.moves import Move
 
 Set = frozenset[str]
 LEAST = 0.02  # of what is left, for an effect to be worth its name

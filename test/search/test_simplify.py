@@ -10,8 +10,8 @@ from helpers.foreign import Joint, driven
 from xy_sysid.axis.model import STANDARD
 from xy_sysid.greybox.axis_data import AxisData, prepare
 from xy_sysid.greybox.free_run import GreyboxFit, fit, fit_base, fit_with
+from xy_sysid.judge.axis_judge import AxisJudge
 from xy_sysid.search.best_first import Node, Search
-from xy_sysid.search.judge import FreeRunJudge
 from xy_sysid.search.simplify import Simplifying
 
 SLIDE = Joint(fs=1000.0, seconds=20.0, count=1e-6, mass=0.1, drag=10.0, coulomb=0.2, shake=1.0, band=(0.5, 60.0))
@@ -25,7 +25,7 @@ def data() -> AxisData:
 
 def settled(data: AxisData, found: GreyboxFit, known: GreyboxFit) -> Simplifying:
     """Gone to its end, from a set, with what the search knows of a simpler one."""
-    judge = FreeRunJudge(data, STANDARD)
+    judge = AxisJudge(data, STANDARD)
     search: Search[GreyboxFit] = Search(judge, lambda: 0.0, 10.0, 4, 0.25)
     for one in (fit_base(data), known, found):
         names = frozenset(name for name, _ in one.model.effects)

@@ -15,9 +15,9 @@ from xy_sysid.units import motion
 
 if TYPE_CHECKING:
     from xy_sysid.axis.model import Library
+    from xy_sysid.diagnosis.diagnose import Diagnosis
     from xy_sysid.greybox.free_run import GreyboxFit
     from xy_sysid.imports.reading import Reading
-    from xy_sysid.search.diagnose import Diagnosis
 
 Own = Annotated[list[Path] | None, typer.Option("--effect-file", metavar="FILE", help="a Python file with an effect of your own (may be repeated)")]
 
@@ -31,9 +31,9 @@ def diagnose(
     json: o.Json = False,
 ) -> None:
     """Name the physical effect that the rigid model of each axis misses, with evidence, or say that none is known."""
+    from xy_sysid.diagnosis.findings import answer, findings
+    from xy_sysid.diagnosis.of_run import diagnose as logic
     from xy_sysid.files.effects import library
-    from xy_sysid.search.findings import answer, findings
-    from xy_sysid.search.of_run import diagnose as logic
 
     begun = time.perf_counter()
     known = library(effect_file or [])
@@ -63,7 +63,7 @@ def diagnose(
 
 
 def _show(name: str, item: Diagnosis, known: Library) -> None:
-    from xy_sysid.search.findings import findings
+    from xy_sysid.diagnosis.findings import findings
 
     sure = "above 0.99" if item.confidence > 0.99 else f"{item.confidence:.2f}"
     say(f"axis {name}: {item.sentence.rstrip()} Confidence {sure}.")

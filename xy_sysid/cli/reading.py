@@ -111,7 +111,7 @@ def read(paths: Sequence[Path], reading: Reading, quiet: bool) -> Recording:
 
 def runs_of(recordings: Sequence[Recording], axis: str) -> tuple[Run, ...]:
     """The longest run of an axis in each recording. Raises BadInput where these do not belong together."""
-    from xy_sysid.search.of_run import runs_together
+    from xy_sysid.diagnosis.of_run import runs_together
 
     return runs_together([recording.run(axis) for recording in recordings])
 

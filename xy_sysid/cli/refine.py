@@ -17,9 +17,9 @@ from xy_sysid.cli.reading import chosen, each, named, read_each, reads, runs_of
 from xy_sysid.units import bare, motion, moved
 
 if TYPE_CHECKING:
+    from xy_sysid.diagnosis.ladder import Ladder
     from xy_sysid.greybox.open_loop import OpenLoop
     from xy_sysid.imports.reading import Reading
-    from xy_sysid.search.ladder import Ladder
 
 
 @reads
@@ -45,14 +45,14 @@ def refine(
     json: o.Json = False,
 ) -> None:
     """Add physical effects to the rigid model, refit everything together, and print the ladder of falling errors."""
+    from xy_sysid.criteria import MOST_EFFECTS
+    from xy_sysid.diagnosis.of_run import refined
+    from xy_sysid.diagnosis.refine import Effort
     from xy_sysid.errors import BadInput
     from xy_sysid.files.effects import library
     from xy_sysid.files.models import write_axis_mat, write_axis_models
     from xy_sysid.greybox.axis_data import prepare
     from xy_sysid.greybox.open_loop import open_loop, settled
-    from xy_sysid.search.criteria import MOST_EFFECTS
-    from xy_sysid.search.of_run import refined
-    from xy_sysid.search.refine import Effort
 
     if not add and not auto:
         raise BadInput("refine", "without --add and --auto", "--add NAME, or --auto", "Say what to do.")
@@ -112,7 +112,7 @@ def refine(
 
 def verdict(ladder: Ladder) -> str:
     """The contract's word."""
-    from xy_sysid.search.criteria import AT_FLOOR
+    from xy_sysid.criteria import AT_FLOOR
     from xy_sysid.story.standing import nearer
 
     if ladder.final.excess < AT_FLOOR:
@@ -144,7 +144,7 @@ def _alone(found: OpenLoop | None, unit: str) -> dict[str, Any]:
 
 
 def _answer(ladder: Ladder) -> dict[str, Any]:
-    from xy_sysid.search.findings import parameters
+    from xy_sysid.diagnosis.findings import parameters
 
     rungs = [
         {

@@ -13,9 +13,9 @@ from xy_sysid.cli.diagnose import Own
 from xy_sysid.cli.output import aside, emit, estimates, progress, say, table
 
 if TYPE_CHECKING:
+    from xy_sysid.diagnosis.findings import Rung
     from xy_sysid.live.fitter import Update
     from xy_sysid.samples.joint_fields import JointOutput
-    from xy_sysid.search.findings import Rung
     from xy_sysid.units import Units
 
 

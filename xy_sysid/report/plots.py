@@ -9,6 +9,10 @@ import plotly.graph_objects as go
 
 from xy_sysid.comparison.of_run import held
 from xy_sysid.comparison.where_it_fails import Comparison, compare_velocity
+from xy_sysid.diagnosis.diagnose import Diagnosis
+from xy_sysid.diagnosis.findings import rung
+from xy_sysid.diagnosis.ladder import Ladder
+from xy_sysid.diagnosis.of_run import Refinement
 from xy_sysid.errors import BadInput
 from xy_sysid.fitting.check_on_data import through_window
 from xy_sysid.fitting.of_run import LinearModel
@@ -20,10 +24,6 @@ from xy_sysid.report.story_parts import drawing
 from xy_sysid.report.theme import FLOOR
 from xy_sysid.response.frf import FrequencyResponse
 from xy_sysid.samples.recording import Recording, Run, one_run
-from xy_sysid.search.diagnose import Diagnosis
-from xy_sysid.search.findings import rung
-from xy_sysid.search.ladder import Ladder
-from xy_sysid.search.of_run import Refinement
 from xy_sysid.settings import IdentifierSettings
 from xy_sysid.story.document import rung_document
 from xy_sysid.units import USUAL

@@ -6,52 +6,15 @@ shows what is being tried, and stops it at any time.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from math import inf, log
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, TypeVar
 
-from xy_sysid.search.criteria import ALIKE, FEWEST, HOPELESS, LATER, LEAST, OPTIMISM, SIMPLE_FIRST
-from xy_sysid.search.moves import Move
-
-
-class Judged(Protocol):
-    """What the search needs to know of a fit."""
-
-    @property
-    def excess(self) -> float:
-        """nats; 0 is nothing left."""
-
+from xy_sysid.criteria import ALIKE, FEWEST, HOPELESS, LATER, LEAST, OPTIMISM, SIMPLE_FIRST
+from xy_sysid.judge.contract import Judge, Judged, Move
 
 F = TypeVar("F", bound=Judged)
-
-
-class Judge(Protocol[F]):
-    """What the search asks; see ``judge.FreeRunJudge``."""
-
-    def moves(self, now: F, brief: F) -> Sequence[Move]:
-        """What may be done next from a set. brief: its quick fit."""
-
-    def slow_moves(self, now: F, brief: F) -> Sequence[Move]:
-        """The same by what only all data show."""
-
-    def taken_for(self, now: F) -> Sequence[Move]:
-        """What may stand in the place of an effect, whose trace is a reason to try it."""
-
-    def brief(self, now: F, move: Move, hopeless: float = inf) -> F | None:
-        """A quick fit."""
-
-    def merged(self, now: F, others: F) -> F | None:
-        """A quick fit of one set with the effects of another, from what either has come to."""
-
-    def whole(self, found: F) -> F:
-        """The same on all data."""
-
-    def refusal(self, found: F) -> str:
-        """Why it explains nothing, or empty."""
-
-    def size(self, found: F, before: F) -> float:
-        """What a fit explains of what one before it left, over what it leaves itself."""
 
 
 @dataclass(eq=False)

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from xy_sysid.criteria import AT_FLOOR, FEWEST, FILTERED
 from xy_sysid.effects._contract import Limits
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.greybox.one_step import error_without
 from xy_sysid.greybox.whitened import whitened_rms
-from xy_sysid.search.beside_one_step import Grown, Wanted, grown, told_apart
+from xy_sysid.judge.axis_judge import AxisJudge
+from xy_sysid.judge.beside_one_step import Grown, Wanted, grown, told_apart
 from xy_sysid.search.best_first import Node, Search
-from xy_sysid.search.criteria import AT_FLOOR, FEWEST, FILTERED
-from xy_sysid.search.judge import FreeRunJudge
 from xy_sysid.search.simplify import whole
 
 Filtered = tuple[tuple[tuple[str, GreyboxFit], ...], float]
@@ -24,7 +24,7 @@ class OneStepTrials:
     found: rungs, and that simulation's error one sample ahead, m/s
     """
 
-    def __init__(self, judge: FreeRunJudge, search: Search[GreyboxFit]) -> None:
+    def __init__(self, judge: AxisJudge, search: Search[GreyboxFit]) -> None:
         self.judge, self.search = judge, search
         whole_record = judge.data.longest() is judge.data
         self.names = tuple(effect.name for effect in judge.library.acting if effect.one_step is not None and whole_record)

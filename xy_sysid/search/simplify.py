@@ -11,10 +11,11 @@ from itertools import chain
 from math import inf
 
 from xy_sysid.axis.model import AxisModel
+from xy_sysid.criteria import HOPELESS, LEAST
 from xy_sysid.greybox.free_run import GreyboxFit
-from xy_sysid.search.best_first import Judge, Node, Search
-from xy_sysid.search.criteria import HOPELESS, LEAST
-from xy_sysid.search.judge import FreeRunJudge
+from xy_sysid.judge.axis_judge import AxisJudge
+from xy_sysid.judge.contract import Judge
+from xy_sysid.search.best_first import Node, Search
 
 
 def whole(judge: Judge[GreyboxFit], node: Node[GreyboxFit]) -> GreyboxFit:
@@ -27,7 +28,7 @@ def whole(judge: Judge[GreyboxFit], node: Node[GreyboxFit]) -> GreyboxFit:
 class Simplifying:
     """From the best set to a simpler one, as long as what is lost could be feigned by what is left unexplained."""
 
-    def __init__(self, judge: FreeRunJudge, search: Search[GreyboxFit], kept: frozenset[str]) -> None:
+    def __init__(self, judge: AxisJudge, search: Search[GreyboxFit], kept: frozenset[str]) -> None:
         self.judge, self.search, self.kept = judge, search, kept
         self.now = search.best
         self.left: set[frozenset[str]] = set()

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from xy_sysid.comparison.residual_correlation import ResidualCorrelation
+from xy_sysid.diagnosis.findings import Rung, answer, parameters, place
 from xy_sysid.linear.transfer_function import Mode, TransferFunction
 from xy_sysid.samples.block import FloatArray
-from xy_sysid.search.findings import Rung, answer, parameters, place
 from xy_sysid.story.pictures import Binned, Measured, Pictures
 from xy_sysid.story.story import Story, StoryStep
 

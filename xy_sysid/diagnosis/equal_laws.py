@@ -11,10 +11,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from xy_sysid.axis.model import AxisModel, Library
+from xy_sysid.diagnosis.ladder import Candidate, Ladder, Rival, Step
 from xy_sysid.effects import Effect
 from xy_sysid.effects._contract import USUAL_WITHIN
 from xy_sysid.greybox.free_run import GreyboxFit
-from xy_sysid.search.ladder import Candidate, Ladder, Rival, Step
 
 
 def equals(library: Library, name: str) -> list[Effect]:

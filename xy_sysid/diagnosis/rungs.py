@@ -9,13 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from xy_sysid.axis.model import Library
+from xy_sysid.criteria import ALIKE, AT_FLOOR, LEAST
+from xy_sysid.diagnosis.equal_laws import is_the_same, likely_names
+from xy_sysid.diagnosis.ladder import Candidate, Ladder, Rival, Step, contains, is_taken_for, part_explained
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit
+from xy_sysid.judge.axis_judge import AxisJudge, joined
 from xy_sysid.search.best_first import Search
-from xy_sysid.search.criteria import ALIKE, AT_FLOOR, LEAST
-from xy_sysid.search.equal_laws import is_the_same, likely_names
-from xy_sysid.search.judge import FreeRunJudge, joined
-from xy_sysid.search.ladder import Candidate, Ladder, Rival, Step, contains, is_taken_for, part_explained
 from xy_sysid.search.one_step_trials import Filtered
 from xy_sysid.search.simplify import Simplifying, whole
 
@@ -28,14 +28,14 @@ class Given:
     steps: tuple[Step, ...]
 
     @staticmethod
-    def of(judge: FreeRunJudge, names: tuple[str, ...]) -> Given:
+    def of(judge: AxisJudge, names: tuple[str, ...]) -> Given:
         steps = [Step(None, judge.begin())]
         for name in names:
             steps.append(Step(name, judge.added(steps[-1].fit, name)))
         return Given(names, tuple(steps))
 
 
-def ladder_of_given(data: AxisData, judge: FreeRunJudge, given: Given) -> Ladder:
+def ladder_of_given(data: AxisData, judge: AxisJudge, given: Given) -> Ladder:
     """The ladder of these effects alone: nothing is searched."""
     final = given.steps[-1].fit
     base = given.steps[0].fit
@@ -52,7 +52,7 @@ def ladder_of_given(data: AxisData, judge: FreeRunJudge, given: Given) -> Ladder
 
 
 def ladder_of_search(
-    judge: FreeRunJudge,
+    judge: AxisJudge,
     search: Search[GreyboxFit],
     settled: Simplifying,
     given: Given,
@@ -152,7 +152,7 @@ def _astray(data: AxisData, settled: Simplifying, name: str) -> float:
     return min(math.sqrt(left / max(float(np.sum(weight * acts)), 1e-300)), 1.0)
 
 
-def _rungs(judge: FreeRunJudge, search: Search[GreyboxFit], given: Given, names: tuple[str, ...], final: GreyboxFit) -> list[Step]:
+def _rungs(judge: AxisJudge, search: Search[GreyboxFit], given: Given, names: tuple[str, ...], final: GreyboxFit) -> list[Step]:
     """One rung for each effect, in this order, the fits that are known already taken from memory."""
     steps: list[Step] = []
     now = given.steps[-1].fit

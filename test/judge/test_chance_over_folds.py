@@ -6,10 +6,10 @@ import pytest
 from helpers.foreign import Joint, driven
 
 from xy_sysid.axis.model import STANDARD
+from xy_sysid.diagnosis.diagnose import diagnose
 from xy_sysid.greybox.axis_data import AxisData, prepare
 from xy_sysid.greybox.free_run import fit_base, fit_with
-from xy_sysid.search.diagnose import diagnose
-from xy_sysid.search.judge import FreeRunJudge
+from xy_sysid.judge.axis_judge import AxisJudge
 
 SHORT = Joint(fs=1000.0, seconds=12.0, count=1e-6, mass=1.0, drag=5.0, coulomb=0.6, moves=(0.1, 0.15, 2.0), control=(4e3, 120.0))
 
@@ -28,7 +28,7 @@ def test_few_windows_are_too_few_for_any_test_of_ranks(short: AxisData) -> None:
 
 def test_a_law_that_holds_is_better_in_a_short_record_and_one_that_does_not_is_not(short: AxisData) -> None:
     """Each window is held out once: those that were fitted are judged by a fit to the others."""
-    judge, base = FreeRunJudge(short, STANDARD), fit_base(short)
+    judge, base = AxisJudge(short, STANDARD), fit_base(short)
     rubbed, lagged = (fit_with(short, base, [name]) for name in ("coulomb_friction", "gain_drift"))
     assert judge.better(rubbed, base)
     assert not judge.better(base, rubbed)

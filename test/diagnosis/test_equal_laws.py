@@ -8,8 +8,8 @@ import scipy.linalg
 import scipy.signal
 
 from xy_sysid.axis.model import STANDARD
-from xy_sysid.search.diagnose import diagnose
-from xy_sysid.search.equal_laws import equals, likelihood
+from xy_sysid.diagnosis.diagnose import diagnose
+from xy_sysid.diagnosis.equal_laws import equals, likelihood
 
 HEAVY_BASE = (0.06, 46.0, 0.02, 0.03)
 TWO_INERTIAS = (0.41, 54.0, 0.02, 0.03)

@@ -9,40 +9,16 @@ from itertools import combinations
 import numpy as np
 
 from xy_sysid.axis.model import AxisModel, Library
+from xy_sysid.criteria import ALIKE, WIDTH
 from xy_sysid.effects import Effect, Scene
 from xy_sysid.effects._contract import in_time
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.forces import taken_for
 from xy_sysid.greybox.free_run import TOLD, GreyboxFit, first_excess, is_read, other_starts, scene_of, screened
 from xy_sysid.greybox.score_test import Gain, Trace
-from xy_sysid.search.criteria import ALIKE, WIDTH
+from xy_sysid.judge.contract import Move
 
 NOTHING = Gain(0.0, 0.0)
-
-
-@dataclass(frozen=True, slots=True)
-class Move:
-    """From one set of effects to another.
-
-    gain, rest: nats that the score test promises, of excess and of the whole error
-    begins: excess with which it begins, where that is known (else infinite)
-    parameters: that the new set has more; starts: first values of what is new; replaced: an effect that gives way
-    expected: every machine has it (friction): it comes first among moves that promise the same, and is tried whatever the whole error promises,
-        for to first order its trace tells little where it bends
-    simpler: for a richer law of friction the set with the simplest in its place, else empty
-    stays: parts of what is replaced that stay beside what takes its place, with their values
-    """
-
-    effects: frozenset[str]
-    gain: float
-    rest: float
-    parameters: int
-    starts: tuple[tuple[str, tuple[float, ...]], ...]
-    replaced: str | None = None
-    begins: float = np.inf
-    expected: bool = False
-    simpler: frozenset[str] = frozenset()
-    stays: tuple[tuple[str, tuple[float, ...]], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

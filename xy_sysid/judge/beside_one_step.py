@@ -10,13 +10,13 @@ from math import inf, log
 
 from xy_sysid.axis.loop_source import undoable
 from xy_sysid.axis.model import Library
+from xy_sysid.criteria import ALIKE, LEAST, MOST_EFFECTS, OPTIMISM, SIZE, WORTH
 from xy_sysid.effects import Effect
 from xy_sysid.effects._contract import PATIENT, Followed, Limits
 from xy_sysid.greybox.free_run import AxisData, GreyboxFit
 from xy_sysid.greybox.innovation_test import traces
 from xy_sysid.greybox.one_step import AT_NOISE, beside, error_without, followed
 from xy_sysid.greybox.score_test import Trace
-from xy_sysid.search.criteria import ALIKE, LEAST, MOST_EFFECTS, OPTIMISM, SIZE, WORTH
 
 
 @dataclass(frozen=True, slots=True)

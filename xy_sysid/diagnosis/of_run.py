@@ -9,16 +9,16 @@ from threadpoolctl import threadpool_limits
 
 from xy_sysid.axis.model import STANDARD, Library
 from xy_sysid.comparison.physical_model import PhysicalModel
+from xy_sysid.criteria import BUDGET, MOST_EFFECTS
+from xy_sysid.diagnosis import diagnose as one
+from xy_sysid.diagnosis.diagnose import Diagnosis
+from xy_sysid.diagnosis.ladder import Ladder
+from xy_sysid.diagnosis.refine import Effort, never
+from xy_sysid.diagnosis.refine import refine as search
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.axis_data import prepare_all
 from xy_sysid.greybox.free_run import EPSILON, GreyboxFit
 from xy_sysid.samples.recording import Recording, Run, one_run
-from xy_sysid.search import diagnose as one
-from xy_sysid.search.criteria import BUDGET, MOST_EFFECTS
-from xy_sysid.search.diagnose import Diagnosis
-from xy_sysid.search.ladder import Ladder
-from xy_sysid.search.refine import Effort, never
-from xy_sysid.search.refine import refine as search
 from xy_sysid.units import bare, motion, moved
 
 Data = Run | Recording | Sequence[Run | Recording]

@@ -19,17 +19,17 @@ from helpers.simulated import recorded
 from xy_sim.parts import PARTS
 from xy_sysid.axis.model import STANDARD, Library
 from xy_sysid.cli import run
+from xy_sysid.criteria import AT_FLOOR, FEWEST
+from xy_sysid.diagnosis.diagnose import Diagnosis, diagnose, judged
+from xy_sysid.diagnosis.ladder import Rival, Step, is_taken_for
+from xy_sysid.diagnosis.refine import Effort, refine, refine_steps
 from xy_sysid.effects import EFFECTS, Effect
 from xy_sysid.greybox.axis_data import AxisData, prepare
 from xy_sysid.greybox.free_run import GreyboxFit, fit_with
 from xy_sysid.imports import save
+from xy_sysid.judge.axis_judge import AxisJudge
+from xy_sysid.judge.beside_one_step import grown
 from xy_sysid.search import one_step_trials
-from xy_sysid.search.beside_one_step import grown
-from xy_sysid.search.criteria import AT_FLOOR, FEWEST
-from xy_sysid.search.diagnose import Diagnosis, diagnose, judged
-from xy_sysid.search.judge import FreeRunJudge
-from xy_sysid.search.ladder import Rival, Step, is_taken_for
-from xy_sysid.search.refine import Effort, refine, refine_steps
 
 
 @pytest.mark.parametrize("effect", ["coulomb_friction", "cogging", "dead_zone", "constant_load", "saturation", "lead_error"])
@@ -206,13 +206,13 @@ def test_an_effect_can_be_added_by_name(rec: Path, capsys: pytest.CaptureFixture
 def test_what_is_compiled_at_first_use_costs_no_budget(monkeypatch: pytest.MonkeyPatch) -> None:
     """On a fresh machine the first fit compiles the laws for longer than the whole budget: the search has its time all the same."""
     now = [0.0]
-    begin = FreeRunJudge.begin
+    begin = AxisJudge.begin
 
-    def slow(judge: FreeRunJudge) -> GreyboxFit:
+    def slow(judge: AxisJudge) -> GreyboxFit:
         now[0] += 100.0
         return begin(judge)
 
-    monkeypatch.setattr(FreeRunJudge, "begin", slow)
+    monkeypatch.setattr(AxisJudge, "begin", slow)
     found = diagnose(2000.0, *recorded("coulomb_friction", seconds=20.0).axis("x"), budget=10.0, clock=lambda: now[0])
     assert found.effects == ("coulomb_friction",) and not found.stopped
 
@@ -319,7 +319,7 @@ def test_a_spring_beside_friction_is_not_taken_for_a_pendulum_and_bumps() -> Non
 def test_a_lag_beside_friction_begins_where_the_base_gives_way() -> None:
     """The base has taken it for a delay, so that its trace promises little; with the delay given back it begins far below."""
     data = prepare(2000.0, *recorded("constant_load+coulomb_friction+amplifier_lag", seconds=30.0).axis("x"))
-    judge = FreeRunJudge(data, STANDARD)
+    judge = AxisJudge(data, STANDARD)
     now = judge.added(judge.added(judge.begin(), "coulomb_friction"), "constant_load")
     moves = {tuple(name for name, _ in move.starts): move for move in judge.moves(now, now)}
     lag = moves["amplifier_lag",]

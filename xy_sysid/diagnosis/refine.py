@@ -12,15 +12,15 @@ from collections.abc import Callable, Generator, Iterable
 from dataclasses import dataclass
 
 from xy_sysid.axis.model import STANDARD, Library
+from xy_sysid.criteria import BUDGET, FEWEST, FREE, IN_HAND, LEAST, MOST_EFFECTS, WORTH
+from xy_sysid.diagnosis.ladder import Ladder
+from xy_sysid.diagnosis.rungs import Given, ladder_of_given, ladder_of_search
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.jit import spent_compiling
+from xy_sysid.judge.axis_judge import AxisJudge, joined
 from xy_sysid.search.best_first import Node, Search
-from xy_sysid.search.criteria import BUDGET, FEWEST, FREE, IN_HAND, LEAST, MOST_EFFECTS, WORTH
-from xy_sysid.search.judge import FreeRunJudge, joined
-from xy_sysid.search.ladder import Ladder
 from xy_sysid.search.one_step_trials import OneStepTrials
-from xy_sysid.search.rungs import Given, ladder_of_given, ladder_of_search
 from xy_sysid.search.simplify import Simplifying
 
 
@@ -72,7 +72,7 @@ def refine_steps(
     """The same, step by step: yields what is being tried, returns what it came to."""
     kept, effort = tuple(given), effort or Effort()
     until = math.inf  # what is given is fitted wholly
-    judge = FreeRunJudge(data, library, lambda: effort.now() > until)
+    judge = AxisJudge(data, library, lambda: effort.now() > until)
     begun = effort.now()
     fixed = Given.of(judge, kept)
     first = min(effort.now() - begun, 0.1 * effort.budget)  # at most: code is read from the disk at its first use
@@ -122,7 +122,7 @@ def settle(data: AxisData, now: GreyboxFit) -> GreyboxFit:
     """Without what is no longer needed, with simpler relatives where they do as well, and one law for several that are the same."""
     if now.model.ahead is not None:
         return now
-    judge = FreeRunJudge(data, now.model.library)
+    judge = AxisJudge(data, now.model.library)
     search: Search[GreyboxFit] = Search(judge=judge, clock=never, budget=BUDGET, most=MOST_EFFECTS, least=WORTH)
     names = frozenset(name for name, _ in now.model.effects)
     search.nodes[names] = Node(effects=names, fit=now, brief=now, parameters=sum(len(values) for _, values in now.model.effects), whole=True)

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 import scipy.signal
 
+from xy_sysid.criteria import CHANCE, FEWEST, STILL
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.axis_data import AxisData, prepare_all
 from xy_sysid.samples.block import FloatArray
-from xy_sysid.search.criteria import CHANCE, FEWEST, STILL
 
 
 def lacking(sampling_rate: float, recordings: Sequence[tuple[FloatArray, FloatArray]]) -> str:

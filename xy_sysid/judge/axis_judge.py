@@ -10,6 +10,7 @@ import numpy as np
 from scipy.stats import norm, wilcoxon
 
 from xy_sysid.axis.model import AxisModel, Library
+from xy_sysid.criteria import CHANCE, HOPELESS, LEAST
 from xy_sysid.effects import Effect
 from xy_sysid.effects._contract import Limits, in_time
 from xy_sysid.greybox.axis_data import AxisData
@@ -18,14 +19,14 @@ from xy_sysid.greybox.forces import braked, of_one_name, stood_in, taken_over
 from xy_sysid.greybox.free_run import GreyboxFit, best_start, finish, first_excess, fit, fit_base, is_read, other_starts, scene_of, screened
 from xy_sysid.greybox.one_step import one_step_fit
 from xy_sysid.greybox.score_test import bounded
+from xy_sysid.judge.beside_one_step import put_beside
+from xy_sysid.judge.contract import Move
+from xy_sysid.judge.moves import Moves
+from xy_sysid.judge.refusal import refusal
 from xy_sysid.samples.block import FloatArray
-from xy_sysid.search.beside_one_step import put_beside
-from xy_sysid.search.criteria import CHANCE, HOPELESS, LEAST
-from xy_sysid.search.moves import Move, Moves
-from xy_sysid.search.refusal import refusal
 
 
-class FreeRunJudge:
+class AxisJudge:
     """Judges by free simulation of one axis; sets are those of a library."""
 
     def __init__(self, data: AxisData, library: Library, late: Callable[[], bool] = in_time) -> None:

@@ -9,8 +9,8 @@ import pytest
 from helpers.foreign import Joint, across_gap, driven
 
 from xy_sysid.axis.model import STANDARD
+from xy_sysid.diagnosis.diagnose import Diagnosis, diagnose
 from xy_sysid.effects import EFFECTS
-from xy_sysid.search.diagnose import Diagnosis, diagnose
 
 SLIDE = Joint(fs=1000.0, seconds=40.0, count=1e-6, mass=0.1, drag=10.0, shake=1.0, band=(0.5, 60.0))
 LINEAR_MOTOR = Joint(
