@@ -29,6 +29,7 @@ class Scene:
     position: (n,) measured, at the middle of each sample, m
     error:    (n,) measured velocity minus the model's, m/s
     recordings: samples of each recording that it is made of, one after the other; empty for one
+    prompt: the same motion behind a drive that answers at once, where the delay that the base has is so long that it may be astray
     """
 
     sampling_rate: float
@@ -39,6 +40,7 @@ class Scene:
     position: FloatArray
     error: FloatArray
     recordings: tuple[int, ...] = ()
+    prompt: Scene | None = None
     _known: dict[tuple[str, float], FloatArray] = field(init=False, repr=False, compare=False, default_factory=dict)
     _guesses: dict[str, list[Guess]] = field(init=False, repr=False, compare=False, default_factory=dict)
 

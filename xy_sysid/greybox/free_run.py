@@ -20,7 +20,7 @@ from xy_sysid.greybox.forces import force_of, friction_of, pushing, rubbing
 from xy_sysid.greybox.least_squares import Round, Scale, Schedule, Solution, Target, solve
 from xy_sysid.greybox.parameters import Estimate, estimates, model_of, problem
 from xy_sysid.greybox.score_test import Screen, Trace, bounded, screen
-from xy_sysid.greybox.start_inverse import inverse_starts
+from xy_sysid.greybox.start_inverse import CUTOFFS, inverse_starts
 from xy_sysid.greybox.start_rigid import base_start
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import USUAL, Units
@@ -47,6 +47,7 @@ LONG = (Round(4, 1e-3), Round(6, 1e-5))
 COARSE, MIDDLING = 2000.0, 4000.0  # Hz: finest sub-steps of looks and first rounds (errors up to 3e-3 of the motion), and of brief fits (6e-4)
 TOLD = 0.01  # part of what is left of the voltage that an effect takes away at least, to be simulated before any fit: of 14 s below 10 Hz chance
 # takes half of it
+LATE = 1.0 / (4.0 * CUTOFFS[-1])  # s, of a delay with which nothing is read if it is wrong: a quarter of the shortest period that is looked at
 FAITHFUL = 0.1  # of what a model leaves: by so much may its motion change with finer sub-steps
 
 
@@ -130,7 +131,19 @@ def other_starts(data: AxisData, base: GreyboxFit, model: AxisModel, name: str, 
     scene: of the base and the first stage's data, if it is known; least: see ``inverse_starts``
     """
     effect, scene = model.library[name], scene or scene_of(data, base)
-    candidates, known = [], _apart(model)
+    candidates = _read(data, model, effect, scene, least)
+    if scene.prompt is not None:
+        candidates += _read(data, replace(model, delay=0.0), effect, scene.prompt, least)
+    if effect.joint is not None:
+        for gain, later, pole, values in effect.joint(scene):
+            whole = replace(model, gain=gain, delay=max(base.model.delay + later, 0.0), pole=min(max(pole, 1e-2), 1e5))
+            candidates.append(whole.with_effect(name, bounded(effect, values, data.similar)))
+    return candidates
+
+
+def _read(data: AxisData, model: AxisModel, effect: Effect, scene: Scene, least: float) -> list[AxisModel]:
+    """The model with one more effect as inverse identification reads it from a scene that has the model's delay."""
+    name, candidates, known = effect.name, [], _apart(model)
     beside, rubs = [own for own in pushing(known) if own != name], [own for own in rubbing(known) if own != name]
     amplified = [own for own, _ in known.effects if known.library[own].category == "input" and own != name]
     if amplified:
@@ -144,10 +157,6 @@ def other_starts(data: AxisData, base: GreyboxFit, model: AxisModel, name: str, 
         whole = whole if known is model else whole.joined()
         if all(own in whole for own, _ in model.effects):
             candidates.append(whole.with_effect(name, start.values))
-    if effect.joint is not None:
-        for gain, later, pole, values in effect.joint(scene):
-            whole = replace(model, gain=gain, delay=max(base.model.delay + later, 0.0), pole=min(max(pole, 1e-2), 1e5))
-            candidates.append(whole.with_effect(name, bounded(effect, values, data.similar)))
     return candidates
 
 
@@ -232,17 +241,21 @@ def screened(data: AxisData, fitted: GreyboxFit, effects: Iterable[Effect], scen
 def scene_of(data: AxisData, fitted: GreyboxFit, early: bool = True) -> Scene:
     """The measured motion of the first stage, or of the whole, as effects see it."""
     model, part = fitted.model, data.begun if early else np.asarray
-    late = [_delayed(data.voltage[run], model.delay * data.sampling_rate)[:-1] for run in data.runs]
-    return Scene(
+
+    def arriving(delay: float) -> FloatArray:
+        return part(np.concatenate([_delayed(data.voltage[run], delay * data.sampling_rate)[:-1] for run in data.runs]))
+
+    scene = Scene(
         sampling_rate=data.sampling_rate,
         gain=model.gain,
         pole=model.pole,
-        voltage=part(np.concatenate(late)),
+        voltage=arriving(model.delay),
         velocity=part(data.velocity),
         position=part(data.middle()),
         error=fitted.error if fitted.brief else part(fitted.error),
         recordings=data.counts(early),
     )
+    return replace(scene, prompt=replace(scene, voltage=arriving(0.0))) if model.delay > LATE else scene
 
 
 def fit(data: AxisData, start: AxisModel, brief: bool = False, hopeless: float = np.inf, late: Callable[[], bool] = in_time) -> GreyboxFit:
