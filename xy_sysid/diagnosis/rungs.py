@@ -19,6 +19,8 @@ from xy_sysid.search.best_first import Search
 from xy_sysid.search.one_step_trials import Filtered
 from xy_sysid.search.simplify import Simplifying, whole
 
+TINY = math.ulp(1.0)  # of a power: less is none
+
 
 @dataclass(frozen=True, slots=True)
 class Given:
@@ -67,22 +69,22 @@ def ladder_of_search(
     )
     refused = tuple((tuple(sorted(item.effects)), item.refused) for item in search.nodes.values() if item.refused)
     if filtered is not None:
-        rungs, bar = filtered
+        rungs, bar = filtered.rungs, filtered.bar
         last = rungs[-1][1]
         names = tuple(name for name, _ in last.model.effects)
-        noise = last.noise_floor
-        explained = 1.0 - max(last.held_out_error**2 - noise**2, 0.0) / max(bar**2 - noise**2, 1e-300)
+        noise = min(max(data.floor.encoder * data.sampling_rate, last.noise_floor), last.held_out_error)  # what is predicted is no noise
+        left, before, without = (error**2 - noise**2 for error in (last.held_out_error, bar, min(bar, filtered.without)))
         return Ladder(
             steps=(Step(None, base), *(Step(name, fit) for name, fit in rungs)),
             final=last,
             effects=names,
             tried=(next(Candidate(name, 0.0, fit) for name, fit in rungs if fit.model.ahead is not None), *tried),
-            rivals=(Rival(tuple(sorted(node.effects)), node.fit, 2.0 * math.log(bar / last.held_out_error)),),
-            sizes=dict.fromkeys(names, (bar / last.held_out_error) ** 2 - 1.0),
+            rivals=(Rival(tuple(sorted(node.effects)), node.fit, 2.0 * math.log(bar / last.held_out_error)),) if node.effects else (),
+            sizes=dict.fromkeys(names, without / max(left, TINY * without) - 1.0),
             refused=refused,
-            explained=explained,
+            explained=1.0 - left / before,
             noise=noise,
-            discrepancy=math.sqrt(max(last.held_out_error**2 - noise**2, 0.0)),
+            discrepancy=math.sqrt(left),
             stopped=search.stopped,
         )
     final, own = joined(data, node.fit, judge.late), settled.sizes()

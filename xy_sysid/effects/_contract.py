@@ -149,6 +149,7 @@ class Followed:
     innovation:   (n,) measured minus predicted position, one step ahead, m
     without:      (n,) the same of the same filter (process noise, what is beside) with the effect taken out and all else refitted, m
     noise:        standard deviation of the encoder, m; runs: how often the filter ran
+    looseness:    process noise that the filter was given, over the usual
     too_small:    True if the effect found is so small that it is none
     given_up:     True if it ended early, because it could not come near the bar
     """
@@ -163,6 +164,7 @@ class Followed:
     without: FloatArray
     noise: float
     runs: int
+    looseness: float = 1.0
     too_small: bool = False
     given_up: bool = False
 

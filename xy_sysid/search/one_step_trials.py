@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from xy_sysid.criteria import AT_FLOOR, FEWEST, FILTERED
@@ -15,13 +17,24 @@ from xy_sysid.judge.beside_one_step import Grown, Wanted, grown, told_apart
 from xy_sysid.search.best_first import Node, Search
 from xy_sysid.search.simplify import whole
 
-Filtered = tuple[tuple[tuple[str, GreyboxFit], ...], float]
+
+@dataclass(frozen=True, slots=True)
+class Filtered:
+    """What one-step prediction found, and what it has beaten.
+
+    rungs: names and fits, the last is the answer; bar: error one sample ahead, m/s, of the best simulation with an autoregressive error
+    without: of the same filter with the effect taken out
+    """
+
+    rungs: tuple[tuple[str, GreyboxFit], ...]
+    bar: float
+    without: float
 
 
 class OneStepTrials:
     """Each is fitted once from a set, and taken if it beats the best simulation with an autoregressive error.
 
-    found: rungs, and that simulation's error one sample ahead, m/s
+    found: what won
     """
 
     def __init__(self, judge: AxisJudge, search: Search[GreyboxFit]) -> None:
@@ -49,7 +62,7 @@ class OneStepTrials:
         self.asked.append(self.search.best.effects)
         for name in self.names:
             self.look(name, self.search.best)
-        if self.found is not None and self.found[0][-1][1].excess > 0.0:
+        if self.found is not None and self.found.rungs[-1][1].excess > 0.0:
             self.found = None
         return self.found is not None
 
@@ -72,7 +85,7 @@ class OneStepTrials:
                 return
             last, without = fitted.rungs[-1][1], error_without(data, fitted.found)
             if name in last.model and last.held_out_error < FILTERED * min(bar, without):
-                self.found = (*self._up_to(node), *fitted.rungs), bar
+                self.found = Filtered((*self._up_to(node), *fitted.rungs), bar, without)
                 return
 
     def _up_to(self, node: Node[GreyboxFit]) -> list[tuple[str, GreyboxFit]]:

@@ -65,13 +65,13 @@ class Simplifying:
         """The simplest other set that was tried, has fewer parameters (or as many, and friction where this has none), and comes near."""
         library = self.judge.library
 
-        def order(node: Node[GreyboxFit]) -> tuple[int, float, int]:
-            """Of sets that do the same, friction first: every machine has it."""
-            return node.parameters, round(node.fit.excess, 1), sum(not library[name].is_dry for name in node.effects)
+        def usual(node: Node[GreyboxFit]) -> tuple[int, int]:
+            """Of sets that do the same: one effect rather than two, and friction first, as every machine has it."""
+            return len(node.effects), sum(not library[name].is_dry for name in node.effects)
 
-        nodes = sorted(self.search.nodes.values(), key=order)
-        for node in nodes:
-            alike = node.parameters == self.now.parameters and order(node) < order(self.now) and node.fit.excess < self.now.fit.excess + LEAST
+        for node in sorted(self.search.nodes.values(), key=lambda node: (node.parameters, round(node.fit.excess, 1), usual(node))):
+            same = node.parameters == self.now.parameters and node.fit.excess < self.now.fit.excess + LEAST
+            alike = same and usual(node) < usual(self.now)
             simpler = (alike or node.parameters < self.now.parameters) and not node.refused and self.kept <= node.effects
             if simpler and self.judge.rest(node.fit, self.now.fit) - here < self.search.least:
                 whole(self.judge, node)

@@ -25,6 +25,7 @@ BRIEF = 6.0  # s of the first fits
 PROMISING = 20.0  # innovation over noise after the brief fits above which the fit is not refined
 SEEN, LEFT = 2.5, 1.5  # encoder noises, and innovations, that a gap must have to be one
 DEAF = 12.0  # the filter is told this much more encoder noise on the way: a smoother valley
+FORGIVING = (1.0, 0.3, 0.1, 0.03)  # process noise that the filter may have in the end, over the usual: what predicts best of the training
 COARSE, FINE = 3, 6  # sub-steps of a sample on the way, and in the end
 BEHIND = 1.5  # held-out innovation over the bar after the first fits, at which it is given up. Development draws, and machines of another make:
 # true gaps 0.1 to 1.1; where there is none 1.2 to 18
@@ -42,7 +43,7 @@ class Contact:
         return from_usual(self._fit(to_usual(task)), task.beside.similar)
 
     def _fit(self, task: OneStepTask) -> Followed:
-        first, _, n = task.stages
+        first = task.stages[0]
         fit = Innovations(task.sampling_rate, task.base, task.noise, task.beside, task.dry.laws)
         fit.late = task.limits.late
         brief = min(first, int(BRIEF * task.sampling_rate))
@@ -50,27 +51,35 @@ class Contact:
         rigid = self._rigid(fit, fit.start(task.base, RIGID, task.dry.values), loose, 1e-2)
         best = self._begun(fit, task, loose)
         if task.limits.bar is not None:
-            innovation = fit.seen(best, View(n, cuts=FINE))
+            looseness, innovation = self._seen(fit, best, task)
             idle = task.begin is None and fit.size(best, loose) > IDLE * fit.softened(SOFT).size(rigid, loose)
             if _rms(innovation[task.stages[1] :]) * task.noise > (1.0 if idle else BEHIND) * task.limits.bar:
-                return self._told(fit, task, best, innovation)
+                return self._told(fit, task, best, (looseness, innovation))
         best = self._refined(fit, best, rigid, near)
         if fit.size(best, near) < PROMISING:
             best = fit.solved(best, np.arange(best.size), whole, 8, 1e-4)
         rigid = self._rigid(fit, self._closed(fit, rigid, best, near), whole, 1e-3)
-        without = fit.softened(SOFT).seen(rigid, View(n, cuts=FINE))
-        return self._told(fit, task, best, fit.seen(best, View(n, cuts=FINE)), fit.spread(best, View(first, cuts=FINE)), without)
+        without = self._seen(fit.softened(SOFT), rigid, task)[1]
+        return self._told(fit, task, best, self._seen(fit, best, task), fit.spread(best, View(first, cuts=FINE)), without)
+
+    @staticmethod
+    def _seen(fit: Innovations, inner: FloatArray, task: OneStepTask) -> tuple[float, FloatArray]:
+        """The process noise with which the filter predicts the training best, over the usual, and all innovations with it."""
+        _, training, n = task.stages
+        found = ((looseness, fit.seen(inner, View(n, looseness, FINE))) for looseness in FORGIVING)
+        return min(found, key=lambda item: _rms(item[1][:training]))
 
     @staticmethod
     def _told(
         fit: Innovations,
         task: OneStepTask,
         best: FloatArray,
-        innovation: FloatArray,
+        seen: tuple[float, FloatArray],
         spread: FloatArray | None = None,
         without: FloatArray | None = None,
     ) -> Followed:
         """What was found; of a fit that was given up there is no spread, and nothing without the gap: it does not matter any more."""
+        looseness, innovation = seen
         values = fit.outer(best)
         errors = np.full(values.size, np.inf) if spread is None else spread
         large = values[GAP] > max(SEEN, LEFT * _rms(innovation[: task.stages[0]])) * task.noise
@@ -85,6 +94,7 @@ class Contact:
             without=(innovation if without is None else without) * task.noise,
             noise=task.noise,
             runs=fit.runs,
+            looseness=looseness,
             too_small=not large,
             given_up=spread is None,
         )
@@ -93,7 +103,7 @@ class Contact:
         """See ``OneStep``."""
         found = from_usual(found, beside.similar, back=True)
         fit = Innovations(sampling_rate * beside.similar.time, found.base, found.noise, usual(beside), found.dry.laws)
-        return fit.seen(fit.start(found.base, found.values, found.dry.values), View(samples, cuts=COARSE))
+        return fit.seen(fit.start(found.base, found.values, found.dry.values), View(samples, found.looseness, COARSE))
 
     @staticmethod
     def _begun(fit: Innovations, task: OneStepTask, view: View) -> FloatArray:
