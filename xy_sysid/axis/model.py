@@ -107,11 +107,6 @@ class AxisModel:
     def __contains__(self, name: str) -> bool:
         return any(name == own for own, _ in self.effects)
 
-    @property
-    def ahead(self) -> Effect | None:
-        """The effect in it that only one-step prediction can judge, if there is one: then errors are of one sample ahead."""
-        return next((self.library[name] for name, _ in self.effects if self.library[name].one_step is not None), None)
-
     def with_effect(self, name: str, values: Iterable[float] | None = None) -> AxisModel:
         """The model with one effect added or changed (None: its typical size)."""
         chosen = self.library[name].typical if values is None else tuple(float(value) for value in values)

@@ -74,7 +74,7 @@ def _show(name: str, item: Diagnosis, known: Library) -> None:
         told = {one.effect: one.share for one in findings(item, known).candidates}
         tried = [(c, c.fit) for c in item.candidates if c.fit is not None]
         tried.sort(key=lambda pair: (float(f"{pair[1].held_out_error:.2g}"), pair[0].effect not in item.effects))  # by what each leaves
-        parts = ["-" if fit.model.ahead else f"{100 * told.get(c.effect, 0.0):.3g} %" for c, fit in tried]  # of another error, one sample ahead
+        parts = ["-" if fit.one_step else f"{100 * told.get(c.effect, 0.0):.3g} %" for c, fit in tried]  # of another error, one sample ahead
         rows = [(*error_cells(c.effect, fit), part) for (c, fit), part in zip(tried, parts, strict=True)]
         if rows:
             table("alone, least left first", ("effect", f"held-out error {motion(item.units.speed)[1]}", "times floor", "share of error"), rows)
@@ -84,7 +84,7 @@ def _show(name: str, item: Diagnosis, known: Library) -> None:
 
 def error_cells(name: str, fit: GreyboxFit) -> tuple[str, str, str]:
     """Name, held-out error and what that is over the noise floor; where free simulation cannot judge, the name says what was judged."""
-    label = f"{name} (error one sample ahead)" if fit.model.ahead else name
+    label = f"{name} (error one sample ahead)" if fit.one_step else name
     return label, f"{motion(fit.units.speed)[0] * fit.held_out_error:.4g}", f"{fit.held_out_error / max(fit.noise_floor, 1e-300):.2f}"
 
 

@@ -73,7 +73,7 @@ def refine(
             runs = runs_of(recordings, name)
             run, effort = runs[0], Effort(MOST_EFFECTS if auto else 0, budget, time.process_time)
             found = refined(runs, tuple(add or ()), known, effort, tolerance).ladder
-            if not found.final.model.ahead and len(runs) == 1:  # free simulation says nothing about those
+            if not found.final.one_step and len(runs) == 1:  # free simulation says nothing about those
                 if simulate_alone:
                     data = prepare(run.sampling_rate, run.voltage, run.position, tolerance, run.units)
                     found = replace(found, final=settled(data, found.final))

@@ -170,7 +170,7 @@ def _surest(data: AxisData, ladder: Ladder) -> tuple[Ladder, float]:
 
     Where two sets do the same, what they share is sure, and what they differ in is not. If nothing is surer than not, all are told.
     """
-    together = ladder.final.model.ahead is not None  # judged one sample ahead, as one: a rung may have brought two of them
+    together = ladder.final.one_step  # judged one sample ahead, as one: a rung may have brought two of them
     for count in range(len(ladder.effects), len(ladder.effects) - 1 if together else 0, -1):
         names = ladder.effects[:count]
         confidence = _confidence(ladder, names)
@@ -230,7 +230,7 @@ def _left(data: AxisData, ladder: Ladder, left: float) -> str:
     noise, beyond = (moved(value, data.units.speed) for value in (ladder.noise, ladder.discrepancy))
     if ladder.final.excess < AT_FLOOR or not ladder.discrepancy > 0.0:
         return f"What is left is the encoder's noise ({noise})."
-    words = "" if ladder.final.model.ahead else f", {_percent(left)} of the motion"
+    words = "" if ladder.final.one_step else f", {_percent(left)} of the motion"
     return f"What is left: {beyond}{words}, beyond the encoder's noise of {noise}{_mostly(data, ladder.final)}."
 
 

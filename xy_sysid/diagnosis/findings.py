@@ -54,7 +54,7 @@ def rung(fit: GreyboxFit, added: str | None = None, removed: str | None = None) 
     else:
         label = "rigid, with delay" if removed is None else f"without {removed}"
     model = fit.model
-    if model.ahead:
+    if fit.one_step:
         label += " (error one sample ahead)"  # free simulation cannot judge these; see ``one_step``
     return Rung(
         label=label,
@@ -155,7 +155,7 @@ def findings(item: Diagnosis, library: Library) -> Findings:
 
 def _tried(item: Candidate, fit: GreyboxFit, base: GreyboxFit) -> Tried:
     before, noise, unit = base.held_out_error, base.noise_floor, base.units.speed
-    if fit.model.ahead:
+    if fit.one_step:
         share = 0.0
         evidence = (
             f"judged one sample ahead, as no free simulation can tell: with it {moved(fit.held_out_error, unit)} are left, "

@@ -77,8 +77,7 @@ def refine_steps(
     fixed = Given.of(judge, kept)
     first = min(effort.now() - begun, 0.1 * effort.budget)  # at most: code is read from the disk at its first use
     until = effort.now() + IN_HAND * effort.budget - first
-    ahead = fixed.steps[-1].fit.model.ahead
-    if ahead is not None or effort.most == 0:
+    if fixed.steps[-1].fit.one_step or effort.most == 0:
         return ladder_of_given(data, judge, fixed)
     search: Search[GreyboxFit] = Search(judge=judge, clock=effort.now, budget=FREE * effort.budget, most=effort.most + len(kept), least=effort.size)
     across = None if kept else OneStepTrials(judge, search)
@@ -120,7 +119,7 @@ def refine_steps(
 
 def settle(data: AxisData, now: GreyboxFit) -> GreyboxFit:
     """Without what is no longer needed, with simpler relatives where they do as well, and one law for several that are the same."""
-    if now.model.ahead is not None:
+    if now.one_step:
         return now
     judge = AxisJudge(data, now.model.library)
     search: Search[GreyboxFit] = Search(judge=judge, clock=never, budget=BUDGET, most=MOST_EFFECTS, least=WORTH)

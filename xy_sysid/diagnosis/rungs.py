@@ -19,8 +19,6 @@ from xy_sysid.search.best_first import Search
 from xy_sysid.search.one_step_trials import Filtered
 from xy_sysid.search.simplify import Simplifying, whole
 
-TINY = math.ulp(1.0)  # of a power: less is none
-
 
 @dataclass(frozen=True, slots=True)
 class Given:
@@ -78,9 +76,9 @@ def ladder_of_search(
             steps=(Step(None, base), *(Step(name, fit) for name, fit in rungs)),
             final=last,
             effects=names,
-            tried=(next(Candidate(name, 0.0, fit) for name, fit in rungs if fit.model.ahead is not None), *tried),
+            tried=(next(Candidate(name, 0.0, fit) for name, fit in rungs if fit.one_step), *tried),
             rivals=(Rival(tuple(sorted(node.effects)), node.fit, 2.0 * math.log(bar / last.held_out_error)),) if node.effects else (),
-            sizes=dict.fromkeys(names, without / max(left, TINY * without) - 1.0),
+            sizes=dict.fromkeys(names, without / max(left, 1e-300) - 1.0),
             refused=refused,
             explained=1.0 - left / before,
             noise=noise,

@@ -64,6 +64,7 @@ class GreyboxFit:
     held:           (windows, bands) power of the held-out error, m^2/s^2
     units:          of input and output; m/s above is ``units.speed``
     brief:          of the first stage's data only: errors are of all of its windows, and what it simulates ends with them
+    one_step:       judged by how it predicts the next sample from all before it, and not by how it simulates: errors are of that
     """
 
     model: AxisModel
@@ -78,6 +79,7 @@ class GreyboxFit:
     converged: bool
     held: FloatArray
     brief: bool = False
+    one_step: bool = False
     units: Units = USUAL
 
     @property

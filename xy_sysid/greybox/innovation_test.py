@@ -5,7 +5,7 @@ The filter is run with a little of each trace put in; what changes is what the e
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -14,9 +14,10 @@ import scipy.signal
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.effects import Effect, Scene
 from xy_sysid.effects._contract import Beside, Followed
+from xy_sysid.effects._scene import Guess
 from xy_sysid.greybox.free_run import AxisData
 from xy_sysid.greybox.one_step import as_beside, beside
-from xy_sysid.greybox.score_test import Trace
+from xy_sysid.greybox.score_test import Projected, Trace, best_trace
 from xy_sysid.greybox.start_rigid import mean_velocity_filter
 from xy_sysid.samples.block import FloatArray
 
@@ -76,22 +77,12 @@ def traces(data: AxisData, model: AxisModel, effect: Effect, found: Followed, ef
     nuisance = np.stack(
         [(seen(recording(*own.undo(moved, n)[:3]), replace(found, base=tuple(moved[:3]))) - here)[skip:] for moved in _moved(numbers)]
     )
-    basis = np.linalg.qr(nuisance.T)[0]
-    target = here[skip:] - basis @ (basis.T @ here[skip:])
-    best: list[Trace] = []
-    for item in effects:
-        trace = Trace(item.name, 0.0, tuple(own.typical for own in item.on(scene.similar)))
-        for guess in item.guessed(scene):
-            columns = np.stack([change(item, column[:n]) for column in guess.columns])
-            columns = columns - (columns @ basis) @ basis.T
-            size = np.linalg.norm(columns, axis=1) + 1e-300
-            unit = columns / size[:, None]
-            inside = unit @ target
-            coefficients = np.linalg.lstsq(unit @ unit.T, inside, rcond=1e-10)[0]
-            share = float(inside @ coefficients) / float(target @ target + 1e-300)
-            if share > trace.share:
-                trace = Trace(item.name, share, item.read(guess, -coefficients / size, scene.similar))
-        best.append(trace)
+    space = Projected.of(here[skip:], nuisance)
+
+    def acting(item: Effect) -> Callable[[Guess], FloatArray]:
+        return lambda guess: -np.stack([change(item, column[:n]) for column in guess.columns])
+
+    best = (best_trace(item, scene, space, item.guessed(scene), acting(item))[0] for item in effects)
     return sorted(best, key=lambda trace: -trace.share)
 
 

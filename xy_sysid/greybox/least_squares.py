@@ -174,7 +174,7 @@ def solve(
                     columns = (change * weight).reshape(size, -1).view(np.float64)
                     normal, slope = columns @ columns.T, columns @ (error * weight).ravel().view(np.float64)
                     fresh = True
-                if schedule.late():
+                if schedule.late() or not (np.all(np.isfinite(normal)) and np.any(normal)):  # a model that runs away, or stands
                     break
                 diagonal = np.maximum(np.diag(normal), 1e-12 * float(np.max(np.diag(normal))) + 1e-300)
                 move = _move(normal + damping * np.diag(diagonal), slope, scale, scale.outer(inner))
@@ -262,6 +262,8 @@ def _updated(change: NDArray[np.complex128], gone: FloatArray, size: FloatArray,
 
 def _covariance(normal: FloatArray) -> FloatArray:
     """Inverse of the normal matrix; infinite for a parameter that the data do not see at all."""
+    if not np.all(np.isfinite(normal)):  # of a model that runs away
+        return np.full(normal.shape, np.inf)
     spread = np.sqrt(np.diag(normal))
     seen = spread > 0.0
     covariance = np.diag(np.where(seen, 0.0, np.inf))

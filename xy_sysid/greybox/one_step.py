@@ -100,9 +100,14 @@ def beside(model: AxisModel, effect: Effect) -> tuple[DryFriction, tuple[tuple[s
     return DryFriction(tuple(own for own, _ in rubbing), tuple(value for _, values in rubbing for value in values)), tuple(others)
 
 
+def follower(model: AxisModel) -> Effect | None:
+    """The effect of a model that only one-step prediction can judge, if there is one."""
+    return next((model.library[name] for name, _ in model.effects if model.library[name].one_step is not None), None)
+
+
 def change_without(data: AxisData, model: AxisModel, name: str) -> float:
     """Mean square of what the innovations over the noise would change by, were one effect of a model absent and all else as it is."""
-    effect = model.ahead
+    effect = follower(model)
     assert effect is not None
     least = (effect.parameters[0].low, *dict(model.effects)[effect.name][1:])
     nothing = model.with_effect(name, least) if name == effect.name else model.without(name)
@@ -189,6 +194,7 @@ def _result(data: AxisData, library: Library, effect: Effect, names: Sequence[st
         runs=found.runs,
         converged=not found.given_up,
         held=data.layout.powers(data.held.spectrum(error)),
+        one_step=True,
         units=data.units,
     )
 

@@ -14,6 +14,7 @@ import numpy as np
 import scipy.signal
 
 from xy_sysid.effects import Effect, Scene
+from xy_sysid.effects._scene import Guess
 from xy_sysid.effects._similarity import Similarity
 from xy_sysid.greybox.floor import Floor, Windows, excess, tolerance
 from xy_sysid.greybox.start_rigid import mean_velocity_filter
@@ -68,24 +69,72 @@ class Gain:
     rest: float
 
 
+@dataclass(frozen=True, slots=True)
+class Projected:
+    """An error, as independent numbers (m,), without what the parameters that a model has already can make of it.
+
+    basis: (m, k) orthonormal, of what these parameters change; power: of the error that is left
+    """
+
+    error: FloatArray
+    basis: FloatArray
+    power: float
+
+    @staticmethod
+    def of(error: FloatArray, nuisance: FloatArray) -> Projected:
+        """error: (m,); nuisance: (k, m) its change by each parameter."""
+        basis = np.linalg.qr(nuisance.T)[0]
+        left = np.asarray(error - basis @ (basis.T @ error))
+        return Projected(left, basis, float(left @ left) + 1e-300)
+
+    def share(self, columns: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+        """Part of the error's power that columns (k, m) explain, their coefficients, and the columns as they count, of size 1."""
+        clean = columns - (columns @ self.basis) @ self.basis.T
+        size = np.linalg.norm(clean, axis=1) + 1e-300
+        clean /= size[:, None]
+        seen = clean @ self.error
+        coefficients = np.linalg.lstsq(clean @ clean.T, seen, rcond=1e-10)[0]
+        return float(seen @ coefficients) / self.power, np.asarray(coefficients / size), clean
+
+
+def best_trace(
+    effect: Effect, scene: Scene, space: Projected, guesses: Iterable[Guess], acting: Callable[[Guess], FloatArray]
+) -> tuple[Trace, FloatArray | None]:
+    """The guess of an effect that explains most, and its columns as they count; none if no guess explains anything.
+
+    acting: what a guess's columns do to the error, (k, m)
+    """
+    best, chosen = Trace(effect.name, 0.0, tuple(item.typical for item in effect.on(scene.similar))), None
+    for guess in guesses:
+        share, coefficients, columns = space.share(acting(guess))
+        if share > best.share:
+            mean = coefficients.reshape(-1, len(guess.columns)).mean(axis=0)  # over the recordings
+            best, chosen = Trace(effect.name, share, effect.read(guess, mean, scene.similar)), columns
+    return best, chosen
+
+
 def screen(effects: Iterable[Effect], scene: Scene, nuisance: FloatArray, windows: Windows, least: Floor) -> Screen:
     """The best trace of each effect.
 
     nuisance: (k, n) change of the model's velocity per unit of each parameter that it has already; windows: of the scene that are looked at
     """
     power = tolerance(windows.layout, windows.spectrum(scene.error), least)
-    space = _Prepared(scene.error, nuisance, windows, (least.excited / np.sqrt(power))[windows.layout.band])
+    weight = (least.excited / np.sqrt(power))[windows.layout.band]
+
+    def white(signals: FloatArray) -> FloatArray:
+        """(k, n) -> (k, m)"""
+        values = windows.spectrum(signals) * weight
+        return np.concatenate((values.real, values.imag), axis=-1).reshape(len(signals), -1)
+
+    space = Projected.of(white(scene.error[None, :])[0], white(nuisance))
     found, rows, columns = [], {}, [space.error[None, :]]
     for effect in effects:
-        best, chosen = Trace(effect.name, 0.0, tuple(item.typical for item in effect.on(scene.similar))), None
-        for guess in effect.guessed(scene):
-            if guess.inverse_only:
-                continue
-            acting = _of_each_recording(guess.columns, effect, scene)
-            share, coefficients, white = space.share(acting if effect.is_behind else _through_base(acting, scene))
-            if share > best.share:
-                mean = coefficients.reshape(-1, len(guess.columns)).mean(axis=0)
-                best, chosen = Trace(effect.name, share, effect.read(guess, mean, scene.similar)), white
+
+        def acting(guess: Guess, effect: Effect = effect) -> FloatArray:
+            force = _of_each_recording(guess.columns, effect, scene)
+            return white(force if effect.is_behind else _through_base(force, scene))
+
+        best, chosen = best_trace(effect, scene, space, (guess for guess in effect.guessed(scene) if not guess.inverse_only), acting)
         found.append(best)
         if chosen is not None:
             begin = sum(map(len, columns))
@@ -132,30 +181,3 @@ def _through_base(forces: FloatArray, scene: Scene) -> FloatArray:
     """(k, n) V against the drive -> m/s."""
     b, a = mean_velocity_filter(scene.gain, scene.pole, scene.sampling_rate)
     return np.asarray(-scipy.signal.lfilter(b, a, forces, axis=1))
-
-
-class _Prepared:
-    """The error, whitened, with the nuisance projected out."""
-
-    def __init__(self, error: FloatArray, nuisance: FloatArray, windows: Windows, weight: FloatArray) -> None:
-        self.windows, self.weight = windows, weight
-        self.basis = np.linalg.qr(self._white(nuisance).T)[0]
-        self.error = self._clean(self._white(error[None, :]))[0]
-        self.power = float(self.error @ self.error) + 1e-300
-
-    def _white(self, signals: FloatArray) -> FloatArray:
-        """(k, n) -> (k, m)"""
-        values = self.windows.spectrum(signals) * self.weight
-        return np.concatenate((values.real, values.imag), axis=-1).reshape(len(signals), -1)
-
-    def _clean(self, values: FloatArray) -> FloatArray:
-        return np.asarray(values - (values @ self.basis) @ self.basis.T)
-
-    def share(self, columns: FloatArray) -> tuple[float, FloatArray, FloatArray]:
-        """Part of the error's power explained, the coefficients, and the whitened columns."""
-        white = self._clean(self._white(columns))
-        size = np.linalg.norm(white, axis=1) + 1e-300
-        white /= size[:, None]
-        seen = white @ self.error
-        coefficients = np.linalg.lstsq(white @ white.T, seen, rcond=1e-10)[0]
-        return float(seen @ coefficients) / self.power, np.asarray(coefficients / size), white

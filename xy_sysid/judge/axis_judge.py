@@ -17,7 +17,7 @@ from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.floor import excess
 from xy_sysid.greybox.forces import braked, of_one_name, stood_in, taken_over
 from xy_sysid.greybox.free_run import GreyboxFit, best_start, finish, first_excess, fit, fit_base, is_read, other_starts, scene_of, screened
-from xy_sysid.greybox.one_step import one_step_fit
+from xy_sysid.greybox.one_step import follower, one_step_fit
 from xy_sysid.greybox.score_test import bounded
 from xy_sysid.judge.beside_one_step import put_beside
 from xy_sysid.judge.contract import Move
@@ -41,7 +41,7 @@ class AxisJudge:
         """A fit with one more effect, unasked; a relative of the same family gives way."""
         effect = self.library[name]
         relative = next((own for own, _ in now.model.effects if effect.family and self.library[own].family == effect.family), None)
-        ahead = now.model.ahead
+        ahead = follower(now.model)
         if effect.one_step is not None:
             return one_step_fit(self.data, now, effect, limits=Limits(late=self.late))
         if ahead is not None:
@@ -77,10 +77,7 @@ class AxisJudge:
         return found
 
     def _tried(self, start: AxisModel, hopeless: float = np.inf) -> GreyboxFit | None:
-        try:
-            found = fit(self.data, start, brief=True, hopeless=hopeless, late=self.late)
-        except np.linalg.LinAlgError:
-            return None
+        found = fit(self.data, start, brief=True, hopeless=hopeless, late=self.late)
         return found if np.isfinite(found.excess) else None
 
     def merged(self, now: GreyboxFit, others: GreyboxFit) -> GreyboxFit | None:
@@ -135,12 +132,9 @@ class AxisJudge:
 
     def again(self, now: GreyboxFit, model: AxisModel) -> GreyboxFit | None:
         """A model beside one that is there: fitted wholly only where it comes near."""
-        try:
-            found = fit(self.data, model, brief=True, hopeless=now.excess + HOPELESS, late=self.late)
-            if found.excess < now.excess + HOPELESS:
-                found = finish(self.data, found.model, found.runs, self.late)
-        except np.linalg.LinAlgError:
-            return None
+        found = fit(self.data, model, brief=True, hopeless=now.excess + HOPELESS, late=self.late)
+        if found.excess < now.excess + HOPELESS:
+            found = finish(self.data, found.model, found.runs, self.late)
         return found if np.isfinite(found.excess) else None
 
     def idle(self, found: GreyboxFit) -> str:
@@ -170,10 +164,7 @@ class AxisJudge:
         if not np.all(gain > 0.0) or self.late():
             return False
         data = replace(self.data, fitted=self.data.held, held=self.data.fitted)
-        try:
-            one, other = (finish(data, found.model, late=self.late) for found in (one, other))
-        except np.linalg.LinAlgError:
-            return False
+        one, other = (finish(data, found.model, late=self.late) for found in (one, other))
         return _is_no_chance(np.concatenate((gain, _scores(other, data) - _scores(one, data))))
 
     def size(self, found: GreyboxFit, before: GreyboxFit) -> float:
@@ -191,6 +182,8 @@ def _is_no_chance(gain: FloatArray) -> bool:
 
     The ranks (Wilcoxon 1945), as a law that acts far out alone explains much in few windows, and a little in all.
     """
+    if not np.all(np.isfinite(gain)):
+        return False
     spread = float(np.std(gain, ddof=1)) / np.sqrt(max(gain.size / 1.5, 1.0)) if gain.size > 1 else 0.0
     if float(np.mean(gain)) > CHANCE * spread:
         return True

@@ -10,7 +10,7 @@ from math import inf, log
 
 from xy_sysid.axis.loop_source import undoable
 from xy_sysid.axis.model import Library
-from xy_sysid.criteria import ALIKE, LEAST, MOST_EFFECTS, OPTIMISM, SIZE, WORTH
+from xy_sysid.criteria import ALIKE, AT_FLOOR, LEAST, MOST_EFFECTS, OPTIMISM, SIZE, WORTH
 from xy_sysid.effects import Effect
 from xy_sysid.effects._contract import PATIENT, Followed, Limits
 from xy_sysid.greybox.free_run import AxisData, GreyboxFit
@@ -90,7 +90,7 @@ def _better(data: AxisData, now: GreyboxFit, effect: Effect, found: Followed, wa
     for trace in promising:
         if trace.share >= ALIKE * promising[0].share:
             tried_with(trace)
-    if now.excess > 0.0 and not any(fit.excess == 0.0 for _, fit, _ in tried):
+    if now.excess >= AT_FLOOR and not any(fit.excess < AT_FLOOR for _, fit, _ in tried):
         rubbing = _rubbing(now, library, found)
         for trace in traces(data, now.model, effect, found, rubbing) if rubbing else ():
             tried_with(trace)

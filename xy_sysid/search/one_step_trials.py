@@ -62,7 +62,7 @@ class OneStepTrials:
         self.asked.append(self.search.best.effects)
         for name in self.names:
             self.look(name, self.search.best)
-        if self.found is not None and self.found.rungs[-1][1].excess > 0.0:
+        if self.found is not None and self.found.rungs[-1][1].excess >= AT_FLOOR:
             self.found = None
         return self.found is not None
 
@@ -100,15 +100,12 @@ class OneStepTrials:
         return [rigid, best] if self._forces(best) else [rigid]
 
     def _fitted(self, name: str, node: Node[GreyboxFit], bar: float) -> Grown | None:
-        """The effect and what is beside it, beginning from a set; each is fitted once. None if it is too late, or there is no fit."""
+        """The effect and what is beside it, beginning from a set; each is fitted once. None if it is too late."""
         key = name, node.effects
         if key not in self.fitted:
             if self.judge.late():
                 self.search.stopped = True
                 return None
-            try:
-                wanted = Wanted(Limits(bar, self.judge.late), self.search.least, self.judge.refusal)
-                self.fitted[key] = grown(self.judge.data, whole(self.judge, node), self.judge.library[name], wanted)
-            except np.linalg.LinAlgError:
-                return None
+            wanted = Wanted(Limits(bar, self.judge.late), self.search.least, self.judge.refusal)
+            self.fitted[key] = grown(self.judge.data, whole(self.judge, node), self.judge.library[name], wanted)
         return self.fitted[key]

@@ -181,7 +181,7 @@ def _compared(data: AxisData, fitted: GreyboxFit) -> Comparison:
                 encoder=data.floor.encoder,
             )
             found = compare_motion(fitted.simulated[first:], held)
-            return replace(found, places=tuple(place for place in found.places if not fitted.model.ahead or place.error_over_floor > AT_NOISE))
+            return replace(found, places=tuple(place for place in found.places if not fitted.one_step or place.error_over_floor > AT_NOISE))
         except BadInput:
             continue
     edges = data.layout.edges()

@@ -19,7 +19,7 @@ from xy_sysid.diagnosis.of_run import diagnose
 from xy_sysid.diagnosis.refine import Effort, never, refine, settle
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.free_run import EPSILON, AxisData, GreyboxFit, fit, fit_base, prepare
-from xy_sysid.greybox.one_step import one_step_fit
+from xy_sysid.greybox.one_step import follower, one_step_fit
 from xy_sysid.judge.axis_judge import AxisJudge
 from xy_sysid.judge.enough_data import lacking
 from xy_sysid.samples.recording import Run
@@ -103,10 +103,9 @@ def added(story: Story, run: Run, name: str, library: Library = STANDARD) -> Sto
     data = prepare(run.sampling_rate, run.voltage, run.position, story.tolerance, run.units)
     now = _fit_of(story, data, library)
     relative = next((own for own in story.effects if library[own].family and library[own].family == library[name].family), None)
-    try:
-        before = now if relative is None else fit(data, now.model.without(relative))
-        found = AxisJudge(data, library).added(before, name)
-    except np.linalg.LinAlgError:
+    before = now if relative is None else fit(data, now.model.without(relative))
+    found = AxisJudge(data, library).added(before, name)
+    if not np.isfinite(found.excess):
         return replace(story, note=f"{name} could not be fitted to these data.")
     return _grown(story, data, found, name, relative)
 
@@ -226,12 +225,12 @@ def _fit_of(story: Story, data: AxisData, library: Library) -> GreyboxFit:
 
 def _simulated(data: AxisData, step: Rung, base: Rung, library: Library) -> GreyboxFit:
     """The fit of a step again: by one simulation, or as it was made where free simulation cannot judge it."""
-    alone = next((library[name] for name in step.effects if library[name].one_step is not None), None)
+    model = AxisModel(gain=step.gain, delay=step.delay, pole=step.pole, effects=step.values, library=library)
+    alone = follower(model)
     if alone is not None:
         rigid = _simulated(data, base, base, library)
         others = tuple((name, values) for name, values in step.values if name != alone.name)
         return one_step_fit(data, replace(rigid, model=replace(rigid.model, effects=others)), alone)
-    model = AxisModel(gain=step.gain, delay=step.delay, pole=step.pole, effects=step.values, library=library)
     simulated = simulate(model, data.sampling_rate, data.voltage, data.position)
     return GreyboxFit(
         model=model,
