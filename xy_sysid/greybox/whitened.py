@@ -27,14 +27,11 @@ def whitened_rms(error: FloatArray, held: NDArray[np.bool_], order: int = ORDER)
         raise BadInput("shape of error and held", f"{error.shape} and {held.shape}", "one and the same (n,)", "Give one flag a sample.")
     if not np.all(np.isfinite(error)):
         raise BadInput("error", "not finite", "finite numbers", "Give the error of a simulation that did not diverge.")
-    judged = held.copy()
-    judged[:order] = False
-    runs = [(a, b) for a, b in _runs(~held) if b - a > order]
-    rows = sum(b - a - order for a, b in runs)
-    if order < 1 or rows < 4 * order or not np.any(judged):
+    runs, judged = _used(held, order)
+    if not enough(held, order):
         raise BadInput(
             "samples to fit and to judge an autoregressive model",
-            f"{rows} and {int(np.sum(judged))}",
+            f"{sum(b - a - order for a, b in runs)} and {int(np.sum(judged))}",
             f"at least {4 * max(order, 1)}, and one, with order >= 1",
             "Record for longer, hold out fewer samples, or lower the order.",
         )
@@ -47,6 +44,19 @@ def whitened_rms(error: FloatArray, held: NDArray[np.bool_], order: int = ORDER)
     past = np.linalg.solve(products[1:, 1:] + ridge * np.eye(order), products[1:, 0])
     left = scipy.signal.lfilter(np.concatenate(([1.0], -past)), [1.0], centred)
     return float(np.sqrt(np.mean(left[judged] ** 2)))
+
+
+def enough(held: NDArray[np.bool_], order: int = ORDER) -> bool:
+    """Whether there are samples to fit an autoregressive model, and to judge it; held: (n,) True where it is judged."""
+    runs, judged = _used(held, order)
+    return order >= 1 and sum(b - a - order for a, b in runs) >= 4 * order and bool(np.any(judged))
+
+
+def _used(held: NDArray[np.bool_], order: int) -> tuple[list[tuple[int, int]], NDArray[np.bool_]]:
+    """Stretches that are fitted, each longer than the order, and (n,) the samples that are judged."""
+    judged = held.copy()
+    judged[:order] = False
+    return [(a, b) for a, b in _runs(~held) if b - a > order], judged
 
 
 def _runs(wanted: NDArray[np.bool_]) -> list[tuple[int, int]]:

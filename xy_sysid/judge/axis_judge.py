@@ -19,7 +19,8 @@ from xy_sysid.greybox.forces import braked, of_one_name, stood_in, taken_over
 from xy_sysid.greybox.free_run import GreyboxFit, best_start, finish, first_excess, fit, fit_base, is_read, other_starts, scene_of, screened
 from xy_sysid.greybox.one_step import follower, one_step_fit
 from xy_sysid.greybox.score_test import bounded
-from xy_sysid.judge.beside_one_step import put_beside
+from xy_sysid.greybox.whitened import enough, whitened_rms
+from xy_sysid.judge.beside_one_step import Grown, Wanted, grown, put_beside
 from xy_sysid.judge.contract import Move
 from xy_sysid.judge.moves import Moves
 from xy_sysid.judge.refusal import refusal
@@ -27,7 +28,7 @@ from xy_sysid.samples.block import FloatArray
 
 
 class AxisJudge:
-    """Judges by free simulation of one axis; sets are those of a library."""
+    """Fits sets of a library's effects to one axis, and says how well they predict what no fit saw: by simulation, or one sample ahead."""
 
     def __init__(self, data: AxisData, library: Library, late: Callable[[], bool] = in_time) -> None:
         self.data, self.library, self.late = data, library, late
@@ -75,6 +76,20 @@ class AxisJudge:
             again = self._tried(best_start(self.data, others), hopeless + HOPELESS) if others else None
             found = min((one for one in (found, again) if one is not None), key=lambda one: one.excess, default=None)
         return found
+
+    def ahead(self, found: GreyboxFit) -> float:
+        """Error one sample ahead, m/s, held out: of a fit that is judged so its own, of a simulation what an autoregressive model leaves.
+
+        0 where the data are too few for any prediction: nothing beats that.
+        """
+        if found.one_step:
+            return found.held_out_error
+        later = np.arange(self.data.velocity.size) >= self.data.training
+        return whitened_rms(found.error, later) if enough(later) else 0.0
+
+    def followed(self, now: GreyboxFit, name: str, bar: float, least: float) -> Grown:
+        """An effect that only one-step prediction can judge, with what acts beside it; see ``beside_one_step``."""
+        return grown(self.data, now, self.library[name], Wanted(Limits(bar, self.late), least, self.refusal))
 
     def _tried(self, start: AxisModel, hopeless: float = np.inf) -> GreyboxFit | None:
         found = fit(self.data, start, brief=True, hopeless=hopeless, late=self.late)

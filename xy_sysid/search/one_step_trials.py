@@ -4,16 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from xy_sysid.criteria import AT_FLOOR, FEWEST, FILTERED
-from xy_sysid.effects._contract import Limits
-from xy_sysid.errors import BadInput
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.greybox.one_step import error_without
-from xy_sysid.greybox.whitened import whitened_rms
 from xy_sysid.judge.axis_judge import AxisJudge
-from xy_sysid.judge.beside_one_step import Grown, Wanted, grown, told_apart
+from xy_sysid.judge.beside_one_step import Grown, told_apart
 from xy_sysid.search.best_first import Node, Search
 from xy_sysid.search.simplify import whole
 
@@ -51,11 +46,14 @@ class OneStepTrials:
         best = self.search.best
         if not self.names or len(self.search.nodes) <= FEWEST or best.fit.excess < AT_FLOOR:
             return False
-        return not self.asked or (len(self.asked) == 1 and best.effects not in self.asked and self._forces(best))
+        return not self.asked or (len(self.asked) == 1 and best.effects not in self.asked and self._beside(best) is not None)
 
-    def _forces(self, node: Node[GreyboxFit]) -> bool:
-        """A filter can have all effects of a set beside the gap, and there are some."""
-        return bool(node.effects) and all(told_apart(self.judge.library[name]) for name in node.effects)
+    def _beside(self, node: Node[GreyboxFit]) -> Node[GreyboxFit] | None:
+        """What a filter can have of a set beside the gap, if that was fitted and is more than the filter has by itself."""
+        library = self.judge.library
+        names = frozenset(name for name in node.effects if told_apart(library[name]) or library[name].is_dry)
+        by_itself = {library[name].rubs for name in self.names}
+        return self.search.nodes.get(names) if names - by_itself else None
 
     def explains(self) -> bool:
         """Whether one of them explains the axis down to the noise: then no more simulations need to be tried."""
@@ -70,20 +68,15 @@ class OneStepTrials:
         """Take it if it beats a set, and the best of all."""
         if self.found is not None:
             return
-        data = self.judge.data
         whole(self.judge, self.search.best)
-        later = np.arange(data.velocity.size) >= data.training
-        try:
-            bar = min(whitened_rms(node.fit.error, later) for node in (best, self.search.best))
-        except BadInput:  # too little data for any prediction
-            return
-        if not FILTERED * bar > data.floor.encoder * data.sampling_rate:
+        bar = min(self.judge.ahead(node.fit) for node in (best, self.search.best))
+        if not FILTERED * bar > self.judge.data.floor.encoder * self.judge.data.sampling_rate:
             return
         for node in self._begins(best):
             fitted = self._fitted(name, node, FILTERED * bar)
             if fitted is None:
                 return
-            last, without = fitted.rungs[-1][1], error_without(data, fitted.found)
+            last, without = fitted.rungs[-1][1], error_without(self.judge.data, fitted.found)
             if name in last.model and last.held_out_error < FILTERED * min(bar, without):
                 self.found = Filtered((*self._up_to(node), *fitted.rungs), bar, without)
                 return
@@ -95,9 +88,9 @@ class OneStepTrials:
         return [(name, whole(self.judge, found)) for name, found in known if found is not None]
 
     def _begins(self, best: Node[GreyboxFit]) -> list[Node[GreyboxFit]]:
-        """The rigid base, and the best set if a filter can have all of it: a large force beside a gap hides it."""
-        rigid = self.search.nodes[frozenset()]
-        return [rigid, best] if self._forces(best) else [rigid]
+        """What a filter can have of the best set, as a large force beside a gap hides it; and the rigid base."""
+        rigid, beside = self.search.nodes[frozenset()], self._beside(best)
+        return [rigid] if beside is None else [beside, rigid]
 
     def _fitted(self, name: str, node: Node[GreyboxFit], bar: float) -> Grown | None:
         """The effect and what is beside it, beginning from a set; each is fitted once. None if it is too late."""
@@ -106,6 +99,5 @@ class OneStepTrials:
             if self.judge.late():
                 self.search.stopped = True
                 return None
-            wanted = Wanted(Limits(bar, self.judge.late), self.search.least, self.judge.refusal)
-            self.fitted[key] = grown(self.judge.data, whole(self.judge, node), self.judge.library[name], wanted)
+            self.fitted[key] = self.judge.followed(whole(self.judge, node), name, bar, self.search.least)
         return self.fitted[key]
