@@ -9,6 +9,7 @@ BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 PYTEST = $(BIN)/python -m pytest -n $(JOBS) --dist loadfile
 PIP := $(BIN)/python -m pip --disable-pip-version-check -qq install --no-compile -c constraints.txt
+LAWS = OPENBLAS_NUM_THREADS=1 $(BIN)/python -c "import xy_sysid as xy; xy.diagnose(xy.simulate(10, hidden=7, seed=1).run('x'))"
 FITS := import ensurepip, sys, venv; sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 14))
 
 .DEFAULT_GOAL := help
@@ -29,7 +30,7 @@ $(INSTALLED): constraints.txt setup.py
 	"$$found" -m venv --clear $(VENV)
 	@$(PIP) setuptools
 	@$(PIP) --no-build-isolation --config-settings editable_mode=compat --editable '.[ros,page,test]'
-	-@$(BIN)/python -m compileall -q -j 0 -x '/(plotly|matplotlib|fontTools|pip|docutils)/' $(VENV)/lib
+	-@$(BIN)/python -m compileall -q -x '/(plotly|matplotlib|fontTools|pip|docutils)/' $(VENV)/lib & $(LAWS); wait
 	@touch $@
 
 demo: $(INSTALLED) ## watch a simulated XY table being identified live (ARGS="--help" for more)
@@ -49,8 +50,8 @@ types: $(INSTALLED) ## types
 unit: $(INSTALLED) ## every test (ARGS="-k words" for some), three files at a time, as many wait (JOBS=0: one after the other)
 	@$(PYTEST) $(ARGS)
 
-laws: $(INSTALLED) # compiled here once, and not by each of the tests' workers
-	@OPENBLAS_NUM_THREADS=1 $(BIN)/python -c "import xy_sysid as xy; xy.diagnose(xy.simulate(10, hidden=7, seed=1).run('x'))"
+laws: $(INSTALLED) # compiled here once if they changed, and not by each of the tests' workers
+	@$(LAWS)
 
 docs: $(VENV)/.docs ## the documentation site in build/site (index.html); a broken link is an error
 	@$(BIN)/python -m xy_sysid.files.architecture_doc --write
