@@ -1,0 +1,46 @@
+"""Starts that are read from the motion where the base answers so late that nothing can be read with its delay."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from helpers.foreign import Joint, driven
+
+from xy_sysid.greybox.axis_data import prepare
+from xy_sysid.greybox.free_run import LATE, first_excess, fit_base, other_starts, scene_of
+from xy_sysid.greybox.whitened import ORDER, enough
+
+LIMITED = Joint(fs=500.0, seconds=30.0, count=2e-5, mass=0.3, drag=8.0, limit=3.0, shake=4.0, band=(0.5, 40.0))
+
+
+def test_behind_a_base_that_is_late_the_motion_is_seen_without_its_delay_too() -> None:
+    """Else it is seen once."""
+    data = prepare(LIMITED.fs, *driven(LIMITED, 1))
+    base = fit_base(data)
+    assert base.model.delay < LATE and scene_of(data, base).prompt is None
+    late = replace(base, model=replace(base.model, delay=0.02))
+    scene = scene_of(data, late)
+    assert scene.prompt is not None
+    shift = int(0.02 * LIMITED.fs)
+    np.testing.assert_allclose(scene.voltage[shift:], scene.prompt.voltage[:-shift])
+
+
+def test_a_limit_is_read_though_the_base_has_a_delay_that_the_axis_has_not() -> None:
+    """With the base's delay of 40 ms alone nothing that is read comes near."""
+    data = prepare(LIMITED.fs, *driven(LIMITED, 1))
+    base = fit_base(data)
+    late = replace(base, model=replace(base.model, delay=0.04))
+    starts = {start.delay == 0.0: start for start in other_starts(data, late, late.model, "saturation")}
+    assert first_excess(data, starts[True]) < first_excess(data, starts[False]) - 2.0
+    assert dict(starts[True].effects)["saturation"][0] == pytest.approx(LIMITED.limit, rel=0.2)
+
+
+def test_an_autoregressive_model_needs_four_samples_for_each_number() -> None:
+    """And one that is judged."""
+    held = np.zeros(6 * ORDER, dtype=np.bool_)
+    assert not enough(held)
+    held[-1] = True
+    assert enough(held)
+    assert not enough(held[-4 * ORDER :])
