@@ -151,10 +151,9 @@ def test_the_whole_page_follows_the_story_from_failing_to_explained(usual: Tab, 
     worst = one.over_floor()
     gain = one.fact("gain")
     assert one.ladder()[0] > 5 and worst > 20
-    one.press("diagnose")
-    one.until(lambda: "Missing: coulomb friction" in one.verdict() and one.filled() == ["Add coulomb friction"], 60)
+    one.press_until("diagnose", lambda: "Missing: coulomb friction" in one.verdict() and one.filled() == ["Add coulomb friction"], 60)
     assert one.headline().startswith("Something is missing: ")
-    one.press("named")
+    one.press_until("named", functools.partial(explained, one, 2), 60, "not explained")
     for seen in (one, other):
         seen.until(functools.partial(explained, seen, 2), 60, "not explained")
         assert seen.ladder()[1] < 1.2 and "at the noise floor" in seen.verdict() and "missing" not in (seen.headline() + seen.verdict()).lower()
@@ -164,20 +163,18 @@ def test_the_whole_page_follows_the_story_from_failing_to_explained(usual: Tab, 
     assert one.filled() == ["Download the model"] and "coulomb friction" in str(one.page.locator(".math").first.text_content())
     one.page.get_by_role("button", name="rigid, with delay").click()
     one.until(lambda: one.over_floor() > 20 and one.fact("gain") == gain)
-    one.page.locator("[data-remove=coulomb_friction]").first.click()
+    one.click_until(one.page.locator("[data-remove=coulomb_friction]").first, functools.partial(failing, one, 3), 60, "stale after Remove")
     for seen in (one, other):
         seen.until(functools.partial(failing, seen, 3), 60, "stale after Remove")
         assert seen.fact("gain") == gain
-    one.press("auto")
-    one.until(lambda: explained(one, 4) and one.filled() == ["Download the model"], 60, "stale after Auto")
+    one.press_until("auto", lambda: explained(one, 4) and one.filled() == ["Download the model"], 60, "stale after Auto")
     one.page.reload()
     one.until(lambda: explained(one, 4), 30, "stale after a reload")
     with one.page.expect_download() as taken:
         one.press("keep")
     model = yaml.safe_load(Path(taken.value.path()).read_text(encoding="utf-8"))
     assert set(model["axes"]) == {"x", "y"} and model["axes"]["x"]["effects"] == ["coulomb_friction"]
-    one.press("reset")
-    one.until(lambda: failing(one, 1) and one.filled() == ["Diagnose"], 30, "stale after Start over")
+    one.press_until("reset", lambda: failing(one, 1) and one.filled() == ["Diagnose"], 30, "stale after Start over")
     assert one.fact("gain") == gain
     for kind, head in (("SVG", "<svg"), ("CSV", "noise floor: ")):
         with one.page.expect_download() as taken:
