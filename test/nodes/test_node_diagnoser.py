@@ -37,10 +37,10 @@ def world(tmp_path: Path) -> Iterator[World]:
         yield made
 
 
-def trigger(world: World, name: str, seconds: float = 60.0) -> tuple[bool, str]:
+def trigger(world: World, name: str, seconds: float = 60.0, times: int = 1) -> tuple[bool, str]:
     from std_srvs.srv import Trigger
 
-    answer = world.call(Trigger, f"/xy/diagnoser/{name}", Trigger.Request(), seconds)
+    answer = world.call(Trigger, f"/xy/diagnoser/{name}", Trigger.Request(), seconds, times)
     return bool(answer.success), str(answer.message)
 
 
@@ -145,7 +145,7 @@ def test_what_lacks_is_said_and_the_model_waits_for_data(world: World) -> None:
     results, statuses = Results(world), world.statuses()
     node = world.start(DIAGNOSER)
     sender = Sender(world)
-    ok, text = trigger(world, "diagnose", 10.0)
+    ok, text = trigger(world, "diagnose", 10.0, times=3)
     assert not ok and "no voltage and no position of axes x, y heard yet" in text
     sender.send(0, 6000)
     assert world.until(lambda: float(newest(statuses, "diagnoser").get("seconds kept (s)", "0")) >= 2.99, 10.0)
