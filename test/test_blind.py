@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from blind import judge
+from blind.__main__ import main
 from blind.cases import EFFECTS, OUTSIDE, Case, _dirt, sets
 from blind.dirt import DIRT, FEWEST, MOST, change, moved
 from blind.judge import Judged, run
@@ -259,3 +260,13 @@ def test_remarks_outlive_the_next_campaign() -> None:
     old = "# Blind\n\nold\n\n## Remarks\n\nwritten\n"
     assert with_remarks("# Blind\n\nnew\n", old) == "# Blind\n\nnew\n\n## Remarks\n\nwritten\n"
     assert with_remarks("new\n", "old\n") == "new\n"
+
+
+@pytest.mark.parametrize("wrong", [["--part", "0"], ["--part", "4", "--first", "-1"], ["exakt"]])
+def test_a_part_or_a_set_that_is_none_is_refused(wrong: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """Before anything is driven."""
+    monkeypatch.setattr("sys.argv", ["blind", *wrong])
+    with pytest.raises(SystemExit) as end:
+        main()
+    said = capsys.readouterr().err
+    assert end.value.code == 2 and ("at least" in said or "'exakt' is not a set; there are exact" in said)
