@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from itertools import count
@@ -19,7 +20,7 @@ from helpers.simulated import recorded
 from xy_sim.parts import PARTS
 from xy_sysid.axis.model import STANDARD, Library
 from xy_sysid.cli import run
-from xy_sysid.criteria import AT_FLOOR, FEWEST
+from xy_sysid.criteria import AT_FLOOR, FEWEST, SIZE
 from xy_sysid.diagnosis.diagnose import Diagnosis, diagnose, judged
 from xy_sysid.diagnosis.ladder import Rival, Step, is_taken_for
 from xy_sysid.diagnosis.refine import Effort, refine, refine_steps
@@ -30,6 +31,7 @@ from xy_sysid.imports import save
 from xy_sysid.judge import axis_judge
 from xy_sysid.judge.axis_judge import AxisJudge
 from xy_sysid.judge.beside_one_step import grown
+from xy_sysid.search.best_first import Node, Search
 
 
 @pytest.mark.parametrize("effect", ["coulomb_friction", "cogging", "dead_zone", "constant_load", "saturation", "lead_error"])
@@ -350,6 +352,44 @@ def test_a_gap_is_asked_for_early_and_once(effect: str, monkeypatch: pytest.Monk
     if effect == "backlash":
         assert len(asked) == 1
         assert tried.index(("backlash",)) == len(tried) - 1 <= FEWEST + 1
+
+
+def test_a_gap_of_little_more_than_a_count_is_no_soft_screw() -> None:
+    """Free simulations call it a compliance; beyond the noise, the filter that knows the gap leaves half of what it leaves without."""
+    found = diagnose(2000.0, *recorded("coulomb_friction=0.03+backlash=1.2e-6", seconds=20.0, counts=5000.0).axis("x"))
+    assert set(found.effects) == {"backlash", "coulomb_friction"}
+    assert found.ladder is not None
+    gap, load = (found.ladder.final.parameter(name) for name in ("backlash.gap", "coulomb_friction.coulomb"))
+    assert gap.low < 1.2e-6 < gap.high and 0.9 < gap.value / 1.2e-6 < 1.1
+    assert 0.95 < load.value / 0.03 < 1.05
+
+
+def test_what_a_simulation_had_taken_a_gap_for_goes() -> None:
+    """A lag, here, of no size once the gap is known: it is taken out of what the filter has beside it."""
+    data = prepare(2000.0, *recorded("coulomb_friction=0.03+backlash=6e-6", seconds=10.0).axis("x"))
+    base = fit_with(data, AxisJudge(data, STANDARD).begin(), ["amplifier_lag"])
+    fit = grown(data, base, EFFECTS["backlash"]).rungs[-1][1]
+    assert "amplifier_lag" not in fit.model and {"backlash", "coulomb_friction"} <= {name for name, _ in fit.model.effects}
+
+
+def test_a_set_that_takes_most_away_is_named_though_another_leaves_less_in_quiet_bands(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Bands count alike in a search: a mode that takes nine tenths of the power may lie behind what is better in many bands."""
+    data = prepare(2000.0, *recorded("screw_compliance=110,damping=0.02", seconds=20.0).axis("x"))
+
+    def led_astray(search: Search[GreyboxFit], start: GreyboxFit, kept: frozenset[str]) -> Iterator[frozenset[str]]:
+        """Ends at the rigid base, the mode known beside it as worse."""
+        found = search.judge.whole(fit_with(data, start, ["screw_compliance"], brief=True))
+        search.nodes[kept] = Node(kept, start, start, 0, whole=True)
+        mode = frozenset({"screw_compliance"})
+        search.nodes[mode] = Node(mode, replace(found, excess=start.excess + 1.0), found, 4, whole=True)
+        search.nodes[kept].led_on = True
+        yield mode
+
+    monkeypatch.setattr(Search, "steps", led_astray)
+    found = refine(data, effort=Effort(size=SIZE))
+    assert found.effects == ("screw_compliance",)
+    verdict = judged(data, found, STANDARD)
+    assert verdict.verdict == "missing_effect" and verdict.explained > 0.9
 
 
 def test_a_gap_beside_a_large_force_is_asked_for_with_that_force() -> None:

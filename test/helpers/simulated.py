@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from xy_sim.effect_text import with_effects
 from xy_sim.machine import Machine
 from xy_sysid.excitation.lockstep import drive
@@ -9,8 +11,14 @@ from xy_sysid.samples.recording import Recording
 from xy_sysid.settings import AxisExcitation, ExcitationSettings
 
 
-def recorded(effect: str, seconds: float = 30.0, seed: int = 21) -> Recording:
+def recorded(effect: str, seconds: float = 30.0, seed: int = 21, counts: float = 0.0) -> Recording:
+    """counts: of the encoder, per revolution of 5 mm; 0 as the machine has it."""
     machine = Machine.from_file("rigid.yaml", seed)
+    if counts:
+        spec = machine.spec
+        machine = Machine(
+            replace(spec, axes=tuple(replace(a, drive=a.drive.model_copy(update={"counts_per_revolution": counts})) for a in spec.axes))
+        )
     machine = with_effects(machine, effect.split("+")) if effect else machine
     axes = {axis: AxisExcitation(seed=seed + k) for k, axis in enumerate(machine.axes)}
     return drive(machine, ExcitationSettings(lockstep=True, speed=0.0, axes=axes), seconds, lambda _: None)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from xy_sysid.axis.model import STANDARD, Library
 from xy_sysid.criteria import BUDGET, FEWEST, FREE, IN_HAND, LEAST, MOST_EFFECTS, WORTH
-from xy_sysid.diagnosis.ladder import Ladder
+from xy_sysid.diagnosis.ladder import Ladder, part_explained
 from xy_sysid.diagnosis.rungs import Given, ladder_of_given, ladder_of_search
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit
@@ -110,11 +110,29 @@ def refine_steps(
             if search.best is best or search.best.score >= final.score - LEAST:
                 break
         settled = Simplifying(judge, search, frozenset(kept))
+    helps = _most_of_use(judge, search, fixed)
+    if not _explains(judge, fixed, final) and _explains(judge, fixed, helps):
+        settled.now = helps
+        while settled.step():
+            yield Trying(tuple(sorted(settled.now.effects)))
+        final = settled.now
     if final.fit.excess >= LEAST and across is not None:
         for name in across.names:
             yield Trying((name,))
             across.look(name, final)
     return ladder_of_search(judge, search, settled, fixed, across.found if across is not None else None)
+
+
+def _explains(judge: AxisJudge, fixed: Given, node: Node[GreyboxFit]) -> bool:
+    """A set takes away more of the error's power than it leaves: what is far off in many quiet bands may yet do that."""
+    explained = part_explained(judge.data, fixed.steps[0].fit, node.fit)
+    return explained >= 1.0 - explained
+
+
+def _most_of_use(judge: AxisJudge, search: Search[GreyboxFit], fixed: Given) -> Node[GreyboxFit]:
+    """The set that takes away most of the error's power, of all that may be named."""
+    nodes = [node for node in search.nodes.values() if node.whole and node.leads and not node.refused and node.effects >= set(fixed.names)]
+    return max(nodes, key=lambda node: part_explained(judge.data, fixed.steps[0].fit, node.fit))
 
 
 def settle(data: AxisData, now: GreyboxFit) -> GreyboxFit:

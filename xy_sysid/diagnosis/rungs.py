@@ -71,14 +71,14 @@ def ladder_of_search(
         last = rungs[-1][1]
         names = tuple(name for name, _ in last.model.effects)
         noise = min(max(data.floor.encoder * data.sampling_rate, last.noise_floor), last.held_out_error)  # what is predicted is no noise
-        left, before, without = (error**2 - noise**2 for error in (last.held_out_error, bar, min(bar, filtered.without)))
+        left, before = (error**2 - noise**2 for error in (last.held_out_error, bar))
         return Ladder(
             steps=(Step(None, base), *(Step(name, fit) for name, fit in rungs)),
             final=last,
             effects=names,
             tried=(next(Candidate(name, 0.0, fit) for name, fit in rungs if fit.one_step), *tried),
             rivals=(Rival(tuple(sorted(node.effects)), node.fit, 2.0 * math.log(bar / last.held_out_error)),) if node.effects else (),
-            sizes=dict.fromkeys(names, without / max(left, 1e-300) - 1.0),
+            sizes=dict.fromkeys(names, filtered.size),
             refused=refused,
             explained=1.0 - left / before,
             noise=noise,

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import inf, log
+from math import inf, log, sqrt
 
 from xy_sysid.axis.loop_source import undoable
 from xy_sysid.axis.model import Library
@@ -17,6 +17,7 @@ from xy_sysid.greybox.free_run import AxisData, GreyboxFit
 from xy_sysid.greybox.innovation_test import traces
 from xy_sysid.greybox.one_step import AT_NOISE, beside, error_without, followed
 from xy_sysid.greybox.score_test import Trace
+from xy_sysid.judge.refusal import none_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +51,8 @@ def grown(data: AxisData, base: GreyboxFit, effect: Effect, wanted: Wanted | Non
     """Rungs: the effect with what the base has beside it, then one more beside it at each."""
     wanted = wanted or Wanted()
     fit, found = followed(data, base, effect, limits=wanted.limits)
+    while not found.given_up and (name := none_of(data, fit)) not in ("", effect.name):  # a simulation had taken the gap for it
+        fit, found = followed(data, replace(fit, model=fit.model.without(name)), effect, begin=found, limits=wanted.limits)
     rungs = [(effect.name, fit)]
     while not found.given_up and len(rungs) < MOST_EFFECTS and not wanted.limits.late():
         now = rungs[-1][1]
@@ -101,10 +104,14 @@ def _better(data: AxisData, now: GreyboxFit, effect: Effect, found: Followed, wa
     return best if worth else None
 
 
+def size_ahead(before: float, after: float, noise: float) -> float:
+    """What is gone of an error one sample ahead, over what is left of it, as powers beyond the noise; all in m/s."""
+    return (before**2 - noise**2) / max(after**2 - noise**2, 1e-300) - 1.0
+
+
 def _size(now: GreyboxFit, part: float) -> float:
-    """What is gone of the innovations' power beyond the noise, over what is left of it, if only a part of the power is left."""
-    noise = (now.noise_floor / now.held_out_error) ** 2
-    return (1.0 - noise) / (part - noise) - 1.0 if part > noise else inf
+    """The same if only a part of the power of a fit's error is left."""
+    return size_ahead(now.held_out_error, sqrt(max(part, 0.0)) * now.held_out_error, now.noise_floor)
 
 
 def _least(name: str, effect: Effect, wanted: Wanted) -> float:

@@ -29,9 +29,7 @@ def refusal(data: AxisData, library: Library, found: GreyboxFit) -> str:
             edge = value >= item.high * (1.0 - 1e-6) or (k == 0 and not item.positive and value <= item.low * (1.0 + 1e-6) and item.low > 0.0)
             if k == 0 and edge:
                 return f"{name}: {item.name} is at its bound"
-            known = found.parameter(f"{name}.{item.name}")
-            judged = k == 0 and item.positive and not found.brief and math.isfinite(known.high)
-            if judged and known.low <= item.low * (1.0 + 1e-6):
+            if k == 0 and _is_none(data, effect, found):
                 return f"{name}: {item.name} cannot be told from 0"
             if item.name == effect.mode_frequency and not low <= value <= high:
                 return f"{name}: a mode at {value:.3g} Hz, outside of what these data excite and see ({low:.3g} to {high:.3g} Hz)"
@@ -39,6 +37,18 @@ def refusal(data: AxisData, library: Library, found: GreyboxFit) -> str:
     if found.model.delay >= 0.99 * limit:
         return f"time_delay: {found.model.delay:.3g} s is at its bound"
     return ""
+
+
+def none_of(data: AxisData, found: GreyboxFit) -> str:
+    """The effect of a fit whose size is its least one within its interval: the data do not tell it from none. Empty if there is none such."""
+    library = found.model.library
+    return next((name for name, _ in found.model.effects if _is_none(data, library[name], found)), "")
+
+
+def _is_none(data: AxisData, effect: Effect, found: GreyboxFit) -> bool:
+    size = effect.on(data.similar)[0]
+    known = found.parameter(f"{effect.name}.{size.name}")
+    return size.positive and not found.brief and math.isfinite(known.high) and known.low <= size.low * (1.0 + 1e-6)
 
 
 def _repeats(data: AxisData, effect: Effect, values: Sequence[float]) -> bool:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import exp
 
-from xy_sysid.criteria import AT_FLOOR, FEWEST, FILTERED
+from xy_sysid.criteria import AT_FLOOR, FEWEST, FILTERED, SIZE
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.greybox.one_step import error_without
 from xy_sysid.judge.axis_judge import AxisJudge
-from xy_sysid.judge.beside_one_step import Grown, told_apart
+from xy_sysid.judge.beside_one_step import Grown, size_ahead, told_apart
 from xy_sysid.search.best_first import Node, Search
 from xy_sysid.search.simplify import whole
 
@@ -24,6 +25,18 @@ class Filtered:
     rungs: tuple[tuple[str, GreyboxFit], ...]
     bar: float
     without: float
+
+    @property
+    def wins(self) -> bool:
+        """It explains as much beyond the noise as what is named must, and what is best without it leaves something that can be told."""
+        tells = min(self.bar, self.without) >= exp(0.5 * AT_FLOOR) * self.rungs[-1][1].held_out_error
+        return tells and self.size >= SIZE
+
+    @property
+    def size(self) -> float:
+        """What is left one sample ahead without the effect and not with it, over what is left with it, as powers beyond the noise."""
+        last = self.rungs[-1][1]
+        return size_ahead(min(self.bar, self.without), last.held_out_error, last.noise_floor)
 
 
 class OneStepTrials:
@@ -76,9 +89,9 @@ class OneStepTrials:
             fitted = self._fitted(name, node, FILTERED * bar)
             if fitted is None:
                 return
-            last, without = fitted.rungs[-1][1], error_without(self.judge.data, fitted.found)
-            if name in last.model and last.held_out_error < FILTERED * min(bar, without):
-                self.found = Filtered((*self._up_to(node), *fitted.rungs), bar, without)
+            found = Filtered((*self._up_to(node), *fitted.rungs), bar, error_without(self.judge.data, fitted.found))
+            if name in fitted.rungs[-1][1].model and found.wins:
+                self.found = found
                 return
 
     def _up_to(self, node: Node[GreyboxFit]) -> list[tuple[str, GreyboxFit]]:

@@ -1,0 +1,58 @@
+"""How much a prediction one sample ahead explains: beyond the noise, as everywhere."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import exp
+
+import numpy as np
+import pytest
+
+from xy_sysid.axis.model import AxisModel
+from xy_sysid.criteria import AT_FLOOR, SIZE
+from xy_sysid.greybox.free_run import GreyboxFit
+from xy_sysid.judge.beside_one_step import size_ahead
+from xy_sysid.search.one_step_trials import Filtered
+
+NOISE = 1e-3  # m/s
+
+
+def ahead(error: float) -> GreyboxFit:
+    """A fit that leaves so much one sample ahead, m/s."""
+    nothing = np.empty(0)
+    fit = GreyboxFit(
+        model=AxisModel(0.1, 1e-3, 250.0),
+        parameters=(),
+        training_error=error,
+        held_out_error=error,
+        noise_floor=NOISE,
+        excess=0.0,
+        simulated=nothing,
+        error=nothing,
+        runs=1,
+        converged=True,
+        held=np.empty((0, 0)),
+    )
+    return replace(fit, one_step=True)
+
+
+def test_what_is_gone_counts_over_what_is_left_beyond_the_noise() -> None:
+    """Of two and one times the noise's own power beyond it, one is gone and one is left."""
+    assert size_ahead(NOISE * 3.0**0.5, NOISE * 2.0**0.5, NOISE) == pytest.approx(1.0)
+    assert size_ahead(NOISE, NOISE * 2.0**0.5, NOISE) == pytest.approx(-1.0)
+
+
+@pytest.mark.parametrize(("bar", "without"), [(1.9, 9.0), (9.0, 1.9)])
+def test_a_gap_wins_by_what_it_explains_beyond_the_noise(bar: float, without: float) -> None:
+    """Against the better of the two that know no gap; what is named must explain so much, here as in a simulation."""
+    last = (1.0 + (1.9**2 - 1.0) / (1.0 + SIZE)) ** 0.5
+    assert Filtered((("backlash", ahead(0.99 * last * NOISE)),), bar * NOISE, without * NOISE).wins
+    assert not Filtered((("backlash", ahead(1.01 * last * NOISE)),), bar * NOISE, without * NOISE).wins
+
+
+def test_a_gap_does_not_win_by_what_nobody_can_tell() -> None:
+    """At the noise the least gain is many times what is left beyond it."""
+    best = ahead(1.0001 * NOISE)
+    little = Filtered((("backlash", best),), 9.0 * NOISE, 1.02 * best.held_out_error)
+    assert little.size > SIZE and not little.wins
+    assert replace(little, without=1.01 * exp(0.5 * AT_FLOOR) * best.held_out_error).wins
