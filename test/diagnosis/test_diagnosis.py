@@ -364,6 +364,13 @@ def test_a_gap_of_little_more_than_a_count_is_no_soft_screw() -> None:
     assert 0.95 < load.value / 0.03 < 1.05
 
 
+def test_what_acts_beside_a_gap_is_asked_for_though_it_was_known_beside_a_screw_only() -> None:
+    """A lag and a compliance are the best simulation: the gap is tried beside the lag, which is fitted for that."""
+    found = diagnose(2000.0, *recorded("amplifier_lag=0.002+coulomb_friction=0.02+backlash=2e-6", seconds=20.0, counts=5000.0).axis("x"))
+    assert set(found.effects) == {"backlash", "coulomb_friction", "amplifier_lag"}
+    assert found.ladder is not None and [step.added for step in found.ladder.steps][:2] == [None, "amplifier_lag"]
+
+
 def test_what_a_simulation_had_taken_a_gap_for_goes() -> None:
     """A lag, here, of no size once the gap is known: it is taken out of what the filter has beside it."""
     data = prepare(2000.0, *recorded("coulomb_friction=0.03+backlash=6e-6", seconds=10.0).axis("x"))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import exp
 
 from xy_sysid.criteria import AT_FLOOR, FEWEST, FILTERED, SIZE
@@ -11,7 +11,7 @@ from xy_sysid.greybox.one_step import error_without
 from xy_sysid.judge.axis_judge import AxisJudge
 from xy_sysid.judge.beside_one_step import Grown, size_ahead, told_apart
 from xy_sysid.search.best_first import Node, Search
-from xy_sysid.search.simplify import whole
+from xy_sysid.search.simplify import remembered, whole
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,11 +62,18 @@ class OneStepTrials:
         return not self.asked or (len(self.asked) == 1 and best.effects not in self.asked and self._beside(best) is not None)
 
     def _beside(self, node: Node[GreyboxFit]) -> Node[GreyboxFit] | None:
-        """What a filter can have of a set beside the gap, if that was fitted and is more than the filter has by itself."""
+        """What a filter can have of a set beside the gap, if that is more than the filter has by itself; fitted if it was not."""
         library = self.judge.library
         names = frozenset(name for name in node.effects if told_apart(library[name]) or library[name].is_dry)
         by_itself = {library[name].rubs for name in self.names}
-        return self.search.nodes.get(names) if names - by_itself else None
+        if not names - by_itself:
+            return None
+        if names not in self.search.nodes and not self.judge.late():
+            less = node.fit.model
+            for name in node.effects - names:
+                less = less.without(name)
+            remembered(self.judge, self.search, names, self.judge.whole(replace(node.fit, model=less)))
+        return self.search.nodes.get(names)
 
     def explains(self) -> bool:
         """Whether one of them explains the axis down to the noise: then no more simulations need to be tried."""

@@ -25,6 +25,13 @@ def whole(judge: Judge[GreyboxFit], node: Node[GreyboxFit]) -> GreyboxFit:
     return node.fit
 
 
+def remembered(judge: AxisJudge, search: Search[GreyboxFit], effects: frozenset[str], fit: GreyboxFit) -> Node[GreyboxFit]:
+    """A set that was fitted on all data, among those that the search knows."""
+    parameters = sum(len(judge.library[name].parameters) for name in effects)
+    search.nodes[effects] = Node(effects=effects, fit=fit, brief=fit, parameters=parameters, whole=True, refused=judge.refusal(fit))
+    return search.nodes[effects]
+
+
 class Simplifying:
     """From the best set to a simpler one, as long as what is lost could be feigned by what is left unexplained."""
 
@@ -159,7 +166,4 @@ class Simplifying:
         fit = None if start is None or self.judge.late() else self.judge.again(self.now.fit, start)
         if fit is None or fit.excess >= below:
             return None
-        parameters = sum(len(self.judge.library[name].parameters) for name in effects)
-        node = Node(effects=effects, fit=fit, brief=fit, parameters=parameters, whole=True, refused=self.judge.refusal(fit))
-        self.search.nodes[effects] = node
-        return node
+        return remembered(self.judge, self.search, effects, fit)
