@@ -229,12 +229,12 @@ def test_a_part_that_rattles_is_no_mode_with_confidence() -> None:
 
 
 def test_not_in_the_library_is_said_less_surely_the_more_is_left() -> None:
-    """An effect may hide in it; and what some set takes away is no longer nowhere."""
+    """An effect may hide in it, or in the noise; and what some set takes away is no longer nowhere."""
     data = prepare(2000.0, *recorded("quadratic_drag", seconds=20.0).axis("x"))
     ladder = refine(data)
     nothing = replace(ladder, effects=(), explained=0.0, helps=0.0)
-    sure = [judged(data, replace(nothing, discrepancy=part * data.layout.rms(data.floor.motion)), STANDARD).confidence for part in (5e-4, 0.03, 0.3)]
-    assert sure[0] == 1.0 > sure[1] > sure[2] > 0.0
+    sure = [judged(data, replace(nothing, discrepancy=part * data.layout.rms(data.floor.motion)), STANDARD).confidence for part in (0.0, 5e-4, 0.03, 0.3)]
+    assert 1.0 > sure[0] == sure[1] > sure[2] > sure[3] > 0.0
     helped = judged(data, replace(nothing, discrepancy=0.0, helps=0.3), STANDARD)
     assert helped.verdict == "not_in_library" and helped.confidence == pytest.approx(0.7)
 

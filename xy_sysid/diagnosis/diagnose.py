@@ -114,6 +114,7 @@ def judged(data: AxisData, ladder: Ladder, library: Library) -> Diagnosis:
     left = ladder.discrepancy / motion
     where, unit = where_base_fails(data, base), data.units.speed
     explained, noise = ladder.explained, moved(ladder.noise, unit)
+    hides = math.sqrt(math.expm1(AT_FLOOR)) * data.layout.rms(data.floor.power) / motion  # in the noise
     if names and (explained >= 1.0 - explained or final.excess < AT_FLOOR):
         verdict: Kind = "missing_effect"
         confidence, experiment = sure, _experiment(names[0], library)
@@ -128,13 +129,12 @@ def judged(data: AxisData, ladder: Ladder, library: Library) -> Diagnosis:
             sentence += f" Runner-up {' and '.join(rival.effects)}: {moved(rival.fit.held_out_error, unit)}{why}."
     elif base.excess < AT_FLOOR:
         verdict, names, explained, experiment = "nothing_missing", (), 0.0, "None is needed."
-        hides = math.sqrt(math.expm1(AT_FLOOR)) * data.layout.rms(data.floor.power) / motion
         confidence = (1.0 - base.excess) * (1.0 - _hidden(hides, data.floor.epsilon))
         sentence = f"Nothing is missing: the rigid model with delay leaves {moved(base.held_out_error, unit)}, the noise alone is {noise}."
         sentence += f" What changes the motion by less than {_percent(hides)} could hide in it."
     else:
         verdict, experiment = "not_in_library", _UNKNOWN
-        confidence = (1.0 - ladder.helps) * (1.0 - _hidden(left, data.floor.epsilon))
+        confidence = (1.0 - ladder.helps) * (1.0 - _hidden(max(left, hides), data.floor.epsilon))
         takes = "take" if len(names) > 1 else "takes"
         best = f"; at best {_listed(names)} {takes} away {_percent(explained)}" if names and explained > 0.0 else ""
         sentence = f"Not in the library: no effect explains what the rigid model leaves ({moved(base.held_out_error, unit)}, {_percent(left)} of the "

@@ -109,7 +109,7 @@ def ladder_of_search(
         rivals=tuple(rivals),
         sizes={name: min(each) for name, each in sizes.items() if each},
         astray=max((_astray(data, settled, name) for name in node.effects if judge.library[name].category == "motion"), default=0.0),
-        helps=1.0 - min(judge.rest(item.fit, base) for item in search.nodes.values() if item.whole and not item.refused),
+        helps=max(1.0 - min(judge.rest(item.fit, base) for item in search.nodes.values() if item.whole and not item.refused), 0.0),
         kept_out=_kept_out(search, node.fit.excess),
         refused=refused,
         explained=part_explained(data, base, final),

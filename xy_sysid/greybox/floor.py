@@ -13,6 +13,8 @@ from functools import cache
 
 import numpy as np
 import scipy.fft
+import scipy.ndimage
+import scipy.signal
 from numpy.typing import NDArray
 
 from xy_sysid.response.frf import ComplexArray
@@ -22,6 +24,7 @@ TOP = 700.0  # Hz; above, at 2 kHz, differences of an encoder's position are all
 TOP_SHARE = 0.35  # of the sampling rate, for slow sampling
 WINDOW = 2.0  # s, nearly: the lowest band is 1/2 Hz wide
 NOISE_BAND = (0.6, 0.94)  # of Nyquist: the quietest twentieth there is the encoder's; friction's harmonics may reach in
+BINS, HARMONICS, SPARSE = 128, 16, 4  # of the spectrum of what counting adds, from every fourth sample
 SEEN = 3.0  # a band is excited if the measured velocity has this many times the encoder's noise
 
 
@@ -179,9 +182,15 @@ def count_size(position: FloatArray) -> float:
 def floor(windows: Windows, velocity: FloatArray, encoder: float, epsilon: float) -> Floor:
     """The floor of data with this measured velocity (n,), m/s."""
     layout = windows.layout
-    share = np.bincount(layout.band, (2.0 * np.sin(np.pi * layout.frequency / layout.sampling_rate)) ** 2, layout.count)
-    noise = share / layout.lines * (encoder * layout.sampling_rate) ** 2
+    unit = (2.0 * np.sin(np.pi * layout.frequency / layout.sampling_rate) * layout.sampling_rate) ** 2  # of white noise in position, by line
     signal = layout.power(windows.spectrum(velocity))
+    noise = np.bincount(layout.band, unit, layout.count) / layout.lines * encoder**2
+    count = count_size(np.cumsum(velocity) / layout.sampling_rate)
+    if count > 0.0:
+        seen = np.flatnonzero(signal > SEEN * noise)
+        top = float(layout.edges()[(seen[-1] if seen.size else 0) + 1])
+        counts = count**2 / 12.0 * counted(layout, velocity, count, top)
+        noise = np.bincount(layout.band, unit * (max(encoder**2 - count**2 / 12.0, 0.0) + counts), layout.count) / layout.lines
     own = np.maximum(signal - noise, 0.0)
     around = np.concatenate(([own[0]], own, [own[-1]]))
     envelope = np.maximum(np.maximum(around[:-2], around[2:]), own)
@@ -194,6 +203,28 @@ def floor(windows: Windows, velocity: FloatArray, encoder: float, epsilon: float
         epsilon=epsilon,
         lines=layout.lines,
     )
+
+
+def counted(layout: Bands, velocity: FloatArray, count: float, top: float) -> FloatArray:
+    """(lines,) power density of what counting adds to a position that moves with this velocity (n,), m/s, over that of white noise.
+
+    What is not counted is a saw of the position: at each moment its harmonics k, with 1/k^2 of the power, have k times the rate at which
+    counts are passed, folded at Nyquist (Bennett, Spectra of quantized signals, Bell Syst. Tech. J. 27, 1948). Where many counts are passed
+    in a sample that is white; where few are, it is many times as high below that rate, and next to nothing above. top: Hz, of the motion.
+    """
+    if top < TOP_SHARE * layout.sampling_rate:
+        velocity = scipy.signal.sosfiltfilt(scipy.signal.butter(4, top, fs=layout.sampling_rate, output="sos"), velocity)
+    rate = np.abs(velocity[::SPARSE]) / (count * layout.sampling_rate)  # counts a sample
+    power = np.zeros(BINS)
+    for k in range(1, HARMONICS + 1):
+        folded = np.abs(k * rate - np.round(k * rate))
+        power += np.bincount(np.minimum((2.0 * BINS * folded).astype(np.int64), BINS - 1), minlength=BINS) / k**2
+    density = power * BINS * 6.0 / np.pi**2 / rate.size
+    density += 1.0 - float(density.mean())  # of the harmonics above
+    turns = float(np.std(np.diff(velocity)) / (np.pi * max(float(np.std(velocity)), 1e-300)))  # how fast the rate itself changes, over Nyquist
+    density = scipy.ndimage.gaussian_filter1d(density, turns * BINS, mode="reflect")
+    place = np.minimum((2.0 * BINS * layout.frequency / layout.sampling_rate).astype(np.int64), BINS - 1)
+    return np.asarray(density[place])
 
 
 def tolerance(layout: Bands, error: ComplexArray, least: Floor) -> FloatArray:
