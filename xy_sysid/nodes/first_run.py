@@ -84,9 +84,12 @@ class Conductor:
             self._transition("configure")
         self._transition("activate")
         try:
-            while (push := first.next()) is not None and not self._over():
-                self._say(first.took(*self._push(push, settings)).sentence)
-            self.problem = self.problem or first.problem or (f"the excitation stopped: {self._reason}" if self._reason else "")
+            while not self._over() and (push := first.next()) is not None:
+                samples = self._push(push, settings)
+                if self._over():  # part of a push says nothing of the machine
+                    break
+                self._say(first.took(*samples).sentence)
+            self.problem = self.problem or (f"the excitation stopped: {self._reason}" if self._reason else first.problem)
         finally:
             if self._state() == "active":
                 self._transition("deactivate")
