@@ -130,6 +130,18 @@ def test_a_gap_before_a_table_that_drags_is_found(gap: float, table: float, coul
     assert values(found)["backlash"][0] == pytest.approx(gap, rel=0.1)
 
 
+@pytest.mark.parametrize(
+    ("gap", "table", "coulomb", "lag", "load"), [(1e-4, 0.1, 0.15, 2e-3, 0.0), (3e-4, 0.05, 0.1, 2e-3, 0.05), (3e-4, 0.1, 0.0, 3e-3, 0.1)]
+)
+def test_what_a_gap_hides_is_found_with_it(gap: float, table: float, coulomb: float, lag: float, load: float) -> None:
+    """An amplifier that lags leaves no trace before a gap, and without it no filter follows the motor; a load pulls on the table."""
+    found = diagnose(2000.0, *across_gap(gap, table, coulomb, 1, lag=lag, load=load))
+    true = {"backlash": gap, "amplifier_lag": lag, "coulomb_friction": coulomb, "constant_load": load}
+    assert set(found.effects) == {name for name, size in true.items() if size}, found.sentence
+    assert {name: values(found)[name][0] for name in found.effects} == pytest.approx({name: size for name, size in true.items() if size}, rel=0.1)
+    assert found.confidence > 0.9
+
+
 @pytest.mark.parametrize("coulomb", [0.0, 0.2])
 def test_a_spring_whose_rest_is_far_off_is_one_spring(coulomb: float) -> None:
     """A valve's: preloaded by five times its travel, which the drive holds."""

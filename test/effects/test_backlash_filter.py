@@ -81,6 +81,15 @@ def innovations(data: AxisData, base: GreyboxFit, *laws: str, others: tuple[tupl
     )
 
 
+def test_a_contact_that_is_stiff_and_damped_does_not_run_away_in_coarse_steps() -> None:
+    """Explicit steps are as many as it needs: with three a sample it would leave the recording, and stay there."""
+    data, base = machine("backlash=20e-6")
+    fit = innovations(data, base, "coulomb_friction")
+    inner = fit.start((base.model.gain, base.model.delay, base.model.pole), (20e-6, 0.75, 3900.0, 1.0, 100.0, 0.4), (0.1,))
+    coarse, fine = (fit.size(inner, View(8000, cuts=cuts)) for cuts in (3, 24))
+    assert coarse == pytest.approx(fine, rel=0.02)
+
+
 @pytest.mark.parametrize(
     ("name", "values"),
     [

@@ -58,18 +58,23 @@ def driven(joint: Joint, seed: int) -> tuple[FloatArray, FloatArray]:
     return _run(wanted, shake, joint.fs, inner, forces, np.array([*joint.control, joint.count, joint.limit, joint.zone]))
 
 
-def across_gap(gap: float, table: float, coulomb: float, seed: int, fs: float = 2000.0) -> tuple[FloatArray, FloatArray]:
-    """(n,) drive and (n,) position of a motor of 0.1 kg, driven with noise of 1 N for 20 s, and a table behind a gap (m), which drags as it does."""
+def across_gap(
+    gap: float, table: float, coulomb: float, seed: int, fs: float = 2000.0, lag: float = 0.0, load: float = 0.0
+) -> tuple[FloatArray, FloatArray]:
+    """(n,) drive and (n,) position of a motor of 0.1 kg, driven with noise of 1 N for 20 s, and a table behind a gap (m), which drags as it does.
+
+    lag: s, of the amplifier; load: N, on the table
+    """
     noise = scipy.signal.sosfilt(
         scipy.signal.butter(2, (0.5, 100.0), "bandpass", fs=fs, output="sos"), np.random.default_rng(seed).standard_normal(40_000)
     )
     drive = noise / noise.std()
-    return drive, _across(drive, fs, gap, table, coulomb)
+    return drive, _across(drive, fs, gap, table, coulomb, lag, load)
 
 
 @compiled
-def _across(drive: FloatArray, fs: float, gap: float, table: float, coulomb: float) -> FloatArray:
-    h, x, v, x2, v2, shown = 1.0 / fs / 20, 0.0, 0.0, 0.0, 0.0, np.empty(drive.size)
+def _across(drive: FloatArray, fs: float, gap: float, table: float, coulomb: float, lag: float, load: float) -> FloatArray:
+    h, x, v, x2, v2, push, shown = 1.0 / fs / 20, 0.0, 0.0, 0.0, 0.0, 0.0, np.empty(drive.size)
     for i in range(drive.size):
         shown[i] = np.round(x / 1e-6) * 1e-6
         held = drive[i - 1] if i > 0 else 0.0  # one sample late
@@ -77,9 +82,10 @@ def _across(drive: FloatArray, fs: float, gap: float, table: float, coulomb: flo
             deep = x - x2 - min(max(x - x2, -0.5 * gap), 0.5 * gap)
             contact = 2e5 * deep + 200.0 * (v - v2) if deep != 0.0 else 0.0
             contact = 0.0 if contact * deep < 0.0 else contact
-            v2 += h * (contact - 10.0 * v2) / table
+            v2 += h * (contact - load - 10.0 * v2) / table
             x2 += h * v2
-            new, stops = v + h * (held - 10.0 * v - contact) / 0.1, h * coulomb / 0.1
+            push += (held - push) * (h / lag if lag > 0.0 else 1.0)
+            new, stops = v + h * (push - 10.0 * v - contact) / 0.1, h * coulomb / 0.1
             new = new - stops if new > stops else new + stops if new < -stops else 0.0
             x += 0.5 * h * (v + new)
             v = new

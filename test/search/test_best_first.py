@@ -536,26 +536,20 @@ def test_a_rival_that_promised_as_much_is_fitted_in_the_end() -> None:
     assert search.best.effects == of("a") and of("b") in search.nodes
 
 
-@pytest.mark.parametrize(("from_nothing", "briefs"), [(1.0, 2), (0.6, 2), (0.1, 1)], ids=["astray", "no better", "better"])
-def test_a_rival_that_gains_nothing_is_fitted_again_from_its_simpler_relative(from_nothing: float, briefs: int) -> None:
-    """A richer law leaves no more than a simple one that is its limit: else it went astray."""
-    rich = Move(effects=of("rich"), gain=0.01, rest=0.01, parameters=2, starts=(("rich", (1.0,)),), replaced="a")
+@pytest.mark.parametrize("left", [0.1, None], ids=["explains", "no fit"])
+def test_richer_relatives_of_the_best_are_tried_once_though_they_promise_nothing(left: float | None) -> None:
+    """How a law bends is nothing to first order."""
+    rich = Move(effects=of("rich"), gain=0.0, rest=0.0, parameters=2, starts=(("rich", (1.0,)),), replaced="a")
 
     class Related(Table):
         def moves(self, now: Looked, brief: Looked) -> list[Move]:
             return [rich] if now.effects == of("a") else super().moves(now, brief)
 
-    judge = Related(
-        {of(): 4.0, of("a"): 0.6, of("rich"): 0.1},
-        {of(): all_of(("a", 1.0), (("rich",), 0.9))},
-        simpler={of("rich"): of("a")},
-        astray={(of(), of("rich")): from_nothing},
-    )
+    leaves = {of(): 4.0, of("a"): 0.6} | ({} if left is None else {of("rich"): left})
+    judge = Related(leaves, {of(): all_of(("a", 1.0))})
     search, tried = searched(judge)
-    assert tried == [of("a")]
-    assert list(search.rivals(of("a"))) == [of("rich")]
-    assert judge.briefs.count(of("rich")) == briefs
-    assert search.best.effects == of("rich") and search.best.fit.excess == 0.1
+    assert tried == [of("a"), of("rich")] and judge.briefs == tried
+    assert search.best.effects == of("a" if left is None else "rich")
 
 
 @pytest.mark.parametrize(("begins", "fits"), [(1.0, 2), (2.0, 1), (inf, 1)])
@@ -581,6 +575,16 @@ def test_a_rival_may_turn_out_to_be_better() -> None:
     search, _ = searched(Table({of(): 2.0, of("a"): 0.02, of("b"): 0.0}, promises))
     list(search.rivals(of("a")))
     assert search.best.effects == of("b")
+
+
+def test_a_set_that_does_the_same_with_more_parameters_is_behind() -> None:
+    """By their price, be it as rich as it may; what leaves less is ahead if that pays for them."""
+    load, spring, better = (
+        Node(of(name), Looked(of(name), left), Looked(of(name), left), count, whole=True)
+        for name, left, count in (("load", 0.5, 1), ("spring", 0.5, 3), ("better", 0.4, 3))
+    )
+    assert spring.behind(load) == pytest.approx(2.0 * SMALLEST) == -load.behind(spring)
+    assert better.behind(load) < 0.0
 
 
 def test_the_same_search_twice_is_the_same() -> None:

@@ -31,7 +31,7 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Rival:
-    """Another set of effects that was tried, and how much more it leaves than the one that was taken: nats of excess.
+    """Another set of effects that was tried, and how much more it leaves than the one that was taken: nats, parameters priced.
 
     refused: why it explains nothing, though it may leave as little: in words, or empty
     """

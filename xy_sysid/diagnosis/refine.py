@@ -8,7 +8,7 @@ axis ends the search, and else in the end.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Generator, Iterable, Iterator
 from dataclasses import dataclass
 
 from xy_sysid.axis.model import STANDARD, Library
@@ -80,59 +80,98 @@ def refine_steps(
     if fixed.steps[-1].fit.one_step or effort.most == 0:
         return ladder_of_given(data, judge, fixed)
     search: Search[GreyboxFit] = Search(judge=judge, clock=effort.now, budget=FREE * effort.budget, most=effort.most + len(kept), least=effort.size)
-    across = None if kept else OneStepTrials(judge, search)
-    for names in search.steps(fixed.steps[-1].fit, frozenset(kept)):
-        yield Trying(tuple(sorted(names)))
-        if across is not None and across.due:
-            yield Trying(across.names)
-            if across.explains():
-                break
-    settled = Simplifying(judge, search, frozenset(kept))
-    if across is not None and across.found is not None:
-        search.stopped = judge.late()
-        return ladder_of_search(judge, search, settled, fixed, across.found)
-    while True:
-        while settled.step():
-            yield Trying(tuple(sorted(settled.now.effects)))
-        final = settled.now
-        if search.goes_on(final):
-            for names in search.steps_from(final):
-                yield Trying(tuple(sorted(names)))
+    return (yield from _Way(judge, search, fixed, None if kept else OneStepTrials(judge, search)).steps())
+
+
+@dataclass(frozen=True, slots=True)
+class _Way:
+    """From a search that is made ready to what it comes to. Each part yields what is about to be fitted.
+
+    fixed: what is given; across: what only one-step prediction can judge, or None where that is not asked for
+    """
+
+    judge: AxisJudge
+    search: Search[GreyboxFit]
+    fixed: Given
+    across: OneStepTrials | None
+
+    def steps(self) -> Generator[Trying, None, Ladder]:
+        """Sets by simulation, the simplest that does the same, what helps most if that does little, and what no simulation can judge."""
+        yield from self._sets()
+        settled = self._settling()
+        if self.across is not None and self.across.found is not None:
+            self.search.stopped = self.judge.late()
         else:
-            for _ in range(FEWEST):  # along a valley that bends the first fit did not come to its end
-                if not final.fit.converged and not judge.late():
-                    final.fit = judge.whole(final.fit)
-            search.stopped = search.stopped or judge.late()
-            best = search.best
-            if not judge.late() and final.effects > frozenset(kept):
-                for names in search.rivals(final.effects):
+            settled = yield from self._simplest(settled)
+            yield from self._most_of_use(settled)
+            yield from self._one_step(settled.now)
+        return ladder_of_search(self.judge, self.search, settled, self.fixed, self.across.found if self.across is not None else None)
+
+    def _settling(self) -> Simplifying:
+        return Simplifying(self.judge, self.search, frozenset(self.fixed.names))
+
+    def _sets(self) -> Iterator[Trying]:
+        """The search, until a gap explains the axis."""
+        for names in self.search.steps(self.fixed.steps[-1].fit, frozenset(self.fixed.names)):
+            yield Trying(tuple(sorted(names)))
+            if self.across is not None and self.across.due:
+                yield Trying(self.across.names)
+                if self.across.explains():
+                    return
+
+    def _simplest(self, settled: Simplifying) -> Generator[Trying, None, Simplifying]:
+        """The simplest set that does the same, until neither what is beside it nor a rival of it is better."""
+        while True:
+            yield from _simpler(settled)
+            final = settled.now
+            if self.search.goes_on(final):
+                for names in self.search.steps_from(final):
                     yield Trying(tuple(sorted(names)))
-            if search.best is best or search.best.score >= final.score - LEAST:
-                break
-        settled = Simplifying(judge, search, frozenset(kept))
-    helps = _most_of_use(judge, search, fixed)
-    if not _explains(judge, fixed, final) and _explains(judge, fixed, helps):
-        settled.now = helps
-        while settled.step():
-            yield Trying(tuple(sorted(settled.now.effects)))
-        final = settled.now
-    if final.fit.excess >= LEAST and across is not None:
-        for name in across.names:
-            yield Trying((name,))
-            across.look(name, final)
-    return ladder_of_search(judge, search, settled, fixed, across.found if across is not None else None)
+            else:
+                self._converge(final)
+                best, self.search.stopped = self.search.best, self.search.stopped or self.judge.late()
+                if not self.judge.late() and final.effects > frozenset(self.fixed.names):
+                    for names in self.search.rivals(final.effects):
+                        yield Trying(tuple(sorted(names)))
+                if self.search.best is best or self.search.best.score >= final.score - LEAST:
+                    return settled
+            settled = self._settling()
+
+    def _converge(self, node: Node[GreyboxFit]) -> None:
+        """Along a valley that bends the first fit did not come to its end."""
+        for _ in range(FEWEST):
+            if not node.fit.converged and not self.judge.late():
+                node.fit = self.judge.whole(node.fit)
+
+    def _most_of_use(self, settled: Simplifying) -> Iterator[Trying]:
+        """Instead of a set that takes away less than it leaves, what takes away most of all that may be named, if that is more."""
+        given, every = frozenset(self.fixed.names), self.search.nodes.values()
+        nodes = [node for node in every if node.whole and node.leads and not node.refused and node.effects >= given]
+        helps = max(nodes, key=self._explained)
+        if not self._explains(settled.now) and self._explains(helps):
+            settled.now = helps
+            yield from _simpler(settled)
+
+    def _one_step(self, final: Node[GreyboxFit]) -> Iterator[Trying]:
+        """What no simulation can judge, where something is left; and with what it hides, where most is left."""
+        if self.across is not None and final.fit.excess >= LEAST:
+            for name in self.across.names:
+                yield Trying((name,))
+                self.across.look(name, final)
+                if not self._explains(final):
+                    self.across.look(name, final, hidden=True)
+
+    def _explained(self, node: Node[GreyboxFit]) -> float:
+        return part_explained(self.judge.data, self.fixed.steps[0].fit, node.fit)
+
+    def _explains(self, node: Node[GreyboxFit]) -> bool:
+        """A set takes away more of the error's power than it leaves: what is far off in many quiet bands may yet do that."""
+        return self._explained(node) >= 0.5
 
 
-def _explains(judge: AxisJudge, fixed: Given, node: Node[GreyboxFit]) -> bool:
-    """A set takes away more of the error's power than it leaves: what is far off in many quiet bands may yet do that."""
-    explained = part_explained(judge.data, fixed.steps[0].fit, node.fit)
-    return explained >= 1.0 - explained
-
-
-def _most_of_use(judge: AxisJudge, search: Search[GreyboxFit], fixed: Given) -> Node[GreyboxFit]:
-    """The set that takes away most of the error's power, of all that may be named."""
-    nodes = [node for node in search.nodes.values() if node.whole and node.leads and not node.refused and node.effects >= set(fixed.names)]
-    return max(nodes, key=lambda node: part_explained(judge.data, fixed.steps[0].fit, node.fit))
+def _simpler(settled: Simplifying) -> Iterator[Trying]:
+    while settled.step():
+        yield Trying(tuple(sorted(settled.now.effects)))
 
 
 def settle(data: AxisData, now: GreyboxFit) -> GreyboxFit:

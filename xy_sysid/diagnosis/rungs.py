@@ -92,7 +92,7 @@ def ladder_of_search(
     ordered = (*given.names, *(name for name in ordered if name not in given.names))
     rivals = sorted(
         (
-            Rival(tuple(sorted(item.effects)), item.fit, item.fit.excess - node.fit.excess, item.refused)
+            Rival(tuple(sorted(item.effects)), item.fit, item.behind(node), item.refused)
             for item in search.nodes.values()
             if item is not node and 0 < len(item.effects) <= len(node.effects) and not item.effects < node.effects
             if not contains(judge.library, item.effects, node.effects)

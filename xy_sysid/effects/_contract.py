@@ -273,6 +273,7 @@ class Effect:
     angular:     True for a law of an angle: it is tried in another's place only where the position is in rad
     on_table:    True for a force that acts on the table: across a gap the motor does not feel it
     rubs:        for ``one_step``: the effect whose dry friction it begins with where no other is given
+    hides:       for ``one_step``: names of effects that leave no trace where it acts, and are tried beside it unasked
     suspects:    names of effects whose trace in an error is a reason to try this one, too: its own trace does not tell
     mode_frequency: of a resonance: which parameter is its frequency, Hz; a mode that the data do not excite cannot be named
     """
@@ -301,6 +302,7 @@ class Effect:
     angular: bool = False
     on_table: bool = False
     rubs: str = ""
+    hides: tuple[str, ...] = ()
     suspects: tuple[str, ...] = ()
     mode_frequency: str = ""
 

@@ -87,9 +87,9 @@ class AxisJudge:
         later = np.arange(self.data.velocity.size) >= self.data.training
         return whitened_rms(found.error, later) if enough(later) else 0.0
 
-    def followed(self, now: GreyboxFit, name: str, bar: float, least: float) -> Grown:
-        """An effect that only one-step prediction can judge, with what acts beside it; see ``beside_one_step``."""
-        return grown(self.data, now, self.library[name], Wanted(Limits(bar, self.late), least, self.refusal))
+    def followed(self, now: GreyboxFit, name: str, bar: float, least: float, hidden: bool = False) -> Grown:
+        """An effect that only one-step prediction can judge, with what acts beside it, and what it hides; see ``beside_one_step``."""
+        return grown(self.data, now, self.library[name], Wanted(Limits(bar, self.late), least, self.refusal, hidden))
 
     def _tried(self, start: AxisModel, hopeless: float = np.inf) -> GreyboxFit | None:
         found = fit(self.data, start, brief=True, hopeless=hopeless, late=self.late)

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import inf, log, sqrt
 
@@ -15,7 +15,7 @@ from xy_sysid.effects import Effect
 from xy_sysid.effects._contract import PATIENT, Followed, Limits
 from xy_sysid.greybox.free_run import AxisData, GreyboxFit
 from xy_sysid.greybox.innovation_test import traces
-from xy_sysid.greybox.one_step import AT_NOISE, beside, error_without, followed
+from xy_sysid.greybox.one_step import AT_NOISE, Others, beside, error_without, followed
 from xy_sysid.greybox.score_test import Trace
 from xy_sysid.judge.refusal import none_of
 
@@ -26,11 +26,13 @@ class Wanted:
 
     limits: until when fits go on; their bar is the error one sample ahead, m/s, of the best without the gap: what cannot come near it ends soon
     least: what one more must explain over what is left unexplained; refused: why a fit explains nothing, or empty
+    hidden: begin with what the effect hides (``Effect.hides``) beside it
     """
 
     limits: Limits = PATIENT
     least: float = WORTH
     refused: Callable[[GreyboxFit], str] = lambda _: ""
+    hidden: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,9 +52,11 @@ def told_apart(effect: Effect) -> bool:
 def grown(data: AxisData, base: GreyboxFit, effect: Effect, wanted: Wanted | None = None) -> Grown:
     """Rungs: the effect with what the base has beside it, then one more beside it at each."""
     wanted = wanted or Wanted()
-    fit, found = followed(data, base, effect, limits=wanted.limits)
+    fit, found = followed(data, base, effect, _hidden(data, base, effect) if wanted.hidden else (), limits=wanted.limits)
     while not found.given_up and (name := none_of(data, fit)) not in ("", effect.name):  # a simulation had taken the gap for it
         fit, found = followed(data, replace(fit, model=fit.model.without(name)), effect, begin=found, limits=wanted.limits)
+    if not found.given_up and fit.held_out_error < (wanted.limits.bar or inf):
+        fit, found = _needed(data, fit, found, effect, wanted)
     rungs = [(effect.name, fit)]
     while not found.given_up and len(rungs) < MOST_EFFECTS and not wanted.limits.late():
         now = rungs[-1][1]
@@ -67,6 +71,24 @@ def grown(data: AxisData, base: GreyboxFit, effect: Effect, wanted: Wanted | Non
     return Grown(tuple(rungs), found)
 
 
+def _hidden(data: AxisData, base: GreyboxFit, effect: Effect) -> Others:
+    """What the effect hides and the base does not have, of usual size."""
+    library = base.model.library
+    hidden = (library[name] for name in effect.hides if name in library.effects and name not in base.model)
+    return [(other.name, tuple(item.typical for item in other.on(data.similar))) for other in hidden]
+
+
+def _needed(data: AxisData, fit: GreyboxFit, found: Followed, effect: Effect, wanted: Wanted) -> tuple[GreyboxFit, Followed]:
+    """Without what a simulation had, and is of no use beside the effect: it must be worth as much as what is put beside it later."""
+    for name, _ in fit.model.effects:
+        if name in (effect.name, effect.rubs) or wanted.limits.late():
+            continue
+        less, its = followed(data, replace(fit, model=fit.model.without(name)), effect, begin=found, limits=wanted.limits)
+        if _size(less, (fit.held_out_error / less.held_out_error) ** 2) < _least(name, effect, wanted):
+            fit, found = less, its
+    return fit, found
+
+
 _Tried = tuple[str, GreyboxFit, Followed]
 
 
@@ -74,34 +96,42 @@ def _better(data: AxisData, now: GreyboxFit, effect: Effect, found: Followed, wa
     """The best fit with one more beside, None if none is worth it.
 
     First what its trace promises; then, if that does not explain the axis, laws of dry friction that say more than the one that the filter
-    has: their traces do not tell, as friction that bends or sticks changes what the filter believes of the gap.
+    has: their traces do not tell, as friction that bends or sticks changes what the filter believes of the gap; last, where nothing was
+    promised and something acts, what promises most, as what is slow promises little.
     """
     library, on = now.model.library, replace(wanted.limits, bar=None)
     known = {name for name, _ in beside(now.model, effect)[1]} | {name for name, _ in now.model.effects}
     open_to = [law for law in library.acting if told_apart(law) and law.simulable and law.name not in known]
     seen = traces(data, now.model, effect, found, [*open_to, *_uneven(effect, library, found)])
     promising = [trace for trace in seen if _size(now, 1.0 - OPTIMISM * trace.share) >= _least(trace.effect, effect, wanted)]
-    if now.held_out_error > AT_NOISE * now.noise_floor and not promising:  # something acts, and what is slow promises little
-        promising = [trace for trace in seen if trace.effect not in effect.suspects]
+    rubbing = _rubbing(now, library, found)
     tried: list[_Tried] = []
 
-    def tried_with(trace: Trace) -> None:
-        fit, its = followed(data, now, effect, [_start(trace, library, found)], found, on)
-        if not wanted.refused(fit):
-            tried.append((trace.effect, fit, its))
+    def try_all(open_to: Sequence[Trace]) -> None:
+        for trace in open_to:
+            if not wanted.limits.late():
+                fit, its = followed(data, now, effect, [_start(trace, library, found)], found, on)
+                if not wanted.refused(fit):
+                    tried.append((trace.effect, fit, its))
 
-    for trace in promising:
-        if trace.share >= ALIKE * promising[0].share:
-            tried_with(trace)
-    if now.excess >= AT_FLOOR and not any(fit.excess < AT_FLOOR for _, fit, _ in tried):
-        rubbing = _rubbing(now, library, found)
-        for trace in traces(data, now.model, effect, found, rubbing) if rubbing else ():
-            tried_with(trace)
+    def is_explained() -> bool:
+        return now.excess < AT_FLOOR or any(fit.excess < AT_FLOOR for _, fit, _ in tried)
+
+    try_all(_alike(promising))
+    if rubbing and not is_explained():
+        try_all(traces(data, now.model, effect, found, rubbing))
+    if not promising and not is_explained() and now.held_out_error > AT_NOISE * now.noise_floor:
+        try_all(_alike([trace for trace in seen if trace.effect not in effect.suspects]))
     least = min((fit.held_out_error for _, fit, _ in tried), default=inf)
     alike = (item for item in tried if 2.0 * log(item[1].held_out_error / least) < LEAST)  # then the simplest
     best = min(alike, key=lambda item: (len(item[1].parameters), item[1].held_out_error), default=None)
     worth = best is not None and _size(now, (best[1].held_out_error / now.held_out_error) ** 2) >= _least(best[0], effect, wanted)
     return best if worth else None
+
+
+def _alike(seen: Sequence[Trace]) -> list[Trace]:
+    """Those that promise as much as the first."""
+    return [trace for trace in seen if trace.share >= ALIKE * seen[0].share]
 
 
 def size_ahead(before: float, after: float, noise: float) -> float:

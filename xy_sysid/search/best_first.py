@@ -23,7 +23,7 @@ class Node(Generic[F]):
 
     parameters: that its effects have; whole: fitted on all data; refused: why it explains nothing, or empty; promised: gain
     shown: largest gain of a move from it over what was promised; tried: moves from it that were tried; brief: excess of its brief fit
-    led_on: moves from it are waiting, or were tried; asked_last: and what may be there though none of them promises enough
+    led_on: moves from it are waiting, or were tried; last: those that are tried though none promises enough, None until they are asked for
     """
 
     effects: frozenset[str]
@@ -38,7 +38,7 @@ class Node(Generic[F]):
     leads: bool = True
     later: float = 0.0
     led_on: bool = False
-    asked_last: bool = False
+    last: list[Move] | None = None
 
     @property
     def score(self) -> float:
@@ -50,6 +50,10 @@ class Node(Generic[F]):
         """The score that it would have if it were not refused."""
         later = 0.0 if self.whole else self.later
         return self.fit.excess + later + LEAST * self.parameters
+
+    def behind(self, other: Node[F]) -> float:
+        """How much more it leaves than another, nats; parameters that gain nothing have their price."""
+        return self.fit.excess - other.fit.excess + LEAST * (self.parameters - other.parameters)
 
     @property
     def optimism(self) -> float:
@@ -151,24 +155,24 @@ class Search(Generic[F]):
             if move.effects not in self.nodes and len(move.effects) <= len(taken) and move.gain > ALIKE * max(known):
                 most -= 1
                 yield move.effects
-                node, again = self._fitted(parent, move), self._from_simpler(move)
-                if node is not None and again is not None and node.fit.excess > again[0].fit.excess - LEAST:
-                    self._fitted(*again)
+                self._fitted(parent, move)
 
     def _last(self) -> list[tuple[Node[F], Move]]:
         """Where nothing promises enough: what all data show of the best set, if they show what its brief fit does not; else, once, what
-        promises most beside it, as beside laws that bend first order sees a part of what it changes."""
+        promises most beside it, and richer relatives of what it has: of laws that bend first order sees a part, or nothing."""
         best = self.best
-        if best.asked_last:
-            return []
-        best.asked_last = True
-        if best.is_slow(self.least):
-            slow = [(best, move) for move in self.judge.slow_moves(best.fit, best.brief) if len(move.effects) <= self.most]
-            self.waiting += slow
-            best.tried, best.shown = 0, 0.0  # what the first stage's promises were worth says nothing of these
-            return [item for item in slow if self._promising(*item)]
-        beside = [(node, move) for node, move in self.waiting if node is best and best.effects and _new(node, move) == 1 and move.gain >= LEAST]
-        return sorted((item for item in beside if not self._known(*item)), key=lambda item: -item[1].gain)[:1]
+        if best.last is None:
+            best.last = []
+            if best.is_slow(self.least):
+                slow = [(best, move) for move in self.judge.slow_moves(best.fit, best.brief) if len(move.effects) <= self.most]
+                self.waiting += slow
+                best.tried, best.shown = 0, 0.0  # what the first stage's promises were worth says nothing of these
+                return [item for item in slow if self._promising(*item)]
+            if best.effects:
+                single = [move for node, move in self.waiting if node is best and _new(node, move) == 1 and not self._known(node, move)]
+                most = max(single, key=lambda move: move.gain, default=None)
+                best.last = [move for move in single if move.replaced is not None or (move is most and move.gain >= LEAST)]
+        return [item for item in self.waiting if item[0] is best and item[1] in best.last and not self._known(*item)]
 
     def _promising(self, parent: Node[F], move: Move) -> bool:
         """It may become better than the best, and what is new may be more than what is left unexplained could feign."""
@@ -183,12 +187,6 @@ class Search(Generic[F]):
         """The move itself, or one to the simpler relative of what it brings, which comes first."""
         first = (item for item in self.waiting if item[0] is parent and item[1].effects == move.simpler and move.simpler not in self.nodes)
         return next(first, (parent, move))
-
-    def _from_simpler(self, move: Move) -> tuple[Node[F], Move] | None:
-        """The move to the same set that waits where its simpler relative was fitted: what leaves no less than that, which is its limit,
-        went astray, and is fitted again from there."""
-        at = self.nodes.get(move.simpler) if move.simpler else None
-        return next((item for item in self.waiting if item[0] is at and item[1].effects == move.effects), None)
 
     def _known(self, parent: Node[F], move: Move) -> bool:
         """The set was fitted. One that left more than a set which it contains, or far more than the move does before any fit, went astray, and may be

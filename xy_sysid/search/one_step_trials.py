@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from math import exp
 
+from xy_sysid.axis.model import AxisModel
 from xy_sysid.criteria import AT_FLOOR, FEWEST, FILTERED, SIZE
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.greybox.one_step import error_without
@@ -68,11 +69,23 @@ class OneStepTrials:
         by_itself = {library[name].rubs for name in self.names}
         if not names - by_itself:
             return None
+        less = node.fit.model
+        for name in node.effects - names:
+            less = less.without(name)
+        return self._node(less, node)
+
+    def _apart(self, node: Node[GreyboxFit]) -> Node[GreyboxFit] | None:
+        """A set whose sums are written as their parts, if it has any: what is one law without a gap is two where the parts act on its two sides."""
+        model = node.fit.model
+        for name, _ in node.fit.model.effects:
+            model = model.apart(name)
+        return None if model is node.fit.model else self._node(model, node)
+
+    def _node(self, model: AxisModel, like: Node[GreyboxFit]) -> Node[GreyboxFit] | None:
+        """The set of a model, fitted if it was not; None if it is too late for that."""
+        names = frozenset(name for name, _ in model.effects)
         if names not in self.search.nodes and not self.judge.late():
-            less = node.fit.model
-            for name in node.effects - names:
-                less = less.without(name)
-            remembered(self.judge, self.search, names, self.judge.whole(replace(node.fit, model=less)))
+            remembered(self.judge, self.search, names, self.judge.whole(replace(like.fit, model=model)))
         return self.search.nodes.get(names)
 
     def explains(self) -> bool:
@@ -84,8 +97,8 @@ class OneStepTrials:
             self.found = None
         return self.found is not None
 
-    def look(self, name: str, best: Node[GreyboxFit]) -> None:
-        """Take it if it beats a set, and the best of all."""
+    def look(self, name: str, best: Node[GreyboxFit], hidden: bool = False) -> None:
+        """Take it if it beats a set, and the best of all. hidden: with what leaves no trace where it acts beside it."""
         if self.found is not None:
             return
         whole(self.judge, self.search.best)
@@ -93,13 +106,14 @@ class OneStepTrials:
         if not FILTERED * bar > self.judge.data.floor.encoder * self.judge.data.sampling_rate:
             return
         for node in self._begins(best):
-            fitted = self._fitted(name, node, FILTERED * bar)
+            fitted = self._fitted(name, node, FILTERED * bar, hidden)
             if fitted is None:
                 return
-            found = Filtered((*self._up_to(node), *fitted.rungs), bar, error_without(self.judge.data, fitted.found))
-            if name in fitted.rungs[-1][1].model and found.wins:
+            found, left = Filtered((*self._up_to(node), *fitted.rungs), bar, error_without(self.judge.data, fitted.found)), fitted.rungs[-1][1]
+            if name in left.model and found.wins and (self.found is None or left.held_out_error < self.found.rungs[-1][1].held_out_error):
                 self.found = found
-                return
+                if left.excess < AT_FLOOR:
+                    return
 
     def _up_to(self, node: Node[GreyboxFit]) -> list[tuple[str, GreyboxFit]]:
         """Rungs up to a set, of the fits that are known."""
@@ -108,16 +122,20 @@ class OneStepTrials:
         return [(name, whole(self.judge, found)) for name, found in known if found is not None]
 
     def _begins(self, best: Node[GreyboxFit]) -> list[Node[GreyboxFit]]:
-        """What a filter can have of the best set, as a large force beside a gap hides it; and the rigid base."""
-        rigid, beside = self.search.nodes[frozenset()], self._beside(best)
-        return [rigid] if beside is None else [beside, rigid]
+        """What a filter can have of the best set, as a large force beside a gap hides it; the rigid base; and what it can have of the set that
+        leaves least, be its effects worth their names or not, as a gap hides these."""
+        nodes = self.search.nodes
+        least = min((node for node in nodes.values() if not node.refused), key=lambda node: node.allowed)
+        beside = self._beside(least)
+        begins = (self._beside(best), nodes[frozenset()], beside, self._apart(beside) if beside is not None else None)
+        return list(dict.fromkeys(node for node in begins if node is not None))
 
-    def _fitted(self, name: str, node: Node[GreyboxFit], bar: float) -> Grown | None:
+    def _fitted(self, name: str, node: Node[GreyboxFit], bar: float, hidden: bool) -> Grown | None:
         """The effect and what is beside it, beginning from a set; each is fitted once. None if it is too late."""
-        key = name, node.effects
+        key = name, node.effects | (set(self.judge.library[name].hides) if hidden else set())
         if key not in self.fitted:
             if self.judge.late():
                 self.search.stopped = True
                 return None
-            self.fitted[key] = self.judge.followed(whole(self.judge, node), name, bar, self.search.least)
+            self.fitted[key] = self.judge.followed(whole(self.judge, node), name, bar, self.search.least, hidden)
         return self.fitted[key]

@@ -82,5 +82,6 @@ EFFECT = Effect(
     simulable=False,
     one_step=Contact(),
     rubs="coulomb_friction",
+    hides=("amplifier_lag",),
     suspects=("screw_compliance", "amplifier_lag", "presliding_hysteresis"),
 )

@@ -21,14 +21,16 @@ SANE = 0.5  # rad/s of the pole over the sampling rate, Hz, to begin with: a bas
 SETTLED = 0.5  # s until the filter is judged
 STEP = 1e-3  # of a number's unit, for derivatives of what is beside
 WORST = 1e6  # innovation over the noise at which it is cut off
-RATE = NAMES.index("rate")
+GAIN, POLE, SHARE, RATE, DAMPING, LOSS = (NAMES.index(name) for name in ("gain", "pole", "share", "rate", "damping", "loss"))
+MOST = 24  # sub-steps of a sample
+STABLE = 1.5  # of what a contact's spring and damper turn in a sub-step, rad: twice as much and explicit steps run away
 LOG = (False, False, True, True, False, True, False, False, False)  # by NAMES
 
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """What the filter is shown and told. looseness: factor on the process noise; cuts: sub-steps of each piece of a sample;
-    deaf: factor on the encoder's noise."""
+    """What the filter is shown and told. looseness: factor on the process noise; cuts: sub-steps of each piece of a sample, at
+    least; deaf: factor on the encoder's noise."""
 
     samples: int
     looseness: float = 1.0
@@ -142,7 +144,7 @@ class Innovations:
             self.fs,
             (view.deaf * noise) ** 2,
             drift,
-            view.cuts,
+            max(view.cuts, self._stable(numbers, float(np.std(voltage)))),
             *moved,
             column,
             nudge,
@@ -158,6 +160,12 @@ class Innovations:
             slopes[:, column] += np.outer(out, passing / through) * (self.unit * np.where(self.log, numbers, 1.0))[column]
             slopes = np.clip(np.nan_to_num(slopes, nan=0.0), -WORST, WORST)
         return out, slopes
+
+    def _stable(self, numbers: FloatArray, volts: float) -> int:
+        """Sub-steps of a sample with which explicit steps follow the contact's spring and damper; volts: rms of the drive, V."""
+        knocks = 3.0 * volts * abs(numbers[GAIN]) * numbers[POLE] / numbers[SHARE]  # m/s^2 of both sides to each other
+        swift = (1.0 + 2.0 * numbers[DAMPING]) * numbers[RATE] + numbers[LOSS] * knocks
+        return min(int(np.ceil(swift / self.fs / STABLE)), MOST)
 
     def _undone(self, numbers: FloatArray, n: int) -> tuple[FloatArray, FloatArray, FloatArray, float]:
         return self.beside.undo(np.concatenate((numbers[:3], numbers[self.others])), n)

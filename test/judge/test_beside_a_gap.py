@@ -1,0 +1,38 @@
+"""What stands beside an effect that only one-step prediction can judge, and what does not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from helpers.foreign import across_gap
+
+from xy_sysid.axis.model import STANDARD
+from xy_sysid.criteria import SIZE
+from xy_sysid.greybox.axis_data import AxisData, prepare
+from xy_sysid.judge.axis_judge import AxisJudge
+
+BAR = 5e-3  # m/s one sample ahead: more than what any filter with this gap leaves
+
+
+@pytest.fixture(scope="module")
+def judge() -> AxisJudge:
+    """Of a motor that rubs before a gap of 0.1 mm, behind an amplifier that lags by 2 ms."""
+    data: AxisData = prepare(2000.0, *across_gap(1e-4, 0.1, 0.15, 1, lag=2e-3))
+    return AxisJudge(data, STANDARD)
+
+
+def test_what_a_simulation_had_and_is_of_no_use_beside_a_gap_goes(judge: AxisJudge) -> None:
+    """Cogging that is not there, beside a lag that is."""
+    base = judge.begin()
+    crowded = replace(base, model=base.model.with_effect("amplifier_lag", (1e-3,)).with_effect("cogging", (0.02, 0.01, 0.0)))
+    grown = judge.followed(crowded, "backlash", BAR, SIZE)
+    assert set(dict(grown.rungs[-1][1].model.effects)) == {"backlash", "coulomb_friction", "amplifier_lag"}
+
+
+@pytest.mark.parametrize("hidden", [False, True])
+def test_without_what_a_gap_hides_no_filter_follows_the_motor(judge: AxisJudge, hidden: bool) -> None:
+    """An encoder's count of 1 um is 0.6 mm/s one sample ahead."""
+    last = judge.followed(judge.begin(), "backlash", 2e-3, SIZE, hidden).rungs[-1][1]
+    assert ("amplifier_lag" in last.model) is hidden
+    assert (last.held_out_error < 1e-3) is hidden
