@@ -157,9 +157,9 @@ class _Way:
         if self.across is not None and final.fit.excess >= LEAST:
             for name in self.across.names:
                 yield Trying((name,))
-                self.across.look(name, final)
+                self.across.look(name, final, last=True)
                 if not self._explains(final):
-                    self.across.look(name, final, hidden=True)
+                    self.across.look(name, final, last=True, hidden=True)
 
     def _explained(self, node: Node[GreyboxFit]) -> float:
         return part_explained(self.judge.data, self.fixed.steps[0].fit, node.fit)

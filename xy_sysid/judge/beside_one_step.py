@@ -55,13 +55,13 @@ def grown(data: AxisData, base: GreyboxFit, effect: Effect, wanted: Wanted | Non
     fit, found = followed(data, base, effect, _hidden(data, base, effect) if wanted.hidden else (), limits=wanted.limits)
     while not found.given_up and (name := none_of(data, fit)) not in ("", effect.name):  # a simulation had taken the gap for it
         fit, found = followed(data, replace(fit, model=fit.model.without(name)), effect, begin=found, limits=wanted.limits)
-    if not found.given_up and fit.held_out_error < (wanted.limits.bar or inf):
+    if _does_something(data, fit, found) and fit.held_out_error < (wanted.limits.bar or inf):
         fit, found = _needed(data, fit, found, effect, wanted)
     rungs = [(effect.name, fit)]
-    while not found.given_up and len(rungs) < MOST_EFFECTS and not wanted.limits.late():
+    while len(rungs) < MOST_EFFECTS and not wanted.limits.late():
         now = rungs[-1][1]
-        if 2.0 * log(error_without(data, found) / now.held_out_error) < LEAST:
-            break  # it is no such effect: without it the same filter does as well
+        if not _does_something(data, now, found):
+            break
         better = _better(data, now, effect, found, wanted)
         if better is None:
             break
@@ -69,6 +69,11 @@ def grown(data: AxisData, base: GreyboxFit, effect: Effect, wanted: Wanted | Non
         new = [own for own, _ in fit.model.effects if own not in now.model]
         rungs.append((name if name in fit.model else new[-1] if new else name, fit))
     return Grown(tuple(rungs), found)
+
+
+def _does_something(data: AxisData, fit: GreyboxFit, found: Followed) -> bool:
+    """Without the effect the same filter leaves more: else it is no such effect."""
+    return not found.given_up and 2.0 * log(error_without(data, found) / fit.held_out_error) >= LEAST
 
 
 def _hidden(data: AxisData, base: GreyboxFit, effect: Effect) -> Others:

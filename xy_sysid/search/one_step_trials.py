@@ -97,15 +97,15 @@ class OneStepTrials:
             self.found = None
         return self.found is not None
 
-    def look(self, name: str, best: Node[GreyboxFit], hidden: bool = False) -> None:
-        """Take it if it beats a set, and the best of all. hidden: with what leaves no trace where it acts beside it."""
+    def look(self, name: str, best: Node[GreyboxFit], last: bool = False, hidden: bool = False) -> None:
+        """Take it if it beats a set, and the best of all. last: no simulation is tried any more; hidden: beside what it hides."""
         if self.found is not None:
             return
         whole(self.judge, self.search.best)
         bar = min(self.judge.ahead(node.fit) for node in (best, self.search.best))
         if not FILTERED * bar > self.judge.data.floor.encoder * self.judge.data.sampling_rate:
             return
-        for node in self._begins(best):
+        for node in self._begins(best, last):
             fitted = self._fitted(name, node, FILTERED * bar, hidden)
             if fitted is None:
                 return
@@ -121,13 +121,15 @@ class OneStepTrials:
         known = [(names[count], self.search.nodes.get(frozenset(names[: count + 1]))) for count in range(len(names))]
         return [(name, whole(self.judge, found)) for name, found in known if found is not None]
 
-    def _begins(self, best: Node[GreyboxFit]) -> list[Node[GreyboxFit]]:
-        """What a filter can have of the best set, as a large force beside a gap hides it; the rigid base; and what it can have of the set that
-        leaves least, be its effects worth their names or not, as a gap hides these."""
+    def _begins(self, best: Node[GreyboxFit], last: bool) -> list[Node[GreyboxFit]]:
+        """What a filter can have of the best set, as a large force beside a gap hides it; the rigid base; and, if the best explains less than
+        it leaves, the same of the set that leaves least, be its effects worth their names or not, as a gap hides these; at last that apart."""
         nodes = self.search.nodes
-        least = min((node for node in nodes.values() if not node.refused), key=lambda node: node.allowed)
-        beside = self._beside(least)
-        begins = (self._beside(best), nodes[frozenset()], beside, self._apart(beside) if beside is not None else None)
+        rigid = nodes[frozenset()]
+        begins = [self._beside(best), rigid]
+        if 2.0 * self.judge.rest(best.fit, rigid.fit) > 1.0:
+            least = self._beside(min((node for node in nodes.values() if not node.refused), key=lambda node: node.allowed))
+            begins += [least, self._apart(least) if last and least is not None else None]
         return list(dict.fromkeys(node for node in begins if node is not None))
 
     def _fitted(self, name: str, node: Node[GreyboxFit], bar: float, hidden: bool) -> Grown | None:
