@@ -79,4 +79,4 @@ FEWEST = _number(
 )
 MOST_EFFECTS = _number("most effects", 4, "1", "in a model: the blind sets have three at most, and of the real machines one takes four")
 BUDGET = 10.0  # s of processor time for one axis, where nobody says another (--budget): no criterion, but what people wait for
-IN_HAND = 0.95  # of it, after which nothing more is begun: the step in hand then takes the rest
+IN_HAND = 0.92  # of it, after which nothing more is begun: the step in hand then takes the rest

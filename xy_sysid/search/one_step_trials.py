@@ -119,7 +119,11 @@ class OneStepTrials:
         """Rungs up to a set, of the fits that are known."""
         names = [name for name, _ in node.fit.model.effects]
         known = [(names[count], self.search.nodes.get(frozenset(names[: count + 1]))) for count in range(len(names))]
-        return [(name, whole(self.judge, found)) for name, found in known if found is not None]
+        return [(name, self._whole(found)) for name, found in known if found is not None]
+
+    def _whole(self, node: Node[GreyboxFit]) -> GreyboxFit:
+        """A set's fit on all data. One that is not worth its names stays as the search knows it: it may yet be asked for."""
+        return whole(self.judge, node) if node.leads or node.whole else self.judge.whole(node.fit)
 
     def _begins(self, best: Node[GreyboxFit], last: bool) -> list[Node[GreyboxFit]]:
         """What a filter can have of the best set, as a large force beside a gap hides it; the rigid base; and, if the best explains less than
@@ -139,5 +143,5 @@ class OneStepTrials:
             if self.judge.late():
                 self.search.stopped = True
                 return None
-            self.fitted[key] = self.judge.followed(whole(self.judge, node), name, bar, self.search.least, hidden)
+            self.fitted[key] = self.judge.followed(self._whole(node), name, bar, self.search.least, hidden)
         return self.fitted[key]
