@@ -173,7 +173,7 @@ def test_what_lacks_is_said_and_the_model_waits_for_data(world: World) -> None:
     assert world.until(lambda: bool(results.ladders["x"]) and len(results.held_out("x")) == 2, 60.0), node.output()
     assert results.held_out("x")[1] < 0.2 * results.held_out("x")[0]
     ok, text = trigger(world, "reset_model", 10.0)
-    assert ok and world.until(lambda: len(results.held_out("x")) == 1, 5.0)
+    assert ok and world.until(lambda: len(results.held_out("x")) == 1, 20.0)
     world.node.create_client(Trigger, "/xy/diagnoser/diagnose").call_async(Trigger.Request())
     assert world.until(lambda: "looking" in newest(results.diagnosis, "progress")["progress"], 20.0)
     node.send(signal.SIGINT)

@@ -138,8 +138,7 @@ def test_the_failing_picture_comes_by_itself_and_every_number_follows_the_story(
     assert "fails" in str(tab.page.locator("[aria-label='linear fit, live']").text_content())
     tab.page.locator("[data-remove=coulomb_friction]:enabled").first.click()
     tab.until(lambda: tab.headline().startswith("Something is missing: ") and tab.over_floor() > 4, 40, "stale after Remove")
-    tab.press("reset")
-    tab.until(lambda: len(tab.ladder()) == 1 and tab.headline().startswith("Something is missing: "), 40, "stale after Start over")
+    tab.press_until("reset", lambda: len(tab.ladder()) == 1 and tab.headline().startswith("Something is missing: "), 60, "stale after Start over")
     assert tab.filled() == ["Add coulomb friction"]
 
 
