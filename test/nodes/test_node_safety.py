@@ -108,7 +108,8 @@ def test_two_excitations_never_drive_one_machine(world: World) -> None:
     activate(world)
     assert world.until(lambda: len(blocks) > 10 and bool(blocks[-1].values.any()))
     second = world.start(EXCITATION, {"watchdog": 2.0}, arguments=["-r", "__node:=other"])
-    assert world.until(lambda: "/xy/other publishes /xy/voltage, too: two must not drive one machine" in first.output(), 20.0), first.output()
+    assert world.until(lambda: "publishes /xy/voltage, too: two must not drive one machine" in first.output(), 20.0), first.output()
+    assert "/xy/other publishes" in first.output() or "whose name nobody has told yet publishes" in first.output()  # after a stall
     assert world.until(lambda: not blocks[-1].values.any(), 1.0) and world.state("excitation") == "inactive"
     for node, process, name in (("other", second, "/xy/excitation"), ("excitation", first, "/xy/other")):
         if node == "other":

@@ -228,7 +228,8 @@ class ExcitationNode(Overridable, LifecycleNode):
         self._unnamed = self._unnamed + ALONE if unnamed else 0.0
         if others and not 0 < self._unnamed < INTRODUCES:
             drive.fault = True
-            drive.stop(f"{' and '.join(others)} publishes {self._way}, too: two must not drive one machine", drive.settings.abort_ramp)
+            who = " and ".join("a node whose name nobody has told yet" if "UNKNOWN" in name else name for name in others)
+            drive.stop(f"{who} publishes {self._way}, too: two must not drive one machine", drive.settings.abort_ramp)
             self.get_logger().error(drive.reason)
             self.trigger_deactivate()
 
