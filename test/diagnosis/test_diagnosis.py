@@ -20,7 +20,7 @@ from helpers.simulated import recorded
 from xy_sim.parts import PARTS
 from xy_sysid.axis.model import STANDARD, Library
 from xy_sysid.cli import run
-from xy_sysid.criteria import AT_FLOOR, FEWEST, SIZE
+from xy_sysid.hypotheses.criteria import AT_FLOOR, FEWEST, SIZE
 from xy_sysid.diagnosis.diagnose import Diagnosis, diagnose, judged
 from xy_sysid.diagnosis.ladder import Rival, Step, is_taken_for
 from xy_sysid.diagnosis.refine import Effort, refine, refine_steps

@@ -14,7 +14,7 @@ from xy_sim.effect_text import with_effects
 from xy_sim.machine import Machine
 from xy_sim.parts import PARTS
 from xy_sysid.axis.model import STANDARD, AxisModel, simulate
-from xy_sysid.criteria import AT_FLOOR
+from xy_sysid.hypotheses.criteria import AT_FLOOR
 from xy_sysid.errors import BadInput
 from xy_sysid.excitation.lockstep import drive
 from xy_sysid.greybox import least_squares

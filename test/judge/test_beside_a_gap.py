@@ -8,7 +8,7 @@ import pytest
 from helpers.foreign import across_gap
 
 from xy_sysid.axis.model import STANDARD
-from xy_sysid.criteria import SIZE
+from xy_sysid.hypotheses.criteria import SIZE
 from xy_sysid.greybox.axis_data import AxisData, prepare
 from xy_sysid.judge.axis_judge import AxisJudge
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from xy_sysid.axis.model import AxisModel
-from xy_sysid.criteria import AT_FLOOR, SIZE
+from xy_sysid.hypotheses.criteria import AT_FLOOR, SIZE
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.judge.beside_one_step import size_ahead
 from xy_sysid.search.one_step_trials import Filtered

@@ -8,8 +8,8 @@ from math import exp, inf
 
 import pytest
 
-from xy_sysid.criteria import FEWEST
-from xy_sysid.criteria import LEAST as SMALLEST
+from xy_sysid.hypotheses.criteria import FEWEST
+from xy_sysid.hypotheses.criteria import LEAST as SMALLEST
 from xy_sysid.judge.contract import Move
 from xy_sysid.search.best_first import Node, Search
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from helpers.foreign import Joint, driven
 
 from xy_sysid.axis.model import STANDARD
-from xy_sysid.criteria import SIZE
+from xy_sysid.hypotheses.criteria import SIZE
 from xy_sysid.diagnosis.refine import never
 from xy_sysid.greybox.axis_data import prepare
 from xy_sysid.greybox.free_run import GreyboxFit, fit_with

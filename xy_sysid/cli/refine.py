@@ -45,7 +45,7 @@ def refine(
     json: o.Json = False,
 ) -> None:
     """Add physical effects to the rigid model, refit everything together, and print the ladder of falling errors."""
-    from xy_sysid.criteria import MOST_EFFECTS
+    from xy_sysid.hypotheses.criteria import MOST_EFFECTS
     from xy_sysid.diagnosis.of_run import refined
     from xy_sysid.diagnosis.refine import Effort
     from xy_sysid.errors import BadInput
@@ -112,7 +112,7 @@ def refine(
 
 def verdict(ladder: Ladder) -> str:
     """The contract's word."""
-    from xy_sysid.criteria import AT_FLOOR
+    from xy_sysid.hypotheses.criteria import AT_FLOOR
     from xy_sysid.story.standing import nearer
 
     if ladder.final.excess < AT_FLOOR:

@@ -11,14 +11,14 @@ import numpy as np
 
 from xy_sysid.axis.model import STANDARD, Library
 from xy_sysid.comparison.where_it_fails import Comparison, compare_velocity
-from xy_sysid.criteria import AT_FLOOR, BUDGET, SIZE
+from xy_sysid.hypotheses.criteria import AT_FLOOR, BUDGET, SIZE
 from xy_sysid.diagnosis.equal_laws import equals, likelihood
 from xy_sysid.diagnosis.ladder import Candidate, Ladder, contains, part_explained
 from xy_sysid.diagnosis.refine import Effort, never, refine
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.axis_data import AxisData, prepare_all
 from xy_sysid.greybox.free_run import GreyboxFit
-from xy_sysid.judge.enough_data import lacking
+from xy_sysid.hypotheses.enough_data import lacking
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import USUAL, Units, bare, moved
 
@@ -180,14 +180,14 @@ def _surest(data: AxisData, ladder: Ladder) -> tuple[Ladder, float]:
             continue
         if fit is ladder.final:
             return ladder, confidence
-        library, behind = fit.model.library, fit.excess - ladder.final.excess
-        rivals = (rival for rival in ladder.rivals if not contains(library, frozenset(rival.effects), frozenset(names)))
+        library = fit.model.library
+        rivals = tuple(rival for rival in ladder.rivals if not contains(library, frozenset(rival.effects), frozenset(names)))
         told = replace(
             ladder,
             steps=ladder.steps[: count + 1],
             final=fit,
             effects=names,
-            rivals=tuple(replace(rival, behind=rival.behind - behind) for rival in rivals),
+            rivals=rivals,
             explained=explained,
             discrepancy=math.sqrt(max(fit.held_out_error**2 - data.noise_floor**2, 0.0)),
         )
@@ -196,15 +196,22 @@ def _surest(data: AxisData, ladder: Ladder) -> tuple[Ladder, float]:
 
 
 def _confidence(ladder: Ladder, names: tuple[str, ...]) -> float:
-    """How far ahead of the next best set without these effects theirs is, how much larger each is than what is left, whether modes
-    leave little where they act, and how likely the name of one is that shares its law with others."""
+    """How likely no other set is as good, how much larger each effect is than what is left, and how likely the name of one is that shares
+    its law with others; of what is undetermined half at most."""
     library = ladder.final.model.library
     rivals = (rival for rival in ladder.rivals if not contains(library, frozenset(rival.effects), frozenset(names)))
-    behind = max(min((rival.behind for rival in rivals), default=math.inf), 0.0)
+    doubt = max((rival.doubt for rival in rivals), default=0.0)
     size = min((ladder.sizes[name] for name in names if name in ladder.sizes), default=0.0)
-    astray = ladder.astray if any(library[name].category == "motion" for name in names) else 0.0
     likely = math.prod(likelihood(library, name, values) for name, values in ladder.final.model.effects if name in names)
-    return (1.0 - 0.5 * math.exp(-behind / AT_FLOOR)) * size / (size + 1.0) * (1.0 - astray) * likely
+    sure = (1.0 - doubt) * size / (size + 1.0) * likely
+    return min(sure, 0.5) if any(_undetermined(ladder.final, name) for name in names) else sure
+
+
+def _undetermined(final: GreyboxFit, name: str) -> bool:
+    """The size of an effect is not told from zero, or is known to worse than a factor of two."""
+    item = final.parameter(f"{name}.{final.model.library[name].parameters[0].name}")
+    low, high = sorted((abs(item.low), abs(item.high)))
+    return item.low * item.high <= 0.0 or not math.isfinite(high) or high > 4.0 * low
 
 
 def _hidden(left: float, trusted: float) -> float:

@@ -71,7 +71,7 @@ def _renamed(ladder: Ladder, names: Mapping[str, str]) -> Ladder:
         return replace(found, model=_model(found.model, names), parameters=tuple(parameters))
 
     def rival(item: Rival) -> Rival:
-        return Rival(tuple(map(word, item.effects)), fit(item.fit), item.behind, item.refused)
+        return Rival(tuple(map(word, item.effects)), fit(item.fit), item.doubt, item.refused)
 
     return replace(
         ladder,

@@ -11,12 +11,15 @@ from typing import Any
 
 from xy_sysid.axis.model import Library
 from xy_sysid.comparison.where_it_fails import Place
-from xy_sysid.criteria import AT_FLOOR
+from xy_sysid.hypotheses.criteria import AT_FLOOR
 from xy_sysid.diagnosis.diagnose import Diagnosis, Kind
 from xy_sysid.diagnosis.ladder import Candidate, Ladder
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.greybox.parameters import Estimate
 from xy_sysid.units import USUAL, Units, bare, moved
+
+
+DOUBTFUL = 0.1  # probability that a rival predicts as well, above which the two are said to be hardly distinguished
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,7 +186,7 @@ def _runner_up(ladder: Ladder) -> tuple[str, str] | None:
         return None
     rival = ladder.rivals[0]
     name, taken = " and ".join(rival.effects), " and ".join(ladder.effects)
-    if rival.behind > AT_FLOOR:
+    if rival.doubt < DOUBTFUL:
         left, right = (moved(fit.held_out_error, fit.units.speed) for fit in (rival.fit, ladder.final))
         return name, f"with {name} instead of {taken} the held-out error is {left}, not {right}."
     if rival.refused:

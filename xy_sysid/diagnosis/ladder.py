@@ -31,14 +31,15 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Rival:
-    """Another set of effects that was tried, and how much more it leaves than the one that was taken: nats, parameters priced.
+    """Another set of effects that was tried.
 
+    doubt: probability (0..1) that it predicts as well as the one that was taken, parameters at their price
     refused: why it explains nothing, though it may leave as little: in words, or empty
     """
 
     effects: tuple[str, ...]
     fit: GreyboxFit
-    behind: float
+    doubt: float
     refused: str = ""
 
 
@@ -48,7 +49,6 @@ class Ladder:
 
     final:    the fit with all effects that are named; effects: their names, that which explains most first
     sizes:    what each explains over what is left unexplained, as powers
-    astray:   amplitude of what is left where a mode acts, over its own; the largest of all modes
     helps:    part (0..1) of the base's error power beyond the noise that the best of all sets takes away, be it named or not
     tried:    single effects on the base, least excess first; rivals: other sets, best first
     kept_out: the refused set that would leave least, if that is less than what the final fit leaves
@@ -63,7 +63,6 @@ class Ladder:
     tried: tuple[Candidate, ...] = ()
     rivals: tuple[Rival, ...] = ()
     sizes: Mapping[str, float] = field(default_factory=dict)
-    astray: float = 0.0
     helps: float = 0.0
     kept_out: Rival | None = None
     refused: tuple[tuple[tuple[str, ...], str], ...] = ()

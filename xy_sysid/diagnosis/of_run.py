@@ -9,7 +9,7 @@ from threadpoolctl import threadpool_limits
 
 from xy_sysid.axis.model import STANDARD, Library
 from xy_sysid.comparison.physical_model import PhysicalModel
-from xy_sysid.criteria import BUDGET, MOST_EFFECTS
+from xy_sysid.hypotheses.criteria import BUDGET, MOST_EFFECTS
 from xy_sysid.diagnosis import diagnose as one
 from xy_sysid.diagnosis.diagnose import Diagnosis
 from xy_sysid.diagnosis.ladder import Ladder

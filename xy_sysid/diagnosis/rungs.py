@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
-import numpy as np
 
 from xy_sysid.axis.model import Library
-from xy_sysid.criteria import ALIKE, AT_FLOOR, LEAST
 from xy_sysid.diagnosis.equal_laws import is_the_same, likely_names
 from xy_sysid.diagnosis.ladder import Candidate, Ladder, Rival, Step, contains, is_taken_for, part_explained
 from xy_sysid.greybox.axis_data import AxisData
-from xy_sysid.greybox.free_run import GreyboxFit
-from xy_sysid.judge.axis_judge import AxisJudge, joined
-from xy_sysid.search.best_first import Search
-from xy_sysid.search.one_step_trials import Filtered
-from xy_sysid.search.simplify import Simplifying, whole
+from xy_sysid.greybox.free_run import GreyboxFit, best_start, fit, fit_base, joined, screened
+from xy_sysid.greybox.one_step import follower, one_step_fit
+from xy_sysid.hypotheses import starts
+from xy_sysid.hypotheses.companions import put_beside
+from xy_sysid.hypotheses.compare import gain, size
+from xy_sysid.hypotheses.criteria import AT_FLOOR, PRICE, RIVAL, TELLS
+from xy_sysid.hypotheses.one_step import Filtered
+from xy_sysid.hypotheses.pool import Node, Pool
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,110 +29,134 @@ class Given:
     steps: tuple[Step, ...]
 
     @staticmethod
-    def of(judge: AxisJudge, names: tuple[str, ...]) -> Given:
-        steps = [Step(None, judge.begin())]
+    def of(data: AxisData, library: Library, names: tuple[str, ...]) -> Given:
+        """Each fitted after those before it."""
+        steps = [Step(None, fit_base(data, library))]
         for name in names:
-            steps.append(Step(name, judge.added(steps[-1].fit, name)))
+            steps.append(Step(name, with_one_more(data, library, steps[-1].fit, name)))
         return Given(names, tuple(steps))
 
 
-def ladder_of_given(data: AxisData, judge: AxisJudge, given: Given) -> Ladder:
+def with_one_more(data: AxisData, library: Library, now: GreyboxFit, name: str) -> GreyboxFit:
+    """A fit with one more effect, unasked; a relative of the same family gives way."""
+    effect = library[name]
+    relative = next((own for own, _ in now.model.effects if effect.family and library[own].family == effect.family), None)
+    ahead = follower(now.model)
+    if effect.one_step is not None:
+        return one_step_fit(data, now, effect)
+    if ahead is not None:
+        return put_beside(data, now, ahead, effect)
+    model = now.model if relative is None else now.model.without(relative)
+    traced = screened(data, now, [effect]).traces[0].values
+    return fit(data, best_start(data, starts.added(data, now, model, effect, traced)))
+
+
+def ladder_of_given(data: AxisData, given: Given) -> Ladder:
     """The ladder of these effects alone: nothing is searched."""
     final = given.steps[-1].fit
-    base = given.steps[0].fit
-    noise = data.noise_floor
-    explained = part_explained(data, base, final)
     return Ladder(
         steps=given.steps,
         final=final,
         effects=tuple(name for name, _ in final.model.effects),
-        explained=explained,
-        noise=noise,
+        explained=part_explained(data, given.steps[0].fit, final),
+        noise=data.noise_floor,
         discrepancy=math.sqrt(max(final.held_out_error**2 - final.noise_floor**2, 0.0)),
     )
 
 
-def ladder_of_search(
-    judge: AxisJudge,
-    search: Search[GreyboxFit],
-    settled: Simplifying,
-    given: Given,
-    filtered: Filtered | None,
-) -> Ladder:
-    """The ladder of the set that was settled on, or of what one-step prediction found instead."""
-    data, node = judge.data, settled.now
-    base = given.steps[0].fit
-    tried = sorted(
-        (Candidate(next(iter(item.effects)), item.promised, item.fit) for item in search.nodes.values() if len(item.effects) == 1),
-        key=lambda item: item.fit.excess if item.fit else math.inf,
-    )
-    refused = tuple((tuple(sorted(item.effects)), item.refused) for item in search.nodes.values() if item.refused)
+def ladder_of_search(pool: Pool, given: Given, filtered: Filtered | None) -> Ladder:
+    """The ladder of the best set, or of what one-step prediction found instead."""
+    data, library, node, base = pool.data, pool.library, pool.best, given.steps[0].fit
+    alone = (item for item in pool.nodes.values() if len(item.effects) == 1)
+    tried = sorted((Candidate(next(iter(item.effects)), item.promised, item.fit) for item in alone), key=lambda item: item.fit.held_out_error)
+    refused = tuple((tuple(sorted(item.effects)), item.refused) for item in pool.nodes.values() if item.refused)
     if filtered is not None:
-        rungs, bar = filtered.rungs, filtered.bar
-        last = rungs[-1][1]
-        names = tuple(name for name, _ in last.model.effects)
-        noise = min(max(data.floor.encoder * data.sampling_rate, last.noise_floor), last.held_out_error)  # what is predicted is no noise
-        left, before = (error**2 - noise**2 for error in (last.held_out_error, bar))
-        return Ladder(
-            steps=(Step(None, base), *(Step(name, fit) for name, fit in rungs)),
-            final=last,
-            effects=names,
-            tried=(next(Candidate(name, 0.0, fit) for name, fit in rungs if fit.one_step), *tried),
-            rivals=(Rival(tuple(sorted(node.effects)), node.fit, 2.0 * math.log(bar / last.held_out_error)),) if node.effects else (),
-            sizes=dict.fromkeys(names, filtered.size),
-            refused=refused,
-            explained=1.0 - left / before,
-            noise=noise,
-            discrepancy=math.sqrt(left),
-            stopped=search.stopped,
-        )
-    final, own = joined(data, node.fit, judge.late), settled.sizes()
+        return _of_one_step(data, base, node, filtered, tried, refused, pool.stopped)
+    final = joined(data, node.fit, pool.late)
+    own = {name: max(size(node.fit, pool.without(node, name).fit), 0.0) for name in node.effects - pool.kept}
     names = tuple(name for name, _ in final.model.effects)
-    sizes = {name: [own[part] for part in _parts(judge.library, name) if part in own] for name in names}
-    ordered = _ordered(judge.library, {name: max(each, default=0.0) for name, each in sizes.items()})
+    parts = {name: [own[part] for part in _parts(library, name) if part in own] for name in names}
+    ordered = _ordered(library, {name: max(each, default=0.0) for name, each in parts.items()})
     ordered = (*given.names, *(name for name in ordered if name not in given.names))
     rivals = sorted(
         (
-            Rival(tuple(sorted(item.effects)), item.fit, item.behind(node), item.refused)
-            for item in search.nodes.values()
-            if item is not node and 0 < len(item.effects) <= len(node.effects) and not item.effects < node.effects
-            if not contains(judge.library, item.effects, node.effects)
-            if not is_the_same(judge.library, (item.effects, item.fit), (node.effects, node.fit), LEAST)
-            if not item.refused or is_taken_for(judge.library, item.effects, node.effects)  # it is no spring, but is it a wave?
+            Rival(tuple(sorted(item.effects)), item.fit, _doubt(node, item), item.refused)
+            for item in pool.nodes.values()
+            if item.whole and item is not node and 0 < len(item.effects) <= len(node.effects) and not item.effects < node.effects
+            if not contains(library, item.effects, node.effects)
+            if not is_the_same(library, (item.effects, item.fit), (node.effects, node.fit), AT_FLOOR)
+            if not item.refused or is_taken_for(library, item.effects, node.effects)  # it is no spring, but is it a wave?
         ),
-        key=lambda item: item.behind,
+        key=lambda item: item.fit.excess,
     )
+    whole = [item for item in pool.nodes.values() if item.whole and not item.refused]
     ladder = Ladder(
-        steps=(*given.steps, *_rungs(judge, search, given, ordered, final)),
+        steps=(*given.steps, *_rungs(pool, given, ordered, final)),
         final=final,
         effects=ordered,
         tried=tuple(tried),
         rivals=tuple(rivals),
-        sizes={name: min(each) for name, each in sizes.items() if each},
-        astray=max((_astray(data, settled, name) for name in node.effects if judge.library[name].category == "motion"), default=0.0),
-        helps=max(1.0 - min(judge.rest(item.fit, base) for item in search.nodes.values() if item.whole and not item.refused), 0.0),
-        kept_out=_kept_out(search, node.fit.excess),
+        sizes={name: min(each) for name, each in parts.items() if each},
+        helps=max((part_explained(data, base, item.fit) for item in whole), default=0.0),
+        kept_out=_kept_out(pool, node),
         refused=refused,
         explained=part_explained(data, base, final),
         noise=data.noise_floor,
         discrepancy=math.sqrt(max(final.held_out_error**2 - data.noise_floor**2, 0.0)),
-        stopped=search.stopped,
+        stopped=pool.stopped,
     )
     return likely_names(ladder, given.names)
+
+
+def _doubt(node: Node, other: Node) -> float:
+    """Probability (0..1) that another set is as good as the one that was taken, parameters at their price."""
+    found = gain(node.fit, other.fit)
+    priced = replace(found, nats=found.nats + PRICE * (other.parameters - node.parameters))
+    return 1.0 - priced.probability
+
+
+def _of_one_step(
+    data: AxisData,
+    base: GreyboxFit,
+    node: Node,
+    filtered: Filtered,
+    tried: Sequence[Candidate],
+    refused: tuple[tuple[tuple[str, ...], str], ...],
+    stopped: bool,
+) -> Ladder:
+    rungs, bar = filtered.rungs, filtered.bar
+    last = rungs[-1][1]
+    names = tuple(name for name, _ in last.model.effects)
+    noise = min(max(data.floor.encoder * data.sampling_rate, last.noise_floor), last.held_out_error)  # what is predicted is no noise
+    left, before = (error**2 - noise**2 for error in (last.held_out_error, bar))
+    doubt = 0.5 * (last.held_out_error / bar) ** (2.0 / TELLS)
+    return Ladder(
+        steps=(Step(None, base), *(Step(name, fit) for name, fit in rungs)),
+        final=last,
+        effects=names,
+        tried=(next(Candidate(name, 0.0, fit) for name, fit in rungs if fit.one_step), *tried),
+        rivals=(Rival(tuple(sorted(node.effects)), node.fit, doubt),) if node.effects else (),
+        sizes=dict.fromkeys(names, filtered.size),
+        refused=refused,
+        explained=1.0 - left / before,
+        noise=noise,
+        discrepancy=math.sqrt(left),
+        stopped=stopped,
+    )
 
 
 def _ordered(library: Library, sizes: Mapping[str, float]) -> tuple[str, ...]:
     """Names, the largest size first; of what is alike to the largest dry friction first, as every machine has it."""
     order = sorted(sizes, key=lambda name: -sizes[name])
-    alike = [name for name in order if library[name].is_dry and sizes[name] >= ALIKE * sizes[order[0]]]
+    alike = [name for name in order if library[name].is_dry and sizes[name] >= RIVAL * sizes[order[0]]]
     return tuple(dict.fromkeys((*alike, *order)))
 
 
-def _kept_out(search: Search[GreyboxFit], left: float) -> Rival | None:
-    """The refused set that would leave least, if that is clearly less than what is left."""
-    nodes = [node for node in search.nodes.values() if node.refused and node.fit.excess < left - AT_FLOOR]
-    best = min(nodes, key=lambda node: (round(node.fit.excess, 1), len(node.effects)), default=None)
-    return None if best is None else Rival(tuple(sorted(best.effects)), best.fit, best.fit.excess - left, best.refused)
+def _kept_out(pool: Pool, node: Node) -> Rival | None:
+    """The refused set that would leave least, if that is clearly less than the best leaves."""
+    nodes = [item for item in pool.nodes.values() if item.refused and item.whole and gain(item.fit, node.fit).is_sure]
+    best = max(nodes, key=lambda item: gain(item.fit, node.fit).nats, default=None)
+    return None if best is None else Rival(tuple(sorted(best.effects)), best.fit, 1.0, best.refused)
 
 
 def _parts(library: Library, name: str) -> tuple[str, ...]:
@@ -140,19 +165,7 @@ def _parts(library: Library, name: str) -> tuple[str, ...]:
     return (name,) if whole is None else (name, *whole.parts)
 
 
-def _astray(data: AxisData, settled: Simplifying, name: str) -> float:
-    """Amplitude of what is left beyond the noise where a mode acts, over what it does there.
-
-    A mode is linear and does not change: what it leaves just where it acts is of another law. What dirt leaves lies elsewhere.
-    """
-    with_it, without = settled.now.fit.power, settled.best_without(name).fit.power
-    acts = np.maximum(without - with_it, 0.0)
-    weight = data.layout.lines * acts
-    left = float(np.sum(weight * np.maximum(with_it - data.floor.noise, 0.0)))
-    return min(math.sqrt(left / max(float(np.sum(weight * acts)), 1e-300)), 1.0)
-
-
-def _rungs(judge: AxisJudge, search: Search[GreyboxFit], given: Given, names: tuple[str, ...], final: GreyboxFit) -> list[Step]:
+def _rungs(pool: Pool, given: Given, names: tuple[str, ...], final: GreyboxFit) -> list[Step]:
     """One rung for each effect, in this order, the fits that are known already taken from memory."""
     steps: list[Step] = []
     now = given.steps[-1].fit
@@ -161,7 +174,10 @@ def _rungs(judge: AxisJudge, search: Search[GreyboxFit], given: Given, names: tu
         if so_far == frozenset(own for own, _ in final.model.effects):
             now = final
         else:
-            known = search.nodes.get(so_far)
-            now = judge.added(now, name) if known is None or known.refused else whole(judge, known)
+            known = pool.nodes.get(so_far)
+            if known is None or known.refused or not known.whole:
+                now = with_one_more(pool.data, pool.library, now, name)
+            else:
+                now = known.fit
         steps.append(Step(name, now))
     return steps

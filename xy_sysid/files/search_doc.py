@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from xy_sysid.criteria import TABLE
+from xy_sysid.hypotheses.criteria import TABLE
 
-BEGIN, END = "<!-- made from xy_sysid/criteria -->\n", "<!-- end -->\n"
+BEGIN, END = "<!-- made from xy_sysid/hypotheses/criteria -->\n", "<!-- end -->\n"
 
 
 def document() -> str:

@@ -15,12 +15,12 @@ from xy_sysid.effects import Effect, Scene
 from xy_sysid.effects._contract import in_time
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.axis_data import EPSILON, AxisData, loosened, prepare, prepare_all
-from xy_sysid.greybox.floor import excess
 from xy_sysid.greybox.forces import force_of, friction_of, pushing, rubbing
-from xy_sysid.greybox.least_squares import Round, Scale, Schedule, Solution, Target, solve
+from xy_sysid.greybox.least_squares import Scale, Schedule, Solution, Target, solve
+from xy_sysid.greybox.objective import Objective, responder
 from xy_sysid.greybox.parameters import Estimate, estimates, model_of, problem
 from xy_sysid.greybox.score_test import Screen, Trace, bounded, screen
-from xy_sysid.greybox.start_inverse import CUTOFFS, inverse_starts
+from xy_sysid.greybox.start_inverse import CUTOFFS, inverse_starts, rigid_starts
 from xy_sysid.greybox.start_rigid import base_start
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import USUAL, Units
@@ -41,9 +41,10 @@ __all__ = [
     "screened",
 ]
 
-# weights are worked out before each round: the likelihood, the largest error, what is wrong anywhere, and in the end the likelihood again
-BRIEF = (Round(6, 1e-2), Round(6, 1e-2, "alike"), Round(6, 3e-3, "what is wrong"), Round(8, 1e-4))
-LONG = (Round(4, 1e-3), Round(6, 1e-5))
+FIRST_LOOK = Schedule(1, 6, 1e-2, 1e-2)
+NEARER = Schedule(4, 6, 3e-3, 3e-3)
+FINER = Schedule(2, 8, 1e-4, 1e-3)
+LONG = Schedule(3, 6, 1e-5, 1e-4)
 COARSE, MIDDLING = 2000.0, 4000.0  # Hz: finest sub-steps of looks and first rounds (errors up to 3e-3 of the motion), and of brief fits (6e-4)
 TOLD = 0.01  # part of what is left of the voltage that an effect takes away at least, to be simulated before any fit: of 14 s below 10 Hz chance
 # takes half of it
@@ -59,7 +60,9 @@ class GreyboxFit:
     training_error: rms in the windows of the fit, below the top band, m/s
     held_out_error: the same in those held out, which no fit saw
     noise_floor:    what the encoder's noise alone makes, m/s
-    excess:         mean ln(power of the held-out error / floor) over the excited bands; 0 is nothing left
+    excess:         score of the held-out error, nats a line above the floor (``objective``); scores: (windows,) nats of each window
+    forced:         lines of a window in which the unmodelled force stands out of the floor
+    force:          of the unmodelled force, V a sample (rms, white), that explains the held-out error beyond the floor
     simulated:      (n - r,) velocity over all recordings, m/s; error: (n - r,) measured minus simulated
     held:           (windows, bands) power of the held-out error, m^2/s^2
     units:          of input and output; m/s above is ``units.speed``
@@ -73,6 +76,9 @@ class GreyboxFit:
     held_out_error: float
     noise_floor: float
     excess: float
+    scores: FloatArray
+    forced: float
+    force: float
     simulated: FloatArray
     error: FloatArray
     runs: int
@@ -96,9 +102,13 @@ class GreyboxFit:
 
 
 def fit_base(data: AxisData, library: Library = STANDARD) -> GreyboxFit:
-    """Gain, delay and pole without a start value."""
+    """Gain, delay and pole: from the best of the frequency response and inverse dynamics, with and without the delay of the former."""
     gain, delay, pole = base_start(data.sampling_rate, data.begun(data.voltage), data.begun(data.velocity))
-    return fit(data, AxisModel(gain, delay, pole, library=library))
+    models = [AxisModel(gain, delay, pole, library=library)]
+    for late in {delay, 0.0}:
+        scene = _scene(data, AxisModel(gain, late, pole, library=library), data.begun(data.velocity), data.begun)
+        models += [AxisModel(own, late, min(max(its, 1e-2), 1e5), library=library) for own, its in rigid_starts(scene)]
+    return fit(data, best_start(data, models))
 
 
 def fit_with(
@@ -196,29 +206,16 @@ def _sized(model: AxisModel, name: str, times: float) -> tuple[float, ...]:
 
 
 def best_start(data: AxisData, candidates: list[AxisModel]) -> AxisModel:
-    """The candidate that leaves least on the first stage's data, without a fit; the whole error counts three times as much as the bands.
-
-    Small errors in many high bands would else hide a large one in a few low bands: on EMPS that chooses the valley with the true friction.
-    """
-    return candidates[0] if len(candidates) == 1 else min(candidates, key=lambda candidate: _misfit(data, candidate))
-
-
-def _misfit(data: AxisData, model: AxisModel) -> float:
-    power = _first_power(data, model)
-    whole = data.layout.rms(power) / data.layout.rms(data.floor.power)
-    return excess(power, data.floor) + 2.0 * float(np.log(max(whole, 1e-6)))
+    """The candidate with the least score on the first stage's data, without a fit."""
+    return candidates[0] if len(candidates) == 1 else min(candidates, key=lambda candidate: first_excess(data, candidate))
 
 
 def first_excess(data: AxisData, model: AxisModel) -> float:
-    """Excess over the first stage's data, without a fit."""
-    return excess(_first_power(data, model), data.floor)
-
-
-def _first_power(data: AxisData, model: AxisModel) -> FloatArray:
-    """Power by band of what a model leaves of the first stage's data; infinite for one that runs away."""
+    """Score over the first stage's data, without a fit."""
     run, values, _ = problem(data, model, True, COARSE)
     power = data.layout.power(data.brief.spectrum(data.begun(data.velocity) - run(values)))
-    return np.where(np.isfinite(power), power, np.inf)
+    power = np.where(np.isfinite(power), power, np.inf)
+    return Objective.of(data.floor).of_power(power, responder(data.layout, model)(values))
 
 
 def look(data: AxisData, fitted: GreyboxFit, effects: Iterable[Effect]) -> list[Trace]:
@@ -237,41 +234,43 @@ def screened(data: AxisData, fitted: GreyboxFit, effects: Iterable[Effect], scen
         moved = inner.copy()
         moved[k] += 1e-4
         nuisance.append(run(scale.outer(moved)) - here)
-    return screen(effects, scene, np.array(nuisance), data.brief if early else data.fitted, data.floor)
+    return screen(effects, scene, np.array(nuisance), data.brief if early else data.fitted, data.floor, responder(data.layout, fitted.model)(values))
 
 
 def scene_of(data: AxisData, fitted: GreyboxFit, early: bool = True) -> Scene:
     """The measured motion of the first stage, or of the whole, as effects see it."""
     model, part = fitted.model, data.begun if early else np.asarray
+    scene = _scene(data, model, fitted.error if fitted.brief else part(fitted.error), part)
+    prompt = _scene(data, replace(model, delay=0.0), scene.error, part)
+    return replace(scene, prompt=prompt) if model.delay > LATE else scene
 
-    def arriving(delay: float) -> FloatArray:
-        return part(np.concatenate([_delayed(data.voltage[run], delay * data.sampling_rate)[:-1] for run in data.runs]))
 
-    scene = Scene(
+def _scene(data: AxisData, model: AxisModel, error: FloatArray, part: Callable[[FloatArray], FloatArray]) -> Scene:
+    voltage = np.concatenate([_delayed(data.voltage[run], model.delay * data.sampling_rate)[:-1] for run in data.runs])
+    return Scene(
         sampling_rate=data.sampling_rate,
         gain=model.gain,
         pole=model.pole,
-        voltage=arriving(model.delay),
+        voltage=part(voltage),
         velocity=part(data.velocity),
         position=part(data.middle()),
-        error=fitted.error if fitted.brief else part(fitted.error),
-        recordings=data.counts(early),
+        error=error,
+        recordings=data.counts(part is not np.asarray),
     )
-    return replace(scene, prompt=replace(scene, voltage=arriving(0.0))) if model.delay > LATE else scene
 
 
 def fit(data: AxisData, start: AxisModel, brief: bool = False, hopeless: float = np.inf, late: Callable[[], bool] = in_time) -> GreyboxFit:
     """All parameters of a model, from where it is; brief, hopeless: see ``fit_with``; late: then the best so far is taken."""
     rate = sub_steps(data, start, True, COARSE)
     run, values, scale = problem(data, start, True, rate)
-    target = Target(data.begun(data.velocity), data.brief, data.floor)
-    found = solve(run, target, scale, values, Schedule(BRIEF[:1], late))
-    if not (late() or (brief and excess(data.layout.power(found.error), data.floor) > hopeless)):
-        nearer = solve(run, target, scale, found.values, Schedule(BRIEF[1:-1], late), found)
+    target = Target(data.begun(data.velocity), data.brief, data.floor, responder(data.layout, start))
+    found = solve(run, target, scale, values, replace(FIRST_LOOK, late=late))
+    if not (late() or (brief and found.score > hopeless)):
+        nearer = solve(run, target, scale, found.values, replace(NEARER, late=late), found)
         finer = sub_steps(data, model_of(data, start, nearer.values), True, MIDDLING)
         if finer != rate:
             run, _, _ = problem(data, start, True, finer)
-        more = solve(run, target, scale, nearer.values, Schedule(BRIEF[-1:], late), nearer)
+        more = solve(run, target, scale, nearer.values, replace(FINER, late=late), nearer)
         found = replace(more, runs=found.runs + nearer.runs + more.runs)
     if not brief:
         return finish(data, model_of(data, start, found.values), found.runs, late)
@@ -281,8 +280,18 @@ def fit(data: AxisData, start: AxisModel, brief: bool = False, hopeless: float =
 def finish(data: AxisData, start: AxisModel, runs: int = 0, late: Callable[[], bool] = in_time) -> GreyboxFit:
     """The second stage alone, on all windows that are not held out, from a model that is nearly there."""
     run, values, scale = problem(data, start, False, sub_steps(data, start, False, FINE))
-    found = solve(run, Target(data.velocity, data.fitted, data.floor), scale, values, Schedule(LONG, late))
+    target = Target(data.velocity, data.fitted, data.floor, responder(data.layout, start))
+    found = solve(run, target, scale, values, replace(LONG, late=late))
     return _result(data, start, scale, replace(found, runs=runs + found.runs))
+
+
+def joined(data: AxisData, found: GreyboxFit, late: Callable[[], bool] = in_time) -> GreyboxFit:
+    """One law for several that are the same; where it is not, as a load is larger than the friction, they stay."""
+    whole = found.model.joined()
+    if whole is found.model:
+        return found
+    one = finish(data, whole, late=late)
+    return one if float(np.sum(one.scores)) < float(np.sum(found.scores)) + 1.0 else found
 
 
 def sub_steps(data: AxisData, model: AxisModel, early: bool, finest: float) -> float:
@@ -319,13 +328,18 @@ def _result(data: AxisData, start: AxisModel, scale: Scale, found: Solution, bri
     error = (data.begun(data.velocity) if brief else data.velocity) - simulated
     fitted, judging = (data.brief, data.first_windows()) if brief else (data.fitted, data.held)
     held = data.layout.powers(judging.spectrum(error))
+    response, objective = responder(data.layout, model)(found.values), Objective.of(data.floor)
+    expected = objective.spectrum(held.mean(axis=0), response)
     return GreyboxFit(
         model=model,
         parameters=estimates(data, model, scale, found),
         training_error=data.layout.rms(data.layout.power(fitted.spectrum(error))),
         held_out_error=data.layout.rms(held.mean(axis=0)),
         noise_floor=data.noise_floor,
-        excess=excess(held.mean(axis=0), data.floor),
+        excess=objective.score(held.mean(axis=0), expected),
+        scores=objective.each(held, expected),
+        forced=objective.forced(expected),
+        force=float(np.sqrt(objective.force_power(held.mean(axis=0), response))),
         simulated=simulated,
         error=error,
         runs=found.runs,

@@ -1,8 +1,9 @@
-"""Levenberg-Marquardt on the whitened error in velocity.
+"""Levenberg-Marquardt on the whitened error in velocity: the fit that minimises the objective.
 
-Levenberg 1944, Marquardt 1963; whitening by the error's own power, worked out again a few times: iteratively reweighted
-least squares towards the Whittle likelihood, with plain least squares on the way (``Round``). Derivatives are forward differences of the
-simulation, taken anew only when a step did not do what they promised, and else brought up to date with what it did (Broyden 1965).
+Levenberg 1944, Marquardt 1963. The error is divided by the spectrum that the objective gives it (``objective.spectrum``), which is worked out again
+before each round: iteratively reweighted least squares. A round that does not lower the objective is taken back, so a fit never ends worse than it starts.
+Derivatives are forward differences of the simulation. They are computed again only where a step did not do what they promised, and are otherwise
+updated with what the step did (Broyden 1965).
 """
 
 from __future__ import annotations
@@ -11,42 +12,32 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from xy_sysid.effects._contract import in_time
-from xy_sysid.greybox.floor import Bands, Floor, Windows, excess, tolerance
+from xy_sysid.greybox.floor import Bands, Floor, Windows, tolerance
+from xy_sysid.greybox.objective import Objective
 from xy_sysid.jit import cores
 from xy_sysid.samples.block import FloatArray
 
 TRUSTED = 0.25  # a step whose fall differs by less than this part from the one expected needs no new derivatives; with 0.75 long valleys take longer
 STEP = 1e-4  # of a logarithm, or of a parameter's scale: far above rounding, far below what bends
 
-Counts = Literal["alike", "what is wrong", "as likely"]
-
-
-@dataclass(frozen=True, slots=True)
-class Round:
-    """Steps with one set of weights. iterations: the most; enough: relative fall of the cost below which it ends.
-
-    counts: which parts of the error. "alike": all lines, so that the largest error is taken away first, which is slow motion;
-    "what is wrong": each band by the part of its power above the floor, or by what chance makes of that; "as likely": by the likelihood.
-    Where friction stops an axis, what a parameter changes is linear in it up to a frequency that falls as the step grows: high bands,
-    in which nothing is wrong, would hold back every large step (as in waveform inversion: Bunks et al., Geophysics 60, 1995)
-    """
-
-    iterations: int
-    enough: float
-    counts: Counts = "as likely"
-
 
 @dataclass(frozen=True, slots=True)
 class Schedule:
-    """Rounds of a solution, and whether it is late: then the best so far is taken after the step in hand."""
+    """How long a solution goes on.
 
-    rounds: tuple[Round, ...]
+    rounds, steps: at most so many sets of weights, and so many steps with each; enough: relative fall of the cost that ends a round;
+    settled: nats a line; a round that gains less is the last; late: if true, the best so far is taken after the present step
+    """
+
+    rounds: int
+    steps: int
+    enough: float
+    settled: float
     late: Callable[[], bool] = in_time
 
 
@@ -72,16 +63,31 @@ class Scale:
 
 @dataclass(frozen=True)
 class Target:
-    """What is to be explained: velocity (n,) m/s, in some windows of it, down to a floor."""
+    """What is to be explained: velocity (n,) m/s, in some windows of it.
+
+    respond: row of parameters -> (bands,) power of the model's response to a force (``objective.responder``)
+    """
 
     velocity: FloatArray
     windows: Windows
     least: Floor
+    respond: Callable[[FloatArray], FloatArray]
 
     @cached_property
     def measured(self) -> NDArray[np.complex128]:
         """(windows, lines) spectrum of the velocity."""
         return self.windows.spectrum(self.velocity)
+
+    @cached_property
+    def objective(self) -> Objective:
+        """Scores an error by band."""
+        return Objective.of(self.least)
+
+    def spectrum(self, error: NDArray[np.complex128], values: FloatArray) -> tuple[FloatArray, float]:
+        """(bands,) expected power of an error (windows, lines), and the error's score, nats a line; infinite for a model that runs away."""
+        power = self.windows.layout.power(error)
+        expected = self.objective.spectrum(power, self.respond(values))
+        return expected, self.objective.score(power, expected)
 
 
 Predictor = Callable[[FloatArray], FloatArray]
@@ -89,7 +95,7 @@ Predictor = Callable[[FloatArray], FloatArray]
 
 @dataclass(frozen=True)
 class Solution:
-    """values: (k,) parameters; cost: whitened; runs: simulations done.
+    """values: (k,) parameters; cost: whitened; score: of the objective, nats a line; runs: simulations done.
 
     run, target: what was solved; error: (windows, lines) spectrum of what is left, m/s; change: (k, windows, lines) its derivatives by the
     solver's coordinates, as last known; weight: (lines,) of the last round; normal: (k, k) products of the whitened derivatives
@@ -97,6 +103,7 @@ class Solution:
 
     values: FloatArray
     cost: float
+    score: float
     runs: int
     converged: bool
     run: Predictor
@@ -164,12 +171,13 @@ def solve(
         normal, cost, converged = np.eye(size), np.inf, False
         change = slopes(inner, error, np.zeros((size, *error.shape), dtype=np.complex128)) if known is None else known.change
         exact = known is None
-        for stage in schedule.rounds:
+        expected, score = target.spectrum(error, scale.outer(inner))
+        weight = _weight(target, expected)
+        for _ in range(schedule.rounds):
             before = inner, error, change, exact
-            weight = _weight(target, error, stage.counts)
             cost = _cost(error * weight)
             damping, converged, fresh = 1e-3, False, False
-            for _ in range(stage.iterations):
+            for _ in range(schedule.steps):
                 if not fresh:
                     columns = (change * weight).reshape(size, -1).view(np.float64)
                     normal, slope = columns @ columns.T, columns @ (error * weight).ravel().view(np.float64)
@@ -191,7 +199,7 @@ def solve(
                         change, exact = slopes(trial, found, change), True
                     inner, error, cost, fresh = trial, found, new, False
                     damping = max(damping * 0.2, 1e-9)
-                    if fall < stage.enough:
+                    if fall < schedule.enough:
                         converged = True
                         break
                 elif not exact:
@@ -201,11 +209,17 @@ def solve(
                     if damping > 1e6:
                         converged = True
                         break
-            if stage.counts != "as likely" and _judged(target, error) > _judged(target, before[1]):
-                inner, error, change, exact = before  # a step aside
+            expected, now = target.spectrum(error, scale.outer(inner))
+            if not now < score:
+                inner, error, change, exact = before
+                break
+            gained, score, weight = score - now, now, _weight(target, expected)
+            if gained < schedule.settled:
+                break
     return Solution(
         values=scale.outer(inner),
         cost=cost,
+        score=score,
         runs=runs,
         converged=converged,
         run=run,
@@ -231,24 +245,10 @@ def _move(normal: FloatArray, slope: FloatArray, scale: Scale, values: FloatArra
     return np.where(free, move, 0.0)
 
 
-def _judged(target: Target, error: NDArray[np.complex128]) -> float:
-    """Excess of an error (windows, lines), infinite for that of a model that runs away."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        found = excess(target.windows.layout.power(error), target.least)
-    return found if np.isfinite(found) else np.inf
-
-
-def _weight(target: Target, error: NDArray[np.complex128], counts: Counts) -> FloatArray:
-    """(lines,) by which an error (windows, lines) is multiplied."""
-    layout, least = target.windows.layout, target.least
-    with np.errstate(over="ignore", invalid="ignore"):  # of a model that runs away
-        power, own = tolerance(layout, error, least), layout.power(error)
-        if counts == "alike":
-            power = np.full_like(power, float(layout.lines @ np.maximum(own, least.power)) / float(layout.lines.sum()))
-        elif counts == "what is wrong":
-            chance = 1.0 / np.sqrt(layout.lines * target.windows.begins.size)
-            power = power / np.maximum(1.0 - least.power / np.maximum(own, 1e-300), chance)
-        return np.asarray(np.sqrt(1.0 / np.maximum(power, 1e-300))[layout.band])
+def _weight(target: Target, expected: FloatArray) -> FloatArray:
+    """(lines,) by which an error (windows, lines) is multiplied, from its expected power (bands,)."""
+    counts = target.objective.lines > 0.0
+    return np.asarray((counts / np.sqrt(expected))[target.windows.layout.band])
 
 
 def _updated(change: NDArray[np.complex128], gone: FloatArray, size: FloatArray, moved: NDArray[np.complex128]) -> NDArray[np.complex128]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -16,7 +17,8 @@ import scipy.signal
 from xy_sysid.effects import Effect, Scene
 from xy_sysid.effects._scene import Guess
 from xy_sysid.effects._similarity import Similarity
-from xy_sysid.greybox.floor import Floor, Windows, excess, tolerance
+from xy_sysid.greybox.floor import Floor, Windows
+from xy_sysid.greybox.objective import Objective
 from xy_sysid.greybox.start_rigid import mean_velocity_filter
 from xy_sysid.samples.block import FloatArray
 
@@ -30,13 +32,13 @@ class Trace:
     values: tuple[float, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Screen:
     """The score test of several effects on one error, alone or together.
 
     traces: largest share first; rows: of each effect in what follows, the columns of its best trace
     inner: (bands, k, k) products of all columns in each band; seen: (bands, k) of the columns with the error; error: (bands,) of it with
-    itself, whitened; power: (bands,) of the error; least: as it was given; rest: its ``Floor.rest`` of this power
+    itself, whitened; power: (bands,) of the error; response: (bands,) of the model to a force (``objective``)
     """
 
     traces: tuple[Trace, ...]
@@ -45,28 +47,23 @@ class Screen:
     seen: FloatArray
     error: FloatArray
     power: FloatArray
-    least: Floor
-    rest: Callable[[FloatArray], float]
+    objective: Objective
+    response: FloatArray
 
-    def gain(self, names: Iterable[str]) -> Gain:
-        """What effects take away to first order, each with its best trace: linear algebra alone."""
+    @cached_property
+    def score(self) -> float:
+        """Of the error as it is, nats a line."""
+        return self.objective.of_power(self.power, self.response)
+
+    def gain(self, names: Iterable[str]) -> float:
+        """Nats a line by which effects lower the score to first order, each with its best trace: linear algebra alone."""
         rows = np.array([row for name in names for row in self.rows[name]], dtype=np.int64)
         inner, seen = self.inner[:, rows[:, None], rows], self.seen[:, rows]
         coefficients = np.linalg.lstsq(inner.sum(axis=0), seen.sum(axis=0), rcond=1e-8)[0]
         left = self.error - 2.0 * seen @ coefficients + np.einsum("bij,i,j->b", inner, coefficients, coefficients)
         # 0 in bands that are not excited: nobody knows what happens there
         ratio = np.where(self.error > 0.0, np.maximum(left, 0.0) / np.maximum(self.error, 1e-300), 1.0)
-        after = self.power * np.minimum(ratio, 1.0)
-        rest = float(np.log(max(self.rest(self.power), 1e-12) / max(self.rest(after), 1e-12)))
-        return Gain(excess(self.power, self.least) - excess(after, self.least), rest)
-
-
-@dataclass(frozen=True, slots=True)
-class Gain:
-    """nats: of the mean over the bands (``floor.excess``), and of the whole error's power beyond the noise (``Floor.rest``)."""
-
-    excess: float
-    rest: float
+        return self.score - self.objective.of_power(self.power * np.minimum(ratio, 1.0), self.response)
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,13 +110,14 @@ def best_trace(
     return best, chosen
 
 
-def screen(effects: Iterable[Effect], scene: Scene, nuisance: FloatArray, windows: Windows, least: Floor) -> Screen:
+def screen(effects: Iterable[Effect], scene: Scene, nuisance: FloatArray, windows: Windows, least: Floor, response: FloatArray) -> Screen:
     """The best trace of each effect.
 
     nuisance: (k, n) change of the model's velocity per unit of each parameter that it has already; windows: of the scene that are looked at
+    response: (bands,) of the model to a force
     """
-    power = tolerance(windows.layout, windows.spectrum(scene.error), least)
-    weight = (least.excited / np.sqrt(power))[windows.layout.band]
+    objective, left = Objective.of(least), windows.layout.power(windows.spectrum(scene.error))
+    weight = ((objective.lines > 0.0) / np.sqrt(objective.spectrum(left, response)))[windows.layout.band]
 
     def white(signals: FloatArray) -> FloatArray:
         """(k, n) -> (k, m)"""
@@ -141,7 +139,6 @@ def screen(effects: Iterable[Effect], scene: Scene, nuisance: FloatArray, window
             rows[effect.name] = tuple(range(begin, begin + len(chosen)))
             columns.append(chosen)
     inner = _by_band(np.concatenate(columns), windows)
-    left = windows.layout.power(windows.spectrum(scene.error))
     return Screen(
         traces=tuple(sorted(found, key=lambda trace: -trace.share)),
         rows=rows,
@@ -149,8 +146,8 @@ def screen(effects: Iterable[Effect], scene: Scene, nuisance: FloatArray, window
         seen=inner[:, :, 0],
         error=inner[:, 0, 0],
         power=left,
-        least=least,
-        rest=least.rest(left),
+        objective=objective,
+        response=response,
     )
 
 

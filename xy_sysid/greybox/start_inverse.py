@@ -77,6 +77,25 @@ def inverse_starts(
     return found
 
 
+def rigid_starts(scene: Scene) -> list[tuple[float, float]]:
+    """(gain, pole) of a rigid axis by inverse dynamics, from each low-pass: alone, with a load, and with a load and Coulomb friction."""
+    samples, found = scene.velocity.size, []
+    direction, ones = scipy.fft.rfft(scene.direction()), scipy.fft.rfft(np.ones(samples))
+    for cutoff in CUTOFFS:
+        if cutoff > 0.2 * scene.sampling_rate:
+            continue
+        slow, acceleration, velocity, voltage = _motion(scene, samples, cutoff)
+        rows = slow.inside()
+        moving = minimum_filter1d(np.abs(velocity), 2 * int(0.5 * slow.rate / cutoff) + 1) > REST * float(np.std(velocity))
+        rows = rows & moving if float(np.mean(moving)) > FEW else rows
+        known = [acceleration, velocity, slow(ones), slow(direction)]
+        for count in (2, 3, 4):
+            inertia, drag = _least(np.array(known[:count])[:, rows], voltage[rows])[0][:2].tolist()
+            if inertia * drag > 0.0:
+                found.append((1.0 / drag, drag / inertia))
+    return found
+
+
 @lru_cache(maxsize=4)
 def _motion(scene: Scene, samples: int, cutoff: float) -> tuple[LowPass, FloatArray, FloatArray, FloatArray]:
     """The low-pass, and acceleration, velocity and voltage through it: the same for all effects."""

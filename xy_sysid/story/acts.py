@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from xy_sysid.axis.model import Library
-from xy_sysid.criteria import MOST_EFFECTS
+from xy_sysid.hypotheses.criteria import MOST_EFFECTS
 from xy_sysid.diagnosis.findings import Findings
 from xy_sysid.diagnosis.refine import never
 from xy_sysid.samples.recording import Run

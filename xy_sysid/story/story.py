@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from xy_sysid.axis.model import STANDARD, AxisModel, Library, simulate
-from xy_sysid.criteria import MOST_EFFECTS
+from xy_sysid.hypotheses.criteria import MOST_EFFECTS
 from xy_sysid.diagnosis.diagnose import not_enough
 from xy_sysid.diagnosis.findings import Findings, Rung, findings, rung
 from xy_sysid.diagnosis.of_run import diagnose
@@ -20,8 +20,8 @@ from xy_sysid.diagnosis.refine import Effort, never, refine, settle
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.free_run import EPSILON, AxisData, GreyboxFit, fit, fit_base, prepare
 from xy_sysid.greybox.one_step import follower, one_step_fit
-from xy_sysid.judge.axis_judge import AxisJudge
-from xy_sysid.judge.enough_data import lacking
+from xy_sysid.diagnosis.rungs import with_one_more
+from xy_sysid.hypotheses.enough_data import lacking
 from xy_sysid.samples.recording import Run
 from xy_sysid.settings import unknown_name
 from xy_sysid.story.pictures import Measured, Pictures, measured, pictures
@@ -104,7 +104,7 @@ def added(story: Story, run: Run, name: str, library: Library = STANDARD) -> Sto
     now = _fit_of(story, data, library)
     relative = next((own for own in story.effects if library[own].family and library[own].family == library[name].family), None)
     before = now if relative is None else fit(data, now.model.without(relative))
-    found = AxisJudge(data, library).added(before, name)
+    found = with_one_more(data, library, before, name)
     if not np.isfinite(found.excess):
         return replace(story, note=f"{name} could not be fitted to these data.")
     return _grown(story, data, found, name, relative)

@@ -10,14 +10,14 @@ from math import inf, log, sqrt
 
 from xy_sysid.axis.loop_source import undoable
 from xy_sysid.axis.model import Library
-from xy_sysid.criteria import ALIKE, AT_FLOOR, LEAST, MOST_EFFECTS, OPTIMISM, SIZE, WORTH
+from xy_sysid.hypotheses.criteria import ALIKE, AT_FLOOR, LEAST, MOST_EFFECTS, OPTIMISM_AHEAD, SIZE, WORTH
 from xy_sysid.effects import Effect
 from xy_sysid.effects._contract import PATIENT, Followed, Limits
 from xy_sysid.greybox.free_run import AxisData, GreyboxFit
 from xy_sysid.greybox.innovation_test import traces
 from xy_sysid.greybox.one_step import AT_NOISE, Others, beside, error_without, followed
 from xy_sysid.greybox.score_test import Trace
-from xy_sysid.judge.refusal import none_of
+from xy_sysid.hypotheses.refusal import none_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +108,7 @@ def _better(data: AxisData, now: GreyboxFit, effect: Effect, found: Followed, wa
     known = {name for name, _ in beside(now.model, effect)[1]} | {name for name, _ in now.model.effects}
     open_to = [law for law in library.acting if told_apart(law) and law.simulable and law.name not in known]
     seen = traces(data, now.model, effect, found, [*open_to, *_uneven(effect, library, found)])
-    promising = [trace for trace in seen if _size(now, 1.0 - OPTIMISM * trace.share) >= _least(trace.effect, effect, wanted)]
+    promising = [trace for trace in seen if _size(now, 1.0 - OPTIMISM_AHEAD * trace.share) >= _least(trace.effect, effect, wanted)]
     rubbing = _rubbing(now, library, found)
     tried: list[_Tried] = []
 

@@ -1,0 +1,57 @@
+"""Is one set of effects better than another on data that neither has seen, by how much, and by more than chance?"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import t as student
+
+from xy_sysid.greybox.free_run import GreyboxFit
+from xy_sysid.hypotheses.criteria import CHANCE
+
+OVERLAP = 1.5  # half overlapping Hann windows for each independent one (Welch 1967)
+
+
+@dataclass(frozen=True, slots=True)
+class Gain:
+    """nats: by which one fit is better than another on all held-out windows; error: its standard error; windows: independent ones."""
+
+    nats: float
+    error: float
+    windows: float
+
+    @property
+    def probability(self) -> float:
+        """That it is better at all, 0..1, by Student's t over the windows."""
+        if not math.isfinite(self.nats):
+            return float(self.nats > 0.0)
+        if self.error == 0.0:
+            return 0.5 if self.nats == 0.0 else float(self.nats > 0.0)
+        return float(student.cdf(self.nats / self.error, max(self.windows - 1.0, 1.0)))
+
+    @property
+    def is_sure(self) -> bool:
+        """More than chance."""
+        return self.probability > CHANCE
+
+
+def gain(one: GreyboxFit, other: GreyboxFit) -> Gain:
+    """Of one fit over another of the same data, paired over windows."""
+    if not np.all(np.isfinite(one.scores)):
+        return Gain(-math.inf, 0.0, 1.0)
+    if not np.all(np.isfinite(other.scores)):
+        return Gain(math.inf, 0.0, 1.0)
+    each = other.scores - one.scores
+    spread = float(np.std(each, ddof=1)) * math.sqrt(OVERLAP * each.size) if each.size > 1 else math.inf
+    return Gain(float(np.sum(each)), spread, each.size / OVERLAP)
+
+
+def size(one: GreyboxFit, before: GreyboxFit) -> float:
+    """Power of the unmodelled force that a fit explains of what one before it left, over what it leaves itself.
+
+    By the likelihood: n nats over l lines in which that force stands out of the floor are a factor exp(2 n / l) of its power.
+    """
+    nats = float(np.mean(before.scores) - np.mean(one.scores))
+    return math.expm1(min(max(2.0 * nats / max(before.forced, 1.0), -50.0), 50.0))

@@ -1,0 +1,116 @@
+"""What may be tried next from a set of effects, and the score that each move promises: a joint score test, so that pairs cost no fit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from xy_sysid.axis.model import AxisModel, Library
+from xy_sysid.effects import Effect
+from xy_sysid.greybox.axis_data import AxisData
+from xy_sysid.greybox.free_run import GreyboxFit, first_excess, scene_of, screened
+from xy_sysid.hypotheses.criteria import RIVAL, WIDTH
+from xy_sysid.hypotheses.starts import added, swapped
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """From one set of effects to another.
+
+    effects: the new set; parameters: that it has more; promised: gain, nats a line, to first order or of the best start, whichever is more
+    starts: models to begin from
+    """
+
+    effects: frozenset[str]
+    parameters: int
+    promised: float
+    starts: Callable[[], Sequence[AxisModel]]
+
+
+def count(library: Library, names: Iterable[str]) -> int:
+    """Parameters of some effects."""
+    return sum(len(library[name].parameters) for name in names)
+
+
+def is_twice(library: Library, names: Iterable[str]) -> bool:
+    """One law is in a set twice: two of a family, or one as a part of what is the sum of several."""
+    own = set(names)
+    families = [library[name].family for name in own if library[name].family]
+    sums = (library[name].sum_of for name in own)
+    return len(families) > len(set(families)) or any(whole is not None and own & set(whole.parts) for whole in sums)
+
+
+def moves(data: AxisData, library: Library, now: GreyboxFit, brief: GreyboxFit, early: bool = True) -> list[Move]:
+    """What may be added, alone or two at once, and what may take the place of a relative or of a law that it is mistaken for; best first, of each kind.
+
+    brief: the same set on the first stage's data, which are looked at; early: else all data are
+    """
+    model, own = now.model, frozenset(name for name, _ in now.model.effects)
+    open_to = [e for e in library.acting if e.simulable and e.name not in own and (e.repeats or not (data.passed_once and e.is_by_place))]
+    scene = scene_of(data, now, early)
+    screen = screened(data, now, open_to, scene)
+    traces = {trace.effect: trace.values for trace in screen.traces}
+    gains = {name: screen.gain([name]) for name in screen.rows}
+    here = first_excess(data, brief.model) if early else 0.0
+
+    def promised(names: Iterable[str], starts: Sequence[AxisModel]) -> float:
+        first = screen.gain(names) if all(name in screen.rows for name in names) else 0.0
+        begun = max((here - first_excess(data, start) for start in starts), default=-np.inf) if early else 0.0
+        return max(first, begun)
+
+    singles, swaps = [], []
+    for effect in open_to:
+        if not is_twice(library, own | {effect.name}):
+            starts = added(data, now, model, effect, traces.get(effect.name), scene if early else None)
+            gain = promised([effect.name], starts)
+            singles.append(Move(own | {effect.name}, len(effect.parameters), gain, _known(starts)))
+        for name in own:
+            if _takes_place(library, name, effect, data.units.output == "rad"):
+                starts = swapped(data, now, name, effect, traces.get(effect.name))
+                gain = promised([effect.name], starts)
+                more = len(effect.parameters) - len(library[name].parameters)
+                swaps.append(Move(own - {name} | {effect.name}, more, gain, _known(starts)))
+    pairs = _pairs(library, now, own, gains, screen.gain, lambda names: _both(data, now, [library[name] for name in names], traces))
+    best = [sorted(kind, key=lambda move: -move.promised)[:WIDTH] for kind in (singles, swaps, pairs)]
+    return [move for kind in best for move in kind]
+
+
+def _known(starts: Sequence[AxisModel]) -> Callable[[], Sequence[AxisModel]]:
+    return lambda: starts
+
+
+def _takes_place(library: Library, name: str, other: Effect, angular: bool) -> bool:
+    """A relative of an effect, or a law that names it as a reason to be tried."""
+    related = bool(other.family) and other.family == library[name].family
+    return related or (name in other.suspects and (angular or not other.angular))
+
+
+def _both(data: AxisData, now: GreyboxFit, effects: Sequence[Effect], traces: Mapping[str, tuple[float, ...]]) -> list[AxisModel]:
+    """The model with two more effects, the second begun beside each start of the first."""
+    models = [now.model]
+    for effect in effects:
+        models = [start for model in models for start in added(data, now, model, effect, traces.get(effect.name))]
+    return models
+
+
+def _pairs(
+    library: Library,
+    now: GreyboxFit,
+    own: frozenset[str],
+    gains: Mapping[str, float],
+    together: Callable[[Iterable[str]], float],
+    starts: Callable[[Sequence[str]], list[AxisModel]],
+) -> list[Move]:
+    """Two at once, where together they promise clearly more than the better of them alone."""
+    found = []
+    for one, other in combinations(sorted(gains, key=lambda name: -gains[name]), 2):
+        if is_twice(library, own | {one, other}):
+            continue
+        both = together((one, other))
+        if RIVAL * both > gains[one]:
+            names = (one, other)
+            found.append(Move(own | {one, other}, count(library, names), both, lambda names=names: starts(names)))  # type: ignore[misc]
+    return found

@@ -1,0 +1,118 @@
+"""Effects that only one-step prediction can judge, such as backlash: when they are tried, from which sets, and whether they win."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from math import exp
+
+import numpy as np
+
+from xy_sysid.greybox.free_run import GreyboxFit
+from xy_sysid.greybox.one_step import error_without
+from xy_sysid.greybox.whitened import enough, whitened_rms
+from xy_sysid.effects._contract import Limits
+from xy_sysid.hypotheses.companions import Grown, Wanted, grown, size_ahead, told_apart
+from xy_sysid.hypotheses.criteria import AT_FLOOR, FEWEST, FILTERED, SIZE, TELLS
+from xy_sysid.hypotheses.pool import Node, Pool
+from xy_sysid.hypotheses.refusal import refusal
+
+
+@dataclass(frozen=True, slots=True)
+class Filtered:
+    """What one-step prediction found, and what it has beaten.
+
+    rungs: names and fits, the last is the answer; bar: error one sample ahead, m/s, of the best simulation with an autoregressive error
+    without: of the same filter with the effect taken out
+    """
+
+    rungs: tuple[tuple[str, GreyboxFit], ...]
+    bar: float
+    without: float
+
+    @property
+    def wins(self) -> bool:
+        """It explains as much beyond the noise as what is named must, and what is best without it leaves an error that can be seen."""
+        seen = min(self.bar, self.without) >= exp(0.5 * TELLS) * self.rungs[-1][1].held_out_error
+        return seen and self.size >= SIZE
+
+    @property
+    def size(self) -> float:
+        """Power of the error one sample ahead that the effect explains, over what is left with it, beyond the noise."""
+        last = self.rungs[-1][1]
+        return size_ahead(min(self.bar, self.without), last.held_out_error, last.noise_floor)
+
+
+@dataclass
+class OneStepTrials:
+    """Each is fitted once from a set, and taken if it beats the best simulation with an autoregressive error. found: what won."""
+
+    pool: Pool
+    found: Filtered | None = None
+    fitted: dict[tuple[str, frozenset[str], bool], Grown] = field(default_factory=dict)
+    asked: set[frozenset[str]] = field(default_factory=set)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Effects to be tried: none where recordings are several."""
+        one = len(self.pool.data.starts) == 1
+        return tuple(effect.name for effect in self.pool.library.acting if effect.one_step is not None and one)
+
+    def due(self) -> bool:
+        """After the first simulations, once, where the best leaves something."""
+        return bool(self.names) and not self.asked and len(self.pool.nodes) > FEWEST and self.pool.best.fit.excess >= AT_FLOOR
+
+    def tried(self, last: bool) -> Iterator[frozenset[str]]:
+        """Try each beside what a filter can have of the best set, and beside nothing; last: also with what it hides. Yields what is about to be fitted."""
+        best = self.pool.best
+        self.asked.add(best.effects)
+        for name in self.names:
+            for node in self._begins(best):
+                for hidden in (False, True) if last and not self._explains(best) else (False,):
+                    if self.found is not None or self.pool.late():
+                        return
+                    yield node.effects | {name}
+                    self._look(name, node, hidden)
+
+    def _explains(self, node: Node) -> bool:
+        """The best set explains more of the error's power than it leaves."""
+        rigid = self.pool.nodes[self.pool.kept]
+        return 2.0 * node.fit.held_out_error**2 < rigid.fit.held_out_error**2
+
+    def _begins(self, best: Node) -> list[Node]:
+        """What a filter can have of the best set, as a large force beside a gap hides it; and the rigid base."""
+        pool, library = self.pool, self.pool.library
+        names = frozenset(name for name in best.effects if told_apart(library[name]) or library[name].is_dry)
+        found = []
+        if names - {library[name].rubs for name in self.names}:
+            less = best.fit.model
+            for name in best.effects - names:
+                less = less.without(name)
+            node = pool.fitted(names, lambda: [less])
+            found += [node] if node is not None else []
+        return list(dict.fromkeys((*found, pool.nodes[pool.kept])))
+
+    def ahead(self, found: GreyboxFit) -> float:
+        """Error one sample ahead, m/s, held out, that an autoregressive model leaves of a simulation; 0 where the data are too few for that."""
+        data = self.pool.data
+        later = np.arange(data.velocity.size) >= data.training
+        return whitened_rms(found.error, later) if enough(later) else 0.0
+
+    def _look(self, name: str, node: Node, hidden: bool) -> None:
+        pool = self.pool
+        bar = min(self.ahead(each.fit) for each in {node, pool.best})
+        key = (name, node.effects, hidden)
+        if not FILTERED * bar > pool.data.floor.encoder * pool.data.sampling_rate or key in self.fitted:
+            return
+        wanted = Wanted(Limits(FILTERED * bar, pool.late), pool.worth, lambda fit: refusal(pool.data, pool.library, fit), hidden)
+        grew = grown(pool.data, node.fit, pool.library[name], wanted)
+        self.fitted[key] = grew
+        result = Filtered((*self._up_to(node), *grew.rungs), bar, error_without(pool.data, grew.found))
+        if name in result.rungs[-1][1].model and result.wins:
+            self.found = result
+
+    def _up_to(self, node: Node) -> list[tuple[str, GreyboxFit]]:
+        """Rungs up to a set, of the fits that are known."""
+        names = [name for name, _ in node.fit.model.effects]
+        known = [(names[n], self.pool.nodes.get(frozenset(names[: n + 1]))) for n in range(len(names))]
+        return [(name, item.fit) for name, item in known if item is not None and item.whole]

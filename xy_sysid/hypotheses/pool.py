@@ -1,0 +1,221 @@
+"""Sets of effects with their best fits, and the search over them: the most promising move next, each set fitted from the best of its starts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+import math
+from math import inf
+
+import numpy as np
+
+from xy_sysid.axis.model import AxisModel, Library
+from xy_sysid.effects._contract import in_time
+from xy_sysid.greybox.axis_data import AxisData
+from xy_sysid.greybox.free_run import GreyboxFit, best_start, finish, first_excess, fit
+from xy_sysid.hypotheses import starts
+from xy_sysid.hypotheses.compare import gain, size
+from xy_sysid.hypotheses.criteria import AT_FLOOR, HOPELESS, MOST_EFFECTS, NEAR, OPTIMISM, PRICE, RIVAL, WORTH
+from xy_sysid.hypotheses.moves import Move, count, moves
+from xy_sysid.hypotheses.refusal import refusal
+
+
+@dataclass(eq=False)
+class Node:
+    """One set that was fitted.
+
+    brief, fit: on the first stage's data, and on all (the brief one where it was not worth that); refused: why it explains nothing, or empty
+    leads: what it adds to the set that it was reached from is worth adding; promised: gain of the move to it, nats a line
+    moves: what may be tried from it, None until asked for
+    """
+
+    effects: frozenset[str]
+    parameters: int
+    brief: GreyboxFit
+    fit: GreyboxFit
+    refused: str = ""
+    leads: bool = True
+    promised: float = 0.0
+    moves: list[Move] | None = None
+
+    @property
+    def whole(self) -> bool:
+        """Fitted on all data."""
+        return not self.fit.brief
+
+
+@dataclass
+class Pool:
+    """The sets of one axis. worth: size of what is added at least; most: effects; late: time is up; kept: effects that every set has."""
+
+    data: AxisData
+    library: Library
+    kept: frozenset[str] = frozenset()
+    worth: float = WORTH
+    most: int = MOST_EFFECTS
+    late: Callable[[], bool] = in_time
+    nodes: dict[frozenset[str], Node] = field(default_factory=dict)
+    stopped: bool = False
+
+    @property
+    def scale(self) -> float:
+        """Nats over all held-out windows for one nat a line."""
+        lines = self.data.floor.lines @ self.data.floor.excited
+        return max(0.5 * float(lines) * self.data.held.begins.size, 1.0)
+
+    def score(self, node: Node) -> float:
+        """Nats of the held-out windows, with the price of the parameters; less is better."""
+        if not node.whole:
+            return inf
+        return float(np.sum(node.fit.scores)) + PRICE * node.parameters
+
+    @property
+    def best(self) -> Node:
+        """The set with the least score, of those that are worth their effects."""
+        return min((node for node in self.nodes.values() if node.leads and not node.refused and node.whole), key=self.score)
+
+    def begin(self, start: GreyboxFit) -> Node:
+        """The first set, from which the search begins."""
+        brief = fit(self.data, start.model, brief=True, late=self.late)
+        return self.remember(frozenset(name for name, _ in start.model.effects), brief, start)
+
+    def remember(self, effects: frozenset[str], brief: GreyboxFit, found: GreyboxFit, leads: bool = True, promised: float = 0.0) -> Node:
+        """A set with its fit, in the place of a worse one of the same set."""
+        parameters = count(self.library, effects - self.kept)
+        node = Node(effects, parameters, brief, found, refusal(self.data, self.library, found), leads, promised)
+        known = self.nodes.get(effects)
+        if known is not None and known.whole and (not node.whole or (self.score(known) <= self.score(node) and not known.refused)):
+            return known
+        self.nodes[effects] = node
+        return node
+
+    def search(self) -> Iterator[frozenset[str]]:
+        """Try moves until none promises a better set; yields each set that is about to be fitted."""
+        while not self.late():
+            best = self.best
+            if best.moves is None and len(best.effects - self.kept) < self.most and best.fit.excess >= AT_FLOOR:
+                best.moves = self._moves(best)
+            move = self._next()
+            if move is None:
+                return
+            yield move[1].effects
+            self._try(*move)
+        self.stopped = True
+
+    def _moves(self, node: Node, early: bool = True) -> list[Move]:
+        found = moves(self.data, self.library, node.fit, node.brief, early)
+        allowed = (move for move in found if self.kept <= move.effects and len(move.effects - self.kept) <= self.most)
+        return [move for move in allowed if move.effects not in self.nodes]
+
+    def _next(self) -> tuple[Node, Move] | None:
+        """The move that promises the best score, of those that promise a better one than there is."""
+        least, chosen = self.score(self.best) - PRICE, None
+        for node in self.nodes.values():
+            if not node.whole:
+                continue
+            for move in node.moves or ():
+                hoped = self.score(node) - self.scale * move.promised + PRICE * move.parameters
+                if move.effects not in self.nodes and hoped < least and self._may_be_worth(node, move):
+                    least, chosen = hoped, (node, move)
+        return chosen
+
+    def _may_be_worth(self, node: Node, move: Move) -> bool:
+        """What is new may be worth adding, if it gains a few times what it promises to first order."""
+        lines = max(node.fit.forced, 1.0) * self.data.held.begins.size
+        most = OPTIMISM * 2.0 * self.scale * move.promised / lines
+        return move.parameters <= 0 or most >= len(move.effects - node.effects) * math.log1p(self.worth)
+
+    def _try(self, parent: Node, move: Move) -> Node | None:
+        """Fit the set of a move, on all data if it comes near the best."""
+        begun = [*move.starts()]
+        new = move.effects - parent.effects
+        alone = self.nodes.get(new | self.kept)
+        if parent.effects > self.kept and alone is not None:
+            begun += starts.merged(parent.fit.model, alone.fit.model)
+        limit = parent.brief.excess + (self._near() - self.score(parent) - PRICE * move.parameters) / self.scale
+        brief = fit(self.data, best_start(self.data, begun), brief=True, hopeless=limit + HOPELESS, late=self.late)
+        if not np.isfinite(brief.excess):
+            parent.moves = [item for item in parent.moves or () if item is not move]
+            return None
+        found = brief
+        if brief.excess < limit:
+            found = finish(self.data, brief.model, brief.runs, self.late)
+        leads = not found.brief and self._is_worth(found, parent, len(new), move.parameters)
+        return self.remember(move.effects, brief, found, leads, move.promised)
+
+    def _near(self) -> float:
+        """The score up to which a quick fit is fitted on all data."""
+        best = self.score(self.best)
+        rigid = max(self.score(node) for node in self.nodes.values() if node.whole)
+        return best + NEAR * (rigid - best) + PRICE
+
+    def _is_worth(self, found: GreyboxFit, parent: Node, new: int, parameters: int) -> bool:
+        better = gain(found, parent.fit)
+        if parent.refused and better.nats > -PRICE:
+            return True
+        least = (1.0 + self.worth) ** new - 1.0 if parameters > 0 else 0.0
+        return better.nats > PRICE * max(parameters, 0) and size(found, parent.fit) >= least
+
+    def rivals(self, taken: frozenset[str], most: int = 2) -> Iterator[frozenset[str]]:
+        """Fit on all data what promised nearly as much as what was taken, and was not tried as that did well; yields as ``search``."""
+        waiting = [(node, move) for node in self.nodes.values() for move in node.moves or () if move.effects not in self.nodes]
+        for parent, move in sorted(waiting, key=lambda item: -item[1].promised):
+            own = [node.promised for node in self.nodes.values() if parent.effects < node.effects <= taken]
+            if most and own and not self.late() and len(move.effects) <= len(taken) and move.promised > RIVAL * max(own):
+                most -= 1
+                yield move.effects
+                self._try(parent, move)
+
+    def simplified(self) -> Iterator[frozenset[str]]:
+        """Try simpler sets than the best; yields as ``search``. What the best gains over a simpler one by chance, or too little, it does not keep."""
+        while not self.late():
+            best, simpler = self.best, None
+            for effects, begun in self._simpler(best):
+                if effects not in self.nodes or not self.nodes[effects].whole:
+                    yield effects
+                node = self.fitted(effects, begun)
+                if node is not None and not node.refused and not self._is_needed(best, node):
+                    simpler = node
+                    break
+            if simpler is None:
+                return
+            best.leads, simpler.leads = False, True
+
+    def _simpler(self, best: Node) -> Iterator[tuple[frozenset[str], Callable[[], Sequence[AxisModel]]]]:
+        """Sets without an effect, or with a simpler relative in its place, and where their fits begin."""
+        data, library, model = self.data, self.library, best.fit.model
+        for name, _ in reversed(model.effects):
+            if name in self.kept:
+                continue
+            effect = library[name]
+            alone = [self.nodes[one].fit.model for other in best.effects - {name} if (one := self.kept | {other}) in self.nodes]
+            for relative in sorted(library.acting, key=lambda item: len(item.parameters)):
+                related = effect.family and relative.family == effect.family and relative.simulable and relative.name not in best.effects
+                if related and len(relative.parameters) < len(effect.parameters):
+                    yield best.effects - {name} | {relative.name}, lambda n=name, r=relative: starts.swapped(data, best.fit, n, r, None)  # type: ignore[misc]
+            yield best.effects - {name}, lambda n=name, a=alone: starts.dropped(data, best.fit, n, a)  # type: ignore[misc]
+
+    def fitted(self, effects: frozenset[str], begun: Callable[[], Sequence[AxisModel]]) -> Node | None:
+        """A set fitted on all data; a known one again where a start is already better than its fit."""
+        known = self.nodes.get(effects)
+        if self.late():
+            return known if known is not None and known.whole else None
+        start = best_start(self.data, list(begun()))
+        if known is not None and known.whole and first_excess(self.data, known.fit.model) <= first_excess(self.data, start) + PRICE / self.scale:
+            return known
+        brief = fit(self.data, start, brief=True, late=self.late)
+        if not np.isfinite(brief.excess):
+            return known
+        return self.remember(effects, brief, finish(self.data, brief.model, brief.runs, self.late), leads=False)
+
+    def _is_needed(self, best: Node, simpler: Node) -> bool:
+        """The best is better than a simpler set by more than chance, and by as much as its effects must be worth."""
+        better = gain(best.fit, simpler.fit)
+        new = max(len(best.effects) - len(simpler.effects), 1)
+        parameters = best.parameters - simpler.parameters
+        return better.is_sure and better.nats > PRICE * parameters and size(best.fit, simpler.fit) >= (1.0 + self.worth) ** new - 1.0
+
+    def without(self, node: Node, name: str) -> Node:
+        """The best of the sets with the same effects but for one."""
+        fewer = (item for item in self.nodes.values() if item.whole and item.effects <= node.effects - {name})
+        return min(fewer, key=lambda item: float(np.sum(item.fit.scores)))

@@ -1,0 +1,53 @@
+"""Where the fit of a set of effects begins: what is known of another set, and what the measured motion shows without a model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from xy_sysid.axis.model import AxisModel
+from xy_sysid.effects import Effect, Scene
+from xy_sysid.greybox.axis_data import AxisData
+from xy_sysid.greybox.forces import of_one_name, stood_in, taken_for, taken_over
+from xy_sysid.greybox.free_run import GreyboxFit, is_read, other_starts, scene_of
+from xy_sysid.greybox.score_test import bounded
+
+
+def added(data: AxisData, now: GreyboxFit, model: AxisModel, effect: Effect, traced: Sequence[float] | None, scene: Scene | None = None) -> list[AxisModel]:
+    """The model with one more effect: as its trace shows it, by inverse dynamics, and of base and effect together."""
+    begun = [] if traced is None else [model.with_effect(effect.name, bounded(effect, traced, data.similar))]
+    return [*begun, *other_starts(data, now, model, effect.name, scene)]
+
+
+def swapped(data: AxisData, now: GreyboxFit, name: str, other: Effect, traced: Sequence[float] | None) -> list[AxisModel]:
+    """The model with another effect in the place of one: with the values of parameters of one name, acting as it did, and by inverse dynamics."""
+    model = now.model
+    begun = [make(data, model, name, other) for make in (of_one_name, stood_in)]
+    rest = model.without(name)
+    if traced is not None:
+        old = dict(zip(model.library[name].names, dict(model.effects)[name], strict=True))
+        values = tuple(old.get(key, value) for key, value in zip(other.names, traced, strict=True))
+        begun.append(rest.with_effect(other.name, bounded(other, values, data.similar)))
+    if is_read(rest):
+        begun += other_starts(data, now, rest, other.name)
+    alike = taken_for(data, model, name, other, scene_of(data, now))
+    return [*begun, *([alike] if alike is not None else [])]
+
+
+def dropped(data: AxisData, now: GreyboxFit, name: str, alone: Sequence[AxisModel]) -> list[AxisModel]:
+    """The model without an effect: as it is, with its force taken over by others, by inverse dynamics, and with the others as they were alone."""
+    less, scene = now.model.without(name), scene_of(data, now)
+    begun = [less.with_effect(other, values) for model in alone for other, values in model.effects if other in less]
+    read = [start for other, _ in less.effects for start in other_starts(data, now, less.without(other), other, scene)]
+    return [less, taken_over(data, now.model, name), *begun, *read]
+
+
+def merged(now: AxisModel, other: AxisModel) -> list[AxisModel]:
+    """The effects of both on the base of either."""
+    found = []
+    for base, more in ((now, other), (other, now)):
+        model = base
+        for name, values in more.effects:
+            if name not in model:
+                model = model.with_effect(name, values)
+        found.append(model)
+    return found
