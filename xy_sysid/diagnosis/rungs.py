@@ -109,10 +109,10 @@ def ladder_of_search(pool: Pool, given: Given, filtered: Filtered | None) -> Lad
 
 
 def _doubt(node: Node, other: Node) -> float:
-    """Probability (0..1) that another set is as good as the one that was taken, parameters at their price."""
+    """Probability that another set predicts better than the one that was taken, parameters at their price; at most a half, as it was not taken."""
     found = gain(node.fit, other.fit)
     priced = replace(found, nats=found.nats + PRICE * (other.parameters - node.parameters))
-    return 1.0 - priced.probability
+    return min(1.0 - priced.probability, 0.5)
 
 
 def _of_one_step(
@@ -156,7 +156,7 @@ def _kept_out(pool: Pool, node: Node) -> Rival | None:
     """The refused set that would leave least, if that is clearly less than the best leaves."""
     nodes = [item for item in pool.nodes.values() if item.refused and item.whole and gain(item.fit, node.fit).is_sure]
     best = max(nodes, key=lambda item: gain(item.fit, node.fit).nats, default=None)
-    return None if best is None else Rival(tuple(sorted(best.effects)), best.fit, 1.0, best.refused)
+    return None if best is None else Rival(tuple(sorted(best.effects)), best.fit, 0.5, best.refused)
 
 
 def _parts(library: Library, name: str) -> tuple[str, ...]:

@@ -5,6 +5,7 @@ First on the first stage's data, where a step is quick, then on all windows that
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -339,7 +340,7 @@ def _result(data: AxisData, start: AxisModel, scale: Scale, found: Solution, bri
         excess=objective.score(held.mean(axis=0), expected),
         scores=objective.each(held, expected),
         forced=objective.forced(expected),
-        force=float(np.sqrt(objective.force_power(held.mean(axis=0), response))),
+        force=math.sqrt(objective.unmodelled(held.mean(axis=0), response)[0]),
         simulated=simulated,
         error=error,
         runs=found.runs,

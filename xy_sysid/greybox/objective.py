@@ -1,8 +1,9 @@
-"""One score of a model on data: the likelihood of its error, caused by the encoder's noise and by a force that the model does not have.
+"""One score of a model on data: the likelihood of its error, caused by the encoder's noise and by what the model does not have.
 
-The spectrum of the error in velocity is S(f) = N(f) + |G(f)|^2 s. N is the floor of the data, G the response of the model's linear part to a
-force at the motor, and s the power of the unmodelled force, estimated for each model. Where s is small this is output error; where s is large
-it is inverse dynamics (Ljung, System Identification, 2nd ed., sec. 3.2 and 10.1). The terms are Whittle's (1953): ln S + P / S for each line of each window.
+The spectrum of the error in velocity is S(f) = N(f) + |G(f)|^2 s + v. N is the floor of the data and G the response of the model's linear part to
+a force at the motor. The power s of an unmodelled force and the power v of an unmodelled motion, both white, are estimated for each model.
+Where both are small this is output error in units of the noise; where v is large it is plain output error, and where s is large it is inverse dynamics
+(Ljung, System Identification, 2nd ed., sec. 3.2 and 10.1). The terms are Whittle's (1953): ln S + P / S for each line of each window.
 """
 
 from __future__ import annotations
@@ -12,14 +13,15 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numba import njit
 
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.effects._contract import arguments
 from xy_sysid.greybox.floor import Bands, Floor
 from xy_sysid.samples.block import FloatArray
 
-LEVELS = np.concatenate(([0.0], np.geomspace(1e-9, 10.0, 81)))  # of the unmodelled force's power, over the largest that any band asks for
-REFINED = 4  # Newton steps from the best of these
+ROUNDS = 100  # of the multiplicative updates, at most
+SETTLED = 1e-4  # relative change of both powers that ends them
 
 
 @dataclass(frozen=True)
@@ -40,33 +42,20 @@ class Objective:
         """Lines that count."""
         return float(np.sum(self.lines))
 
-    def force_power(self, power: FloatArray, response: FloatArray) -> float:
-        """s, V^2: the power of the unmodelled force that makes an error of this power (bands,) likeliest; response: (bands,) |G|^2."""
-        used = (self.lines > 0.0) & (response > 0.0)
-        if not np.any(used) or not np.all(np.isfinite(power[used])):
-            return 0.0
-        n, p, g, lines = self.floor[used], power[used], response[used], self.lines[used]
-        largest = float(np.max((p - n) / g))
-        if not largest > 0.0:
-            return 0.0
-        levels = LEVELS * largest
-        s = n[None, :] + np.outer(levels, g)
-        place = int(np.argmin((np.log(s) + p / s) @ lines))
-        if place == 0:
-            return 0.0
-        low, high = np.log(levels[max(place - 1, 1)]), np.log(levels[min(place + 1, levels.size - 1)])
-        x = np.log(levels[place])
-        for _ in range(REFINED):  # Fisher scoring on the logarithm
-            part = np.exp(x) * g
-            spectrum = n + part
-            slope = float(lines @ (part / spectrum * (1.0 - p / spectrum)))
-            bend = float(lines @ (part / spectrum) ** 2)
-            x = float(np.clip(x - slope / max(bend, 1e-300), low, high))
-        return float(np.exp(x))
+    def unmodelled(self, power: FloatArray, response: FloatArray) -> tuple[float, float]:
+        """(s, v): powers of the unmodelled force, V^2, and motion, m^2/s^2, that make an error of this power (bands,) likeliest.
+
+        response: (bands,) |G|^2
+        """
+        if not np.all(np.isfinite(power[self.lines > 0.0])):
+            return 0.0, 0.0
+        force, motion = likeliest(self.floor, power, response, self.lines)
+        return float(force), float(motion)
 
     def spectrum(self, power: FloatArray, response: FloatArray) -> FloatArray:
-        """(bands,) S, m^2/s^2, with the likeliest unmodelled force."""
-        return np.asarray(self.floor + self.force_power(power, response) * response)
+        """(bands,) S, m^2/s^2, with the likeliest unmodelled force and motion."""
+        force, motion = self.unmodelled(power, response)
+        return np.asarray(self.floor + force * response + motion)
 
     def each(self, powers: FloatArray, spectrum: FloatArray) -> FloatArray:
         """(windows,) nats of each half overlapping window's power (windows, bands), above an error that is the floor alone."""
@@ -79,12 +68,42 @@ class Objective:
         return float(self.each(power[None, :], spectrum)[0]) / max(0.5 * self.count, 1.0)
 
     def of_power(self, power: FloatArray, response: FloatArray) -> float:
-        """Score of an error's power (bands,), nats a line, with the unmodelled force that suits it."""
+        """Score of an error's power (bands,), nats a line, with the unmodelled force and motion that suit it."""
         return self.score(power, self.spectrum(power, response))
 
     def forced(self, spectrum: FloatArray) -> float:
-        """Lines of a window in which the unmodelled force stands out of the floor: those that tell how large it is."""
+        """Lines of a window in which what is unmodelled stands out of the floor: those that tell how large it is."""
         return float(self.lines @ (1.0 - self.floor / spectrum) ** 2)
+
+
+@njit(cache=True)
+def likeliest(floor: FloatArray, power: FloatArray, response: FloatArray, lines: FloatArray) -> tuple[float, float]:
+    """(s, v) as of ``Objective.unmodelled``, by multiplicative updates of the Itakura-Saito divergence (Fevotte, Bertin & Durrieu 2009, eq. 2.7)."""
+    force = motion = 0.0
+    for k in range(floor.size):
+        if lines[k] > 0.0:
+            beyond = max(power[k] - floor[k], 1e-6 * floor[k])
+            motion = max(motion, 0.5 * beyond)
+            force = max(force, 0.5 * beyond / max(response[k], 1e-300))
+    for _ in range(ROUNDS):
+        up_force = down_force = up_motion = down_motion = 0.0
+        for k in range(floor.size):
+            if lines[k] > 0.0:
+                spectrum = floor[k] + force * response[k] + motion
+                weight = lines[k] / spectrum
+                ratio = power[k] / spectrum
+                up_force += weight * response[k] * ratio
+                down_force += weight * response[k]
+                up_motion += weight * ratio
+                down_motion += weight
+        if down_motion <= 0.0:
+            return 0.0, 0.0
+        by_force = np.sqrt(up_force / down_force) if down_force > 0.0 else 0.0
+        by_motion = np.sqrt(up_motion / down_motion)
+        force, motion = force * by_force, motion * by_motion
+        if abs(by_force - 1.0) < SETTLED and abs(by_motion - 1.0) < SETTLED:
+            break
+    return force, motion
 
 
 def responder(layout: Bands, model: AxisModel) -> Callable[[FloatArray], FloatArray]:

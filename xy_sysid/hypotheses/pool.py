@@ -140,8 +140,9 @@ class Pool:
         found = brief
         if brief.excess < limit:
             found = finish(self.data, brief.model, brief.runs, self.late)
-        leads = not found.brief and self._is_worth(found, parent, len(new), move.parameters)
-        return self.remember(move.effects, brief, found, leads, move.promised)
+        node = self.remember(move.effects, brief, found, promised=move.promised)
+        node.leads = node.whole and self._is_worth(node)
+        return node
 
     def _near(self) -> float:
         """The score up to which a quick fit is fitted on all data."""
@@ -149,12 +150,19 @@ class Pool:
         rigid = max(self.score(node) for node in self.nodes.values() if node.whole)
         return best + NEAR * (rigid - best) + PRICE
 
-    def _is_worth(self, found: GreyboxFit, parent: Node, new: int, parameters: int) -> bool:
-        better = gain(found, parent.fit)
-        if parent.refused and better.nats > -PRICE:
-            return True
-        least = (1.0 + self.worth) ** new - 1.0 if parameters > 0 else 0.0
-        return better.nats > PRICE * max(parameters, 0) and size(found, parent.fit) >= least
+    def _is_worth(self, node: Node) -> bool:
+        """It is better than the best set that it contains, by as much as what is new must be worth."""
+        inside = [item for item in self.nodes.values() if item.effects < node.effects and item.whole and not item.refused]
+        return not inside or self._is_better(node, min(inside, key=self.score))
+
+    def _is_better(self, node: Node, simpler: Node) -> bool:
+        """More than chance better than a simpler set, at the price of its parameters, and by as much as its effects must be worth.
+
+        Of a richer law in the place of a simpler one WORTH is asked.
+        """
+        better, new = gain(node.fit, simpler.fit), len(node.effects) - len(simpler.effects)
+        least = (1.0 + self.worth) ** new - 1.0 if new > 0 else WORTH
+        return better.is_sure and better.nats > PRICE * (node.parameters - simpler.parameters) and size(node.fit, simpler.fit) >= least
 
     def rivals(self, taken: frozenset[str], most: int = 2) -> Iterator[frozenset[str]]:
         """Fit on all data what promised nearly as much as what was taken, and was not tried as that did well; yields as ``search``."""
@@ -174,7 +182,7 @@ class Pool:
                 if effects not in self.nodes or not self.nodes[effects].whole:
                     yield effects
                 node = self.fitted(effects, begun)
-                if node is not None and not node.refused and not self._is_needed(best, node):
+                if node is not None and not node.refused and not self._is_better(best, node):
                     simpler = node
                     break
             if simpler is None:
@@ -207,13 +215,6 @@ class Pool:
         if not np.isfinite(brief.excess):
             return known
         return self.remember(effects, brief, finish(self.data, brief.model, brief.runs, self.late), leads=False)
-
-    def _is_needed(self, best: Node, simpler: Node) -> bool:
-        """The best is better than a simpler set by more than chance, and by as much as its effects must be worth."""
-        better = gain(best.fit, simpler.fit)
-        new = max(len(best.effects) - len(simpler.effects), 1)
-        parameters = best.parameters - simpler.parameters
-        return better.is_sure and better.nats > PRICE * parameters and size(best.fit, simpler.fit) >= (1.0 + self.worth) ** new - 1.0
 
     def without(self, node: Node, name: str) -> Node:
         """The best of the sets with the same effects but for one."""
