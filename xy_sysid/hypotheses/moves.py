@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import combinations
-
-import numpy as np
 
 from xy_sysid.axis.model import AxisModel, Library
 from xy_sysid.effects import Effect
 from xy_sysid.greybox.axis_data import AxisData
-from xy_sysid.greybox.free_run import GreyboxFit, first_excess, scene_of, screened
+from xy_sysid.greybox.free_run import TOLD, GreyboxFit, first_excess, is_read, other_starts, scene_of, screened
 from xy_sysid.hypotheses.criteria import RIVAL, WIDTH
 from xy_sysid.hypotheses.starts import added, swapped
 
@@ -56,36 +55,29 @@ def moves(data: AxisData, library: Library, now: GreyboxFit, brief: GreyboxFit, 
     gains = {name: screen.gain([name]) for name in screen.rows}
     here = first_excess(data, brief.model) if early else 0.0
 
-    def promised(names: Iterable[str], starts: Sequence[AxisModel]) -> float:
+    def promised(names: Iterable[str], begun: Sequence[AxisModel] = ()) -> float:
+        """To first order, or by models of starts as they are, whichever is more."""
         first = screen.gain(names) if all(name in screen.rows for name in names) else 0.0
-        begun = max((here - first_excess(data, start) for start in starts), default=-np.inf) if early else 0.0
-        return max(first, begun)
+        return max(first, *(here - first_excess(data, start) for start in begun if early), 0.0)
 
     singles, swaps = [], []
     for effect in open_to:
+        traced = traces.get(effect.name)
         if not is_twice(library, own | {effect.name}):
-            starts = added(data, now, model, effect, traces.get(effect.name), scene if early else None)
-            gain = promised([effect.name], starts)
-            singles.append(Move(own | {effect.name}, len(effect.parameters), gain, _known(starts)))
+            gain = promised([effect.name], other_starts(data, now, model, effect.name, scene, TOLD) if early else ())
+            singles.append(Move(own | {effect.name}, len(effect.parameters), gain, partial(added, data, now, model, effect, traced)))
         for name in own:
-            if _takes_place(library, name, effect, data.units.output == "rad"):
-                starts = swapped(data, now, name, effect, traces.get(effect.name))
-                gain = promised([effect.name], starts)
+            related = bool(effect.family) and effect.family == library[name].family
+            suspected = name in effect.suspects and (data.units.output == "rad" or not effect.angular)
+            if related or suspected:
+                starts = partial(swapped, data, now, name, effect, traced)
+                rest = model.without(name)
+                begun = starts() if suspected else other_starts(data, now, rest, effect.name, scene, TOLD) if early and is_read(rest) else ()
                 more = len(effect.parameters) - len(library[name].parameters)
-                swaps.append(Move(own - {name} | {effect.name}, more, gain, _known(starts)))
+                swaps.append(Move(own - {name} | {effect.name}, more, promised([effect.name], begun), starts))
     pairs = _pairs(library, now, own, gains, screen.gain, lambda names: _both(data, now, [library[name] for name in names], traces))
     best = [sorted(kind, key=lambda move: -move.promised)[:WIDTH] for kind in (singles, swaps, pairs)]
     return [move for kind in best for move in kind]
-
-
-def _known(starts: Sequence[AxisModel]) -> Callable[[], Sequence[AxisModel]]:
-    return lambda: starts
-
-
-def _takes_place(library: Library, name: str, other: Effect, angular: bool) -> bool:
-    """A relative of an effect, or a law that names it as a reason to be tried."""
-    related = bool(other.family) and other.family == library[name].family
-    return related or (name in other.suspects and (angular or not other.angular))
 
 
 def _both(data: AxisData, now: GreyboxFit, effects: Sequence[Effect], traces: Mapping[str, tuple[float, ...]]) -> list[AxisModel]:

@@ -93,7 +93,9 @@ class Pool:
         """Try moves until none promises a better set; yields each set that is about to be fitted."""
         while not self.late():
             best = self.best
-            if best.moves is None and len(best.effects - self.kept) < self.most and best.fit.excess >= AT_FLOOR:
+            if best.fit.excess < AT_FLOOR:
+                return
+            if best.moves is None and len(best.effects - self.kept) < self.most:
                 best.moves = self._moves(best)
             move = self._next()
             if move is None:
