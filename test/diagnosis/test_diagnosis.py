@@ -20,18 +20,17 @@ from helpers.simulated import recorded
 from xy_sim.parts import PARTS
 from xy_sysid.axis.model import STANDARD, Library
 from xy_sysid.cli import run
-from xy_sysid.hypotheses.criteria import AT_FLOOR, FEWEST, SIZE
+from xy_sysid.hypotheses.criteria import AT_FLOOR, FEWEST
+from xy_sysid.diagnosis import rungs
 from xy_sysid.diagnosis.diagnose import Diagnosis, diagnose, judged
 from xy_sysid.diagnosis.ladder import Rival, Step, is_taken_for
 from xy_sysid.diagnosis.refine import Effort, refine, refine_steps
 from xy_sysid.effects import EFFECTS, Effect
 from xy_sysid.greybox.axis_data import AxisData, prepare
-from xy_sysid.greybox.free_run import GreyboxFit, fit_with
+from xy_sysid.greybox.free_run import GreyboxFit, fit_base, fit_with
 from xy_sysid.imports import save
-from xy_sysid.judge import axis_judge
-from xy_sysid.judge.axis_judge import AxisJudge
-from xy_sysid.judge.beside_one_step import grown
-from xy_sysid.search.best_first import Node, Search
+from xy_sysid.hypotheses import one_step
+from xy_sysid.hypotheses.companions import grown
 
 
 @pytest.mark.parametrize("effect", ["coulomb_friction", "cogging", "dead_zone", "constant_load", "saturation", "lead_error"])
@@ -208,24 +207,21 @@ def test_an_effect_can_be_added_by_name(rec: Path, capsys: pytest.CaptureFixture
 def test_what_is_compiled_at_first_use_costs_no_budget(monkeypatch: pytest.MonkeyPatch) -> None:
     """On a fresh machine the first fit compiles the laws for longer than the whole budget: the search has its time all the same."""
     now = [0.0]
-    begin = AxisJudge.begin
 
-    def slow(judge: AxisJudge) -> GreyboxFit:
+    def slow(data: AxisData, library: Library) -> GreyboxFit:
         now[0] += 100.0
-        return begin(judge)
+        return fit_base(data, library)
 
-    monkeypatch.setattr(AxisJudge, "begin", slow)
+    monkeypatch.setattr(rungs, "fit_base", slow)
     found = diagnose(2000.0, *recorded("coulomb_friction", seconds=20.0).axis("x"), budget=10.0, clock=lambda: now[0])
     assert found.effects == ("coulomb_friction",) and not found.stopped
 
 
 def test_a_part_that_rattles_is_no_mode_with_confidence() -> None:
-    """The mode explains most of it, and leaves much of it just where it acts; a true mode of the same strength leaves nothing there."""
+    """The mode explains most of the error and leaves some; a true mode of the same strength leaves none."""
     rattles, rings = (diagnose(2000.0, *recorded(name, seconds=20.0).axis("x")) for name in ("loose_mode", "base_resonance"))
     assert rattles.effect is None or rattles.confidence < 0.9
     assert rings.effects == ("base_resonance",) and rings.confidence > 0.9
-    assert rattles.ladder is not None and rings.ladder is not None
-    assert rings.ladder.astray < 0.02
 
 
 def test_not_in_the_library_is_said_less_surely_the_more_is_left() -> None:
@@ -245,7 +241,7 @@ def test_what_two_sets_share_is_named_and_what_they_differ_in_is_not() -> None:
     data = prepare(2000.0, *recorded("coulomb_friction", seconds=20.0).axis("x"))
     alone = refine(data)
     both = fit_with(data, alone.final, ["constant_load"])
-    tie = Rival(("coulomb_friction", "cogging"), both, 0.0)
+    tie = Rival(("coulomb_friction", "cogging"), both, 0.5)
     ladder = replace(
         alone,
         steps=(*alone.steps, Step("constant_load", both)),
@@ -261,7 +257,7 @@ def test_what_two_sets_share_is_named_and_what_they_differ_in_is_not() -> None:
     assert found.ladder is not None
     assert found.ladder.final is alone.final
     assert tie not in found.ladder.rivals
-    unsure = judged(data, replace(ladder, rivals=(Rival(("cogging",), both, 0.0),)), STANDARD)
+    unsure = judged(data, replace(ladder, rivals=(Rival(("cogging",), both, 0.5),)), STANDARD)
     assert unsure.effects == ("coulomb_friction", "constant_load")  # nothing is surer than not: all are told
     assert unsure.confidence < 0.5
 
@@ -275,7 +271,7 @@ def test_a_refused_spring_that_leaves_as_little_as_a_wave_makes_the_wave_unsure(
     assert not is_taken_for(STANDARD, frozenset({"cogging"}), wave)
     data = prepare(2000.0, *recorded("cogging", seconds=20.0).axis("x"))
     ladder = refine(data)
-    rival = Rival(("return_spring",), ladder.final, 0.0, "return_spring: it would give way")
+    rival = Rival(("return_spring",), ladder.final, 0.5, "return_spring: it would give way")
     found = judged(data, replace(ladder, rivals=(rival,)), STANDARD)
     assert found.effects == ("cogging",) and found.confidence <= 0.5
     assert "Runner-up return_spring" in found.sentence and "(refused, return_spring: it would give way)" in found.sentence
@@ -319,16 +315,6 @@ def test_a_spring_beside_friction_is_not_taken_for_a_pendulum_and_bumps() -> Non
     assert {EFFECTS[name].family for name in found.effects} == {"spring", "dry_friction"}, found.sentence
 
 
-def test_a_lag_beside_friction_begins_where_the_base_gives_way() -> None:
-    """The base has taken it for a delay, so that its trace promises little; with the delay given back it begins far below."""
-    data = prepare(2000.0, *recorded("constant_load+coulomb_friction+amplifier_lag", seconds=30.0).axis("x"))
-    judge = AxisJudge(data, STANDARD)
-    now = judge.added(judge.added(judge.begin(), "coulomb_friction"), "constant_load")
-    moves = {tuple(name for name, _ in move.starts): move for move in judge.moves(now, now)}
-    lag = moves["amplifier_lag",]
-    assert now.excess - lag.begins > 5.0 * lag.gain
-
-
 @pytest.mark.parametrize("effect", ["backlash", "base_resonance+thermal_viscosity"])
 def test_a_gap_is_asked_for_early_and_once(effect: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """One that explains the axis ends the simulations; one that does not is not fitted again beside the same effects."""
@@ -339,7 +325,7 @@ def test_a_gap_is_asked_for_early_and_once(effect: str, monkeypatch: pytest.Monk
         asked.append((gap.name, *sorted(name for name, _ in base.model.effects)))
         return fitted(data, base, gap, *others)
 
-    monkeypatch.setattr(axis_judge, "grown", counted)
+    monkeypatch.setattr(one_step, "grown", counted)
     data = prepare(2000.0, *recorded(effect, seconds=20.0).axis("x"))
     steps, tried = refine_steps(data), []
     while True:
@@ -375,29 +361,9 @@ def test_what_acts_beside_a_gap_is_asked_for_though_it_was_known_beside_a_screw_
 def test_what_a_simulation_had_taken_a_gap_for_goes() -> None:
     """A lag, here, of no size once the gap is known: it is taken out of what the filter has beside it."""
     data = prepare(2000.0, *recorded("coulomb_friction=0.03+backlash=6e-6", seconds=10.0).axis("x"))
-    base = fit_with(data, AxisJudge(data, STANDARD).begin(), ["amplifier_lag"])
+    base = fit_with(data, fit_base(data), ["amplifier_lag"])
     fit = grown(data, base, EFFECTS["backlash"]).rungs[-1][1]
     assert "amplifier_lag" not in fit.model and {"backlash", "coulomb_friction"} <= {name for name, _ in fit.model.effects}
-
-
-def test_a_set_that_takes_most_away_is_named_though_another_leaves_less_in_quiet_bands(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Bands count alike in a search: a mode that takes nine tenths of the power may lie behind what is better in many bands."""
-    data = prepare(2000.0, *recorded("screw_compliance=110,damping=0.02", seconds=20.0).axis("x"))
-
-    def led_astray(search: Search[GreyboxFit], start: GreyboxFit, kept: frozenset[str]) -> Iterator[frozenset[str]]:
-        """Ends at the rigid base, the mode known beside it as worse."""
-        found = search.judge.whole(fit_with(data, start, ["screw_compliance"], brief=True))
-        search.nodes[kept] = Node(kept, start, start, 0, whole=True)
-        mode = frozenset({"screw_compliance"})
-        search.nodes[mode] = Node(mode, replace(found, excess=start.excess + 1.0), found, 4, whole=True)
-        search.nodes[kept].led_on = True
-        yield mode
-
-    monkeypatch.setattr(Search, "steps", led_astray)
-    found = refine(data, effort=Effort(size=SIZE))
-    assert found.effects == ("screw_compliance",)
-    verdict = judged(data, found, STANDARD)
-    assert verdict.verdict == "missing_effect" and verdict.explained > 0.9
 
 
 def test_a_gap_beside_a_large_force_is_asked_for_with_that_force() -> None:

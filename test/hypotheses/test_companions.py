@@ -9,30 +9,36 @@ from helpers.foreign import across_gap
 
 from xy_sysid.axis.model import STANDARD
 from xy_sysid.hypotheses.criteria import SIZE
+from xy_sysid.effects._contract import Limits
 from xy_sysid.greybox.axis_data import AxisData, prepare
-from xy_sysid.judge.axis_judge import AxisJudge
+from xy_sysid.greybox.free_run import GreyboxFit, fit_base
+from xy_sysid.hypotheses.companions import Grown, Wanted, grown
 
 BAR = 5e-3  # m/s one sample ahead: more than what any filter with this gap leaves
 
 
 @pytest.fixture(scope="module")
-def judge() -> AxisJudge:
+def data() -> AxisData:
     """Of a motor that rubs before a gap of 0.1 mm, behind an amplifier that lags by 2 ms."""
-    data: AxisData = prepare(2000.0, *across_gap(1e-4, 0.1, 0.15, 1, lag=2e-3))
-    return AxisJudge(data, STANDARD)
+    return prepare(2000.0, *across_gap(1e-4, 0.1, 0.15, 1, lag=2e-3))
 
 
-def test_what_a_simulation_had_and_is_of_no_use_beside_a_gap_goes(judge: AxisJudge) -> None:
+def followed(data: AxisData, base: GreyboxFit, bar: float, hidden: bool = False) -> Grown:
+    """Backlash and what acts with it."""
+    return grown(data, base, STANDARD["backlash"], Wanted(Limits(bar), SIZE, hidden=hidden))
+
+
+def test_what_a_simulation_had_and_is_of_no_use_beside_a_gap_goes(data: AxisData) -> None:
     """Cogging that is not there, beside a lag that is."""
-    base = judge.begin()
+    base = fit_base(data)
     crowded = replace(base, model=base.model.with_effect("amplifier_lag", (1e-3,)).with_effect("cogging", (0.02, 0.01, 0.0)))
-    grown = judge.followed(crowded, "backlash", BAR, SIZE)
-    assert set(dict(grown.rungs[-1][1].model.effects)) == {"backlash", "coulomb_friction", "amplifier_lag"}
+    found = followed(data, crowded, BAR)
+    assert set(dict(found.rungs[-1][1].model.effects)) == {"backlash", "coulomb_friction", "amplifier_lag"}
 
 
 @pytest.mark.parametrize("hidden", [False, True])
-def test_without_what_a_gap_hides_no_filter_follows_the_motor(judge: AxisJudge, hidden: bool) -> None:
+def test_without_what_a_gap_hides_no_filter_follows_the_motor(data: AxisData, hidden: bool) -> None:
     """An encoder's count of 1 um is 0.6 mm/s one sample ahead."""
-    last = judge.followed(judge.begin(), "backlash", 2e-3, SIZE, hidden).rungs[-1][1]
+    last = followed(data, fit_base(data), 2e-3, hidden).rungs[-1][1]
     assert ("amplifier_lag" in last.model) is hidden
     assert (last.held_out_error < 1e-3) is hidden

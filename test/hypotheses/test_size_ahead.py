@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from xy_sysid.axis.model import AxisModel
-from xy_sysid.hypotheses.criteria import AT_FLOOR, SIZE
+from xy_sysid.hypotheses.criteria import SIZE, TELLS
 from xy_sysid.greybox.free_run import GreyboxFit
-from xy_sysid.judge.beside_one_step import size_ahead
-from xy_sysid.search.one_step_trials import Filtered
+from xy_sysid.hypotheses.companions import size_ahead
+from xy_sysid.hypotheses.one_step import Filtered
 
 NOISE = 1e-3  # m/s
 
@@ -27,6 +27,9 @@ def ahead(error: float) -> GreyboxFit:
         held_out_error=error,
         noise_floor=NOISE,
         excess=0.0,
+        scores=nothing,
+        forced=1.0,
+        force=0.0,
         simulated=nothing,
         error=nothing,
         runs=1,
@@ -55,4 +58,4 @@ def test_a_gap_does_not_win_by_what_nobody_can_tell() -> None:
     best = ahead(1.0001 * NOISE)
     little = Filtered((("backlash", best),), 9.0 * NOISE, 1.02 * best.held_out_error)
     assert little.size > SIZE and not little.wins
-    assert replace(little, without=1.01 * exp(0.5 * AT_FLOOR) * best.held_out_error).wins
+    assert replace(little, without=1.01 * exp(0.5 * TELLS) * best.held_out_error).wins
