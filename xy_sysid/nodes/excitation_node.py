@@ -29,6 +29,7 @@ from xy_sysid.nodes.hearing import Ear
 from xy_sysid.nodes.quality import AS_IT_IS, Overridable
 from xy_sysid.nodes.streams import AXES, declare_axes
 from xy_sysid.nodes.wall import Wall
+from xy_sysid.processes.terminal import printable
 from xy_sysid.samples.block import Block, FloatArray
 from xy_sysid.settings import ExcitationSettings, for_axes, knobs
 
@@ -436,7 +437,7 @@ class ExcitationNode(Overridable, LifecycleNode):
         kind = re.sub(r"[\d.]+", "", text)
         if kind != self._complaint:
             self._complaint = kind
-            self.get_logger().warning(text)
+            self.get_logger().warning(printable(text))
 
     def _report(self) -> None:
         drive = self._drive

@@ -13,6 +13,7 @@ from types import FrameType
 from typing import Any, Protocol, cast
 
 from xy_sysid.errors import MissingExtra, XySysidError
+from xy_sysid.processes.terminal import printable
 
 LOOK = 0.1  # s between two looks whether the node is to end
 LONGEST_STOP = 3.0  # s an orderly end may take; then the last words are said without waiting
@@ -99,5 +100,5 @@ def _spin(node: Runnable, asked: list[int]) -> None:
 
 def _refuse(error: Exception) -> int:
     """One line on stderr; what rcl adds about its own source files is left out."""
-    sys.stderr.write(" ".join(str(error).split(", at /")[0].split()) + "\n")
+    sys.stderr.write(printable(" ".join(str(error).split(", at /")[0].split())) + "\n")
     return 2
