@@ -39,7 +39,7 @@ EffortLag = Annotated[
 Period = Annotated[str, typer.Option(help="samples of the input's period: auto, none or a number")]
 Span = Annotated[str, typer.Option("--span", metavar="FROM:TO", help="only this part, in seconds from the start, for example 10:70")]
 LARGEST_DOMAIN = 232
-Force = Annotated[bool, typer.Option("--force", help="replace a model file that is there already")]
+Force = Annotated[bool, typer.Option("--force", help="replace a file that is there already")]
 Json = Annotated[bool, typer.Option("--json", help="one JSON document on stdout")]
 
 
@@ -83,29 +83,31 @@ def ros_domain() -> None:
         raise BadInput("ROS_DOMAIN_ID", repr(text), f"0 to {LARGEST_DOMAIN}", "Set it, or leave it unset for 0.")
 
 
-def output_file(option: str, path: Path | None) -> None:
-    """Raises BadInput, before any work is done, when a file cannot be written."""
+def output_file(option: str, path: Path | None, force: bool) -> None:
+    """Raises BadInput, before any work is done, when a file cannot be written, or would replace one and nobody said --force."""
     if path is None:
         return
+    from xy_sysid.files.unasked import free
+
     folder = path.absolute().parent
     try:
         if path.is_dir():
             raise BadInput(option, str(path), "a file, and this is a folder", "Give the file a name.")
         if not folder.is_dir():
             raise BadInput(option, str(path), "a file in a folder that is there", f"Make {folder} first.")
+        free(option, path, force, "add --force")
     except OSError as problem:
         raise BadInput(option, str(path), "a name that the file system takes", f"{problem.strerror}.") from None
     if not os.access(path if path.exists() else folder, os.W_OK):
         raise BadInput(option, str(path), "a file that you may write", "Choose another place.")
 
 
-def model_file(path: Path | None, force: bool) -> None:
-    """Raises BadInput, before any work is done, when a model cannot be written, or would replace a file and nobody said --force."""
-    output_file("--model", path)
-    if path is not None:
-        from xy_sysid.files.unasked import free
+def new_bag(path: Path | None) -> None:
+    """Raises BadRecording where something is there already: a bag never replaces anything."""
+    from xy_sysid.bags.atomic import taken
 
-        free("--model", path, force, "add --force")
+    if path is not None and taken(path):
+        raise BadRecording(path, "exists already", "Choose another name; nothing is overwritten.")
 
 
 def read_text(path: Path) -> str:

@@ -22,12 +22,11 @@ def record(
 ) -> None:
     """Record the topics of the contract to a rosbag2; Ctrl-C ends it and the bag is whole."""
     from xy_sysid.cli.output import emit, people
-    from xy_sysid.errors import BadInput, BadRecording, MissingExtra
+    from xy_sysid.errors import BadInput, MissingExtra
 
     if storage not in ("sqlite3", "mcap"):
         raise BadInput("--storage", repr(storage), "sqlite3, mcap", "Choose one of these.")
-    if out.exists():
-        raise BadRecording(out, "exists already", "Choose another name; nothing is overwritten.")
+    o.new_bag(out)
     try:
         import rclpy  # noqa: F401
     except ModuleNotFoundError:

@@ -55,8 +55,7 @@ def replay(
     settings = o.settings_from(params, set_)
     if velocity:
         settings = changed(settings, {"output": "velocity"})
-    if out is not None and out.exists():
-        raise BadRecording(out, "exists already", "Choose another name; nothing is overwritten.")
+    o.new_bag(out)
     last: Update | None = None
     updates, alarms = 0, dict[str, str]()
     begun = time.perf_counter()
