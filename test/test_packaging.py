@@ -104,6 +104,7 @@ def test_entry_points_lead_to_a_main_function(setup_arguments: dict[str, Any]) -
         assert source.is_file(), f"{name}: {source} is not there"
         tree = ast.parse(source.read_text(encoding="utf-8"))
         defined = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+        defined |= {target.id for node in tree.body if isinstance(node, ast.Assign) for target in node.targets if isinstance(target, ast.Name)}
         defined |= {alias.asname or alias.name for node in tree.body if isinstance(node, ast.ImportFrom) for alias in node.names}
         assert function in defined, f"{name}: {source} has no {function}"
 

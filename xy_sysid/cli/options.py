@@ -23,7 +23,7 @@ Axes = Annotated[list[str] | None, typer.Option("--axis", "-a", help="only this 
 Set = Annotated[
     list[str] | None, typer.Option("--set", "-s", metavar="NAME=VALUE", help="change a setting, for example length=2048 (see docs/settings.md)")
 ]
-Params = Annotated[Path | None, typer.Option("--params", metavar="FILE", help="ROS parameter file, or the run file of xy-sysid run; the identifier's part is used")]
+Params = Annotated[Path | None, typer.Option("--params", metavar="FILE", help="ROS parameter file or run file; the identifier's part is used")]
 Topics = Annotated[
     list[str] | None,
     typer.Option("--topic", metavar="WHAT=NAME", help="topic names in a bag: voltage=..., position=... or joints=... (may be repeated)"),

@@ -54,10 +54,9 @@ def _arguments(values: dict[str, Any], namespace: str) -> list[str]:
 
 def _run(arguments: list[str]) -> int:
     """The recorder in this process: Ctrl-C is a wish to end it, and not an error."""
-    from xy_sysid.nodes.recorder import make
-    from xy_sysid.nodes.run import run_node
+    from xy_sysid.nodes.run import maker, run_node
 
-    return run_node(make, ["recorder", *arguments])
+    return run_node(maker("xy_sysid.nodes.recorder_node:RecorderNode"), ["recorder", *arguments])
 
 
 def _content(out: Path) -> dict[str, int]:

@@ -23,7 +23,8 @@ from xy_sysid.errors import BadInput
 from xy_sysid.excitation.drive import Drive
 from xy_sysid.excitation.pacing import CATCH_UP, Answers, Clock
 from xy_sysid.nodes.commands import Beat, Commands
-from xy_sysid.nodes.common import DATA_QOS, NAMESPACE, STOP_HEARD, STOP_TOPIC, declare, from_message, status, to_message
+from xy_sysid.nodes.common import DATA_QOS, NAMESPACE, STOP_HEARD, STOP_TOPIC, declare
+from xy_sysid.nodes.convert import from_message, status, to_message
 from xy_sysid.nodes.diagnostics import Diagnostics
 from xy_sysid.nodes.hearing import Ear
 from xy_sysid.nodes.quality import AS_IT_IS, Overridable

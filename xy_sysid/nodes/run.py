@@ -5,10 +5,12 @@ Imports nothing heavy, so that the signals are in hand before anything that take
 
 from __future__ import annotations
 
+import functools
 import signal
 import sys
 import time
 from collections.abc import Callable, Sequence
+from importlib import import_module
 from types import FrameType
 from typing import Any, Protocol, cast
 
@@ -43,6 +45,17 @@ class Runnable(Protocol):
     def get_logger(self) -> Any:
         """rclpy's."""
         ...
+
+
+def maker(place: str) -> Callable[[], Runnable]:
+    """What makes a node. place: module:class, imported when the node is made: after the signals are in hand and rclpy is known to be there."""
+    module, _, name = place.partition(":")
+    return lambda: cast("Runnable", getattr(import_module(module), name)())
+
+
+def executable(place: str) -> Callable[[], int]:
+    """The ``main`` of a node's executable: it runs the node and returns the exit code. place: as for ``maker``."""
+    return functools.partial(run_node, maker(place))
 
 
 def run_node(factory: Callable[[], Runnable], args: Sequence[str] | None = None) -> int:

@@ -12,8 +12,9 @@ from std_msgs.msg import Float64MultiArray
 
 from xy_sysid.errors import BadInput, XySysidError
 from xy_sysid.live.heard import Heard
-from xy_sysid.live.messages import topic_of
-from xy_sysid.nodes.common import DATA_QOS, declare_fixed, from_message, overrides
+from xy_sysid.live.plain_messages import topic_of
+from xy_sysid.nodes.common import DATA_QOS, declare_fixed, overrides
+from xy_sysid.nodes.convert import from_message
 from xy_sysid.nodes.hearing import Ear
 from xy_sysid.processes.terminal import printable
 from xy_sysid.samples.block import Block, StreamName
