@@ -5,6 +5,7 @@ from pathlib import Path
 from setuptools import find_packages, setup
 
 NAME = "xy_sysid"
+HOME = "https://github.com/xy-sysid/xy_sysid"  # also in package.xml
 ROS_WHEELS = "sys_platform == 'linux' and platform_machine == 'x86_64'"
 ISAL = "isal; platform_machine in 'x86_64 AMD64 aarch64 arm64'"  # fast checksums; elsewhere zlib's will do
 
@@ -21,7 +22,9 @@ setup(
     description="Live identification of an XY table over ROS 2, and the same from a recording",
     author="xy_sysid contributors",
     maintainer="xy_sysid maintainers",
-    maintainer_email="maintainers@users.noreply.example.com",
+    maintainer_email="xy-sysid@users.noreply.github.com",
+    url=f"{HOME}#readme",
+    project_urls={"Repository": HOME, "Bugtracker": f"{HOME}/issues"},
     license="Apache-2.0",
     python_requires=">=3.11,<3.14",
     packages=find_packages(include=["xy_sysid", "xy_sysid.*", "xy_sim", "xy_sim.*"]),

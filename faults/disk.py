@@ -25,12 +25,12 @@ RIGID = ("--set", "numerator_order=0", "--set", "denominator_order=2")
 OLD = b"what was there before"
 COMMANDS: dict[str, tuple[str, ...]] = {
     "fit --model": ("fit", "REC", *RIGID, "--force", "--model", "OUT"),
-    "fit --mat": ("fit", "REC", *RIGID, "--mat", "OUT"),
-    "frf --csv": ("frf", "REC", "--csv", "OUT"),
-    "study --out": ("study", "REC", *RIGID, "--out", "OUT"),
+    "fit --mat": ("fit", "REC", *RIGID, "--mat", "OUT", "--force"),
+    "frf --csv": ("frf", "REC", "--csv", "OUT", "--force"),
+    "study --out": ("study", "REC", *RIGID, "--out", "OUT", "--force"),
     "refine --model": ("refine", "REC", "--add", "coulomb_friction", "--force", "--model", "OUT"),
-    "refine --mat": ("refine", "REC", "--add", "coulomb_friction", "--mat", "OUT"),
-    "report -o": ("report", "REC", "-o", "OUT"),
+    "refine --mat": ("refine", "REC", "--add", "coulomb_friction", "--mat", "OUT", "--force"),
+    "report -o": ("report", "REC", "-o", "OUT", "--force"),
 }
 FRESH: dict[str, tuple[str, ...]] = {
     "simulate, a bag": ("simulate", "OUT", "--duration", "2"),

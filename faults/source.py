@@ -12,7 +12,8 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Float64MultiArray
 
-from xy_sysid.nodes.common import DATA_QOS, to_message
+from xy_sysid.nodes.common import DATA_QOS
+from xy_sysid.nodes.convert import to_message
 from xy_sysid.samples.block import Block
 
 ROWS = 20

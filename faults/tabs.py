@@ -124,7 +124,8 @@ def scene(folder: Path) -> Iterator[Scene]:
     from std_msgs.msg import Float64MultiArray
 
     from xy_sysid.cli.monitor import Monitor
-    from xy_sysid.nodes.common import DATA_QOS, from_message
+    from xy_sysid.nodes.common import DATA_QOS
+    from xy_sysid.nodes.convert import from_message
 
     os.environ.update(ROS_DOMAIN_ID=str(os.getpid() % 90 + 10), ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST")
     made = Scene(folder, Monitor(("x", "y"), listeners=2))

@@ -50,6 +50,22 @@ def test_package_xml_and_setup_py_say_the_same(setup_arguments: dict[str, Any], 
     assert manifest.findtext("export/build_type") == "ament_python"
 
 
+def test_ros_tools_accept_the_manifest_and_find_where_to_ask(setup_arguments: dict[str, Any], manifest: ElementTree.Element) -> None:
+    """catkin_pkg, which colcon and rosdep use, reads it without a complaint; a website, a repository and a bugtracker are named as for pip.
+
+    The domain of the maintainer's address is a real one: those reserved for examples (RFC 2606) reach nobody.
+    """
+    package = pytest.importorskip("catkin_pkg.package", reason="catkin_pkg comes with the extra [test]")
+    complaints: list[str] = []
+    found = package.parse_package(str(ROOT / "package.xml"), warnings=complaints)
+    found.validate(warnings=complaints)
+    assert not complaints
+    assert not re.search(r"(^|\.)(example|invalid|test|localhost)(\.|$)", found.maintainers[0].email.partition("@")[2])
+    urls = {node.get("type"): node.text for node in manifest.findall("url")}
+    told = {"website": setup_arguments["url"], **{name.lower(): place for name, place in setup_arguments["project_urls"].items()}}
+    assert urls == told and set(urls) == {"website", "repository", "bugtracker"}
+
+
 def test_every_dependency_has_a_rosdep_key_or_a_word_about_it(setup_arguments: dict[str, Any], manifest: ElementTree.Element) -> None:
     """What pip installs is in package.xml too, under its rosdep key; what has none is named in a comment."""
     keys = {node.text for node in manifest.findall("exec_depend")}
@@ -88,6 +104,7 @@ def test_entry_points_lead_to_a_main_function(setup_arguments: dict[str, Any]) -
         assert source.is_file(), f"{name}: {source} is not there"
         tree = ast.parse(source.read_text(encoding="utf-8"))
         defined = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+        defined |= {target.id for node in tree.body if isinstance(node, ast.Assign) for target in node.targets if isinstance(target, ast.Name)}
         defined |= {alias.asname or alias.name for node in tree.body if isinstance(node, ast.ImportFrom) for alias in node.names}
         assert function in defined, f"{name}: {source} has no {function}"
 

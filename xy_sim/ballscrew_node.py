@@ -16,7 +16,8 @@ from std_msgs.msg import Float64MultiArray
 
 from xy_sim.machine import Machine
 from xy_sysid.errors import BadInput
-from xy_sysid.nodes.common import DATA_QOS, WalledNode, declare, from_message, status, to_message
+from xy_sysid.nodes.common import DATA_QOS, WalledNode, declare
+from xy_sysid.nodes.convert import from_message, status, to_message
 from xy_sysid.nodes.diagnostics import Diagnostics
 from xy_sysid.samples.block import Block
 from xy_sysid.settings import BallscrewSettings

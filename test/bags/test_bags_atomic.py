@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import resource
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.bag_making import a_recording
-from helpers.cli_tools import RIGID, cli, npz
+from helpers.cli_tools import RIGID, bare, cli, npz
 
 from xy_sysid.bags.atomic import whole, write_text
 from xy_sysid.errors import BadRecording
@@ -47,11 +49,11 @@ def rec(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 COMMANDS: dict[str, tuple[str, ...]] = {
     "model": ("fit", "REC", *RIGID, "--model", "OUT", "--force"),
-    "matlab": ("fit", "REC", *RIGID, "--mat", "OUT"),
-    "response": ("frf", "REC", "--csv", "OUT"),
-    "study": ("study", "REC", "--out", "OUT", *RIGID),
+    "matlab": ("fit", "REC", *RIGID, "--mat", "OUT", "--force"),
+    "response": ("frf", "REC", "--csv", "OUT", "--force"),
+    "study": ("study", "REC", "--out", "OUT", *RIGID, "--force"),
     "axis model": ("refine", "REC", "--add", "coulomb_friction", "--model", "OUT", "--force"),
-    "axis matlab": ("refine", "REC", "--add", "coulomb_friction", "--mat", "OUT"),
+    "axis matlab": ("refine", "REC", "--add", "coulomb_friction", "--mat", "OUT", "--force"),
     "bag": ("simulate", "OUT", "--duration", "2"),
 }
 
@@ -117,6 +119,64 @@ def test_the_file_is_on_the_disk_before_it_takes_the_name(tmp_path: Path, monkey
     monkeypatch.setattr(Path, "replace", replace)
     write_text(tmp_path / "a.txt", "text")
     assert done[0].endswith("/a.txt") and done[0] != str(tmp_path / "a.txt") and done[1:] == ["rename", str(tmp_path)]
+
+
+KILLED = """
+import sys, time
+from pathlib import Path
+from xy_sysid.bags.atomic import whole
+with whole(Path(sys.argv[1])) as part:
+    part.write_text("half")
+    print("writing", flush=True)
+    time.sleep(60)
+"""
+
+
+def test_what_kill_9_leaves_is_removed_by_the_next_writer_and_what_the_living_write_is_not(tmp_path: Path) -> None:
+    """Two writers at work in one folder. The first is killed: a third writer removes what it left, and the second still ends well."""
+    writers = [
+        subprocess.Popen([sys.executable, "-c", KILLED, str(tmp_path / name)], stdout=subprocess.PIPE, env=bare()) for name in ("first", "second")
+    ]
+    try:
+        for writer in writers:
+            assert writer.stdout is not None and writer.stdout.readline() == b"writing\n"
+        writers[0].kill()
+        writers[0].wait()
+        assert len(list(tmp_path.iterdir())) == 2
+        write_text(tmp_path / "third", "whole")
+        (left,) = tmp_path.glob(".xy_part_*")
+        assert [item.name for item in left.iterdir()] == ["second"] and (tmp_path / "third").read_text() == "whole"
+    finally:
+        for writer in writers:
+            writer.kill()
+            writer.wait()
+    write_text(tmp_path / "third", "again")
+    assert list(tmp_path.iterdir()) == [tmp_path / "third"]
+
+
+def test_only_the_folders_of_writers_are_removed(tmp_path: Path) -> None:
+    """A folder of somebody whose name begins alike stays, and so does a link, with what it leads to."""
+    own, link = tmp_path / ".xy_part_of_mine", tmp_path / f".xy_part_{'0' * 16}"
+    own.mkdir()
+    (own / "kept").write_bytes(OLD)
+    link.symlink_to(own)
+    write_text(tmp_path / "new", "whole")
+    assert (own / "kept").read_bytes() == OLD and link.is_symlink()
+
+
+def test_a_folder_that_is_removed_before_its_writer_has_locked_it_is_made_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another writer may look between the two; what is written is whole all the same."""
+    real, removed = os.open, list[str]()
+
+    def slow(path: str | Path, flags: int, mode: int = 0o777, *, dir_fd: int | None = None) -> int:
+        if Path(path).name.startswith(".xy_part_") and not removed:
+            removed.append(str(path))
+            Path(path).rmdir()
+        return real(path, flags, mode, dir_fd=dir_fd)
+
+    monkeypatch.setattr(os, "open", slow)
+    write_text(tmp_path / "new", "whole")
+    assert removed and (tmp_path / "new").read_text() == "whole" and list(tmp_path.iterdir()) == [tmp_path / "new"]
 
 
 @pytest.mark.parametrize("problem", [KeyboardInterrupt(), SystemExit(3), ValueError("x")])

@@ -16,7 +16,8 @@ from helpers.stories import told
 
 from xy_sysid.files.viewer_layouts import LARGEST_BLOCK, foxglove, plotjuggler
 from xy_sysid.live.fitter import Update
-from xy_sysid.live.messages import COMPARISON_COLUMNS, LADDER_COLUMNS, StatusMessage, comparison_message, diagnosis_status, ladder_message
+from xy_sysid.live.messages import COMPARISON_COLUMNS, LADDER_COLUMNS, comparison_message, diagnosis_status, ladder_message
+from xy_sysid.live.plain_messages import StatusMessage
 from xy_sysid.live.replay import replay
 from xy_sysid.samples.block import Block, columns, pack
 from xy_sysid.settings import ExcitationSettings, IdentifierSettings

@@ -60,7 +60,7 @@ class Source:
         return all(p.get_subscription_count() > 0 for p in self.publishers.values())
 
     def send(self, first: int, last: int, block: int = 200, shift: int = 0) -> None:
-        from xy_sysid.nodes.common import to_message
+        from xy_sysid.nodes.convert import to_message
 
         for start in range(first, last, block):
             rows = slice(start, min(start + block, last))

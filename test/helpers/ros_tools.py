@@ -154,7 +154,8 @@ class World:
         """A list that fills with the blocks of a topic."""
         from std_msgs.msg import Float64MultiArray
 
-        from xy_sysid.nodes.common import DATA_QOS, from_message
+        from xy_sysid.nodes.common import DATA_QOS
+        from xy_sysid.nodes.convert import from_message
 
         heard: list[Block] = []
         self.node.create_subscription(Float64MultiArray, topic, lambda message: heard.append(from_message(message)), DATA_QOS)
@@ -172,7 +173,8 @@ class World:
         """A machine in this process: every voltage block is answered by what the function makes of it."""
         from std_msgs.msg import Float64MultiArray
 
-        from xy_sysid.nodes.common import DATA_QOS, from_message, to_message
+        from xy_sysid.nodes.common import DATA_QOS
+        from xy_sysid.nodes.convert import from_message, to_message
 
         position = self.node.create_publisher(Float64MultiArray, "position", DATA_QOS)
 

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from helpers import ROOT
 from helpers.bag_making import a_bag, a_recording, assert_same, block, both, joint_state, numbered
-from helpers.cli_tools import cli
+from helpers.cli_tools import cli, refused
 
 from xy_sysid.bags import BagWriter, stream_blocks
 from xy_sysid.bags.cdr import JOINT_TYPE
@@ -318,6 +319,56 @@ def test_replay_of_a_robots_bag_takes_the_nodes_own_parameters(tmp_path: Path) -
     ).json  # fmt: skip
     assert said["axes"] == told["axes"]
     assert "rad/s/(N m)" in " ".join(told["axes"]["x"]["values"]) or told["axes"]["x"]["values"]["input unit"] == "N m"
+
+
+def test_replay_takes_the_run_file_of_the_guide(tmp_path: Path) -> None:
+    """docs/ros2-control.md writes one file for ``run`` and ``replay``: the template, with the names of the joint set, replays a bag of that joint."""
+    robot_bag(tmp_path / "bag")
+    text = (ROOT / "config" / "ros2_control.yaml").read_text(encoding="utf-8")
+    run_file = tmp_path / "my_joint.yaml"
+    run_file.write_text(text.replace("shoulder_pan_joint", "pan").replace("length: 512", "length: 256"), encoding="utf-8")
+    told = cli("replay", tmp_path / "bag", "--params", run_file, "--json").json
+    assert told["units"] == {"input": "N m", "output": "rad"} and set(told["axes"]) == {"x"}
+    said = cli(
+        "replay", tmp_path / "bag", "--effort", "--joint", "x=pan", "--effort-lag", "1", "--axis", "x", "--set", "length=256",
+        "--set", "band_high=60", "--set", "input_unit=N m", "--set", "output_unit=rad", "--json",
+    ).json  # fmt: skip
+    assert said["axes"] == told["axes"]
+
+
+def test_a_run_file_says_where_its_identifier_listens(tmp_path: Path) -> None:
+    """Namespace, remapping, a parameter file beside it and its own parameters over that: as ``run`` starts the node."""
+    (tmp_path / "cell.yaml").write_text("/**/watcher: {ros__parameters: {length: 128, band_high: 40.0}}")
+    node = {"executable": "identifier", "name": "watcher", "params_file": "cell.yaml", "remap": {"voltage": "/drive/command"}}
+    content = {"namespace": "/cell/left", "nodes": [{**node, "parameters": {"length": 256}}, {"executable": "recorder"}]}
+    (tmp_path / "run.yaml").write_text(yaml.safe_dump(content))
+    with BagWriter(tmp_path / "bag") as writer:
+        for voltage, position in blocks(a_recording(4000)):
+            writer.write_block("/drive/command", voltage, int(voltage.time[-1] * 1e9))
+            writer.write_block("/cell/left/position", position, int(position.time[-1] * 1e9))
+    found = cli("replay", tmp_path / "bag", "--params", tmp_path / "run.yaml", "--json").json
+    said = cli(
+        "replay", tmp_path / "bag", "--topic", "voltage=/drive/command", "--topic", "position=/cell/left/position", "--set", "length=256",
+        "--set", "band_high=40", "--json",
+    ).json  # fmt: skip
+    assert found["axes"] == said["axes"]
+
+
+def test_a_run_file_of_two_machines_is_refused_in_one_line(tmp_path: Path) -> None:
+    """Whose parameters are meant is not guessed."""
+    save(a_recording(400), tmp_path / "bag")
+    two = [{"executable": "identifier", "name": name} for name in ("left", "right")]
+    (tmp_path / "run.yaml").write_text(yaml.safe_dump({"nodes": two}))
+    assert "with 2 of executable: identifier" in refused("replay", tmp_path / "bag", "--params", tmp_path / "run.yaml")
+
+
+def test_a_diagnosis_of_a_bag_heeds_the_run_files_diagnoser(tmp_path: Path) -> None:
+    """Its tolerance stands in the story, as it would live."""
+    save(a_recording(40_000), tmp_path / "bag")
+    nodes = [{"executable": "identifier"}, {"executable": "diagnoser", "parameters": {"tolerance": 0.02}}]
+    (tmp_path / "run.yaml").write_text(yaml.safe_dump({"nodes": nodes}))
+    found = cli("replay", tmp_path / "bag", "--params", tmp_path / "run.yaml", "--diagnose", "--axis", "x", "--json").json
+    assert found["stories"]["x"]["tolerance"] == 0.02
 
 
 def test_joint_states_are_numbered_in_a_replay_as_they_were_live(tmp_path: Path) -> None:

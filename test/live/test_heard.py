@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Literal
 
 from xy_sysid.live.heard import Heard, verdict
-from xy_sysid.live.messages import ERROR, OK, STALE, WARN
+from xy_sysid.live.plain_messages import ERROR, OK, STALE, WARN
 
 GOOD = Heard(silent=(), paired=100, refused="", refusals=0, stamps="", sentences={})
 

@@ -12,7 +12,8 @@ from xy_sim.machine import Machine
 from xy_sysid.errors import BadInput
 from xy_sysid.live.fitter import LiveFitter
 from xy_sysid.live.identifier import FitRequest, Identifier
-from xy_sysid.live.messages import ERROR, OK, read_transfer_function
+from xy_sysid.live.messages import read_transfer_function
+from xy_sysid.live.plain_messages import ERROR, OK
 from xy_sysid.live.replay import replay
 from xy_sysid.samples.block import Block
 from xy_sysid.samples.pairing import Quantity

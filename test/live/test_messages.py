@@ -8,14 +8,8 @@ import numpy as np
 from helpers.fitting_cases import held, paper_machine
 
 from xy_sysid.fitting import Structure, identify
-from xy_sysid.live.messages import (
-    comparison_message,
-    frf_message,
-    read_transfer_function,
-    table,
-    topic_of,
-    transfer_function_message,
-)
+from xy_sysid.live.messages import comparison_message, frf_message, read_transfer_function, table, transfer_function_message
+from xy_sysid.live.plain_messages import topic_of
 
 
 def test_a_response_is_rows_of_frequency_real_imag_coherence_sigma() -> None:

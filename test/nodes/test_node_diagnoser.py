@@ -23,7 +23,7 @@ from helpers.simulated import recorded
 
 from xy_sysid.cli import run
 from xy_sysid.files.package_files import find
-from xy_sysid.live.messages import ArrayMessage
+from xy_sysid.live.plain_messages import ArrayMessage
 from xy_sysid.samples.block import Block
 from xy_sysid.samples.recording import Recording
 
@@ -129,7 +129,7 @@ class Sender:
         assert world.until(lambda: all(p.get_subscription_count() > 0 for p in self.publishers.values()), 30.0)
 
     def send(self, first: int, last: int) -> None:
-        from xy_sysid.nodes.common import to_message
+        from xy_sysid.nodes.convert import to_message
 
         recording = friction()
         for start in range(first, last, 200):

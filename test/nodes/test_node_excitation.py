@@ -278,7 +278,8 @@ def test_broken_positions_do_not_crash_it(world: World) -> None:
     """NaN, wrong columns and wrong sizes count as no position."""
     from std_msgs.msg import Float64MultiArray
 
-    from xy_sysid.nodes.common import DATA_QOS, to_message
+    from xy_sysid.nodes.common import DATA_QOS
+    from xy_sysid.nodes.convert import to_message
 
     publisher = world.node.create_publisher(Float64MultiArray, "position", DATA_QOS)
     process = world.start(MODULE, {"patience": 1.0})

@@ -21,7 +21,7 @@ from helpers.ros_tools import World, needs_ros, new_domain, world_in
 from xy_sysid.bags import Bag, BagWriter, stream_blocks
 from xy_sysid.bags.sums import check_sums
 from xy_sysid.imports import load
-from xy_sysid.live.messages import ArrayMessage
+from xy_sysid.live.plain_messages import ArrayMessage
 from xy_sysid.live.replay import replay
 from xy_sysid.samples.block import Block
 from xy_sysid.settings import IdentifierSettings
@@ -169,7 +169,7 @@ def test_bad_messages_are_refused_in_words_and_nothing_crashes(world: World) -> 
     """Wrong columns, sizes that do not fit, NaN, a restart of the source: counted, said, and identification goes on."""
     from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 
-    from xy_sysid.nodes.common import to_message
+    from xy_sysid.nodes.convert import to_message
 
     statuses = world.statuses()
     source = Source(world)
@@ -233,7 +233,8 @@ def test_joint_states_in_ros_time_are_paired_with_the_voltage_of_the_excitation(
     from sensor_msgs.msg import JointState
     from std_msgs.msg import Float64MultiArray
 
-    from xy_sysid.nodes.common import DATA_QOS, from_message, to_message
+    from xy_sysid.nodes.common import DATA_QOS
+    from xy_sysid.nodes.convert import from_message, to_message
 
     statuses, place, late = world.statuses(), np.zeros(2), [1000.0]
     publisher = world.node.create_publisher(JointState, "joint_states", 1000)

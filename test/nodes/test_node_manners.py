@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -11,7 +12,7 @@ from typing import Any
 import pytest
 from helpers import ROOT
 from helpers.cli_tools import bare
-from helpers.live_nodes import FAST, newest
+from helpers.live_nodes import FAST, Source, newest
 from helpers.ros_tools import Integrator, World, needs_ros, world_in
 
 pytestmark = needs_ros
@@ -116,6 +117,47 @@ def test_topics_that_are_remapped_go_on_working(world: World) -> None:
     assert world.until(lambda: int(newest(statuses, "axis x").get("windows", "0")) > 20, 60.0)
     assert float(newest(statuses, "axis x")["relative error (1)"]) < 0.05
     assert world.node.count_publishers("/xy/voltage") == 0
+
+
+def test_two_robots_with_joints_in_any_script_are_told_apart(world: World) -> None:
+    """Each robot in a namespace of its own, with a joint whose name has no Latin letter: identified under the axis' name, each from its own data."""
+    from sensor_msgs.msg import JointState
+
+    joints = {"/left": "关节-2", "/right": "Шарнир Ä"}
+    statuses = {space: world.statuses(f"{space}/metrics") for space in joints}
+    publishers = {space: world.node.create_publisher(JointState, f"{space}/joint_states", 10_000) for space in joints}
+    hears = {**QUICK, "axes": '["größe"]', "source": "joint_state", "effort_as_voltage": True, "length": 256, "band_high": 60.0}
+    for space, joint in joints.items():
+        world.start(IDENTIFIER, {**hears, "joints": json.dumps([f"größe={joint}"])}, arguments=["-r", f"__ns:={space}"])
+    source = Source(world, ("größe",), rate=125.0)
+    assert world.until(lambda: all(publisher.get_subscription_count() > 0 for publisher in publishers.values()), 30.0)
+    for n in range(4000):
+        for number, (space, joint) in enumerate(joints.items(), start=1):
+            message = JointState(name=["gripper", joint], position=[0.0, source.y[n, 0]], effort=[0.0, number * source.u[n, 0]])
+            message.header.stamp.sec, message.header.stamp.nanosec = 5 + n // 125, n % 125 * 8_000_000
+            publishers[space].publish(message)
+        if n % 100 == 0:
+            world.spin(0.01)
+
+    def gains() -> list[float]:
+        return [float(newest(heard, "axis größe").get("gain (m/s/V)", "nan")) for heard in statuses.values()]
+
+    assert world.until(lambda: gains()[0] == pytest.approx(0.1, rel=0.05) and gains()[1] == pytest.approx(0.05, rel=0.05), 60.0), gains()
+
+
+def test_the_name_of_a_joint_cannot_steer_the_terminal_of_a_node(world: World) -> None:
+    """A name from the network stands in the log, character by character."""
+    from sensor_msgs.msg import JointState
+
+    node = world.start(IDENTIFIER, {**QUICK, "source": "joint_state", "effort_as_voltage": True})
+    publisher = world.node.create_publisher(JointState, "joint_states", 10)
+
+    def told() -> bool:
+        publisher.publish(JointState(name=["arm\x1b]0;mine\x07\x9b2J"], position=[0.0], effort=[0.0]))
+        return "expected x, y" in node.output()
+
+    assert world.until(told, 40.0), node.output()
+    assert "joints arm␛]0;mine␇�2J" in node.output() and "\x1b]0" not in node.output()
 
 
 def test_with_use_sim_time_samples_are_stamped_by_the_clock_topic(world: World) -> None:

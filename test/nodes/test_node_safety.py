@@ -66,7 +66,8 @@ def test_a_voltage_that_starts_again_is_followed_though_its_first_blocks_were_lo
     """The drive has moved on by itself when a source begins again, and hears it from counter 160 on: it answers with that one's counters."""
     from std_msgs.msg import Float64MultiArray
 
-    from xy_sysid.nodes.common import DATA_QOS, to_message
+    from xy_sysid.nodes.common import DATA_QOS
+    from xy_sysid.nodes.convert import to_message
 
     positions = world.blocks("position")
     world.start(MACHINE, {"machine": "rigid.yaml", "realtime": True, "watchdog": 0.05})

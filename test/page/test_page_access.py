@@ -196,6 +196,22 @@ def test_the_guard_stands_before_http_and_websockets() -> None:
     assert refused["type"] == "websocket.close" and refused["code"] == 4403
 
 
+def test_stop_is_obeyed_without_the_page_and_without_an_origin() -> None:
+    """As ``curl -X POST`` sends it, even with the signs of another site's form: it can only stop. With an origin it must be the page's own."""
+    access = rules("127.0.0.1")
+    assert ask(access, "/stop")[2] == "inside"
+    assert ask(access, "/stop", **{"sec-fetch-site": "cross-site", "sec-fetch-mode": "navigate"})[2] == "inside"
+    for origin in ("null", "http://evil.example"):
+        assert ask(access, "/stop", origin=origin, **{"sec-fetch-site": "cross-site", "sec-fetch-mode": "navigate"})[0]["status"] == 403
+
+
+def test_scripts_come_from_this_server_only() -> None:
+    """No address made of text or of a blob is a script, nothing is embedded, and no other base for addresses can be set."""
+    policy = dict(part.split(" ", 1) for part in ask(rules("127.0.0.1"))[1]["content-security-policy"].split("; "))
+    assert not {"data:", "blob:", "*", "https:"} & set(policy["script-src"].split())
+    assert policy["default-src"] == "'self'" and policy["object-src"] == policy["base-uri"] == policy["frame-ancestors"] == "'none'"
+
+
 def test_the_guard_sets_a_cookie_out_of_reach_of_scripts() -> None:
     """HttpOnly and SameSite=Strict, and the redirect never leaves this server."""
     access = Access("secret", ())

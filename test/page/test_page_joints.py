@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 
-from xy_sysid.live.messages import OK, ArrayMessage, StatusMessage, topic_of
+from xy_sysid.live.plain_messages import OK, ArrayMessage, StatusMessage, topic_of
 from xy_sysid.page.topics_state import TopicsState
 
 AXIS = "joint-2"

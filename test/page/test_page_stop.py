@@ -213,7 +213,8 @@ sys.exit(main())
 """
     from std_msgs.msg import Float64MultiArray
 
-    from xy_sysid.nodes.common import DATA_QOS, to_message
+    from xy_sysid.nodes.common import DATA_QOS
+    from xy_sysid.nodes.convert import to_message
 
     statuses = world.statuses()
     process = world.start(code)

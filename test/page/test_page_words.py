@@ -13,7 +13,7 @@ from helpers import ROOT
 
 from xy_sysid.errors import BadInput
 from xy_sysid.linear.transfer_function import TransferFunction
-from xy_sysid.live.messages import ArrayMessage, StatusMessage
+from xy_sysid.live.plain_messages import ArrayMessage, StatusMessage
 from xy_sysid.page.document_words import look_alike_lines, model_effects, verdict_words
 from xy_sysid.page.downloads import model_text, plain_name
 from xy_sysid.page.facts import coherence_fact, dropped_words, facts, polynomial, seconds_text, transfer_function_html

@@ -54,6 +54,12 @@ def test_each_line_says_which_node_wrote_it() -> None:
     assert ("a", "hello") in heard
 
 
+def test_what_a_node_writes_cannot_steer_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    """A name from the network that a node repeats is shown, and sets neither title nor colours."""
+    assert run([stand_in("a", "print('joint \\x1b]0;mine\\x07 is not there')")]) == 0
+    assert "a | joint ␛]0;mine␇ is not there" in capsys.readouterr().out.splitlines()
+
+
 def test_the_excitation_is_stopped_first_and_the_machine_last() -> None:
     """Stopping goes rank by rank: nobody is asked to stop before everybody of a lower rank has ended."""
     ears = Ears("up", 3)

@@ -202,7 +202,7 @@ def test_the_command_writes_the_page_and_speaks_one_json_document(
     assert fits["ML"]["delay"] == pytest.approx(study["x"].fits["ML"].tf.delay, rel=1e-9)
     assert fits["NLLS"]["relative_error"] == pytest.approx(study["x"].fits["NLLS"].relative_error, rel=1e-9)
     assert out.stat().st_size == document["bytes"] and "Study of table.npz" in out.read_text(encoding="utf-8")
-    assert run(["study", str(source), "-o", str(out), "--axis", "x"]) == 0
+    assert run(["study", str(source), "-o", str(out), "--axis", "x", "--force"]) == 0
     assert "relative error" in capsys.readouterr().out
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Literal, Protocol
 
+from xy_sysid.bags.atomic import taken
 from xy_sysid.bags.cdr import ARRAY_TYPE, encode_array
 from xy_sysid.bags.mcap_writer import McapWriter
 from xy_sysid.bags.sqlite_writer import SqliteWriter
@@ -73,7 +74,7 @@ class BagWriter:
         self.first, self.last = 0, 0
         self._waiting, self._flushed = 0, time.monotonic()
         try:
-            if self.path.exists():
+            if taken(self.path):
                 raise BadRecording(self.path, "exists already", "Choose another name; nothing is overwritten.")
             (self.path.parent if bare else self.path).mkdir(parents=True, exist_ok=True)
             self.file = self.path if bare else self.path / f"{self.path.name}{ending}"

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from typing import TextIO
 
 from xy_sysid.cli.interrupt import Interrupts
+from xy_sysid.processes.terminal import printable
 
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")  # results repeat bit for bit with one thread, and small matrices gain nothing from two
@@ -90,7 +91,7 @@ def _unless_terminated(code: object) -> int:
 def _say(line: str) -> None:
     """A line on stderr; where even that has no room, the exit code tells."""
     try:
-        sys.stderr.write(line)
+        sys.stderr.write(printable(line))
         sys.stderr.flush()
     except OSError:
         _discard(sys.stderr)

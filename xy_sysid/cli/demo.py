@@ -140,7 +140,7 @@ def _panel(monitor: Monitor, axes: tuple[str, ...], seconds: float) -> Renderabl
     from rich.text import Text
 
     from xy_sysid.cli.drawing import curve
-    from xy_sysid.live.messages import topic_of
+    from xy_sysid.live.plain_messages import topic_of
 
     panels = []
     for axis in axes:
@@ -204,7 +204,8 @@ def result(monitor: Monitor, axis: str, truth: dict[str, Any]) -> dict[str, Any]
 
 def function_text(monitor: Monitor, axis: str) -> str:
     """The transfer function that was published, in a line of mathematics."""
-    from xy_sysid.live.messages import read_transfer_function, topic_of
+    from xy_sysid.live.messages import read_transfer_function
+    from xy_sysid.live.plain_messages import topic_of
 
     message = monitor.arrays.get(topic_of("transfer_function", axis))
     if message is None:

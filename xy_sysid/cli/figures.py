@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json as _json
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -26,6 +27,7 @@ def figures(
     out: Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="the folder to write into, made if it is not there")] = Path("figures"),
     kind: Annotated[list[str] | None, typer.Option("--kind", metavar="KIND", help="svg, pdf or csv (may be repeated; default all three)")] = None,
     effect_file: Own = None,
+    force: Annotated[bool, typer.Option("--force", help="replace the pictures of these axes that are there already")] = False,
     json: o.Json = False,
 ) -> None:
     """Write every picture of the story of each axis, from where the rigid model fails to the falling error, as SVG, PDF and CSV."""
@@ -45,9 +47,11 @@ def figures(
         raise BadInput("--out", str(out), "a folder", "Give another name.")
     known = library(effect_file or [])
     recording = read(recs, reading, json)
+    names = chosen(recording, reading.axes)
+    if not force:
+        _free(out, names, kinds)
     written: dict[str, list[str]] = {}
     with progress() as bar:
-        names = chosen(recording, reading.axes)
         task = bar.add_task("telling the story", total=len(names))
 
         def work(name: str) -> dict[str, Any]:
@@ -56,7 +60,7 @@ def figures(
             made = []
             for title, figure in gallery(story).items():
                 for one in kinds:
-                    path = out / f"{name}_{title}.{one}"
+                    path = out / f"{_plain(name)}_{title}.{one}"
                     made.append((path, table(_json.loads(figure.to_json())).encode() if one == "csv" else vectors(figure, one)))
             _write(out, made)
             written[name] = [path.name for path, _ in made]
@@ -72,6 +76,23 @@ def figures(
     for name, text in refused.items():
         say(f"axis {name}: {text}")
     say(f"wrote {sum(len(names) for names in written.values())} files into {out}")
+
+
+def _plain(name: str) -> str:
+    """The name of an axis as the beginning of a file's name: it comes from a recording, and leads into no other folder."""
+    return re.sub(r"[/\\\0-\x1f]", "_", name)
+
+
+def _free(out: Path, names: tuple[str, ...], kinds: tuple[str, ...]) -> None:
+    """Raises BadInput where a picture of one of these axes is there already, before any is drawn."""
+    from glob import escape
+
+    from xy_sysid.files.unasked import free
+
+    for name in names:
+        for kind in kinds:
+            for path in out.glob(f"{escape(_plain(name))}_*.{kind}"):
+                free("--out", path, force=False, act="add --force")
 
 
 def _write(out: Path, made: list[tuple[Path, bytes]]) -> None:

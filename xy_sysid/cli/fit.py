@@ -41,8 +41,8 @@ def fit(
     from xy_sysid.fitting.of_run import Method, fit_response
 
     settings = o.settings_from(params, set_)
-    o.model_file(model, force)
-    o.output_file("--mat", mat)
+    o.output_file("--model", model, force)
+    o.output_file("--mat", mat, force)
     samples = o.period_from(period)
     way = Method(method, weighting, domain)
     way.structure(settings)  # refuses what makes no sense, before any work is done

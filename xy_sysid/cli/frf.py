@@ -28,6 +28,7 @@ def frf(
     params: o.Params = None,
     period: o.Period = "auto",
     csv: Annotated[Path | None, typer.Option("--csv", metavar="FILE", help="write frequency, real, imag, coherence and sigma of every line")] = None,
+    force: o.Force = False,
     json: o.Json = False,
 ) -> None:
     """Frequency response, coherence and uncertainty of each axis."""
@@ -36,7 +37,7 @@ def frf(
     from xy_sysid.fitting.of_recording import estimate
 
     settings = o.settings_from(params, set_)
-    o.output_file("--csv", csv)
+    o.output_file("--csv", csv, force)
     recording = read(recs, reading, json)
     samples = o.period_from(period)
     done, problems = each(chosen(recording, reading.axes), lambda name: estimate(recording, name, settings, samples))

@@ -16,7 +16,7 @@ from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Float64MultiArray
 
 from xy_sysid.errors import BadInput
-from xy_sysid.live.messages import ArrayMessage, topic_of
+from xy_sysid.live.plain_messages import ArrayMessage, topic_of
 from xy_sysid.nodes.common import LATCHED_QOS, NAMESPACE
 from xy_sysid.nodes.convert import array_from_ros
 from xy_sysid.nodes.wall import Wall

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.settings import IdentifierSettings, Settings, changed, unknown_name
+
+if TYPE_CHECKING:
+    from xy_sysid.processes.run_plan import Told
 
 Rec = Annotated[Path, typer.Argument(metavar="REC", help="recording: a rosbag2 folder or file (.db3, .mcap), .csv, .mat or .npz")]
 Recs = Annotated[
@@ -20,7 +23,7 @@ Axes = Annotated[list[str] | None, typer.Option("--axis", "-a", help="only this 
 Set = Annotated[
     list[str] | None, typer.Option("--set", "-s", metavar="NAME=VALUE", help="change a setting, for example length=2048 (see docs/settings.md)")
 ]
-Params = Annotated[Path | None, typer.Option("--params", metavar="FILE", help="ROS parameter file; the identifier's part is used")]
+Params = Annotated[Path | None, typer.Option("--params", metavar="FILE", help="ROS parameter file or run file; the identifier's part is used")]
 Topics = Annotated[
     list[str] | None,
     typer.Option("--topic", metavar="WHAT=NAME", help="topic names in a bag: voltage=..., position=... or joints=... (may be repeated)"),
@@ -39,7 +42,7 @@ EffortLag = Annotated[
 Period = Annotated[str, typer.Option(help="samples of the input's period: auto, none or a number")]
 Span = Annotated[str, typer.Option("--span", metavar="FROM:TO", help="only this part, in seconds from the start, for example 10:70")]
 LARGEST_DOMAIN = 232
-Force = Annotated[bool, typer.Option("--force", help="replace a model file that is there already")]
+Force = Annotated[bool, typer.Option("--force", help="replace a file that is there already")]
 Json = Annotated[bool, typer.Option("--json", help="one JSON document on stdout")]
 
 
@@ -47,20 +50,25 @@ def settings_from(params: Path | None, pairs: list[str] | None) -> IdentifierSet
     """The identifier's settings from a parameter file and NAME=VALUE pairs."""
     settings = IdentifierSettings()
     if params is not None:
-        settings = changed(settings, {name: value for name, value in _of_identifier(params).items() if name != "axes"})
+        settings = changed(settings, {name: value for name, value in told_to("identifier", params).parameters.items() if name != "axes"})
     return changed(settings, values_from(pairs, "--set", "length=2048", IdentifierSettings))
 
 
 def axes_from(params: Path | None) -> tuple[str, ...]:
     """The axes that a parameter file gives the identifier; none if it does not."""
-    found = _of_identifier(params).get("axes", []) if params is not None else []
+    found = told_to("identifier", params).parameters.get("axes", []) if params is not None else []
     return tuple(map(str, found)) if isinstance(found, list) else ()
 
 
-def _of_identifier(params: Path) -> dict[str, Any]:
+def told_to(kind: str, params: Path) -> Told:
+    """What a ROS parameter file or a run file tells a kind of node; no parameters where a parameter file does not speak of it."""
     from xy_sysid.files.ros_parameters import parameters
+    from xy_sysid.processes.run_plan import Told, is_run_file, told
 
-    return dict(parameters(read_text(params), str(params)).get("identifier", {}))
+    text = read_text(params)
+    if is_run_file(text, str(params)):
+        return told(kind, text, str(params), lambda name: read_text(params.resolve().parent / name))
+    return Told(parameters(text, str(params)).get(kind, {}))
 
 
 def values_from(pairs: list[str] | None, option: str, example: str, cls: type[Settings]) -> dict[str, Any]:
@@ -83,29 +91,31 @@ def ros_domain() -> None:
         raise BadInput("ROS_DOMAIN_ID", repr(text), f"0 to {LARGEST_DOMAIN}", "Set it, or leave it unset for 0.")
 
 
-def output_file(option: str, path: Path | None) -> None:
-    """Raises BadInput, before any work is done, when a file cannot be written."""
+def output_file(option: str, path: Path | None, force: bool) -> None:
+    """Raises BadInput, before any work is done, when a file cannot be written, or would replace one and nobody said --force."""
     if path is None:
         return
+    from xy_sysid.files.unasked import free
+
     folder = path.absolute().parent
     try:
         if path.is_dir():
             raise BadInput(option, str(path), "a file, and this is a folder", "Give the file a name.")
         if not folder.is_dir():
             raise BadInput(option, str(path), "a file in a folder that is there", f"Make {folder} first.")
+        free(option, path, force, "add --force")
     except OSError as problem:
         raise BadInput(option, str(path), "a name that the file system takes", f"{problem.strerror}.") from None
     if not os.access(path if path.exists() else folder, os.W_OK):
         raise BadInput(option, str(path), "a file that you may write", "Choose another place.")
 
 
-def model_file(path: Path | None, force: bool) -> None:
-    """Raises BadInput, before any work is done, when a model cannot be written, or would replace a file and nobody said --force."""
-    output_file("--model", path)
-    if path is not None:
-        from xy_sysid.files.unasked import free
+def new_bag(path: Path | None) -> None:
+    """Raises BadRecording where something is there already: a bag never replaces anything."""
+    from xy_sysid.bags.atomic import taken
 
-        free("--model", path, force, "add --force")
+    if path is not None and taken(path):
+        raise BadRecording(path, "exists already", "Choose another name; nothing is overwritten.")
 
 
 def read_text(path: Path) -> str:

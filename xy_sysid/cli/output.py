@@ -7,16 +7,18 @@ import math
 import re
 import sys
 import textwrap
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.segment import Segment
 from rich.table import Table
 
 from xy_sysid.errors import ReaderGone
+from xy_sysid.processes.terminal import printable
 from xy_sysid.units import readable
 
 if TYPE_CHECKING:
@@ -35,6 +37,11 @@ class Terminal(Console):
     def on_broken_pipe(self) -> None:
         """Called by rich, which would end the process itself."""
         raise ReaderGone
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterator[Segment]:
+        """What rich draws a thing with; text steers no terminal, whoever wrote it."""
+        for part in super().render(renderable, options):
+            yield part if part.control else Segment(printable(part.text), part.style)
 
 
 people = Terminal(highlight=False, soft_wrap=True, markup=False, emoji=False)  # a file may be called [bold] or :car:

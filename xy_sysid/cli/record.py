@@ -22,12 +22,11 @@ def record(
 ) -> None:
     """Record the topics of the contract to a rosbag2; Ctrl-C ends it and the bag is whole."""
     from xy_sysid.cli.output import emit, people
-    from xy_sysid.errors import BadInput, BadRecording, MissingExtra
+    from xy_sysid.errors import BadInput, MissingExtra
 
     if storage not in ("sqlite3", "mcap"):
         raise BadInput("--storage", repr(storage), "sqlite3, mcap", "Choose one of these.")
-    if out.exists():
-        raise BadRecording(out, "exists already", "Choose another name; nothing is overwritten.")
+    o.new_bag(out)
     try:
         import rclpy  # noqa: F401
     except ModuleNotFoundError:
@@ -55,10 +54,9 @@ def _arguments(values: dict[str, Any], namespace: str) -> list[str]:
 
 def _run(arguments: list[str]) -> int:
     """The recorder in this process: Ctrl-C is a wish to end it, and not an error."""
-    from xy_sysid.nodes.recorder import make
-    from xy_sysid.nodes.run import run_node
+    from xy_sysid.nodes.run import maker, run_node
 
-    return run_node(make, ["recorder", *arguments])
+    return run_node(maker("xy_sysid.nodes.recorder_node:RecorderNode"), ["recorder", *arguments])
 
 
 def _content(out: Path) -> dict[str, int]:

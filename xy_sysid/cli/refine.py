@@ -60,7 +60,8 @@ def refine(
     for name in add or []:
         if known[name].category == "base":
             raise BadInput("--add", name, "an effect that is not in every model already", "See xy-sysid effects.")
-    o.model_file(model, force)
+    o.output_file("--model", model, force)
+    o.output_file("--mat", mat, force)
     recordings = read_each(recs, reading, json)
     recording = recordings[0]
     names = chosen(recording, reading.axes)

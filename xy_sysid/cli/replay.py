@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from xy_sysid.samples.joint_fields import JointOutput
     from xy_sysid.units import Units
 
+OF_DIAGNOSER = ("memory", "minimum", "tolerance", "effect_files")  # settings of the live diagnoser that a diagnosis of a whole bag heeds
+
 
 def replay(
     bag: Annotated[Path, typer.Argument(metavar="BAG", help="rosbag2 folder or file with voltage and position")],
@@ -46,6 +48,7 @@ def replay(
     from xy_sysid.live.diagnoser import Diagnoser, all_at_once
     from xy_sysid.live.identifier import Identifier
     from xy_sysid.live.replay import replay as logic
+    from xy_sysid.processes.run_plan import Told
     from xy_sysid.samples.pairing import QUANTITIES
     from xy_sysid.settings import DiagnoserSettings, changed, given
     from xy_sysid.story.acts import sentence as words
@@ -53,10 +56,13 @@ def replay(
     from xy_sysid.units import USUAL, motion
 
     settings = o.settings_from(params, set_)
+    looking = DiagnoserSettings()
+    if diagnose and params is not None:
+        given_to = o.told_to("diagnoser", params).parameters
+        looking = changed(looking, {name: given_to[name] for name in OF_DIAGNOSER if name in given_to})
     if velocity:
         settings = changed(settings, {"output": "velocity"})
-    if out is not None and out.exists():
-        raise BadRecording(out, "exists already", "Choose another name; nothing is overwritten.")
+    o.new_bag(out)
     last: Update | None = None
     updates, alarms = 0, dict[str, str]()
     begun = time.perf_counter()
@@ -64,11 +70,12 @@ def replay(
         writer: BagWriter | None = None
         bar = stack.enter_context(progress())
         task = bar.add_task(f"replaying {bag.name}", total=None)
-        names: dict[str, Any] = dict(o.topics_from(topic))
+        live = Told({}) if params is None else o.told_to("identifier", params)
+        names: dict[str, Any] = {"voltage_topic": live.topic("voltage"), "position_topic": live.topic("position"), **o.topics_from(topic)}
         units: list[Units] = []
         notes: list[str] = []
         if settings.source == "joint_state":
-            names.setdefault("joint_topic", settings.joint_topic if settings.joint_topic.startswith("/") else f"/xy/{settings.joint_topic}")
+            names.setdefault("joint_topic", live.topic(settings.joint_topic))
         joints, lag = tuple(joint or given(settings.joints)), effort_lag or settings.effort_lag
         output: JointOutput | None = "velocity" if settings.output == "velocity" else None
         wanted = Topics(effort_as_voltage=effort or settings.effort_as_voltage, joints=joints, effort_lag=lag, output=output, **names)
@@ -86,7 +93,8 @@ def replay(
             units[0] = settings.units
         identifier = Identifier(settings, wished, units[0])
 
-        diagnoser = Diagnoser(DiagnoserSettings(reorder=settings.reorder, input_unit=units[0].input, output_unit=units[0].output), identifier.axes)
+        looking = changed(looking, {"reorder": settings.reorder, "input_unit": units[0].input, "output_unit": units[0].output})
+        diagnoser = Diagnoser(looking, identifier.axes)
 
         def all_blocks() -> Any:
             for name, block in itertools.chain([(kind, first)], blocks):
@@ -106,7 +114,7 @@ def replay(
                 for message in update.arrays():
                     writer.write_array(f"/xy/{message.topic}", message.labels, message.sizes, message.data, stamp)
     seconds = time.perf_counter() - begun
-    stories = all_at_once(diagnoser, library(effect_file or [])) if diagnose else {}
+    stories = all_at_once(diagnoser, library(effect_file or given(looking.effect_files))) if diagnose else {}
     if last is None:
         windows = f"{identifier.samples} paired samples, {settings.length + 1} needed in one piece"
         faults = ", ".join(f"{name} {count}" for name, count in identifier.faults.items()) or "no faults"

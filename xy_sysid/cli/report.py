@@ -29,6 +29,7 @@ def report(
     params: o.Params = None,
     period: o.Period = "auto",
     effect_file: Own = None,
+    force: o.Force = False,
     json: o.Json = False,
 ) -> None:
     """Everything in one self-contained page: summary, experiment, response, fits, checks, what is missing, the falling error."""
@@ -40,7 +41,7 @@ def report(
 
     settings = o.settings_from(params, set_)
     samples = o.period_from(period)
-    o.output_file("--out", out)
+    o.output_file("--out", out, force)
     known = library(effect_file or [])
     recording = read(recs, reading, json)
     names = chosen(recording, reading.axes)

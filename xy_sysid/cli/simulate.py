@@ -30,6 +30,7 @@ def simulate(
         list[str] | None, typer.Option("--excite", "-e", metavar="NAME=VALUE", help="excitation setting for every axis, for example kind=multisine")
     ] = None,
     truth: Annotated[Path | None, typer.Option(metavar="FILE", help="write what was really simulated as JSON")] = None,
+    force: Annotated[bool, typer.Option("--force", help="replace the file of --truth that is there already; OUT never replaces anything")] = False,
     json: o.Json = False,
 ) -> None:
     """Simulate the XY table and write a recording."""
@@ -40,7 +41,7 @@ def simulate(
     from xy_sysid.settings import AxisExcitation
 
     _free(out)
-    o.output_file("--truth", truth)
+    o.output_file("--truth", truth, force)
     table = table_of(machine, effect or [], hidden, seed, clean)
     settings = excitation(table, o.values_from(excite, "--excite", "rms=0.5", AxisExcitation), seed)
     with progress() as bar:
@@ -64,10 +65,11 @@ def simulate(
 
 
 def _free(out: Path) -> None:
+    from xy_sysid.bags.atomic import taken
     from xy_sysid.errors import BadInput
     from xy_sysid.imports import writer_of
 
-    o.output_file("output", None if out.is_dir() else out)
-    if out.exists():
+    o.output_file("output", None if out.is_dir() else out, force=True)
+    if taken(out):
         raise BadInput("output", str(out), "a name that is not there yet", "Choose another name or remove it first.")
     writer_of(out)

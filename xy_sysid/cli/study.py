@@ -31,17 +31,21 @@ def study(
     set_: o.Set = None,
     params: o.Params = None,
     period: o.Period = "auto",
+    force: o.Force = False,
     json: o.Json = False,
 ) -> None:
     """The paper's study (figures 2-7, tables 1-2) of any recording, as one HTML page that opens offline."""
     from xy_sysid.bags.atomic import write_text
+    from xy_sysid.errors import BadInput
     from xy_sysid.report.captions import summary
     from xy_sysid.report.study import study_axis
     from xy_sysid.report.study_page import study_page
 
     settings = o.settings_from(params, set_)
     samples = o.period_from(period)
-    _writable(out, loose, loose_span)
+    o.output_file("--out", out, force)
+    if loose_span and loose is None:
+        raise BadInput("--loose-span", repr(loose_span), "only together with --loose", "Give the second recording too.")
     start, stop = o.span_from(loose_span)
     recording = read([rec], reading, json)
     names = chosen(recording, reading.axes)
@@ -98,17 +102,6 @@ def answer(one: AxisStudy) -> dict[str, Any]:
         moved = {shift.name: {"value": shift.value, "ci95": [shift.low, shift.high], "unit": "Hz"} for shift in one.change.shifts}
         change = {"before": one.change.before_name, "after": one.change.after_name, "shift": moved, "problem": one.change.problem}
     return {"problem": one.problem, "fits": fits, "change": change, "remarks": axis_remarks(one)}
-
-
-def _writable(out: Path, loose: Path | None, loose_span: str) -> None:
-    from xy_sysid.errors import BadInput
-
-    if not out.absolute().parent.is_dir():
-        raise BadInput("--out: folder", str(out.absolute().parent), "a folder that is there", "Make it first.")
-    if out.is_dir():
-        raise BadInput("--out", str(out), "a file", "Give the page a name, for example study.html.")
-    if loose_span and loose is None:
-        raise BadInput("--loose-span", repr(loose_span), "only together with --loose", "Give the second recording too.")
 
 
 def _same_machine(first: Recording, second: Recording, names: tuple[str, ...]) -> None:

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from xy_sysid.bags import POSITION, REFERENCE, VOLTAGE, BagWriter
-from xy_sysid.bags.atomic import whole
+from xy_sysid.bags.atomic import taken, whole
 from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.imports import arrays, csv, sheet_table, table
 from xy_sysid.imports.bag import load_bag
@@ -108,7 +108,7 @@ def save(recording: Recording, path: Path | str) -> None:
     """
     path = Path(path)
     writer = writer_of(path)
-    if writer is _write_bag and path.exists():
+    if writer is _write_bag and taken(path):
         raise BadRecording(path, "exists already", "Choose another name; nothing is overwritten.")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -17,7 +17,8 @@ from xy_sysid.fitting.modes import pole_estimates
 from xy_sysid.fitting.result import Fit, Interval
 from xy_sysid.fitting.structure import FitOptions, Structure, structure_from
 from xy_sysid.live.identifier import AxisRequest, FitRequest
-from xy_sysid.live.messages import ERROR, OK, WARN, ArrayMessage, StatusMessage, comparison_message, frf_message, transfer_function_message
+from xy_sysid.live.messages import comparison_message, frf_message, transfer_function_message
+from xy_sysid.live.plain_messages import ERROR, OK, WARN, ArrayMessage, StatusMessage
 from xy_sysid.live.resonance_watch import Resonance, Track, alarm_sentence, follow
 from xy_sysid.response.frf import FrequencyResponse
 from xy_sysid.response.h1 import H1Options, frequency_response

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from xy_sysid.live.messages import ERROR, OK, STALE, WARN
+from xy_sysid.live.plain_messages import ERROR, OK, STALE, WARN
 from xy_sysid.samples.block import StreamName
 
 

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import re
-from dataclasses import dataclass
-
 import numpy as np
 
 from xy_sysid.fitting.result import Fit
 from xy_sysid.linear.transfer_function import TransferFunction
+from xy_sysid.live.plain_messages import OK, STALE, WARN, ArrayMessage, StatusMessage, topic_of
 from xy_sysid.response.frf import FrequencyResponse
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.story.acts import sentence
@@ -17,33 +15,6 @@ from xy_sysid.story.story import Story
 FRF_COLUMNS = ("frequency", "real", "imag", "coherence", "sigma")
 COMPARISON_COLUMNS = ("frequency", "measured_db", "model_db", "residual_sigma")
 LADDER_COLUMNS = ("step", "train_error", "held_out_error", "noise_floor")
-OK, WARN, ERROR, STALE = 0, 1, 2, 3
-
-
-@dataclass(frozen=True, slots=True)
-class ArrayMessage:
-    """A Float64MultiArray: labels and sizes of its dimensions, and its numbers, row-major."""
-
-    topic: str
-    labels: tuple[str, ...]
-    sizes: tuple[int, ...]
-    data: FloatArray
-
-
-@dataclass(frozen=True, slots=True)
-class StatusMessage:
-    """One diagnostic_msgs/DiagnosticStatus: level OK, WARN, ERROR or STALE, a sentence, named values."""
-
-    name: str
-    level: int
-    message: str
-    values: tuple[tuple[str, str], ...]
-
-
-def topic_of(kind: str, axis: str) -> str:
-    """``<kind>/<axis>``; what ROS does not allow in a name, as in joint-2 or left/wrist, becomes an underscore."""
-    name = re.sub(r"[^A-Za-z0-9_]+", "_", axis)
-    return f"{kind}/{'_' if name[:1].isdigit() else ''}{name}"
 
 
 def table(topic: str, columns: tuple[str, ...], rows: FloatArray) -> ArrayMessage:

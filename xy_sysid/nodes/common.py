@@ -1,25 +1,19 @@
-"""What the nodes share: parameters made from the settings, and blocks to messages and back."""
+"""What the nodes share: topics, their quality of service, and parameters made from the settings."""
 
 from __future__ import annotations
 
-import array
-import functools
 from collections.abc import Callable, Collection
 from typing import Any, Generic, TypeVar, cast
 
-import numpy as np
-from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
-from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout
 
 from xy_sysid.errors import BadInput
 from xy_sysid.nodes.quality import Overridable
 from xy_sysid.nodes.run import run_node
 from xy_sysid.nodes.wall import Wall
-from xy_sysid.samples.block import Block, columns, pack, unpack
 from xy_sysid.settings import AXES, Knob, Settings, build, changed, knobs, of_other_axes, unknown_name
 
 __all__ = [
@@ -31,11 +25,8 @@ __all__ = [
     "Parameters",
     "WalledNode",
     "declare",
-    "from_message",
     "run_node",
     "settings_from_parameters",
-    "status",
-    "to_message",
 ]
 
 NAMESPACE = "/xy"
@@ -171,29 +162,3 @@ def describe(item: Knob, fixed: bool = False) -> ParameterDescriptor:
         else:
             descriptor.integer_range = [IntegerRange(from_value=int(item.low), to_value=int(item.high))]
     return descriptor
-
-
-@functools.lru_cache(maxsize=64)
-def _layout(axes: tuple[str, ...], rows: int) -> MultiArrayLayout:
-    width = 2 + len(axes)
-    sample = MultiArrayDimension(label="sample", size=rows, stride=rows * width)
-    return MultiArrayLayout(dim=[sample, MultiArrayDimension(label=columns(axes), size=width, stride=width)])
-
-
-def to_message(block: Block) -> Float64MultiArray:
-    """The block as it travels; an array.array is taken over whole, where a list would be checked number by number."""
-    return Float64MultiArray(layout=_layout(block.axes, len(block)), data=array.array("d", pack(block).tobytes()))
-
-
-def from_message(message: Float64MultiArray) -> Block:
-    """The block in a message; raises BadInput if its layout is not two dimensions with the columns named."""
-    dim = message.layout.dim
-    if len(dim) != 2:
-        raise BadInput("layout.dim", f"{len(dim)} dimensions", "2: rows and named columns", "Set layout.dim.")
-    return unpack(dim[1].label, dim[0].size, dim[1].size, np.frombuffer(message.data, dtype=np.float64))
-
-
-def status(name: str, level: int, message: str, values: dict[str, str]) -> DiagnosticStatus:
-    """One line of diagnostics: level 0 OK, 1 WARN, 2 ERROR, 3 STALE."""
-    pairs = [KeyValue(key=key, value=value) for key, value in values.items()]
-    return DiagnosticStatus(name=name, hardware_id=name, level=bytes([level]), message=message, values=pairs)

@@ -23,12 +23,14 @@ from xy_sysid.errors import BadInput
 from xy_sysid.excitation.drive import Drive
 from xy_sysid.excitation.pacing import CATCH_UP, Answers, Clock
 from xy_sysid.nodes.commands import Beat, Commands
-from xy_sysid.nodes.common import DATA_QOS, NAMESPACE, STOP_HEARD, STOP_TOPIC, declare, from_message, status, to_message
+from xy_sysid.nodes.common import DATA_QOS, NAMESPACE, STOP_HEARD, STOP_TOPIC, declare
+from xy_sysid.nodes.convert import from_message, status, to_message
 from xy_sysid.nodes.diagnostics import Diagnostics
 from xy_sysid.nodes.hearing import Ear
 from xy_sysid.nodes.quality import AS_IT_IS, Overridable
 from xy_sysid.nodes.streams import AXES, declare_axes
 from xy_sysid.nodes.wall import Wall
+from xy_sysid.processes.terminal import printable
 from xy_sysid.samples.block import Block, FloatArray
 from xy_sysid.settings import ExcitationSettings, for_axes, knobs
 
@@ -436,7 +438,7 @@ class ExcitationNode(Overridable, LifecycleNode):
         kind = re.sub(r"[\d.]+", "", text)
         if kind != self._complaint:
             self._complaint = kind
-            self.get_logger().warning(text)
+            self.get_logger().warning(printable(text))
 
     def _report(self) -> None:
         drive = self._drive

@@ -23,7 +23,8 @@ from std_msgs.msg import Float64MultiArray
 
 from xy_sysid.errors import BadInput
 from xy_sysid.excitation.first_run import AxisFound, FirstRun, Push
-from xy_sysid.nodes.common import DATA_QOS, NAMESPACE, from_message
+from xy_sysid.nodes.common import DATA_QOS, NAMESPACE
+from xy_sysid.nodes.convert import from_message
 from xy_sysid.nodes.hearing import Ear
 from xy_sysid.nodes.wall import Wall
 from xy_sysid.samples.block import Block, FloatArray

@@ -18,7 +18,7 @@ from xy_sysid.files.state import load_state, save_state, set_aside
 from xy_sysid.live.fitter import LiveFitter, Update, warm_up
 from xy_sysid.live.heard import verdict
 from xy_sysid.live.identifier import Identifier
-from xy_sysid.live.messages import WARN, StatusMessage, topic_of
+from xy_sysid.live.plain_messages import WARN, StatusMessage, topic_of
 from xy_sysid.nodes.common import LATCHED_QOS, WalledNode, declare
 from xy_sysid.nodes.convert import array_to_ros, status_to_ros
 from xy_sysid.nodes.diagnostics import Diagnostics

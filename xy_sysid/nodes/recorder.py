@@ -4,20 +4,9 @@ from __future__ import annotations
 
 import sys
 
-from xy_sysid.nodes.run import Runnable, run_node
+from xy_sysid.nodes.run import executable
 
-
-def make() -> Runnable:
-    """The node; its imports wait until the signals are in hand and rclpy is known to be there."""
-    from xy_sysid.nodes.recorder_node import RecorderNode
-
-    return RecorderNode()
-
-
-def main() -> int:
-    """Run the node; the exit code."""
-    return run_node(make)
-
+main = executable("xy_sysid.nodes.recorder_node:RecorderNode")
 
 if __name__ == "__main__":
     sys.exit(main())

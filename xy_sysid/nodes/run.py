@@ -5,14 +5,17 @@ Imports nothing heavy, so that the signals are in hand before anything that take
 
 from __future__ import annotations
 
+import functools
 import signal
 import sys
 import time
 from collections.abc import Callable, Sequence
+from importlib import import_module
 from types import FrameType
 from typing import Any, Protocol, cast
 
 from xy_sysid.errors import MissingExtra, XySysidError
+from xy_sysid.processes.terminal import printable
 
 LOOK = 0.1  # s between two looks whether the node is to end
 LONGEST_STOP = 3.0  # s an orderly end may take; then the last words are said without waiting
@@ -42,6 +45,17 @@ class Runnable(Protocol):
     def get_logger(self) -> Any:
         """rclpy's."""
         ...
+
+
+def maker(place: str) -> Callable[[], Runnable]:
+    """What makes a node. place: module:class, imported when the node is made: after the signals are in hand and rclpy is known to be there."""
+    module, _, name = place.partition(":")
+    return lambda: cast("Runnable", getattr(import_module(module), name)())
+
+
+def executable(place: str) -> Callable[[], int]:
+    """The ``main`` of a node's executable: it runs the node and returns the exit code. place: as for ``maker``."""
+    return functools.partial(run_node, maker(place))
 
 
 def run_node(factory: Callable[[], Runnable], args: Sequence[str] | None = None) -> int:
@@ -99,5 +113,5 @@ def _spin(node: Runnable, asked: list[int]) -> None:
 
 def _refuse(error: Exception) -> int:
     """One line on stderr; what rcl adds about its own source files is left out."""
-    sys.stderr.write(" ".join(str(error).split(", at /")[0].split()) + "\n")
+    sys.stderr.write(printable(" ".join(str(error).split(", at /")[0].split())) + "\n")
     return 2

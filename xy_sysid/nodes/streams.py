@@ -12,9 +12,11 @@ from std_msgs.msg import Float64MultiArray
 
 from xy_sysid.errors import BadInput, XySysidError
 from xy_sysid.live.heard import Heard
-from xy_sysid.live.messages import topic_of
-from xy_sysid.nodes.common import DATA_QOS, declare_fixed, from_message, overrides
+from xy_sysid.live.plain_messages import topic_of
+from xy_sysid.nodes.common import DATA_QOS, declare_fixed, overrides
+from xy_sysid.nodes.convert import from_message
 from xy_sysid.nodes.hearing import Ear
+from xy_sysid.processes.terminal import printable
 from xy_sysid.samples.block import Block, StreamName
 from xy_sysid.samples.integral import integrated
 from xy_sysid.samples.joint_fields import JointReader
@@ -134,7 +136,7 @@ class Streams:
 
     def _refuse(self, text: str) -> None:
         if self.refused != text:
-            self._node.get_logger().warning(text)
+            self._node.get_logger().warning(printable(text))
         self.refused, self.refusals = text, self.refusals + 1
 
 

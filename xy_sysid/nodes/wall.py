@@ -12,6 +12,8 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Any
 
+from xy_sysid.processes.terminal import printable
+
 LONGEST = 200  # characters of an error that are told
 
 
@@ -50,7 +52,7 @@ class Wall:
 
 def words_of(error: BaseException) -> str:
     """Kind, text and place of an error in one short line."""
-    text = " ".join(str(error).split())[:LONGEST]
+    text = printable(" ".join(str(error).split())[:LONGEST])
     frames = traceback.extract_tb(error.__traceback__)
     place = f", {frames[-1].name} line {frames[-1].lineno}" if frames else ""
     return f"{type(error).__name__}{': ' if text else ''}{text}{place}"

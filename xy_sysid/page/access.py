@@ -17,9 +17,24 @@ from urllib.parse import parse_qs, urlsplit
 LARGEST = 1 << 20  # bytes of a request's body; the page itself sends next to nothing
 LOOPBACK = ("localhost", "127.0.0.1", "::1")
 COOKIE = "xy_sysid_token"
+CONTENT = {
+    "default-src": "'self'",
+    # NiceGUI evaluates event handlers, and every answer of a button, from strings (static/nicegui.js): without unsafe-eval nothing is drawn.
+    # plotly.js does not need it.
+    "script-src": "'self' 'unsafe-inline' 'unsafe-eval'",
+    "style-src": "'self' 'unsafe-inline'",
+    "img-src": "'self' data: blob:",  # pictures that are kept as PNG are drawn from these
+    "font-src": "'self' data:",
+    "object-src": "'none'",
+    "base-uri": "'none'",
+    "form-action": "'self'",
+    "frame-ancestors": "'none'",  # as x-frame-options
+}
+"""Where the browser may take content from, by kind: this server alone, and pictures that the page itself has made."""
+
 HEADERS = {
     "x-frame-options": "DENY",  # nobody lays an invisible copy of the buttons over something else
-    "content-security-policy": "default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob:; frame-ancestors 'none'; form-action 'self'",
+    "content-security-policy": "; ".join(f"{kind} {places}" for kind, places in CONTENT.items()),
     "referrer-policy": "no-referrer",
     "x-content-type-options": "nosniff",
 }

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from xy_sysid.live.messages import ArrayMessage
+from xy_sysid.live.plain_messages import ArrayMessage
 from xy_sysid.page.topics_state import columns
 from xy_sysid.report.story_parts import pictured, row
 from xy_sysid.report.words import interval_text, moved, number, quantity

@@ -26,7 +26,7 @@ from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Bool, Float64MultiArray, String
 from std_srvs.srv import Trigger
 
-from xy_sysid.live.messages import StatusMessage
+from xy_sysid.live.plain_messages import StatusMessage
 from xy_sysid.nodes.common import LATCHED_QOS, NAMESPACE, STOP_TOPIC
 from xy_sysid.nodes.convert import array_from_ros
 from xy_sysid.nodes.wall import Wall

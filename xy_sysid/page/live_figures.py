@@ -10,7 +10,7 @@ import plotly.graph_objects as go
 
 from xy_sysid.linear.simulate import held_response
 from xy_sysid.linear.transfer_function import TransferFunction
-from xy_sysid.live.messages import ArrayMessage
+from xy_sysid.live.plain_messages import ArrayMessage
 from xy_sysid.page.topics_state import Tracked, columns, thinned
 from xy_sysid.report.parts import band, broken, decibel, frequency_axis, outline, phase_of, plain, positive, rows, turns, unbroken
 from xy_sysid.report.theme import BEFORE, FAILS, MEASURED, MODEL, UNTRUSTED, fade

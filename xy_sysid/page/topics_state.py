@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from xy_sysid.linear.transfer_function import TransferFunction
-from xy_sysid.live.messages import ArrayMessage, StatusMessage, read_transfer_function, topic_of
+from xy_sysid.live.messages import read_transfer_function
+from xy_sysid.live.plain_messages import ArrayMessage, StatusMessage, topic_of
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import USUAL, Units
 

@@ -1,16 +1,16 @@
-"""From a run file (which nodes, with what) to the processes to start; nothing is started and no file is read here."""
+"""From a run file (which nodes, with what) to the processes to start, or to what one node is told; nothing is started and no file is read here."""
 
 from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from xy_sysid.errors import BadInput
-from xy_sysid.files.ros_parameters import NODES, checked, load
+from xy_sysid.files.ros_parameters import NODES, checked, load, parameters
 from xy_sysid.settings import unknown_name
 
 MODULES = {
@@ -116,3 +116,43 @@ def parameter_files(text: str, where: str) -> list[tuple[str, dict[str, str]]]:
         if "params_file" in entry:
             found.setdefault(entry["params_file"], {name: name for name in NODES})[entry.get("name", entry["executable"])] = entry["executable"]
     return list(found.items())
+
+
+def is_run_file(text: str, where: str) -> bool:
+    """Whether it lists nodes, and is no ROS parameter file. Raises BadInput for what is no YAML."""
+    document = load(text, where)
+    return isinstance(document, dict) and "nodes" in document
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """What a run file tells one node: its parameters by dotted name, its namespace and its remappings."""
+
+    parameters: Mapping[str, Any]
+    namespace: str = NAMESPACE
+    remap: Mapping[str, str] = field(default_factory=dict)
+
+    def topic(self, name: str) -> str:
+        """The full name of a topic that the node calls so."""
+        name = self.remap.get(name, name)
+        return name if name.startswith("/") else f"{self.namespace.rstrip('/')}/{name}"
+
+
+def told(kind: str, text: str, where: str, read: Callable[[str], str]) -> Told:
+    """What a run file tells its one node of a kind, its own parameters over those of its parameter file.
+
+    read: the text of a parameter file, by the name that the run file gives it
+    Raises BadInput for a file that holds none of the kind, or several.
+    """
+    plan(text, where, Path())
+    document = load(text, where)
+    entries = [entry for entry in document["nodes"] if entry["executable"] == kind]
+    if len(entries) != 1:
+        raise BadInput(f"{where}: nodes", f"with {len(entries)} of executable: {kind}", "one", "Give a run file of one machine.")
+    (entry,) = entries
+    found: dict[str, Any] = {}
+    if "params_file" in entry:
+        kinds = dict(parameter_files(text, where))[entry["params_file"]]
+        found |= parameters(read(entry["params_file"]), entry["params_file"], kinds).get(entry.get("name", kind), {})
+    found |= checked(kind, entry.get("parameters", {}), f"{where}: {kind}")
+    return Told(found, entry.get("namespace", document.get("namespace", NAMESPACE)), entry.get("remap", {}))

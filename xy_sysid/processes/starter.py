@@ -22,6 +22,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.files.package_files import find, share
 from xy_sysid.files.ros_parameters import parameters
 from xy_sysid.processes.run_plan import ProcessSpec, parameter_files, plan
+from xy_sysid.processes.terminal import printable
 
 INTERRUPTED = 130
 TERMINATED = 143
@@ -94,7 +95,7 @@ def run(
 
 
 def _print(line: str) -> None:
-    sys.stdout.write(line + "\n")
+    sys.stdout.write(printable(line) + "\n")
     sys.stdout.flush()
 
 

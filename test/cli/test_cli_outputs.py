@@ -1,0 +1,103 @@
+"""No command replaces a file unasked, directly or through a link."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers.cli_tools import RIGID, cli, npz, refused, rigid
+
+from xy_sysid.imports import save
+from xy_sysid.samples.recording import Recording
+
+OLD = b"what was there before"
+QUICK = (*RIGID, "--set", "length=1024")
+
+
+@pytest.fixture(scope="module")
+def rec(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """12 s of a rigid axis."""
+    return npz(tmp_path_factory.mktemp("rec") / "rec.npz", 12_000)
+
+
+FILES: dict[str, tuple[str, ...]] = {
+    "fit --model": ("fit", "REC", *QUICK, "--model", "OUT"),
+    "fit --mat": ("fit", "REC", *QUICK, "--mat", "OUT"),
+    "frf --csv": ("frf", "REC", "--csv", "OUT"),
+    "refine --model": ("refine", "REC", "--add", "coulomb_friction", "--model", "OUT"),
+    "refine --mat": ("refine", "REC", "--add", "coulomb_friction", "--mat", "OUT"),
+    "report -o": ("report", "REC", *QUICK, "-o", "OUT"),
+    "study -o": ("study", "REC", *QUICK, "-o", "OUT"),
+    "simulate --truth": ("simulate", "NEW", "--duration", "1", "--truth", "OUT"),
+}
+BAGS: dict[str, tuple[str, ...]] = {
+    "simulate": ("simulate", "OUT", "--duration", "1"),
+    "simulate, CSV": ("simulate", "OUT.csv", "--duration", "1"),
+    "replay --out": ("replay", "NONE", "--out", "OUT"),
+    "record": ("record", "OUT"),
+}
+
+
+def words(row: tuple[str, ...], rec: Path, out: Path) -> list[str]:
+    """The words of a command with its paths in them."""
+    places = {"REC": str(rec), "NEW": str(out.with_name("new.npz")), "NONE": str(rec)}
+    return [str(out) + word[3:] if word.startswith("OUT") else places.get(word, word) for word in row]
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_file_is_replaced_with_force_only(name: str, rec: Path, tmp_path: Path) -> None:
+    """Refused before any work is done, in a line that says --force; with it the file is new."""
+    out = tmp_path / "out"
+    out.write_bytes(OLD)
+    assert "add --force to replace it" in refused(*words(FILES[name], rec, out))
+    assert out.read_bytes() == OLD and list(tmp_path.iterdir()) == [out]
+    assert cli(*words(FILES[name], rec, out), "--force").code == 0
+    assert out.read_bytes() != OLD
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_link_is_followed_with_force_only(name: str, rec: Path, tmp_path: Path) -> None:
+    """The line says where the link leads, be there a file or none yet."""
+    other, link = tmp_path / "elsewhere" / "precious", tmp_path / "out"
+    other.parent.mkdir()
+    link.symlink_to(other)
+    assert str(other) in refused(*words(FILES[name], rec, link)) and not other.exists()
+    other.write_bytes(OLD)
+    assert str(other) in refused(*words(FILES[name], rec, link)) and other.read_bytes() == OLD
+
+
+@pytest.mark.parametrize("name", BAGS)
+def test_a_recording_never_replaces_anything(name: str, rec: Path, tmp_path: Path) -> None:
+    """Neither a file nor a link that leads nowhere yet."""
+    given = words(BAGS[name], rec, tmp_path / "out")
+    place = Path(next(word for word in given if word.startswith(str(tmp_path))))
+    place.symlink_to(tmp_path / "elsewhere")
+    assert "Choose another name" in refused(*given)
+    assert place.is_symlink() and not (tmp_path / "elsewhere").exists()
+
+
+def test_pictures_are_replaced_with_force_only(rec: Path, tmp_path: Path) -> None:
+    """Those of the axes that are drawn; other files of the folder matter to nobody."""
+    given = ("figures", rec, "-o", tmp_path, "--kind", "csv")
+    (tmp_path / "notes.csv").write_bytes(OLD)
+    assert cli(*given).code == 0
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    assert len(before) > 1 and "add --force to replace it" in refused(*given)
+    assert cli(*given, "--force").code == 0
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def test_what_goes_into_a_pipe_replaces_nothing(rec: Path) -> None:
+    """A device is there always, and takes whatever is written to it."""
+    assert cli("frf", rec, "--csv", "/dev/null").code == 0
+
+
+def test_the_name_of_an_axis_leads_into_no_other_folder(tmp_path: Path) -> None:
+    """It comes from the recording, and the pictures are named after it."""
+    t, u, y = rigid(12_000).values()
+    axis, out = "../../left/wrist", tmp_path / "a" / "b" / "pictures"
+    save(Recording(1000.0, (axis,), np.arange(12_000), t, u[:, None], y[:, None]), tmp_path / "bag")
+    said = cli("figures", tmp_path / "bag", "-o", out, "--kind", "csv")
+    assert said.code == 0, said.err
+    assert list(out.glob(".._.._left_wrist_*.csv")) and {item.name for item in tmp_path.iterdir()} == {"bag", "a"}
