@@ -63,7 +63,6 @@ def test_what_was_found_comes_first_and_what_is_left_is_said() -> None:
     assert (found.verdict, found.effects[0]) == ("missing_effect", "coulomb_friction")
     assert found.sentence.startswith("Missing: coulomb_friction") and " of the error's power (" in found.sentence
     assert 0.9 < found.explained < 1.0
-    assert found.confidence < 0.9
     assert found.discrepancy > 0.0
     assert "What is left: " in found.sentence and "of the motion, beyond the encoder's noise of " in found.sentence
 

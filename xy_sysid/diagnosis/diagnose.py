@@ -174,7 +174,11 @@ def _surest(data: AxisData, ladder: Ladder) -> tuple[Ladder, float]:
     for count in range(len(ladder.effects), len(ladder.effects) - 1 if together else 0, -1):
         names = ladder.effects[:count]
         confidence = _confidence(ladder, names)
-        fit = ladder.final if names == ladder.effects else ladder.steps[count].fit
+        rungs = (place for place, step in enumerate(ladder.steps) if {name for name, _ in step.fit.model.effects} == set(names))
+        place = next(rungs, None)
+        if place is None and names != ladder.effects:
+            continue
+        fit = ladder.final if place is None or names == ladder.effects else ladder.steps[place].fit
         explained = ladder.explained if fit is ladder.final else part_explained(data, ladder.base, fit)
         if confidence < 0.5 or explained < 0.5:
             continue
@@ -184,7 +188,7 @@ def _surest(data: AxisData, ladder: Ladder) -> tuple[Ladder, float]:
         rivals = tuple(rival for rival in ladder.rivals if not contains(library, frozenset(rival.effects), frozenset(names)))
         told = replace(
             ladder,
-            steps=ladder.steps[: count + 1],
+            steps=ladder.steps[: (len(ladder.steps) if place is None else place) + 1],
             final=fit,
             effects=names,
             rivals=rivals,

@@ -11,15 +11,12 @@ from typing import Any
 
 from xy_sysid.axis.model import Library
 from xy_sysid.comparison.where_it_fails import Place
-from xy_sysid.hypotheses.criteria import AT_FLOOR
+from xy_sysid.hypotheses.criteria import AT_FLOOR, DOUBTFUL
 from xy_sysid.diagnosis.diagnose import Diagnosis, Kind
 from xy_sysid.diagnosis.ladder import Candidate, Ladder
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.greybox.parameters import Estimate
 from xy_sysid.units import USUAL, Units, bare, moved
-
-
-DOUBTFUL = 0.1  # probability that a rival predicts as well, above which the two are said to be hardly distinguished
 
 
 @dataclass(frozen=True, slots=True)

@@ -69,15 +69,11 @@ def refine_steps(
 ) -> Generator[Trying, None, Ladder]:
     """The same, step by step: yields what is being tried, returns what it came to."""
     kept, effort = tuple(given), effort or Effort()
-    until = effort.now() + IN_HAND * effort.budget
-
-    def late() -> bool:
-        return effort.now() > until
-
     fixed = Given.of(data, library, kept)
     if fixed.steps[-1].fit.one_step or effort.most == 0:
         return ladder_of_given(data, fixed)
-    pool = Pool(data, library, frozenset(kept), effort.size, effort.most, late)
+    until = effort.now() + IN_HAND * effort.budget
+    pool = Pool(data, library, frozenset(kept), effort.size, effort.most, lambda: effort.now() > until)
     pool.begin(fixed.steps[-1].fit)
     trials = OneStepTrials(pool)
     yield from _sets(pool, None if kept else trials)

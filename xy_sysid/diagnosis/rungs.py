@@ -66,12 +66,12 @@ def ladder_of_given(data: AxisData, given: Given) -> Ladder:
 
 def ladder_of_search(pool: Pool, given: Given, filtered: Filtered | None) -> Ladder:
     """The ladder of the best set, or of what one-step prediction found instead."""
-    data, library, node, base = pool.data, pool.library, pool.best, given.steps[0].fit
+    data, library, node, base = pool.data, pool.library, pool.answer, given.steps[0].fit
     alone = (item for item in pool.nodes.values() if len(item.effects) == 1)
     tried = sorted((Candidate(next(iter(item.effects)), item.promised, item.fit) for item in alone), key=lambda item: item.fit.held_out_error)
     refused = tuple((tuple(sorted(item.effects)), item.refused) for item in pool.nodes.values() if item.refused)
     if filtered is not None:
-        return _of_one_step(data, base, node, filtered, tried, refused, pool.stopped)
+        return _of_one_step(data, base, node, filtered, tried, refused, pool.late())
     final = joined(data, node.fit, pool.late)
     own = {name: max(size(node.fit, pool.without(node, name).fit), 0.0) for name in node.effects - pool.kept}
     names = tuple(name for name, _ in final.model.effects)
@@ -103,7 +103,7 @@ def ladder_of_search(pool: Pool, given: Given, filtered: Filtered | None) -> Lad
         explained=part_explained(data, base, final),
         noise=data.noise_floor,
         discrepancy=math.sqrt(max(final.held_out_error**2 - data.noise_floor**2, 0.0)),
-        stopped=pool.stopped,
+        stopped=pool.late(),
     )
     return likely_names(ladder, given.names)
 
@@ -166,9 +166,9 @@ def _parts(library: Library, name: str) -> tuple[str, ...]:
 
 
 def _rungs(pool: Pool, given: Given, names: tuple[str, ...], final: GreyboxFit) -> list[Step]:
-    """One rung for each effect, in this order, the fits that are known already taken from memory."""
+    """One rung for each effect, in this order, the fits that are known already taken from memory; none that does not lower the held-out error."""
     steps: list[Step] = []
-    now = given.steps[-1].fit
+    now = shown = given.steps[-1].fit
     for name in names[len(given.names) :]:
         so_far = frozenset(own for own, _ in now.model.effects) | {name}
         if so_far == frozenset(own for own, _ in final.model.effects):
@@ -179,5 +179,7 @@ def _rungs(pool: Pool, given: Given, names: tuple[str, ...], final: GreyboxFit) 
                 now = with_one_more(pool.data, pool.library, now, name)
             else:
                 now = known.fit
-        steps.append(Step(name, now))
+        if now is final or now.held_out_error < shown.held_out_error:
+            steps.append(Step(name, now))
+            shown = now
     return steps

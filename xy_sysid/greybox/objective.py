@@ -78,7 +78,7 @@ class Objective:
 
 @njit(cache=True)
 def likeliest(floor: FloatArray, power: FloatArray, response: FloatArray, lines: FloatArray) -> tuple[float, float]:
-    """(s, v) as of ``Objective.unmodelled``, by multiplicative updates of the Itakura-Saito divergence (Fevotte, Bertin & Durrieu 2009, eq. 2.7)."""
+    """(s, v) as of ``Objective.unmodelled``, by multiplicative updates of the Itakura-Saito divergence (Fevotte, Bertin & Durrieu 2009, sec. 2.3)."""
     force = motion = 0.0
     for k in range(floor.size):
         if lines[k] > 0.0:
@@ -98,8 +98,8 @@ def likeliest(floor: FloatArray, power: FloatArray, response: FloatArray, lines:
                 down_motion += weight
         if down_motion <= 0.0:
             return 0.0, 0.0
-        by_force = np.sqrt(up_force / down_force) if down_force > 0.0 else 0.0
-        by_motion = np.sqrt(up_motion / down_motion)
+        by_force = up_force / down_force if down_force > 0.0 else 0.0
+        by_motion = up_motion / down_motion
         force, motion = force * by_force, motion * by_motion
         if abs(by_force - 1.0) < SETTLED and abs(by_motion - 1.0) < SETTLED:
             break

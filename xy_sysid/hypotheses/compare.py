@@ -9,10 +9,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from xy_sysid.greybox.free_run import GreyboxFit
-from xy_sysid.hypotheses.criteria import CHANCE
-
-OVERLAP = 1.5  # half overlapping Hann windows for each independent one (Welch 1967)
-
+from xy_sysid.hypotheses.criteria import CHANCE, OVERLAP
 
 @dataclass(frozen=True, slots=True)
 class Gain:

@@ -31,6 +31,8 @@ def _number(name: str, value: N, unit: str, because: str) -> N:
 
 PRICE = _number("price", 4.0, "nats", "of a parameter: half the logarithm of the number of independent lines (Schwarz 1978), which is 3 to 6")
 CHANCE = _number("chance", 0.977, "1", "probability that a gain over the held-out windows is real: two standard errors")
+OVERLAP = _number("overlap", 1.5, "windows", "half overlapping Hann windows for each independent one (Welch 1967)")
+DOUBTFUL = _number("doubtful", 0.1, "1", "probability that a rival predicts as well, above which the two are said to be hardly distinguished")
 SIZE = _number("size", 0.7, "1", "an effect explains at least so much of what is left unexplained, else what no law explains could feign it")
 WORTH = _number("worth adding", 0.25, "1", "the same for an effect that is added without being named: real machines have small effects, too")
 WIDTH = _number("width", 6, "moves", "from one set that are tried at most, of each kind: the truth was among the first four")

@@ -55,7 +55,6 @@ class Pool:
     most: int = MOST_EFFECTS
     late: Callable[[], bool] = in_time
     nodes: dict[frozenset[str], Node] = field(default_factory=dict)
-    stopped: bool = False
 
     @property
     def scale(self) -> float:
@@ -73,6 +72,14 @@ class Pool:
     def best(self) -> Node:
         """The set with the least score, of those that are worth their effects."""
         return min((node for node in self.nodes.values() if node.leads and not node.refused and node.whole), key=self.score)
+
+    @property
+    def answer(self) -> Node:
+        """The best set whose held-out error in velocity (rms) is below that of the first, or the first."""
+        first = self.nodes[self.kept]
+        lower = (node for node in self.nodes.values() if node.leads and not node.refused and node.whole)
+        better = [node for node in lower if node.fit.held_out_error < first.fit.held_out_error]
+        return min(better, key=self.score, default=first) if self.best is not first else first
 
     def begin(self, start: GreyboxFit) -> Node:
         """The first set, from which the search begins."""
@@ -102,7 +109,6 @@ class Pool:
                 return
             yield move[1].effects
             self._try(*move)
-        self.stopped = True
 
     def _moves(self, node: Node, early: bool = True) -> list[Move]:
         found = moves(self.data, self.library, node.fit, node.brief, early)

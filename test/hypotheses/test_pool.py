@@ -1,0 +1,137 @@
+"""The search over sets of effects: what is tried, what is kept, and when it ends."""
+
+from __future__ import annotations
+
+
+import numpy as np
+import pytest
+from helpers.simulated import recorded
+
+from xy_sysid.axis.model import STANDARD
+from xy_sysid.diagnosis.rungs import with_one_more
+from xy_sysid.diagnosis.refine import Effort, refine
+from xy_sysid.greybox.axis_data import AxisData, prepare
+from xy_sysid.greybox.free_run import fit_base
+from xy_sysid.hypotheses.compare import gain, size
+from xy_sysid.hypotheses.criteria import AT_FLOOR, SIZE
+from xy_sysid.hypotheses.moves import is_twice, moves
+from xy_sysid.hypotheses.pool import Pool
+
+
+def data_of(effect: str, seconds: float = 20.0) -> AxisData:
+    return prepare(2000.0, *recorded(effect, seconds=seconds).axis("x"))
+
+
+def searched(data: AxisData, **how: object) -> tuple[Pool, list[frozenset[str]]]:
+    """The pool after a search, and the sets that were said to be tried."""
+    pool = Pool(data, STANDARD, worth=SIZE, **how)  # type: ignore[arg-type]
+    pool.begin(fit_base(data))
+    return pool, [*pool.search(), *pool.simplified()]
+
+
+@pytest.fixture(scope="module")
+def both() -> tuple[Pool, list[frozenset[str]]]:
+    """Of friction and cogging."""
+    return searched(data_of("coulomb_friction+cogging"))
+
+
+def test_both_effects_are_found(both: tuple[Pool, list[frozenset[str]]]) -> None:
+    """One after the other or at once; what is left is the floor."""
+    pool, _ = both
+    assert pool.best.effects == {"coulomb_friction", "cogging"}
+    assert pool.best.fit.excess < AT_FLOOR
+
+
+def test_no_set_is_tried_twice(both: tuple[Pool, list[frozenset[str]]]) -> None:
+    """What is said before is what is fitted after, once."""
+    pool, tried = both
+    assert len(set(tried)) == len(tried)
+    assert {*tried, frozenset()} >= set(pool.nodes)
+
+
+def test_the_same_data_give_the_same_search(both: tuple[Pool, list[frozenset[str]]]) -> None:
+    """To the last bit."""
+    pool, tried = both
+    again, same = searched(data_of("coulomb_friction+cogging"))
+    assert same == tried
+    assert again.best.fit.model == pool.best.fit.model
+    assert np.array_equal(again.best.fit.error, pool.best.fit.error)
+
+
+def test_an_axis_at_the_floor_asks_for_no_fit() -> None:
+    """Nothing is missing, so nothing is tried."""
+    pool, tried = searched(data_of(""))
+    assert tried == []
+    assert pool.best.effects == frozenset()
+
+
+def test_no_set_has_more_effects_than_were_asked_for() -> None:
+    """Nor does it try more than one then."""
+    pool, tried = searched(data_of("coulomb_friction+cogging"), most=1)
+    assert all(len(effects) == 1 for effects in tried)
+    assert len(pool.best.effects) <= 1
+
+
+def test_every_set_has_what_is_given() -> None:
+    """And the effect that is missing beside it."""
+    data = data_of("coulomb_friction+cogging")
+    pool = Pool(data, STANDARD, frozenset({"cogging"}), SIZE)
+    pool.begin(with_one_more(data, STANDARD, fit_base(data), "cogging"))
+    assert all("cogging" in effects for effects in [*pool.search(), *pool.simplified()])
+    assert pool.best.effects == {"cogging", "coulomb_friction"}
+
+
+def test_what_is_of_no_use_is_left_out_again() -> None:
+    """A set with one effect too many becomes the set without it."""
+    data = data_of("coulomb_friction")
+    pool, _ = searched(data)
+    crowded = frozenset({"coulomb_friction", "constant_load"})
+    pool.fitted(crowded, lambda: [pool.best.fit.model.with_effect("constant_load", (0.001,))])
+    pool.nodes[frozenset({"coulomb_friction"})].leads = False
+    pool.nodes[crowded].leads = True
+    assert pool.best.effects == crowded
+    list(pool.simplified())
+    assert pool.best.effects == {"coulomb_friction"}
+
+
+def test_a_search_that_is_late_ends_with_the_best_so_far() -> None:
+    """After the fit in hand, and the answer says so."""
+    ticks = iter(range(10_000))
+    ladder = refine(data_of("coulomb_friction+cogging"), effort=Effort(budget=3.0, clock=lambda: float(next(ticks))))
+    assert ladder.stopped
+    assert np.isfinite(ladder.final.held_out_error)
+
+
+def test_a_refused_set_is_never_best(both: tuple[Pool, list[frozenset[str]]]) -> None:
+    """Whatever it leaves."""
+    pool, _ = both
+    best = pool.best
+    try:
+        best.refused = "coulomb_friction: at its bound"
+        assert pool.best is not best
+    finally:
+        best.refused = ""
+
+
+def test_moves_hold_no_law_twice() -> None:
+    """Neither two of a family, nor a sum beside one of its parts."""
+    data = data_of("coulomb_friction+cogging")
+    base = fit_base(data)
+    assert is_twice(STANDARD, ["asymmetric_friction", "constant_load"])
+    assert is_twice(STANDARD, ["coulomb_friction", "stribeck_friction"])
+    assert not is_twice(STANDARD, ["coulomb_friction", "constant_load"])
+    assert not any(is_twice(STANDARD, move.effects) for move in moves(data, STANDARD, base, base))
+
+
+def test_the_better_of_two_fits_gains_and_a_fit_gains_nothing_over_itself(both: tuple[Pool, list[frozenset[str]]]) -> None:
+    """Paired over the held-out windows, with its chance."""
+    pool, _ = both
+    rigid, best = pool.nodes[frozenset()], pool.best
+    assert gain(best.fit, rigid.fit).is_sure and not gain(rigid.fit, best.fit).is_sure
+    assert gain(best.fit, rigid.fit).probability > 0.999
+    same = gain(best.fit, best.fit)
+    assert same.nats == 0.0 and same.probability == 0.5 and not same.is_sure
+    assert size(best.fit, rigid.fit) > 100.0
+    assert size(best.fit, best.fit) == 0.0
+
+
