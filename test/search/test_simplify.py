@@ -52,3 +52,11 @@ def test_what_is_known_and_right_is_not_fitted_again(data: AxisData) -> None:
     right = fit_with(data, fit_base(data), ["coulomb_friction"])
     loaded = fit(data, right.model.with_effect("constant_load", (1e-4,)))
     assert settled(data, loaded, right).now.fit is right
+
+
+def test_an_effect_has_a_size_though_the_rigid_model_is_refused(data: AxisData) -> None:
+    """Its delay may be at the bound; the model that a search began from is what every effect is compared with."""
+    right = fit_with(data, fit_base(data), ["coulomb_friction"])
+    settling = settled(data, right, right)
+    settling.search.nodes[frozenset()].refused = "time_delay: 0.1 s is at its bound"
+    assert settling.sizes()["coulomb_friction"] > 1.0

@@ -108,7 +108,7 @@ def ladder_of_search(
         tried=tuple(tried),
         rivals=tuple(rivals),
         sizes={name: min(each) for name, each in sizes.items() if each},
-        astray=max((_astray(data, settled, name) for name in node.effects if judge.library[name].category == "motion"), default=0.0),
+        astray=max((_astray(data, settled, name) for name in own if judge.library[name].category == "motion"), default=0.0),
         helps=max(1.0 - min(judge.rest(item.fit, base) for item in search.nodes.values() if item.whole and not item.refused), 0.0),
         kept_out=_kept_out(search, node.fit.excess),
         refused=refused,

@@ -64,8 +64,9 @@ class Simplifying:
         return found
 
     def best_without(self, name: str) -> Node[GreyboxFit]:
-        """The best of the sets that were fitted of the same effects but for one."""
-        fewer = (node for node in self.search.nodes.values() if node.effects <= self.now.effects - {name} and not node.refused)
+        """The best of the sets that were fitted of the same effects but for one, which was not given; what was given is one, refused or not."""
+        sets = (node for node in self.search.nodes.values() if not node.refused or node.effects == self.kept)
+        fewer = (node for node in sets if node.effects <= self.now.effects - {name})
         return min(fewer, key=lambda node: self.judge.rest(node.fit, self.now.fit))
 
     def _tried(self, here: float) -> list[Node[GreyboxFit]]:
