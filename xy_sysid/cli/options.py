@@ -110,12 +110,9 @@ def model_file(path: Path | None, force: bool) -> None:
 
 def read_text(path: Path) -> str:
     """A text file; raises BadRecording in one line when it cannot be read."""
-    try:
-        return path.read_text(encoding="utf-8")
-    except OSError as problem:
-        raise BadRecording(path, problem.strerror or "cannot be read", "Check the path.") from None
-    except UnicodeDecodeError:
-        raise BadRecording(path, "is not text", "Give a text file.") from None
+    from xy_sysid.bags.opening import text_of
+
+    return text_of(path, "a parameter file")
 
 
 def period_from(text: str) -> int | None:
