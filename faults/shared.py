@@ -43,7 +43,11 @@ RECORDINGS = (
     Shared("bam_servo/bam_xl330_sin_time_square_kp800_even.npz"),
     Shared("bam_servo/bam_xl330_up_and_down_kp100.csv"),
     Shared("bam_servo/bam_xl330_up_and_down_kp100_even.npz"),
-    Shared("camber/LinA_no-pp-sine-sweep-10mm-0.5Hz.txt", mapped("time=1,input=6,output=4", "--unit", "time=ms", "--unit", "output=mm"), ("--span", "0:15")),
+    Shared(
+        "camber/LinA_no-pp-sine-sweep-10mm-0.5Hz.txt",
+        mapped("time=1,input=6,output=4", "--unit", "time=ms", "--unit", "output=mm"),
+        ("--span", "0:15"),
+    ),
     Shared("crane/crane_1.npz", part=("--span", "0:30")),
     Shared("daisy/robot_arm.dat", mapped("input=1,output=2", "--rate", "500", "--unit", "output=m/s^2")),
     Shared(

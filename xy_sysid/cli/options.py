@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from xy_sysid.errors import BadInput, BadRecording
+from xy_sysid.errors import BadInput
 from xy_sysid.settings import IdentifierSettings, Settings, changed, unknown_name
 
 Rec = Annotated[Path, typer.Argument(metavar="REC", help="recording: a rosbag2 folder or file (.db3, .mcap), .csv, .mat or .npz")]

@@ -21,7 +21,7 @@ from xy_sysid.samples.recording import Recording, rate_from_time
 EXAMPLE = "Name the columns like time,x_voltage,x_position[mm] in the first row."
 HEADS = 10  # lines whose cells are counted before anything is made of them
 PIECE = 1 << 24  # bytes read at once
-LONGEST_LINE = 1_000_000  # bytes; MOST_COLUMNS of 100 each
+LONGEST_LINE = 10_000_000  # bytes; a thousand for each of MOST_COLUMNS
 LOOK = 200  # rows before the last one that show how its numbers are written
 
 
