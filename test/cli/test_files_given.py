@@ -19,6 +19,7 @@ from xy_sysid.errors import BadRecording
 from xy_sysid.files.state import load_state
 
 QUICK = 2.0  # s, for a refusal
+DOUBLING = [("", "n0"), *((f"n{k}", f"n{k + 1}") for k in range(30))]  # each list holds the one before twice
 ENDLESS = 10.0  # s after which a command is taken to hang
 
 
@@ -165,9 +166,6 @@ def test_a_model_far_too_large_is_one_line_at_once(what: str, change: Callable[[
     path.write_text(change(model))
     line = refusal("compare", rec, path, seconds=QUICK)
     assert str(path) in line, what
-
-
-DOUBLING = [("", "n0"), *((f"n{k}", f"n{k + 1}") for k in range(30))]
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ from xy_sysid.live.identifier import Identifier
 from xy_sysid.samples.block import Block, FloatArray
 from xy_sysid.samples.joint_states import JointCounter
 from xy_sysid.samples.newest import Newest
+from xy_sysid.samples.pairing import QUANTITIES
 from xy_sysid.settings import IdentifierSettings
 
 SOON = 10.0  # s of data until another rate is noticed
@@ -42,8 +43,8 @@ def heard(joints: JointCounter, times: FloatArray) -> Iterator[Block]:
 
 def feed(sink: Identifier | Newest, joints: JointCounter, times: FloatArray) -> None:
     for block in heard(joints, times):
-        for place, kind in enumerate(("position", "voltage")):
-            sink.feed(kind, Block(("x",), block.seq, block.time, block.values[:, place : place + 1]))  # type: ignore[arg-type]
+        for place, kind in enumerate(QUANTITIES[::-1]):
+            sink.feed(kind, Block(("x",), block.seq, block.time, block.values[:, place : place + 1]))
 
 
 @pytest.mark.parametrize("change", CHANGES)
@@ -101,8 +102,8 @@ def test_another_rate_of_blocks_is_followed_within_ten_seconds(rate: float, chan
         at = time + np.arange(rows) / pace
         time = float(at[-1]) + 1.0 / pace
         seq = np.arange(first, first + rows, dtype=float)
-        for kind in ("voltage", "position"):
-            identifier.feed(kind, Block(("x",), seq, at, random.standard_normal((rows, 1))))  # type: ignore[arg-type]
+        for kind in QUANTITIES:
+            identifier.feed(kind, Block(("x",), seq, at, random.standard_normal((rows, 1))))
         if time > 12.3 + SOON + 250.0 / pace:
             break
     assert identifier.sampling_rate == pytest.approx(rate * change, rel=2e-3)

@@ -57,7 +57,7 @@ def too_much(text: str, most: int = WORDS) -> str:
     known: dict[str, int] = {}  # parts of what an anchor names
     for event in yaml.parse(text, Loader=PARSER):
         if isinstance(event, yaml.AliasEvent):
-            parts += known.get(event.anchor, most + 1)  # what repeats itself within itself never ends
+            parts += known.get(event.anchor or "", most + 1)  # what repeats itself within itself never ends
         elif isinstance(event, yaml.CollectionStartEvent):
             inside.append((event.anchor, parts))
             parts += 1

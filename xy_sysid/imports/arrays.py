@@ -21,7 +21,7 @@ from xy_sysid.imports.limits import MOST_COLUMNS, fits
 from xy_sysid.imports.reading import Reading
 from xy_sysid.imports.sheet import Column, Sheet
 from xy_sysid.imports.sheet_table import in_seconds, scaled
-from xy_sysid.imports.table import Table, axis_names, places_of
+from xy_sysid.imports.table import ONE_UNIT, Table, axis_names, places_of
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import Recording
 
@@ -161,9 +161,7 @@ def _si(side: tuple[str, FloatArray, str], path: Path, axes: tuple[str, ...], re
         units.append(unit)
     if len({unit.name for unit in units}) > 1:
         given = ", ".join(sorted({unit.name for unit in units}))
-        raise BadRecording(
-            path, f"axes in different units ({given})", "Give all axes of one kind the same unit, or choose axes of one unit with --axis."
-        )
+        raise BadRecording(path, f"axes in different units ({given})", ONE_UNIT)
     notes += dict.fromkeys(said)
     return np.column_stack(columns), units[0]
 

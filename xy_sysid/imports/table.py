@@ -18,6 +18,7 @@ from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import Recording, Sensed, rate_from_time
 
 USUAL = ("x", "y", "z")
+ONE_UNIT = "Give all axes of one kind the same unit, or choose axes of one unit with --axis."
 APART = 0.1  # part of the rows; if more have an input and no output or the other way round, the two have stamps of their own
 
 
