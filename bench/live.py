@@ -79,7 +79,7 @@ def processor(process: subprocess.Popen[bytes]) -> float:
 def real_time(watched: float) -> dict[str, float]:
     """Per cent of a core of each node over so many seconds."""
     with nodes({"speed": "1.0", "lockstep": "false"}) as (monitor, started):
-        until(monitor, lambda: value(monitor, "axis x", "windows") >= 6, 60.0, "the sixth window")
+        until(monitor, lambda: value(monitor, "axis x", "windows") >= 6, 180.0, "the sixth window")
         before, begun = {name: processor(process) for name, process in started.items()}, time.monotonic()
         while time.monotonic() - begun < watched:
             monitor.spin(0.5)
@@ -90,7 +90,7 @@ def real_time(watched: float) -> dict[str, float]:
 def as_fast_as_it_goes(fast: float) -> tuple[float, int, int, dict[str, str]]:
     """(times real time, samples sent, samples paired, what the identifier complains of)."""
     with nodes({"speed": "0.0", "lockstep": "true", "duration": str(fast)}) as (monitor, _):
-        until(monitor, lambda: value(monitor, "streams", "samples paired") > 0, 60.0, "the first sample")
+        until(monitor, lambda: value(monitor, "streams", "samples paired") > 0, 180.0, "the first sample")
         first, begun = value(monitor, "streams", "samples paired"), time.monotonic()
         until(monitor, lambda: value(monitor, "streams", "samples paired") >= 0.9 * fast * RATE, 300.0, "nine tenths of the data")
         speed = (value(monitor, "streams", "samples paired") - first) / RATE / (time.monotonic() - begun)
