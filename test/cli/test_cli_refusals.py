@@ -216,7 +216,7 @@ def test_what_is_no_model_file_is_one_line(good: Path, model: Path, tmp_path: Pa
     document = yaml.safe_load(model.read_text())
     assert "Missing argument 'MODEL'" in refused("validate", good)
     assert "No such file" in refused("validate", good, tmp_path / "missing.yaml")
-    assert "Is a directory" in refused("validate", good, tmp_path)
+    assert "a socket or a folder" in refused("validate", good, tmp_path)
     assert "not a YAML file" in refused("validate", good, good)
     for change in ([1, 2], {**document, "format": "other"}, {**document, "axes": {}}, {**document, "axes": None}, {**document, "axes": {"x": None}}):
         (tmp_path / "m.yaml").write_text(yaml.safe_dump(change))
