@@ -217,7 +217,7 @@ def test_what_is_no_model_file_is_one_line(good: Path, model: Path, tmp_path: Pa
     assert "Missing argument 'MODEL'" in refused("validate", good)
     assert "No such file" in refused("validate", good, tmp_path / "missing.yaml")
     assert "a socket or a folder" in refused("validate", good, tmp_path)
-    assert "not a YAML file" in refused("validate", good, good)
+    assert "is not text in UTF-8" in refused("validate", good, good)
     for change in ([1, 2], {**document, "format": "other"}, {**document, "axes": {}}, {**document, "axes": None}, {**document, "axes": {"x": None}}):
         (tmp_path / "m.yaml").write_text(yaml.safe_dump(change))
         assert "xy-sysid fit --model" in refused("validate", good, tmp_path / "m.yaml")
