@@ -1,7 +1,7 @@
-"""python -m bench [name ...]: run the benchmarks and write docs/benchmarks.md.
+"""python -m bench [--short] [name ...]: run the benchmarks and write docs/benchmarks.md.
 
 h1, fit, replay, bags, live and intervals run without a name; only by name: long_bag (a day of data, gigabytes on disk), axis_model, and
-real_fits (recordings of real machines in $XY_SYSID_DATA).
+real_fits (recordings of real machines in $XY_SYSID_DATA). --short: a little of each, as the tests run it; nothing is written.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ from __future__ import annotations
 import importlib
 import os
 import platform
-import runpy
 import sys
 from datetime import date
 from importlib.metadata import PackageNotFoundError, version
@@ -46,7 +45,8 @@ def main() -> int:
     """Run what was asked for; the page is written when everything ran."""
     for threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):  # before numpy comes in: one core for everybody
         os.environ.setdefault(threads, "1")
-    asked = sys.argv[1:]
+    asked = [word for word in sys.argv[1:] if word != "--short"]
+    short = len(asked) < len(sys.argv) - 1
     unknown = [name for name in asked if name not in (*TABLES, *SCRIPTS)]
     if unknown:
         sys.stderr.write(f"bench: {unknown[0]} is not a benchmark; there are {', '.join((*TABLES, *SCRIPTS))}\n")
@@ -55,13 +55,13 @@ def main() -> int:
     for name in asked or TABLES:
         if name in SCRIPTS:
             sys.argv = [name]
-            runpy.run_module(f"bench.{name}", run_name="__main__")
+            importlib.import_module(f"bench.{name}").main(short)
             continue
-        table: Table = importlib.import_module(f"bench.{name}").run(lambda line: sys.stderr.write(line + "\n"))
+        table: Table = importlib.import_module(f"bench.{name}").run(lambda line: sys.stderr.write(line + "\n"), short)
         parts.append(text(name, table))
         sys.stdout.write(parts[-1] + "\n")
         sys.stdout.flush()
-    if not asked:
+    if not asked and not short:
         head = f"# Benchmarks\n\nMade by `make bench`; every ratio is from one run, side by side. {facts()}\n"
         PAGE.write_text("\n".join([head, *parts]), encoding="utf-8")
     return 0

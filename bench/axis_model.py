@@ -1,6 +1,6 @@
 """Time of the generated loop against one written by hand for the same model, of compiling, loading and fitting.
 
-OPENBLAS_NUM_THREADS=1 python bench/axis_model.py
+python -m bench axis_model
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from xy_sysid.greybox.free_run import fit_base, fit_with, look, prepare
 from xy_sysid.jit import compiled
 from xy_sysid.samples.block import FloatArray
 
-RATE, SECONDS = 2000.0, 60.0
+RATE, SECONDS, BRIEF = 2000.0, 60.0, 10.0
 BASE = AxisModel(0.097, 1.29e-3, 246.0)
 FIRST_CALL = """
 import time
@@ -75,7 +75,7 @@ def by_hand(u: FloatArray, gain: float, delay: float, pole: float, coulomb: floa
         out[i] = moved * fs
 
 
-def best(action: Callable[[], object], times: int = 15) -> float:
+def best(action: Callable[[], object], times: int) -> float:
     """Shortest of several runs, ms."""
     action()
     took = []
@@ -95,8 +95,10 @@ def fresh(folder: str) -> tuple[float, float]:
     return float(loaded), float(first)
 
 
-def main() -> None:
-    n = int(RATE * SECONDS) + 1
+def main(short: bool = False) -> None:
+    """Print what was measured."""
+    seconds, times = (BRIEF, 1) if short else (SECONDS, 15)
+    n = int(RATE * seconds) + 1
     u = np.asarray(sosfilt(butter(4, 300, fs=RATE, output="sos"), np.random.default_rng(0).standard_normal(n)))
     u /= u.std()
     still, out = np.zeros(n), np.empty(n - 1)
@@ -106,16 +108,16 @@ def main() -> None:
     hand_loop = partial(by_hand, u[:-1], gain, delay, pole, coulomb, RATE, out)
     hand_loop()
     print(f"largest difference of the two loops: {np.max(np.abs(run(row) - out)):.2g} m/s")
-    ours, hand = best(lambda: run(row)), best(hand_loop)
-    print(f"{SECONDS:g} s at {RATE:g} Hz, base and Coulomb friction: {ours:.2f} ms, by hand {hand:.2f} ms, ratio {ours / hand:.2f}")
+    ours, hand = best(lambda: run(row), times), best(hand_loop, times)
+    print(f"{seconds:g} s at {RATE:g} Hz, base and Coulomb friction: {ours:.2f} ms, by hand {hand:.2f} ms, ratio {ours / hand:.2f}")
 
     for effect in STANDARD.acting:
         model = BASE.with_effect(effect.name)
         one = simulator(STANDARD, [effect.name], RATE, u, still)
-        print(f"    {effect.name}: {best(partial(one, np.array(list(model.values().values()))), 5):.2f} ms")
+        print(f"    {effect.name}: {best(partial(one, np.array(list(model.values().values()))), min(times, 5)):.2f} ms")
 
     with tempfile.TemporaryDirectory() as folder:
-        for label in ("cold", "warm"):
+        for label in () if short else ("cold", "warm"):
             loaded, first = fresh(folder)
             print(f"{label}: import {loaded:.2f} s, first simulation {first:.2f} s")
 

@@ -24,19 +24,19 @@ from xy_sysid.bags.cdr import JOINT_TYPE
 from xy_sysid.imports import load
 from xy_sysid.samples.block import Block
 
-RATE, ROWS, REPEATS = 2000, 20, 3
-MINUTES = 5.0
+RATE, ROWS, REPEATS = 2000, 20, 5
+MINUTES, BRIEF = 5.0, 0.05
 STORE = get_typestore(Stores.ROS2_JAZZY)
 
 
 def write_blocks(path: Path, samples: int) -> int:
     """Two axes at 2 kHz, 20 rows a message, voltage and position; the number of samples read from it."""
-    values = np.random.default_rng(0).normal(size=(ROWS, 2))
+    values = np.random.default_rng(0).normal(size=(2, ROWS, 2))
     with BagWriter(path, "mcap" if "mcap" in path.name else "sqlite3") as writer:
         for first in range(0, samples, ROWS):
             seq = np.arange(first, first + ROWS, dtype=np.float64)
-            for topic in ("/xy/voltage", "/xy/position"):
-                writer.write_block(topic, Block(("x", "y"), seq, seq / RATE, values), int(first * 1e9 / RATE))
+            for topic, block in zip(("/xy/voltage", "/xy/position"), values, strict=True):
+                writer.write_block(topic, Block(("x", "y"), seq, seq / RATE, block), int(first * 1e9 / RATE))
     return 2 * samples
 
 
@@ -52,12 +52,13 @@ def write_usual(path: Path, samples: int) -> int:
 def write_joints(path: Path, samples: int) -> int:
     """Two joints at 2 kHz, one sample a message."""
     types = STORE.types
-    stamp, values = types["builtin_interfaces/msg/Time"], np.random.default_rng(0).normal(size=2)
+    stamp, (position, velocity, effort) = types["builtin_interfaces/msg/Time"], np.random.default_rng(0).normal(size=(3, ROWS, 2))
     with BagWriter(path, "mcap" if "mcap" in path.name else "sqlite3") as writer:
         for index in range(samples):
             now = 10**18 + index * 10**9 // RATE
             header = types["std_msgs/msg/Header"](stamp=stamp(sec=now // 10**9, nanosec=now % 10**9), frame_id="")
-            message = types[JOINT_TYPE](header=header, name=["x", "y"], position=values, velocity=values, effort=values)
+            row = index % ROWS
+            message = types[JOINT_TYPE](header=header, name=["x", "y"], position=position[row], velocity=velocity[row], effort=effort[row])
             writer.write_raw("/joint_states", JOINT_TYPE, bytes(STORE.serialize_cdr(message, JOINT_TYPE)), now)
     return samples
 
@@ -76,7 +77,7 @@ def stream(path: Path) -> None:
         pass
 
 
-def best(work: Callable[[Path], object], path: Path, repeats: int = REPEATS) -> float:
+def best(work: Callable[[Path], object], path: Path, repeats: int) -> float:
     """Shortest of some runs, s; the first one compiles and is not counted."""
     times = []
     for _ in range(repeats + 1):
@@ -86,9 +87,10 @@ def best(work: Callable[[Path], object], path: Path, repeats: int = REPEATS) -> 
     return min(times[1:])
 
 
-def run(report: Callable[[str], None]) -> Table:
+def run(report: Callable[[str], None], short: bool = False) -> Table:
     """Million samples a second, and ratios to the loop that deserializes message by message."""
-    samples = int(MINUTES * 60 * RATE) // ROWS * ROWS
+    samples = int((BRIEF if short else MINUTES) * 60 * RATE) // ROWS * ROWS
+    few = 1 if short else REPEATS
     found: dict[str, tuple[float, float, float]] = {}
     with tempfile.TemporaryDirectory() as folder:
         for name, write in (
@@ -100,7 +102,7 @@ def run(report: Callable[[str], None]) -> Table:
         ):
             path = Path(folder) / name.replace(" ", "_").replace(",", "")
             count = write(path, samples)
-            found[name] = count / best(loop, path, 2), count / best(stream, path, 5), count / best(load, path)
+            found[name] = count / best(loop, path, min(few, 2)), count / best(stream, path, few), count / best(load, path, few)
             report(f"bags: {name} measured")
     per_message = found["joint states, sqlite3"][0]
     rows = tuple((name, *(f"{x / 1e6:.2f}" for x in three), f"{three[1] / three[0]:.1f}x") for name, three in found.items())

@@ -23,7 +23,7 @@ from xy_sysid.response.frf import FrequencyResponse
 from xy_sysid.response.h1 import H1Options, frequency_response
 from xy_sysid.samples.block import FloatArray
 
-SAMPLES, REPEATS = 600_000, 21
+SAMPLES, BRIEF, REPEATS = 600_000, 20_000, 21
 
 
 def ours(u: FloatArray, y: FloatArray) -> FrequencyResponse:
@@ -48,11 +48,11 @@ def pyfrfs(u: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
     return np.asarray(made.get_H1()), np.asarray(made.get_coherence())
 
 
-def run(report: Callable[[str], None]) -> Table:
+def run(report: Callable[[str], None], short: bool = False) -> Table:
     """Times and ratios; the answers are compared first."""
     random = np.random.default_rng(0)
-    u = random.standard_normal(SAMPLES)
-    y = scipy.signal.lfilter([0.0, 0.2], [1.0, -0.8], u) + 0.1 * random.standard_normal(SAMPLES)
+    u = random.standard_normal(BRIEF if short else SAMPLES)
+    y = scipy.signal.lfilter([0.0, 0.2], [1.0, -0.8], u) + 0.1 * random.standard_normal(u.size)
     mine, (theirs, coherence) = ours(u, y), scipys(u, y)
     same = max(float(np.max(np.abs(mine.response / theirs[1:] - 1.0))), float(np.max(np.abs(mine.coherence - coherence[1:]))))
     taper = SHAPE.taper()
@@ -78,7 +78,7 @@ def run(report: Callable[[str], None]) -> Table:
         works["pyFRF"] = lambda: pyfrfs(u, y)
     report("h1: times")
     slow = works.pop("pyFRF", None)
-    times = medians(works, REPEATS)
+    times = medians(works, 1 if short else REPEATS)
     if slow is not None:
         times |= medians({"pyFRF": slow}, 1)
     mine_time = times["xy_sysid"]

@@ -25,6 +25,7 @@ from xy_sysid.samples.block import Block, columns, pack
 
 RATE = 2000
 ALLOWED = 400.0  # MB
+BRIEF = ("--hours", "0.002", "0.004")
 
 READ = """
 import json, resource, sys, time
@@ -73,14 +74,15 @@ def measure(folder: Path, storage: str, hours: float, rows: int) -> dict[str, fl
     return {"hours": hours, "gigabytes": size, "written": writing, "seconds": answer["seconds"], "peak": answer["peak"]}
 
 
-def main() -> None:
+def main(short: bool = False) -> None:
+    """Print what was measured; SystemExit for more memory than allowed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--hours", type=float, nargs="+", default=[1 / 24, 1.0, 4.0])
     parser.add_argument("--storage", choices=("sqlite3", "mcap"), default="sqlite3")
     parser.add_argument("--rows", type=int, default=20, help="samples in one message")
     parser.add_argument("--folder", type=Path, default=None, help="where the bag is written for a while")
     parser.add_argument("--json", action="store_true")
-    options = parser.parse_args()
+    options = parser.parse_args(BRIEF if short else None)
     results = []
     if not options.json:
         print(

@@ -13,6 +13,7 @@ door:      attacks on the page's server
 tabs:      fifty tabs, a stalled one, restarts, STOP meanwhile
 cable:     two hosts with a cable that loses packets, as network namespaces
 network:   the nodes on two hosts: loss, a pulled cable, restarts, clocks
+shared:    every recording of a real machine through every command that reads one
 soak:      a day of data through all nodes, with memory and descriptors of each
 report:    docs/faults.md
 """

@@ -14,4 +14,5 @@ GROUPS = {
     "door": "The page's door",
     "tabs": "The page under load",
     "network": "Two hosts",
+    "shared": "Recordings of real machines",
 }

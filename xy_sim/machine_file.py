@@ -19,6 +19,7 @@ from xy_sysid.settings import build, unknown_name
 Parts = Mapping[str, Mapping[str, float]]
 _TOP = ("description", "base", "rate", "inner_rate", "seed", "unit", "axes", "hidden")
 _HIDDEN = ("seed", "effects", "scale")
+LONGEST = 1 << 17  # bytes of a machine file
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,6 +139,8 @@ def _table(name: str | Path, beside: Path | None = None, depth: int = 0) -> tupl
     path = near if near is not None and near.is_file() else machine_path(name)
     if depth > 8:
         raise BadInput(f"{path.name}: base", repr(str(name)), "a chain of at most 8 files", "A file must not be its own base.")
+    if path.stat().st_size > LONGEST:
+        raise BadInput("machine file", f"{path}, {path.stat().st_size / 1e6:.3g} MB", f"{LONGEST / 1e3:.0f} kB at most", "Check the path.")
     try:
         own = _mapping(yaml.safe_load(path.read_text(encoding="utf-8")), path.name)
     except (yaml.YAMLError, UnicodeDecodeError, OSError) as error:

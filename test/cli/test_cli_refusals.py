@@ -216,8 +216,8 @@ def test_what_is_no_model_file_is_one_line(good: Path, model: Path, tmp_path: Pa
     document = yaml.safe_load(model.read_text())
     assert "Missing argument 'MODEL'" in refused("validate", good)
     assert "No such file" in refused("validate", good, tmp_path / "missing.yaml")
-    assert "Is a directory" in refused("validate", good, tmp_path)
-    assert "not a YAML file" in refused("validate", good, good)
+    assert "a socket or a folder" in refused("validate", good, tmp_path)
+    assert "is not text in UTF-8" in refused("validate", good, good)
     for change in ([1, 2], {**document, "format": "other"}, {**document, "axes": {}}, {**document, "axes": None}, {**document, "axes": {"x": None}}):
         (tmp_path / "m.yaml").write_text(yaml.safe_dump(change))
         assert "xy-sysid fit --model" in refused("validate", good, tmp_path / "m.yaml")

@@ -9,8 +9,8 @@ from helpers.real_data import data
 
 import xy_sysid as xy
 from xy_sysid.cli.simulated_recording import simulate
-from xy_sysid.fitting import Structure
-from xy_sysid.fitting.choose_orders import Choice, choose
+from xy_sysid.fitting import Structure, choose_orders, identify
+from xy_sysid.fitting.choose_orders import MOST_POLES, Choice, choose
 from xy_sysid.fitting.verdicts import validate
 from xy_sysid.linear.simulate import held_response
 from xy_sysid.linear.transfer_function import TransferFunction
@@ -90,3 +90,10 @@ def test_real_machines_get_no_more_than_they_show(path: str, hold: str, wanted: 
     assert (model.fit.structure.numerator_order, model.fit.structure.denominator_order) == wanted
     if frequency is not None:
         assert model.fit.interval("resonance_1.frequency").value == pytest.approx(frequency, rel=0.03)
+
+
+def test_orders_that_no_fit_takes_are_not_tried() -> None:
+    """From eight zeros and ten poles, four more of each are more than a fit has: nobody chose them, and nobody is told to lower them."""
+    frf = held(two_resonances(), 0.01, seed=3)
+    richest = identify(frf, Structure(numerator_order=8, denominator_order=10))
+    assert all(step.fit.structure.free_order <= MOST_POLES for step in choose_orders._steps(frf, richest))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -61,3 +62,13 @@ def test_an_axis_behind_a_coarse_encoder_is_not_blamed_for_its_counts() -> None:
     found = diagnose(RATE, *drive(Machine(replace(machine.spec, axes=(coarse,))), settings, 30.0, lambda _: None).axis("x"))
     assert found.effects == () and found.confidence < 0.1
     assert found.discrepancy < 0.1 * found.noise
+
+
+def test_an_axis_that_runs_far_one_way_makes_no_overflow() -> None:
+    """A motor turned by millions of revolutions: its mean speed is no noise, and nothing is printed about it."""
+    position = 1e80 * np.arange(20_000.0) / RATE + np.random.default_rng(1).normal(size=20_000)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert np.isfinite(encoder_noise(RATE, position))
+        slow = 10.0 * np.arange(20_000.0) / RATE + 1e-3 * np.random.default_rng(1).normal(size=20_000)
+        assert encoder_noise(RATE, slow) == pytest.approx(1e-3, rel=0.2)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import scipy.io
 from helpers.bag_making import a_recording, assert_same
+from helpers.table_making import csv_of
 
 from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.imports import load, save
@@ -219,3 +220,21 @@ def test_files_that_are_none_are_one_line(tmp_path: Path) -> None:
     assert "not a text file" in error_of(tmp_path / "binary.csv")
     with pytest.raises(BadInput, match="file ending"):
         save(a_recording(10), tmp_path / "a.xlsx")
+
+
+@pytest.mark.parametrize("kind", ["csv", "npz"])
+def test_the_units_of_axes_that_are_left_out_do_not_matter(kind: str, tmp_path: Path) -> None:
+    """One axis of a robot is chosen and its unit is given: that of the others, which nobody asked for, is no hindrance."""
+    if kind == "csv":
+        path = csv_of(tmp_path, {"time": T, "x_u": U, "y_u": U, "x_y": Y, "y_y": 2 * Y})
+    else:
+        path = tmp_path / "two.npz"
+        np.savez(path, t=T, u=np.column_stack((U, U)), y=np.column_stack((Y, 2 * Y)), r=np.column_stack((Y, 3 * Y)))
+    recording = load(path, axes=["y"], units={"y.output": "rad"})
+    assert (recording.axes, recording.output_unit) == (("y",), "rad")
+    assert np.array_equal(recording.position[:, 0], 2 * Y)
+    assert kind == "csv" or (recording.reference is not None and np.array_equal(recording.reference[:, 0], 3 * Y))
+    with pytest.raises(BadRecording, match="choose axes of one unit with --axis"):
+        load(path, units={"y.output": "rad"})
+    with pytest.raises(BadInput, match="allowed: x, y"):
+        load(path, axes=["z"], units={"y.output": "rad"})

@@ -27,8 +27,13 @@ def friction() -> Recording:
     return recorded("x:coulomb_friction", seconds=12.0)
 
 
-def send(hearing: Newest | Diagnoser, first: int, last: int, size: int = 20, shift: int = 0) -> None:
-    recording = friction()
+@cache
+def resonance() -> Recording:
+    return recorded("x:base_resonance+x:coulomb_friction", seconds=10.0)
+
+
+def send(hearing: Newest | Diagnoser, first: int, last: int, size: int = 20, shift: int = 0, recording: Recording | None = None) -> None:
+    recording = recording or friction()
     for start in range(first, last, size):
         rows = slice(start, min(start + size, last))
         seq = np.arange(rows.start, rows.stop, dtype=float) - shift
@@ -101,6 +106,22 @@ def test_requests_are_done_one_after_the_other_and_answered() -> None:
     assert play(diagnoser)[-1] == "x without coulomb_friction"
     diagnoser.reset_model()
     assert len(diagnoser.stories["x"].steps) == 1 and diagnoser.stories["x"].diagnosis is not None
+
+
+def test_once_a_resonance_is_in_the_model_the_next_effects_are_found() -> None:
+    """By add_next and by auto, and again after the model was reset."""
+    diagnoser = Diagnoser(DiagnoserSettings(minimum=5.0), AXES)
+    send(diagnoser, 0, 20_000, recording=resonance())
+    diagnoser.have("x", ("base_resonance",))
+    play(diagnoser)
+    diagnoser.ask("add_next", ["x"])
+    play(diagnoser)
+    assert diagnoser.effects["x"] == ("base_resonance", "coulomb_friction")
+    diagnoser.reset_model()
+    diagnoser.ask("auto", ["x"])
+    play(diagnoser)
+    assert set(diagnoser.effects["x"]) == {"base_resonance", "coulomb_friction"}
+    assert all(answer.done for answer in diagnoser.answers())
 
 
 def test_the_live_document_is_the_offline_one() -> None:

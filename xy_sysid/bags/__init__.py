@@ -4,6 +4,7 @@ reading:                               a recording as a whole: its files, topics
 sqlite_file, pages:                    a .db3, by SQL or straight from its pages
 mcap_file, compression, checksum:      an .mcap and its chunks
 sums:                                  check sums for what has none of its own
+opening:                               what is looked at before a file is opened
 atomic:                                files that are written whole or not at all
 cdr, stride:                           proof of layout, then arrays without deserializing each
 streaming:                             blocks of voltage and position in log order

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import stat
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ import yaml
 
 from xy_sysid.bags.compression import decompressor, expand
 from xy_sysid.bags.mcap_file import McapFile
+from xy_sysid.bags.opening import PARSER, regular_file, too_much
 from xy_sysid.bags.sqlite_file import SqliteFile
 from xy_sysid.bags.stride import Batch
 from xy_sysid.bags.sums import check_sums
@@ -23,9 +23,8 @@ from xy_sysid.errors import BadRecording
 
 STORAGES: Mapping[str, type[SqliteFile] | type[McapFile]] = {".db3": SqliteFile, ".mcap": McapFile}
 ANOTHER_COPY = "Take another copy of the bag."
-LOADER = getattr(yaml, "CBaseLoader", yaml.BaseLoader)  # the compiled one where there is one; every value stays text
 METADATA = 1 << 21  # bytes; no bag has longer metadata
-DEEPEST, WORDS = 30, 100_000  # levels and parts of metadata; more is no description of a bag
+WORDS = 100_000  # parts of metadata; more is no description of a bag
 DIGITS = 20  # of a number of messages
 KNOWN = "a rosbag2 folder, .db3, .mcap"
 
@@ -101,7 +100,7 @@ class Bag:
 
     def _open(self, path: Path) -> SqliteFile | McapFile:
         try:
-            _plain(path)
+            regular_file(path)
             with path.open("rb") as content:
                 if not content.read(1):
                     raise BadRecording(path, "the file is empty (0 bytes)", ANOTHER_COPY)
@@ -144,7 +143,7 @@ class Bag:
         try:
             if not file.exists():
                 return None
-            _plain(file)
+            regular_file(file)
             if file.stat().st_size > METADATA:
                 raise BadRecording(file, f"metadata.yaml of {file.stat().st_size / 1e6:.3g} MB, which no bag has", ANOTHER_COPY)
             content = _yaml(file, file.read_text("utf-8"))
@@ -166,6 +165,9 @@ class Bag:
             self._compressed = method
         custom = metadata.get("custom_data")
         self.custom = {str(key): str(value) for key, value in custom.items()} if isinstance(custom, dict) else {}
+        for file in named:
+            if file.exists():
+                regular_file(file)
         found = [file for file in dict.fromkeys(named) if file.is_file()]
         missing = [file.name for file in named if not file.is_file()]
         if missing:
@@ -198,20 +200,11 @@ class Bag:
         return target
 
 
-def _plain(path: Path) -> None:
-    """Raises BadRecording for a pipe or a device, which may never end."""
-    if not stat.S_ISREG(path.stat().st_mode):
-        raise BadRecording(path, "not a file but a pipe, a device or a folder", "Copy its content into a file first.")
-
-
 def _yaml(path: Path, text: str) -> Any:
     """The content, all values as text; raises BadRecording for what is crafted rather than written by a recorder."""
-    depth = 0
-    for count, event in enumerate(yaml.parse(text, Loader=LOADER)):
-        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
-        if isinstance(event, yaml.AliasEvent) or depth > DEEPEST or count > WORDS:
-            raise BadRecording(path, "metadata.yaml is nested, repeated or long as no recorder writes it", ANOTHER_COPY)
-    return yaml.load(text, Loader=LOADER)
+    if too_much(text, WORDS):
+        raise BadRecording(path, "metadata.yaml is nested, repeated or long as no recorder writes it", ANOTHER_COPY)
+    return yaml.load(text, Loader=PARSER)
 
 
 def _word(value: object) -> str:

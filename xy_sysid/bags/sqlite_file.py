@@ -12,18 +12,28 @@ import numpy as np
 
 from xy_sysid.bags import pages
 from xy_sysid.bags.compression import whole_ones
+from xy_sysid.bags.opening import regular_file
 from xy_sysid.bags.stride import Batch, Indices
 from xy_sysid.errors import BadRecording
 
 COLUMNS = ["id", "topic_id", "timestamp", "data"]
+BESIDE = ("-journal", "-wal", "-shm")  # endings of the files that sqlite keeps beside a database
 ROWS = 1024  # rows fetched at once on the slow way
 TOPICS = 1 << 16  # topic ids from 0 up to here are looked up in a table; others are read by SQL
+
+
+def files_of(path: Path) -> list[Path]:
+    """What sqlite opens of a database: itself, and what is there of the files beside it. Raises BadRecording where one is no regular file."""
+    found = [path, *(beside for ending in BESIDE if (beside := path.with_name(path.name + ending)).exists())]
+    for file in found:
+        regular_file(file)
+    return found
 
 
 def _unsaved(path: Path) -> list[Path]:
     """Files beside the database in which sqlite keeps changes that are not in it yet."""
     found = []
-    for ending in ("-journal", "-wal"):
+    for ending in BESIDE[:2]:
         beside = path.with_name(path.name + ending)
         with contextlib.suppress(OSError):
             if beside.stat().st_size > 0:
@@ -49,6 +59,7 @@ class SqliteFile:
     def __init__(self, path: Path, notes: list[str]) -> None:
         self.path, self.notes = path, notes
         self._closed = contextlib.ExitStack()
+        files_of(path)
         self.database = self._open()
         self._closed.callback(self.database.close)
         try:

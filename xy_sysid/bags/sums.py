@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import json
 import sqlite3
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any, Literal
 from zlib import crc32
 
+from xy_sysid.bags.sqlite_file import files_of
 from xy_sysid.errors import BadRecording
 
 KEY = "xy_sysid_crc32"  # in custom_data of metadata.yaml: {topic: [messages, sum]} as JSON
@@ -54,7 +55,7 @@ def check_sums(path: Path) -> Checked:
         return "none"
     found = Sums()
     try:
-        for name in sorted(path.glob("*.db3")):
+        for name in _databases(path):
             with closing(sqlite3.connect(f"{name.absolute().as_uri()}?mode=ro", uri=True)) as file:
                 for topic, data in file.execute(BODY):
                     if isinstance(data, bytes) and found.count(topic) < told.get(topic, (0, 0))[0]:
@@ -63,11 +64,20 @@ def check_sums(path: Path) -> Checked:
         return "damaged"  # the reader says with what, and reads the rest
     for topic, (count, value) in told.items():
         if found.count(topic) == count and found.sum(topic) != value:
-            if not all(map(_sound, path.glob("*.db3"))):
+            if not all(map(_sound, _databases(path))):
                 return "damaged"
             problem = f"the messages on {topic} are not those that were recorded (their check sum is another)"
             raise BadRecording(path, problem, f"Take another copy; to read it all the same, delete {KEY} in its metadata.yaml.")
     return "good" if all(found.count(topic) == count for topic, (count, _) in told.items()) else "damaged"
+
+
+def _databases(path: Path) -> list[Path]:
+    """The databases of a bag; a pipe or a device that is called like one is none."""
+    found = []
+    for file in sorted(path.glob("*.db3")):
+        with suppress(BadRecording, OSError):
+            found.append(files_of(file)[0])
+    return found
 
 
 def _sound(name: Path) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -27,7 +28,7 @@ def diagnose(
     recs: o.Recs,
     reading: Reading,
     effect_file: Own = None,
-    budget: o.Budget = 10.0,
+    budget: o.Budget = None,
     json: o.Json = False,
 ) -> None:
     """Name the physical effect that the rigid model of each axis misses, with evidence, or say that none is known."""
@@ -45,7 +46,7 @@ def diagnose(
 
         def work(name: str) -> Diagnosis:
             bar.update(task, description=f"diagnosing axis {name}")
-            found = logic(runs_of(recordings, name), known, budget, time.process_time)
+            found = logic(runs_of(recordings, name), known, math.inf if budget is None else budget, time.process_time)
             bar.advance(task)
             return found
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from xy_sysid.errors import BadInput, BadRecording
+from xy_sysid.errors import BadInput
 from xy_sysid.settings import IdentifierSettings, Settings, changed, unknown_name
 
 if TYPE_CHECKING:
@@ -120,12 +120,9 @@ def new_bag(path: Path | None) -> None:
 
 def read_text(path: Path) -> str:
     """A text file; raises BadRecording in one line when it cannot be read."""
-    try:
-        return path.read_text(encoding="utf-8")
-    except OSError as problem:
-        raise BadRecording(path, problem.strerror or "cannot be read", "Check the path.") from None
-    except UnicodeDecodeError:
-        raise BadRecording(path, "is not text", "Give a text file.") from None
+    from xy_sysid.bags.opening import text_of
+
+    return text_of(path, "a parameter file")
 
 
 def period_from(text: str) -> int | None:
@@ -170,5 +167,11 @@ def topics_from(pairs: list[str] | None) -> dict[str, str]:
 
 
 Budget = Annotated[
-    float, typer.Option("--budget", metavar="S", min=0.1, help="seconds of processor time for each axis, after which the best so far is said")
+    float | None,
+    typer.Option(
+        "--budget",
+        metavar="S",
+        min=0.1,
+        help="seconds of processor time for each axis, after which the best so far is said; without it a fixed amount of work",
+    ),
 ]

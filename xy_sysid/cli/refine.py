@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -41,7 +42,7 @@ def refine(
     model: Annotated[Path | None, typer.Option("--model", metavar="FILE", help="write the model with its physical parameters as YAML")] = None,
     mat: Annotated[Path | None, typer.Option("--mat", metavar="FILE", help="write the linear part and all parameters for MATLAB")] = None,
     force: o.Force = False,
-    budget: o.Budget = 10.0,
+    budget: o.Budget = None,
     json: o.Json = False,
 ) -> None:
     """Add physical effects to the rigid model, refit everything together, and print the ladder of falling errors."""
@@ -72,7 +73,7 @@ def refine(
         def work(name: str) -> Ladder:
             bar.update(task, description=f"refining axis {name}")
             runs = runs_of(recordings, name)
-            run, effort = runs[0], Effort(MOST_EFFECTS if auto else 0, budget, time.process_time)
+            run, effort = runs[0], Effort(MOST_EFFECTS if auto else 0, math.inf if budget is None else budget, time.process_time)
             found = refined(runs, tuple(add or ()), known, effort, tolerance).ladder
             if not found.final.one_step and len(runs) == 1:  # free simulation says nothing about those
                 if simulate_alone:

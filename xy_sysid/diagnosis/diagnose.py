@@ -11,7 +11,7 @@ import numpy as np
 
 from xy_sysid.axis.model import STANDARD, Library
 from xy_sysid.comparison.where_it_fails import Comparison, compare_velocity
-from xy_sysid.hypotheses.criteria import AT_FLOOR, BUDGET, SIZE
+from xy_sysid.hypotheses.criteria import AT_FLOOR, SIZE
 from xy_sysid.diagnosis.equal_laws import equals, likelihood
 from xy_sysid.diagnosis.ladder import Candidate, Ladder, contains, part_explained
 from xy_sysid.diagnosis.refine import Effort, never, refine
@@ -69,7 +69,7 @@ def diagnose(
     voltage: FloatArray,
     position: FloatArray,
     library: Library = STANDARD,
-    budget: float = BUDGET,
+    budget: float = math.inf,
     clock: Callable[[], float] = never,
 ) -> Diagnosis:
     """Diagnose one axis from gap-free samples (n,), V and m. budget: see ``refine``."""
@@ -80,7 +80,7 @@ def diagnose_all(
     sampling_rate: float,
     recordings: Recordings,
     library: Library = STANDARD,
-    budget: float = BUDGET,
+    budget: float = math.inf,
     clock: Callable[[], float] = never,
     units: Units = USUAL,
 ) -> Diagnosis:
@@ -144,7 +144,7 @@ def judged(data: AxisData, ladder: Ladder, library: Library) -> Diagnosis:
         sentence += f" {_listed(ladder.kept_out.effects)} {leaves} {moved(ladder.kept_out.fit.held_out_error, unit)}, and is refused:"
         sentence += f" {ladder.kept_out.refused}."
     if ladder.stopped:
-        sentence += " The search was stopped when its time was up."
+        sentence += " The search was stopped by its budget."
         confidence *= 0.8
     return Diagnosis(
         verdict=verdict,

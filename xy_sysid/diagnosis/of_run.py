@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
 
@@ -9,7 +10,7 @@ from threadpoolctl import threadpool_limits
 
 from xy_sysid.axis.model import STANDARD, Library
 from xy_sysid.comparison.physical_model import PhysicalModel
-from xy_sysid.hypotheses.criteria import BUDGET, MOST_EFFECTS
+from xy_sysid.hypotheses.criteria import MOST_EFFECTS
 from xy_sysid.diagnosis import diagnose as one
 from xy_sysid.diagnosis.diagnose import Diagnosis
 from xy_sysid.diagnosis.ladder import Ladder
@@ -103,12 +104,12 @@ class Diagnosed(Diagnosis):
         return f"<Diagnosis: {self.sentence} Confidence {self.confidence:.2f}.>"
 
 
-def diagnose(data: Data, library: Library = STANDARD, budget: float = BUDGET, clock: Callable[[], float] = never) -> Diagnosed:
+def diagnose(data: Data, library: Library = STANDARD, budget: float = math.inf, clock: Callable[[], float] = never) -> Diagnosed:
     """Which physical effects the rigid model misses, with evidence and runner-up; or that nothing is missing, or that none is known.
 
     data:   a run or several of one axis, V and m; library: with effects of your own (``files.effects.library``)
-    budget: s after which the best so far is said, if ``clock`` (for example ``time.process_time``) tells the time; else it takes as
-            long as it takes, and the same data give the same answer on any machine
+    budget: s after which the best so far is said, if ``clock`` (for example ``time.process_time``) tells the time; without one the search
+            ends after a fixed amount of work, and the same data give the same answer however busy the machine is
     Too little data is an answer, ``not_enough_data``, and no error. Raises BadInput for runs that do not belong together.
     """
     runs = runs_together(data)
@@ -123,7 +124,7 @@ def refine(
     add: Iterable[str] = (),
     auto: bool = True,
     library: Library = STANDARD,
-    budget: float = BUDGET,
+    budget: float = math.inf,
     clock: Callable[[], float] = never,
 ) -> Refinement:
     """Add effects, fit everything together, and see the error on held-out data fall: a step for the rigid base and one for each effect.

@@ -16,7 +16,7 @@ from xy_sysid.diagnosis.ladder import Ladder
 from xy_sysid.diagnosis.rungs import Given, ladder_of_given, ladder_of_search
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit, joined
-from xy_sysid.hypotheses.criteria import AT_FLOOR, BUDGET, IN_HAND, MOST_EFFECTS, WORTH
+from xy_sysid.hypotheses.criteria import AT_FLOOR, MOST_EFFECTS, WORK, WORK_EACH, WORTH
 from xy_sysid.hypotheses.one_step import OneStepTrials
 from xy_sysid.hypotheses.pool import Pool
 from xy_sysid.jit import spent_compiling
@@ -38,13 +38,14 @@ def never() -> float:
 class Effort:
     """How far a search goes.
 
-    most: effects, besides those given; budget: s of processor time as ``clock`` tells it, after which it says the best it has; the time
-        in which laws are compiled, once on a machine, does not count
+    most: effects, besides those given
+    budget: s of processor time as ``clock`` tells it, after which it says the best it has; the time in which laws are compiled, once on a
+        machine, does not count. Without one the search ends after a fixed amount of work, and the same data give the same answer
     size: what an effect must explain to be added, over what is left unexplained, as powers
     """
 
     most: int = MOST_EFFECTS
-    budget: float = BUDGET
+    budget: float = math.inf
     clock: Callable[[], float] = never
     size: float = WORTH
 
@@ -72,8 +73,12 @@ def refine_steps(
     fixed = Given.of(data, library, kept)
     if fixed.steps[-1].fit.one_step or effort.most == 0:
         return ladder_of_given(data, fixed)
-    until = effort.now() + IN_HAND * effort.budget
-    pool = Pool(data, library, frozenset(kept), effort.size, effort.most, lambda: effort.now() > until)
+    until, enough = effort.now() + effort.budget, data.work.done + WORK + WORK_EACH * data.velocity.size
+
+    def late() -> bool:
+        return effort.now() > until or (effort.budget == math.inf and data.work.done > enough)
+
+    pool = Pool(data, library, frozenset(kept), effort.size, effort.most, late)
     pool.begin(fixed.steps[-1].fit)
     trials = OneStepTrials(pool)
     yield from _sets(pool, None if kept else trials)

@@ -10,6 +10,7 @@ import numpy as np
 import yaml
 
 from xy_sysid.bags.atomic import whole, write_text
+from xy_sysid.bags.opening import text_of, too_much
 from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.files.seal import sealed, unsealed
 from xy_sysid.fitting.of_run import LinearModel
@@ -20,6 +21,7 @@ from xy_sysid.units import over
 FORMAT = "xy_sysid model 1"
 Hold = Literal["zoh", "none"]
 LONGEST_DELAY = 1e3  # s; no axis answers later
+MOST_COEFFICIENTS = 64  # of a polynomial; the roots of longer ones are lost in rounding
 
 
 def model_document(fits: dict[str, Fit], provenance: dict[str, Any]) -> dict[str, Any]:
@@ -107,12 +109,14 @@ def fitted_to(origin: Any, axis: str) -> tuple[str, ...]:
 
 def model_file(path: Path, formats: tuple[str, ...] = (FORMAT,)) -> dict[str, Any]:
     """The document of a model file of one of these formats; raises BadRecording in one line if it is not one."""
+    text = unsealed(path, text_of(path, "a model"))
     try:
-        document = yaml.safe_load(unsealed(path, path.read_text(encoding="utf-8")))
-    except OSError as problem:
-        raise BadRecording(path, problem.strerror or "cannot be read", "Check the path.") from None
+        problem = too_much(text)
+        document = None if problem else yaml.safe_load(text)
     except (yaml.YAMLError, ValueError):
         raise BadRecording(path, "is not a YAML file", "Give a model written by xy-sysid fit --model.") from None
+    if problem:
+        raise BadRecording(path, f"holds {problem}, and no model does", "Give a model written by xy-sysid fit --model.")
     if not isinstance(document, dict) or document.get("format") not in formats or not isinstance(document.get("axes"), dict) or not document["axes"]:
         known = " or ".join(f"'{name}'" for name in formats)
         raise BadRecording(path, f"is not a model file ({known})", "Give a model written by xy-sysid fit --model.")
@@ -133,6 +137,7 @@ def _transfer_function(path: Path, axis: str, part: Any) -> TransferFunction:
         raise BadRecording(path, f"axis {axis} has no transfer_function with {needed}", "Write the model again with xy-sysid fit --model.") from None
     for problem, allowed in (
         (numerator.ndim != 1 or denominator.ndim != 1, "numerator and denominator as plain lists of coefficients"),
+        (max(numerator.size, denominator.size) > MOST_COEFFICIENTS, f"at most {MOST_COEFFICIENTS} coefficients each"),
         (not (np.isfinite(numerator).all() and np.isfinite(denominator).all()), "finite coefficients"),
         (not numerator.any(), "a numerator that is not 0"),
         (not denominator.size or denominator.flat[0] == 0, "a denominator that does not begin with 0"),

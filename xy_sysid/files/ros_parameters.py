@@ -11,6 +11,7 @@ from typing import Any
 
 import yaml
 
+from xy_sysid.bags.opening import too_much
 from xy_sysid.errors import BadInput
 from xy_sysid.settings import (
     AXES,
@@ -41,6 +42,9 @@ BARE_BOOLEANS = re.compile(r"y|n|yes|no|on|off|true|false", re.IGNORECASE)
 def load(text: str, where: str) -> Any:
     """The YAML document; raises BadInput for text that is no YAML, and for a bare ``y`` as a name, which ROS reads as true."""
     try:
+        problem = too_much(text)
+        if problem:
+            raise BadInput(where, problem, "at most a few hundred values in a few levels", "Start from config/default.yaml.")
         root = yaml.compose(text, Loader=yaml.SafeLoader)
         document = yaml.safe_load(text)
     except yaml.YAMLError as error:

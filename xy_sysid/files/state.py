@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from xy_sysid.bags.atomic import whole
+from xy_sysid.bags.opening import regular_file
 from xy_sysid.errors import BadRecording
 from xy_sysid.response.spectra import State
 
@@ -40,6 +41,7 @@ def save_state(path: Path, state: State) -> None:
 def load_state(path: Path) -> State:
     """What was saved; raises BadRecording if the file is none of ours."""
     try:
+        regular_file(path)
         with np.load(path, allow_pickle=False) as file:
             return {name: file[name] for name in file.files}
     except DAMAGED as problem:

@@ -105,11 +105,10 @@ def _steps(frf: FrequencyResponse, now: Fit) -> list[_Step]:
     found: list[_Step] = []
     at = now.structure
     for zeros, poles in STEPS:
+        if at.denominator_order + poles > MOST_POLES + at.integrators:
+            continue
         structure = replace(at, numerator_order=at.numerator_order + zeros, denominator_order=at.denominator_order + poles)
-        if (
-            structure.denominator_order > MOST_POLES + at.integrators
-            or independent_data(frf, len(now.frequency)) < NUMBERS_EACH * structure.parameters
-        ):
+        if independent_data(frf, len(now.frequency)) < NUMBERS_EACH * structure.parameters:
             continue
         try:
             fit = identify(frf, structure)

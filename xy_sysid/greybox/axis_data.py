@@ -6,8 +6,9 @@ hold the motion that they judge. Of several recordings each is cut so.
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -35,6 +36,19 @@ ONCE = 1.2  # times the travel, which a way must be at least for places to be pa
 SHIFTS = 4  # places tried for the blocks that are held out
 
 
+class Work:
+    """What was simulated so far: samples times sub-steps, the same on every machine and however busy it is."""
+
+    def __init__(self) -> None:
+        self.done = 0.0
+        self._lock = threading.Lock()
+
+    def add(self, samples: float) -> None:
+        """From any thread."""
+        with self._lock:
+            self.done += samples
+
+
 @dataclass(frozen=True)
 class AxisData:
     """One axis without gaps, ready to be fitted, with what its data allow.
@@ -45,6 +59,7 @@ class AxisData:
     early: samples of each recording's velocity that are in the first stage; brief: windows in these (``begun``) that a fit sees there
     training: samples of ``velocity`` for what must run through
     units: what V and m stand for, wherever words are made of it
+    work: what was simulated for it
     """
 
     sampling_rate: float
@@ -60,6 +75,7 @@ class AxisData:
     early: tuple[int, ...]
     floor: Floor
     units: Units = USUAL
+    work: Work = field(default_factory=Work, compare=False, repr=False)
 
     @property
     def noise_floor(self) -> float:

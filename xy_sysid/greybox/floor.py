@@ -158,8 +158,8 @@ def encoder_noise(sampling_rate: float, position: FloatArray) -> float:
     length = min(4096, velocity.size // 2 * 2)
     windows = np.lib.stride_tricks.sliding_window_view(velocity, length)[:: length // 2] * np.hanning(length)
     power = np.mean(np.abs(scipy.fft.rfft(windows, axis=1)) ** 2, axis=0) / np.sum(np.hanning(length) ** 2)
-    share = np.arange(power.size) / (length / 2.0)
-    white = power / np.maximum((2.0 * np.sin(0.5 * np.pi * share) * sampling_rate) ** 2, 1e-300)
+    share = np.arange(1, power.size) / (length / 2.0)  # without the mean, which no noise in position makes
+    white = power[1:] / np.maximum((2.0 * np.sin(0.5 * np.pi * share) * sampling_rate) ** 2, 1e-300)
     seen = [float(np.median(white[(share >= low) & (share < low + 0.05)])) for low in np.arange(*NOISE_BAND, 0.05)]
     return float(np.sqrt(max(min(seen), count_size(position) ** 2 / 12.0)))
 

@@ -145,14 +145,12 @@ def solve(
     def left(inner: FloatArray) -> NDArray[np.complex128]:
         return np.asarray(measured - windows.spectrum(run(scale.outer(inner))))
 
-    def slopes(inner: FloatArray, error: NDArray[np.complex128], old: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """New ones, as far as there is time; on all cores, as a simulation leaves the interpreter to others."""
+    def slopes(inner: FloatArray, error: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        """New ones; on all cores, as a simulation leaves the interpreter to others."""
         nonlocal runs
         runs += inner.size
 
         def slope(k: int) -> NDArray[np.complex128]:
-            if schedule.late():
-                return np.asarray(old[k])
             step = STEP if scale.outer(inner)[k] < scale.high[k] else -STEP
             moved = inner.copy()
             moved[k] += step
@@ -169,7 +167,7 @@ def solve(
             error, runs = left(inner), runs + 1
         size = inner.size
         normal, cost, converged = np.eye(size), np.inf, False
-        change = slopes(inner, error, np.zeros((size, *error.shape), dtype=np.complex128)) if known is None else known.change
+        change = slopes(inner, error) if known is None else known.change
         exact = known is None
         expected, score = target.spectrum(error, scale.outer(inner))
         weight = _weight(target, expected)
@@ -196,14 +194,14 @@ def solve(
                     if abs((cost - new) - hoped) < TRUSTED * hoped:
                         change, exact = _updated(change, gone, diagonal, found - error), False
                     else:
-                        change, exact = slopes(trial, found, change), True
+                        change, exact = slopes(trial, found), True
                     inner, error, cost, fresh = trial, found, new, False
                     damping = max(damping * 0.2, 1e-9)
                     if fall < schedule.enough:
                         converged = True
                         break
                 elif not exact:
-                    change, exact, fresh = slopes(inner, error, change), True, False
+                    change, exact, fresh = slopes(inner, error), True, False
                 else:
                     damping *= 10.0
                     if damping > 1e6:

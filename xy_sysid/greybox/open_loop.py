@@ -45,7 +45,8 @@ def open_loop(sampling_rate: float, position: FloatArray, simulated: FloatArray,
     """
     started = _travelled(sampling_rate, _fading(sampling_rate, pole, simulated.size))
     drift = position - position[0] - _travelled(sampling_rate, simulated)
-    speed = float(drift @ started) / float(started @ started)
+    lasting = float(started @ started)
+    speed = float(drift @ started) / lasting if lasting > 0.0 else 0.0  # a pole far above the sampling rate forgets it at once
     error = drift - speed * started
     rms, spread = _rms(error), float(np.std(position))
     share = rms / spread if spread > 0.0 else np.inf

@@ -51,11 +51,13 @@ def problem(data: AxisData, model: AxisModel, early: bool, fine: float = FINE) -
         starts.append(start_of(one, data.sampling_rate, u, y, BEGINS))
         runs.append(simulator(model.library, names, data.sampling_rate, u, y, fine))
     first, later = each[0], each[1:, places] - each[0, places]
+    cost = sum(data.counts(early)) * (max(fine / data.sampling_rate, 1.0) if names else 1.0)
     size = first.size
 
     def simulated(values: FloatArray) -> FloatArray:
         rows = np.repeat(values[None, :size], len(runs), axis=0)
         rows[1:, places] += values[size:].reshape(later.shape)
+        data.work.add(cost)
         parts = [one(row, speed) for one, row, speed in zip(runs, rows, starts, strict=True)]
         return parts[0] if len(parts) == 1 else np.concatenate(parts)
 

@@ -89,7 +89,8 @@ class Pool:
     def remember(self, effects: frozenset[str], brief: GreyboxFit, found: GreyboxFit, leads: bool = True, promised: float = 0.0) -> Node:
         """A set with its fit, in the place of a worse one of the same set."""
         parameters = count(self.library, effects - self.kept)
-        node = Node(effects, parameters, brief, found, refusal(self.data, self.library, found), leads, promised)
+        refused = refusal(self.data, self.library, found, self.kept) if effects > self.kept else ""
+        node = Node(effects, parameters, brief, found, refused, leads, promised)
         known = self.nodes.get(effects)
         if known is not None and known.whole and (not node.whole or (self.score(known) <= self.score(node) and not known.refused)):
             return known

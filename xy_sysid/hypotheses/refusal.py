@@ -12,13 +12,15 @@ from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit
 
 
-def refusal(data: AxisData, library: Library, found: GreyboxFit) -> str:
-    """Why a fit explains nothing, whatever it leaves: in words, or empty."""
+def refusal(data: AxisData, library: Library, found: GreyboxFit, given: frozenset[str] = frozenset()) -> str:
+    """Why a fit explains nothing, whatever error it leaves: in words, or empty. given: effects that are not asked, as somebody wants them."""
     low, high = data.sampling_rate * 0.0, 0.4 * data.sampling_rate
     excited = data.layout.edges()[:-1][data.floor.excited]
     if excited.size:
         low, high = float(excited[0]), min(high, 1.5 * float(data.layout.edges()[1:][data.floor.excited][-1]))
     for name, values in found.model.effects:
+        if name in given:
+            continue
         effect = library[name]
         why = effect.refusal(values, data.reach) if effect.refusal is not None else ""
         if why:

@@ -24,10 +24,11 @@ import numpy as np
 
 from xy_sysid.bags import POSITION, REFERENCE, VOLTAGE, BagWriter
 from xy_sysid.bags.atomic import taken, whole
+from xy_sysid.bags.opening import regular_file
 from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.imports import arrays, csv, sheet_table, table
 from xy_sysid.imports.bag import load_bag
-from xy_sysid.imports.limits import fits, plain_file
+from xy_sysid.imports.limits import fits
 from xy_sysid.imports.matlab import read_mat
 from xy_sysid.imports.motion import as_position
 from xy_sysid.imports.plausible import meaningful, remarks, without_dead_parts
@@ -73,7 +74,7 @@ def kind_of(path: Path) -> str:
         return "bag"
     if suffix not in TABLES:
         raise BadRecording(path, f"a file of kind {path.suffix!r}, which is not a recording", f"Give {KINDS}.")
-    plain_file(path)
+    regular_file(path)
     if path.stat().st_size == 0:
         raise BadRecording(path, "the file is empty (0 bytes)", "Take another copy of the file.")
     return suffix[1:] if suffix in (".npz", ".mat") else "csv"

@@ -21,7 +21,7 @@ from xy_sysid.imports.limits import MOST_COLUMNS, fits
 from xy_sysid.imports.reading import Reading
 from xy_sysid.imports.sheet import Column, Sheet
 from xy_sysid.imports.sheet_table import in_seconds, scaled
-from xy_sysid.imports.table import Table, axis_names
+from xy_sysid.imports.table import ONE_UNIT, Table, axis_names, places_of
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import Recording
 
@@ -108,7 +108,11 @@ def table(path: Path, arrays: Arrays, reading: Reading, notes: list[str]) -> Tab
     reference_name = next((name for name in REFERENCES if name in arrays), None)
     reference = None if reference_name is None else _matrix(path, reference_name, arrays[reference_name], rows)
     names = np.atleast_1d(arrays["axes"]).astype(str).tolist() if "axes" in arrays else []
-    axes = tuple(name.strip() for name in names) if len(names) == inputs.shape[1] else axis_names(inputs.shape[1])
+    every = tuple(name.strip() for name in names) if len(names) == inputs.shape[1] else axis_names(inputs.shape[1])
+    places = places_of(every, reading.axes)  # the units of those that are left out do not matter
+    if reference is not None and reference.shape == outputs.shape:
+        reference = reference[:, places]
+    axes, inputs, outputs = tuple(every[place] for place in places), inputs[:, places], outputs[:, places]
     if time is None and fs is None and reading.rate is None:
         said = next((f"{name} ({value})" for name, value in arrays.items() if _plain(name) in RATES), "fs")
         raise BadRecording(path, f"neither a time column nor a usable {said}", "Add t in seconds or fs in Hz, or give --rate.")
@@ -157,7 +161,7 @@ def _si(side: tuple[str, FloatArray, str], path: Path, axes: tuple[str, ...], re
         units.append(unit)
     if len({unit.name for unit in units}) > 1:
         given = ", ".join(sorted({unit.name for unit in units}))
-        raise BadRecording(path, f"axes in different units ({given})", "Give all axes of one kind the same unit.")
+        raise BadRecording(path, f"axes in different units ({given})", ONE_UNIT)
     notes += dict.fromkeys(said)
     return np.column_stack(columns), units[0]
 

@@ -20,6 +20,8 @@ from xy_sysid.samples.recording import Recording, rate_from_time
 
 EXAMPLE = "Name the columns like time,x_voltage,x_position[mm] in the first row."
 HEADS = 10  # lines whose cells are counted before anything is made of them
+PIECE = 1 << 24  # bytes read at once
+LONGEST_LINE = 10_000_000  # bytes; a thousand for each of MOST_COLUMNS
 LOOK = 200  # rows before the last one that show how its numbers are written
 
 
@@ -41,7 +43,7 @@ def sheet(path: Path) -> Sheet:
 
 def _text(path: Path) -> str:
     """The file's text: UTF-8, UTF-16 if it begins so, or else as Windows writes it."""
-    raw = path.read_bytes()
+    raw = _raw(path)
     for code in ("utf-16",) if raw.startswith((b"\xff\xfe", b"\xfe\xff")) else ("utf-8-sig", "cp1252"):
         try:
             text = raw.decode(code)
@@ -50,6 +52,23 @@ def _text(path: Path) -> str:
         if "\0" not in text:
             return text
     raise BadRecording(path, "not a text file", "Save it as CSV in UTF-8.")
+
+
+def _raw(path: Path) -> bytes:
+    """The file's bytes; raises BadRecording, before the rest is read, for a line that no table has."""
+    parts: list[bytes] = []
+    open_line = 0  # bytes since the last end of a line
+    with path.open("rb") as file:
+        while part := file.read(PIECE):
+            bytes_ = np.frombuffer(part, np.uint8)
+            ends = np.flatnonzero((bytes_ == ord("\n")) | (bytes_ == ord("\r")))
+            lengths = np.diff(ends, prepend=-1 - open_line, append=len(part))
+            if lengths.max() > LONGEST_LINE:
+                problem = f"a line of more than {LONGEST_LINE / 1e6:.0f} million characters, so not a table"
+                raise BadRecording(path, problem, "Save it with one line for each sample.")
+            open_line = int(lengths[-1]) - 1
+            parts.append(part)
+    return b"".join(parts)
 
 
 def _whole(rows: Rows, separator: str, width: int, notes: list[str]) -> Rows:

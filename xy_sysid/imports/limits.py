@@ -1,9 +1,8 @@
-"""How much a file may become: nothing is unpacked before its size is known to fit, and nothing is read that never ends."""
+"""How much a file may become: nothing is unpacked before its size is known to fit."""
 
 from __future__ import annotations
 
 import os
-import stat
 from pathlib import Path
 
 from xy_sysid.errors import BadRecording
@@ -23,10 +22,3 @@ def fits(path: Path, size: float, what: str = "unpacked") -> None:
     if size > room():
         problem = f"{what} it would take {size / 1e9:.3g} GB, and {room() / 1e9:.2g} GB may be loaded at once"
         raise BadRecording(path, problem, "Store a shorter part, or as a rosbag2 and give a part with --span.")
-
-
-def plain_file(path: Path) -> None:
-    """Raises BadRecording for a pipe, a device or a socket, which may never end; OSError where there is nothing."""
-    mode = path.stat().st_mode
-    if not stat.S_ISREG(mode):
-        raise BadRecording(path, "not a file but a pipe, a device or a folder", "Copy its content into a file first.")

@@ -15,7 +15,7 @@ from xy_sysid.imports.names import meaning, usual_unit
 from xy_sysid.imports.reading import Reading
 from xy_sysid.imports.roles import Found, Roles, assigned
 from xy_sysid.imports.sheet import Column, Sheet, spoken
-from xy_sysid.imports.table import Table
+from xy_sysid.imports.table import ONE_UNIT, Table, places_of
 from xy_sysid.samples.block import FloatArray
 
 EPOCHS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"))  # a clock that reads more than this counts no seconds since 1970
@@ -29,7 +29,8 @@ def table(sheet: Sheet, reading: Reading, notes: list[str]) -> Table:
     roles = assigned(sheet, reading, notes)
     if roles.joint is not None:
         roles = _by_joint(sheet, roles, notes)
-    axes = tuple(axis for axis in roles.inputs if axis in roles.outputs)
+    every = tuple(axis for axis in roles.inputs if axis in roles.outputs)
+    axes = tuple(every[place] for place in places_of(every, reading.axes))  # the units of those that are left out do not matter
     time, fs = _time(sheet, roles, reading, notes)
     u, input_unit = _values(sheet, "input", roles.inputs, axes, reading, notes)
     y, output_unit = _values(sheet, "output", roles.outputs, axes, reading, notes)
@@ -112,7 +113,7 @@ def _values(sheet: Sheet, role: str, columns: Found, axes: tuple[str, ...], read
         said += told
     if len({unit.name for unit in units.values()}) > 1:
         given = ", ".join(sorted(texts))
-        raise BadRecording(sheet.path, f"axes in different units ({given})", "Give all axes of one kind the same unit, or choose some with --axis.")
+        raise BadRecording(sheet.path, f"axes in different units ({given})", ONE_UNIT)
     if len({len(one) for one in found}) > 1:
         lengths = ", ".join(f"{columns[axis].name} {len(one)}" for axis, one in zip(axes, found, strict=True))
         raise BadRecording(sheet.path, f"lengths differ: {lengths}", "Give one row per sample.")

@@ -18,6 +18,7 @@ from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import Recording, Sensed, rate_from_time
 
 USUAL = ("x", "y", "z")
+ONE_UNIT = "Give all axes of one kind the same unit, or choose axes of one unit with --axis."
 APART = 0.1  # part of the rows; if more have an input and no output or the other way round, the two have stamps of their own
 
 
@@ -60,7 +61,7 @@ def recording(path: Path, table: Table, wanted: Sequence[str] | None, start: flo
         notes.append(f"there is no time; fs = {table.fs:g} Hz is taken")
     else:
         time = table.time
-    columns = _whole(path, table, _columns(table.axes, wanted), notes)
+    columns = _whole(path, table, places_of(table.axes, wanted), notes)
     voltage, position = table.input[:, columns], table.output[:, columns]
     reference = None if table.reference is None else table.reference[:, columns]
     seq = np.arange(rows, dtype=np.float64) if table.seq is None else table.seq
@@ -145,7 +146,8 @@ def _apart(voltage: FloatArray, position: FloatArray) -> bool:
     return alone[0] > APART * int(np.sum(has_output)) and alone[1] > 0 and int(np.sum(has_input)) > 1
 
 
-def _columns(axes: tuple[str, ...], wanted: Sequence[str] | None) -> list[int]:
+def places_of(axes: tuple[str, ...], wanted: Sequence[str] | None) -> list[int]:
+    """Places of the axes that are wanted, all for None; raises BadInput for one that is not there."""
     if wanted is None:
         return list(range(len(axes)))
     unknown = [name for name in wanted if name not in axes]

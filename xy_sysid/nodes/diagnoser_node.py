@@ -171,6 +171,7 @@ class DiagnoserNode(WalledNode):
 
     def _forget(self) -> str:
         self._diagnoser.reset()
+        self._streams.forget()
         return "everything heard is forgotten"
 
     def _cancel(self) -> str:

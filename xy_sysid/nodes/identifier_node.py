@@ -129,6 +129,7 @@ class IdentifierNode(WalledNode):
 
     def _reset(self) -> str:
         self._identifier.reset()
+        self._streams.forget()
         self._worker.change(LiveFitter(self._own.settings))
         return "everything heard is forgotten"
 

@@ -63,14 +63,10 @@ class Streams:
             node.get_logger().warning(words)
         if source == "joint_state" and settings.output == "velocity":
             node.get_logger().info(integrated(settings.units.speed))
-        self.refused, self.refusals = "", 0
-        self._node, self._axes, self._effort, self._give = node, axes, effort, feed
-        self._joints = JointCounter(axes, with_voltage=not effort, output=settings.output)
+        self._node, self._axes, self._effort, self._output, self._give = node, axes, effort, settings.output, feed
         closed = isinstance(settings, IdentifierSettings) and settings.response == "joint_input_output"
         self._streams: tuple[StreamName, ...] = (*QUANTITIES, "reference") if closed else QUANTITIES
-        self._heard = dict.fromkeys(self._streams, 0)
-        self._before = dict(self._heard)
-        self._paired = 0  # samples, at the last look
+        self.forget()
         self._by_stamp = source == "joint_state"
         if self._by_stamp:
             Ear(node, JointState, settings.joint_topic, self._on_joints, JOINT_QOS)
@@ -80,6 +76,14 @@ class Streams:
             Ear(node, Float64MultiArray, "voltage", self._on_voltage, DATA_QOS)
         if closed:
             Ear(node, Float64MultiArray, "reference", self._on_reference, DATA_QOS)
+
+    def forget(self) -> None:
+        """Begin anew with all that was learned from the streams: the rate and the counter of joint states, what was refused."""
+        self.refused, self.refusals = "", 0
+        self._joints = JointCounter(self._axes, with_voltage=not self._effort, output=self._output)
+        self._heard = dict.fromkeys(self._streams, 0)
+        self._before = dict(self._heard)
+        self._paired = 0  # samples, at the last look
 
     def heard(self, samples: int, sentences: Mapping[str, str]) -> Heard:
         """What came since the last call; samples: paired since the start; sentences: what the pairing says, by reason."""

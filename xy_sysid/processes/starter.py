@@ -18,6 +18,7 @@ from pathlib import Path
 from types import FrameType
 from typing import IO
 
+from xy_sysid.bags.opening import text_of
 from xy_sysid.errors import BadInput
 from xy_sysid.files.package_files import find, share
 from xy_sysid.files.ros_parameters import parameters
@@ -46,12 +47,12 @@ def load(name: str) -> list[ProcessSpec]:
     Raises BadInput.
     """
     path = find(name)
-    text, folder = path.read_text(encoding="utf-8"), path.resolve().parent
+    text, folder = text_of(path, "a run file"), path.resolve().parent
     specs = plan(text, path.name, folder)
     for file, kinds in parameter_files(text, path.name):
         if not (folder / file).is_file():
             raise BadInput(f"{path.name}: params_file", repr(file), f"a file, relative to {folder}", "Give one that exists.")
-        parameters((folder / file).read_text(encoding="utf-8"), file, kinds)
+        parameters(text_of(folder / file, "a parameter file"), file, kinds)
     return [replace(spec, env=tuple(_network(spec.env, folder, path.name))) for spec in specs]
 
 

@@ -11,19 +11,21 @@ from collections import deque
 import numpy as np
 
 from xy_sysid.errors import BadInput
+from xy_sysid.jit import compiled
 from xy_sysid.samples.block import Block, FloatArray
 from xy_sysid.samples.integral import Path
 from xy_sysid.samples.joint_fields import JointOutput
 from xy_sysid.samples.ring import RATE_SAMPLES
-from xy_sysid.samples.stamp_counter import StampCounter
+from xy_sysid.samples.stamp_counter import FOLLOW, StampCounter
 
 RESTART = 1.0  # s that a stamp must go back to mean that the source has started again
 APART = 1.0  # s between the newest stamps of voltage and joint states from which on they are not one clock
 ANCHORS = 20  # samples of voltage from which the rate is read at first
 SAME_RATE = 0.01  # part by which the rates of voltage and joint states may differ in what 200 jittering stamps tell
 CATCHING_UP = 0.2  # part by which steps of long stretches may leave the median step as long as it is believed
-AGAIN = 4  # times as many stamps as teach the rate at first, after which it is looked at again
-OTHER_RATE = 1.3  # factor by which their median and their mean step must both differ from it: losses change the mean alone, bursts the median alone
+LOOK, FEW_LOOK, MANY_LOOK = 2.0, RATE_SAMPLES // 2, 40_000  # s of stamps, and at least and most so many, after which the rate is looked at again
+OTHER_RATE = 1.01  # factor by which their counted and their mean step must both differ from it: losses change the mean alone, bursts the count alone
+COUNTED = 3  # rounds in which the step that stamps are counted by becomes that of the line through them
 STICKS = 0.8  # samples by which a sample may leave its voltage sample before it is given to another
 STILL = 20  # messages in a row with one stamp that mean that nobody stamps them
 
@@ -46,13 +48,36 @@ def joints_of(axes: tuple[str, ...], entries: tuple[str, ...]) -> dict[str, str]
     return found
 
 
+def counted_step(times: FloatArray) -> float:
+    """s between samples, by a straight line through stamps that are counted by the usual step: losses and jitter do not change it, bursts do."""
+    step = float(np.median(np.diff(times)))
+    for _ in range(COUNTED):
+        count = _counted(times, step)
+        count -= count.mean()
+        step = float(count @ (times - times.mean()) / (count @ count))
+    return step
+
+
+@compiled
+def _counted(times: FloatArray, step: float) -> FloatArray:
+    """Number of each stamp, by the even instants that follow them slowly: jitter does not add up."""
+    count = np.zeros(times.shape[0])
+    instant = times[0]
+    for k in range(1, times.shape[0]):
+        passed = np.rint((times[k] - instant) / step)
+        instant += passed * step
+        instant += FOLLOW * (times[k] - instant)
+        count[k] = count[k - 1] + passed
+    return count
+
+
 def usual_step(times: FloatArray) -> float:
-    """s between samples: the median step, or where most cycles only catch up with a late one, that of a straight line."""
+    """s between samples: the counted step, or where most cycles only catch up with a late one, that of a straight line."""
     times = times[np.concatenate(([True], np.diff(np.maximum.accumulate(times)) > 0))]
     far = max(len(times) // 4, 1)
     step, mean = float(np.median(np.diff(times))), float(np.median(times[far:] - times[:-far])) / far
     if abs(mean / step - 1.0) < CATCHING_UP:
-        return step
+        return counted_step(times)
     count = np.arange(len(times)) - (len(times) - 1) / 2
     return float(count @ (times - times.mean()) / (count @ count))
 
@@ -78,7 +103,8 @@ class JointCounter:
         self._stamps: deque[float] = deque(maxlen=RATE_SAMPLES)
         self._newest, self._still = 0.0, 0
         self._latest = 0.0  # stamp of the newest sample that was not left out
-        self._since: list[float] = []  # stamps since the period was learnt or found to be right
+        self._since: list[float] = []  # stamps since the last look at the period
+        self._other = 0  # whether the last look found a longer step than was learnt (1), or a shorter one (-1)
 
     def see_voltage(self, block: Block) -> None:
         """Learn rate and place from the voltage stream; blocks may have one row."""
@@ -123,11 +149,9 @@ class JointCounter:
 
     def _own_rate(self) -> float | None:
         """Hz, of the newest stamps, None while there are too few."""
-        steps = np.diff(np.array(self._stamps))
-        steps = steps[steps > 0]
-        if steps.size < RATE_SAMPLES // 2:
-            return None
-        return float(np.sum(np.rint(steps / np.median(steps))) / np.sum(steps))
+        times = np.array(self._stamps)
+        times = times[np.concatenate(([True], np.diff(times) > 0))] if times.size else times
+        return 1.0 / counted_step(times) if times.size > RATE_SAMPLES // 2 else None
 
     def _watch(self, time: float) -> None:
         self._still = self._still + 1 if time == self._newest else 0
@@ -164,15 +188,18 @@ class JointCounter:
         self._rate, self._anchor = 1.0 / period, (float(times[0]) - period, -1.0)
 
     def _learn_again(self, time: float) -> None:
-        """What was learnt while a source only caught up with a stall is not its period: from enough stamps since, it is learnt anew."""
+        """The driver may have come back at another rate, or the first one was learnt while it caught up with a stall: the newest stamps tell."""
         self._since.append(time)
-        if len(self._since) < AGAIN * RATE_SAMPLES:
+        count, seconds = len(self._since), time - self._since[0]
+        if count < FEW_LOOK or (seconds < LOOK and count < MANY_LOOK):
             return
         assert self._rate is not None
         times, self._since = np.array(self._since), []
-        steps = self._rate * np.array([np.median(np.diff(times)), (times[-1] - times[0]) / (times.size - 1)])
-        if np.all(steps > OTHER_RATE) or np.all(steps < 1.0 / OTHER_RATE):
-            self._rate, self._counter = 1.0 / usual_step(times), None
+        steps = self._rate * np.array([counted_step(times), seconds / (count - 1)])
+        other = int(np.all(steps > OTHER_RATE)) - int(np.all(steps < 1.0 / OTHER_RATE))
+        if other and other == self._other:  # a second time: all of these stamps came after the change
+            self._rate, self._counter, other = 1.0 / usual_step(times), None, 0
+        self._other = other
 
     def _count(self, samples: list[tuple[float, FloatArray]]) -> Block | None:
         assert self._rate is not None and self._anchor is not None

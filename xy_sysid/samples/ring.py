@@ -15,7 +15,8 @@ from xy_sysid.samples.block import Block, FloatArray
 from xy_sysid.samples.recording import rate_from_time
 
 RATE_SAMPLES = 200  # samples of one stream from which its rate is read
-DRIFT, DRIFT_SAMPLES = 0.01, 10 * RATE_SAMPLES  # of a period a sample, over so many samples: then the rate is another one
+DRIFT = 0.01  # of a period a sample, over DRIFT_SECONDS: then the rate is another one
+DRIFT_SECONDS, DRIFT_SAMPLES = 5.0, 10 * RATE_SAMPLES  # of which so many samples are enough; half as many show twice the drift
 
 Counters = NDArray[np.int64]
 
@@ -75,9 +76,10 @@ class Ring:
             return False
         counter, offset = self._anchor
         span = self.newest - counter
-        if abs(self.offset - offset) * self.rate > DRIFT * max(span, DRIFT_SAMPLES):
+        enough = min(max(round(DRIFT_SECONDS * self.rate), RATE_SAMPLES), DRIFT_SAMPLES)
+        if abs(self.offset - offset) * self.rate > DRIFT * max(span, enough):
             return True
-        if span > DRIFT_SAMPLES:
+        if span > enough:
             self._anchor = self.newest, self.offset
         return False
 

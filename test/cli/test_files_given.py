@@ -1,0 +1,199 @@
+"""Files that somebody names and that are none, or far too long: one line at once, whichever option names them."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import socket
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from helpers.busy import allowed
+from helpers.cli_tools import RIGID, Said, cli, npz
+
+from xy_sysid.bags.opening import too_much
+from xy_sysid.errors import BadRecording
+from xy_sysid.files.state import load_state
+
+QUICK = 2.0  # s, for a refusal
+DOUBLING = [("", "n0"), *((f"n{k}", f"n{k + 1}") for k in range(30))]  # each list holds the one before twice
+ENDLESS = 10.0  # s after which a command is taken to hang
+
+
+def at_once(act: Callable[[], Said], seconds: float = ENDLESS) -> Said:
+    """What a command says; fails where it hangs, which leaves its thread behind."""
+    said: list[Said] = []
+    thread = threading.Thread(target=lambda: said.append(act()), daemon=True)
+    thread.start()
+    thread.join(allowed(seconds))
+    assert said, "it hangs"
+    return said[0]
+
+
+def refusal(*words: object, seconds: float = ENDLESS) -> str:
+    """The one line of a command that refuses within its time."""
+    said = at_once(lambda: cli(*words), seconds)
+    lines = [line for line in said.err.splitlines() if not line.startswith("note: ")]
+    assert said.code == 2 and said.out == "" and len(lines) == 1, said
+    return lines[0]
+
+
+def fifo(path: Path) -> None:
+    os.mkfifo(path)
+
+
+def device(path: Path) -> None:
+    path.symlink_to("/dev/zero")
+
+
+def folder(path: Path) -> None:
+    path.mkdir()
+
+
+@contextmanager
+def within(place: Path) -> Iterator[None]:
+    """In a folder: the name of a socket has 107 characters at most."""
+    before = Path.cwd()
+    os.chdir(place)
+    try:
+        yield
+    finally:
+        os.chdir(before)
+
+
+def bound(path: Path) -> None:
+    with within(path.parent), socket.socket(socket.AF_UNIX) as made:
+        made.bind(path.name)
+
+
+ODD = {"a pipe": fifo, "a device": device, "a socket": bound, "a folder": folder}
+READS = {
+    "a table": ("frf", "FILE.csv"),
+    "an npz": ("fit", "FILE.npz"),
+    "a mat": ("diagnose", "FILE.mat"),
+    "a database": ("frf", "FILE.db3"),
+    "an mcap": ("frf", "FILE.mcap"),
+    "columns": ("columns", "FILE.csv"),
+    "a model": ("compare", "REC", "FILE.yaml"),
+    "a model before": ("compare", "REC", "--before", "FILE.yaml", "--after", "FILE.yaml"),
+    "a model to check": ("validate", "REC", "FILE.yaml"),
+    "parameters": ("fit", "REC", "--params", "FILE.yaml"),
+    "an effect": ("refine", "REC", "--auto", "--effect-file", "FILE.py"),
+    "a run file": ("run", "--params", "FILE.yaml"),
+    "a machine": ("simulate", "new", "--machine", "FILE.yaml"),
+}
+
+
+@pytest.fixture(scope="module")
+def rec(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return npz(tmp_path_factory.mktemp("rec") / "rec.npz", rows=4000)
+
+
+@pytest.mark.parametrize("odd", ODD)
+@pytest.mark.parametrize("what", READS)
+def test_what_is_no_regular_file_is_refused_wherever_one_is_read(what: str, odd: str, rec: Path, tmp_path: Path) -> None:
+    """It may never end: nothing waits for it."""
+    if (what, odd) in (("a database", "a folder"), ("an mcap", "a folder")):
+        pytest.skip("a folder may be a bag")
+    words = [str(rec) if word == "REC" else word.replace("FILE", str(tmp_path / "odd")) for word in READS[what]]
+    ODD[odd](next(Path(word) for word in words if word.startswith(str(tmp_path / "odd"))))
+    assert "odd" in refusal(*words)
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    bag = tmp_path_factory.mktemp("bag") / "rec"
+    assert cli("simulate", bag, "--duration", "2").code == 0
+    return bag
+
+
+@pytest.mark.parametrize("odd", ODD)
+@pytest.mark.parametrize("name", ["named.db3", "rec.db3-journal", "rec.db3-wal"])
+def test_a_bag_with_a_file_that_is_none_is_refused(name: str, odd: str, good: Path, tmp_path: Path) -> None:
+    """As its metadata names it, or beside the database, where sqlite would open it."""
+    bag = tmp_path / "rec"
+    shutil.copytree(good, bag)
+    ODD[odd](bag / name)
+    if name == "named.db3":
+        metadata = bag / "metadata.yaml"
+        metadata.write_text(metadata.read_text().replace("rec.db3", name))
+    line = refusal("frf", bag)
+    assert name in line and "not a file but a pipe, a device, a socket or a folder" in line
+
+
+def test_a_pipe_that_nobody_names_does_not_matter(good: Path, tmp_path: Path) -> None:
+    """The files that the metadata names are read, and no other is opened."""
+    bag = tmp_path / "rec"
+    shutil.copytree(good, bag)
+    os.mkfifo(bag / "other.db3")
+    assert at_once(lambda: cli("columns", bag)).code == 0
+
+
+def test_a_state_that_is_a_pipe_is_refused(tmp_path: Path) -> None:
+    """The identifier sets it aside and begins anew."""
+    os.mkfifo(tmp_path / "state")
+    os.close(os.open(tmp_path / "state", os.O_RDWR | os.O_NONBLOCK))
+    with pytest.raises(BadRecording, match="not a file but a pipe"):
+        load_state(tmp_path / "state")
+
+
+@pytest.fixture(scope="module")
+def model(rec: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
+    """A model without the sum of its lines, as after a change by hand."""
+    path = tmp_path_factory.mktemp("model") / "model.yaml"
+    assert cli("fit", rec, *RIGID, "--set", "length=1024", "--model", path).code == 0
+    return path.read_text().partition("\n")[2]
+
+
+@pytest.mark.parametrize(
+    ("what", "change"),
+    [
+        ("40 MB", lambda text: text + "  # nothing\n" * 3_400_000),
+        ("200,000 coefficients", lambda text: text.replace("numerator:", f"numerator: [{'1.0, ' * 200_000}1.0]\n      other:", 1)),
+        ("90 coefficients", lambda text: text.replace("numerator:", f"numerator: [{'1.0, ' * 89}1.0]\n      other:", 1)),
+        (
+            "a list that doubles itself 30 times",
+            lambda text: text + "".join(f"{b}: &{b} [*{a}, *{a}]\n" if a else f"{b}: &{b} [1, 2]\n" for a, b in DOUBLING),
+        ),
+    ],
+)
+def test_a_model_far_too_large_is_one_line_at_once(what: str, change: Callable[[str], str], rec: Path, model: str, tmp_path: Path) -> None:
+    """Nobody waits a minute to hear that it was the wrong file."""
+    path = tmp_path / "model.yaml"
+    path.write_text(change(model))
+    line = refusal("compare", rec, path, seconds=QUICK)
+    assert str(path) in line, what
+
+
+@pytest.mark.parametrize(
+    "words", [("fit", "REC", "--params", "FILE"), ("run", "--params", "FILE"), ("simulate", "new", "--machine", "FILE")], ids=lambda words: words[0]
+)
+def test_settings_far_too_long_are_one_line_at_once(words: tuple[str, ...], rec: Path, tmp_path: Path) -> None:
+    """Parameters, run files and machines of 40 MB."""
+    path = tmp_path / "p.yaml"
+    path.write_text("a: 1\n" + "# nothing\n" * 4_000_000)
+    line = refusal(*(str(rec) if word == "REC" else str(path) if word == "FILE" else word for word in words), seconds=QUICK)
+    assert str(path) in line and " at most" in line
+
+
+@pytest.mark.parametrize(("head", "text"), [("", "a" * 64), ("", "1.0 " * 16), ("time,u,y\n0,1,2\n1,2,3\n", "a;b;" * 16)])
+def test_a_line_of_200_mb_is_refused_at_once(text: str, head: str, tmp_path: Path) -> None:
+    """First or last line: it is said, and nothing is made of it."""
+    path = tmp_path / "long.csv"
+    with path.open("w") as file:
+        file.write(head)
+        for _ in range(50):
+            file.write(text * 65536)
+    line = refusal("columns", path, seconds=QUICK)
+    assert "a line of more than 10 million characters" in line
+
+
+def test_yaml_is_counted_as_it_reads_and_not_as_it_is_written() -> None:
+    """A part that is repeated counts as often; what holds itself never ends; a few repeated parts are nothing."""
+    assert too_much("a: &a [1, 2]\nb: [*a, *a]\n") == ""
+    assert "values" in too_much("".join(f"{b}: &{b} [*{a}, *{a}]\n" if a else f"{b}: &{b} [1]\n" for a, b in DOUBLING))
+    assert "values" in too_much("a: &a [*a]\n")
+    assert "levels" in too_much("[" * 50 + "]" * 50)

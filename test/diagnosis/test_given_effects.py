@@ -1,0 +1,33 @@
+"""A search from effects that somebody gave: they stay, and nothing asks how the axis would do without them."""
+
+from __future__ import annotations
+
+import pytest
+from helpers.simulated import recorded
+
+from xy_sysid.axis.model import STANDARD
+from xy_sysid.diagnosis.refine import Effort, refine
+from xy_sysid.greybox.axis_data import AxisData, prepare
+
+MODES = [effect.name for effect in STANDARD.acting if effect.category == "motion"]
+
+
+@pytest.fixture(scope="module")
+def data() -> AxisData:
+    """An axis with a mode and dry friction."""
+    return prepare(2000.0, *recorded("base_resonance+coulomb_friction", seconds=8.0).axis("x"))
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_a_search_goes_on_from_a_mode_that_was_given(mode: str, data: AxisData) -> None:
+    """The mode keeps its name and its place; the friction is found beside it."""
+    found = refine(data, given=[mode], effort=Effort(most=1))
+    assert found.effects == (mode, "coulomb_friction")
+    assert [step.added for step in found.steps] == [None, *found.effects]
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_a_mode_that_was_given_stays_where_nothing_else_was_fitted(mode: str, data: AxisData) -> None:
+    """No budget at all: there is no set without the mode, and none is asked for."""
+    found = refine(data, given=[mode], effort=Effort(budget=-1.0, clock=lambda: 0.0))
+    assert found.effects == (mode,) and found.stopped

@@ -1,0 +1,34 @@
+"""Every recording of a real machine that we have, through the commands that read one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from helpers.real_data import data
+
+from faults.attack import GOOD
+from faults.shared import COMMANDS, RECORDINGS, Shared, told, unnamed
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize("row", RECORDINGS, ids=lambda row: row.path)
+def test_a_command_answers_or_refuses_in_one_line(row: Shared, name: str, tmp_path: Path) -> None:
+    """A short part of each, with a small budget; no traceback, and no warning of numpy."""
+    data(row.path)
+    found = told(name, row, tmp_path, short=True)
+    assert found.outcome in GOOD, found.note
+
+
+def test_every_file_is_in_the_table() -> None:
+    """A recording that is new is walked through, too: add it to faults/shared.py with the options that it needs."""
+    assert unnamed(data("")) == []
+
+
+def test_a_new_file_is_noticed(tmp_path: Path) -> None:
+    """Beside those that the table names, and in a folder of its own."""
+    for name in ("README.md", "emps/emps_train.npz", "joint_state_bags/roblab_hw4/rosbag.db3", "emps/new.csv", "new/a.npz"):
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(b"")
+    assert unnamed(tmp_path) == ["emps/new.csv", "new/a.npz"]

@@ -1,0 +1,77 @@
+"""Every benchmark runs to its end: a little of each, with its figures looked at where they do not depend on the machine."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+
+import pytest
+from helpers import ROOT
+from helpers.cli_tools import bare
+from helpers.real_data import data
+from helpers.ros_tools import needs_ros
+
+from bench.__main__ import SCRIPTS, TABLES, main, text
+from bench.tables import Table
+
+HERE = [name for name in TABLES if name != "live"]  # which starts processes that talk to each other
+
+
+def short(name: str) -> Table:
+    """The short form of a benchmark in this process."""
+    run: Callable[..., Table] = importlib.import_module(f"bench.{name}").run
+    return run(lambda line: None, short=True)
+
+
+@pytest.mark.parametrize("name", HERE)
+def test_a_benchmark_gives_its_table(name: str) -> None:
+    """A row for each thing measured, all of the same width, and figures against goals."""
+    table = short(name)
+    assert table.rows and table.checks
+    assert {len(row) for row in table.rows} == {len(table.columns)}
+    assert " nan" not in text(name, table)
+
+
+def test_what_is_compared_is_equal() -> None:
+    """Times of different answers would say nothing: H1 is scipy's, and the cost is that of least_squares."""
+    for name, words in (("h1", "largest relative difference"), ("fit", "cost of xy_sysid")):
+        (check,) = (check for check in short(name).checks if check.what.startswith(words))
+        assert check.met, check
+
+
+@needs_ros
+def test_the_live_benchmark_gives_its_table() -> None:
+    """Nodes as processes: all samples that were sent are paired."""
+    done = subprocess.run([sys.executable, "-m", "bench", "--short", "live"], cwd=ROOT, env=bare(), capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    assert "| lost, dropped or refused | none |" in done.stdout
+
+
+@pytest.mark.parametrize("name", SCRIPTS)
+def test_a_benchmark_that_is_asked_for_by_name_runs(name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """It prints what it measured, and writes no page."""
+    if name == "real_fits":
+        monkeypatch.setenv("XY_SYSID_DATA", os.fspath(data("two_inertia_bench").parent))
+    monkeypatch.setattr("sys.argv", ["bench", "--short", name])
+    page = ROOT / "docs" / "benchmarks.md"
+    before = page.read_bytes()
+    assert main() == 0
+    said = capsys.readouterr().out
+    assert len(said.splitlines()) > 2 and " nan" not in said
+    assert page.read_bytes() == before
+
+
+def test_every_benchmark_is_among_these() -> None:
+    """A new file of bench/ has a short form, too."""
+    files = {path.stem for path in (ROOT / "bench").glob("*.py")} - {"__init__", "__main__", "tables"}
+    assert files == {*TABLES, *SCRIPTS}
+
+
+def test_an_unknown_benchmark_is_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """With the names that there are."""
+    monkeypatch.setattr("sys.argv", ["bench", "bag"])
+    assert main() == 2
+    assert capsys.readouterr().err.startswith("bench: bag is not a benchmark; there are h1, ")

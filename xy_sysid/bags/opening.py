@@ -1,0 +1,74 @@
+"""What is looked at before a file that somebody names is opened: that it is a regular file, no longer than such a file can be, and modest YAML."""
+
+from __future__ import annotations
+
+import stat
+from pathlib import Path
+
+import yaml
+
+from xy_sysid.errors import BadRecording
+
+LONGEST = 1 << 20  # bytes of a text that people or the commands write: a model, parameters, a run file
+WORDS = 20_000  # parts of a YAML document of that kind, each repeated part counted as often as it stands there
+DEEPEST = 30  # levels of a YAML document
+PARSER = getattr(yaml, "CBaseLoader", yaml.BaseLoader)  # the compiled one where there is one
+
+
+def regular_file(path: Path) -> None:
+    """Raises BadRecording for a pipe, a device, a socket or a folder, which may never end; OSError where there is nothing."""
+    if not stat.S_ISREG(path.stat().st_mode):
+        raise BadRecording(path, "not a file but a pipe, a device, a socket or a folder", "Copy its content into a file first.")
+
+
+def is_regular(path: Path) -> bool:
+    """Whether there is such a file."""
+    try:
+        regular_file(path)
+    except (BadRecording, OSError):
+        return False
+    return True
+
+
+def text_of(path: Path, what: str, most: int = LONGEST) -> str:
+    """The text of a file in UTF-8.
+
+    what: kind of file, for the message; most: bytes
+    Raises BadRecording in one line if it is no file, longer, not readable, or not text.
+    """
+    try:
+        regular_file(path)
+        size = path.stat().st_size
+        if size > most:
+            raise BadRecording(path, f"{size / 1e6:.3g} MB, and {what} has {most / 1e6:.2g} MB at most", "Check the path.")
+        return path.read_text(encoding="utf-8")
+    except OSError as problem:
+        raise BadRecording(path, problem.strerror or "cannot be read", "Check the path and the permissions.") from None
+    except UnicodeDecodeError:
+        raise BadRecording(path, "is not text in UTF-8", f"Give {what}.") from None
+
+
+def too_much(text: str, most: int = WORDS) -> str:
+    """Why a YAML text is not to be read: it is longer or deeper than anybody writes it, or repeats itself to that length. Empty if it may be read.
+
+    most: parts. Raises yaml.YAMLError for what is no YAML.
+    """
+    parts, inside = 0, list[tuple[str | None, int]]()
+    known: dict[str, int] = {}  # parts of what an anchor names
+    for event in yaml.parse(text, Loader=PARSER):
+        if isinstance(event, yaml.AliasEvent):
+            parts += known.get(event.anchor or "", most + 1)  # what repeats itself within itself never ends
+        elif isinstance(event, yaml.CollectionStartEvent):
+            inside.append((event.anchor, parts))
+            parts += 1
+        elif isinstance(event, yaml.CollectionEndEvent):
+            anchor, begun = inside.pop()
+            known |= {anchor: parts - begun} if anchor else {}
+        elif isinstance(event, yaml.ScalarEvent):
+            parts += 1
+            known |= {event.anchor: 1} if event.anchor else {}
+        if parts > most:
+            return f"more than {most} values"
+        if len(inside) > DEEPEST:
+            return f"nested deeper than {DEEPEST} levels"
+    return ""
