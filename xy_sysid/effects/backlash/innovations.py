@@ -21,10 +21,11 @@ SANE = 0.5  # rad/s of the pole over the sampling rate, Hz, to begin with: a bas
 SETTLED = 0.5  # s until the filter is judged
 STEP = 1e-3  # of a number's unit, for derivatives of what is beside
 WORST = 1e6  # innovation over the noise at which it is cut off
-GAIN, POLE, SHARE, RATE, DAMPING, LOSS = (NAMES.index(name) for name in ("gain", "pole", "share", "rate", "damping", "loss"))
-MOST = 24  # sub-steps of a sample
-STABLE = 1.5  # of what a contact's spring and damper turn in a sub-step, rad: twice as much and explicit steps run away
-LOG = (False, False, True, True, False, True, False, False, False)  # by NAMES
+RATE, HERTZ, GAP = (NAMES.index(name) for name in ("rate", "hertz", "gap"))
+SPEED = 0.025
+MOST = 40  # sub-steps of a sample
+STABLE = 0.7  # of what a contact's spring and damper turn in a sub-step, rad: twice as much and explicit steps run away
+LOG = (False, False, True, True, False, True, False, False, False, False, False)  # by NAMES
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,9 +52,9 @@ class Innovations:
         self.friction = slice(len(NAMES), len(NAMES) + len(rows))
         self.others = slice(self.friction.stop, self.friction.stop + beside.start.size)
         longest = max(20.0 / sampling_rate, 2.0 * base[1])
-        low = [-np.inf, 0.0, 1e-2, 1e-10, 0.02, STIFF, 0.0, 0.0, 0.0]
-        high = [np.inf, longest, 1e5, 1e-2, 0.98, max(5.0 * sampling_rate, 2.0 * STIFF), 2.0, 500.0, 0.9]
-        unit = [0.02 * abs(base[0]), 0.1 / sampling_rate, 0.05, 0.1, 0.05, 0.1, 0.05, 2.0, 0.02]
+        low = [-np.inf, 0.0, 1e-2, 1e-10, 0.02, STIFF/2, 0.0, 0.0, 0.0, 0.0, 0.0]
+        high = [np.inf, longest, 1e5, 1e-2, 0.98, max(15.0 * sampling_rate, 2.0 * STIFF), 2.0, 500.0, 0.9, 1.0, 10.0]
+        unit = [0.02 * abs(base[0]), 0.1 / sampling_rate, 0.05, 0.1, 0.05, 0.1, 0.05, 2.0, 0.02, 0.1, 0.02]
         self.log = np.array([*LOG, *(row.log for row in rows), *beside.positive], dtype=np.bool_)
         self.unit = np.array([*unit, *(row.unit for row in rows), *np.where(beside.positive, 0.05, 0.05 * beside.unit)])
         self.low = self.inner(np.array([*low, *(row.low for row in rows), *beside.low]))
@@ -163,8 +164,8 @@ class Innovations:
 
     def _stable(self, numbers: FloatArray, volts: float) -> int:
         """Sub-steps of a sample with which explicit steps follow the contact's spring and damper; volts: rms of the drive, V."""
-        knocks = 3.0 * volts * abs(numbers[GAIN]) * numbers[POLE] / numbers[SHARE]  # m/s^2 of both sides to each other
-        swift = (1.0 + 2.0 * numbers[DAMPING]) * numbers[RATE] + numbers[LOSS] * knocks
+        depth = 0.3 * SPEED / numbers[RATE]
+        swift = numbers[RATE] * np.sqrt(1.0 + numbers[HERTZ] * (1.5 * np.sqrt(2.0 * depth / numbers[GAP]) - 1.0))
         return min(int(np.ceil(swift / self.fs / STABLE)), MOST)
 
     def _undone(self, numbers: FloatArray, n: int) -> tuple[FloatArray, FloatArray, FloatArray, float]:
