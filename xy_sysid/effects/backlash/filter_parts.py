@@ -73,6 +73,6 @@ def drifted(p: Covariance, h: float) -> Covariance:
 def kicked(p: Covariance, to_v: Four, to_w: Four, shaken: float) -> Covariance:
     """The covariance after speeds have changed. to_v, to_w: derivatives of the new speed and rate by the state; shaken: variance
     of either mass's speed that is new, m^2/s^2; what shakes the motor shakes the distance, too."""
-    xx, xv, xd, xw, _, vd, _, dd, dw, _ = p
+    xx, _, xd, _, _, _, _, dd, _, _ = p
     v, w = _times(to_v, p), _times(to_w, p)
     return (xx, v[0], xd, w[0], _dot(to_v, v) + shaken, v[2], _dot(to_w, v) + shaken, dd, w[2], _dot(to_w, w) + 2.0 * shaken)
