@@ -7,6 +7,8 @@ Identification, 2nd ed., sec. 3.2). The filter that predicts is in ``filter_temp
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from xy_sysid.effects._contract import Beside, DryFriction, Followed, OneStepTask
@@ -44,9 +46,11 @@ class Contact:
         if task.limits.bar is not None:
             looseness, innovation = self._seen(fit, best, task)
             idle = task.begin is None and fit.scale(fit.seen(best, near)) > IDLE * fit.scale(fit.softened(SOFT).seen(rigid, near))
-            if _rms(innovation[task.stages[1] :]) * task.noise > (1.0 if idle else BEHIND) * task.limits.bar:
+            if fit.scale(innovation[task.stages[1] :]) * task.noise > (1.0 if idle else BEHIND) * task.limits.bar:
                 return self._told(fit, task, best, (looseness, innovation))
         best = fit.solved(best, np.arange(best.size), whole, 20, 1e-3)
+        calm = replace(whole, looseness=self._seen(fit, best, task)[0])
+        best = fit.solved(best, np.arange(best.size), calm, 10, 1e-3)
         rigid = self._rigid(fit, self._closed(fit, rigid, best, near), whole, 1e-3)
         without = self._seen(fit.softened(SOFT), rigid, task)[1]
         return self._told(fit, task, best, self._seen(fit, best, task), fit.spread(best, whole), without)

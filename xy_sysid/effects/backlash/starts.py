@@ -6,7 +6,6 @@ forgets within a few milliseconds, so that its valleys are wide; a thousand runs
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from itertools import product
 
 import numpy as np
@@ -28,7 +27,8 @@ AROUND = ((0.75, 0.87, 1.0, 1.15, 1.32, 1.6), (0.7, 1.0, 1.6, 2.5), (0.0, 1.0)) 
 APART = {"gap": 0.6, "share": 0.15, "rate": 0.8}  # starts that differ by less, in logarithms but for the share, find the same
 NEAR = {"gap": 0.2, "rate": 0.6, "hertz": 0.7}
 BEST = (5, 4)  # starts that are followed, of the first and of the second grid
-STEPS, ENOUGH = 12, 1e-2
+RACE = ((6, 2), (20, 1))  # steps that each start goes, and how many go on
+ENOUGH = 3e-3  # relative fall of the cost in a step, below which it ends
 GAP, RATE, HERTZ = (NAMES.index(name) for name in ("gap", "rate", "hertz"))
 
 
@@ -37,14 +37,13 @@ def searched(fit: Innovations, task: OneStepTask) -> FloatArray:
     first, second = FIRST.within(task.stages[0]), SECOND.within(task.stages[0])
     grid = product(_gaps(task.noise, task.beside.swing), SHARES, RATES, DAMPINGS)
     starts = [fit.start(task.base, (*numbers, *REST), task.dry.values) for numbers in grid]
-    found = _followed(fit, _best(fit, starts, first, APART, BEST[0]), first, task.limits.late)
-    around = [found[0]]
+    found = _raced(fit, _best(fit, starts, first, APART, BEST[0]), first)
+    around = [found]
     for wider, stiffer, hertz in product(*AROUND):
-        numbers = fit.outer(found[0])
+        numbers = fit.outer(found)
         numbers[GAP], numbers[RATE], numbers[HERTZ] = numbers[GAP] * wider, numbers[RATE] * stiffer, hertz
         around.append(fit.inner(numbers))
-    chosen = _best(fit, [*around, *found[1:2]], second, NEAR, BEST[1])
-    return _followed(fit, [found[0], *chosen], second, task.limits.late)[0]
+    return _raced(fit, [found, *_best(fit, around, second, NEAR, BEST[1])], second)
 
 
 def _best(fit: Innovations, starts: list[FloatArray], view: View, apart: dict[str, float], most: int) -> list[FloatArray]:
@@ -63,15 +62,14 @@ def _best(fit: Innovations, starts: list[FloatArray], view: View, apart: dict[st
     return found
 
 
-def _followed(fit: Innovations, starts: Iterable[FloatArray], view: View, late: Callable[[], bool]) -> list[FloatArray]:
-    """What some steps make of each, best first; at least the first of them."""
-    starts = list(starts)
+def _raced(fit: Innovations, starts: list[FloatArray], view: View) -> FloatArray:
+    """The best of some starts: each goes a few steps, the better ones more."""
     scale = min(fit.scale(fit.seen(start, view)) for start in starts)
-    every, found = np.arange(starts[0].size), []
-    for start in starts:
-        if not found or not late():
-            found.append(fit.solved(start, every, view, STEPS, ENOUGH, scale))
-    return sorted(found, key=lambda one: fit.cost(fit.seen(one, view), scale))
+    every = np.arange(starts[0].size)
+    for steps, left in RACE:
+        moved = (fit.solved(start, every, view, steps, ENOUGH, scale) for start in starts)
+        starts = sorted(moved, key=lambda start: fit.cost(fit.seen(start, view), scale))[:left]
+    return starts[0]
 
 
 def _gaps(noise: float, swing: float) -> list[float]:
