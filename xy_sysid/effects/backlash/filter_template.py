@@ -2,9 +2,13 @@
 
 Two masses that touch across a gap, followed sample by sample: an extended Kalman filter on the motor's position. State: motor
 position (x) and speed (v), motor minus table (d), its rate (w). Flanks push as k depth (1 + loss speed) + c speed and never
-pull (Hunt & Crossley, J. Appl. Mech. 42, 1975, eq. 8). The motor rubs by the laws of dry friction given; the deflection of
-bristles follows the motor's position and is corrected with it. Integrated by the explicit midpoint rule within each of a
-sample's two pieces of constant voltage (the filter: Jazwinski, Stochastic Processes and Filtering Theory, 1970, sec. 8.3).
+pull (Hunt & Crossley, J. Appl. Mech. 42, 1975, eq. 8); k is constant, or grows with the root of the depth (Hertz), or between.
+The motor rubs by the laws of dry friction given, the table by Coulomb's; the deflection of bristles follows the motor's position
+and is corrected with it (the filter: Jazwinski, Stochastic Processes and Filtering Theory, 1970, sec. 8.3).
+
+Each sub-step of a sample's two pieces of constant voltage is half a drift, a kick and half a drift (leapfrog; Hairer, Lubich &
+Wanner, Acta Numerica 12, 2003), the kick linearly implicit in the speeds: stable while the contact turns less than 2 rad in it,
+whatever damps or rubs. The covariance goes the same way.
 
 Derivatives come from the same recursion, differentiated with the filter's gain held: what a parameter changes in the covariance
 is left out. (Near the optimum their angle to differences of the filter is below 0.1; the covariance's own would cost some ten
@@ -61,7 +65,7 @@ def $name(u, y, against, q, fs, noise, drift, cuts, moved_u, moved_y, moved_f, c
     part = late - whole
     p = (noise, 0.0, 0.0, 0.0, 1e-8, 0.0, 0.0, half * half + 1e-14, 0.0, 1e-8)
     x, v, d, w, z, zm = y[0], 0.0, 0.0, 0.0, 0.0, 0.0
-    rho, rub, slip, spring, follows = 0.0, 0.0, 0.0, 0.0, 0.0
+    rho, rub, slip, spring, follows, rubbing = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     sx, sv, sd, sw, sz = np.zeros(count), np.zeros(count), np.zeros(count), np.zeros(count), np.zeros(count)
     to_v, to_w, to_z = np.zeros(count), np.zeros(count), np.zeros(count)
     fine = 1e-6 * abs(bent(q, 0.0, $slow, 1e-3)) + 1e-300
@@ -115,10 +119,12 @@ def $name(u, y, against, q, fs, noise, drift, cuts, moved_u, moved_y, moved_f, c
                         change = per_net * ((moved_u[b, at] if at >= 0 else 0.0) - moved_f[b, 0, i]) * per_motor
                         to_v[column[b]] += change
                         to_w[column[b]] += change + per_net * moved_f[b, 1, i] * per_table
-                    change = pole * (net - turn * rho) * per_motor
+                    if $rubs:
+                        rubbing = rubbed(q, zm, vm)[0]
+                    change = pole * (net - turn * rubbing) * per_motor
                     to_v[0] += change
                     to_w[0] += change + pole * (against[1, i] + turn * stuck * turned) * per_table
-                    change = (gain * net - abs(gain) * rho - (1.0 - guide) * vm) * per_motor
+                    change = (gain * net - abs(gain) * rubbing - (1.0 - guide) * vm) * per_motor
                     to_v[2] += change
                     to_w[2] += change + (guide * (vm - wm) + gain * against[1, i] + abs(gain) * stuck * turned) * per_table
                     change = -a * per_motor
@@ -157,7 +163,7 @@ def $name(u, y, against, q, fs, noise, drift, cuts, moved_u, moved_y, moved_f, c
                         for b in range(frictions):
                             kept = q[$first + b]
                             q[$first + b] = kept + nudge[b]
-                            change = -per_volt * (rubbed(q, zm, v)[0] - rho) / nudge[b] * per_motor
+                            change = -per_volt * (rubbed(q, zm, vm)[0] - rubbing) / nudge[b] * per_motor
                             if $bristled:
                                 to_z[$first + b] = (bent(q, before, vm, h) - z) / nudge[b]
                             q[$first + b] = kept
