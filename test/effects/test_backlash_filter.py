@@ -24,7 +24,6 @@ from xy_sysid.files.effects import from_file
 from xy_sysid.greybox.free_run import AxisData, GreyboxFit, fit_base, prepare
 from xy_sysid.greybox.one_step import as_beside, error_without, followed, noise_of, one_step_fit
 from xy_sysid.greybox.whitened import whitened_rms
-from xy_sysid.samples.block import FloatArray
 from xy_sysid.settings import AxisExcitation, ExcitationSettings, build
 
 RATE = 2000.0
