@@ -113,6 +113,7 @@ def $name(u, y, against, q, fs, noise, drift, cuts, moved_u, moved_y, moved_f, c
                 if sloped:
                     a, on_table = kick_v / h, (kick_v - kick_w) / h / per_table
                     force += by_w * (wm - w)
+                    turned += (1.0 - turned * turned) / $slow * (vm - wm - v + w)
                     for b in range(count):
                         to_v[b], to_w[b] = 0.0, 0.0
                     for b in range(taken):
@@ -120,7 +121,8 @@ def $name(u, y, against, q, fs, noise, drift, cuts, moved_u, moved_y, moved_f, c
                         to_v[column[b]] += change
                         to_w[column[b]] += change + per_net * moved_f[b, 1, i] * per_table
                     if $rubs:
-                        rubbing = rubbed(q, zm, vm)[0]
+                        level, slope, _of_z = rubbed(q, zm, v)
+                        rubbing = level + slope * (vm - v)
                     change = pole * (net - turn * rubbing) * per_motor
                     to_v[0] += change
                     to_w[0] += change + pole * (against[1, i] + turn * stuck * turned) * per_table
@@ -163,7 +165,8 @@ def $name(u, y, against, q, fs, noise, drift, cuts, moved_u, moved_y, moved_f, c
                         for b in range(frictions):
                             kept = q[$first + b]
                             q[$first + b] = kept + nudge[b]
-                            change = -per_volt * (rubbed(q, zm, vm)[0] - rubbing) / nudge[b] * per_motor
+                            level, slope, _of_z = rubbed(q, zm, v)
+                            change = -per_volt * (level + slope * (vm - v) - rubbing) / nudge[b] * per_motor
                             if $bristled:
                                 to_z[$first + b] = (bent(q, before, vm, h) - z) / nudge[b]
                             q[$first + b] = kept

@@ -123,19 +123,21 @@ class Innovations:
         whole, skip = np.clip(start, self.low, self.high), self._skipped(view.samples)
         inside = np.clip(start, self.low + 1e-6, self.high - 1e-6)[free]
 
-        def told(part: FloatArray, sloped: bool) -> FloatArray:
+        def errors(part: FloatArray) -> FloatArray:
             whole[free] = part
-            out, slopes = self.run(self.outer(whole), view, sloped)
-            return slopes[skip:, free] if sloped else out[skip:]
+            return self.run(self.outer(whole), view, False)[0][skip:]
 
-        first = told(inside, False)
+        def slopes(part: FloatArray) -> FloatArray:
+            whole[free] = part
+            return self.run(self.outer(whole), view, True)[1][skip:, free]
+
         size = scale or max(self.scale(self.seen(start, view)), 1e-3)
-        if not np.all(np.isfinite(first)) or self.late():
+        if self.late():
             return start
         found = scipy.optimize.least_squares(
-            lambda part: told(part, False),
+            errors,
             inside,
-            lambda part: told(part, True),
+            slopes,
             (self.low[free], self.high[free]),
             loss="cauchy",
             f_scale=TAILS * size,
