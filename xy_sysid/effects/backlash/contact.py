@@ -7,32 +7,27 @@ Identification, 2nd ed., sec. 3.2). The filter that predicts is in ``filter_temp
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from xy_sysid.effects._contract import Beside, DryFriction, Followed, OneStepTask
 from xy_sysid.effects.backlash.filter_source import NAMES
-from xy_sysid.effects.backlash.innovations import Innovations, View
+from xy_sysid.effects.backlash.innovations import CLOSED, Innovations, View
+from xy_sysid.effects.backlash.starts import SECOND, searched
 from xy_sysid.effects.backlash.usual_machine import from_usual, to_usual, usual
 from xy_sysid.samples.block import FloatArray
 
-GAPS = (3.0, 0.5, 3.0)  # to begin with: from so many encoder noises up to so much of the way between two reversals, each so much wider
-RACE = ((3, 2), (5, 1))  # steps that each start goes, and how many go on: what the gap does is seen once gain and pole have given way
-WIDEST = 24  # gaps to begin with, at most
-FLANKS = (0.4, 1500.0, 0.2, 5.0, 0.5)  # share, rate, damping, loss, guide to begin with
-RIGID = (1e-10, 0.4, 1500.0, 0.1, 0.0, 0.03)  # no gap
+RIGID = (CLOSED, 0.4, 1500.0, 0.1, 0.0, 0.03, 0.0, 0.0)  # no gap
 SOFT = 10.0  # rad/s of the spring at least that may take the place of the gap
-BRIEF = 6.0  # s of the first fits
-PROMISING = 20.0  # innovation over noise after the brief fits above which the fit is not refined
 SEEN, LEFT = 2.5, 1.5  # encoder noises, and innovations, that a gap must have to be one
-DEAF = 12.0  # the filter is told this much more encoder noise on the way: a smoother valley
+WHOLE = View(samples=1_000_000, looseness=0.5, cuts=4)
 FORGIVING = (1.0, 0.3, 0.1, 0.03)  # process noise that the filter may have in the end, over the usual: what predicts best of the training
-COARSE, FINE = 3, 6  # sub-steps of a sample on the way, and in the end
 BEHIND = 1.5  # held-out innovation over the bar after the first fits, at which it is given up. Development draws, and machines of another make:
 # true gaps 0.1 to 1.1; where there is none 1.2 to 18
 IDLE = 0.9  # innovation with a gap over that without it, after the first fits, from which it does nothing, and must be at the bar. The same
 # machines: gaps that were found in the end 0.04 to 0.82, without one mostly 0.95 to 1.1
-CLOSED = 0.8  # innovation without a gap over that with it from which the gap is not looked for where it was
-OWN, GAP = len(NAMES), NAMES.index("gap")
+OWN, GAP, HERTZ = len(NAMES), NAMES.index("gap"), NAMES.index("hertz")
 
 
 class Contact:
@@ -43,30 +38,28 @@ class Contact:
         return from_usual(self._fit(to_usual(task)), task.beside.similar)
 
     def _fit(self, task: OneStepTask) -> Followed:
-        first = task.stages[0]
         fit = Innovations(task.sampling_rate, task.base, task.noise, task.beside, task.dry.laws)
         fit.late = task.limits.late
-        brief = min(first, int(BRIEF * task.sampling_rate))
-        loose, near, whole = View(brief, 2.0, COARSE, DEAF), View(brief, 1.0, COARSE, DEAF), View(first, 1.0, FINE, DEAF)
-        rigid = self._rigid(fit, fit.start(task.base, RIGID, task.dry.values), loose, 1e-2)
-        best = self._begun(fit, task, loose)
+        whole, near = WHOLE.within(task.stages[0]), SECOND.within(task.stages[0])
+        best = self._begun(fit, task)
+        rigid = self._rigid(fit, fit.start(task.base, RIGID, task.dry.values), near, 1e-2)
         if task.limits.bar is not None:
             looseness, innovation = self._seen(fit, best, task)
-            idle = task.begin is None and fit.size(best, loose) > IDLE * fit.softened(SOFT).size(rigid, loose)
-            if _rms(innovation[task.stages[1] :]) * task.noise > (1.0 if idle else BEHIND) * task.limits.bar:
+            idle = task.begin is None and fit.scale(fit.seen(best, near)) > IDLE * fit.scale(fit.softened(SOFT).seen(rigid, near))
+            if fit.scale(innovation[task.stages[1] :]) * task.noise > (1.0 if idle else BEHIND) * task.limits.bar:
                 return self._told(fit, task, best, (looseness, innovation))
-        best = self._refined(fit, best, rigid, near)
-        if fit.size(best, near) < PROMISING:
-            best = fit.solved(best, np.arange(best.size), whole, 8, 1e-4)
+        best = fit.solved(best, np.arange(best.size), whole, 20, 1e-3)
+        calm = replace(whole, looseness=self._seen(fit, best, task)[0])
+        best = fit.solved(best, np.arange(best.size), calm, 10, 1e-3)
         rigid = self._rigid(fit, self._closed(fit, rigid, best, near), whole, 1e-3)
         without = self._seen(fit.softened(SOFT), rigid, task)[1]
-        return self._told(fit, task, best, self._seen(fit, best, task), fit.spread(best, View(first, cuts=FINE)), without)
+        return self._told(fit, task, best, self._seen(fit, best, task), fit.spread(best, whole), without)
 
     @staticmethod
     def _seen(fit: Innovations, inner: FloatArray, task: OneStepTask) -> tuple[float, FloatArray]:
         """The process noise with which the filter predicts the training best, over the usual, and all innovations with it."""
         _, training, n = task.stages
-        found = ((looseness, fit.seen(inner, View(n, looseness, FINE))) for looseness in FORGIVING)
+        found = ((looseness, fit.seen(inner, View(n, looseness))) for looseness in FORGIVING)
         return min(found, key=lambda item: _rms(item[1][:training]))
 
     @staticmethod
@@ -82,7 +75,7 @@ class Contact:
         looseness, innovation = seen
         values = fit.outer(best)
         errors = np.full(values.size, np.inf) if spread is None else spread
-        large = values[GAP] > max(SEEN, LEFT * _rms(innovation[: task.stages[0]])) * task.noise
+        large = values[GAP] > max(SEEN, LEFT * fit.scale(innovation[: task.stages[0]])) * task.noise
         return Followed(
             base=_three(values),
             values=tuple(values[3:OWN].tolist()),
@@ -103,62 +96,34 @@ class Contact:
         """See ``OneStep``."""
         found = from_usual(found, beside.similar, back=True)
         fit = Innovations(sampling_rate * beside.similar.time, found.base, found.noise, usual(beside), found.dry.laws)
-        return fit.seen(fit.start(found.base, found.values, found.dry.values), View(samples, found.looseness, COARSE))
+        return fit.seen(fit.start(found.base, found.values, found.dry.values), View(samples, found.looseness))
 
     @staticmethod
-    def _begun(fit: Innovations, task: OneStepTask, view: View) -> FloatArray:
-        """Coordinates after the first fits: from an earlier result, or from the best of some gaps."""
-        base, friction, begin = task.base, task.dry.values, task.begin
-        if begin is not None:
-            base, friction = begin.base, begin.dry.values if begin.dry.names == task.dry.names else friction
-        if begin is not None and not begin.too_small:
-            best = fit.start(base, begin.values, friction)
-        else:  # nothing draws a gap open that has closed
-            best = _raced(fit, [fit.start(base, (gap, *FLANKS), friction) for gap in _gaps(task.noise, task.beside.swing)], view)
-        return fit.solved(best, np.arange(best.size), view, 15, 1e-2)
-
-    @staticmethod
-    def _refined(fit: Innovations, best: FloatArray, rigid: FloatArray, near: View) -> FloatArray:
-        """Coordinates after the brief fits."""
-        every, true = np.arange(best.size), View(near.samples, 1.0, COARSE)
-        best = min(best, fit.solved(best, every, near, 40, 1e-3), key=lambda item: fit.size(item, true))  # what is not whole yet can lead astray
-        if CLOSED * fit.size(best, near) > fit.softened(SOFT).size(rigid, near):  # no gap does far better: begin there
-            other = fit.solved(rigid, every, near, 40, 1e-3)
-            best = min(best, other, key=lambda item: fit.size(item, near))
-        return best
+    def _begun(fit: Innovations, task: OneStepTask) -> FloatArray:
+        """Coordinates after the first fits: from an earlier result, or, as nothing draws a gap open that has closed, from a grid."""
+        begin = task.begin
+        if begin is None or begin.too_small:
+            return searched(fit, task)
+        start = fit.start(begin.base, begin.values, begin.dry.values if begin.dry.names == task.dry.names else task.dry.values)
+        return fit.solved(start, np.arange(start.size), SECOND.within(task.stages[0]), 15, 1e-2)
 
     @staticmethod
     def _closed(fit: Innovations, rigid: FloatArray, best: FloatArray, view: View) -> FloatArray:
         """Where the filter without a gap goes on from: the better of its own first fit, and of what was found with the gap closed."""
         rigid[fit.others] = best[fit.others]
         closed = best.copy()
-        closed[GAP] = rigid[GAP]
+        closed[[GAP, HERTZ]] = rigid[[GAP, HERTZ]]
         soft = fit.softened(SOFT)
         return min(rigid, closed, key=lambda start: soft.size(start, view))
 
     @staticmethod
     def _rigid(fit: Innovations, start: FloatArray, view: View, enough: float) -> FloatArray:
         """Without a gap, by the same filter; any spring will do then."""
-        return fit.softened(SOFT).solved(start, np.delete(np.arange(start.size), GAP), view, 15, enough)
+        return fit.softened(SOFT).solved(start, np.delete(np.arange(start.size), [GAP, HERTZ]), view, 15, enough)
 
 
 def _rms(signal: FloatArray) -> float:
     return float(np.sqrt(np.mean(signal**2)))
-
-
-def _raced(fit: Innovations, starts: list[FloatArray], view: View) -> FloatArray:
-    """The best of some starts: each goes a few steps, the better ones some more."""
-    every = np.arange(fit.others.stop)
-    for steps, left in RACE:
-        starts = sorted((fit.solved(start, every, view, steps, 1e-2) for start in starts), key=lambda item: fit.size(item, view))[:left]
-    return starts[0]
-
-
-def _gaps(noise: float, swing: float) -> list[float]:
-    """Widths to begin with, m."""
-    low, high, wider = GAPS[0] * noise, max(GAPS[1] * swing, 2.0 * GAPS[0] * noise), GAPS[2]
-    count = min(int(np.ceil(np.log(high / low) / np.log(wider))) + 1, WIDEST)
-    return [float(gap) for gap in np.geomspace(low, high, count)]
 
 
 def _three(numbers: FloatArray) -> tuple[float, float, float]:

@@ -44,7 +44,8 @@ Filter = Callable[
 @lru_cache(maxsize=32)
 def _made(laws: tuple[_Laws, ...]) -> Filter:
     effects = [item.effect for item in laws]
-    names = {"math": math, "np": np, "law": law, "contact": filter_parts.contact, "spread_on": filter_parts.spread_on, **law_names(effects)}
+    made = (filter_parts.contact, filter_parts.smooth_sign, filter_parts.drifted, filter_parts.kicked)
+    names = {"math": math, "np": np, "law": law, **{part.__name__: part for part in made}, **law_names(effects)}
     parts = [*law_texts(effects), inspect.getsource(filter_parts)]
     return cast("Filter", compiled_text(lambda name: text(name, effects), names, parts, exact=False))
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from xy_sysid.effects._contract import law
 
 Four = tuple[float, float, float, float]
@@ -9,19 +11,26 @@ Covariance = tuple[float, float, float, float, float, float, float, float, float
 
 
 @law
-def contact(depth_of: float, rate: float, half: float, k: float, c: float, loss: float) -> tuple[float, float, float]:
-    """Force of the contact, and its derivatives by distance and by its rate."""
-    if depth_of > half:
-        depth = depth_of - half
-        force = k * depth * (1.0 + loss * rate) + c * rate
+def contact(apart: float, rate: float, half: float, k: float, c: float, loss: float, hertz: float) -> tuple[float, float, float]:
+    """Force of the contact, and its derivatives by the distance and by the rate of the distance."""
+    side = 1.0 if apart > 0.0 else -1.0
+    depth = side * apart - half
+    if depth > 0.0:
+        stiffer, losses = math.sqrt(depth / half), 1.0 + loss * side * rate
+        elastic = k * depth * (1.0 - hertz + hertz * stiffer)
+        force = elastic * losses + c * side * rate
         if force > 0.0:
-            return force, k * (1.0 + loss * rate), k * depth * loss + c
-    elif depth_of < -half:
-        depth = depth_of + half
-        force = k * depth * (1.0 - loss * rate) + c * rate
-        if force < 0.0:
-            return force, k * (1.0 - loss * rate), -k * depth * loss + c
+            return side * force, k * (1.0 - hertz + 1.5 * hertz * stiffer) * losses, elastic * loss + c
     return 0.0, 0.0, 0.0
+
+
+@law
+def smooth_sign(v: float, slow: float) -> float:
+    """tanh(v / slow), in a third of its time."""
+    if abs(v) > 18.0 * slow:
+        return 1.0 if v > 0.0 else -1.0
+    steep = math.exp(-2.0 * abs(v) / slow)
+    return math.copysign((1.0 - steep) / (1.0 + steep), v)
 
 
 @law
@@ -43,25 +52,27 @@ def _dot(one: Four, other: Four) -> float:
 
 
 @law
-def spread_on(p: Covariance, of_v: Four, of_w: Four, h: float, drift: float) -> Covariance:
-    """The covariance ``h`` s on, to first order. of_v, of_w: derivatives, by the state, of what changes the speed and the distance's rate."""
+def drifted(p: Covariance, h: float) -> Covariance:
+    """The covariance after positions have gone on for ``h`` s at their speeds."""
     xx, xv, xd, xw, vv, vd, vw, dd, dw, ww = p
-    to_v = (h * of_v[0], 1.0 + h * of_v[1], h * of_v[2], h * of_v[3])
-    to_w = (h * of_w[0], h * of_w[1], h * of_w[2], 1.0 + h * of_w[3])
-    x = (xx + h * xv, xv + h * vv, xd + h * vd, xw + h * vw)
-    v = _times(to_v, p)
-    d = (xd + h * xw, vd + h * vw, dd + h * dw, dw + h * ww)
-    w = _times(to_w, p)
-    shared = drift * h  # what shakes the motor shakes the distance, too
     return (
-        x[0] + h * x[1],
-        _dot(to_v, x),
-        x[2] + h * x[3],
-        _dot(to_w, x),
-        _dot(to_v, v) + shared,
-        v[2] + h * v[3],
-        _dot(to_w, v) + shared,
-        d[2] + h * d[3],
-        _dot(to_w, d),
-        _dot(to_w, w) + 2.0 * shared,
+        xx + h * (2.0 * xv + h * vv),
+        xv + h * vv,
+        xd + h * (vd + xw + h * vw),
+        xw + h * vw,
+        vv,
+        vd + h * vw,
+        vw,
+        dd + h * (2.0 * dw + h * ww),
+        dw + h * ww,
+        ww,
     )
+
+
+@law
+def kicked(p: Covariance, to_v: Four, to_w: Four, shaken: float) -> Covariance:
+    """The covariance after speeds have changed. to_v, to_w: derivatives of the new speed and rate by the state; shaken: variance
+    of either mass's speed that is new, m^2/s^2; what shakes the motor shakes the distance, too."""
+    xx, _, xd, _, _, _, _, dd, _, _ = p
+    v, w = _times(to_v, p), _times(to_w, p)
+    return (xx, v[0], xd, w[0], _dot(to_v, v) + shaken, v[2], _dot(to_w, v) + shaken, dd, w[2], _dot(to_w, w) + 2.0 * shaken)

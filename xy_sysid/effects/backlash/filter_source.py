@@ -9,7 +9,7 @@ from xy_sysid.effects._contract import Effect, arguments
 from xy_sysid.effects.backlash.filter_template import TEMPLATE
 from xy_sysid.errors import BadInput
 
-NAMES = ("gain", "delay", "pole", "gap", "share", "rate", "damping", "loss", "guide")  # numbers before those of friction
+NAMES = ("gain", "delay", "pole", "gap", "share", "rate", "damping", "loss", "guide", "hertz", "rub")  # numbers before those of friction
 SLOW = 1e-3  # m/s at which the smoothed friction reaches its level
 FAST = 18.0 * SLOW  # m/s above which nothing of that is left
 NUDGE = 1e-7  # m/s, for the derivative of a law by speed
@@ -41,6 +41,7 @@ def text(name: str, laws: Sequence[Effect]) -> str:
         rubbed=_lines(BRISTLED if bristles else _dry(dry) if dry else ["return 0.0, 0.0, 0.0"]),
         rubs=str(bool(laws)),
         bristled=str(bool(bristles)),
+        first=str(len(NAMES)),
         slow=f"{SLOW!r}",
         nudge=f"{NUDGE!r}",
     )

@@ -2,9 +2,13 @@
 
 Two masses that touch across a gap, followed sample by sample: an extended Kalman filter on the motor's position. State: motor
 position (x) and speed (v), motor minus table (d), its rate (w). Flanks push as k depth (1 + loss speed) + c speed and never
-pull (Hunt & Crossley, J. Appl. Mech. 42, 1975, eq. 8). The motor rubs by the laws of dry friction given; the deflection of
-bristles follows the motor's position and is corrected with it. Integrated by the explicit midpoint rule within each of a
-sample's two pieces of constant voltage (the filter: Jazwinski, Stochastic Processes and Filtering Theory, 1970, sec. 8.3).
+pull (Hunt & Crossley, J. Appl. Mech. 42, 1975, eq. 8); k is constant, or grows with the root of the depth (Hertz), or between.
+The motor rubs by the laws of dry friction given, the table by Coulomb's; the deflection of bristles follows the motor's position
+and is corrected with it (the filter: Jazwinski, Stochastic Processes and Filtering Theory, 1970, sec. 8.3).
+
+Each sub-step of a sample's two pieces of constant voltage is half a drift, a kick and half a drift (leapfrog; Hairer, Lubich &
+Wanner, Acta Numerica 12, 2003), the kick linearly implicit in the speeds: stable while the contact turns less than 2 rad in it,
+whatever damps or rubs. The covariance goes the same way.
 
 Derivatives come from the same recursion, differentiated with the filter's gain held: what a parameter changes in the covariance
 is left out. (Near the optimum their angle to differences of the filter is below 0.1; the covariance's own would cost some ten
@@ -47,6 +51,7 @@ def $name(u, y, against, q, fs, noise, drift, cuts, moved_u, moved_y, moved_f, c
     n, count, taken, frictions = out.shape[0], slopes.shape[1], column.shape[0], nudge.shape[0]
     sloped = slopes.shape[0] > 0
     gain, delay, pole, gap, share, rate, damping, loss, guide = q[0], q[1], q[2], q[3], q[4], q[5], q[6], q[7], q[8]
+    hertz, stuck = q[9], q[10]
     reduced = share * (1.0 - share)
     k, c = reduced * rate * rate, 2.0 * reduced * damping * rate
     turn = math.copysign(1.0, gain)
@@ -60,7 +65,7 @@ def $name(u, y, against, q, fs, noise, drift, cuts, moved_u, moved_y, moved_f, c
     part = late - whole
     p = (noise, 0.0, 0.0, 0.0, 1e-8, 0.0, 0.0, half * half + 1e-14, 0.0, 1e-8)
     x, v, d, w, z, zm = y[0], 0.0, 0.0, 0.0, 0.0, 0.0
-    rho, rub, slip, spring, follows = 0.0, 0.0, 0.0, 0.0, 0.0
+    rho, rub, slip, spring, follows, rubbing = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     sx, sv, sd, sw, sz = np.zeros(count), np.zeros(count), np.zeros(count), np.zeros(count), np.zeros(count)
     to_v, to_w, to_z = np.zeros(count), np.zeros(count), np.zeros(count)
     fine = 1e-6 * abs(bent(q, 0.0, $slow, 1e-3)) + 1e-300
@@ -80,54 +85,65 @@ def $name(u, y, against, q, fs, noise, drift, cuts, moved_u, moved_y, moved_f, c
             net = volts - against[0, i]
             push, hold = per_net * net, per_net * against[1, i]
             for _ in range(steps):
-                force, _by_d, _by_w = contact(d, w, half, k, c, loss)
-                if $rubs:
-                    rub = per_volt * rubbed(q, z, v)[0]
-                a = (push - rub - drag_motor * v - force) * per_motor
-                r = a - (force - drag_table * (v - w) - hold) * per_table
-                vm, dm, wm = v + 0.5 * h * a, d + 0.5 * h * w, w + 0.5 * h * r
-                force, by_d, by_w = contact(dm, wm, half, k, c, loss)
+                dm = d + 0.5 * h * w
+                force, by_d, by_w = contact(dm, w, half, k, c, loss, hertz)
                 if $bristled:
                     before = z
-                    zm = bent(q, z, vm, 0.5 * h)
-                    z = bent(q, zm, vm, 0.5 * h)
+                    zm = bent(q, z, v, 0.5 * h)
                 if $rubs:
-                    rho, slip, spring = rubbed(q, zm, vm)
+                    rho, slip, spring = rubbed(q, zm, v)
                     rub, slip, spring = per_volt * rho, per_volt * slip, per_volt * spring
-                a = (push - rub - drag_motor * vm - force) * per_motor
-                on_table = force - drag_table * (vm - wm) - hold
-                r = a - on_table * per_table
+                turned = smooth_sign(v - w, $slow)
+                dragged = drag_table + per_volt * stuck * (1.0 - turned * turned) / $slow
+                a = (push - rub - drag_motor * v - force) * per_motor
+                r = a - (force - drag_table * (v - w) - per_volt * stuck * turned - hold) * per_table
+                v_v, v_d, v_w = -(drag_motor + slip) * per_motor, -by_d * per_motor, -by_w * per_motor
+                w_v, w_d, w_w = v_v + dragged * per_table, v_d - by_d * per_table, v_w - (by_w + dragged) * per_table
+                g = 0.5 * h
+                one, two = 1.0 - g * v_v, 1.0 - g * w_w
+                over = h / (one * two - g * g * v_w * w_v)
+                of_vv, of_vw, of_wv, of_ww = over * two, over * g * v_w, over * g * w_v, over * one
+                kick_v, kick_w = of_vv * a + of_vw * r, of_wv * a + of_ww * r
+                vm, wm = v + 0.5 * kick_v, w + 0.5 * kick_w
                 v_x = 0.0
                 if $bristled:
+                    z = bent(q, before, vm, h)
                     follows = ridden(q, before, z, vm, h)
                     v_x = -spring * follows * per_motor
-                v_v, v_d, v_w = -(drag_motor + slip) * per_motor, -by_d * per_motor, -by_w * per_motor
-                w_v, w_d, w_w = v_v + drag_table * per_table, v_d - by_d * per_table, v_w - (by_w + drag_table) * per_table
                 if sloped:
+                    a, on_table = kick_v / h, (kick_v - kick_w) / h / per_table
+                    force += by_w * (wm - w)
+                    turned += (1.0 - turned * turned) / $slow * (vm - wm - v + w)
                     for b in range(count):
                         to_v[b], to_w[b] = 0.0, 0.0
                     for b in range(taken):
                         change = per_net * ((moved_u[b, at] if at >= 0 else 0.0) - moved_f[b, 0, i]) * per_motor
                         to_v[column[b]] += change
                         to_w[column[b]] += change + per_net * moved_f[b, 1, i] * per_table
-                    change = pole * (net - turn * rho) * per_motor
+                    if $rubs:
+                        level, slope, _of_z = rubbed(q, zm, v)
+                        rubbing = level + slope * (vm - v)
+                    change = pole * (net - turn * rubbing) * per_motor
                     to_v[0] += change
-                    to_w[0] += change + pole * against[1, i] * per_table
-                    change = (gain * net - abs(gain) * rho - (1.0 - guide) * vm) * per_motor
+                    to_w[0] += change + pole * (against[1, i] + turn * stuck * turned) * per_table
+                    change = (gain * net - abs(gain) * rubbing - (1.0 - guide) * vm) * per_motor
                     to_v[2] += change
-                    to_w[2] += change + (guide * (vm - wm) + gain * against[1, i]) * per_table
+                    to_w[2] += change + (guide * (vm - wm) + gain * against[1, i] + abs(gain) * stuck * turned) * per_table
                     change = -a * per_motor
                     to_v[4] += change
                     to_w[4] += change - on_table * per_table * per_table
                     change = pole * vm * per_motor
                     to_v[8] += change
                     to_w[8] += change + pole * (vm - wm) * per_table
+                    to_w[10] += per_volt * turned * per_table
                     if force != 0.0:
                         both = per_motor + per_table
                         side = 1.0 if dm > 0.0 else -1.0
                         depth = abs(dm) - half
                         damped = c * wm
-                        change = 0.5 * by_d * side
+                        losses = 1.0 + loss * side * wm
+                        stiffer = math.sqrt(depth / half)
+                        change = 0.5 * side * (by_d + 0.5 * k * hertz * depth / half * stiffer * losses)
                         to_v[3] += change * per_motor
                         to_w[3] += change * both
                         change = -force * uneven
@@ -139,40 +155,46 @@ def $name(u, y, against, q, fs, noise, drift, cuts, moved_u, moved_y, moved_f, c
                         change = -2.0 * reduced * rate * wm
                         to_v[6] += change * per_motor
                         to_w[6] += change * both
-                        change = -k * depth * wm
+                        change = -k * depth * (1.0 - hertz + hertz * stiffer) * wm
                         to_v[7] += change * per_motor
                         to_w[7] += change * both
+                        change = -side * k * depth * (stiffer - 1.0) * losses
+                        to_v[9] += change * per_motor
+                        to_w[9] += change * both
                     if $rubs:
                         for b in range(frictions):
-                            kept = q[9 + b]
-                            q[9 + b] = kept + nudge[b]
-                            change = -per_volt * (rubbed(q, zm, vm)[0] - rho) / nudge[b] * per_motor
+                            kept = q[$first + b]
+                            q[$first + b] = kept + nudge[b]
+                            level, slope, _of_z = rubbed(q, zm, v)
+                            change = -per_volt * (level + slope * (vm - v) - rubbing) / nudge[b] * per_motor
                             if $bristled:
-                                to_z[9 + b] = (bent(q, before, vm, h) - z) / nudge[b]
-                            q[9 + b] = kept
-                            to_v[9 + b] += change
-                            to_w[9 + b] += change
+                                to_z[$first + b] = (bent(q, before, vm, h) - z) / nudge[b]
+                            q[$first + b] = kept
+                            to_v[$first + b] += change
+                            to_w[$first + b] += change
                     if $bristled:
                         by_z = (bent(q, before + fine, vm, h) - z) / fine
-                        by_v = (bent(q, before, vm + $nudge, h) - z) / $nudge
+                        of_v = (bent(q, before, vm + $nudge, h) - z) / $nudge
                         of_z = -spring * per_motor
                         for b in range(count):
-                            after = by_z * sz[b] + by_v * sv[b] + to_z[b]
+                            after = by_z * sz[b] + of_v * sv[b] + to_z[b]
                             to_v[b] += of_z * 0.5 * (sz[b] + after)
                             to_w[b] += of_z * 0.5 * (sz[b] + after)
                             sz[b] = after
-                    g = 0.5 * h
                     for b in range(count):
-                        xx, vv, dd, ww = sx[b], sv[b], sd[b], sw[b]
-                        vh = vv + g * (v_v * vv + v_d * dd + v_w * ww + to_v[b])
-                        wh = ww + g * (w_v * vv + w_d * dd + w_w * ww + to_w[b])
-                        dh = dd + g * ww
-                        sx[b] = xx + h * vh
-                        sv[b] = vv + h * (v_v * vh + v_d * dh + v_w * wh + to_v[b])
-                        sd[b] = dd + h * wh
-                        sw[b] = ww + h * (w_v * vh + w_d * dh + w_w * wh + to_w[b])
-                x, v, d, w = x + h * vm, v + h * a, d + h * wm, w + h * r
-                p = spread_on(p, (v_x, v_v, v_d, v_w), (v_x, w_v, w_d, w_w), h, drift)
+                        vv, ww = sv[b], sw[b]
+                        dd = sd[b] + g * ww
+                        by_v = v_v * vv + v_d * dd + v_w * ww + to_v[b]
+                        by_w = w_v * vv + w_d * dd + w_w * ww + to_w[b]
+                        more_v, more_w = of_vv * by_v + of_vw * by_w, of_wv * by_v + of_ww * by_w
+                        sx[b] += h * (vv + 0.5 * more_v)
+                        sd[b] += h * (ww + 0.5 * more_w)
+                        sv[b] = vv + more_v
+                        sw[b] = ww + more_w
+                x, v, d, w = x + h * vm, v + kick_v, d + h * wm, w + kick_w
+                to_v_of = (of_vv * v_x + of_vw * v_x, 1.0 + of_vv * v_v + of_vw * w_v, of_vv * v_d + of_vw * w_d, of_vv * v_w + of_vw * w_w)
+                to_w_of = (of_wv * v_x + of_ww * v_x, of_wv * v_v + of_ww * w_v, of_wv * v_d + of_ww * w_d, 1.0 + of_wv * v_w + of_ww * w_w)
+                p = drifted(kicked(drifted(p, g), to_v_of, to_w_of, drift * h), g)
         xx, xv, xd, xw, vv, vd, vw, dd, dw, ww = p
         seen = xx + noise
         error = y[i + 1] - x

@@ -4,38 +4,50 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.optimize
 from numpy.typing import NDArray
 
 from xy_sysid.effects._contract import Beside, Effect, Parameter, in_time
+from xy_sysid.effects._similarity import SPEED
 from xy_sysid.effects.backlash.contact_filter import filter_with
-from xy_sysid.effects.backlash.descent import Found, Patience, descend
 from xy_sysid.effects.backlash.filter_source import NAMES
 from xy_sysid.samples.block import FloatArray
 
-STIFF = 2.0 * np.pi * 180.0  # rad/s of the contact at least: flanks of steel; a softer one is a loosely held mass, not play in the drive
+STIFF = 2.0 * np.pi * 90.0  # rad/s of the contact at least: flanks of steel; a softer one is a loosely held mass, not play in the drive
 DRIFT = 0.3  # process noise per rms speed, 1/sqrt(s): the filter forgives this much acceleration
 SANE = 0.5  # rad/s of the pole over the sampling rate, Hz, to begin with: a base that was led astray would make the filter unstable
 SETTLED = 0.5  # s until the filter is judged
 STEP = 1e-3  # of a number's unit, for derivatives of what is beside
 WORST = 1e6  # innovation over the noise at which it is cut off
-GAIN, POLE, SHARE, RATE, DAMPING, LOSS = (NAMES.index(name) for name in ("gain", "pole", "share", "rate", "damping", "loss"))
-MOST = 24  # sub-steps of a sample
-STABLE = 1.5  # of what a contact's spring and damper turn in a sub-step, rad: twice as much and explicit steps run away
-LOG = (False, False, True, True, False, True, False, False, False)  # by NAMES
+CLOSED = 1e-10  # m: no gap
+TAILS = 3.0  # innovations over their usual size from which they count less (Cauchy): a filter that has lost the gap for a moment
+NORMAL = 1.4826  # standard deviation over the median of what is normally distributed
+MOST = 40  # sub-steps of a sample
+PRESSED = 0.3  # speed of the flanks as they meet, over the usual speed
+LOG = (False, False, True, True, False, True, False, False, False, False, False)  # by NAMES
+GAP, RATE, HERTZ = (NAMES.index(name) for name in ("gap", "rate", "hertz"))
 
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """What the filter is shown and told. looseness: factor on the process noise; cuts: sub-steps of each piece of a sample, at
-    least; deaf: factor on the encoder's noise."""
+    """What the filter is shown and told.
+
+    looseness: factor on the process noise; cuts: sub-steps of a sample, at least; deaf: factor on the encoder's noise;
+    turn: rad that the closed contact may turn in a sub-step
+    """
 
     samples: int
     looseness: float = 1.0
     cuts: int = 6
     deaf: float = 1.0
+    turn: float = 0.35
+
+    def within(self, samples: int) -> View:
+        """The same of so many samples at most."""
+        return replace(self, samples=min(self.samples, samples))
 
 
 class Innovations:
@@ -51,9 +63,9 @@ class Innovations:
         self.friction = slice(len(NAMES), len(NAMES) + len(rows))
         self.others = slice(self.friction.stop, self.friction.stop + beside.start.size)
         longest = max(20.0 / sampling_rate, 2.0 * base[1])
-        low = [-np.inf, 0.0, 1e-2, 1e-10, 0.02, STIFF, 0.0, 0.0, 0.0]
-        high = [np.inf, longest, 1e5, 1e-2, 0.98, max(5.0 * sampling_rate, 2.0 * STIFF), 2.0, 500.0, 0.9]
-        unit = [0.02 * abs(base[0]), 0.1 / sampling_rate, 0.05, 0.1, 0.05, 0.1, 0.05, 2.0, 0.02]
+        low = [-np.inf, 0.0, 1e-2, 0.1 * noise, 0.02, STIFF / 2, 0.0, 0.0, 0.0, 0.0, 0.0]
+        high = [np.inf, longest, 1e5, 1e-2, 0.98, max(15.0 * sampling_rate, 4.0 * STIFF), 2.0, 500.0, 0.9, 1.0, 10.0]
+        unit = [0.02 * abs(base[0]), 0.1 / sampling_rate, 0.05, 0.1, 0.05, 0.1, 0.05, 2.0, 0.02, 0.1, 0.02]
         self.log = np.array([*LOG, *(row.log for row in rows), *beside.positive], dtype=np.bool_)
         self.unit = np.array([*unit, *(row.unit for row in rows), *np.where(beside.positive, 0.05, 0.05 * beside.unit)])
         self.low = self.inner(np.array([*low, *(row.low for row in rows), *beside.low]))
@@ -62,10 +74,10 @@ class Innovations:
         self.heeded = np.arange(3)  # numbers of the base on which what is beside depends
 
     def softened(self, rate: float) -> Innovations:
-        """The same, with a contact that may be as soft as that, rad/s; runs count for both."""
+        """The same, with a contact that may be as soft as that, rad/s, and a gap of nothing; runs count for both."""
         other = copy(self)
         other.low = self.low.copy()
-        other.low[RATE] = np.log(rate) / self.unit[RATE]
+        other.low[[RATE, GAP]] = np.log((rate, CLOSED)) / self.unit[[RATE, GAP]]
         return other
 
     def start(self, base: tuple[float, float, float], values: Sequence[float], friction: Sequence[float]) -> FloatArray:
@@ -95,31 +107,60 @@ class Innovations:
         """rms of the innovations over the noise."""
         return float(np.sqrt(np.mean(self.seen(inner, view) ** 2)))
 
-    def solved(self, start: FloatArray, free: NDArray[np.int64], view: View, most: int, enough: float) -> FloatArray:
-        """Coordinates that make the innovations least, from a start, of which some are free; most, enough: see ``Patience``."""
-        whole = start.copy()
-        whole[free] = self._descended(start, free, view, most, enough).part
+    def scale(self, errors: FloatArray) -> float:
+        """Their usual size, over the noise, whatever their tails are."""
+        return NORMAL * float(np.median(np.abs(errors[self._skipped(errors.size) :])))
+
+    def cost(self, errors: FloatArray, scale: float) -> float:
+        """Mean of ln(1 + (error / 3 scale)^2): what a fit makes least."""
+        return float(np.mean(np.log1p((errors[self._skipped(errors.size) :] / (TAILS * scale)) ** 2)))
+
+    def solved(self, start: FloatArray, free: NDArray[np.int64], view: View, most: int, enough: float, scale: float | None = None) -> FloatArray:
+        """Coordinates that make ``cost`` least, from a start, of which some are free.
+
+        most: steps; enough: relative fall of the cost below which it ends; scale: that of the start if it is not given
+        """
+        whole, skip = np.clip(start, self.low, self.high), self._skipped(view.samples)
+        inside = np.clip(start, self.low + 1e-6, self.high - 1e-6)[free]
+
+        def errors(part: FloatArray) -> FloatArray:
+            whole[free] = part
+            return self.run(self.outer(whole), view, False)[0][skip:]
+
+        def slopes(part: FloatArray) -> FloatArray:
+            whole[free] = part
+            return self.run(self.outer(whole), view, True)[1][skip:, free]
+
+        size = scale or max(self.scale(self.seen(start, view)), 1e-3)
+        if self.late():
+            return start
+        found = scipy.optimize.least_squares(
+            errors,
+            inside,
+            slopes,
+            (self.low[free], self.high[free]),
+            loss="cauchy",
+            f_scale=TAILS * size,
+            max_nfev=most,
+            ftol=enough,
+            xtol=1e-6,
+            gtol=1e-12,
+        )
+        whole[free] = found.x
         return whole
 
     def spread(self, inner: FloatArray, view: View) -> FloatArray:
         """Standard errors of the numbers, from the innovations' slopes."""
-        found = self._descended(inner, np.arange(inner.size), view, 0, 0.0)
-        size = np.sqrt(np.maximum(np.diag(found.normal), 1e-300))
-        covariance = np.linalg.pinv(found.normal / np.outer(size, size), rcond=1e-10, hermitian=True) / np.outer(size, size)
-        own = np.sqrt(np.maximum(np.diag(covariance), 0.0) * found.cost) * self.unit
+        errors, slopes = self.run(self.outer(inner), view, True)
+        skip = self._skipped(errors.size)
+        normal = slopes[skip:].T @ slopes[skip:]
+        size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+        covariance = np.linalg.pinv(normal / np.outer(size, size), rcond=1e-10, hermitian=True) / np.outer(size, size)
+        own = np.sqrt(np.maximum(np.diag(covariance), 0.0) * float(np.mean(errors[skip:] ** 2))) * self.unit
         return np.asarray(np.where(self.log, own * self.outer(inner), own))
 
-    def _descended(self, start: FloatArray, free: NDArray[np.int64], view: View, most: int, enough: float) -> Found:
-        skip = min(int(SETTLED * self.fs), view.samples // 4)
-        inner = start.copy()
-
-        def errors(part: FloatArray, sloped: bool) -> tuple[FloatArray, FloatArray]:
-            inner[free] = part
-            numbers = self.outer(inner)
-            out, slopes = self.run(numbers, view, sloped)
-            return out[skip:], slopes[skip:, free] if sloped else slopes
-
-        return descend(errors, start[free], self.low[free], self.high[free], Patience(most, enough, self.late))
+    def _skipped(self, samples: int) -> int:
+        return min(int(SETTLED * self.fs), samples // 8)
 
     def run(self, numbers: FloatArray, view: View, sloped: bool) -> tuple[FloatArray, FloatArray]:
         """(n,) innovations over the noise, and (n, coordinates) their derivatives, or (0, 0)."""
@@ -144,7 +185,7 @@ class Innovations:
             self.fs,
             (view.deaf * noise) ** 2,
             drift,
-            max(view.cuts, self._stable(numbers, float(np.std(voltage)))),
+            max(view.cuts, self._cuts(numbers, view.turn)),
             *moved,
             column,
             nudge,
@@ -161,11 +202,11 @@ class Innovations:
             slopes = np.clip(np.nan_to_num(slopes, nan=0.0), -WORST, WORST)
         return out, slopes
 
-    def _stable(self, numbers: FloatArray, volts: float) -> int:
-        """Sub-steps of a sample with which explicit steps follow the contact's spring and damper; volts: rms of the drive, V."""
-        knocks = 3.0 * volts * abs(numbers[GAIN]) * numbers[POLE] / numbers[SHARE]  # m/s^2 of both sides to each other
-        swift = (1.0 + 2.0 * numbers[DAMPING]) * numbers[RATE] + numbers[LOSS] * knocks
-        return min(int(np.ceil(swift / self.fs / STABLE)), MOST)
+    def _cuts(self, numbers: FloatArray, turn: float) -> int:
+        """Sub-steps of a sample with which the closed contact, as stiff as it usually is, turns so far in each, rad."""
+        depth = PRESSED * SPEED / numbers[RATE]
+        stiffer = 1.0 + numbers[HERTZ] * (1.5 * np.sqrt(2.0 * depth / numbers[GAP]) - 1.0)
+        return min(int(np.ceil(numbers[RATE] * np.sqrt(max(stiffer, 0.0)) / self.fs / turn)), MOST)
 
     def _undone(self, numbers: FloatArray, n: int) -> tuple[FloatArray, FloatArray, FloatArray, float]:
         return self.beside.undo(np.concatenate((numbers[:3], numbers[self.others])), n)

@@ -10,7 +10,7 @@ from xy_sysid.effects._similarity import Similarity
 from xy_sysid.samples.block import FloatArray
 
 BASE = ("m/s/V", "s", "rad/s")  # gain, delay, pole
-CONTACT = ("m", "", "rad/s", "", "s/m", "")  # gap, share, rate, damping, loss, guide
+CONTACT = ("m", "", "rad/s", "", "s/m", "", "", "V")  # gap, share, rate, damping, loss, guide, hertz, rub
 
 
 def to_usual(task: OneStepTask) -> OneStepTask:

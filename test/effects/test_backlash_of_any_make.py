@@ -1,0 +1,67 @@
+"""A gap is found whatever its contact is: linear or stiffening, lightly or well damped, rubbing on either side."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from helpers import real_data
+from helpers.gap_machines import GapMachine, driven
+
+from xy_sysid.diagnosis.diagnose import diagnose
+from xy_sysid.effects import EFFECTS
+from xy_sysid.greybox.axis_data import AxisData, prepare
+from xy_sysid.greybox.free_run import fit_base
+from xy_sysid.greybox.one_step import error_without, followed
+
+GAP = EFFECTS["backlash"]
+
+
+@pytest.mark.parametrize(
+    "machine",
+    [
+        GapMachine(gap=30.0, contact=650.0, damping=0.05),
+        GapMachine(gap=20.0, contact=500.0, damping=0.05, hertz=True, share=0.65),
+        GapMachine(gap=8.0, contact=350.0, damping=0.4, share=0.35, table_rubs=0.15),
+        GapMachine(gap=50.0, contact=1000.0, damping=0.1, hertz=True, share=0.45, motor_rubs=0.1),
+    ],
+    ids=["lightly damped", "Hertz", "a few counts before a table that rubs", "Hertz behind a motor that rubs"],
+)
+def test_the_gap_and_the_masses_come_out_right(machine: GapMachine) -> None:
+    """To 10 % and 0.03, and the same filter without a gap leaves at least twice as much."""
+    data = prepare(machine.fs, *driven(machine, 1))
+    fit, found = followed(data, fit_base(data), GAP)
+    assert fit.parameter("backlash.gap").value == pytest.approx(machine.gap * machine.count, rel=0.1)
+    assert fit.parameter("backlash.share").value == pytest.approx(machine.share, abs=0.03)
+    assert error_without(data, found) > 2.0 * fit.held_out_error
+
+
+def test_the_contact_comes_out_right_too() -> None:
+    """Of a linear one its frequency and damping, and that it does not stiffen."""
+    machine = GapMachine(gap=30.0, contact=650.0, damping=0.05)
+    data = prepare(machine.fs, *driven(machine, 2))
+    fit = followed(data, fit_base(data), GAP)[0]
+    assert fit.parameter("backlash.rate").value == pytest.approx(2.0 * np.pi * 650.0, rel=0.05)
+    assert fit.parameter("backlash.damping").value == pytest.approx(0.05, abs=0.02)
+    assert fit.parameter("backlash.hertz").value < 0.1
+
+
+def test_the_answer_is_the_same_in_other_units() -> None:
+    """Nothing in the search for a start knows metres or volts."""
+    machine = GapMachine(gap=30.0, contact=650.0, damping=0.05)
+    u, y = driven(machine, 1)
+    gaps = [_gap(prepare(machine.fs, u * volts, y * length)) / length for volts, length in ((1.0, 1.0), (300.0, 2000.0))]
+    assert gaps[1] == pytest.approx(gaps[0], rel=1e-3)
+
+
+def _gap(data: AxisData) -> float:
+    return followed(data, fit_base(data), GAP)[0].parameter("backlash.gap").value
+
+
+@pytest.mark.parametrize(("name", "gap"), [("gap_hertz_16um", 16e-6), ("gap_linear_12um", 12e-6), ("gap_linear_37um", 37e-6)])
+def test_the_gaps_of_another_simulator_are_named(name: str, gap: float) -> None:
+    """And nothing else is; the gap to 5 %."""
+    with np.load(real_data.data(f"gap_foreign/{name}.npz")) as arrays:
+        found = diagnose(float(arrays["fs"]), arrays["u"], arrays["y"])
+    assert found.effects == ("backlash",)
+    assert found.ladder is not None
+    assert found.ladder.final.parameter("backlash.gap").value == pytest.approx(gap, rel=0.05)

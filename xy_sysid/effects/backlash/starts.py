@@ -1,0 +1,79 @@
+"""Where a fit of the contact begins: the best of a grid, then of a second grid around what that became.
+
+The innovations of a gap have many valleys, and those of a stiff contact are narrow. A filter that is told of much process noise
+forgets within a few milliseconds, so that its valleys are wide; a thousand runs over two seconds take less than a second.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+
+from xy_sysid.effects._contract import OneStepTask
+from xy_sysid.effects.backlash.filter_source import NAMES
+from xy_sysid.effects.backlash.innovations import Innovations, View
+from xy_sysid.samples.block import FloatArray
+
+FIRST = View(samples=4000, looseness=5.0, cuts=4, turn=0.7)
+SECOND = View(samples=8000, looseness=1.2, cuts=4, turn=0.35)
+GAPS = (10.0, 0.5, 2.0)  # from so many encoder noises up to so much of the way between two reversals, each so much wider
+WIDEST = 12  # gaps at most
+SHARES = (0.3, 0.4, 0.5, 0.6, 0.7, 0.8)
+RATES = tuple(2.0 * np.pi * hertz for hertz in (250.0, 500.0, 1000.0, 2000.0))
+DAMPINGS = (0.05, 0.3)
+REST = (0.0, 0.1, 0.3, 0.0)  # loss, guide, hertz, rub
+AROUND = ((0.75, 0.87, 1.0, 1.15, 1.32, 1.6), (0.7, 1.0, 1.6, 2.5), (0.0, 1.0))  # gap and rate over what was found; hertz
+APART = {"gap": 0.6, "share": 0.15, "rate": 0.8}  # starts that differ by less, in logarithms but for the share, find the same
+NEAR = {"gap": 0.2, "rate": 0.6, "hertz": 0.7}
+BEST = (5, 4)  # starts that are followed, of the first and of the second grid
+RACE = ((6, 2), (20, 1))  # steps that each start goes, and how many go on
+ENOUGH = 3e-3  # relative fall of the cost in a step, below which it ends
+GAP, RATE, HERTZ = (NAMES.index(name) for name in ("gap", "rate", "hertz"))
+
+
+def searched(fit: Innovations, task: OneStepTask) -> FloatArray:
+    """Coordinates near the best fit, from a grid."""
+    first, second = FIRST.within(task.stages[0]), SECOND.within(task.stages[0])
+    grid = product(_gaps(task.noise, task.beside.swing), SHARES, RATES, DAMPINGS)
+    starts = [fit.start(task.base, (*numbers, *REST), task.dry.values) for numbers in grid]
+    found = _raced(fit, _best(fit, starts, first, APART, BEST[0]), first)
+    around = [found]
+    for wider, stiffer, hertz in product(*AROUND):
+        numbers = fit.outer(found)
+        numbers[GAP], numbers[RATE], numbers[HERTZ] = numbers[GAP] * wider, numbers[RATE] * stiffer, hertz
+        around.append(fit.inner(numbers))
+    return _raced(fit, [found, *_best(fit, around, second, NEAR, BEST[1])], second)
+
+
+def _best(fit: Innovations, starts: list[FloatArray], view: View, apart: dict[str, float], most: int) -> list[FloatArray]:
+    """Those that cost least, each unlike the others, best first."""
+    errors = [fit.seen(start, view) for start in starts]
+    scale = min(fit.scale(error) for error in errors)
+    costs = [fit.cost(error, scale) for error in errors]
+    places, widths = [NAMES.index(name) for name in apart], np.array(list(apart.values()))
+    found: list[FloatArray] = []
+    for at in np.argsort(costs, kind="stable"):
+        near = (np.abs(starts[at] - other)[places] * fit.unit[places] < widths for other in found)
+        if not any(np.all(same) for same in near):
+            found.append(starts[at])
+        if len(found) == most:
+            break
+    return found
+
+
+def _raced(fit: Innovations, starts: list[FloatArray], view: View) -> FloatArray:
+    """The best of some starts: each goes a few steps, the better ones more."""
+    scale = min(fit.scale(fit.seen(start, view)) for start in starts)
+    every = np.arange(starts[0].size)
+    for steps, left in RACE:
+        moved = (fit.solved(start, every, view, steps, ENOUGH, scale) for start in starts)
+        starts = sorted(moved, key=lambda start: fit.cost(fit.seen(start, view), scale))[:left]
+    return starts[0]
+
+
+def _gaps(noise: float, swing: float) -> list[float]:
+    """Widths to begin with, m."""
+    low, high, wider = GAPS[0] * noise, max(GAPS[1] * swing, 4.0 * GAPS[0] * noise), GAPS[2]
+    count = min(int(np.ceil(np.log(high / low) / np.log(wider))) + 1, WIDEST)
+    return [float(gap) for gap in np.geomspace(low, high, count)]
