@@ -20,7 +20,7 @@ class EncoderNoise:
 
     def __init__(self, axes: int) -> None:
         self.count = np.full(axes, np.inf)  # m, the smallest change so far
-        self._variance = np.zeros(axes)
+        self.variance = np.zeros(axes)  # m^2 of one reading
         self._readings = 0
         self._last = np.empty((0, axes))
 
@@ -34,10 +34,10 @@ class EncoderNoise:
             bent = np.diff(rows, 2, axis=0)
             self._readings = min(self._readings + len(bent), MEMORY)
             share = min(1.0, len(bent) / self._readings)
-            self._variance += share * (np.mean(bent * bent, axis=0) / BENT - self._variance)
+            self.variance += share * (np.mean(bent * bent, axis=0) / BENT - self.variance)
         self._last = rows[-2:]
 
     @property
     def still(self) -> FloatArray:
         """(axes,) m by which two readings differ at most while the axis rests."""
-        return np.asarray(COUNTS * np.where(np.isfinite(self.count), self.count, 0.0) + SIGMAS * np.sqrt(self._variance))
+        return np.asarray(COUNTS * np.where(np.isfinite(self.count), self.count, 0.0) + SIGMAS * np.sqrt(self.variance))
