@@ -35,6 +35,7 @@ DriveState = Literal["idle", "active", "stopping", "stopped"]
 LIVE_AXIS = frozenset({"rms", "limit", "offset", "centring", "travel_min", "travel_max", "brake", "brake_voltage", "velocity_gain", "breakaway"})
 LIVE = frozenset({"duration", "watchdog", "abort_ramp", "patience"})
 
+STOP_RAMP = 0.1  # s in which STOP fades out at most, whatever abort_ramp is
 AHEAD = 1.0  # s by which a stamp may lie ahead of the commands; their thread may have been held up
 ABSURD = 10.0  # a position so many travel ranges away from the middle is a broken encoder, not a place
 
@@ -116,6 +117,10 @@ class Drive:
         elif length >= self._fade_length - self._fade_at:
             return
         self._fade_from, self._fade_at, self._fade_length = level, 0, length
+
+    def obey_stop(self) -> None:
+        """STOP: fade out within ``abort_ramp``, and STOP_RAMP at most."""
+        self.stop("STOP", min(self.settings.abort_ramp, STOP_RAMP))
 
     def _level(self, at: int) -> float:
         """Part of the voltage left after so many samples of fading out."""

@@ -46,8 +46,12 @@ DATA_QOS = QoSProfile(depth=1000, history=HistoryPolicy.KEEP_LAST, reliability=R
 LATCHED_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 STOP_TOPIC = "stop"  # std_msgs/Bool: true is zero volts now and no activate until false
-# Heard twice: what was latched before the node was there, and whoever publishes without latching or reliability.
-STOP_HEARD = (LATCHED_QOS, QoSProfile(depth=10, history=HistoryPolicy.KEEP_LAST, reliability=ReliabilityPolicy.BEST_EFFORT))
+# Heard twice: what was latched before the node was there, and whoever publishes without latching or reliability. The depth is that of all
+# publishers together: at a depth of 1 the false of one would hide the true of another.
+STOP_HEARD = (
+    QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL),
+    QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT),
+)
 
 OF_ROS = ("use_sim_time", "start_type_description_service", "qos_overrides.")  # parameters that rclpy has by itself
 
