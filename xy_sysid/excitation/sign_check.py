@@ -6,7 +6,8 @@ Two models of each axis are fitted to the motion of the last seconds. In both, t
 
 and the response to a plus voltage is never negative in one, and never positive in the other. Masses, friction, delays, lags and
 encoders on the load side all answer first in the direction of the voltage. The axis is wired backwards if the negative model is
-better by far more than chance: by EVIDENCE in log likelihood, and with at most half of the residual error.
+better by far more than chance: by EVIDENCE in log likelihood, and with at most half of the residual error, while the positive model
+explains less than half of what is new in the motion.
 
 The voltage is the excitation alone, without centring: the excitation does not depend on the motion, so no disturbance, falling
 load or vibration of a resting axis can go along with it by itself. Only motion beyond the encoder's noise is judged, and only
@@ -25,11 +26,11 @@ from xy_sysid.samples.block import FloatArray
 from xy_sysid.settings import ExcitationSettings
 
 INTERVAL = 0.01  # s, unless positions come more seldom
-LAGS = ((0, 1), (1, 2), (2, 4), (4, 8), (8, 16))  # first and end of the intervals before, which share one response
+LAGS = ((0, 1), (1, 2), (2, 3), (3, 4), (4, 6), (6, 8), (8, 12), (12, 16))  # first and end of the intervals before, which share one response
 PAST = LAGS[-1][1]
 SPANS = (50, 200)  # intervals that are looked at: a sign that turns shows in the short one, a low voltage in the long one
-EVIDENCE = 20.0  # ratio of log likelihoods; a chance of 1 in 10^9, as 5 responses are fitted
-BETTER = 2.0  # times less residual power
+EVIDENCE = 20.0  # ratio of log likelihoods; right machines of all kinds, sticky, late, soft, loaded, have shown 7 at most
+BETTER = 2.0  # times less residual power than the other, which explains less than this part itself
 NORMAL = 3.0  # mean fourth power of normal numbers of variance 1
 FINEST = 1e-6  # no model of a machine is better than this part of the power
 FAST = 0.25  # greatest part of the new in steps that motion within an interval may have, beyond noise and a straight line
@@ -123,10 +124,10 @@ def _against(steps: FloatArray, responses: FloatArray, unsure: FloatArray, span:
     step, told = both[:, 0], both[:, 1:]
     fits = [nnls(sign * told, step) for sign in (1.0, -1.0)]
     plus, minus = (float(residual) ** 2 for _, residual in fits)
-    if plus <= BETTER * minus:
+    if plus < len(step) / BETTER or plus < BETTER * minus:
         return False
     rest = step - told @ fits[0][0]
     alike = max(float(rest[1:] @ rest[:-1]) / plus, 0.0)  # slow motion tells less than it has steps
     jerks = NORMAL * len(step) / float(np.mean(step**4))  # and so does motion of a few jerks
-    free = min(jerks, len(step)) * (1 - alike) / (1 + alike) - known.shape[1] - responses.shape[1]
+    free = min(jerks, len(step)) * (1 - alike) / (1 + alike) - known.shape[1] - np.count_nonzero(fits[1][0])
     return 0.5 * free * float(np.log(plus / max(minus, FINEST * plus))) > EVIDENCE
