@@ -35,20 +35,21 @@ def test_no_guard_applies_more_than_was_asked(driven: str, rms: float, start: fl
     moves, rests = drive.axes.index(driven), drive.axes.index(resting)
     place, asked = np.zeros(2), 0.0
     place[rests] = start
+    voltage = np.zeros((ROWS, 2))
     drive.start()
     for k in range(600):
         drive.tick(k * ROWS / RATE)
         seq = np.arange((k - 1) * ROWS, k * ROWS, dtype=np.float64)
-        path = place + 0.1 / RATE * np.cumsum(block.values, axis=0) if k else np.tile(place, (ROWS, 1))
+        path = place + 0.1 / RATE * np.cumsum(voltage, axis=0)
         drive.see(Block(drive.axes, seq, seq / RATE, flickering(path, noise, random)))
         place = path[-1]
         if k == 300:
             drive.change(settings.model_copy(update={"axes": pushed}))
             asked = 0.025
-        block = drive.next(ROWS)
-        assert block.values[:, moves] == pytest.approx(wanted.next(ROWS), rel=1e-12)
-        assert np.abs(block.values[:, rests]).max() <= asked + 1e-12
-        assert start or k <= 300 or block.values[-1, rests] == asked
+        voltage = drive.next(ROWS).values
+        assert voltage[:, moves] == pytest.approx(wanted.next(ROWS), rel=1e-12)
+        assert np.abs(voltage[:, rests]).max() <= asked + 1e-12
+        assert start or k <= 300 or voltage[-1, rests] == asked
     assert drive.state == "active", drive.reason
 
 

@@ -6,7 +6,8 @@ encoder explains. So no guard ever moves an axis that rests.
 Positions are old when they arrive and a block lasts, so the guard looks at where the axis will be when it answers: the last
 place plus the time since then (and REACTION) times an outward speed. That speed is the greatest of those seen during the
 last such time, and of what the voltages under way and asked for mean for this axis, by the ratio of speed to voltage that
-it has shown so far (up to what any motion can have). Speed is motion beyond the noise. A fast axis, loud voltage or an old position therefore brake earlier instead of later.
+it has shown so far (up to what any motion can have). Speed is motion beyond the noise. A fast axis, loud voltage or an old
+position therefore brake earlier instead of later.
 
 Proven on 0.097 m/s/V, 246 rad/s, 1.3 ms delay with up to 10 V and 40 ms old positions. The zone must be longer than the way
 in which the axis stops by itself at 0 V.

@@ -25,7 +25,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.excitation.first_run import AxisFound, FirstRun, Push
 from xy_sysid.nodes.common import DATA_QOS, NAMESPACE, from_message
 from xy_sysid.nodes.hearing import Ear
-from xy_sysid.nodes.wall import Wall
+from xy_sysid.nodes.wall import Wall, words_of
 from xy_sysid.samples.block import Block, FloatArray
 from xy_sysid.settings import ExcitationSettings, build, knobs
 
@@ -51,7 +51,7 @@ class Conductor:
         self._executor.add_node(self._node)
         self._blocks: dict[str, dict[float, Block]] = {"voltage": {}, "position": {}}
         self._reason = ""
-        wall = Wall(say)
+        self._wall = wall = Wall(lambda words: None)  # told as the problem
         for topic in self._blocks:
             Ear(self._node, Float64MultiArray, topic, wall.around(self._keeper(topic)), DATA_QOS)
         self._node.create_subscription(DiagnosticArray, "metrics", wall.around(self._on_statuses), 100)
@@ -67,6 +67,8 @@ class Conductor:
             self._conduct()
         except BadInput as problem:
             self.problem = str(problem)
+        except Exception as error:  # whatever it is, the machine stands by now, and nobody may take this for success
+            self.problem = f"ended by an error of its own ({words_of(error)}); please report it"
         if self.problem:
             self._say(self.problem)
         return not self.problem
@@ -91,12 +93,19 @@ class Conductor:
                 self._say(first.took(*samples).sentence)
             self.problem = self.problem or (f"the excitation stopped: {self._reason}" if self._reason else first.problem)
         finally:
-            if self._state() == "active":
-                self._transition("deactivate")
+            self._rest()
         for axis in first.axes:
             self.found[axis] = first.found(axis)
             if not self.problem:
                 self._say(first.summary(axis))
+
+    def _rest(self) -> None:
+        """Deactivate; what goes wrong with that is told beside what has ended the run, and the nodes are ended anyway."""
+        try:
+            if self._state() == "active":
+                self._transition("deactivate")
+        except BadInput as problem:
+            self.problem = self.problem or str(problem)
 
     def _push(self, push: Push, settings: ExcitationSettings) -> tuple[FloatArray, FloatArray]:
         """Voltage and position of a push; again where the messages of one did not all come, as on a busy machine."""
@@ -129,6 +138,8 @@ class Conductor:
     def _over(self) -> bool:
         if self._is_over():
             self.problem = self.problem or "stopped before the end"
+        if self._wall.count:
+            self.problem = self.problem or self._wall.told
         return bool(self.problem or self._reason)
 
     # what is heard
