@@ -121,7 +121,7 @@ def test_a_load_that_tips_over_is_no_fault_of_the_wires() -> None:
 
 def test_a_brake_that_opens_with_the_voltage_leaves_both_causes_open() -> None:
     """It falls during the push forth alone: both causes are named, with the test that tells which."""
-    run = pushed(lambda place, speed, volts, time: -20.0 * (0.1 < time < 0.25) - 1e3 * speed * (time > 0.25))
+    run = pushed(lambda place, speed, volts, time: -20.0 * (0.1 < time < 0.25) - (volts + 1e3 * speed) * (time > 0.25))
     assert "to minus at plus volts, and not the other way" in run.problem
     assert "push it by hand" in run.problem and "load" in run.problem and "swap the motor's wires" in run.problem
 
