@@ -20,7 +20,7 @@ RATE, ROWS = 2000.0, 20
 LONG = {"limit": 5.0, "travel_min": -0.1, "travel_max": 0.1, "brake": 0.04}
 
 
-@dataclass
+@dataclass(kw_only=True)
 class Axis:
     """speed' = (gain (voltage - friction) - speed) / lag + unstable * place: m/s/V, s, V of friction and load, 1/s^2, s of delay, m of noise."""
 
@@ -34,7 +34,7 @@ class Axis:
     count: float = 5e-7
     place: float = 0.0
     speed: float = 0.0
-    late: deque[float] = field(default_factory=deque)
+    late: deque[float] = field(default_factory=deque, init=False)
 
     def play(self, voltage: FloatArray, random: np.random.Generator) -> FloatArray:
         """(n,) V -> (n,) m as the encoder shows them."""
@@ -132,7 +132,7 @@ def test_a_right_axis_is_never_called_backwards(right: str, rms: float) -> None:
 def test_no_kind_of_signal_makes_a_right_axis_look_backwards(kind: str, delay: float) -> None:
     """Where a delay is half a period, plus moves it to minus: that says nothing of the wiring."""
     for rms in (0.3, 2.0):
-        drive, _ = driven(Axis(delay=delay), AxisExcitation(kind=kind, rms=rms, low=0.5, **LONG), 6.0)  # type: ignore[arg-type]
+        drive, _ = driven(Axis(delay=delay), AxisExcitation(kind=kind, rms=rms, low=0.5, **LONG), 6.0)
         assert "sign" not in drive.reason and "wires" not in drive.reason, drive.reason
 
 

@@ -130,4 +130,4 @@ def _against(steps: FloatArray, responses: FloatArray, unsure: FloatArray, span:
     alike = max(float(rest[1:] @ rest[:-1]) / plus, 0.0)  # slow motion tells less than it has steps
     jerks = NORMAL * len(step) / float(np.mean(step**4))  # and so does motion of a few jerks
     free = min(jerks, len(step)) * (1 - alike) / (1 + alike) - known.shape[1] - np.count_nonzero(fits[1][0])
-    return 0.5 * free * float(np.log(plus / max(minus, FINEST * plus))) > EVIDENCE
+    return bool(0.5 * free * np.log(plus / max(minus, FINEST * plus)) > EVIDENCE)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import array
 import functools
+import math
 from collections.abc import Callable, Collection
 from typing import Any, Generic, TypeVar, cast
 
@@ -171,9 +172,13 @@ def describe(item: Knob, fixed: bool = False) -> ParameterDescriptor:
     )
     if item.low is not None and item.high is not None:
         if isinstance(item.value, float):
-            descriptor.floating_point_range = [FloatingPointRange(from_value=item.low, to_value=item.high)]
+            low = math.nextafter(item.low, math.inf) if item.above else item.low  # a range of ROS has its ends
+            high = math.nextafter(item.high, -math.inf) if item.below else item.high
+            descriptor.floating_point_range = [FloatingPointRange(from_value=low, to_value=high)]
         else:
-            descriptor.integer_range = [IntegerRange(from_value=int(item.low), to_value=int(item.high))]
+            descriptor.integer_range = [IntegerRange(from_value=int(item.low) + item.above, to_value=int(item.high) - item.below)]
+        open_ends = [f"above {item.low:g}"] * item.above + [f"below {item.high:g}"] * item.below
+        descriptor.additional_constraints = " and ".join(open_ends)
     return descriptor
 
 

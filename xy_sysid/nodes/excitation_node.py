@@ -22,6 +22,7 @@ from std_msgs.msg import Float64MultiArray
 from xy_sysid.errors import BadInput
 from xy_sysid.excitation.drive import Drive
 from xy_sysid.excitation.pacing import CATCH_UP, Answers, Clock
+from xy_sysid.live.recent import Recent
 from xy_sysid.nodes.commands import Beat, Commands
 from xy_sysid.nodes.common import DATA_QOS, NAMESPACE, declare, from_message, status, to_message
 from xy_sysid.nodes.diagnostics import Diagnostics
@@ -69,7 +70,8 @@ class ExcitationNode(Overridable, LifecycleNode):
         self._loud = False  # the last block published was not all zeros
         self._complaint = ""
         self._unnamed = 0.0  # s since which another one is there without a name
-        self._refused = ""  # why the last activate was refused
+        self._refused = ""  # why the last transition was refused
+        self._refusals, self._recent = 0, Recent()
         self._made = time.monotonic()
         self._wall = Wall(self._complain)
         for service in self._services:  # rclpy's own: a transition that the state does not have would end the node
@@ -104,11 +106,7 @@ class ExcitationNode(Overridable, LifecycleNode):
         time.sleep(max(0.0, self._made + FOUND - time.monotonic()))
         rivals = self._rivals()
         if rivals:
-            self._refused = f"{rivals}: no configure beside it. End one of the two. {KILLED}"
-            self.get_logger().error(self._refused)
-            self._report()
-            return TransitionCallbackReturn.FAILURE
-        self._refused = ""
+            return self._refuse(f"{rivals}: no configure beside it. End one of the two. {KILLED}")
         try:
             self._drive = Drive(self._knobs.settings)
         except BadInput as error:
@@ -120,20 +118,13 @@ class ExcitationNode(Overridable, LifecycleNode):
         """Begin, at 0 V until the first position; refused while STOP is on."""
         self._obey_stop()
         if self._stop.held:
-            self.get_logger().error(self._stop.why())
-            self._report()
-            return TransitionCallbackReturn.FAILURE
+            return self._refuse(self._stop.why())
         others = self._others()
         if others:
-            self._refused = f"{' and '.join(others)} publishes {self._way}, too: no activate beside it. {KILLED}"
-            self.get_logger().error(self._refused)
-            self._report()
-            return TransitionCallbackReturn.FAILURE
-        self._refused = "" if self._commands else self._no_blocks()
-        if self._refused:
-            self.get_logger().error(self._refused)
-            self._report()
-            return TransitionCallbackReturn.FAILURE
+            return self._refuse(f"{' and '.join(others)} publishes {self._way}, too: no activate beside it. {KILLED}")
+        strange = "" if self._commands else self._no_blocks()
+        if strange:
+            return self._refuse(strange)
         settings, now = self._knobs.settings, time.monotonic()
         if self._drive is not None and self._until is not None:
             self._first = self._drive.seq
@@ -158,6 +149,13 @@ class ExcitationNode(Overridable, LifecycleNode):
             self._pacer = self._beat.clock
         self._pace = self.create_timer(max(wake, 0.001), self._on_time, clock=self._steady)
         return super().on_activate(state)
+
+    def _refuse(self, why: str) -> TransitionCallbackReturn:
+        """Say why a transition is not made, in the log and for some seconds in the status."""
+        self._refused, self._refusals = why, self._refusals + 1
+        self.get_logger().error(why)
+        self._report()
+        return TransitionCallbackReturn.FAILURE
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Fade out now, then zero."""
@@ -480,7 +478,8 @@ class ExcitationNode(Overridable, LifecycleNode):
                 values[f"{axis}.rms"] = f"{report.rms[number]:.4g}"
                 values[f"{axis}.clipped"] = f"{report.clipped[number]:.0f}"
                 values[f"{axis}.braked"] = f"{report.braked[number]:.0f}"
-        if self._stop.held or (self._refused and (drive is None or drive.state != "active")):
+        refused = self._recent.goes_on("refused", self._refusals, time.monotonic())
+        if self._stop.held or (refused and (drive is None or drive.state != "active")):
             message, level = self._stop.why() if self._stop.held else self._refused, max(level, 1)
         values["input unit"], values["output unit"] = self._knobs.settings.units
         values["stop"] = "on" if self._stop.held else "off"

@@ -25,7 +25,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.excitation.first_run import AxisFound, FirstRun, Push
 from xy_sysid.nodes.common import DATA_QOS, NAMESPACE, from_message
 from xy_sysid.nodes.hearing import Ear
-from xy_sysid.nodes.wall import Wall, words_of
+from xy_sysid.nodes.wall import Wall
 from xy_sysid.samples.block import Block, FloatArray
 from xy_sysid.settings import ExcitationSettings, build, knobs
 
@@ -51,7 +51,7 @@ class Conductor:
         self._executor.add_node(self._node)
         self._blocks: dict[str, dict[float, Block]] = {"voltage": {}, "position": {}}
         self._reason = ""
-        self._wall = wall = Wall(lambda words: None)  # told as the problem
+        self._wall = wall = Wall(lambda words: None, "ended by an error of its own, please report it")  # told as the problem
         for topic in self._blocks:
             Ear(self._node, Float64MultiArray, topic, wall.around(self._keeper(topic)), DATA_QOS)
         self._node.create_subscription(DiagnosticArray, "metrics", wall.around(self._on_statuses), 100)
@@ -63,12 +63,12 @@ class Conductor:
 
     def run(self) -> bool:
         """Whether all was well; ``problem`` says what was not, ``found`` what is known."""
-        try:
-            self._conduct()
-        except BadInput as problem:
-            self.problem = str(problem)
-        except Exception as error:  # whatever it is, the machine stands by now, and nobody may take this for success
-            self.problem = f"ended by an error of its own ({words_of(error)}); please report it"
+        with self._wall:
+            try:
+                self._conduct()
+            except BadInput as problem:
+                self.problem = str(problem)
+        self.problem = self._wall.told or self.problem
         if self.problem:
             self._say(self.problem)
         return not self.problem
