@@ -232,9 +232,7 @@ class MotionCheck:
                 if abs(slope) < SHARE or parts[0] < LEADS * max(parts[1], rest):
                     continue
                 if slope < 0:
-                    return (
-                        f"{self.axes[axis]}: the position goes against the {self._what}: a sign is wrong, or a load drives it. {BY_HAND}"
-                    )
+                    return f"{self.axes[axis]}: the position goes against the {self._what}: a sign is wrong, or a load drives it. {BY_HAND}"
                 if seconds == MEMORY:
                     shown = float(slope * self._gain[axis])
                     self._learnt[axis] = shown if not np.isfinite(self._learnt[axis]) else 0.95 * self._learnt[axis] + 0.05 * shown
