@@ -84,7 +84,7 @@ def test_the_simulated_table_wired_backwards_is_stopped_as_the_docs_promise(rms:
     """Default settings, signs wrong from the start, two seeds of the 25 that were measured."""
     seconds, way = promised()[rms]
     stopped, longest, furthest = worst(rms, (2, 5))
-    assert stopped and longest <= seconds and furthest <= way
+    assert stopped and round(longest, 3) <= seconds and furthest <= way
 
 
 @pytest.mark.parametrize("rms", [0.1, 0.2, 0.5, 1.0, 2.0, 5.0])
