@@ -83,13 +83,13 @@ class Scene:
     def drive(self) -> None:
         """STOP is released, then configure and activate, by the page's own means of ROS."""
         from lifecycle_msgs.msg import Transition
-        from std_msgs.msg import Bool
+        from std_srvs.srv import Trigger
 
-        from xy_sysid.nodes.common import LATCHED_QOS, STOP_TOPIC
-
-        node = self.monitor._node
-        release = node.create_publisher(Bool, STOP_TOPIC, LATCHED_QOS)
-        release.publish(Bool(data=False))
+        release = self.monitor._node.create_client(Trigger, "excitation/release_stop")
+        assert self.until(release.service_is_ready, 60.0), self.said("excitation")
+        for _ in range(2):  # the first names whose STOP it is
+            answer = release.call_async(Trigger.Request())
+            assert self.until(answer.done, 30.0), self.said("excitation")
         self.monitor._wanted = [Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE]
 
         def moving() -> bool:
@@ -100,7 +100,7 @@ class Scene:
             return bool(self.voltage) and bool(self.voltage[-1].values.any())
 
         assert self.until(moving, 150.0), (self.said("excitation"), self.monitor.statuses)
-        node.destroy_publisher(release)
+        self.monitor._node.destroy_client(release)
 
     def stop(self, what: str) -> Found:
         """POST /stop, and what came of it."""

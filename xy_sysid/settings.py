@@ -327,6 +327,8 @@ class Knob:
     low: float | None
     high: float | None
     choices: tuple[str, ...]
+    above: bool = False  # low itself is not allowed
+    below: bool = False  # high itself is not allowed
 
 
 def _limit(metadata: list[Any], *names: str) -> float | None:
@@ -369,6 +371,8 @@ def knobs(settings: Settings, prefix: str = "") -> Iterator[Knob]:
             low=_limit(info.metadata, "ge", "gt"),
             high=_limit(info.metadata, "le", "lt"),
             choices=choices,
+            above=_limit(info.metadata, "gt") is not None,
+            below=_limit(info.metadata, "lt") is not None,
         )
 
 

@@ -56,7 +56,7 @@ def test_friction_is_told_from_a_fault_and_measured() -> None:
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
-        (lambda position: -position, "plus volts move it to minus"),
+        (lambda position: -position, "plus volts move it to minus, and minus volts to plus: swap the motor's wires"),
         (lambda position: 1000 * position, "is the position in m?"),
         (lambda position: position[:, ::-1], "cables or columns are swapped"),
         (lambda position: np.vstack((np.tile(position[:1], (240, 1)), position[:-240])), "it answers after 1"),
@@ -89,3 +89,70 @@ def test_an_axis_that_never_moves_is_named() -> None:
     """Nothing moves up to twice rms: said, with what to do, and no number is made up."""
     run, _ = first_run(Machine.from_file("rigid.yaml").with_parts({"coulomb_friction": 8.0}))
     assert run.problem == "" and run.found("x").velocity_gain is None and "did not move up to 2 V: raise rms" in run.summary("x")
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("load", [0.3, -0.3])
+def test_a_load_that_falls_is_no_fault_of_the_wires(load: float, sign: float) -> None:
+    """It moves at 0 V, before any push: a load drives it, and nobody is told to swap wires, whichever way they are."""
+    run, answers = first_run(Machine.from_file("rigid.yaml").with_parts({"constant_load": load}), lambda position: sign * position)
+    assert len(answers) == 1 and "at 0 V, before any push: a load drives it" in run.problem and "swap" not in run.problem
+
+
+def pushed(law: Any, lag: float = 0.1, gain: float = 0.1) -> FirstRun:
+    """The first run of an axis that answers by speed' = (gain voltage - speed) / lag + law(place, speed, voltage, time)."""
+    run = FirstRun(settings({"rms": 1.0}, axes=("x",)))
+    shape = np.convolve(np.concatenate([np.zeros(200), np.ones(300), np.zeros(200), -np.ones(300), np.zeros(200)]), np.ones(20) / 20)[:1200]
+    while (what := run.next()) is not None:
+        random, place, speed, seen = np.random.default_rng(1), 0.0, 0.0, np.empty(len(shape))
+        for row, volts in enumerate(what.volts * shape):
+            seen[row] = np.round((place + 2e-7 * random.standard_normal()) / 5e-7) * 5e-7
+            speed += ((gain * volts - speed) / lag + law(place, speed, volts, row / 2000)) / 2000
+            place += speed / 2000
+        run.took((what.volts * shape)[:, None], seen[:, None])
+    return run
+
+
+def test_a_load_that_tips_over_is_no_fault_of_the_wires() -> None:
+    """Balanced until the first push, then it runs off in that direction, whatever the next push says."""
+    run = pushed(lambda place, speed, volts, time: 1500.0 * place)
+    assert "a load drives it (it hangs or tips over)" in run.problem and "swap" not in run.problem
+
+
+def test_a_brake_that_opens_with_the_voltage_leaves_both_causes_open() -> None:
+    """It falls during the push forth alone: both causes are named, with the test that tells which."""
+    run = pushed(lambda place, speed, volts, time: -20.0 * (0.1 < time < 0.25) - (volts + 1e3 * speed) * (time > 0.25))
+    assert "to minus at plus volts, and not the other way" in run.problem
+    assert "push it by hand" in run.problem and "load" in run.problem and "swap the motor's wires" in run.problem
+
+
+@pytest.mark.parametrize(("gain", "lag"), [(0.1, 0.005), (0.5, 0.5), (5.0, 5.0)])
+def test_an_axis_that_coasts_is_seen_the_right_way(gain: float, lag: float) -> None:
+    """Slow poles and free masses go on after a push: no word of wires or loads while plus is plus, and the wires if it is not."""
+    assert "swap" not in pushed(lambda *_: 0.0, lag, gain).problem and "load drives" not in pushed(lambda *_: 0.0, lag, gain).problem
+    assert "swap the motor's wires" in pushed(lambda *_: 0.0, lag, -gain).problem
+
+
+def test_a_sticky_axis_that_gives_and_comes_back_is_not_asked_for_its_unit() -> None:
+    """A contact that sticks moves by micrometres and springs back: it is held, and louder pushes follow."""
+    run = pushed(lambda place, speed, volts, time: -4e4 * place, lag=0.01)
+    assert run.problem == "" and run.found("x").velocity_gain is None
+
+
+def test_an_axis_that_moves_too_little_is_asked_for_both_causes() -> None:
+    """It stays where it was moved, and that is hardly anywhere: its unit or friction, and the test that tells which."""
+    run, _ = first_run(Machine.from_file("rigid.yaml", clean=True), lambda position: position / 1000)
+    assert "is the position in m?" in run.problem and "by hand" in run.problem and "friction" in run.problem
+
+
+@pytest.mark.parametrize("moved", [(0.0, -1e-3), (-5e-7, -1e-3)])
+def test_a_push_that_moves_it_only_back_is_no_division_by_zero(moved: tuple[float, float]) -> None:
+    """As a resting axis with a load or asymmetric friction does: said, and the next push follows."""
+    run = FirstRun(settings({"rms": 1.0}, axes=("x",)))
+    what = run.next()
+    assert what is not None
+    shape = np.concatenate([np.zeros(200), np.ones(300), np.zeros(200), -np.ones(300), np.zeros(200)])
+    flicker = 5e-7 * (np.arange(1200) % 3 == 0)
+    place = np.cumsum(moved[0] * (shape > 0) / 300 + moved[1] * (shape < 0) / 300) + flicker
+    told = run.took((what.volts * shape)[:, None], place[:, None])
+    assert told.problem == "" and "not forth" in told.sentence and run.next() is not None

@@ -214,3 +214,17 @@ def test_a_source_that_comes_back_at_another_rate_starts_new_spectra(size: int) 
     assert identifier.sampling_rate == 250.0
     assert 5 <= identifier.windows["x"] <= 14
     assert "came back at 250 Hz, before it was 500 Hz" in identifier.sentences["rate_changed"]
+
+
+def test_a_level_clears_within_ten_seconds_after_a_loss_is_over(paper: Recording) -> None:
+    """Two blocks of position never come: the axes say so at once, are well again within 10 s of data, and the count stays."""
+    part = slice(0, 80_000)
+    short = Recording(paper.sampling_rate, AXES, paper.seq[part], paper.time[part], paper.voltage[part], paper.position[part])
+    gone = {("position", 40_000.0), ("position", 40_020.0)}
+    kept = [(kind, block) for kind, block in blocks(short) if (kind, float(block.seq[0])) not in gone]
+    assert len(kept) == len(list(blocks(short))) - 2
+    levels = {update.request.seconds: update.statuses()[0] for update in replay(iter(kept), SETTINGS, AXES)}
+    lost = [seconds for seconds, status in levels.items() if "lost" in status.message]
+    assert lost and min(lost) >= 20.0 and max(lost) <= 30.0
+    final = list(levels.values())[-1]
+    assert final.level == OK and dict(final.values)["stream: lost"] == "40"

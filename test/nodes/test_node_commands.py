@@ -210,15 +210,14 @@ def test_a_controller_of_more_joints_gets_one_number_each_in_its_order(world: Wo
 
 
 def test_another_publisher_of_commands_is_refused(world: World) -> None:
-    """Two must not drive one controller: activate names the other one. And axes do not change after the start."""
+    """Two must not drive one controller: configure names the other one. And axes do not change after the start."""
     from std_msgs.msg import Float64MultiArray
 
     world.node.create_publisher(Float64MultiArray, COMMANDS, 10)
     drive = excitation(world, "effort")
-    assert world.transition("excitation", "configure")
-    assert world.until(lambda: world.node.count_publishers(COMMANDS) == 2)
+    assert world.until(lambda: world.node.count_publishers(COMMANDS) == 2, 20.0)
     world.spin(0.5)
-    assert not world.transition("excitation", "activate")
+    assert not world.transition("excitation", "configure")
     assert f"publishes {COMMANDS}, too" in drive.output()
     changed, why = world.set_parameter("excitation", "axes", ["q"])
     assert not changed and "read-only" in why
@@ -231,7 +230,8 @@ def test_blocks_are_not_sent_where_a_controller_listens(world: World) -> None:
     assert world.transition("excitation", "configure")
     assert not world.transition("excitation", "activate")
     assert "would go to" in drive.output() and "output to commands" in drive.output()
-    drive.end()
+    drive.process.terminate()  # one that is killed would be taken for another excitation for 20 s
+    assert drive.wait() == 0
     told = world.start(EXCITATION, {"renamed": True, "patience": 0.5}, arguments=remap)
     assert world.until(lambda: "unconfigured" in told.output())
     world.spin(1.0)

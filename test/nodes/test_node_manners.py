@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 from helpers import ROOT
+from helpers.busy import allowed
 from helpers.cli_tools import bare
 from helpers.live_nodes import FAST, Source, newest
 from helpers.ros_tools import Integrator, World, needs_ros, world_in
@@ -190,7 +191,10 @@ def test_descriptors_say_what_may_be_set(world: World) -> None:
 
     world.start(IDENTIFIER, QUICK)
     world.start(EXCITATION)
-    names = {"identifier": ["source", "window", "overlap", "axes", "input_unit"], "excitation": ["x.kind", "x.rms", "output", "rate", "axes"]}
+    names = {
+        "identifier": ["source", "window", "overlap", "axes", "input_unit", "refit"],
+        "excitation": ["x.kind", "x.rms", "output", "rate", "axes", "watchdog"],
+    }
     found: dict[str, Any] = {}
     for node, asked in names.items():
         answer = world.call(DescribeParameters, f"/xy/{node}/describe_parameters", DescribeParameters.Request(names=asked), times=3)
@@ -200,6 +204,9 @@ def test_descriptors_say_what_may_be_set(world: World) -> None:
     assert found["excitation output"].read_only and "one of blocks, commands" in found["excitation output"].additional_constraints
     assert "multisine" in found["excitation x.kind"].additional_constraints and not found["excitation x.kind"].read_only
     assert found["excitation x.rms"].floating_point_range[0].to_value == 100.0
+    for node, name in (("excitation", "watchdog"), ("identifier", "refit")):  # 0 is refused, and outside of the range
+        assert found[f"{node} {name}"].floating_point_range[0].from_value > 0.0 and found[f"{node} {name}"].additional_constraints == "above 0"
+        assert not world.set_parameter(node, name, 0.0)[0] and world.set_parameter(node, name, 0.002) == (True, "")
     assert found["identifier overlap"].floating_point_range and all(item.description for item in found.values())
 
 
@@ -234,3 +241,39 @@ def test_an_excitation_that_starts_by_itself_waits_for_the_machine_however_long_
     machine.alive = True
     assert world.until(lambda: any(block.values.any() for block in blocks), 20.0), node.output()
     assert world.until(lambda: newest(statuses, "excitation").get("reason", "").startswith("the duration")), newest(statuses, "excitation")
+
+
+def test_joints_of_another_publisher_are_no_warning_and_a_fault_that_is_over_clears(world: World) -> None:
+    """A gripper's joint states on the same topic leave the level OK; a message without numbers is a WARN, for 10 s and no longer."""
+    import time
+
+    from rclpy.duration import Duration
+    from sensor_msgs.msg import JointState
+
+    topic = world.node.create_publisher(JointState, "joint_states", 50)
+    statuses = world.statuses()
+    world.start(IDENTIFIER, {**QUICK, "axes": '["pan"]', "source": "joint_state", "effort_as_voltage": True})
+    assert world.until(lambda: topic.get_subscription_count() == 1, 40.0)
+    sent, first = [0], world.node.get_clock().now()
+
+    def publish(names: list[str], values: list[float]) -> None:
+        message = JointState(name=names, position=values, effort=values)
+        message.header.stamp = (first + Duration(nanoseconds=sent[0] * 20_000_000)).to_msg()  # even, however busy the computer is
+        topic.publish(message)
+
+    def tick() -> None:
+        sent[0] += 1
+        publish(["pan"], [0.001 * (sent[0] % 7)])
+        publish(["finger"], [0.5])
+
+    def levels() -> list[int]:
+        return [status.level[0] for status in statuses if status.name == "streams"]
+
+    world.node.create_timer(0.02, tick)
+    assert world.until(lambda: levels()[-3:] == [0, 0, 0], 20.0), [one.message for one in statuses]
+    assert int(newest(statuses, "streams")["messages refused"]) == 0
+    publish(["pan"], [])  # without numbers
+    assert world.until(lambda: levels()[-1] == 1, 5.0)
+    begun = time.monotonic()
+    assert world.until(lambda: levels()[-1] == 0, 20.0), [one.message for one in statuses][-3:]
+    assert time.monotonic() - begun < allowed(10.0) and int(newest(statuses, "streams")["messages refused"]) == 1

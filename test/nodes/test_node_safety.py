@@ -102,7 +102,7 @@ def test_guards_do_not_sleep_when_the_clock_is_taken_away(world: World) -> None:
 
 
 def test_two_excitations_never_drive_one_machine(world: World) -> None:
-    """A second one that appears stops the first, with its name; and activate of either is refused while the other is there."""
+    """A second one that appears stops the first, with its name; the second does not configure, nor the first activate, while both are there."""
     blocks, statuses = world.blocks(), world.statuses()
     world.machine(Integrator())
     first = world.start(EXCITATION, {"watchdog": 2.0, "ramp": 0.0})
@@ -112,12 +112,12 @@ def test_two_excitations_never_drive_one_machine(world: World) -> None:
     assert world.until(lambda: "publishes /xy/voltage, too: two must not drive one machine" in first.output(), 20.0), first.output()
     assert "/xy/other publishes" in first.output() or "whose name nobody has told yet publishes" in first.output()  # after a stall
     assert world.until(lambda: not blocks[-1].values.any(), 1.0) and world.state("excitation") == "inactive"
-    for node, process, name in (("other", second, "/xy/excitation"), ("excitation", first, "/xy/other")):
-        if node == "other":
-            assert world.transition(node, "configure")
-        assert not world.transition(node, "activate")
-        assert f"{name} publishes /xy/voltage, too: no activate beside it" in process.output()
+    assert not world.transition("other", "configure")
+    assert "/xy/excitation publishes /xy/voltage, too: no configure beside it. End one of the two." in second.output()
+    assert not world.transition("excitation", "activate")
+    assert "/xy/other publishes /xy/voltage, too: no activate beside it" in first.output()
     assert world.until(lambda: any("no activate beside it" in status.message for status in statuses), 2.0)
+    assert world.until(lambda: any("no configure beside it" in status.message for status in statuses), 2.0)
     second.send(signal.SIGTERM)
     assert second.wait() == 0
     assert world.until(lambda: world.transition("excitation", "activate"), 10.0)
@@ -143,9 +143,7 @@ def test_an_encoder_that_freezes_is_told_and_ends_at_zero_volts(world: World) ->
 
 def test_post_stop_is_answered_from_the_machines_state(world: World, tmp_path: Path) -> None:
     """The page's server: no 'stopped' while nobody has confirmed it, and with an excitation zero volts and its own word."""
-    from std_msgs.msg import Bool
-
-    from xy_sysid.nodes.common import LATCHED_QOS
+    from std_srvs.srv import Trigger
 
     blocks = world.blocks()
     server = Server(tmp_path, ROS_DOMAIN_ID=str(world.domain), ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST")
@@ -163,9 +161,10 @@ def test_post_stop_is_answered_from_the_machines_state(world: World, tmp_path: P
         process = world.start(EXCITATION, {"watchdog": 2.0, "ramp": 0.0})
         assert world.transition("excitation", "configure")
         assert world.until(lambda: "STOP is on" in process.output(), 10.0)  # still on, from before the excitation was there
-        release = world.node.create_publisher(Bool, "stop", LATCHED_QOS)  # as the page's: who hears it late hears it, too
-        release.publish(Bool(data=False))
-        assert world.until(lambda: "STOP is released" in process.output(), 5.0) and world.transition("excitation", "activate")
+        assert not world.transition("excitation", "activate") and "from page_stop" in process.output()
+        for done in (False, True):
+            assert world.call(Trigger, "/xy/excitation/release_stop", Trigger.Request()).success == done
+        assert world.transition("excitation", "activate")
         assert world.until(lambda: len(blocks) > 10 and bool(blocks[-1].values.any()))
         with ThreadPoolExecutor() as pool:
             asked = pool.submit(post)

@@ -270,3 +270,12 @@ def test_a_picture_is_never_kept_under_a_stamp_that_is_newer_than_its_story() ->
     source = (ROOT / "xy_sysid" / "page" / "story_card.py").read_text(encoding="utf-8")
     refresh = source[source.index("async def refresh") :]
     assert refresh.index("self._source.stamp(axis)") < refresh.index("self._source.document(axis)") and refresh.count("source.stamp(") == 1
+
+
+def test_a_stop_of_somebody_else_is_named_and_the_pages_own_is_not() -> None:
+    """Activate releases the page's own STOP by itself; whoever else holds it is told, also a page that has gone."""
+    heard = TopicsState()
+    assert heard.stopped_by_others() == ""
+    for held, others in (("", ""), ("page_stop", ""), ("guard, page_stop", "guard"), ("page_stop (gone)", "page_stop (gone)")):
+        heard.status(StatusMessage("excitation", 1, "", (("stop held by", held),)), 0.0)
+        assert heard.stopped_by_others() == others

@@ -21,8 +21,10 @@ import numpy as np
 
 from xy_sysid.errors import BadInput
 from xy_sysid.excitation import signal
+from xy_sysid.excitation.encoder_noise import EncoderNoise
 from xy_sysid.excitation.following import FollowCheck
 from xy_sysid.excitation.motion_check import MotionCheck, check_loop
+from xy_sysid.excitation.sign_check import SignCheck
 from xy_sysid.excitation.travel_limits import FURTHEST, Seen, TravelGuard
 from xy_sysid.samples.block import Block, FloatArray
 from xy_sysid.settings import ExcitationSettings, knobs
@@ -33,6 +35,7 @@ DriveState = Literal["idle", "active", "stopping", "stopped"]
 LIVE_AXIS = frozenset({"rms", "limit", "offset", "centring", "travel_min", "travel_max", "brake", "brake_voltage", "velocity_gain", "breakaway"})
 LIVE = frozenset({"duration", "watchdog", "abort_ramp", "patience"})
 
+STOP_RAMP = 0.1  # s in which STOP fades out at most, whatever abort_ramp is
 AHEAD = 1.0  # s by which a stamp may lie ahead of the commands; their thread may have been held up
 ABSURD = 10.0  # a position so many travel ranges away from the middle is a broken encoder, not a place
 
@@ -68,7 +71,7 @@ class Drive:
         self.fault = False  # stopped by a guard
         self.seq = seq
         check_loop(settings)
-        self._travel = TravelGuard(settings)
+        self._travel, self._noise, self._sign = TravelGuard(settings), EncoderNoise(len(self.axes)), SignCheck(settings)
         self._motion: MotionCheck | FollowCheck = FollowCheck(settings) if settings.holds else MotionCheck(settings)
         self._signals = [signal(axis.model_copy(update={"rms": 1.0}), settings.rate) for axis in settings.axes.values()]
         self._use(settings)
@@ -91,6 +94,7 @@ class Drive:
         self._slow, self._slow_period = self._wanted("slow"), self._wanted("slow_period")
         self._travel.use(settings)
         self._motion.use(settings)
+        self._sign.use(settings)
 
     def _wanted(self, name: str) -> FloatArray:
         return np.array([getattr(axis, name) for axis in self.settings.axes.values()], dtype=np.float64)
@@ -113,6 +117,10 @@ class Drive:
         elif length >= self._fade_length - self._fade_at:
             return
         self._fade_from, self._fade_at, self._fade_length = level, 0, length
+
+    def obey_stop(self) -> None:
+        """STOP: fade out within ``abort_ramp``, and STOP_RAMP at most."""
+        self.stop("STOP", min(self.settings.abort_ramp, STOP_RAMP))
 
     def _level(self, at: int) -> float:
         """Part of the voltage left after so many samples of fading out."""
@@ -144,7 +152,8 @@ class Drive:
             self._unusable, self._why = self._unusable + 1, why
             return False
         values, seq = block.values[:, [block.axes.index(axis) for axis in self.axes]], float(block.seq[-1])
-        self._travel.saw(Seen(seq, values[-1].copy(), self._speed(values, block.seq)))
+        self._noise.saw(values)
+        self._travel.saw(Seen(seq, values[-1].copy(), self._speed(values, block.seq)), self._noise.still)
         self._silence, self._unusable, self._seen_time = 0.0, 0, float(block.time[-1])
         if self._start is None:
             self._start = values[-1].copy()
@@ -154,11 +163,19 @@ class Drive:
                 span = f"{self._travel.low[axis]:g} to {self._travel.high[axis]:g} {self.settings.unit}"
                 self.fault = True
                 self.stop(f"{self.axes[axis]} stands at {values[-1, axis]:.6g} {self.settings.unit}, outside its travel from {span}", 0.0)
-        reason = self._motion.saw(block.seq, values) if self._watched and self.state == "active" else ""
+        reason = self._wrong(block.seq, values) if self._watched and self.state == "active" else ""
         if reason:
             self.fault = True
             self.stop(reason, self.settings.abort_ramp)
         return True
+
+    def _wrong(self, seq: FloatArray, values: FloatArray) -> str:
+        """What the motion shows to be wrong, or nothing."""
+        backwards = [] if self.settings.holds else self._sign.saw(seq, values, self._noise)
+        if backwards:
+            what = "voltage" if self.settings.output == "blocks" else self.settings.interface
+            return f"{self.axes[backwards[0]]}: plus {what} moves it to minus: swap the motor's wires or the encoder's sign"
+        return self._motion.saw(seq, values)
 
     @property
     def unusable(self) -> str:
@@ -193,12 +210,13 @@ class Drive:
         return ""
 
     def _speed(self, values: FloatArray, seq: FloatArray) -> FloatArray:
-        """(axes,) m/s over the block, or since the last position if it has one row; 0 if neither tells."""
+        """(axes,) m/s over the block, or since the last position if it has one row; 0 if neither tells, or noise explains it."""
         first, at = values[0], float(seq[0])
         if len(seq) == 1 and self._travel.seen is not None:
             first, at = self._travel.seen.position, self._travel.seen.seq
         seconds = (float(seq[-1]) - at) / self.settings.rate
-        speed = (values[-1] - first) / seconds if seconds > 0 else np.zeros(len(self.axes))
+        step = np.where(np.abs(values[-1] - first) > self._noise.still, values[-1] - first, 0.0)
+        speed = step / seconds if seconds > 0 else np.zeros(len(self.axes))
         return np.where(np.isfinite(speed), speed, 0.0)
 
     @property
@@ -233,6 +251,8 @@ class Drive:
             self._travel.sent(self.seq, np.tile(self._last, (n, 1)))
             self._motion.sent(self.seq, np.tile(self._last, (n, 1)))
         self.seq += n
+        if n > 0:
+            self._sign.forget()
         if self._running():
             for stream in self._signals:
                 stream.next(n)
@@ -275,7 +295,7 @@ class Drive:
     def _reference(self, n: int) -> FloatArray:
         """(n, axes) positions to be held: about where it stood at the start, and where it is once it has stopped."""
         assert self._start is not None
-        wanted = np.clip(self._driven(n), -self._limit, self._limit)
+        wanted = np.clip(self._driven(n)[0], -self._limit, self._limit)
         self._clipped += np.sum(np.abs(wanted) == self._limit, axis=0)
         reference = self._start + wanted
         if self.state == "stopping":
@@ -287,8 +307,8 @@ class Drive:
         self._braked += np.sum(kept != reference, axis=0)
         return np.asarray(kept)
 
-    def _driven(self, n: int) -> FloatArray:
-        """(n, axes) signal, slow sine and offset, faded in."""
+    def _driven(self, n: int) -> tuple[FloatArray, FloatArray]:
+        """(n, axes) signal, slow sine and offset, and the same with centring; both faded in."""
         driven = np.column_stack([stream.next(n) for stream in self._signals]) * _line(self._gain, self._rms, n)
         driven += _line(self._offset, self._steady, n)
         self._gain, self._offset = self._rms, self._steady
@@ -296,13 +316,13 @@ class Drive:
             since = (self._begun + np.arange(n))[:, None] / self.settings.rate
             driven += self._slow * np.sin(2 * np.pi * since / self._slow_period)
         ramp = round(self.settings.ramp * self.settings.rate)
-        if not self.settings.holds:
-            driven += self._centring * self._away()
+        centred = driven if self.settings.holds else driven + self._centring * self._away()
         if self._begun < ramp:
             part = np.minimum(np.arange(self._begun, self._begun + n) / ramp, 1.0)
-            driven *= (0.5 * (1 - np.cos(np.pi * part)))[:, None]
+            fade = (0.5 * (1 - np.cos(np.pi * part)))[:, None]
+            driven, centred = driven * fade, centred * fade
         self._begun += n
-        return driven
+        return driven, centred
 
     def _away(self) -> FloatArray:
         """(axes,) from where it is back to where it stood at the start."""
@@ -310,8 +330,9 @@ class Drive:
         return self._start - self._travel.seen.position
 
     def _voltage(self, n: int) -> FloatArray:
-        driven = self._driven(n)
+        excitation, driven = self._driven(n)
         guarded = self._travel.within(driven, self.seq)
+        self._sign.sent(self.seq, np.clip(excitation, -self._limit, self._limit), (guarded != driven).any(axis=0))
         if self.state == "stopping":
             guarded *= np.array([self._level(self._fade_at + i) for i in range(n)])[:, None]
             self._fade_at += n

@@ -24,6 +24,10 @@ CLEAR = 0.2  # of the furthest push, what another must reach to count for gain a
 NEXT = 1.5  # the next push may go so many times further than in proportion
 SLOWEST = 0.1  # s of delay and lag; the travel limits look no further ahead
 HALF = 0.5  # part of the push at which voltage counts as on
+RETURNS = 0.2  # part of a push that a contact which sticks gives back at 0 V; less is an axis that stays where it was moved
+LOADED = "a load drives it (it hangs or tips over), so nothing is known of the wires. Hold or balance the load, and begin again"
+BY_HAND = "Switch the drive off and push it by hand: does it run off by itself, hold or balance the load; if it stays where it is left, "
+SWAP = "swap the motor's wires or the encoder's sign"
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +81,8 @@ class FirstRun:
         self.axes = tuple(settings.axes)
         self.problem = ""
         self._expected, self._units = gains(settings), settings.units
-        self._asked = f"is the position in {self._units.output}? (or set velocity_gain)"
+        unit = self._units.output
+        self._asked = f"is the position in {unit}? Move it by hand and compare with a ruler or protractor; if the number is right, "
         self._seen = {axis: _Seen() for axis in self.axes}
         self._plan = [Push(axis, volts) for axis in self.axes for volts in self._levels(axis)]
 
@@ -103,21 +108,36 @@ class FirstRun:
         if begin < 8:
             return self._end(push, "no position at rest before the push")
         rest = position[:begin]
-        noise = rest.std(axis=0)
+        line = np.linspace(-1.0, 1.0, begin)
+        noise = (rest - np.polynomial.polynomial.polyval(line, np.polynomial.polynomial.polyfit(line, rest, 2)).T).std(axis=0)
         steps = np.abs(np.diff(position, axis=0))
         count = np.array([np.min(steps[:, k][steps[:, k] > 0], initial=np.inf) for k in range(len(self.axes))])
         least = np.maximum(SIGMAS * noise, COUNTS * np.where(np.isfinite(count), count, 0.0))
         middle, end = position[turn - 1] - rest.mean(axis=0), position[-1] - position[turn - 1]
         seen.noise = float(noise[column])
         moved = (float(middle[column]), float(end[column]))
+        drift = np.abs(rest[-1] - rest[0])
+        if not any(one.pushed or one.still for one in self._seen.values()) and (drift > least).any():
+            worst = int(np.argmax(drift - least))
+            went = in_words(drift[worst], self._units.output, 2)
+            return self._end(push, f"{self.axes[worst]} moves by {went} at 0 V, before any push: {LOADED}", moved)
         others = [axis for k, axis in enumerate(self.axes) if k != column and abs(middle[k]) > max(least[k], abs(middle[column]))]
         if others:
             return self._end(push, f"{others[0]} moved and {push.axis} did not: cables or columns are swapped", moved)
-        if abs(moved[0]) <= least[column] and abs(moved[1]) <= least[column]:
+        answer = _answers(place, begin, (int(forth[-1]), turn))
+        problem = _which_way(answer, float(least[column]))
+        if problem:
+            return self._end(push, problem, moved)
+        peak = float(np.abs(place[begin:turn] - rest[:, column].mean()).max())
+        small = max(peak, abs(moved[1])) < SMALL * self._expected[column] * float(volts[:turn].sum()) / rate
+        gives = small and abs(moved[0]) < (1 - RETURNS) * peak
+        if gives or (abs(answer[0]) <= least[column] and abs(answer[1]) <= least[column]):
             seen.still = push.volts
-            return PushResult(push, moved, f"{push.axis} at {push.volts:.3g} V: at rest (noise {in_words(noise[column], self._units.output, 2)})")
-        if moved[0] < -least[column]:
-            return self._end(push, "plus volts move it to minus: swap the motor's wires or the encoder's sign", moved)
+            what = "held by friction or a spring, it gives and comes back" if gives and peak > least[column] else "at rest"
+            return PushResult(push, moved, f"{push.axis} at {push.volts:.3g} V: {what} (noise {in_words(noise[column], self._units.output, 2)})")
+        if answer[0] <= least[column]:
+            words = f"{push.axis} at {push.volts:.3g} V: it moves back by {in_words(moved[1], self._units.output)}, and not forth: a load or friction"
+            return PushResult(push, moved, words)
         return self._moved(push, moved, (volts[:turn] / rate, place[:turn] - rest[:, column].mean()))
 
     def _moved(self, push: Push, moved: tuple[float, float], forth: tuple[FloatArray, FloatArray]) -> PushResult:
@@ -133,10 +153,11 @@ class FirstRun:
         sentence = f"{push.axis} at {push.volts:.3g} V: +{bare(moved[0], self._units.output)} and {in_words(moved[1], self._units.output)}"
         sentence += f", {gain:.3g} {self._units.of('m/s/V')}, after {seen.lag * 1000:.2g} ms"
         if ratio > LARGE:
-            return self._end(push, f"it moves {ratio:.0f} times as far as its travel suggests: {self._asked}", moved)
+            return self._end(push, f"it moves {ratio:.0f} times as far as its travel suggests: {self._asked}set velocity_gain", moved)
         still_friction = seen.still > 0.5 * push.volts
         if ratio < SMALL and not still_friction and len(seen.pushed) > 2:
-            return self._end(push, f"it moves {1 / ratio:.0f} times less than its travel suggests: {self._asked}", moved)
+            what = f"it moves {1 / ratio:.0f} times less than its travel suggests: {self._asked}friction holds it, or it is slow: set velocity_gain"
+            return self._end(push, what, moved)
         if seen.lag > SLOWEST:
             return self._end(
                 push, f"it answers after {seen.lag * 1000:.0f} ms; the guards look {SLOWEST * 1000:.0f} ms ahead: shorten the way", moved
@@ -179,3 +200,27 @@ class FirstRun:
             f"{axis}: plus is plus, {found.velocity_gain:.3g} {self._units.of('m/s/V')}{friction}, moves from {found.moves:.3g} V{answers}; "
             f"write velocity_gain: {found.velocity_gain:.3g} and breakaway: {1.5 * max(found.moves, found.friction or 0.0):.2g}"
         )
+
+
+def _answers(place: FloatArray, begin: int, turn: tuple[int, int]) -> tuple[float, float]:
+    """m by which a push forth, from ``begin``, and one back have changed the motion that was there before each.
+
+    turn: last sample of the push forth, and first of the push back; the second half of the rest between them shows the motion there
+    """
+    rested = (turn[0] + turn[1]) // 2
+    before = [float(np.polyfit(np.arange(len(part)), part, 1)[0]) if len(part) > 2 else 0.0 for part in (place[:begin], place[rested : turn[1]])]
+    forth = float(place[turn[1] - 1] - place[:begin].mean()) - before[0] * (turn[1] - 1 - (begin - 1) / 2)
+    back = float(place[-1] - place[turn[1] - 1]) - before[1] * (len(place) - turn[1])
+    return forth, back
+
+
+def _which_way(answer: tuple[float, float], least: float) -> str:
+    """What is wrong with the direction, or nothing; answer: m by which a push forth and one back have changed the motion."""
+    forth, back = answer
+    if forth < -least and back > least:
+        return f"plus volts move it to minus, and minus volts to plus: {SWAP}"
+    if min(forth, back) > least or max(forth, back) < -least:
+        return f"it moves to {'plus' if forth > 0 else 'minus'} at plus volts and at minus volts: {LOADED}"
+    if forth < -least or back > least:
+        return f"it moves {'to minus at plus volts' if forth < 0 else 'to plus at minus volts'}, and not the other way: {BY_HAND}{SWAP}"
+    return ""

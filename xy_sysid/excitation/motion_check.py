@@ -41,6 +41,10 @@ SHARE = 0.05  # part of the reckoned motion below which its sign says nothing
 RETURN = 0.5  # s beyond a limit in which an axis must have begun to come back
 PROGRESS = 0.02  # of the brake zone, what coming back is at least
 SLOWING = 0.03  # s over which outward motion under full inward voltage must become slower
+BY_HAND = (
+    "Switch the drive off and move it back by hand: if it runs off by itself, hold or balance the load; "
+    "if it stays where it is left, run --first tells whether plus is plus"
+)
 STEADY = 0.5  # greatest centring * speed per volt * age of a position; above 1.57 the loop swings by itself
 
 
@@ -228,10 +232,7 @@ class MotionCheck:
                 if abs(slope) < SHARE or parts[0] < LEADS * max(parts[1], rest):
                     continue
                 if slope < 0:
-                    return (
-                        f"{self.axes[axis]}: the position goes against the {self._what}: "
-                        "swap the motor's wires or the encoder's sign, plus must mean plus"
-                    )
+                    return f"{self.axes[axis]}: the position goes against the {self._what}: a sign is wrong, or a load drives it. {BY_HAND}"
                 if seconds == MEMORY:
                     shown = float(slope * self._gain[axis])
                     self._learnt[axis] = shown if not np.isfinite(self._learnt[axis]) else 0.95 * self._learnt[axis] + 0.05 * shown
@@ -273,7 +274,7 @@ class MotionCheck:
         return ""
 
     def _lost(self, axis: int, what: str) -> str:
-        return f"{self.axes[axis]} {what}: a sign is wrong, brake_voltage is too small, or it is held; move it back by hand"
+        return f"{self.axes[axis]} {what}: a sign is wrong, brake_voltage is too small, a load drives it, or it is held. {BY_HAND}"
 
 
 def _wider(ends: FloatArray, values: FloatArray) -> FloatArray:

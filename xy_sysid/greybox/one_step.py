@@ -29,7 +29,7 @@ CLEAN = 1.6  # innovation over the noise up to which next to nothing else is lef
 LITTLE_BETTER = 1.03  # and what is enough there in the place of BETTER: a gap of one encoder count makes 1.04 to 1.07
 TELLING = 0.005  # dry friction over the rms voltage from which it is named
 
-FILTER_WORK = 12.0  # samples times sub-steps simulated in the time that the filter takes for one sample
+FILTER_WORK = 2.0  # samples times sub-steps simulated in the time that the filter takes for one sample
 
 Others = Sequence[tuple[str, tuple[float, ...]]]
 

@@ -49,5 +49,5 @@ FILTERED = (1.0 + SIZE) ** -0.5  # innovation of a filter over that of the best 
 STILL = _number("still", 0.1, "1", "part of the liveliest motion below which a window stands")
 FEWEST = _number("fewest", 3, "1", "tones of an input, bands that it excites, held-out windows that move (twice as many to fit): less, and any law fits")
 MOST_EFFECTS = _number("most effects", 4, "1", "in a model: the blind sets have three at most, and of the real machines one takes four")
-WORK = 1.2e8  # samples times sub-steps simulated for one axis, about 6 s, where nobody gives another budget: no criterion, but what people wait for
+WORK = 1.5e8  # samples times sub-steps simulated for one axis, about 10 s, where nobody gives another budget: no criterion, but what people wait for
 WORK_EACH = 400.0  # the same for each sample of the record, so that long records are searched as far as short ones

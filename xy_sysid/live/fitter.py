@@ -192,8 +192,8 @@ def _verdict(axis: str, update: AxisUpdate, request: FitRequest) -> tuple[int, s
         return WARN, f"axis {axis}: the fit did not converge: {fit.reason if fit else update.problem}"
     if fit.relative_error > GOOD_ERROR:
         return WARN, f"axis {axis}: relative error {100 * fit.relative_error:.2g} %; the model does not fit (yet)"
-    if any(request.faults.values()) or any(update.dropped.values()):
-        reasons = ", ".join(sorted({*request.faults, *update.dropped}))
+    if request.going_on[axis]:
+        reasons = ", ".join(request.going_on[axis])
         return WARN, f"axis {axis}: relative error {100 * fit.relative_error:.2g} %; some data could not be used ({reasons})"
     return OK, f"axis {axis}: relative error {100 * fit.relative_error:.2g} %"
 

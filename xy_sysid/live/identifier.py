@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from xy_sysid.errors import BadInput
+from xy_sysid.live.recent import Recent
 from xy_sysid.response.closed_loop import LoopTransformer, RunningLoop, joint_input_output
 from xy_sysid.response.frf import FrequencyResponse
 from xy_sysid.response.h1 import H1Options, frequency_response
@@ -51,7 +52,7 @@ class FitRequest:
     """A fit is due.
 
     number: counts the requests from 1; seq: counter of the first sample after the newest window
-    seconds: of data heard; faults: samples or blocks not used, by reason
+    seconds: of data heard; faults: samples or blocks not used, by reason; going_on: the reasons of the last seconds, by axis
     """
 
     number: int
@@ -60,6 +61,7 @@ class FitRequest:
     sampling_rate: float
     axes: dict[str, AxisRequest]
     faults: dict[str, int]
+    going_on: dict[str, tuple[str, ...]]
 
 
 class Identifier:
@@ -88,6 +90,7 @@ class Identifier:
         self._used: Counter[str] = Counter()
         self._dropped: dict[str, Counter[str]] = {axis: Counter() for axis in self.axes}
         self._counts: Counter[str] = Counter()
+        self._complaints = Recent()
         self._said: dict[str, str] = {}
         self._samples = 0
         self._slot = -1
@@ -220,7 +223,12 @@ class Identifier:
     def request(self, seq: int, rate: float) -> FitRequest:
         """What there is to fit now."""
         axes: dict[str, AxisRequest] = {}
+        seconds = self._samples / rate
+        streams = [reason for reason, count in self.faults.items() if self._complaints.goes_on(reason, count, seconds)]
+        going_on = {}
         for axis in self.axes:
+            dropped = [why for why, count in self._dropped[axis].items() if self._complaints.goes_on(f"{why} of {axis}", count, seconds)]
+            going_on[axis] = tuple(sorted({*streams, *dropped}))
             if self._used[axis] == 0:
                 continue
             enough = self._used[axis] >= self.settings.alarm_windows
@@ -230,7 +238,7 @@ class Identifier:
                 windows=self._used[axis],
                 dropped=dict(self._dropped[axis]),
             )
-        return FitRequest(number=self._number, seq=seq, seconds=self._samples / rate, sampling_rate=rate, axes=axes, faults=self.faults)
+        return FitRequest(number=self._number, seq=seq, seconds=seconds, sampling_rate=rate, axes=axes, faults=self.faults, going_on=going_on)
 
     def _frf(self, running: RunningSpectra | RunningLoop, rate: float) -> FrequencyResponse:
         settings = self.settings

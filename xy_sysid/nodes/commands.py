@@ -49,6 +49,7 @@ class Commands:
             allowed = f"each joint once, with {', '.join(self._joints)} among them"
             raise BadInput("controller_joints", ", ".join(self._order), allowed, "Write them as controllers.yaml has them.")
         self._others = tuple(joint for joint in self._order if joint not in self._joints)
+        self._heard = False  # a joint of ours
         self._kept: dict[str, float] = {}  # where positions are sent: the others stay where they are
         self._on_positions, self._complain, self._holds = on_positions, complain, settings.holds
         self.publisher = node.create_publisher(Float64MultiArray, settings.command_topic, COMMAND_QOS)
@@ -64,19 +65,29 @@ class Commands:
         return True
 
     def _on_states(self, message: JointState) -> None:
+        ours = not set(self._joints).isdisjoint(message.name)
+        self._heard = self._heard or ours
+        if self._heard and not set(self._order) & set(message.name):
+            return  # of another publisher on the topic
         if len(message.position) != len(message.name):
             self._complain(f"joint states: {len(message.name)} joints with {len(message.position)} positions")
             return
         places = dict(zip(message.name, message.position, strict=True))
         missing = [joint for joint in self._joints if joint not in places]
+        if missing and self._heard and not ours:
+            self._keep(places)
+            return
         if missing:
             self._complain(f"joint states: no {', '.join(missing)} among {', '.join(message.name)}; set the parameter joints")
             return
+        self._keep(places)
+        stamp = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
+        self._on_positions(stamp, np.array([places[joint] for joint in self._joints], dtype=np.float64))
+
+    def _keep(self, places: dict[str, float]) -> None:
         for joint in self._others:
             if joint in places and np.isfinite(places[joint]):
                 self._kept.setdefault(joint, places[joint])
-        stamp = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
-        self._on_positions(stamp, np.array([places[joint] for joint in self._joints], dtype=np.float64))
 
     def forget(self) -> None:
         """Where the other joints were: they may be elsewhere by the next start."""

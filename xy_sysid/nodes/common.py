@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection
 from typing import Any, Generic, TypeVar, cast
 
@@ -37,8 +38,12 @@ DATA_QOS = QoSProfile(depth=1000, history=HistoryPolicy.KEEP_LAST, reliability=R
 LATCHED_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 STOP_TOPIC = "stop"  # std_msgs/Bool: true is zero volts now and no activate until false
-# Heard twice: what was latched before the node was there, and whoever publishes without latching or reliability.
-STOP_HEARD = (LATCHED_QOS, QoSProfile(depth=10, history=HistoryPolicy.KEEP_LAST, reliability=ReliabilityPolicy.BEST_EFFORT))
+# Heard twice: what was latched before the node was there, and whoever publishes without latching or reliability. The depth is that of all
+# publishers together: at a depth of 1 the false of one would hide the true of another.
+STOP_HEARD = (
+    QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL),
+    QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT),
+)
 
 OF_ROS = ("use_sim_time", "start_type_description_service", "qos_overrides.")  # parameters that rclpy has by itself
 
@@ -158,7 +163,11 @@ def describe(item: Knob, fixed: bool = False) -> ParameterDescriptor:
     )
     if item.low is not None and item.high is not None:
         if isinstance(item.value, float):
-            descriptor.floating_point_range = [FloatingPointRange(from_value=item.low, to_value=item.high)]
+            low = math.nextafter(item.low, math.inf) if item.above else item.low  # a range of ROS has its ends
+            high = math.nextafter(item.high, -math.inf) if item.below else item.high
+            descriptor.floating_point_range = [FloatingPointRange(from_value=low, to_value=high)]
         else:
-            descriptor.integer_range = [IntegerRange(from_value=int(item.low), to_value=int(item.high))]
+            descriptor.integer_range = [IntegerRange(from_value=int(item.low) + item.above, to_value=int(item.high) - item.below)]
+        open_ends = [f"above {item.low:g}"] * item.above + [f"below {item.high:g}"] * item.below
+        descriptor.additional_constraints = " and ".join(open_ends)
     return descriptor

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import functools
 import json
+import time
 from pathlib import Path
 from typing import Any
 
@@ -113,9 +114,9 @@ class DiagnoserNode(WalledNode):
     def _beat(self) -> None:
         """What is heard, once a second."""
         hearing = self._diagnoser.hearing
-        level, text = verdict(self._streams.heard(hearing.total, hearing.sentences), "voltage and position are heard")
+        level, text = verdict(self._streams.heard(hearing.total, hearing.sentences, hearing.faults), "voltage and position are heard")
         text = f"{text}; {hearing.seconds:.1f} s without a gap are kept"
-        if self.wall.told:
+        if self._streams.recent.goes_on("callbacks", self.wall.count, time.monotonic()):
             level, text = max(level, WARN), f"{text}; {self.wall.told}"
         values = {
             "seconds kept (s)": f"{hearing.seconds:.6g}",

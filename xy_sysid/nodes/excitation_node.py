@@ -17,17 +17,19 @@ from rclpy.clock_type import ClockType
 from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.timer import Timer
-from std_msgs.msg import Bool, Float64MultiArray
+from std_msgs.msg import Float64MultiArray
 
 from xy_sysid.errors import BadInput
 from xy_sysid.excitation.drive import Drive
 from xy_sysid.excitation.pacing import CATCH_UP, Answers, Clock
+from xy_sysid.live.recent import Recent
 from xy_sysid.nodes.commands import Beat, Commands
-from xy_sysid.nodes.common import DATA_QOS, NAMESPACE, STOP_HEARD, STOP_TOPIC, declare
+from xy_sysid.nodes.common import DATA_QOS, NAMESPACE, declare
 from xy_sysid.nodes.convert import from_message, status, to_message
 from xy_sysid.nodes.diagnostics import Diagnostics
 from xy_sysid.nodes.hearing import Ear
-from xy_sysid.nodes.quality import AS_IT_IS, Overridable
+from xy_sysid.nodes.quality import Overridable
+from xy_sysid.nodes.stop_topic import StopTopic
 from xy_sysid.nodes.streams import AXES, declare_axes
 from xy_sysid.nodes.wall import Wall
 from xy_sysid.processes.terminal import printable
@@ -39,6 +41,8 @@ SAME_EPOCH = 0.05  # s by which the ROS time of counter 0 may move over a pause 
 SETTLED = 0.5  # s without a new listener before starting by itself: whoever was started together hears the first sample
 SAME_NODE = 2.0  # s to look for one node that reads voltage and writes position, before any two will do
 ALONE = 0.1  # s between two looks whether somebody else drives
+STOP_LOOK = 0.02  # s between two looks whether STOP was asked for
+FOUND = 1.0  # s after which a node has found all who were there before it
 INTRODUCES = 0.5  # s in which a node that is seen becomes known by its name
 KILLED = "One that was killed is forgotten after 20 s."
 
@@ -68,8 +72,9 @@ class ExcitationNode(Overridable, LifecycleNode):
         self._loud = False  # the last block published was not all zeros
         self._complaint = ""
         self._unnamed = 0.0  # s since which another one is there without a name
-        self._refused = ""  # why the last activate was refused
-        self._held = False  # STOP was asked for on the topic, and not released
+        self._refused = ""  # why the last transition was refused
+        self._refusals, self._recent = 0, Recent()
+        self._made = time.monotonic()
         self._wall = Wall(self._complain)
         for service in self._services:  # rclpy's own: a transition that the state does not have would end the node
             service.callback = self._wall.around(service.callback)
@@ -83,8 +88,8 @@ class ExcitationNode(Overridable, LifecycleNode):
         commanding = self._knobs.settings.output == "commands"
         self._commands = Commands(self, self._knobs.settings, self._on_joints, self._complain) if commanding else None
         self._position = self._commands.states if self._commands else Ear(self, Float64MultiArray, "position", self._on_position, DATA_QOS)
-        for quality in STOP_HEARD:
-            self.create_subscription(Bool, STOP_TOPIC, self._on_stop, quality, qos_overriding_options=AS_IT_IS)
+        self._stop = StopTopic(self, self._wall)
+        self.create_timer(STOP_LOOK, self._hear_stop, clock=self._steady)
         self._pace: Timer | None = None
         self.create_timer(0.5, self._report, clock=self._steady)
         self.create_timer(ALONE, self._look_for_another, clock=self._steady)
@@ -99,7 +104,11 @@ class ExcitationNode(Overridable, LifecycleNode):
     # lifecycle
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Check that every signal fits the rate."""
+        """Check that every signal fits the rate, and that nobody else is there to drive the machine."""
+        time.sleep(max(0.0, self._made + FOUND - time.monotonic()))
+        rivals = self._rivals()
+        if rivals:
+            return self._refuse(f"{rivals}: no configure beside it. End one of the two. {KILLED}")
         try:
             self._drive = Drive(self._knobs.settings)
         except BadInput as error:
@@ -109,21 +118,15 @@ class ExcitationNode(Overridable, LifecycleNode):
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Begin, at 0 V until the first position; refused while STOP is on."""
-        if self._held:
-            self.get_logger().error(self._why_held())
-            self._report()
-            return TransitionCallbackReturn.FAILURE
+        self._obey_stop()
+        if self._stop.held:
+            return self._refuse(self._stop.why())
         others = self._others()
         if others:
-            self._refused = f"{' and '.join(others)} publishes {self._way}, too: no activate beside it. {KILLED}"
-            self.get_logger().error(self._refused)
-            self._report()
-            return TransitionCallbackReturn.FAILURE
-        self._refused = "" if self._commands else self._no_blocks()
-        if self._refused:
-            self.get_logger().error(self._refused)
-            self._report()
-            return TransitionCallbackReturn.FAILURE
+            return self._refuse(f"{' and '.join(others)} publishes {self._way}, too: no activate beside it. {KILLED}")
+        strange = "" if self._commands else self._no_blocks()
+        if strange:
+            return self._refuse(strange)
         settings, now = self._knobs.settings, time.monotonic()
         if self._drive is not None and self._until is not None:
             self._first = self._drive.seq
@@ -149,6 +152,13 @@ class ExcitationNode(Overridable, LifecycleNode):
         self._pace = self.create_timer(max(wake, 0.001), self._on_time, clock=self._steady)
         return super().on_activate(state)
 
+    def _refuse(self, why: str) -> TransitionCallbackReturn:
+        """Say why a transition is not made, in the log and for some seconds in the status."""
+        self._refused, self._refusals = why, self._refusals + 1
+        self.get_logger().error(why)
+        self._report()
+        return TransitionCallbackReturn.FAILURE
+
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Fade out now, then zero."""
         self._finish("deactivated")
@@ -170,17 +180,22 @@ class ExcitationNode(Overridable, LifecycleNode):
 
     # STOP
 
-    def _on_stop(self, message: Bool) -> None:
-        """True: zero volts and inactive now, and no activate until false."""
-        if self._held == message.data:
-            return
-        self._held = message.data
-        if self._held and self._drive is not None and self._pace is not None:
-            with self._hold:
-                self._drive.stop("STOP", self._drive.settings.abort_ramp)
+    def _hear_stop(self) -> None:
+        """STOP: zero volts and inactive now, and no activate until it is released."""
+        if self._obey_stop() and self._drive is not None and self._pace is not None:
             self.trigger_deactivate()
-        self.get_logger().warning(self._why_held() if self._held else "STOP is released: activate is allowed again")
-        self._report()
+            self._report()
+
+    def _obey_stop(self) -> bool:
+        """Take what the topic says, and begin to fade out; whether STOP has come on."""
+        if self._stop.listen():
+            if self._stop.held and self._drive is not None and not self.has_stopped():
+                with self._hold:
+                    self._drive.obey_stop()
+            self.get_logger().warning(self._stop.why() if self._stop.held else "STOP is released: activate is allowed again")
+            self._report()
+            return self._stop.held
+        return False
 
     # another excitation
 
@@ -221,6 +236,15 @@ class ExcitationNode(Overridable, LifecycleNode):
             names.remove(me)  # once: another one may have the same name
         return sorted(set(names))
 
+    def _rivals(self) -> str:
+        """Who else drives the machine or has this node's name, in words; empty if nobody."""
+        others = self._others()
+        if others:
+            return f"{' and '.join(others)} publishes {self._way}, too"
+        me = self.get_fully_qualified_name()
+        names = [f"{space.rstrip('/')}/{name}" for name, space in self.get_node_names_and_namespaces()]
+        return f"another node is called {me}, too" if names.count(me) > 1 else ""
+
     def _look_for_another(self) -> None:
         drive = self._drive
         if drive is None or drive.state != "active":
@@ -234,11 +258,6 @@ class ExcitationNode(Overridable, LifecycleNode):
             drive.stop(f"{who} publishes {self._way}, too: two must not drive one machine", drive.settings.abort_ramp)
             self.get_logger().error(drive.reason)
             self.trigger_deactivate()
-
-    def _why_held(self) -> str:
-        names = {info.node_name for info in self.get_publishers_info_by_topic(self.resolve_topic_name(STOP_TOPIC))}
-        who = sorted(name for name in names if "UNKNOWN" not in name)  # a message may come before its sender's name
-        return f"STOP is on (topic {STOP_TOPIC}{', from ' + ', '.join(who) if who else ''}): no activate before false is published there"
 
     # the end of the process
 
@@ -262,6 +281,11 @@ class ExcitationNode(Overridable, LifecycleNode):
                 self._publish(block)
                 self._voltage.wait_for_all_acked(ARRIVES)
 
+    def destroy_node(self) -> None:
+        """As rclpy's."""
+        self._stop.close()
+        super().destroy_node()
+
     def _finish(self, reason: str) -> None:
         """Fade out without waiting for positions, at the pace of the machine, and see the zeros arrive."""
         if self._pace is not None:
@@ -276,6 +300,7 @@ class ExcitationNode(Overridable, LifecycleNode):
         was_running = drive.state in ("active", "stopping")
         drive.stop(reason, drive.settings.abort_ramp)
         while drive.state == "stopping":
+            self._obey_stop()
             self._send(drive)
             time.sleep(0.0 if drive.settings.lockstep else self._pacer.period)
         self._report()  # whoever waits for the end need not wait for the acknowledgements
@@ -289,6 +314,7 @@ class ExcitationNode(Overridable, LifecycleNode):
             drive.stop(reason, drive.settings.abort_ramp)
         until = time.monotonic() + drive.settings.abort_ramp + ARRIVES.nanoseconds * 1e-9
         while drive.state == "stopping" and beat.alive and time.monotonic() < until:
+            self._obey_stop()
             time.sleep(beat.clock.period)
         beat.close()
         self._beat = None
@@ -454,10 +480,12 @@ class ExcitationNode(Overridable, LifecycleNode):
                 values[f"{axis}.rms"] = f"{report.rms[number]:.4g}"
                 values[f"{axis}.clipped"] = f"{report.clipped[number]:.0f}"
                 values[f"{axis}.braked"] = f"{report.braked[number]:.0f}"
-        if self._held or (self._refused and (drive is None or drive.state != "active")):
-            message, level = self._why_held() if self._held else self._refused, max(level, 1)
+        refused = self._recent.goes_on("refused", self._refusals, time.monotonic())
+        if self._stop.held or (refused and (drive is None or drive.state != "active")):
+            message, level = self._stop.why() if self._stop.held else self._refused, max(level, 1)
         values["input unit"], values["output unit"] = self._knobs.settings.units
-        values["stop"] = "on" if self._held else "off"
+        values["stop"] = "on" if self._stop.held else "off"
+        values["stop held by"] = ", ".join(self._stop.holders)
         values["listeners"] = str(self.count_subscribers(self._way))
         self._metrics.publish([status("excitation", level, message, values)])
 
@@ -480,8 +508,8 @@ class ExcitationNode(Overridable, LifecycleNode):
         if time.monotonic() < self._settled_at:
             return
         others = self._others()
-        if others or self._held:
-            self._complain(self._why_held() if self._held else f"{' and '.join(others)} publishes {self._way}, too: waiting. {KILLED}")
+        if others or self._stop.held:
+            self._complain(self._stop.why() if self._stop.held else f"{' and '.join(others)} publishes {self._way}, too: waiting. {KILLED}")
             return
         assert self._autostart is not None
         self.destroy_timer(self._autostart)

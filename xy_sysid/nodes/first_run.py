@@ -52,7 +52,7 @@ class Conductor:
         self._executor.add_node(self._node)
         self._blocks: dict[str, dict[float, Block]] = {"voltage": {}, "position": {}}
         self._reason = ""
-        wall = Wall(say)
+        self._wall = wall = Wall(lambda words: None, "ended by an error of its own, please report it")  # told as the problem
         for topic in self._blocks:
             Ear(self._node, Float64MultiArray, topic, wall.around(self._keeper(topic)), DATA_QOS)
         self._node.create_subscription(DiagnosticArray, "metrics", wall.around(self._on_statuses), 100)
@@ -64,10 +64,12 @@ class Conductor:
 
     def run(self) -> bool:
         """Whether all was well; ``problem`` says what was not, ``found`` what is known."""
-        try:
-            self._conduct()
-        except BadInput as problem:
-            self.problem = str(problem)
+        with self._wall:
+            try:
+                self._conduct()
+            except BadInput as problem:
+                self.problem = str(problem)
+        self.problem = self._wall.told or self.problem
         if self.problem:
             self._say(self.problem)
         return not self.problem
@@ -92,12 +94,19 @@ class Conductor:
                 self._say(first.took(*samples).sentence)
             self.problem = self.problem or (f"the excitation stopped: {self._reason}" if self._reason else first.problem)
         finally:
-            if self._state() == "active":
-                self._transition("deactivate")
+            self._rest()
         for axis in first.axes:
             self.found[axis] = first.found(axis)
             if not self.problem:
                 self._say(first.summary(axis))
+
+    def _rest(self) -> None:
+        """Deactivate; what goes wrong with that is told beside what has ended the run, and the nodes are ended anyway."""
+        try:
+            if self._state() == "active":
+                self._transition("deactivate")
+        except BadInput as problem:
+            self.problem = self.problem or str(problem)
 
     def _push(self, push: Push, settings: ExcitationSettings) -> tuple[FloatArray, FloatArray]:
         """Voltage and position of a push; again where the messages of one did not all come, as on a busy machine."""
@@ -130,6 +139,8 @@ class Conductor:
     def _over(self) -> bool:
         if self._is_over():
             self.problem = self.problem or "stopped before the end"
+        if self._wall.count:
+            self.problem = self.problem or self._wall.told
         return bool(self.problem or self._reason)
 
     # what is heard

@@ -7,6 +7,7 @@ data handling never waits for a fit.
 from __future__ import annotations
 
 import functools
+import time
 from pathlib import Path
 from typing import Any
 
@@ -88,11 +89,12 @@ class IdentifierNode(WalledNode):
 
     def _beat(self) -> None:
         """What is heard of the streams, once a second, whether or not there is anything to fit."""
-        heard = self._streams.heard(self._identifier.samples, self._identifier.sentences)
+        recent, now = self._streams.recent, time.monotonic()
+        heard = self._streams.heard(self._identifier.samples, self._identifier.sentences, self._identifier.faults)
         level, text = verdict(heard, f"{', '.join(heard.streams[:-1])} and {heard.streams[-1]} are heard")
-        if self.wall.told:
+        if recent.goes_on("callbacks", self.wall.count, now):
             level, text = max(level, WARN), f"{text}; {self.wall.told}"
-        if self._worker.skipped:
+        if recent.goes_on("skipped fits", self._worker.skipped, now):
             level, text = max(level, WARN), f"{text}; {self._worker.skipped} fits were skipped, the machine is too slow for this rate"
         values = {
             "samples paired": str(self._identifier.samples),

@@ -2,7 +2,7 @@
 
 Quality of service: ``qos_overrides./xy/position.subscription.reliability`` and the like, as in rclcpp.
 
-Source: https://design.ros2.org/articles/qos_configurability.html. The topic STOP is left out, so that no file can make it unheard.
+Source: https://design.ros2.org/articles/qos_configurability.html. The topic STOP does not go this way, so that no file can make it unheard.
 """
 
 from __future__ import annotations
@@ -27,7 +27,6 @@ ALLOWED = {
 DEEPEST = 1_000_000  # messages
 KINDS = {name: QoSPolicyKind[name.upper()] for name in ALLOWED}
 OF_RCLPY = ("/parameter_events", "/clock", "/rosout")  # made by rclpy itself, in moments in which no parameter may be declared
-AS_IT_IS = QoSOverridingOptions([])  # for what nobody may change
 
 
 class Overridable(Node):

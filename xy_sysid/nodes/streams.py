@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -13,6 +14,7 @@ from std_msgs.msg import Float64MultiArray
 from xy_sysid.errors import BadInput, XySysidError
 from xy_sysid.live.heard import Heard
 from xy_sysid.live.plain_messages import topic_of
+from xy_sysid.live.recent import Recent
 from xy_sysid.nodes.common import DATA_QOS, declare_fixed, overrides
 from xy_sysid.nodes.convert import from_message
 from xy_sysid.nodes.hearing import Ear
@@ -80,13 +82,19 @@ class Streams:
     def forget(self) -> None:
         """Begin anew with all that was learned from the streams: the rate and the counter of joint states, what was refused."""
         self.refused, self.refusals = "", 0
+        self.recent = Recent()
         self._joints = JointCounter(self._axes, with_voltage=not self._effort, output=self._output)
         self._heard = dict.fromkeys(self._streams, 0)
         self._before = dict(self._heard)
         self._paired = 0  # samples, at the last look
 
-    def heard(self, samples: int, sentences: Mapping[str, str]) -> Heard:
-        """What came since the last call; samples: paired since the start; sentences: what the pairing says, by reason."""
+    def heard(self, samples: int, sentences: Mapping[str, str], faults: Mapping[str, int]) -> Heard:
+        """What came since the last call; samples: paired since the start; sentences, faults: what the pairing says, and how often, by reason.
+
+        What has not happened again for some seconds is over.
+        """
+        now = time.monotonic()
+        going_on = {why: text for why, text in sentences.items() if self.recent.goes_on(why, (text, faults.get(why, 0)), now)}
         silent = tuple(kind for kind in self._streams if self._heard[kind] == self._before[kind])
         paired, self._paired = samples - self._paired, samples
         self._before = dict(self._heard)
@@ -94,10 +102,10 @@ class Streams:
             streams=self._streams,
             silent=silent,
             paired=max(paired, 0),
-            refused=self.refused,
+            refused=self.refused if self.recent.goes_on("refused", self.refusals, now) else "",
             refusals=self.refusals,
             stamps=self._joints.wrong() if self._by_stamp and self._heard["position"] else "",
-            sentences=sentences,
+            sentences=going_on,
         )
 
     def _on_voltage(self, message: Float64MultiArray) -> None:
@@ -121,6 +129,8 @@ class Streams:
             self._joints.see_voltage(block)
 
     def _on_joints(self, message: JointState) -> None:
+        if self._reader.of_others(message):
+            return
         self._heard["position"] += 1
         if self._effort:
             self._heard["voltage"] += 1
@@ -128,8 +138,8 @@ class Streams:
         if wrong:
             self._refuse(wrong)
             return
-        time = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
-        block = self._joints.add(time, self._reader.row(message))
+        stamp = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
+        block = self._joints.add(stamp, self._reader.row(message))
         if block is None:
             return
         number = len(self._axes)

@@ -20,10 +20,10 @@ LONGEST = 200  # characters of an error that are told
 class Wall:
     """``with wall: ...`` lets no error through but tells it. count: errors so far; told: the last one, empty if there was none."""
 
-    def __init__(self, say: Callable[[str], None]) -> None:
-        """say: takes the sentence, once for the same error again and again."""
+    def __init__(self, say: Callable[[str], None], what: str = "a message or request could not be dealt with") -> None:
+        """say: takes the sentence, once for the same error again and again; what: how it begins."""
         self.count, self.told = 0, ""
-        self._say = say
+        self._say, self._what = say, what
 
     def __enter__(self) -> Wall:
         return self
@@ -32,7 +32,7 @@ class Wall:
         if not isinstance(error, Exception):
             return False
         self.count += 1
-        words = f"a message or request could not be dealt with ({words_of(error)})"
+        words = f"{self._what} ({words_of(error)})"
         if words != self.told:
             self.told = words
             self._say(words)

@@ -132,7 +132,11 @@ class Control:
             session.link.transition(label, told)
 
     def _ask_activate(self) -> None:
-        """A real machine moves: ask once more. A simulated one may go at once."""
+        """A real machine moves: ask once more. A simulated one may go at once. The STOP of somebody else is overridden by name only."""
+        held = self._session.heard.stopped_by_others()
+        if held:
+            self._ask_override(held)
+            return
         if "ballscrew" in self._session.heard.present:
             self._go("activate")
             return
@@ -146,6 +150,28 @@ class Control:
             ui.label("Keep the machine's own emergency stop in your hand. STOP in the bar, or Escape, brings the voltage to zero.")
             with ui.element("div").classes("buttons"):
                 ui.button("Activate", on_click=sure).props("unelevated no-caps data-act=sure")
+                ui.button("Cancel", on_click=dialog.close).props("flat no-caps")
+        dialog.on("hide", dialog.delete)
+        dialog.open()
+
+    def _ask_override(self, held: str) -> None:
+        """The excitation is asked twice: when the dialog opens, for the names, and when the user has seen them."""
+        session = self._session
+
+        def release() -> None:
+            if session.link is not None:
+                session.link.trigger("excitation/release_stop", lambda done, words: session.say(words or "the excitation did not answer", done))
+
+        def sure() -> None:
+            dialog.close()
+            release()
+
+        release()
+        with ui.dialog() as dialog, ui.element("div").classes("card"):
+            ui.html("<h2>Somebody else holds STOP</h2>", sanitize=False)
+            ui.label(f"STOP is on from: {held}. Look at the machine and ask there, before you override it. Then press Activate again.")
+            with ui.element("div").classes("buttons"):
+                ui.button("Override STOP", on_click=sure).props("unelevated no-caps data-act=override")
                 ui.button("Cancel", on_click=dialog.close).props("flat no-caps")
         dialog.on("hide", dialog.delete)
         dialog.open()

@@ -165,6 +165,11 @@ class TopicsState:
         """Whether the excitation says that it drives."""
         return self.values("excitation").get("state") in ("active", "stopping")
 
+    def stopped_by_others(self) -> str:
+        """Who holds STOP, apart from the page that Activate releases; empty if nobody."""
+        holders = [name for name in self.values("excitation").get("stop held by", "").split(", ") if name]
+        return ", ".join(name for name in holders if name != "page_stop")
+
     def at_rest_since(self, begun: float) -> bool:
         """Whether the excitation itself has said after that time that it does not drive."""
         return self.when.get("excitation", -math.inf) > begun and self.values("excitation").get("state") in ("idle", "stopped")

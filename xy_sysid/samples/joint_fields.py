@@ -46,7 +46,14 @@ class JointReader:
         """joints: the joint of each axis; output: the field that is the output; effort: whether the effort is wanted, too."""
         self._axis, self._names = next(iter(joints)), tuple(joints.values())
         self._wanted: tuple[JointField, ...] = (output, "effort") if effort else (output,)
+        self._heard = False
         self._known: set[JointField] = set()  # fields that have had numbers for all joints; NaN in between is a fault of single samples
+
+    def of_others(self, message: JointMessage) -> bool:
+        """Whether it is of other joints alone, while ours have been heard: several publishers may share the topic, as for a gripper."""
+        ours = not set(self._names).isdisjoint(message.name)
+        self._heard = self._heard or ours
+        return self._heard and not ours
 
     def wrong(self, message: JointMessage) -> str:
         """What is lacking, and what to do about it."""

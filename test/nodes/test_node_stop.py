@@ -1,0 +1,153 @@
+"""STOP over real DDS: held per publisher, released by who set it or by an operator, quick whatever the ramps are; and one excitation alone."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from helpers.busy import allowed
+from helpers.ros_tools import Integrator, NodeProcess, World, needs_ros, world_in
+
+from xy_sysid.samples.block import Block
+
+pytestmark = needs_ros
+EXCITATION = "xy_sysid.nodes.excitation"
+QUIET: dict[str, Any] = {"watchdog": 5.0, "ramp": 0.0}
+PUBLISHER = """
+import sys, rclpy
+from std_msgs.msg import Bool
+from xy_sysid.nodes.common import LATCHED_QOS
+rclpy.init(args=["--ros-args", "-r", "__ns:=/xy"])
+node = rclpy.create_node("guard")
+topic = node.create_publisher(Bool, "stop", LATCHED_QOS)
+topic.publish(Bool(data=True))
+rclpy.spin(node)
+"""
+
+
+@pytest.fixture
+def world(tmp_path: Path) -> Iterator[World]:
+    with world_in(tmp_path) as made:
+        yield made
+
+
+def driving(world: World, blocks: list[Block]) -> None:
+    assert world.until(lambda: len(blocks) > 10 and bool(blocks[-1].values.any()), 20.0)
+
+
+def release(world: World) -> tuple[bool, str]:
+    from std_srvs.srv import Trigger
+
+    answer = world.call(Trigger, "/xy/excitation/release_stop", Trigger.Request())
+    return bool(answer.success), str(answer.message)
+
+
+@pytest.mark.parametrize("latched", [True, False])
+def test_stop_is_held_by_each_who_asked_for_it(world: World, latched: bool) -> None:
+    """Two publishers: the false of one does not release the STOP of the other, latched or not, and the status names the holder."""
+    from std_msgs.msg import Bool
+
+    from xy_sysid.nodes.common import LATCHED_QOS
+
+    world.machine(Integrator())
+    statuses = world.statuses()
+    process = world.start(EXCITATION, QUIET)
+    assert world.transition("excitation", "configure")
+    quality = LATCHED_QOS if latched else 10
+    one, other = (world.node.create_publisher(Bool, "stop", quality) for _ in range(2))
+    assert world.until(lambda: min(one.get_subscription_count(), other.get_subscription_count()) >= 1 + latched)
+    one.publish(Bool(data=True))
+    assert world.until(lambda: "STOP is on (topic stop, from test)" in process.output())
+    other.publish(Bool(data=True))
+    other.publish(Bool(data=False))
+    held = {"stop": "on", "stop held by": "test"}
+    assert world.until(lambda: bool(statuses) and held.items() <= {pair.key: pair.value for pair in statuses[-1].values}.items())
+    assert not world.transition("excitation", "activate") and "STOP is released" not in process.output()
+    one.publish(Bool(data=False))
+    assert world.until(lambda: "STOP is released" in process.output())
+    assert world.transition("excitation", "activate")
+
+
+def test_the_stop_of_one_who_is_gone_is_released_by_an_operator_who_was_told_whose_it_is(world: World) -> None:
+    """A process latches true and dies: false from another releases nothing; the service names it first, and overrides it when called again."""
+    from std_msgs.msg import Bool
+
+    from xy_sysid.nodes.common import LATCHED_QOS
+
+    world.machine(Integrator())
+    guard = world.start(PUBLISHER)
+    process = world.start(EXCITATION, QUIET)
+    assert world.transition("excitation", "configure")
+    assert world.until(lambda: "STOP is on (topic stop, from guard)" in process.output(), 20.0), process.output()
+    guard.end()
+    page = world.node.create_publisher(Bool, "stop", LATCHED_QOS)
+    page.publish(Bool(data=False))
+    assert not world.transition("excitation", "activate")
+    first, words = release(world)
+    assert not first and "held by guard" in words and not world.transition("excitation", "activate")
+    second, words = release(world)
+    assert second and "STOP of guard" in words and "is overridden" in words
+    assert world.transition("excitation", "activate")
+
+
+def test_stop_is_quick_whatever_the_ramps_are(world: World) -> None:
+    """abort_ramp is set to 10 s while it drives, and a deactivate begins that fade: STOP is zero volts in half a second all the same."""
+    from lifecycle_msgs.msg import Transition
+    from lifecycle_msgs.srv import ChangeState
+    from std_msgs.msg import Bool
+
+    blocks = world.blocks()
+    world.machine(Integrator())
+    world.start(EXCITATION, QUIET)
+    stop = world.node.create_publisher(Bool, "stop", 10)
+    for deactivated in (False, True):
+        assert not deactivated or world.transition("excitation", "activate")
+        if not deactivated:
+            assert world.transition("excitation", "configure") and world.transition("excitation", "activate")
+        driving(world, blocks)
+        assert world.set_parameter("excitation", "abort_ramp", 10.0) == (True, "")
+        if deactivated:
+            client = world.node.create_client(ChangeState, "/xy/excitation/change_state")
+            assert world.until(client.service_is_ready)
+            client.call_async(ChangeState.Request(transition=Transition(label="deactivate")))
+            world.spin(0.3)
+            assert blocks[-1].values.any()
+        begun = time.monotonic()
+        stop.publish(Bool(data=True))
+        assert world.until(lambda: not blocks[-1].values.any(), 1.0)
+        assert time.monotonic() - begun < allowed(0.5)
+        assert world.until(lambda: world.state("excitation") == "inactive", 3.0)
+        stop.publish(Bool(data=False))
+        world.spin(0.2)
+
+
+def alone(process: NodeProcess) -> bool:
+    return "no configure beside it" in process.output()
+
+
+def test_two_excitations_of_one_name_never_drive(world: World) -> None:
+    """A launch file that was started twice: neither configures beside the other, and no voltage is published; one alone drives."""
+    from lifecycle_msgs.msg import Transition
+    from lifecycle_msgs.srv import ChangeState
+
+    blocks = world.blocks()
+    world.machine(Integrator())
+    both = [world.start(EXCITATION, QUIET) for _ in range(2)]
+    client = world.node.create_client(ChangeState, "/xy/excitation/change_state")
+    assert world.until(client.service_is_ready, 20.0)
+    for label in ("configure", "activate"):
+        client.call_async(ChangeState.Request(transition=Transition(label=label)))
+    assert world.until(lambda: any(alone(process) for process in both), 20.0), [process.output() for process in both]
+    assert world.until(lambda: all("ready" in process.output() for process in both), 20.0)
+    client.call_async(ChangeState.Request(transition=Transition(label="configure")))
+    assert world.until(lambda: all(alone(process) for process in both), 20.0), [process.output() for process in both]
+    client.call_async(ChangeState.Request(transition=Transition(label="activate")))
+    world.spin(1.0)
+    assert blocks == []
+    both[1].process.terminate()
+    assert both[1].wait() == 0
+    assert world.until(lambda: world.transition("excitation", "configure"), 20.0) and world.transition("excitation", "activate")
+    driving(world, blocks)

@@ -1,0 +1,58 @@
+"""Who holds STOP: everybody who has asked for it, until the same one releases it or an operator overrides it by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+AGAIN = 30.0  # s in which an operator who was told whom he overrides may confirm it
+KEPT = 100  # publishers without a STOP of which the last message is remembered
+
+
+@dataclass(frozen=True, slots=True)
+class _Said:
+    """The last word of a publisher: its number, and whether STOP is on."""
+
+    number: int
+    on: bool
+
+
+class StopLatch:
+    """``heard`` takes what publishers say, ``release`` what an operator wants; STOP is on while anybody holds it."""
+
+    def __init__(self) -> None:
+        self._said: dict[bytes, _Said] = {}
+        self._named: tuple[float, frozenset[bytes]] = (0.0, frozenset())  # whom the operator was told of, and until when he may confirm
+
+    @property
+    def holders(self) -> tuple[bytes, ...]:
+        """Publishers who hold STOP, in the order in which they were first heard."""
+        return tuple(publisher for publisher, said in self._said.items() if said.on)
+
+    def heard(self, publisher: bytes, number: int, on: bool) -> None:
+        """A message and its number; one that is older than the last of its publisher came by a second way, and is no news."""
+        before = self._said.get(publisher)
+        if before is not None and number < before.number:
+            return
+        self._said[publisher] = _Said(number, on)
+        silent = [one for one, said in self._said.items() if not said.on and one != publisher]
+        for one in silent[: max(0, len(silent) - KEPT)]:
+            del self._said[one]
+
+    def release(self, now: float, name: Callable[[bytes], str]) -> tuple[bool, str]:
+        """What an operator's release does at a time, s: whether STOP is off, and the answer.
+
+        The first call names whom it would override and changes nothing; a second one within AGAIN overrides those, and nobody else.
+        """
+        holders = self.holders
+        if not holders:
+            return True, "STOP is not on"
+        names = " and ".join(name(one) for one in holders)
+        until, named = self._named
+        if now > until or not set(holders) <= named:
+            self._named = now + AGAIN, frozenset(holders)
+            return False, f"STOP is held by {names}: call again within {AGAIN:g} s to override that"
+        for one in holders:
+            self._said[one] = _Said(self._said[one].number, False)
+        self._named = 0.0, frozenset()
+        return True, f"STOP of {names} is overridden: activate is allowed again"
