@@ -16,7 +16,7 @@ from xy_sysid.report.story_failure import By, failure, failure_words
 
 READING: dict[By, str] = {
     "frequency": "by frequency: a resonance, a lag",
-    "speed": "by speed: friction near 0, drag at the ends",
+    "speed": "by speed: friction, drag, saturation",
     "position": "by position: cogging, lead error, a spring",
     "time": "over time: drift, warming",
 }

@@ -65,7 +65,7 @@ PICTURES = (
         card=WHERE,
         tab="speed",
         figure=draw.residual_speed,
-        reading="High at low speed: friction. Rising with speed: drag or saturation.",
+        reading="A mean error that jumps where the velocity changes its sign: Coulomb friction. A mean that bends with speed: drag or saturation.",
     ),
     Picture(
         name="residual_position",
@@ -91,7 +91,7 @@ PICTURES = (
     Picture(
         name="zoom",
         card=TIME,
-        tab="half a second",
+        tab="worst moment",
         figure=draw.zoom,
         reading="Measured and simulated around the largest error of the rigid model. Drag to zoom, double click to go back.",
     ),
@@ -100,7 +100,7 @@ PICTURES = (
         card=TIME,
         tab="speed, all",
         figure=draw.velocity,
-        reading="The whole record, least and most of each stretch. The shaded part was held out of every fit.",
+        reading="The whole record, least and most of each stretch. Grey stretches were held out of every fit.",
     ),
     Picture(
         name="position",

@@ -52,7 +52,7 @@ class StoryCard:
                 self._doing = ui.label("").classes("grow")
                 ui.button("Cancel", on_click=self._cancel).props("outline dense data-act=cancel")
         with ui.element("section").classes("card evidence").props('aria-label="steps and evidence"') as self.body:
-            self._ladder = Plot("Each step adds one effect. Held-out error counts; no model can pass the dotted noise floor.", "ladder")
+            self._ladder = Plot("Each step adds one effect. The held-out error counts; a complete model ends at the dotted noise floor.", "ladder")
             self._model = ui.element("div").classes("stack").style("gap:.3rem")
             with ui.element("div").classes("stack").style("gap:.4rem") as self._evidence:
                 ui.html("<h3>What the rigid model misses</h3>", sanitize=False)

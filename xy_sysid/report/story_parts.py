@@ -16,6 +16,7 @@ from xy_sysid.units import motion
 
 Document = Mapping[str, Any]
 
+AHEAD = "one sample ahead"  # in the label of a step whose error is not that of a free simulation
 MARGIN = {"l": 8, "r": 10, "t": 30, "b": 8}
 SMALL = 220  # px, height of a figure of one row
 
@@ -102,9 +103,18 @@ def words(name: str) -> str:
     return name.replace("_", " ")
 
 
-def held_out_from(document: Document) -> float:
-    """s from which no fit has seen the data."""
-    return float(document["measured"]["time"]["held_out_from"])
+def shade_held_out(figure: go.Figure, document: Document, shown: Document, at: tuple[int, ...] = (1,)) -> None:
+    """Grey where no fit has seen the data. The first stretch is named, at the foot of the first row."""
+    time = document["measured"]["time"]
+    ahead = AHEAD in str(shown["label"])
+    spans = [(float(time["held_out_from"]), float(document["seconds"]))] if ahead else [(float(a), float(b)) for a, b in time["held_out"]]
+    for row_ in at:
+        for first, last in spans:
+            figure.add_vrect(x0=first, x1=last, fillcolor=fade(UNTRUSTED, 0.14), line_width=0, layer="below", row=row_, col=1)
+    if spans:
+        figure.add_annotation(
+            text="grey: held out", x=0, xref="x domain", y=0, yref="y domain", xanchor="left", yanchor="bottom", showarrow=False, font={"size": 11}
+        )
 
 
 def grey(size: int = 4) -> dict[str, Any]:

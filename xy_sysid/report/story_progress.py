@@ -19,7 +19,7 @@ WIDE = 14  # letters of a line below a step of the ladder; one that runs over th
 
 
 def ladder(document: Document, mode: str = "light") -> go.Figure:
-    """The errors of all steps as a falling staircase: training, held-out, and the noise floor that no model can pass."""
+    """The errors of all steps as a falling staircase: training, held-out, and the noise floor."""
     rungs = list(document["ladder"])
     if not rungs:
         return nothing(document["sentence"], mode)
