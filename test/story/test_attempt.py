@@ -8,7 +8,9 @@ from xy_sysid.errors import BadInput
 from xy_sysid.story.attempt import Attempt
 
 
-@pytest.mark.parametrize("error", [ValueError("min() arg is an empty sequence"), IndexError("7"), KeyError("gain"), MemoryError(), ZeroDivisionError()])
+@pytest.mark.parametrize(
+    "error", [ValueError("min() arg is an empty sequence"), IndexError("7"), KeyError("gain"), MemoryError(), ZeroDivisionError()]
+)
 def test_an_unforeseen_error_becomes_a_sentence_with_what_to_do(error: Exception) -> None:
     """Its name and place are kept for the log alone."""
     with Attempt() as attempt:

@@ -90,7 +90,9 @@ def refine(
     if mat is not None:
         write_axis_mat(mat, {name: ladder.final for name, ladder in found.items()})
     if json:
-        answers: dict[str, Any] = {name: _answer(ladder, floors[name]) | _alone(alone.get(name), recording.output_unit) for name, ladder in found.items()}
+        answers: dict[str, Any] = {
+            name: _answer(ladder, floors[name]) | _alone(alone.get(name), recording.output_unit) for name, ladder in found.items()
+        }
         emit({"recording": origin, "axes": answers, "refused": refused})
         return
     scale, unit = motion(recording.units.speed)

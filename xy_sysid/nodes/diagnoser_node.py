@@ -58,7 +58,7 @@ class DiagnoserNode(WalledNode):
         self._diagnosis = self.create_publisher(DiagnosticArray, "diagnosis", LATCHED_QOS)
         self._ladders = {axis: self.create_publisher(Float64MultiArray, topic_of("error_ladder", axis), LATCHED_QOS) for axis in self._axes}
         self._stories = {axis: self.create_publisher(String, topic_of("story", axis), LATCHED_QOS) for axis in self._axes}
-        self._triggers = []
+        self._triggers: list[LaterTrigger] = []
         self._serve(self._axes)
         for axis in self._axes:
             self._serve((axis,), axis)

@@ -108,7 +108,7 @@ def story_facts(document: Mapping[str, Any], step: int | None = None) -> list[Fa
         if bool(trusted.any()):
             inside = slice(int(np.flatnonzero(trusted)[0]), int(np.flatnonzero(trusted)[-1]) + 1)
             measured = coherence_fact(row(response["frequency"])[inside], row(response["coherence"])[inside])
-            found.append(replace(measured, label="linear part, lowest", meaning=MEANINGS["linear part"], good=None))
+            found.append(replace(measured, label="linear part", meaning=MEANINGS["linear part"], good=None))
     for name, text in parameter_rows(last["parameters"]):
         effect, _, own = name.partition(".")
         label = name if not own else f"{effect.replace('_', ' ')}: {own.replace('_', ' ')}"

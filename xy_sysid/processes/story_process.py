@@ -1,6 +1,7 @@
 """A process that performs jobs on stories, so that nobody who hears data ever waits for a fit; cancelling ends the process.
 
-It is started at once, so that the first job need not wait for it, and stays, idle, for the next ones. The core knows no processes; this is the adapters' own.
+It is started at once, so that the first job need not wait for it, and stays, idle, for the next ones. The core knows no processes; this is
+the adapters' own.
 """
 
 from __future__ import annotations

@@ -76,4 +76,3 @@ def position(document: Document, step: int | None = None, mode: str = "light") -
     figure.update_xaxes(title_text="time (s)", row=1, col=1)
     figure.update_yaxes(title_text=f"position ({plain(unit)})", row=1, col=1)
     return figure
-

@@ -44,7 +44,15 @@ def vectors(figure: go.Figure, kinds: Sequence[str]) -> dict[str, bytes]:
         import matplotlib as mpl
     except ModuleNotFoundError:
         raise MissingExtra("Matplotlib, which draws vectors,", "figures") from None
-    look: Any = {"font.family": [_font()[0], "DejaVu Sans"], "svg.fonttype": "path", "pdf.fonttype": 42, "svg.hashsalt": "xy_sysid", "font.size": 8.5, "text.color": INK, "axes.labelcolor": INK}
+    look: Any = {
+        "font.family": [_font()[0], "DejaVu Sans"],
+        "svg.fonttype": "path",
+        "pdf.fonttype": 42,
+        "svg.hashsalt": "xy_sysid",
+        "font.size": 8.5,
+        "text.color": INK,
+        "axes.labelcolor": INK,
+    }
     with mpl.rc_context(look):
         drawn = _drawn(figure)
         return {kind: _written(drawn, kind) for kind in kinds}
