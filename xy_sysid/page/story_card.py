@@ -102,6 +102,7 @@ class StoryCard:
             button.set_enabled(able)
         self._buttons["renew"].set_enabled(able and self._source.newer(axis))
         self._data.set_visibility(self._source.live)
+        self._data.classes(remove="idle" if document is not None else "", add="" if document is not None else "idle")
         self._used.set_text(self._source.used(axis))
         self._fill(document, able and not quiet)
         effects = self._source.effects()
