@@ -20,7 +20,7 @@ STATES = {
     "finalized": "shut down",
     "": "not there",
 }
-HELD = "STOP is on; nothing moves before it is released"
+HELD = "STOP is on: it is released before anything moves"
 
 
 class Control:
@@ -72,7 +72,7 @@ class Control:
                         ui.label(name).style("font-weight:600")
                         ui.label(words).classes("bad" if level > 1 else "warn")
         state = heard.lifecycle
-        self._state.set_text(f"Excitation: {HELD if held else STATES.get(state, state)}")
+        self._state.set_text(f"Excitation: {STATES.get(state, state)}{'. STOP is on; Activate releases it first.' if held else ''}")
         self._activate.set_text("Release STOP and activate" if held else "Activate")
         self._configure.set_enabled(state == "unconfigured")
         self._activate.set_enabled(state == "inactive")

@@ -80,13 +80,14 @@ class Panel:
         await self._cards.refresh(axis, view)
 
     def _choose(self) -> View:
-        """What is looked at; whenever the story goes on, its newest model."""
+        """What is looked at; whenever the story goes on, its newest model. What was chosen while the first model was awaited stays."""
         document = self._source.document(self._axis)
         found = views(document, self._source.live, self._source.awaits(self._axis))
         goes_on = self._axis, len(document["steps"]) if document is not None else 0, tuple(found)
         if goes_on != self._steps:
+            awaited = self._steps[:2] == (self._axis, 0) and self._view.value in found
             self._steps, self._views = goes_on, found
-            self._view.set_options(found, value=next(iter(found), None))
+            self._view.set_options(found, value=self._view.value if awaited else next(iter(found), None))
         elif found != self._views:  # other words for the same: what was chosen stays
             self._views = found
             self._view.set_options(found, value=self._view.value)
