@@ -96,10 +96,11 @@ def test_too_short_a_recording_is_refused() -> None:
 
 
 def test_the_floor_is_that_of_a_diagnosis() -> None:
-    """What the encoder adds, from the whole recording, whichever part is compared: within 1 %, also of a model that was fitted here."""
+    """The floor by which a fit is judged, of the whole recording, whichever part is compared: within 1 %, also of a model that was fitted here."""
     recording = simulate(20.0, effects=["coulomb_friction"], machine="rigid.yaml")
     run = recording.run("x")
-    known = prepare(run.sampling_rate, run.voltage, run.position).noise_floor
+    data = prepare(run.sampling_rate, run.voltage, run.position)
+    known = data.layout.rms(data.floor.power)
     assert xy.compare(run).noise_floor == pytest.approx(known, rel=0.01)
 
 

@@ -38,6 +38,29 @@ ARGUMENTS = [
 ]
 
 
+OVER_EACH_OTHER = """() => {
+    const shown = element => {
+        for (let one = element; one && one.nodeType === 1; one = one.parentElement) {
+            const style = getComputedStyle(one);
+            if (style.visibility === "hidden" || style.display === "none" || Number(style.opacity) === 0) return false;
+        }
+        return true;
+    };
+    const leaves = [...document.querySelectorAll("main *")].filter(e => !e.closest("svg") && e.textContent.trim() && !e.children.length);
+    const drawn = [...document.querySelectorAll("main .js-plotly-plot svg text")].filter(e => e.textContent.trim());
+    const words = [...leaves, ...drawn].map(e => ({box: e.getBoundingClientRect(), said: e.textContent.trim().slice(0, 60), e}))
+        .filter(word => word.box.width > 1 && word.box.height > 1 && shown(word.e));
+    const found = [];
+    for (let i = 0; i < words.length; i++) for (let k = i + 1; k < words.length; k++) {
+        const a = words[i].box, b = words[k].box;
+        const wide = Math.min(a.right, b.right) - Math.max(a.left, b.left), high = Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top);
+        const least = Math.min(a.width * a.height, b.width * b.height);
+        if (wide > 0 && high > 0 && wide * high > 0.15 * least) found.push(words[i].said + " / " + words[k].said);
+    }
+    return found;
+}"""
+
+
 class Server:
     """``xy-sysid page`` as a process; ``first`` is the line that it printed, ``address`` the same if it is one."""
 
@@ -194,6 +217,18 @@ class Tab:
             return False
 
         self.until(tried, seconds, why)
+
+    def places(self) -> dict[str, tuple[float, float]]:
+        """Left and top of each card that can be seen, px from the corner of the page."""
+        script = """() => Object.fromEntries([...document.querySelectorAll("main .card")].filter(card => card.offsetParent).map((card, k) => {
+            const box = card.getBoundingClientRect();
+            return [card.getAttribute("aria-label") || card.className, [box.left + scrollX, box.top + scrollY]];
+        }))"""
+        return {name: (float(left), float(top)) for name, (left, top) in self.page.evaluate(script).items()}
+
+    def over_each_other(self) -> list[str]:
+        """Pairs of words that can be seen, on the page and in its figures, of which one lies on the other."""
+        return [str(pair) for pair in self.page.evaluate(OVER_EACH_OTHER)]
 
     def wide(self) -> int:
         """Width of the content, px."""

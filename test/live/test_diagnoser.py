@@ -160,7 +160,7 @@ def test_cancelling_answers_everybody_and_keeps_the_stories() -> None:
     job = diagnoser.start()
     assert job is not None and job.run.voltage.shape == (8000,)
     assert diagnoser.start() is None, "one at a time"
-    assert diagnoser.cancel() == "cancelled axis x: diagnose"
+    assert diagnoser.cancel() == "cancelled axis x: fitting the rigid model"
     assert [(answer.request, answer.text) for answer in diagnoser.answers()] == [(first, "cancelled"), (second, "cancelled")]
     assert diagnoser.cancel() == "nothing was running" and not diagnoser.busy
 
@@ -185,3 +185,49 @@ def test_a_diagnosis_that_is_asked_for_twice_is_made_once() -> None:
 def test_an_empty_name_is_no_effect(names: list[str]) -> None:
     """ROS parameter files know no empty lists."""
     assert DiagnoserSettings(effects={"x": names}).chosen("x") == ()
+
+
+def test_each_axis_is_asked_for_by_itself() -> None:
+    """Diagnose on x starts nothing for y; what y waits for can be given up while x goes on."""
+    diagnoser = Diagnoser(DiagnoserSettings(minimum=1.0), AXES)
+    send(diagnoser, 0, 8000)
+    first = diagnoser.ask("diagnose", ["x"])
+    assert diagnoser.start() is not None and diagnoser.doings() == {"x": "fitting the rigid model"}
+    second = diagnoser.ask("diagnose", ["y"])
+    assert diagnoser.doings() == {"x": "fitting the rigid model", "y": "waits"}
+    assert diagnoser.cancel(["y"]) == "cancelled axis y: waits"
+    assert [(answer.request, answer.done) for answer in diagnoser.answers()] == [(second, False)]
+    assert diagnoser.under_way == "x" and diagnoser.doings() == {"x": "fitting the rigid model"}
+    diagnoser.finish("not done here")
+    assert diagnoser.start() is None and [answer.request for answer in diagnoser.answers()] == [first]
+
+
+def test_giving_up_one_axis_of_a_request_leaves_the_others() -> None:
+    """The axis that runs is given up; the one that waits in the same request is next."""
+    diagnoser = Diagnoser(DiagnoserSettings(minimum=1.0), AXES)
+    send(diagnoser, 0, 8000)
+    number = diagnoser.ask("diagnose")
+    assert diagnoser.start() is not None
+    assert diagnoser.cancel(["x"]) == "cancelled axis x: fitting the rigid model"
+    job = diagnoser.start()
+    assert job is not None and job.run.axis == "y"
+    diagnoser.finish("not done here")
+    assert diagnoser.start() is None and [(answer.request, answer.done) for answer in diagnoser.answers()] == [(number, False)]
+
+
+def test_it_says_which_seconds_a_story_is_about_and_renews_it() -> None:
+    """From where to where since the samples began to be heard; renewed, the model has its effects on the newest samples, without a diagnosis."""
+    diagnoser = Diagnoser(DiagnoserSettings(minimum=5.0, memory=6.0), AXES)
+    send(diagnoser, 0, 16_000)
+    diagnoser.ask("begin", ["x"])
+    play(diagnoser)
+    assert diagnoser.used("x") == pytest.approx((2.0, 8.0), abs=0.1) and diagnoser.used("y") is None
+    diagnoser.have("x", ("coulomb_friction",))
+    play(diagnoser)
+    send(diagnoser, 16_000, 24_000)
+    assert diagnoser.used("x") == pytest.approx((2.0, 8.0), abs=0.1)
+    diagnoser.ask("renew", ["x"])
+    assert play(diagnoser) == ["x fitting the rigid model", "x the rigid model is fitted", "x adding coulomb_friction", "x with coulomb_friction"]
+    assert diagnoser.used("x") == pytest.approx((6.0, 12.0), abs=0.1) and diagnoser.stories["x"].effects == ("coulomb_friction",)
+    diagnoser.reset()
+    assert diagnoser.used("x") is None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -20,19 +21,19 @@ pytestmark = needs_ros
 
 
 def test_the_demo_prints_the_address_of_a_page_that_answers_and_ctrl_c_ends_all_of_it(tmp_path: Path) -> None:
-    """The page is there while the nodes run; afterwards no process is left, and nothing was written to the folder."""
+    """The page is there, at the port that was asked for, while the nodes run; afterwards no process is left, and the folder is empty."""
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
     mark = uuid.uuid4().hex
     environment = bare(ROS_DOMAIN_ID=str(new_domain()), XY_SYSID_TEST_MARK=mark)
     environment.pop("DISPLAY", None)
-    demo = subprocess.Popen(
-        [sys.executable, "-m", "xy_sysid", "demo", "--page"], cwd=tmp_path, env=environment, text=True, stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-    )  # fmt: skip
+    words = [sys.executable, "-m", "xy_sysid", "demo", "--page", "--port", str(port), "--no-browser"]
+    demo = subprocess.Popen(words, cwd=tmp_path, env=environment, text=True, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     try:
         assert demo.stdout is not None
         line = demo.stdout.readline()
         found = re.search(r"http://127\.0\.0\.1:\d+/", line)
-        assert found, line
+        assert found and found.group() == f"http://127.0.0.1:{port}/", line
         with urllib.request.urlopen(found.group(), timeout=60) as page:
             assert "xy_sysid" in page.read().decode()
         time.sleep(0.5)

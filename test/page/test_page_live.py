@@ -128,6 +128,11 @@ def test_the_failing_picture_comes_by_itself_and_every_number_follows_the_story(
     tab.press_until("diagnose", lambda: "Missing: coulomb friction" in tab.verdict() and tab.filled() == ["Add coulomb friction"], 90)
     tab.until(lambda: tab.headline().startswith("Something is missing: ") and len(tab.ladder()) == 1, 40, "the headline is stale")
     assert tab.ladder()[0] > 4
+    tab.page.get_by_role("button", name="axis x").click()
+    tab.until(lambda: tab.headline().startswith("Something is missing: ") and tab.filled() == ["Diagnose"], 40, "x was diagnosed with y")
+    assert "Missing:" not in tab.verdict() and tab.page.locator("[data-act=diagnose]").is_enabled()
+    tab.page.get_by_role("button", name="axis y").click()
+    tab.until(lambda: "Missing: coulomb friction" in tab.verdict(), 40, "axis y is not shown")
     tab.press_until("named", lambda: tab.headline().startswith("Explained: ") and tab.over_floor() < 2 and len(tab.ladder()) == 2, 60)
     tab.until(lambda: tab.fact("worst place").startswith("nowhere"), 40, "the tiles are stale")
     assert tab.ladder()[1] < 1.2 and "at the noise floor" in tab.verdict() and tab.fact("held-out error").startswith("0.3")
@@ -236,6 +241,8 @@ def test_stop_really_makes_the_excitation_inactive(scene: Scene, way: str) -> No
 
     tab.until(stopped, 15)
     assert world.state("excitation") == "inactive" and scene.silent()
+    tab.until(lambda: tab.page.get_by_role("button", name="Release STOP and activate").is_enabled(), 15, "what Activate does with STOP is not said")
+    assert "no activate" not in scene.nodes()
     cancel = tab.page.get_by_role("button", name="Cancel").last
     if way == "button" and cancel.is_visible():  # a page that was loaded again has no dialog
         cancel.click()

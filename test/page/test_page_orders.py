@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from helpers.ros_tools import World, needs_ros, world_in
 
+from xy_sysid.live.messages import StatusMessage
 from xy_sysid.page.live import Live
 from xy_sysid.page.orders import Wish
 from xy_sysid.page.topics_state import TopicsState
@@ -48,17 +49,73 @@ def test_a_diagnosis_that_nobody_heard_of_is_asked_for_again(monkeypatch: pytest
     for _ in range(9):
         assert page.job("x") is not None
         now[0] += 5.0
-    assert deaf.asked == 3 * ["diagnoser/diagnose"]
+    assert deaf.asked == 3 * ["diagnoser/diagnose/x"]
     page.ask("next", "x")
-    heard.doing("axis x: tries them all", now[0])
+    heard.doing({"axis x": "tries them all", "axis y": "idle"}, now[0])
     now[0] += 11.0
     assert page.job("x") is not None and len(deaf.asked) == 4
-    heard.doing("idle", now[0])
+    heard.doing({"axis x": "idle", "axis y": "idle"}, now[0])
     assert page.job("x") is None and len(deaf.asked) == 4
     page.ask("diagnose", "x")
     deaf.told(True, "axis x: found")
     now[0] += 100.0
     assert page.job("x") is None and len(deaf.asked) == 5
+
+
+def test_each_axis_has_its_own_state(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Diagnose on x asks for x alone, and the buttons of y stay free: before the diagnoser has said anything, and while it works for x."""
+    now = [1000.0]
+    monkeypatch.setattr("xy_sysid.page.live.time.monotonic", lambda: now[0])
+    heard, deaf = TopicsState(), Deaf()
+    heard.graph({"diagnoser"}, now[0])
+    link: Any = deaf
+    page = Live(heard, link, lambda words, done: None)
+    page.ask("diagnose", "x")
+    assert page.job("x") is not None and page.job("y") is None and deaf.asked == ["diagnoser/diagnose/x"]
+    stamp = page.stamp("y")
+    heard.doing({"axis x": "looking for what is missing", "axis y": "idle"}, now[0])
+    at_work = page.job("x")
+    assert at_work is not None and at_work.words == "looking for what is missing" and at_work.running
+    assert page.job("y") is None and page.stamp("y") == stamp
+    page.ask("auto", "y")
+    heard.doing({"axis x": "looking for what is missing", "axis y": "waits"}, now[0])
+    waits = page.job("y")
+    assert waits is not None and not waits.running and deaf.asked[-1] == "diagnoser/auto/y"
+    page.cancel("y")
+    assert deaf.asked[-1] == "diagnoser/cancel/y"
+
+
+def test_live_says_what_is_waited_for_and_which_seconds_were_used() -> None:
+    """Before there is a story: how much of the data is here. Afterwards: from where to where, and how many are newer; they can be used."""
+    heard = TopicsState()
+    link: Any = Deaf()
+    page = Live(heard, link, lambda words, done: None)
+    assert "not heard yet" in page.words("x") and not page.ready("x")
+    heard.graph({"diagnoser"}, 0.0)
+    assert page.words("x").startswith("Waiting for the first samples.") and "press Diagnose" not in page.words("x")
+
+    def said(**values: str) -> None:
+        told = tuple((name.replace("_", " ") + " (s)", value) for name, value in values.items())
+        heard.status(StatusMessage("diagnoser", 0, "", told), 0.0)
+
+    said(seconds_kept="6.2")
+    assert page.words("x") == "6 of 10 s of data are here; then the rigid model is fitted by itself." and not page.ready("x")
+    said(seconds_kept="12", seconds_heard="12")
+    assert "is being fitted" in page.words("x") and page.ready("x") and page.used("x") == ""
+    heard.stories["x"] = {"seconds": 10.4, "ladder": []}
+    said(seconds_kept="60", seconds_heard="60.5", axis_x_used_from="2.1", axis_x_used_to="12.5")
+    assert page.used("x") == "Fitted to seconds 2 to 12 of the data. 48 s of newer data have come." and page.newer("x")
+    said(seconds_kept="60", seconds_heard="12.7", axis_x_used_from="2.1", axis_x_used_to="12.5")
+    assert page.used("x").endswith("They are the newest.") and not page.newer("x")
+    said(seconds_kept="3", seconds_heard="3")
+    assert "no longer kept" in page.used("x")
+    page.ask("renew", "x")
+    assert deaf_asked(link) == ["diagnoser/renew/x"]
+
+
+def deaf_asked(link: Any) -> list[str]:
+    """What a deaf link was asked for."""
+    return list(link.asked)
 
 
 def test_effects_that_the_diagnoser_does_not_begin_with_are_set_again(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -79,8 +136,8 @@ def test_effects_that_the_diagnoser_does_not_begin_with_are_set_again(monkeypatc
     assert said == ["the diagnoser has the effects that are wanted, and does nothing; press Diagnose"]
     page.ask("add", "x", "coulomb_friction")
     deaf.told(True, "")
-    heard.doing("axis x: adding coulomb_friction", now[0])
-    heard.doing("idle", now[0])
+    heard.doing({"axis x": "adding coulomb_friction"}, now[0])
+    heard.doing({"axis x": "idle", "axis y": "idle"}, now[0])
     now[0] += 3.5
     assert page.job("x") is None
     assert len(deaf.asked) == 4 and len(said) == 1

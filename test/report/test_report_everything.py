@@ -58,6 +58,7 @@ def test_a_manager_reads_the_summary_first(page: str) -> None:
     assert text.index("Summary") < text.index("A rigid axis with delay and coulomb friction") < text.index("Remarks")
     assert "is enough: nothing that the data show is missing" in text
     assert "which no fit has seen" in text and "% of the speed itself" in text
+    assert "The linear fit alone, without coulomb friction: relative error" in text and "checks of the linear fit passed" in text
     assert "coulomb_friction" not in text.partition("Provenance")[0]
 
 
@@ -72,7 +73,7 @@ def test_every_part_of_the_report_is_there(page: str) -> None:
     text = words_of(page)
     for part in (
         "LLS NLLS ML",
-        "Checks of the ML fit",
+        "Checks of the linear fit (ML)",
         "Where the rigid model fails",
         "What is missing",
         "parameters of the last model",

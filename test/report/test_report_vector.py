@@ -28,10 +28,10 @@ def test_every_picture_of_a_story_becomes_vectors() -> None:
     figures = gallery(document(told()))
     assert {"ladder", "bode", "candidates", "before_after", "rigid_fails_by_speed", "fails_by_frequency"} <= set(figures)
     for name, figure in figures.items():
-        svg = vectors(figure, "svg")
+        svg = vectors(figure, ["svg"])["svg"]
         assert b"<image" not in svg and paths(svg) > 20, name
-    assert vectors(figures["ladder"], "svg") == vectors(figures["ladder"], "svg")
-    assert vectors(figures["ladder"], "pdf")[:5] == b"%PDF-"
+    assert vectors(figures["ladder"], ["svg"]) == vectors(figures["ladder"], ["svg"])
+    assert vectors(figures["ladder"], ["pdf"])["pdf"][:5] == b"%PDF-"
 
 
 def test_a_curve_lies_where_its_numbers_say() -> None:
@@ -39,7 +39,7 @@ def test_a_curve_lies_where_its_numbers_say() -> None:
     figure = go.Figure(go.Scatter(x=[1.0, 100.0], y=[1.0, 100.0], mode="lines", line={"color": "#123456"}))
     figure.update_xaxes(type="log", range=[0, 2])
     figure.update_yaxes(type="log", range=[0, 2])
-    drawn = [item.get("d") for item in ET.fromstring(vectors(figure, "svg")).iter() if "#123456" in (item.get("style") or "")]
+    drawn = [item.get("d") for item in ET.fromstring(vectors(figure, ["svg"])["svg"]).iter() if "#123456" in (item.get("style") or "")]
     (line,) = [path for path in drawn if path]
     numbers = np.array([float(word) for word in line.replace("M", " ").replace("L", " ").split()]).reshape(-1, 2)
     assert numbers[-1][0] - numbers[0][0] > 300 and numbers[0][1] - numbers[-1][1] > 150
@@ -49,7 +49,7 @@ def test_without_matplotlib_it_says_what_to_install(monkeypatch: pytest.MonkeyPa
     """One line with the extra's name."""
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(MissingExtra, match=r"xy_sysid\[figures\]"):
-        vectors(go.Figure(), "svg")
+        vectors(go.Figure(), ["svg"])
 
 
 def test_figures_writes_them_into_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -24,6 +24,8 @@ def demo(
     speed: Annotated[float, typer.Option(help="times faster than real time; 0 is as fast as it goes", min=0.0, max=1000.0)] = 4.0,
     seed: Annotated[int, typer.Option(help="of the excitation", min=1, max=2**31 - 100)] = 1,
     page: Annotated[bool | None, typer.Option("--page/--no-page", help="with the page in a browser; default is yes in a terminal")] = None,
+    port: Annotated[int, typer.Option(help="port of the page, or the next one that is free; 0 is any", min=0, max=65535)] = 8080,
+    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="open a browser where there is a display")] = True,
     json: o.Json = False,
 ) -> None:
     """Watch two axes being identified live: all nodes run on this machine, and nothing else is needed."""
@@ -41,7 +43,7 @@ def demo(
     machine = machine or ("surprise.yaml" if with_page else "paper.yaml")
     table = Machine.from_file(machine)
     if with_page:
-        raise typer.Exit(watch_page(_specs(table, machine, seconds or 0.0, speed, seed), table.axes, speed))
+        raise typer.Exit(watch_page(_specs(table, machine, seconds or 0.0, speed, seed), table.axes, speed, port, browser))
     seconds = seconds or 60.0
     aside.print("starting the nodes: a simulated table, an excitation and an identifier, over ROS 2 ...")
     code, monitor, lines, wall = _watch(_specs(table, machine, seconds, speed, seed), table.axes, seconds, plain=json)

@@ -10,7 +10,6 @@ from typing import Any
 
 from xy_sysid.errors import MissingExtra
 
-PORT = 8080  # or one of the next that is free
 LAST = 20  # lines of the nodes that are shown when one of them fails
 
 
@@ -26,8 +25,11 @@ def wished(page: bool | None, json: bool) -> bool:
     return page
 
 
-def watch_page(specs: list[Any], axes: tuple[str, ...], speed: float) -> int:
-    """Run the nodes and the page until Ctrl-C or until the page ends; the exit code. speed: times real time, 0 as fast as it goes."""
+def watch_page(specs: list[Any], axes: tuple[str, ...], speed: float, port: int, browse: bool) -> int:
+    """Run the nodes and the page until Ctrl-C or until the page ends; the exit code.
+
+    speed: times real time, 0 as fast as it goes; port: of the page, or the next one that is free; browse: open a browser where there is a display
+    """
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     from xy_sysid.cli.monitor import Monitor, refuse_others
     from xy_sysid.cli.output import aside, people, say
@@ -38,7 +40,7 @@ def watch_page(specs: list[Any], axes: tuple[str, ...], speed: float) -> int:
     aside.print("starting the nodes and the page: a simulated table with something hidden in each axis, over ROS 2 ...")
     monitor = Monitor(axes)
     refuse_others(monitor)
-    command = (sys.executable, "-m", "xy_sysid", "page", "--no-browse", "--port", str(PORT))
+    command = (sys.executable, "-m", "xy_sysid", "page", "--no-browse", "--port", str(port))
     page = ProcessSpec("page", command, (("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST"),), stop_rank=max(spec.stop_rank for spec in specs))
     lines: list[str] = []
 
@@ -47,7 +49,7 @@ def watch_page(specs: list[Any], axes: tuple[str, ...], speed: float) -> int:
             people.print(f"the page is at {line}")
             pace = f"{speed:g} times faster than real time" if speed else "as fast as it goes"
             say(f"The table is simulated, {pace}. See where the rigid model fails, press Diagnose, then Add. Ctrl-C ends everything.")
-            if display():
+            if browse and display():
                 webbrowser.open(line)
 
     def enough() -> bool:

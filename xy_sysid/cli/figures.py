@@ -59,9 +59,10 @@ def figures(
             story = dict(told(recording, name, known))
             made = []
             for title, figure in gallery(story).items():
-                for one in kinds:
-                    path = out / f"{_plain(name)}_{title}.{one}"
-                    made.append((path, table(_json.loads(figure.to_json())).encode() if one == "csv" else vectors(figure, one)))
+                content = vectors(figure, [one for one in kinds if one != "csv"])
+                if "csv" in kinds:
+                    content["csv"] = table(_json.loads(figure.to_json())).encode()
+                made += [(out / f"{_plain(name)}_{title}.{one}", content[one]) for one in kinds]
             _write(out, made)
             written[name] = [path.name for path, _ in made]
             bar.advance(task)

@@ -2,6 +2,10 @@
 
 By frequency, speed, direction of motion, position (once or repeating), amplitude of the input, and time: each place with its
 size in multiples of the noise floor.
+
+The noise floor is the least error that a model can be known to have: the encoder's noise, together with the part of the motion to which
+laws are trusted (EPSILON). It is the floor by which a fit is judged. The error over the floor is one number for the whole recording; the
+error in bins of speed, position, amplitude and time is scaled so that its mean power is the square of that number.
 """
 
 from __future__ import annotations
@@ -10,10 +14,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import signal
 
 from xy_sysid.errors import BadInput
-from xy_sysid.greybox.floor import Windows, bands, encoder_noise, floor
+from xy_sysid.greybox.floor import Floor, Windows, bands, encoder_noise, floor
 from xy_sysid.greybox.free_run import EPSILON
 from xy_sysid.linear.simulate import simulate
 from xy_sysid.linear.transfer_function import TransferFunction
@@ -52,10 +57,9 @@ class Comparison:
     """A model against unseen samples, in velocity.
 
     time: (n,) s; measured, predicted: (n,) m/s; position: (n,) m
-    error, noise_floor: rms, m/s, up to the top band; noise_floor is what the encoder alone adds, the same as in a diagnosis
+    error, noise_floor: rms, m/s, up to the top band
     band_end: Hz, where motion and noise meet; error_below_end, floor_below_end: rms up to there, m/s
     frequency: (bands,) Hz centres; error_over_floor: (bands,) amplitude ratio; places: worst first
-    The floor of the last three and of the places has, beside the noise, the part of the motion to which laws are trusted (EPSILON).
     """
 
     time: FloatArray
@@ -92,6 +96,7 @@ class Unseen:
 
     voltage, position: (n,) input and output; begins: time of the first, s
     encoder: rms of the encoder's noise, in units.output, if more of the recording is known; None: from these samples
+    held: windows of the velocity that no fit saw, and the floor, where a fit has cut them; None: every sample counts
     """
 
     voltage: FloatArray
@@ -100,6 +105,21 @@ class Unseen:
     units: Units = USUAL
     begins: float = 0.0
     encoder: float | None = None
+    held: tuple[Windows, Floor] | None = None
+
+    def windows(self, measured: FloatArray) -> tuple[Windows, Floor]:
+        """Windows that are judged, and the floor there. measured: (n,) velocity."""
+        if self.held is not None:
+            return self.held
+        encoder = encoder_noise(self.sampling_rate, self.position) if self.encoder is None else self.encoder
+        layout = bands(self.sampling_rate, measured.size // WINDOWS)
+        every = Windows(layout, np.arange(0, max(measured.size - layout.length, 0) + 1, layout.length // 2))
+        return every, floor(every, measured, encoder, EPSILON)
+
+    @property
+    def skipped(self) -> int:
+        """Samples at the start that do not count."""
+        return min(int(SKIP * self.sampling_rate), self.position.shape[0] // 5) if self.held is None else 0
 
 
 def compare(tf: TransferFunction, u: FloatArray, y: FloatArray, sampling_rate: float) -> Comparison:
@@ -117,16 +137,14 @@ def compare_motion(model: FloatArray, unseen: Unseen) -> Comparison:
     unit, sampling_rate, y = unseen.units.speed, unseen.sampling_rate, unseen.position
     if y.shape[0] < SHORTEST_RUN or model.shape[0] != y.shape[0] - 1:
         raise BadInput("number of samples", y.shape[0], f"{SHORTEST_RUN} or more", "Give a longer recording.")
-    first = min(int(SKIP * sampling_rate), y.shape[0] // 5)
+    first = unseen.skipped
     measured, predicted = np.diff(y)[first:] * sampling_rate, model[first:]
-    position, drive = y[first:], unseen.voltage[first:-1]
     error = measured - predicted
-    encoder = encoder_noise(sampling_rate, y) if unseen.encoder is None else unseen.encoder
-    layout = bands(sampling_rate, error.size // WINDOWS)
-    every = Windows(layout, np.arange(0, max(error.size - layout.length, 0) + 1, layout.length // 2))
-    least = floor(every, measured, encoder, EPSILON)
-    offset = float(np.mean(error))
-    power = layout.power(every.spectrum(error - offset))
+    windows, least = unseen.windows(measured)
+    counts = _inside(windows, error.size) if unseen.held is not None else slice(None)
+    layout = windows.layout
+    offset = float(np.mean(error[counts]))
+    power = layout.power(windows.spectrum(error - offset))
     edges = layout.edges()
     centres = np.append(0.5 * edges[1], np.sqrt(edges[2:] * edges[1:-1]))
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
@@ -134,39 +152,49 @@ def compare_motion(model: FloatArray, unseen: Unseen) -> Comparison:
     audible = np.flatnonzero(least.motion > least.noise)
     seen = int(audible[-1]) + 1 if audible.size else layout.count
     end = float(edges[seen])
-    noise = float(np.sqrt(np.sum((layout.lines * least.power)[:seen]) * 2.0 / layout.length))
+    whole, allowed = float(np.hypot(layout.rms(power), offset)), layout.rms(least.power)
     low_error, low_speed = (_low_pass(values, end, sampling_rate) for values in (error, measured))
     time = unseen.begins + (np.arange(error.shape[0]) + first) / sampling_rate
+    total = float(np.sqrt(np.mean(low_error[counts] ** 2)))
+    noise = total * allowed / max(whole, 1e-300)  # so that the bins have the ratio of the whole in their mean
     places = _frequency_places(edges, ratio, end)
-    total = float(np.sqrt(np.mean(low_error**2)))
-    if abs(offset) > TWICE * noise:
-        text = f"a constant error of {moved(offset, unit)}, {told(abs(offset) / noise)} times the floor"
-        places.append(_place("frequency", (0.0, float(edges[1])), "Hz", abs(offset) / noise, text))
-    if total > TWICE * noise:
+    if abs(offset) > TWICE * allowed:
+        text = f"a constant error of {moved(offset, unit)}, {told(abs(offset) / allowed)} times the floor"
+        places.append(_place("frequency", (0.0, float(edges[1])), "Hz", abs(offset) / allowed, text))
+    if noise > 0.0 and np.isfinite(noise):
         width = max(int(ENVELOPE * sampling_rate), 1)
-        envelope = np.sqrt(np.maximum(signal.oaconvolve(drive**2, np.full(width, 1.0 / width), mode="same"), 0.0))
-        here = position[:-1]
-        places += _binned("speed", (np.abs(low_speed), unit), SPEED_BINS, low_error, noise)
-        places += _direction(low_speed, low_error, noise, unit)
-        places += _binned("position", (here, unseen.units.output), POSITION_BINS, low_error, noise)
-        places += _periodic(here, low_error, noise, unseen.units.output)
-        places += _binned("amplitude", (envelope, unseen.units.input), AMPLITUDE_BINS, low_error, noise)
-        places += _binned("time", (time, "s"), TIME_BINS, low_error, noise)
+        power_in = np.asarray(signal.oaconvolve(unseen.voltage[first:-1] ** 2, np.full(width, 1.0 / width), mode="same"), dtype=np.float64)
+        envelope, here = np.sqrt(np.maximum(power_in, 0.0))[counts], y[first:-1][counts]
+        off, speed = low_error[counts], low_speed[counts]
+        places += _binned("speed", (np.abs(speed), unit), SPEED_BINS, off, noise)
+        places += _direction(speed, off, noise, unit)
+        places += _binned("position", (here, unseen.units.output), POSITION_BINS, off, noise)
+        places += _periodic(here, off, noise, unseen.units.output)
+        places += _binned("amplitude", (envelope, unseen.units.input), AMPLITUDE_BINS, off, noise)
+        places += _binned("time", (time[counts], "s"), TIME_BINS, off, noise)
     return Comparison(
         time=time,
         measured=measured,
         predicted=predicted,
-        position=position[:-1],
-        error=float(np.hypot(layout.rms(power), offset)),
-        noise_floor=layout.rms(least.noise),
+        position=y[first:-1],
+        error=whole,
+        noise_floor=allowed,
         error_below_end=total,
-        floor_below_end=noise,
+        floor_below_end=float(np.sqrt(np.sum((layout.lines * least.power)[:seen]) * 2.0 / layout.length)),
         band_end=end,
         unit=unit,
         frequency=centres,
         error_over_floor=ratio,
-        places=tuple(sorted(places, key=lambda place: -place.error_over_floor)),
+        places=tuple(sorted((place for place in places if place.error_over_floor >= TWICE), key=lambda place: -place.error_over_floor)),
     )
+
+
+def _inside(windows: Windows, samples: int) -> NDArray[np.bool_]:
+    """(samples,) those in a window."""
+    inside = np.zeros(samples, dtype=np.bool_)
+    for begin in windows.begins:
+        inside[begin : begin + windows.layout.length] = True
+    return inside
 
 
 def _place(kind: PlaceKind, span: tuple[float, float], unit: str, ratio: float, sentence: str) -> Place:
@@ -253,7 +281,7 @@ def _periodic(position: FloatArray, error: FloatArray, noise: float, unit: str) 
     size = np.sqrt(2.0) * np.abs(turns[np.minimum(np.round(4.0 * travel / periods), 2 * bins).astype(np.int64)]) / error.size
     best = int(np.argmax(size))
     ratio = float(size[best] / noise)
-    if ratio < TWICE / 2 or size[best] < 6.0 * float(np.median(size)):
+    if size[best] < 6.0 * float(np.median(size)):
         return []
     period = float(periods[best])
     return [_place("position", (period, period), unit, ratio, f"{told(ratio)} times the floor repeating every {moved(period, unit)} of position")]

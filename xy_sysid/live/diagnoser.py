@@ -1,6 +1,7 @@
 """What a live diagnosis does when: requests come in, jobs go out one at a time, stories come back. No thread, no clock, no IO.
 
-A story stays with the samples it began with, so that its ladder compares like with like; ``diagnose`` begins anew.
+A story stays with the samples it began with, so that its ladder compares like with like; ``diagnose`` and ``renew`` begin anew. Each axis
+can be asked for by itself: what is done for one leaves the others as they are.
 """
 
 from __future__ import annotations
@@ -10,13 +11,24 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 from xy_sysid.axis.model import Library
+from xy_sysid.errors import BadInput
 from xy_sysid.samples.block import Block
 from xy_sysid.samples.newest import Newest
 from xy_sysid.samples.pairing import Quantity
 from xy_sysid.samples.recording import Run
 from xy_sysid.settings import DiagnoserSettings
-from xy_sysid.story.acts import Act, Job, perform, sentence, unheard
+from xy_sysid.story.acts import ANEW, Act, Job, perform, sentence, unheard
 from xy_sysid.story.story import Story
+
+WAITS = "waits"  # what an axis does that is asked for and not under way
+BEGINS: dict[Act, str] = {
+    "begin": "fitting the rigid model",
+    "diagnose": "fitting the rigid model",
+    "renew": "fitting the rigid model",
+    "effects": "changing the effects",
+    "add_next": "looking for the next effect",
+    "auto": "looking for the next effect",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +62,8 @@ class Diagnoser:
         self._queue: deque[_Request] = deque()
         self._answers: list[Answer] = []
         self._data: dict[str, Run] = {}
-        self._under_way = ""
+        self._ends: dict[str, tuple[Newest, float]] = {}  # hearing, and s heard there, when an axis' samples were taken
+        self.under_way = ""  # the axis that the worker works for
         self._number = 0
         self.reset()
 
@@ -86,7 +99,7 @@ class Diagnoser:
         too: who asks twice, as where answers get lost, has it once."""
         chosen = self.axes if axes is None else tuple(axes)
         for place, known in enumerate(self._queue):
-            if known.act == act and known.whole == chosen and (place > 0 or act == "diagnose"):
+            if known.act == act and known.whole == chosen and (place > 0 or act in ANEW):
                 return known.number
         self._number += 1
         self._queue.append(_Request(number=self._number, act=act, axes=deque(chosen), whole=chosen))
@@ -96,18 +109,41 @@ class Diagnoser:
         """The model of an axis is to have these effects; fitted as soon as there are data."""
         self.effects[axis] = effects
         story = self.stories.get(axis)
-        if (story.effects if story is not None else ()) != effects or self._under_way == axis:
+        if (story.effects if story is not None else ()) != effects or self.under_way == axis:
             self.ask("effects", [axis])
 
-    def reset_model(self) -> None:
-        """Back to the rigid model, without a new fit; the diagnosis stays."""
-        for axis, story in self.stories.items():
-            self.stories[axis] = replace(story, steps=story.steps[:1], note="")
-        self.effects = dict.fromkeys(self.axes, ())
+    def reset_model(self, axes: Iterable[str] | None = None) -> None:
+        """Back to the rigid model, without a new fit; the diagnosis stays. Raises BadInput while one of these axes is worked for."""
+        chosen = self.axes if axes is None else tuple(axes)
+        busy = [axis for axis in chosen if axis in self.doings()]
+        if busy:
+            raise BadInput("reset_model", f"while axis {busy[0]} is worked for", "an axis that nothing is done for", "Call cancel first.")
+        for axis in chosen:
+            if axis in self.stories:
+                self.stories[axis] = replace(self.stories[axis], steps=self.stories[axis].steps[:1], note="")
+            self.effects[axis] = ()
+
+    def doings(self) -> dict[str, str]:
+        """What is done for each axis that is worked for or waits."""
+        found = {axis: WAITS for request in self._queue for axis in request.axes}
+        if self.under_way:
+            found[self.under_way] = self.doing.partition(": ")[2]
+        return found
+
+    def used(self, axis: str) -> tuple[float, float] | None:
+        """(from, to), s since the samples began to be heard, of those that the axis' story is about; None if that was before a reset."""
+        hearing, end = self._ends.get(axis, (None, 0.0))
+        if hearing is not self.hearing or axis not in self._data:
+            return None
+        return max(end - self._data[axis].seconds, 0.0), end
+
+    def _heard(self) -> float:
+        """s of samples since they began to be heard."""
+        return self.hearing.total / self.hearing.sampling_rate if self.hearing.sampling_rate else 0.0
 
     def start(self) -> Job | None:
         """The next job, once the one before is finished."""
-        while self._queue and not self._under_way:
+        while self._queue and not self.under_way:
             request = self._queue[0]
             if not request.axes:
                 self._answers.append(Answer(request.number, request.done, " ".join(request.told)))
@@ -115,12 +151,13 @@ class Diagnoser:
                 continue
             axis = request.axes.popleft()
             story = self.stories.get(axis)
-            if request.act == "diagnose" or axis not in self._data or story is None or not story.steps:
+            if request.act in ANEW or axis not in self._data or story is None or not story.steps:
                 lacking, story = self.hearing.lacking(), None
                 if lacking:
                     self._lacks(request, axis, lacking)
                     continue
                 heard, column = self.hearing.newest(), self.axes.index(axis)
+                self._ends[axis] = self.hearing, self._heard()
                 self._data[axis] = Run(
                     axis=axis,
                     sampling_rate=heard.sampling_rate,
@@ -129,7 +166,7 @@ class Diagnoser:
                     input_unit=self._settings.units.input,
                     output_unit=self._settings.units.output,
                 )
-            self._under_way, self.doing = axis, f"axis {axis}: {request.act}"
+            self.under_way, self.doing = axis, f"axis {axis}: {BEGINS[request.act]}"
             return Job(
                 act=request.act,
                 run=self._data[axis],
@@ -141,14 +178,14 @@ class Diagnoser:
 
     def progress(self, doing: str, story: Story | None) -> None:
         """The worker has got so far."""
-        self.doing = f"axis {self._under_way}: {doing}"
+        self.doing = f"axis {self.under_way}: {doing}"
         if story is not None:
-            self.stories[self._under_way] = story
+            self.stories[self.under_way] = story
 
     def finish(self, problem: str = "") -> None:
         """The job under way has ended; ``problem`` if it failed."""
-        axis, request = self._under_way, self._queue[0]
-        self._under_way, self.doing = "", ""
+        axis, request = self.under_way, self._queue[0]
+        self.under_way, self.doing = "", ""
         story = self.stories.get(axis)
         if not any(waiting.act == "effects" and axis in waiting.axes for waiting in self._queue):
             self.effects[axis] = story.effects if story is not None else ()
@@ -159,16 +196,25 @@ class Diagnoser:
             request.done &= bool(story.steps)
             request.told.append(sentence(story))
 
-    def cancel(self) -> str:
-        """Give up all requests, running and waiting; what was given up, in words."""
-        given_up = self.doing
-        for request in self._queue:
-            self._answers.append(Answer(request.number, False, "cancelled"))
-        self._queue.clear()
-        self._under_way, self.doing = "", ""
+    def cancel(self, axes: Iterable[str] | None = None) -> str:
+        """Give up what runs and waits for all axes, or some; what was given up, in words."""
+        chosen = self.axes if axes is None else tuple(axes)
+        doing = self.doings()
+        given_up = [f"axis {axis}: {doing[axis]}" for axis in chosen if axis in doing]
+        running = self.under_way in chosen
+        if running:
+            self.under_way, self.doing = "", ""
+        for place, request in enumerate(list(self._queue)):
+            kept = deque(axis for axis in request.axes if axis not in chosen)
+            if len(kept) < len(request.axes) or (running and place == 0):
+                request.axes, request.done, request.whole = kept, False, ()
+                if not kept and not (place == 0 and self.under_way):
+                    self._answers.append(Answer(request.number, False, "cancelled"))
+                    self._queue.remove(request)
         for axis, story in self.stories.items():
-            self.effects[axis] = story.effects
-        return f"cancelled {given_up}" if given_up else "nothing was running"
+            if axis in chosen:
+                self.effects[axis] = story.effects
+        return f"cancelled {given_up[0]}" if given_up else "nothing was running"
 
     def answers(self) -> list[Answer]:
         """The requests that have ended since the last call."""

@@ -35,7 +35,8 @@ from xy_sysid.story.story import Story, allowed
 
 LOOK = 0.1  # s between two looks for news
 HEARTBEAT = 1.0  # s between two statuses in metrics
-ACTS: tuple[Act, ...] = ("begin", "diagnose", "add_next", "auto")  # services
+ACTS: tuple[Act, ...] = ("begin", "diagnose", "renew", "add_next", "auto")  # services, of all axes and of each
+IDLE = "idle"
 FIXED = (*HEARING, "effect_files")
 
 
@@ -59,14 +60,25 @@ class DiagnoserNode(WalledNode):
         self._diagnosis = self.create_publisher(DiagnosticArray, "diagnosis", LATCHED_QOS)
         self._ladders = {axis: self.create_publisher(Float64MultiArray, topic_of("error_ladder", axis), LATCHED_QOS) for axis in self._axes}
         self._stories = {axis: self.create_publisher(String, topic_of("story", axis), LATCHED_QOS) for axis in self._axes}
-        self._triggers = [LaterTrigger(self, f"~/{act}", functools.partial(self._diagnoser.ask, act)) for act in ACTS]
-        for name, act in (("reset_model", self._reset_model), ("forget", self._forget), ("cancel", self._cancel)):
-            self.create_service(Trigger, f"~/{name}", functools.partial(answered, act))
+        self._triggers: list[LaterTrigger] = []
+        self._serve(self._axes)
+        for axis in self._axes:
+            self._serve((axis,), axis)
+        self.create_service(Trigger, "~/forget", functools.partial(answered, self._forget))
         self._streams = Streams(self, self._axes, settings, self._diagnoser.feed)
         self.create_timer(LOOK, self._look)
         self.create_timer(HEARTBEAT, self._beat)
         self._ready = True
         self._tell()
+
+    def _serve(self, axes: tuple[str, ...], of: str = "") -> None:
+        """The services of all axes, or of one: ~/diagnose and ~/diagnose/x."""
+        for act in ACTS:
+            name = topic_of(act, of) if of else act
+            self._triggers.append(LaterTrigger(self, f"~/{name}", functools.partial(self._diagnoser.ask, act, axes)))
+        for kind, do in (("reset_model", self._reset_model), ("cancel", self._cancel)):
+            name = topic_of(kind, of) if of else kind
+            self.create_service(Trigger, f"~/{name}", functools.partial(answered, functools.partial(do, axes)))
 
     # work
 
@@ -107,8 +119,10 @@ class DiagnoserNode(WalledNode):
             else StatusMessage(f"axis {axis}", STALE, f"axis {axis}: not diagnosed yet; call the service diagnose", ())
             for axis in self._axes
         ]
-        doing = diagnoser.doing or ("waiting" if diagnoser.busy else "idle")
-        statuses.append(StatusMessage("progress", OK, doing, (("progress", doing),)))
+        doing = diagnoser.doing or ("waiting" if diagnoser.busy else IDLE)
+        own = diagnoser.doings()
+        values = tuple((f"axis {axis}", own.get(axis, IDLE)) for axis in self._axes)
+        statuses.append(StatusMessage("progress", OK, doing, (("progress", doing), *values)))
         self._diagnosis.publish(statuses_to_ros(statuses, self.get_clock().now().to_msg(), "diagnoser"))
 
     def _beat(self) -> None:
@@ -124,8 +138,12 @@ class DiagnoserNode(WalledNode):
             "sampling rate (Hz)": f"{hearing.sampling_rate or 0.0:.9g}",
             "messages refused": str(self._streams.refusals),
             "errors of callbacks": str(self.wall.count),
-            "progress": self._diagnoser.doing or "idle",
+            "progress": self._diagnoser.doing or IDLE,
+            "seconds heard (s)": f"{hearing.total / hearing.sampling_rate if hearing.sampling_rate else 0.0:.6g}",
         }
+        for axis in self._axes:
+            used = self._diagnoser.used(axis)
+            values |= {f"axis {axis} used {end} (s)": f"{at:.6g}" for end, at in zip(("from", "to"), used, strict=True)} if used is not None else {}
         values |= {f"stream: {reason}": str(number) for reason, number in hearing.faults.items()}
         status = StatusMessage("diagnoser", level, text, tuple(values.items()))
         self._metrics.publish([status_to_ros(status, "diagnoser")])
@@ -160,12 +178,10 @@ class DiagnoserNode(WalledNode):
             make: Any = Parameter
             self.set_parameters([make(f"effects.{axis}", value=list(names) or [""]) for axis, names in wrong.items()])
 
-    def _reset_model(self) -> str:
-        if self._diagnoser.busy:
-            raise BadInput("reset_model", "while work is under way", "an idle diagnoser", "Call cancel first.")
-        self._diagnoser.reset_model()
+    def _reset_model(self, axes: tuple[str, ...]) -> str:
+        self._diagnoser.reset_model(axes)
         self._follow()
-        for story in self._diagnoser.stories.values():
+        for story in [story for axis, story in self._diagnoser.stories.items() if axis in axes]:
             self._show(story, json.dumps(document(story), allow_nan=False, separators=(",", ":")))
         self._tell()
         return "the models are rigid again"
@@ -175,9 +191,10 @@ class DiagnoserNode(WalledNode):
         self._streams.forget()
         return "everything heard is forgotten"
 
-    def _cancel(self) -> str:
-        self._worker.cancel()
-        text = self._diagnoser.cancel()
+    def _cancel(self, axes: tuple[str, ...]) -> str:
+        if self._diagnoser.under_way in axes:
+            self._worker.cancel()
+        text = self._diagnoser.cancel(axes)
         self._follow()
         self._tell()
         return text

@@ -20,6 +20,7 @@ STATES = {
     "finalized": "shut down",
     "": "not there",
 }
+HELD = "STOP is on: it is released before anything moves"
 
 
 class Control:
@@ -33,7 +34,7 @@ class Control:
         self._filled: object = None
         with ui.element("section").classes("card machine").props('aria-label="machine"'):
             ui.html("<h2>The machine</h2>", sanitize=False)
-            self._nodes = ui.element("div").classes("stack").style("gap:.2rem").props("role=status aria-live=polite data-part=nodes")
+            self._nodes = ui.element("div").classes("stack").classes("nodes").props("role=status aria-live=polite data-part=nodes")
             self._state = ui.label("").props("data-part=lifecycle")
             with ui.element("div").classes("buttons"):
                 self._configure = heeded(
@@ -41,7 +42,7 @@ class Control:
                 )
                 self._activate = heeded(ui.button("Activate", on_click=self._ask_activate).props("outline dense no-caps data-act=activate"))
                 self._reset = heeded(ui.button("Forget what was heard", on_click=self._forget).props("flat dense no-caps data-act=forget"))
-            self._windows = ui.element("div").classes("rows small").props("data-part=windows")
+            self._windows = ui.element("div").classes("rows small windows").props("data-part=windows")
             with ui.expansion("Excitation").classes("w-full").props("dense data-part=excitation"):
                 self._settings = ui.element("div").classes("stack")
             with ui.expansion("Record to a bag").classes("w-full").props("dense data-part=record"):
@@ -51,7 +52,8 @@ class Control:
         """Show what is now; whether a button here is the next to be pressed. begun: there is a story, which comes first."""
         session = self._session
         heard, now = session.heard, time.monotonic()
-        nodes = tuple((node.name, node.level, node.words) for node in heard.nodes(now))
+        held = heard.values("excitation").get("stop") == "on"
+        nodes = tuple((node.name, node.level, HELD if held and node.name == "excitation" else node.words) for node in heard.nodes(now))
         if nodes != self._nodes_shown:
             self._nodes_shown = nodes
             self._nodes.clear()
@@ -70,7 +72,8 @@ class Control:
                         ui.label(name).style("font-weight:600")
                         ui.label(words).classes("bad" if level > 1 else "warn")
         state = heard.lifecycle
-        self._state.set_text(f"Excitation: {STATES.get(state, state)}")
+        self._state.set_text(f"Excitation: {STATES.get(state, state)}{'. STOP is on; Activate releases it first.' if held else ''}")
+        self._activate.set_text("Release STOP and activate" if held else "Activate")
         self._configure.set_enabled(state == "unconfigured")
         self._activate.set_enabled(state == "inactive")
         self._reset.set_enabled("streams" in heard.statuses)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
 from typing import Any
 
@@ -44,13 +44,15 @@ MEANINGS = {
     "antiresonance": "Where the motor hardly moves because something else swings in its place. Comes in a pair with a resonance.",
     "resonance": "Where the machine swings most. Good is high and well damped; when it moves, something has become loose or heavier.",
     "relative error": "Distance between measured and modelled response, relative. Below 2 % is good; above 5 % something is missing.",
-    "worst coherence": "Part of the motion that the input explains, 0 to 1, where it is lowest. Low: too little of it there, noise, or something "
-    "not linear. Above 0.9 is good.",
+    "worst coherence": "Part of the motion that a linear response to the input explains, 0 to 1, where it is lowest. Low: too little input there, "
+    "noise, or something not linear. Above 0.9 is good.",
+    "linear part": "Lowest coherence: the part of the measured motion, 0 to 1, that a linear response explains. It belongs to the recording and not "
+    "to this model: friction and backlash lower it, and a model that has them may be complete all the same.",
     "worst place": "Where the error is largest, in multiples of the noise floor. Below 2 is good.",
     "windows": "Stretches of signal in the estimate. More make the bands narrower; a dozen is the least for a trend.",
     "windows dropped": "Windows that were not used because samples were missing or broken. Good is none.",
     "held-out error": "rms error of the simulated velocity on data held out, which no fit has seen. Good is at the noise floor.",
-    "noise floor": "The least error that encoder noise and the tolerance allow. No model can be better.",
+    "noise floor": "The least error that encoder noise and the tolerance of the laws (0.1 % of the motion) allow. A complete model is there.",
 }
 UNSURE = " The model fails: the interval counts noise only and is too narrow."
 NEIGHBOURS = 5  # lines of which the middle one counts, so that one line alone is not the worst
@@ -105,7 +107,8 @@ def story_facts(document: Mapping[str, Any], step: int | None = None) -> list[Fa
         trusted = np.array(response["trusted"], dtype=bool)
         if bool(trusted.any()):
             inside = slice(int(np.flatnonzero(trusted)[0]), int(np.flatnonzero(trusted)[-1]) + 1)
-            found.append(coherence_fact(row(response["frequency"])[inside], row(response["coherence"])[inside]))
+            measured = coherence_fact(row(response["frequency"])[inside], row(response["coherence"])[inside])
+            found.append(replace(measured, label="linear part", meaning=MEANINGS["linear part"], good=None))
     for name, text in parameter_rows(last["parameters"]):
         effect, _, own = name.partition(".")
         label = name if not own else f"{effect.replace('_', ' ')}: {own.replace('_', ' ')}"

@@ -12,11 +12,11 @@ from xy_sysid.page.orders import Source
 from xy_sysid.page.plot import Plot
 from xy_sysid.page.session import Session
 from xy_sysid.page.views import View
-from xy_sysid.report.story_failure import By, failure, failure_words
+from xy_sysid.report.story_failure import HEIGHT, By, failure, failure_words
 
 READING: dict[By, str] = {
     "frequency": "by frequency: a resonance, a lag",
-    "speed": "by speed: friction near 0, drag at the ends",
+    "speed": "by speed: friction, drag, saturation",
     "position": "by position: cogging, lead error, a spring",
     "time": "over time: drift, warming",
 }
@@ -32,15 +32,18 @@ class FailureCard:
             ui.html("<h2>Where the model fails: error on unseen data, in multiples of the noise floor</h2>", sanitize=False)
             with ui.element("div").classes("four"):
                 for by in get_args(By):
-                    self.plots[by] = Plot(READING[by], f"fails_by_{by}")
+                    self.plots[by] = Plot(READING[by], f"fails_by_{by}", HEIGHT)
 
     async def refresh(self, axis: str, view: View) -> None:
         """Draw again what has changed."""
         stamp = self._source.stamp(axis)  # before the document: see StoryCard
         document = self._source.document(axis)
-        there = document is not None and bool(document["steps"]) and not view.linear
-        self._card.set_visibility(there)
-        if document is None or not there:
+        self._card.set_visibility(not view.linear)
+        if view.linear:
+            return
+        if document is None or not document["steps"]:
+            for by, plot in self.plots.items():
+                plot.wait(f"Where the model fails, by {by}, axis {axis}: not fitted yet.")
             return
         key = self._source.key, axis, stamp, view.step, "fails"
         shows = [plot.show(self._session, (*key, by), partial(failure, by=by), document, step=view.step) for by, plot in self.plots.items()]

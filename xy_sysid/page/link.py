@@ -368,7 +368,7 @@ class _Line:
     def _on_diagnosis(self, message: DiagnosticArray) -> None:
         for status in message.status:
             if status.name == "progress":
-                self.heard.doing(status.message, time.monotonic())
+                self.heard.doing({pair.key: pair.value for pair in status.values}, time.monotonic())
 
     def _on_statuses(self, message: DiagnosticArray) -> None:
         for status in message.status:

@@ -1,15 +1,18 @@
-"""The machine as it runs, as a Source: stories come from the diagnoser, and what is asked for goes to it."""
+"""The machine as it runs, as a Source: stories come from the diagnoser, and what is asked for goes to it. Each axis has its own state."""
 
 from __future__ import annotations
 
 import itertools
 import math
-import re
 import time
+from dataclasses import dataclass, field
 from typing import Any
 
 from xy_sysid.axis.model import STANDARD
 from xy_sysid.errors import BadInput
+from xy_sysid.live.diagnoser import WAITS
+from xy_sysid.live.messages import topic_of
+from xy_sysid.page.facts import seconds_text
 from xy_sysid.page.link import Link
 from xy_sysid.page.orders import Order, OrderKind, OrderState
 from xy_sysid.page.topics_state import TopicsState
@@ -20,8 +23,23 @@ SETTLES = 3.0  # s after an answer in which the diagnoser begins, or has said wh
 LOST = 10.0  # s without an answer and without work of the diagnoser after which it is asked again,
 AGAIN = 2  # times
 ENOUGH = 10.0  # s of data with which the rigid model is fitted unasked, so that the first picture shows where it fails
-SERVICES = {"diagnose": "diagnose", "next": "add_next", "auto": "auto", "reset": "reset_model"}
-AXIS = re.compile(r"axis (\S+): (.*)")
+NEWER = 1.0  # s of newer data that are worth a word
+SERVICES = {"diagnose": "diagnose", "renew": "renew", "next": "add_next", "auto": "auto", "reset": "reset_model"}
+
+
+@dataclass
+class _Asked:
+    """What was asked for of one axis.
+
+    before: what the diagnoser had said of the axis then; again: times that it may be asked once more
+    settled: when the order was answered, and what the diagnoser had said then; wanted: parameters that were set
+    """
+
+    state: OrderState
+    before: int
+    again: int = AGAIN
+    settled: tuple[float, int] = (math.inf, 0)
+    wanted: dict[str, list[str]] = field(default_factory=dict)
 
 
 class Live:
@@ -32,13 +50,10 @@ class Live:
 
     def __init__(self, heard: TopicsState, link: Link, say: Any) -> None:
         self.title, self.heard, self.link, self._say = "live", heard, link, say
-        self._job: OrderState | None = None
+        self._jobs: dict[str, _Asked] = {}
         self._asked = 0
-        self._again, self._before = 0, 0  # times that a question may be asked once more; what the diagnoser had said when it was asked
-        self._settled = (math.inf, 0)  # when the last order was answered, and the stamp then
         self._enough = ENOUGH
         self._numbers = itertools.count(1)
-        self._wanted: dict[str, list[str]] = {}
 
     def axes(self) -> tuple[str, ...]:
         """Axes of which something was heard."""
@@ -49,60 +64,88 @@ class Live:
         return self.heard.stories.get(axis)
 
     def stamp(self, axis: str) -> int:
-        """Grows with each story and each change of what is done."""
-        return self.heard.version.get(f"story {axis}", 0) + self.heard.version.get("progress", 0) + self._asked
+        """Grows with each story of the axis and each change of what is done for it."""
+        return self._done(axis) + self._asked
 
     def job(self, axis: str) -> OrderState | None:
-        """What the diagnoser says that it does, for any axis, or what it was asked for a moment ago."""
-        words, since = self.heard.progress
+        """What the diagnoser says that it does for the axis, or what it was asked for a moment ago."""
+        words, since = self.heard.doings.get(axis, ("", 0.0))
         if words and NODE in self.heard.present:
-            told = AXIS.fullmatch(words)
-            own, said = (told.group(1), told.group(2)) if told else (axis, words)
-            return OrderState(order=Order(0, "diagnose", own), begun=since, part=None, running=True, said=said.replace("_", " "))
-        at, stamp = self._settled
-        if self._job is not None and (time.monotonic() - at > SETTLES or (self._news() != stamp and math.isfinite(at))):
-            self._set_again_or_end()
-        if self._job is not None and self._job.order.act in SERVICES:
-            self._look_for_losses(self._job)
-        return self._job
+            return OrderState(order=Order(0, "diagnose", axis), begun=since, running=words != WAITS, said=words.replace("_", " "))
+        asked = self._jobs.get(axis)
+        if asked is not None:
+            at, stamp = asked.settled
+            if time.monotonic() - at > SETTLES or (self._news(axis) != stamp and math.isfinite(at)):
+                self._set_again_or_end(axis, asked)
+            elif asked.state.order.act in SERVICES:
+                self._look_for_losses(axis, asked)
+        asked = self._jobs.get(axis)
+        return asked.state if asked is not None else None
 
-    def _set_again_or_end(self) -> None:
+    def _set_again_or_end(self, axis: str, asked: _Asked) -> None:
         """The effects are set. Where the diagnoser has not begun with them they are set once more, which it does nothing about if it has them."""
-        if self._done() != self._before:
-            self._job = None
-        elif self._again:
-            self._again -= 1
-            self._settled = math.inf, 0
-            self.link.set_parameters(NODE, self._wanted, self._set)
+        if self._done(axis) != asked.before:
+            self._end(axis)
+        elif asked.again:
+            asked.again -= 1
+            asked.settled = math.inf, 0
+            self.link.set_parameters(NODE, asked.wanted, lambda done, words: self._set(axis, done, words))
         else:
-            self._told(False, "the diagnoser has the effects that are wanted, and does nothing; press Diagnose")
+            self._told(axis, False, "the diagnoser has the effects that are wanted, and does nothing; press Diagnose")
 
-    def _look_for_losses(self, job: OrderState) -> None:
+    def _look_for_losses(self, axis: str, asked: _Asked) -> None:
         """The diagnoser is idle and has not answered: either the answer was lost, or the question, as on a computer under load."""
-        waited = time.monotonic() - job.begun
-        if waited > LOST and self._done() != self._before:  # it has worked: never asked for twice
-            self._job = None
-        elif self._again and waited > LOST * (AGAIN + 1 - self._again):
-            self._again -= 1
-            self.link.trigger(f"{NODE}/{SERVICES[job.order.act]}", self._told, LONG)
+        waited = time.monotonic() - asked.state.begun
+        if waited > LOST and self._done(axis) != asked.before:  # it has worked: never asked for twice
+            self._end(axis)
+        elif asked.again and waited > LOST * (AGAIN + 1 - asked.again):
+            asked.again -= 1
+            self._trigger(asked.state.order)
 
     def begin(self) -> None:
         """Have the rigid model fitted, once there are data for it and nobody has asked for more."""
-        kept = self.heard.values(NODE).get("seconds kept (s)", "0")
-        if not self.heard.stories and NODE in self.heard.present and float(kept) >= self._enough:
-            self._enough = 2.0 * float(kept)
+        if not self.heard.stories and NODE in self.heard.present and self._kept() >= self._enough:
+            self._enough = 2.0 * self._kept()
             self.link.trigger(f"{NODE}/begin", lambda done, words: None, LONG)
 
     def ready(self, axis: str) -> bool:
-        """Whether something can be asked for: the diagnoser is there."""
-        return NODE in self.heard.present
+        """Whether something can be asked for: the diagnoser is there, and it has a story of the axis, or data for one."""
+        return NODE in self.heard.present and (axis in self.heard.stories or self._kept() >= ENOUGH)
 
     def words(self, axis: str) -> str:
-        """What there is to say before there is a story."""
+        """What is waited for before there is a story, and how long."""
         if NODE not in self.heard.present:
-            return "The diagnoser is not running: start it with xy-sysid run, or record a bag and open it here."
-        kept = self.heard.values(NODE).get("seconds kept (s)", "0")
-        return f"Not diagnosed yet. {float(kept):.0f} s of data are kept; press Diagnose."
+            return "The diagnoser is not heard yet. If it does not run, start it with xy-sysid run, or record a bag and open it here."
+        kept = self._kept()
+        if kept <= 0.0:
+            moves = "" if self.heard.driving() else " Nothing is driven yet: Configure, then Activate."
+            return f"Waiting for the first samples. With {ENOUGH:.0f} s of data the rigid model is fitted by itself.{moves}"
+        if kept < ENOUGH:
+            return f"{kept:.0f} of {ENOUGH:.0f} s of data are here; then the rigid model is fitted by itself."
+        return f"{ENOUGH:.0f} s of data are here; the rigid model is being fitted, which takes a few seconds."
+
+    def used(self, axis: str) -> str:
+        """The seconds that the story is about, since the samples began to be heard, and how many are newer."""
+        values = self.heard.values(NODE)
+        document = self.document(axis)
+        if document is None:
+            return ""
+        ends = _number(values, f"axis {axis} used from (s)"), _number(values, f"axis {axis} used to (s)")
+        if not all(math.isfinite(end) for end in ends):
+            return f"Fitted to {float(document['seconds']):.0f} s of data that are no longer kept."
+        newer = max(_number(values, "seconds heard (s)") - ends[1], 0.0)
+        more = f"{seconds_text(newer)} of newer data have come." if newer >= NEWER else "They are the newest."
+        return f"Fitted to seconds {ends[0]:.0f} to {ends[1]:.0f} of the data. {more}"
+
+    def awaits(self, axis: str) -> bool:
+        """Whether the diagnoser is there, or may still be seen: until the identifier has shown a response."""
+        return NODE in self.heard.present or self.heard.table("frf", axis) is None
+
+    def newer(self, axis: str) -> bool:
+        """Whether there are newer data than those of the story."""
+        values = self.heard.values(NODE)
+        end = _number(values, f"axis {axis} used to (s)")
+        return axis in self.heard.stories and not _number(values, "seconds heard (s)") < end + NEWER
 
     def effects(self) -> tuple[str, ...]:
         """The library; what the diagnoser has besides can be added with its parameter."""
@@ -114,46 +157,66 @@ class Live:
 
     def ask(self, act: OrderKind, axis: str, argument: str = "") -> None:
         """Pass it on to the diagnoser."""
+        asked = _Asked(OrderState(Order(next(self._numbers), act, axis, argument), time.monotonic(), None, True), self._done(axis))
         if act in ("add", "remove"):
             effects = self._effects(axis)
             if act == "add" and (argument in effects or not argument):
                 raise BadInput("effect", repr(argument), "one that is not in the model yet", "Choose another.")
             wanted = [*effects, argument] if act == "add" else [name for name in effects if name != argument]
-            self._wanted = {f"effects.{axis}": wanted or [""]}
-            self.link.set_parameters(NODE, self._wanted, self._set)
+            asked.wanted = {f"effects.{axis}": wanted or [""]}
+            self._jobs[axis] = asked
+            self.link.set_parameters(NODE, asked.wanted, lambda done, words: self._set(axis, done, words))
         elif act in SERVICES:
-            self.link.trigger(f"{NODE}/{SERVICES[act]}", self._told, LONG)
+            self._jobs[axis] = asked
+            self._trigger(asked.state.order)
         else:
             raise BadInput("order", act, ", ".join(("add", "remove", *SERVICES)), "Record a bag and open it for that.")
-        self._again, self._before = AGAIN, self._done()
-        self._job, self._settled = OrderState(Order(next(self._numbers), act, axis, argument), time.monotonic(), None, True), (math.inf, 0)
         self._asked += 1
 
     def cancel(self, axis: str) -> None:
-        """Leave what the diagnoser does."""
-        self.link.trigger(f"{NODE}/cancel", self._told)
+        """Leave what the diagnoser does for the axis."""
+        self.link.trigger(f"{NODE}/{topic_of('cancel', axis)}", lambda done, words: self._told(axis, done, words))
 
-    def _told(self, done: bool, words: str) -> None:
-        self._job = None
-        self._asked += 1
+    def _trigger(self, order: Order) -> None:
+        service, axis = topic_of(SERVICES[order.act], order.axis), order.axis
+        self.link.trigger(f"{NODE}/{service}", lambda done, words: self._told(axis, done, words), LONG)
+
+    def _told(self, axis: str, done: bool, words: str) -> None:
+        self._end(axis)
         if not done:  # what was done stands in the story
             self._say(words or "the diagnoser refused", done)
 
-    def _set(self, done: bool, words: str) -> None:
+    def _end(self, axis: str) -> None:
+        self._jobs.pop(axis, None)
+        self._asked += 1
+
+    def _set(self, axis: str, done: bool, words: str) -> None:
         """A parameter is set at once; what follows from it begins a moment later."""
-        if done and not words:
-            self._settled = time.monotonic(), self._news()
+        asked = self._jobs.get(axis)
+        if done and not words and asked is not None:
+            asked.settled = time.monotonic(), self._news(axis)
         else:
-            self._told(done, words)
+            self._told(axis, done, words)
 
-    def _news(self) -> int:
-        """Grows with each story of any axis."""
-        return sum(number for name, number in list(self.heard.version.items()) if name.startswith("story "))
+    def _news(self, axis: str) -> int:
+        """Grows with each story of the axis."""
+        return self.heard.version.get(f"story {axis}", 0)
 
-    def _done(self) -> int:
-        """Grows with each story, and with whatever the diagnoser says that it does."""
-        return self._news() + self.heard.version.get("progress", 0)
+    def _done(self, axis: str) -> int:
+        """Grows with each story, and with whatever the diagnoser says that it does for the axis."""
+        return self._news(axis) + self.heard.version.get(f"progress {axis}", 0)
+
+    def _kept(self) -> float:
+        """s of data that the diagnoser keeps."""
+        return _number(self.heard.values(NODE), "seconds kept (s)", 0.0)
 
     def _effects(self, axis: str) -> list[str]:
         ladder = (self.document(axis) or {}).get("ladder") or [{}]
         return [str(name) for name in ladder[-1].get("effects", [])]
+
+
+def _number(values: dict[str, str], name: str, without: float = math.nan) -> float:
+    try:
+        return float(values[name])
+    except (KeyError, ValueError):
+        return without

@@ -13,6 +13,7 @@ from xy_sysid.linear.transfer_function import TransferFunction
 from xy_sysid.live.plain_messages import ArrayMessage
 from xy_sysid.page.topics_state import Tracked, columns, thinned
 from xy_sysid.report.parts import band, broken, decibel, frequency_axis, outline, phase_of, plain, positive, rows, turns, unbroken
+from xy_sysid.report.story_parts import LINE, NAMED
 from xy_sysid.report.theme import BEFORE, FAILS, MEASURED, MODEL, UNTRUSTED, fade
 from xy_sysid.response.frf import Z95
 from xy_sysid.samples.block import FloatArray
@@ -136,11 +137,11 @@ def _residual(figure: go.Figure, comparison: ArrayMessage | None) -> None:
     kept = thinned(frequency, size, MOST)
     _curve(figure, 1, (frequency[kept], positive(size[kept])), {"color": MODEL, "width": 1.2}, "residual")
     figure.add_hline(y=Z95, line={"color": UNTRUSTED, "width": 1, "dash": "dot"}, row=1, col=1)
-    for low, high, worst in failing(comparison)[:4]:
+    for place, (low, high, worst) in enumerate(failing(comparison)[:NAMED]):
         figure.add_vrect(x0=low, x1=high, fillcolor=fade(FAILS, 0.13), line={"color": fade(FAILS, 0.5), "width": 1}, row=1, col=1)
         figure.add_annotation(
-            text=f"fails: {worst:.2g} σ", x=float(np.log10(np.sqrt(low * high))), xref="x", y=1, yref="y domain", yanchor="top", showarrow=False,
-            font={"color": FAILS, "size": 11},
+            text=f"fails: {worst:.2g} σ", x=float(np.log10(np.sqrt(low * high))), xref="x", y=1, yref="y domain", yanchor="top", yshift=-LINE * place,
+            showarrow=False, font={"color": FAILS, "size": 11},
         )  # fmt: skip
     top = float(np.nanmax(np.log10(np.maximum(size, 1e-2))))
     figure.update_yaxes(range=[-1.0, max(top, 1.0) + 0.35], row=1, col=1)

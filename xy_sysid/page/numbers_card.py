@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from nicegui import ui
 
-from xy_sysid.page.facts import Fact, base_fails, facts, story_facts, transfer_function_html
+from xy_sysid.page.facts import MEANINGS, Fact, base_fails, facts, story_facts, transfer_function_html
 from xy_sysid.page.live_figures import failing
 from xy_sysid.page.orders import Source
 from xy_sysid.page.session import Session
@@ -15,6 +15,8 @@ from xy_sysid.page.views import View
 from xy_sysid.report.parts import plain
 from xy_sysid.report.story_parts import pictured
 from xy_sysid.report.story_parts import words as spoken
+
+AWAITED = ("held-out error", "noise floor", "worst place", "linear part", "gain", "delay", "pole")  # of the rigid model, before it is fitted
 
 
 class Numbers:
@@ -34,6 +36,8 @@ class Numbers:
             return
         self._shown = stamp
         found, words = numbers_of(session, source, axis, view)
+        if not found and not view.linear:
+            found = [Fact(label, "…", MEANINGS[label], sure=False) for label in AWAITED]
         self._card.set_visibility(bool(found))
         self._math.clear()
         with self._math:

@@ -7,11 +7,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
-OrderKind = Literal["begin", "diagnose", "add", "remove", "next", "auto", "reset"]
+OrderKind = Literal["begin", "diagnose", "renew", "add", "remove", "next", "auto", "reset"]
 
 DOING = {
     "begin": "fitting the rigid base",
     "diagnose": "looking for what is missing",
+    "renew": "fitting the model to the newest data",
     "add": "adding {}",
     "remove": "taking out {}",
     "next": "finding the next effect",
@@ -138,4 +139,16 @@ class Source(Protocol):
 
     def cancel(self, axis: str) -> None:
         """Leave what is being done for the axis."""
+        ...
+
+    def used(self, axis: str) -> str:
+        """Which seconds of the data the story is about, and whether newer ones have come; empty where that is no question."""
+        ...
+
+    def awaits(self, axis: str) -> bool:
+        """Whether a story of the axis will come by itself."""
+        ...
+
+    def newer(self, axis: str) -> bool:
+        """Whether there are newer data than those of the story."""
         ...

@@ -44,15 +44,16 @@ class Panel:
             self._reading = ui.label("").props("role=status data-part=reading")
             self._wait = ui.linear_progress(0, show_value=False).props('instant-feedback aria-label="reading"')
             with ui.element("div").classes("split") as self._split:
-                with ui.element("div").classes("stack") as self._pictures:
+                with ui.element("div").classes("stack"):
                     self._first = FailureCard(session, source)
                     self._live = LiveCards(session) if source.live else None
                     self._numbers = Numbers()
                     self._cards = Cards(session, source, self._first.plots["frequency"])
                 with ui.element("div").classes("stack side"):
-                    self._story = StoryCard(session, source)
-                    if source.live:
-                        self._control = Control(session)
+                    self._story = StoryCard(session, source, self._machine if source.live else lambda: None)
+
+    def _machine(self) -> None:
+        self._control = Control(self._session)
 
     def delete(self) -> None:
         """Take it off the page."""
@@ -68,29 +69,25 @@ class Panel:
             wanted = (self._axis, self._tab().get(self._source.key, ""), *axes)
             self._axis = next((axis for axis in wanted if axis in axes), "")
             self._choice.set_options({axis: f"axis {axis}" if len(axis) <= SHORT else axis for axis in axes}, value=self._axis or None)
-        begun = bool(self._axis) and source.document(self._axis) is not None
+        begun = source.document(self._axis) is not None
         waits = self._control is not None and self._control.refresh(self._axes, begun)
-        self._root.classes(add="begun" if begun else "", remove="" if begun else "begun")
-        self._pictures.set_visibility(bool(self._axis))
-        for part in (self._story.head, self._story.body):
-            part.set_visibility(bool(self._axis))
-        if self._axis:
-            axis, view = self._axis, self._choose()
-            self._numbers.refresh(self._session, source, axis, view)  # first what waits for nothing: meanwhile the browser may go
-            await self._story.refresh(axis, quiet=waits)
-            await self._first.refresh(axis, view)
-            if self._live is not None:
-                await self._live.refresh(axis, view.linear)
-            await self._cards.refresh(axis, view)
+        axis, view = self._axis, self._choose()  # without an axis every card keeps its place, and says what is waited for
+        self._numbers.refresh(self._session, source, axis, view)  # first what waits for nothing: meanwhile the browser may go
+        await self._story.refresh(axis, quiet=waits)
+        await self._first.refresh(axis, view)
+        if self._live is not None:
+            await self._live.refresh(axis, view.linear)
+        await self._cards.refresh(axis, view)
 
     def _choose(self) -> View:
-        """What is looked at; whenever the story goes on, its newest model."""
+        """What is looked at; whenever the story goes on, its newest model. What was chosen while the first model was awaited stays."""
         document = self._source.document(self._axis)
-        found = views(document, self._source.live)
+        found = views(document, self._source.live, self._source.awaits(self._axis))
         goes_on = self._axis, len(document["steps"]) if document is not None else 0, tuple(found)
         if goes_on != self._steps:
+            awaited = self._steps[:2] == (self._axis, 0) and self._view.value in found
             self._steps, self._views = goes_on, found
-            self._view.set_options(found, value=next(iter(found), None))
+            self._view.set_options(found, value=self._view.value if awaited else next(iter(found), None))
         elif found != self._views:  # other words for the same: what was chosen stays
             self._views = found
             self._view.set_options(found, value=self._view.value)

@@ -21,13 +21,14 @@ Document = Mapping[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """One picture of a story; tab: which of the card's pictures are chosen between; words: what it shows, for screen readers."""
+    """One picture of a story; tab: which of the card's pictures are chosen between; height: of its figure, px."""
 
     name: str
     card: str
     tab: str
     figure: Callable[..., go.Figure]
     reading: str
+    height: int
 
 
 def aligned(make: Callable[..., go.Figure]) -> Callable[..., go.Figure]:
@@ -52,6 +53,7 @@ PICTURES = (
         tab="",
         figure=aligned(draw.bode),
         reading="Where the dashed model leaves the band of the measurement, something is missing. Grey crosses are noise.",
+        height=420,
     ),
     Picture(
         name="coherence",
@@ -59,13 +61,15 @@ PICTURES = (
         tab="",
         figure=aligned(draw.coherence),
         reading="Near 1: the input explains the motion. Low: too little excitation, noise, or something not linear.",
+        height=220,
     ),
     Picture(
         name="residual_speed",
         card=WHERE,
         tab="speed",
         figure=draw.residual_speed,
-        reading="High at low speed: friction. Rising with speed: drag or saturation.",
+        reading="A mean error that jumps where the velocity changes its sign: Coulomb friction. A mean that bends with speed: drag or saturation.",
+        height=340,
     ),
     Picture(
         name="residual_position",
@@ -73,6 +77,7 @@ PICTURES = (
         tab="position",
         figure=draw.residual_position,
         reading="Uneven along the travel: cogging, lead error, a stiffening end.",
+        height=340,
     ),
     Picture(
         name="residual_time",
@@ -80,6 +85,7 @@ PICTURES = (
         tab="time",
         figure=draw.residual_time,
         reading="Growing with time: something warms up, drifts or comes loose.",
+        height=340,
     ),
     Picture(
         name="residual_correlation",
@@ -87,20 +93,23 @@ PICTURES = (
         tab="correlation",
         figure=draw.residual_correlation,
         reading="Beyond the grey with the input: the model misses something linear, or its delay. With itself alone: noise with a colour.",
+        height=380,
     ),
     Picture(
         name="zoom",
         card=TIME,
-        tab="half a second",
+        tab="worst moment",
         figure=draw.zoom,
         reading="Measured and simulated around the largest error of the rigid model. Drag to zoom, double click to go back.",
+        height=360,
     ),
     Picture(
         name="velocity",
         card=TIME,
         tab="speed, all",
         figure=draw.velocity,
-        reading="The whole record, least and most of each stretch. The shaded part was held out of every fit.",
+        reading="The whole record, least and most of each stretch. Grey stretches were held out of every fit.",
+        height=220,
     ),
     Picture(
         name="position",
@@ -108,6 +117,7 @@ PICTURES = (
         tab="position, all",
         figure=draw.position,
         reading="Position, measured and summed up from the simulated speed: a slow drift apart is usual.",
+        height=220,
     ),
     Picture(
         name="poles_zeros",
@@ -115,6 +125,7 @@ PICTURES = (
         tab="",
         figure=draw.poles_zeros,
         reading="Of the linear part: crosses left of 0 are stable; close to the vertical axis they ring.",
+        height=260,
     ),
 )
 
@@ -137,10 +148,13 @@ class Cards:
         """Draw again what has changed."""
         stamp = self._source.stamp(axis)  # before the document: see StoryCard
         document = self._source.document(axis)
-        there = document is not None and bool(document["steps"]) and not view.linear
         for card in self._cards.values():
-            card.set_visibility(there)
-        if document is None or not there:
+            card.set_visibility(not view.linear)
+        if view.linear:
+            return
+        if document is None or not document["steps"]:
+            for picture in PICTURES:
+                self._plots[picture.name].wait(f"{picture.card}, {picture.name.replace('_', ' ')}, axis {axis}: not fitted yet.")
             return
         for picture in PICTURES:
             key = (self._source.key, axis, stamp, view.step, picture.name)
@@ -151,7 +165,7 @@ class Cards:
         tabs = [picture for picture in pictures if picture.tab]
         if not tabs:
             for picture in pictures:
-                self._plots[picture.name] = Plot(picture.reading, picture.name)
+                self._plots[picture.name] = Plot(picture.reading, picture.name, picture.height)
             if len(pictures) > 1:
                 Linked([self._beside, *(self._plots[picture.name] for picture in pictures)])
             return
@@ -161,7 +175,7 @@ class Cards:
         with ui.tab_panels(bar, value=tabs[0].name, animated=False, keep_alive=True).props("animated=false").style("background: transparent"):
             for picture in tabs:
                 with ui.tab_panel(picture.name).style("padding: 0"):
-                    self._plots[picture.name] = Plot(picture.reading, picture.name)
+                    self._plots[picture.name] = Plot(picture.reading, picture.name, picture.height)
 
 
 def words(picture: Picture, document: Document, at: int | None = None) -> str:

@@ -14,18 +14,21 @@ from xy_sysid.report.figure_data import table
 
 EMPTY = {"paper_bgcolor": "rgba(0,0,0,0)", "plot_bgcolor": "rgba(0,0,0,0)"}
 CONFIG = {"displayModeBar": False, "responsive": True, "scrollZoom": False}  # its tools would lie over legends and words
+HIDDEN = {"visible": False}
 KINDS = ("svg", "png", "csv")
 
 
 class Plot:
     """One figure in one browser, with how to read it and buttons to keep it."""
 
-    def __init__(self, reading: str, name: str = "figure") -> None:
+    def __init__(self, reading: str, name: str = "figure", height: int = 200) -> None:
+        """height: px of the figures that it will show, kept free until then."""
+        self._empty = {"data": [], "layout": {"height": height, "xaxis": HIDDEN, "yaxis": HIDDEN, **EMPTY}, "config": CONFIG}
         self._shown: object = None
         self._said = ""
         self._drawn: dict[str, Any] = {}
-        with ui.element("div").classes("plot") as self.root:
-            self.plot = ui.plotly({"data": [], "layout": {"height": 200, **EMPTY}, "config": CONFIG}).classes("plot").props("role=img tabindex=0")
+        with ui.element("div").classes("plot awaited") as self.root:
+            self.plot = ui.plotly(self._empty).classes("plot").props("role=img tabindex=0").style(f"min-height:{height}px")
             with ui.element("div").classes("under"):
                 ui.label(reading).classes("soft small grow")
                 for kind in KINDS:
@@ -40,7 +43,16 @@ class Plot:
         drawn = await run.io_bound(session.figure, key, lambda: plain(make(*arguments, **named)))
         if drawn is not None:
             self._drawn = drawn
+            self.root.classes(remove="awaited")
             self.plot.update_figure(drawn)
+
+    def wait(self, words: str = "") -> None:
+        """Show that there is nothing yet; words: what is waited for, for who cannot see it."""
+        self.say(words)
+        if self._shown is not None:
+            self._shown, self._drawn = None, {}
+            self.root.classes(add="awaited")
+            self.plot.update_figure(self._empty)
 
     def say(self, words: str) -> None:
         """The picture's content in words."""

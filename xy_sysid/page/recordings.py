@@ -88,6 +88,18 @@ class OpenRecording:
         self._changed(axis)
         self._send(order)
 
+    def used(self, axis: str) -> str:
+        """A recording is used whole."""
+        return ""
+
+    def awaits(self, axis: str) -> bool:
+        """The rigid model is fitted unasked."""
+        return not self._problem
+
+    def newer(self, axis: str) -> bool:
+        """Nothing comes after it."""
+        return False
+
     def cancel(self, axis: str) -> None:
         """Leave the fit of this axis; if it waits behind another one, that one goes on."""
         job = self._jobs.get(axis)

@@ -31,28 +31,34 @@ BUTTONS: tuple[tuple[OrderKind, str, str], ...] = (
 class StoryCard:
     """One axis of one source, in one browser."""
 
-    def __init__(self, session: Session, source: Source) -> None:
+    def __init__(self, session: Session, source: Source, between: Callable[[], None]) -> None:
+        """between: makes what stands between the headline and the evidence."""
         self._session, self._source, self._axis = session, source, ""
         self._shown: object = None
         self._filled: object = None
         self._named = ""
         self._wish = Wish()
         self._buttons: dict[str, ui.button] = {}
+        self._rows: list[ui.button] = []
         with ui.element("section").classes("card story").props('aria-label="story"') as self.head:
             self._headline = ui.label("").classes("headline").props("role=heading aria-level=2 aria-live=polite data-part=headline")
             self._verdict = ui.label("").classes("sentence").props("role=status aria-live=polite data-part=verdict")
             self._note = ui.label("").classes("soft")
-            with ui.element("div").classes("buttons"):
+            with ui.element("div").classes("buttons used") as self._data:
+                self._used = ui.label("").classes("soft small grow").props("data-part=used")
+                self._button("renew", "Use the newest", "Fit the model with its effects to the newest data.", partial(self._ask, "renew"))
+            with ui.element("div").classes("buttons acts"):
                 self._button("named", "Add", "What the diagnosis names: fit it together with all that is in the model.", self._add_named)
                 self._button("keep", "Download the model", "The newest models of all axes as YAML.", lambda: self._downloads.take("model"))
                 for act, text, meaning in BUTTONS:
                     self._button(act, text, meaning, partial(self._ask, act))
-            with ui.element("div").classes("buttons").props("role=status aria-live=polite") as self._busy:
+            with ui.element("div").classes("buttons busy").props("role=status aria-live=polite") as self._busy:
                 ui.spinner(size="1.2em")
                 self._doing = ui.label("").classes("grow")
                 ui.button("Cancel", on_click=self._cancel).props("outline dense data-act=cancel")
+        between()
         with ui.element("section").classes("card evidence").props('aria-label="steps and evidence"') as self.body:
-            self._ladder = Plot("Each step adds one effect. Held-out error counts; no model can pass the dotted noise floor.", "ladder")
+            self._ladder = Plot("Each step adds one effect. Held-out error counts; a complete model ends at the dotted noise floor.", "ladder", 320)
             self._model = ui.element("div").classes("stack").style("gap:.3rem")
             with ui.element("div").classes("stack").style("gap:.4rem") as self._evidence:
                 ui.html("<h3>What the rigid model misses</h3>", sanitize=False)
@@ -82,19 +88,22 @@ class StoryCard:
         at = self._source.stamp(axis)  # before the document, which another thread may exchange: never an old picture under a new stamp
         job = self._source.job(axis)
         document = self._source.document(axis)
-        self._busy.set_visibility(job is not None)
-        own = job is not None and job.order.axis == axis and (job.running or self._source.live)
+        self._busy.classes(remove="idle" if job is not None else "", add="" if job is not None else "idle")  # its place is kept
         if job is not None:
-            waits = "" if own else "waits: " if not self._source.live else f"axis {job.order.axis}: "
+            waits = "" if job.running else "waits: " if not job.said else ""
             self._doing.set_text(f"{waits}{job.words} ({seconds_text(time.monotonic() - job.begun)}){self._wish.words}")
-        self._headline.set_text(headline(document, spaced(job.words) if job is not None and own else ""))
+        self._headline.set_text(headline(document, spaced(job.words) if job is not None and job.running else ""))
         able = job is None and self._source.ready(axis)
         wish = self._wish.taken(axis) if able else None
         if wish is not None:
             self._ask(*wish)
             able = False
-        for button in self._buttons.values():
+        for button in (*self._buttons.values(), *self._rows):
             button.set_enabled(able)
+        self._buttons["renew"].set_enabled(able and self._source.newer(axis))
+        self._data.set_visibility(self._source.live)
+        self._data.classes(remove="idle" if document is not None else "", add="" if document is not None else "idle")
+        self._used.set_text(self._source.used(axis))
         self._fill(document, able and not quiet)
         effects = self._source.effects()
         if len(effects) != len(self._choice.options):
@@ -103,8 +112,8 @@ class StoryCard:
         if stamp != self._shown:
             self._shown = stamp
             self._write(document)
-        self._ladder.root.set_visibility(bool(document and document["ladder"]))
-        if document is None:
+        if document is None or not document["ladder"]:
+            self._ladder.wait(f"The error ladder of axis {axis}: no step yet." if axis else "")
             return
         key = (self._source.key, axis, at)
         self._ladder.say(ladder_words(document))
@@ -123,7 +132,7 @@ class StoryCard:
 
     def _fill(self, document: dict[str, Any] | None, able: bool) -> None:
         """Fill the one button that is next, and show those that are sometimes next only then."""
-        act, name = next_act(document) or ("diagnose" if document is None else "", "")
+        act, name = next_act(document) or ("", "")
         chosen = {"add": "named"}.get(act, act)
         if (chosen, name, able) == self._filled:
             return
@@ -133,6 +142,8 @@ class StoryCard:
         for own, button in self._buttons.items():
             if own in ("named", "keep"):
                 button.set_visibility(own == chosen)
+            if own == "renew":
+                continue  # never the next act
             filled = own == chosen and able
             button.props(add="unelevated" if filled else "outline", remove="outline" if filled else "unelevated")
 
@@ -162,7 +173,10 @@ class StoryCard:
         self._overlay.set_visibility(bool(document and len(document["steps"]) > 1))
         for part in (self._ranked, self._model, self._more):
             part.clear()
+        self._rows.clear()
         if document is None:
+            with self._model:
+                ui.label("In the model: rigid base with delay, nothing else")
             return
         there = model_effects(document)
         self._told.set_text(verdict_words(document) if there else "")
@@ -194,6 +208,7 @@ class StoryCard:
             )
         )
         button.set_enabled(self._source.job(self._axis) is None)
+        self._rows.append(button)
 
     def _compare(self) -> None:
         if self._first.value is not None and self._last.value is not None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -18,6 +19,7 @@ from xy_sysid.units import USUAL, Units
 
 LOST = 4.0  # s without a word or a place in the graph after which a node is called lost
 HISTORY = 2000  # resonances remembered for each axis
+IDLE = "idle"  # what the diagnoser says of an axis that nothing is done for
 KNOWN = ("excitation", "identifier", "ballscrew", "diagnoser", "recorder")
 SPEAKER = {"streams": "identifier"}  # who sends a status that does not have its own name
 OFTEN = {"excitation", "ballscrew", "identifier"}  # say something at least once a second
@@ -57,7 +59,7 @@ class TopicsState:
     resonances: dict[str, deque[Tracked]] = field(default_factory=dict)
     present: dict[str, float] = field(default_factory=dict)
     lifecycle: str = ""
-    progress: tuple[str, float] = ("", 0.0)
+    doings: dict[str, tuple[str, float]] = field(default_factory=dict)
     version: dict[str, int] = field(default_factory=dict)
 
     def axes(self) -> tuple[str, ...]:
@@ -105,12 +107,14 @@ class TopicsState:
         self._changed(f"story {axis}")
         return ""
 
-    def doing(self, words: str, now: float) -> None:
-        """What the diagnoser does now."""
-        words = "" if words == "idle" else words
-        if words != self.progress[0]:
-            self.progress = words, now
-            self._changed("progress")
+    def doing(self, values: Mapping[str, str], now: float) -> None:
+        """What the diagnoser does for each axis now; values: of its status ``progress``, as ``axis x``: ``idle``."""
+        for key, words in values.items():
+            axis = key.removeprefix("axis ")
+            words = "" if words == IDLE else words
+            if axis != key and words != self.doings.get(axis, ("", 0.0))[0]:
+                self.doings[axis] = words, now
+                self._changed(f"progress {axis}")
 
     def graph(self, names: set[str], now: float) -> None:
         """Which nodes are in the namespace now."""

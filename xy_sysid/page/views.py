@@ -9,6 +9,7 @@ from typing import Any
 from xy_sysid.report.story_parts import words
 
 NOW, RIGID, LINEAR = "now", "rigid", "linear"
+AWAITED = "rigid, with delay"  # how the first model of a story is called
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,14 +20,16 @@ class View:
     step: int | None = None
 
 
-def views(document: Mapping[str, Any] | None, live: bool) -> dict[str, str]:
-    """What can be chosen, with its name; the first is what is shown unasked."""
+def views(document: Mapping[str, Any] | None, live: bool, awaited: bool = False) -> dict[str, str]:
+    """What can be chosen, with its name; the first is what is shown unasked. awaited: the rigid model will come."""
     steps = document["steps"] if document is not None else []
     found: dict[str, str] = {}
     if steps:
         found[NOW] = words(str(steps[-1]["label"]))
         if len(steps) > 1 and steps[-1]["effects"]:
             found[RIGID] = words(str(steps[0]["label"]))
+    elif awaited:
+        found[NOW] = AWAITED
     if live:
         found[LINEAR] = "linear fit"
     return found

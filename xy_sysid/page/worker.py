@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from xy_sysid.errors import XySysidError
 from xy_sysid.page.orders import Order, Reading, WorkerNews
+from xy_sysid.story.attempt import Attempt
 
 if TYPE_CHECKING:
     from xy_sysid.story.acts import Act, Job
@@ -24,7 +25,7 @@ ACTS: dict[str, Act] = {"next": "add_next", "auto": "auto"}
 LEAVE = signal.SIGUSR1
 
 
-class Left(Exception):
+class Left(BaseException):
     """The fit that runs is not wanted any more."""
 
 
@@ -108,12 +109,12 @@ def main(path: str, reading: Reading, orders: Connection, words: Connection) -> 
             sys.exit(0)
         try:
             busy[0] = True
-            desk.do(order)
+            with Attempt() as attempt:
+                desk.do(order)
             busy[0] = False
-            words.send(WorkerNews("done", order.number, order.axis))
         except Left:
             words.send(WorkerNews("failed", order.number, order.axis, "Left as it was."))
-        except (XySysidError, ArithmeticError, ValueError, MemoryError, OSError) as problem:
-            busy[0] = False
-            text = str(problem) if isinstance(problem, XySysidError) else f"{type(problem).__name__}: {problem}"
-            words.send(WorkerNews("failed", order.number, order.axis, text))
+            continue
+        if attempt.detail:
+            sys.stderr.write(f"axis {order.axis}, {order.act}: {attempt.detail}\n")
+        words.send(WorkerNews("failed" if attempt.problem else "done", order.number, order.axis, attempt.problem))

@@ -1,6 +1,7 @@
 """A process that performs jobs on stories, so that nobody who hears data ever waits for a fit; cancelling ends the process.
 
-It is started by the first job and stays, idle, for the next ones. The core knows no processes; this is the adapters' own.
+It is started at once, so that the first job need not wait for it, and stays, idle, for the next ones. The core knows no processes; this is
+the adapters' own.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import multiprocessing
 import os
 import queue
 import signal
+import sys
 import threading
 import time
 from dataclasses import dataclass
@@ -18,9 +20,9 @@ from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
-from xy_sysid.errors import XySysidError
 from xy_sysid.files.effects import library
 from xy_sysid.story.acts import Job, perform
+from xy_sysid.story.attempt import Attempt
 from xy_sysid.story.document import document
 from xy_sysid.story.story import Story
 
@@ -79,12 +81,13 @@ class StoryWorker:
         self._thread.join(3.0)
 
     def _run(self) -> None:
-        process, pipe = None, None
+        process: BaseProcess | None
+        process, pipe = _begin(self._files)
         while (item := self._jobs.get()) is not None:
             number, job = item
             if number != self._number:
                 continue
-            if process is None or pipe is None or not process.is_alive():
+            if process is None or not process.is_alive():
                 process, pipe = _begin(self._files)
             try:
                 pipe.send((number, job))
@@ -93,7 +96,7 @@ class StoryWorker:
                         process.terminate()
             except (EOFError, OSError):
                 process.join(2.0)
-                text = f"the worker process ended (exit code {process.exitcode}); see the log."
+                text = f"The process that calculates has ended (exit code {process.exitcode}); the model stays as it was. Ask again; see the log."
                 self._news.put(JobNews(number, "", ended=True, problem=text))
                 process = None
         if process is not None:
@@ -130,12 +133,12 @@ def work(pipe: Connection, effect_files: tuple[str, ...]) -> None:
         known = library([Path(file).expanduser() for file in effect_files])
         while True:
             number, job = pipe.recv()
-            try:
+            with Attempt() as attempt:
                 for doing, story in perform(job, known, time.process_time):
                     text = "" if story is None else json.dumps(document(story), allow_nan=False, separators=(",", ":"))
                     pipe.send(JobNews(number, doing, story, text))
-                pipe.send(JobNews(number, "", ended=True))
-            except XySysidError as problem:
-                pipe.send(JobNews(number, "", ended=True, problem=str(problem)))
+            if attempt.detail:
+                sys.stderr.write(f"axis {job.run.axis}, {job.act}: {attempt.detail}\n")
+            pipe.send(JobNews(number, "", ended=True, problem=attempt.problem))
     except (EOFError, OSError):
         return

@@ -59,7 +59,7 @@ def coherence(frf: FrequencyResponse) -> go.Figure:
 
 
 def ladder(found: Diagnosis | Refinement | Ladder) -> go.Figure:
-    """The errors of all steps as a falling staircase: training, held-out, and the noise floor that no model can pass."""
+    """The errors of all steps as a falling staircase: training, held-out, and the noise floor."""
     return story_progress.ladder(_document(found))
 
 

@@ -123,11 +123,13 @@ def _told(one: AxisReport, library: Library) -> tuple[str, ...]:
     else:
         made += [story_words.verdict(story, library), story_words.size(story, one.speed)]
         made += [story_words.confidence(story), story_words.runner_up(story)]
-    made.append(captions.summary(one.study).replace(f"Axis {one.axis}: ", "Transfer function: ", 1))
+    effects = story["ladder"][-1]["effects"] if story is not None and story["ladder"] else ()
+    alone = f"The linear fit alone, without {' and '.join(effects)}" if effects else "The linear fit"
+    made.append(captions.summary(one.study).replace(f"Axis {one.axis}: ", f"{alone}: ", 1))
     if one.verdicts is not None:
         failed = ", ".join(check.name.replace("_", " ") for check in one.verdicts.verdicts if not check.ok)
         passed, count = sum(check.ok for check in one.verdicts.verdicts), len(one.verdicts.verdicts)
-        made.append(f"{passed} of {count} checks of the transfer function passed{f'; not passed: {failed}' if failed else ''}.")
+        made.append(f"{passed} of {count} checks of the linear fit passed{f'; not passed: {failed}' if failed else ''}.")
     if story is not None and story["ladder"] and story["next_experiment"]:
         made.append(f"Next experiment: {story['next_experiment']}")
     return tuple(spoken(text, library) for text in made if text)
@@ -185,7 +187,7 @@ def _fits(page: _Page, axes: Mapping[str, AxisReport]) -> None:
     tables = "".join(table_html(result_table(one.study)) + table_html(coefficient_table(axis, one.study.fits)) for axis, one in fitted.items())
     checks = "".join(table_html(_verdicts(axis, one)) for axis, one in fitted.items())
     orders = "".join(_optional(order_table(axis, one.verdicts.orders, one.study.fits["ML"])) for axis, one in fitted.items() if one.verdicts)
-    extra = f"{orders}{paragraph(captions.COEFFICIENTS)}{paragraph(NOT_A_CONFIDENCE)}{tables}<h3>Checks of the ML fit</h3>{checks}"
+    extra = f"{orders}{paragraph(captions.COEFFICIENTS)}{paragraph(NOT_A_CONFIDENCE)}{tables}<h3>Checks of the linear fit (ML)</h3>{checks}"
     page.add("fits", title, section("fits", title, drawn, captions.FITS, extra))
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from xy_sysid.report.parts import frequency_axis, plain, positive
-from xy_sysid.report.story_parts import Document, drawing, floor_line, held_out_from, nothing, pictured, ratio_axis, row, shade
+from xy_sysid.report.story_parts import Document, drawing, floor_line, nothing, pictured, ratio_axis, row, shade, shade_held_out
 from xy_sysid.report.theme import FAILS, MODEL, UNTRUSTED, fade
 from xy_sysid.units import motion
 
@@ -58,7 +58,7 @@ def residual_position(document: Document, step: int | None = None, mode: str = "
 
 
 def residual_time(document: Document, step: int | None = None, mode: str = "light") -> go.Figure:
-    """Error against time: its size over the noise floor, and its mean; what drifts shows here. The part that no fit saw is marked."""
+    """Error against time: its size over the noise floor, and its mean; what drifts shows here. Grey stretches are data that no fit saw."""
     return _against(document, "time", step, mode)
 
 
@@ -113,10 +113,7 @@ def _against(document: Document, kind: str, step: int | None, mode: str) -> go.F
     if by.size > 1:
         shade(figure, places, (float(by[0]), float(by[-1])), log=False, scale=scale)
     if kind == "time":
-        start = held_out_from(document)
-        for at in (1, 2):
-            figure.add_vline(x=start, line={"color": UNTRUSTED, "width": 1, "dash": "dash"}, row=at, col=1)
-        figure.add_annotation(text="held out →", x=start, y=0, yref="y domain", xanchor="left", yanchor="bottom", showarrow=False, font={"size": 11})
+        shade_held_out(figure, document, shown, at=(1, 2))
     least = LEAST * faster * float(shown["noise_floor"])
     reach = 1.1 * max(least, faster * float(np.nanmax(np.abs(mean), initial=0.0)))
     figure.update_yaxes(title_text=f"mean ({plain(speed)})", range=[-reach, reach], tickformat="~g", row=2, col=1)

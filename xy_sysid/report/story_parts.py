@@ -16,6 +16,8 @@ from xy_sysid.units import motion
 
 Document = Mapping[str, Any]
 
+AHEAD = "one sample ahead"  # in the label of a step whose error is not that of a free simulation
+NAMED, LINE = 3, 14  # places of a picture that are named, and px of a line of small words
 MARGIN = {"l": 8, "r": 10, "t": 30, "b": 8}
 SMALL = 220  # px, height of a figure of one row
 
@@ -67,13 +69,15 @@ def floor_line(figure: go.Figure, at: int = 1, level: float = 1.0, label: str = 
 
 
 def shade(figure: go.Figure, places: list[Mapping[str, Any]], ends: tuple[float, float], log: bool, scale: float = 1.0, at: int = 1) -> None:
-    """Failing places as shaded stretches, each named by its size; ends: of the axis in the document's unit."""
+    """Failing places as shaded stretches, the first NAMED by their size, each in a line of its own; ends: of the axis in the document's unit."""
     low, high = ends
     for level, item in enumerate(places):
         first, last = max(float(item["from"]), low), min(float(item["to"]), high)
         if not last >= first:
             continue
         figure.add_vrect(x0=first * scale, x1=last * scale, fillcolor=fade(FAILS, 0.13), line={"color": fade(FAILS, 0.5), "width": 1}, row=at, col=1)
+        if level >= NAMED:
+            continue
         middle = np.log10(np.sqrt(first * last) * scale) if log else 0.5 * (first + last) * scale
         left, right = (np.log10([low, high]) if log else np.array([low, high])) + (np.log10(scale) if log else 0.0)
         where = (middle - left) / max(right - left, 1e-300) if log else (middle / scale - low) / max(high - low, 1e-300)
@@ -81,7 +85,7 @@ def shade(figure: go.Figure, places: list[Mapping[str, Any]], ends: tuple[float,
         text = f"fails: {number(float(item['error_over_floor']), 3)} × floor"
         figure.add_annotation(
             text=text, x=float(middle), xref=_axis("x", at), y=1, yref=f"{_axis('y', at)} domain",
-            yanchor="top", yshift=-14 * (level % 3), xanchor=anchor, showarrow=False, font={"color": FAILS, "size": 11},
+            yanchor="top", yshift=-LINE * level, xanchor=anchor, showarrow=False, font={"color": FAILS, "size": 11},
             hovertext=str(item["sentence"]),
         )  # fmt: skip
 
@@ -102,9 +106,18 @@ def words(name: str) -> str:
     return name.replace("_", " ")
 
 
-def held_out_from(document: Document) -> float:
-    """s from which no fit has seen the data."""
-    return float(document["measured"]["time"]["held_out_from"])
+def shade_held_out(figure: go.Figure, document: Document, shown: Document, at: tuple[int, ...] = (1,)) -> None:
+    """Grey where no fit has seen the data. The first stretch is named, at the foot of the first row."""
+    time = document["measured"]["time"]
+    ahead = AHEAD in str(shown["label"])
+    spans = [(float(time["held_out_from"]), float(document["seconds"]))] if ahead else [(float(a), float(b)) for a, b in time["held_out"]]
+    for row_ in at:
+        for first, last in spans:
+            figure.add_vrect(x0=first, x1=last, fillcolor=fade(UNTRUSTED, 0.14), line_width=0, layer="below", row=row_, col=1)
+    if spans:
+        figure.add_annotation(
+            text="grey: held out", x=0, xref="x domain", y=0, yref="y domain", xanchor="left", yanchor="bottom", showarrow=False, font={"size": 11}
+        )
 
 
 def grey(size: int = 4) -> dict[str, Any]:

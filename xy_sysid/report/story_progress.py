@@ -10,16 +10,17 @@ import numpy as np
 import plotly.graph_objects as go
 
 from xy_sysid.report.parts import frequency_axis, plain, positive
-from xy_sysid.report.story_parts import Document, drawing, floor_line, nothing, pictured, ratio_axis, row, speed_unit, words
+from xy_sysid.report.story_parts import LINE, Document, drawing, floor_line, nothing, pictured, ratio_axis, row, speed_unit, words
 from xy_sysid.report.theme import AFTER, BEFORE, FLOOR, MODEL, UNTRUSTED, fade
 from xy_sysid.report.words import number, quantity
 
+LOWEST = 170  # px of the candidates: in less, the title of the axis has no room
 LEAST = 0.35  # of a decade to each side, so that a scale has two figures at least
 WIDE = 14  # letters of a line below a step of the ladder; one that runs over the edge is not drawn at all
 
 
 def ladder(document: Document, mode: str = "light") -> go.Figure:
-    """The errors of all steps as a falling staircase: training, held-out, and the noise floor that no model can pass."""
+    """The errors of all steps as a falling staircase: training, held-out, and the noise floor."""
     rungs = list(document["ladder"])
     if not rungs:
         return nothing(document["sentence"], mode)
@@ -114,7 +115,7 @@ def candidates(document: Document, mode: str = "light", most: int = 8) -> go.Fig
         return nothing("No candidate was tried: " + str(document["sentence"]), mode)
     scale, unit = speed_unit(document)
     chosen, runner = list(document["effects"]), (document["runner_up"] or {}).get("effect")
-    figure = drawing([1.0], 90 + 34 * len(tried), mode)
+    figure = drawing([1.0], max(90 + 34 * len(tried), LOWEST), mode)
     errors = [float(item["held_out_error"]) * scale for item in tried]
     colours = [
         MODEL
@@ -134,10 +135,20 @@ def candidates(document: Document, mode: str = "light", most: int = 8) -> go.Fig
         x=errors, y=[words(item["effect"]) for item in tried], orientation="h", marker={"color": colours}, text=figures, textposition=inside,
         insidetextanchor="end", cliponaxis=False, hovertext=[_evidence(item) for item in tried], hoverinfo="text", showlegend=False,
     )  # fmt: skip
-    for level, told, colour, dash, anchor in ((floor, "floor", FLOOR, "dot", "left"), (base, "none added", UNTRUSTED, "dash", "right")):
+    for at, (level, told, colour, dash, anchor) in enumerate(
+        ((floor, "floor", FLOOR, "dot", "left"), (base, "none added", UNTRUSTED, "dash", "right"))
+    ):
         figure.add_vline(x=level, line={"color": colour, "width": 1.5, "dash": dash}, row=1, col=1)
         figure.add_annotation(
-            text=told, x=level, y=1, yref="y domain", yanchor="bottom", xanchor=anchor, showarrow=False, font={"color": colour, "size": 11}
+            text=told,
+            x=level,
+            y=1,
+            yref="y domain",
+            yanchor="bottom",
+            yshift=LINE * at,
+            xanchor=anchor,
+            showarrow=False,
+            font={"color": colour, "size": 11},
         )
     figure.update_xaxes(title_text=f"held-out error ({plain(unit)})", range=[0, 1.04 * most_left], row=1, col=1)
     figure.update_yaxes(autorange="reversed", row=1, col=1)

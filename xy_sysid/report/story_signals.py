@@ -6,13 +6,13 @@ import numpy as np
 import plotly.graph_objects as go
 
 from xy_sysid.report.parts import plain
-from xy_sysid.report.story_parts import SMALL, Document, drawing, held_out_from, nothing, pictured, row, speed_unit
-from xy_sysid.report.theme import FAILS, MEASURED, MODEL, UNTRUSTED, fade
+from xy_sysid.report.story_parts import SMALL, Document, drawing, nothing, pictured, row, shade_held_out, speed_unit
+from xy_sysid.report.theme import FAILS, MEASURED, MODEL, fade
 from xy_sysid.units import readable
 
 
 def zoom(document: Document, step: int | None = None, mode: str = "light") -> go.Figure:
-    """Half a second around the base's largest error: velocity measured and simulated, and below their difference."""
+    """The moment around the base's largest error: velocity measured and simulated, and below their difference."""
     shown = pictured(document, step)
     if shown is None:
         return nothing(document["sentence"], mode)
@@ -50,7 +50,7 @@ def velocity(document: Document, step: int | None = None, mode: str = "light") -
             x=around, y=edge, mode="lines", line={"color": colour, "width": 0.8}, fill="toself",
             fillcolor=fade(colour, opacity), hoverinfo="skip", name=name, row=1, col=1,
         )  # fmt: skip
-    _held_out(figure, document)
+    shade_held_out(figure, document, shown)
     figure.update_xaxes(title_text="time (s)", row=1, col=1)
     figure.update_yaxes(title_text=f"velocity ({plain(unit)})", row=1, col=1)
     return figure
@@ -72,15 +72,7 @@ def position(document: Document, step: int | None = None, mode: str = "light") -
         x=time, y=row(shown["pictures"]["time"]["position"]) * scale, mode="lines", line={"color": MODEL, "width": 1.6, "dash": "dash"},
         name="simulated", row=1, col=1,
     )  # fmt: skip
-    _held_out(figure, document)
+    shade_held_out(figure, document, shown)
     figure.update_xaxes(title_text="time (s)", row=1, col=1)
     figure.update_yaxes(title_text=f"position ({plain(unit)})", row=1, col=1)
     return figure
-
-
-def _held_out(figure: go.Figure, document: Document) -> None:
-    start = held_out_from(document)
-    figure.add_vrect(x0=start, x1=float(document["seconds"]), fillcolor=fade(UNTRUSTED, 0.1), line_width=0, row=1, col=1)
-    figure.add_annotation(
-        text="held out", x=start, y=1, yref="y domain", xanchor="left", yanchor="top", showarrow=False, font={"size": 11}, row=1, col=1
-    )

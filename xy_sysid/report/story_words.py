@@ -7,17 +7,16 @@ from collections.abc import Mapping
 from typing import Any
 
 from xy_sysid.axis.model import Library
-from xy_sysid.report.story_parts import Document, words
+from xy_sysid.report.story_parts import AHEAD, Document, words
 from xy_sysid.report.tables import Table
 from xy_sysid.report.words import interval_text, number, quantity
 from xy_sysid.story.standing import nearer
 
 STANDARD_TOLERANCE = 1e-3
-AHEAD = "one sample ahead"  # in the label of a step whose error is not that of a free simulation
 
 LADDER = (
     "How the error falls as effects are added and everything is fitted again. Solid: the error on the data held out, which no fit has seen; "
-    "dashed: the error on the data of the fit; dotted: the noise floor, below which no model can come. A step at the floor has a tick."
+    "dashed: the error on the data of the fit; dotted: the noise floor (encoder noise and the tolerance of the laws). A step at the floor has a tick."
 )
 CANDIDATES = "What each effect leaves of the held-out error when it alone is added to the rigid model. Shorter is better."
 BEFORE_AFTER = (
@@ -33,7 +32,7 @@ AGAINST = (
 )
 LEFT = "What the last model leaves, over the noise floor, in the same pictures."
 SIGNALS = (
-    "Measured, and simulated from the input alone: half a second around the rigid model's worst moment, and the position over the whole "
+    "Measured, and simulated from the input alone: velocity around the rigid model's worst moment, and the position over the whole "
     "recording. The simulated position is integrated freely from the first sample, so small errors of speed add up to a drift."
 )
 CORRELATION = (
@@ -94,7 +93,7 @@ def size(story: Document, speed: float) -> str:
     text = f"{how} on the part of the recording held out, which no fit has seen, the model is off by {off} rms"
     if math.isfinite(speed) and speed > 0:
         text += f", {number(100 * float(last['held_out_error']) / speed, 2)} % of the speed itself"
-    text += f"; measurement noise alone makes {quantity(float(last['noise_floor']), unit, 3)}."
+    text += f"; the noise floor is {quantity(float(last['noise_floor']), unit, 3)}."
     if last["effects"]:
         times = float(first["held_out_error"]) / max(float(last["held_out_error"]), 1e-300)
         text += f" Without {' and '.join(words(name) for name in last['effects'])} it was off by {quantity(float(first['held_out_error']), unit, 3)}"

@@ -5,9 +5,11 @@ It knows what the figures of this package are made of: lines, markers, areas and
 
 from __future__ import annotations
 
+import functools
 import io
 import re
-from collections.abc import Mapping
+import tempfile
+from collections.abc import Mapping, Sequence
 from html import unescape
 from typing import TYPE_CHECKING, Any
 
@@ -27,21 +29,62 @@ DASHES = {"solid": "-", "dash": "--", "dot": ":", "dashdot": "-."}
 SYMBOLS = {"x-thin": "x", "circle-open": "o", "circle": "o", "diamond": "D"}
 RGBA = re.compile(r"rgba?\(([^)]*)\)")
 INK = "#24292f"
+SANS = "xy_sysid Sans"
+FAMILY = (1, 3, 4, 16)  # name records of a font that say its family
+LETTERS = (  # ranges of Unicode, the last not included; what is not among them comes from DejaVu Sans itself
+    (0x20, 0x180), (0x391, 0x3CA), (0x2010, 0x2040), (0x2070, 0x20A0), (0x2190, 0x2194), (0x2212, 0x2213), (0x221A, 0x221B), (0x2248, 0x2249),
+    (0x2264, 0x2266),
+)  # fmt: skip
 DECADES = 1.6  # of a logarithmic axis below which 2 and 5 are named, too
 
 
-def vectors(figure: go.Figure, kind: str) -> bytes:
-    """The figure as svg or pdf. Raises MissingExtra without Matplotlib."""
+def vectors(figure: go.Figure, kinds: Sequence[str]) -> dict[str, bytes]:
+    """The figure as svg, pdf or both, by kind: drawn once, written in each. Raises MissingExtra without Matplotlib."""
     try:
         import matplotlib as mpl
     except ModuleNotFoundError:
         raise MissingExtra("Matplotlib, which draws vectors,", "figures") from None
-    look: Any = {"svg.fonttype": "path", "pdf.fonttype": 42, "svg.hashsalt": "xy_sysid", "font.size": 8.5, "text.color": INK, "axes.labelcolor": INK}
+    look: Any = {
+        "font.family": [_font()[0], "DejaVu Sans"],
+        "svg.fonttype": "path",
+        "pdf.fonttype": 42,
+        "svg.hashsalt": "xy_sysid",
+        "font.size": 8.5,
+        "text.color": INK,
+        "axes.labelcolor": INK,
+    }
     with mpl.rc_context(look):
         drawn = _drawn(figure)
-        written = io.BytesIO()
-        drawn.savefig(written, format=kind, metadata={"Date" if kind == "svg" else "CreationDate": None})
-        return written.getvalue()
+        return {kind: _written(drawn, kind) for kind in kinds}
+
+
+@functools.cache
+def _font() -> tuple[str, tempfile.TemporaryDirectory[str]]:
+    """The family of a font that has only LETTERS of DejaVu Sans, and the folder that must stay while it is used.
+
+    A PDF holds the letters it needs: to find them among all of DejaVu Sans takes longer than to draw the figure.
+    """
+    from fontTools import subset
+    from matplotlib.font_manager import findfont, fontManager
+
+    options = subset.Options(hinting=False, layout_features=[], drop_tables=["FFTM", "GDEF", "GPOS", "GSUB", "gasp", "kern"], name_IDs=["*"])
+    font = subset.load_font(findfont("DejaVu Sans"), options)
+    cutter = subset.Subsetter(options)
+    cutter.populate(unicodes=[code for first, last in LETTERS for code in range(first, last)])
+    cutter.subset(font)
+    for name in font["name"].names:
+        if name.nameID in FAMILY:
+            name.string = SANS
+    folder = tempfile.TemporaryDirectory(prefix="xy_sysid_font_")
+    font.save(f"{folder.name}/sans.ttf")
+    fontManager.addfont(f"{folder.name}/sans.ttf")
+    return SANS, folder
+
+
+def _written(drawn: Figure, kind: str) -> bytes:
+    written = io.BytesIO()
+    drawn.savefig(written, format=kind, metadata={"Date" if kind == "svg" else "CreationDate": None})
+    return written.getvalue()
 
 
 def _drawn(figure: go.Figure) -> Figure:
@@ -179,6 +222,7 @@ def _scales(ax: Axes, layout: Any, name: str) -> None:
             if float(high) - float(low) < DECADES:
                 getattr(ax, f"{letter}axis").set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
             getattr(ax, f"{letter}axis").set_major_formatter("{x:g}")
+            getattr(ax, f"{letter}axis").set_minor_locator(LogLocator(subs=(2.0, 5.0)))
             getattr(ax, f"{letter}axis").set_minor_formatter("")
         if axis.range is not None:
             low, high = (10.0 ** float(end) if axis.type == "log" else float(end) for end in axis.range)

@@ -14,7 +14,8 @@ from xy_sysid.samples.recording import Run
 from xy_sysid.story.story import Story, added, begin, diagnosed, next_best, pruned, removed
 from xy_sysid.units import Units, bare, moved
 
-Act = Literal["begin", "diagnose", "effects", "add_next", "auto"]
+Act = Literal["begin", "diagnose", "renew", "effects", "add_next", "auto"]
+ANEW: tuple[Act, ...] = ("diagnose", "renew")  # acts that begin a story anew
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +23,8 @@ class Job:
     """What is to be done with one axis.
 
     act: ``begin`` fits the rigid model if there is no story yet, ``diagnose`` begins anew with these samples and then has ``effects`` in
-    the model, ``effects`` has them without asking what is missing, ``add_next`` adds the best one, ``auto`` all that help
+    the model, ``renew`` does so without asking what is missing, ``effects`` changes the effects and keeps the samples, ``add_next`` adds the
+    best one, ``auto`` all that help
     run: of the axis; story: so far, None to begin
     """
 
@@ -36,18 +38,18 @@ class Job:
 def perform(job: Job, library: Library, clock: Callable[[], float] = never) -> Iterator[tuple[str, Story | None]]:
     """(what is being done now, None), and (what was done, the story so far) after each step. Raises BadInput for a wrong effect."""
     run = job.run
-    story = None if job.act == "diagnose" else job.story
+    story = None if job.act in ANEW else job.story
     if story is None:
         yield "fitting the rigid model", None
         story = begin(run, library, job.tolerance)
         yield "the rigid model is fitted", story
     if not story.steps or job.act == "begin":
         return
-    if job.act != "effects" and story.diagnosis is None:
+    if job.act not in ("renew", "effects") and story.diagnosis is None:
         yield "looking for what is missing", None
         story = diagnosed(story, run, library, clock)
         yield "diagnosed", story
-    if job.act in ("diagnose", "effects"):
+    if job.act in ("diagnose", "renew", "effects"):
         for name in [name for name in story.effects if name not in job.effects]:
             yield f"taking {name} out", None
             story = removed(story, run, name, library)

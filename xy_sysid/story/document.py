@@ -107,7 +107,8 @@ def _measured(item: Measured) -> dict[str, Any]:
             "velocity_low": _row(item.velocity_low),
             "velocity_high": _row(item.velocity_high),
             "position": _row(item.position),
-            "held_out_from": item.held_out,
+            "held_out": [[first, last] for first, last in item.held_out],
+            "held_out_from": item.ahead,
         },
         "zoom": {
             "start": item.zoom_start,

@@ -6,6 +6,7 @@ simulated motion through the same windows as the measured one, so that friction 
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -41,7 +42,8 @@ class Measured:
     frequency: (m,) Hz, log-spaced; magnitude, magnitude_low, magnitude_high: dB (m/V) with 95 % band; phase...: degrees
     coherence: (m,); trusted: (m,) bool: excited and coherent
     time: (k,) s, middle of each bucket; velocity_low, velocity_high: (k,) m/s, least and most in it; position: (k,) m, mean
-    zoom_start: s; zoom_voltage, zoom_velocity: samples around the base's largest error; held_out: s from which no fit has seen
+    zoom_start: s; zoom_voltage, zoom_velocity: samples around the base's largest error
+    held_out: (from, to), s, of each stretch that no fit has seen, except fits that are judged one sample ahead; those see none from ahead on
     """
 
     frequency: FloatArray
@@ -57,7 +59,8 @@ class Measured:
     velocity_low: FloatArray
     velocity_high: FloatArray
     position: FloatArray
-    held_out: float
+    held_out: tuple[tuple[float, float], ...]
+    ahead: float
     zoom_start: float
     zoom_voltage: FloatArray
     zoom_velocity: FloatArray
@@ -127,7 +130,8 @@ def measured(data: AxisData, base: GreyboxFit) -> Measured:
         velocity_low=low,
         velocity_high=most,
         position=_means(data.position[:-1]),
-        held_out=data.training / data.sampling_rate,
+        held_out=_stretches(data),
+        ahead=data.training / data.sampling_rate,
         zoom_start=start / data.sampling_rate,
         zoom_voltage=data.voltage[start:stop].copy(),
         zoom_velocity=data.velocity[start:stop].copy(),
@@ -135,13 +139,15 @@ def measured(data: AxisData, base: GreyboxFit) -> Measured:
 
 
 def pictures(data: AxisData, fitted: GreyboxFit, shown: Measured) -> Pictures:
-    """The side of one fit."""
+    """The side of one fit. The error over the floor in bins has the ratio of the whole, held-out error over floor, in its mean power."""
     position = data.position[0] + np.concatenate(([0.0], np.cumsum(fitted.simulated))) / data.sampling_rate
     _, weight, point = _points(data)
     response = _mean_response(_response(data, position), weight, point)
     compared = _compared(data, fitted)
-    noise, end = max(compared.floor_below_end, 1e-300), compared.band_end
+    end = compared.band_end
     error, speed = (_below(values, end, data.sampling_rate) for values in (fitted.error, data.velocity))
+    unseen = np.arange(error.size) >= data.training if fitted.one_step else data.held_samples()
+    noise = max(_rms(error[unseen]) * compared.noise_floor / max(compared.error, 1e-300), 1e-300)
     time = np.asarray((np.arange(error.size) + 0.5) / data.sampling_rate, dtype=np.float64)
     known = np.isfinite(compared.error_over_floor)  # narrow bands may hold no line
     low, most = _extremes(fitted.simulated)
@@ -166,24 +172,23 @@ def pictures(data: AxisData, fitted: GreyboxFit, shown: Measured) -> Pictures:
 
 
 def _compared(data: AxisData, fitted: GreyboxFit) -> Comparison:
-    """On the samples that no fit saw; on all of them if those are few, and by bands alone if all are few.
+    """On the samples that no fit saw; by bands alone if those are few.
 
     A model that is judged one sample ahead fails where it is above what counts as explained there.
     """
-    for first in (data.training, 0):
-        try:
-            held = Unseen(
-                voltage=data.voltage[first:],
-                position=data.position[first:],
-                sampling_rate=data.sampling_rate,
-                units=data.units,
-                begins=first / data.sampling_rate,
-                encoder=data.floor.encoder,
-            )
-            found = compare_motion(fitted.simulated[first:], held)
-            return replace(found, places=tuple(place for place in found.places if not fitted.one_step or place.error_over_floor > AT_NOISE))
-        except BadInput:
-            continue
+    first = data.training if fitted.one_step else 0
+    unseen = Unseen(
+        voltage=data.voltage[first:],
+        position=data.position[first:],
+        sampling_rate=data.sampling_rate,
+        units=data.units,
+        begins=first / data.sampling_rate,
+        encoder=data.floor.encoder,
+        held=None if fitted.one_step else (data.held, data.floor),
+    )
+    with contextlib.suppress(BadInput):
+        found = compare_motion(fitted.simulated[first:], unseen)
+        return replace(found, places=tuple(place for place in found.places if not fitted.one_step or place.error_over_floor > AT_NOISE))
     edges = data.layout.edges()
     ratio = np.sqrt(fitted.power / np.maximum(data.floor.power, 1e-300))
     nothing = np.zeros(0)
@@ -193,15 +198,30 @@ def _compared(data: AxisData, fitted: GreyboxFit) -> Comparison:
         predicted=nothing,
         position=nothing,
         error=fitted.held_out_error,
-        noise_floor=fitted.noise_floor,
+        noise_floor=floor_of(data),
         error_below_end=fitted.held_out_error,
-        floor_below_end=data.layout.rms(data.floor.power),
+        floor_below_end=floor_of(data),
         band_end=float(edges[-1]),
         unit=data.units.speed,
         frequency=np.sqrt(np.maximum(edges[:-1], 0.5 * edges[1]) * edges[1:]),
         error_over_floor=ratio,
         places=(),
     )
+
+
+def floor_of(data: AxisData) -> float:
+    """The least error that a fit can be known to have, m/s rms: of the encoder's noise and of the part of the motion to which laws are trusted."""
+    return data.layout.rms(data.floor.power)
+
+
+def _stretches(data: AxisData) -> tuple[tuple[float, float], ...]:
+    """(from, to), s, of each stretch of samples that no fit has seen."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], data.held_samples().astype(np.int8), [0])))) / data.sampling_rate
+    return tuple((float(first), float(last)) for first, last in zip(edges[::2], edges[1::2], strict=True))
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2))) if values.size else 0.0
 
 
 def _correlation(data: AxisData, fitted: GreyboxFit) -> ResidualCorrelation | None:

@@ -1,0 +1,111 @@
+"""The first half minute of the demo in a real browser, frame by frame: nothing lies on anything else, and no card moves."""
+
+from __future__ import annotations
+
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+from helpers.browser_tools import Tab, browser, needs_browser
+from helpers.busy import allowed
+from helpers.cli_tools import bare
+from helpers.ros_tools import needs_ros, new_domain
+
+pytestmark = [needs_browser, needs_ros]
+
+EVERY = 250  # ms between two frames
+STILL = 6.0  # px that a card may move
+SLOW = 0.5  # times real time, so that the page is there long before the verdict on a busy machine, too
+SOON = 5.5  # s from 10 s of data to the verdict on the rigid model, on a quiet machine: 8 s from the first sample of the demo, which runs 4 times
+# faster than real time
+
+
+@dataclass
+class Frames:
+    """What was seen: words on each other, cards that moved, headline and sentence of each frame, and s since the first."""
+
+    tab: Tab
+    over: list[str] = field(default_factory=list)
+    moved: list[str] = field(default_factory=list)
+    said: list[tuple[float, str, str]] = field(default_factory=list)
+    begun: float = field(default_factory=time.monotonic)
+    first: dict[str, tuple[float, float]] = field(default_factory=dict)
+
+    def look(self) -> None:
+        """One frame."""
+        now = time.monotonic() - self.begun
+        self.said.append((now, self.tab.headline(), self.tab.verdict()))
+        self.over += [f"{now:.1f} s: {pair}" for pair in self.tab.over_each_other()]
+        for name, (left, top) in self.tab.places().items():
+            before = self.first.setdefault(name, (left, top))
+            if max(abs(left - before[0]), abs(top - before[1])) > STILL:
+                self.moved.append(f"{now:.1f} s: {name} from {before} to {(left, top)}")
+        self.tab.page.wait_for_timeout(EVERY)
+
+    def since(self, words: str) -> float:
+        """s of the first frame whose headline or sentence says so."""
+        return next(at for at, headline, sentence in self.said if words in headline or words in sentence)
+
+
+@pytest.fixture
+def chromium() -> Iterator[Any]:
+    """It is there before the demo begins, as a user's browser is."""
+    with browser() as made:
+        yield made
+
+
+@pytest.fixture
+def address(tmp_path: Path, chromium: Any) -> Iterator[str]:
+    environment = bare(ROS_DOMAIN_ID=str(new_domain()))
+    environment.pop("DISPLAY", None)
+    command = [sys.executable, "-m", "xy_sysid", "demo", "--page", "--port", "0", "--no-browser", "--speed", str(SLOW)]
+    log = (tmp_path / "log").open("w")
+    demo = subprocess.Popen(command, cwd=tmp_path, env=environment, text=True, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=log)
+    try:
+        assert demo.stdout is not None
+        found = re.search(r"http://\S+/", demo.stdout.readline())
+        assert found
+        yield found.group()
+    finally:
+        demo.send_signal(signal.SIGINT)
+        try:
+            demo.wait(60)
+        except subprocess.TimeoutExpired:
+            demo.kill()
+            demo.wait(5)
+
+
+@pytest.mark.parametrize("width", [1400, 400])
+def test_the_demo_begins_without_a_jump_and_says_what_is_awaited(address: str, chromium: Any, width: int) -> None:
+    """Every quarter of a second until the rigid model is drawn, and a while on: no two words lie on each other, each card stays where it was
+    first seen. It is said what is awaited, never to press what is disabled, and the verdict comes soon after the data that it needs."""
+    tab = Tab(chromium, address, width)
+    tab.until(lambda: tab.page.locator(".panel").count() == 1 and tab.places(), 30)
+    frames = Frames(tab)
+
+    def drawn() -> bool:
+        frames.look()
+        return tab.headline().startswith("Something is missing: ") and tab.over_floor() > 4 and bool(tab.ladder())
+
+    tab.until(drawn, 60, "no verdict on the rigid model")
+    for _ in range(12):
+        frames.look()
+    assert frames.over == [] and frames.moved == []
+    awaited = [sentence for _, headline, sentence in frames.said if not headline.startswith("Something is missing")]
+    assert awaited and all(re.search("not heard yet|Waiting|of data are here", sentence) for sentence in awaited), awaited
+    last = max(at for at, _, sentence in frames.said if re.search("of 10 s of data are here", sentence))
+    assert frames.since("Something is missing") - last < allowed(SOON)
+    used = tab.page.locator("[data-part=used]")
+    tab.until(lambda: "newer data have come" in str(used.text_content()), 30)
+    assert "Fitted to seconds " in str(used.text_content())
+    before = str(used.text_content()).partition(" of the data")[0]
+    tab.press_until("renew", lambda: not str(used.text_content()).startswith(before), 60, "the newest are not used")
+    assert tab.errors == []
+    tab.close()
