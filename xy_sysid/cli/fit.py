@@ -37,7 +37,7 @@ def fit(
 ) -> None:
     """Transfer function with delay of each axis, 95 % intervals, and whether it can be trusted."""
     from xy_sysid.files import linear_models
-    from xy_sysid.fitting.of_recording import estimate, split
+    from xy_sysid.fitting.of_recording import estimate, few_periods, split
     from xy_sysid.fitting.of_run import Method, fit_response
 
     settings = o.settings_from(params, set_)
@@ -47,6 +47,9 @@ def fit(
     way = Method(method, weighting, domain)
     way.structure(settings)  # refuses what makes no sense, before any work is done
     recording = read(recs, reading, json)
+    if len(recording) and few_periods(recording, held_out):
+        held_out = 0.0
+        aside.print("note: the input is there hardly more than twice, so nothing is held out for the check in time")
     training, unseen = split(recording, held_out)
 
     def work(name: str) -> tuple[AxisEstimate, Fit, Validation]:

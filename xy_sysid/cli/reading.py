@@ -110,10 +110,13 @@ def read(paths: Sequence[Path], reading: Reading, quiet: bool) -> Recording:
 
 
 def runs_of(recordings: Sequence[Recording], axis: str) -> tuple[Run, ...]:
-    """The longest run of an axis in each recording. Raises BadInput where these do not belong together."""
+    """The stretches of an axis in all recordings. Raises BadInput where these do not belong together, or hold one move only."""
     from xy_sysid.diagnosis.of_run import runs_together
+    from xy_sysid.samples.moves import several_moves
 
-    return runs_together([recording.run(axis) for recording in recordings])
+    runs = runs_together([run for recording in recordings for run in recording.stretches(axis)])
+    several_moves(runs)
+    return runs
 
 
 def named(paths: Sequence[Path]) -> str:

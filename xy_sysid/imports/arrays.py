@@ -40,7 +40,7 @@ RATES = ("fs", "samplingrate", "samplerate", "samplingfrequency", "samplefrequen
 PERIODS = ("ts", "dt", "samplingperiod", "sampleperiod", "samplingtime", "sampletime", "tsample", "samplinginterval", "sampleinterval")
 QUOTED = re.compile(r'"([^"]*)"')
 DULL = re.compile(r"Model Root|(In|Out)\d+", re.IGNORECASE)  # parts of a block's path that tell nothing
-VALUES, LABELS, UNITS = ("Data", "data", "values", "Values"), ("Name", "name", "label", "Label"), ("Unit", "unit", "Units", "units")
+VALUES, LABELS, UNITS = ("Data", "data", "values", "Values"), ("Name", "name", "label", "Label", "Path"), ("Unit", "unit", "Units", "units")
 
 
 def read_npz(path: Path) -> Arrays:
@@ -227,11 +227,11 @@ def _label(arrays: Arrays, name: str) -> str:
     place, _, last = name.rpartition(".")
     if last not in VALUES:
         return name
-    said = next((str(arrays[f"{place}.{one}"].ravel()[0]) for one in LABELS if f"{place}.{one}" in arrays and arrays[f"{place}.{one}"].size), "")
-    parts = [part for part in QUOTED.findall(said) or said.split("/") if part and not DULL.fullmatch(part)]
-    if parts:
-        twice = sum(str(value.ravel()[0]) == said for key, value in arrays.items() if key.rpartition(".")[2] in LABELS and value.size)
-        return parts[-1].strip().replace(".", " ") if twice == 1 else name
+    for label in LABELS:
+        said = str(arrays[f"{place}.{label}"].ravel()[0]) if f"{place}.{label}" in arrays and arrays[f"{place}.{label}"].size else ""
+        parts = [part for part in QUOTED.findall(said) or said.split("/") if part and not DULL.fullmatch(part)]
+        if parts and sum(str(value.ravel()[0]) == said for key, value in arrays.items() if key.rpartition(".")[2] == label and value.size) == 1:
+            return parts[-1].strip().replace(".", " ")
     if place.rpartition(".")[2] == "X":
         return "time"
     return name if place.endswith(")") else place or name

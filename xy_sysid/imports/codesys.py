@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from xy_sysid.errors import BadRecording
+from xy_sysid.imports.arrays import short
 from xy_sysid.imports.csv import text_of
 from xy_sysid.imports.sheet import Column, Sheet
 
@@ -43,4 +44,4 @@ def sheet(path: Path) -> Sheet:
     for place, rows in samples.items():
         numbers = np.array(rows)
         columns.append(Column(names.get(place, place), "", numbers[:, 1], clock=PER_SECOND * numbers[:, 0]))
-    return Sheet(path=path, columns=tuple(columns), kind="variable")
+    return Sheet(path=path, columns=tuple(short(columns)), kind="variable")

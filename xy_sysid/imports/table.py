@@ -13,6 +13,7 @@ from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.imports.clock import disagreements
 from xy_sysid.imports.even import even
 from xy_sysid.imports.foreign_units import Quantity
+from xy_sysid.imports.motion import wraps
 from xy_sysid.imports.paired_streams import LARGEST, cut, hollow, sane
 from xy_sysid.imports.reading import Reading
 from xy_sysid.samples.block import FloatArray
@@ -70,7 +71,7 @@ def recording(path: Path, table: Table, reading: Reading, notes: list[str]) -> R
     _same_length(path, table)
     time = _time(path, table, notes)
     columns = _whole(path, table, _columns(table.axes, reading.axes), notes)
-    rows = _finite(path, table, columns, time, notes)
+    rows = _unwrapped(table, _finite(path, table, columns, time, notes), notes)
     first = float(rows.time[0])
     rows, rate = _numbered(path, table, rows, notes)
     measured: Sensed = table.measured if table.measured in ("velocity", "acceleration") else "position"
@@ -124,6 +125,21 @@ def _finite(path: Path, table: Table, columns: list[int], time: FloatArray, note
     return rows
 
 
+def _unwrapped(table: Table, rows: _Rows, notes: list[str]) -> _Rows:
+    """An angle that is kept within a turn goes on where it leaps by one: between two samples of it nothing could be interpolated."""
+    if table.output_unit != "rad" or table.measured != "position":
+        return rows
+    turns = [wraps(column) for column in rows.position.T]
+    if not any(turns):
+        return rows
+    notes.append(f"the output leaps by a whole turn {sum(turns)} times, as an angle that wraps; it is unwrapped")
+    position = np.column_stack([np.unwrap(column) if count else column for column, count in zip(rows.position.T, turns, strict=True)])
+    reference = rows.reference
+    if reference is not None:
+        reference = reference + position - rows.position
+    return replace(rows, position=position, reference=reference)
+
+
 def _stretches(table: Table, time: FloatArray) -> FloatArray:
     """(n,) number of the stretch that each row belongs to: as the table says, or each time that the clock begins anew."""
     begins = np.zeros(len(time))
@@ -131,7 +147,7 @@ def _stretches(table: Table, time: FloatArray) -> FloatArray:
         starts = np.array([start for start in table.starts[1:] if start < len(time)], dtype=np.int64)
         np.add.at(begins, starts, 1.0)
     elif table.seq is None and len(time) > 1:
-        begins[1:][(np.diff(time) < 0) & (time[1:] <= float(time[0]) + 0.5 * abs(float(time[1] - time[0])))] = 1.0
+        begins[1:][(np.diff(time) < 0) & (time[1:] < float(time[0]) + 0.5 * abs(float(time[1] - time[0])))] = 1.0
     return np.asarray(np.cumsum(begins))
 
 

@@ -10,11 +10,11 @@ from xy_sysid.samples.block import FloatArray
 
 LIKENESS = 0.98  # correlation of the input with itself one period later; measured inputs carry a little noise
 OFF_WHOLE = 0.1  # of a sample that the true period may be off: windows then slip against it by less than half a sample in five
-FEWEST = 6  # periods that must be there, so that five are left to average after the transient
+FEWEST = 2  # periods that must be there: fewer do not repeat
 
 
 def find_period(u: FloatArray, shortest: int = 16) -> int | None:
-    """Period of a (n,) input in samples, or None if it does not repeat at least six times.
+    """Period of a (n,) input in samples, or None if it is not there twice.
 
     The first peak of the autocorrelation, checked and sharpened on the samples themselves.
     """
