@@ -219,7 +219,9 @@ def sheet_of(path: Path, arrays: Arrays) -> Sheet:
 def short(columns: list[Column]) -> list[Column]:
     """Without the names of structs or groups where that leaves no two alike."""
     last = [column.name.rpartition(".")[2] for column in columns]
-    return [replace(one, name=name if last.count(name) == 1 else one.name) for one, name in zip(columns, last, strict=True)]
+    return [
+        replace(one, name=name, full=one.name) if last.count(name) == 1 and name != one.name else one for one, name in zip(columns, last, strict=True)
+    ]
 
 
 def _label(arrays: Arrays, name: str) -> str:

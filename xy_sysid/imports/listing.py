@@ -11,7 +11,7 @@ import numpy as np
 from xy_sysid.bags.cdr import ARRAY_TYPE, JOINT_TYPE, Unreadable, array_layout, joint_layout
 from xy_sysid.bags.reading import Bag
 from xy_sysid.errors import XySysidError
-from xy_sysid.imports import arrays, format_of, load, roles, sheet_of
+from xy_sysid.imports import arrays, format_of, load, response_file, roles, sheet_of
 from xy_sysid.imports.reading import Reading
 from xy_sysid.imports.registry import BAG
 from xy_sysid.imports.sheet import Column, Sheet
@@ -58,6 +58,8 @@ def listing(path: Path) -> Listing:
         sheet = sheet_of(path, form)
         taken = _taken(sheet)
         found = tuple(_listed(column, taken.get(column.name, "")) for column in sheet.columns)
+        if form.kind == "response":
+            return _of_response(path, sheet)
     try:
         recording = load(path)
     except XySysidError as problem:
@@ -73,6 +75,19 @@ def listing(path: Path) -> Listing:
         problem="",
         notes=recording.notes,
     )
+
+
+def _of_response(path: Path, sheet: Sheet) -> Listing:
+    """Of a measured frequency response."""
+    roles_of = {column.name: role for role in response_file.NAMES if (column := response_file.column_of(sheet, role, Reading())) is not None}
+    found = tuple(_listed(column, roles_of.get(column.name, "")) for column in sheet.columns)
+    try:
+        measured = response_file.responses(path, sheet, Reading())
+    except XySysidError as problem:
+        return Listing(kind="response", columns=found, reads="", problem=str(problem), notes=())
+    said = [f"axis {name}, {len(one)} lines from {one.frequency[0]:.4g} to {one.frequency[-1]:.4g} Hz" for name, one in measured.items()]
+    notes = tuple(dict.fromkeys(note for one in measured.values() for note in one.origin.notes))
+    return Listing(kind="response", columns=found, reads=f"a measured frequency response: {'; '.join(said)}", problem="", notes=notes)
 
 
 def _taken(sheet: Sheet) -> Mapping[str, str]:

@@ -34,7 +34,9 @@ def on_one_clock(path: Path, roles: Roles, notes: list[str]) -> Roles:
         raise BadRecording(path, f"{', '.join(repr(column.name) for column in sides)} share no time", "Choose columns that were recorded together.")
     moved = [column.name for column in sides if not _same(column.clock, base.clock)]
     if moved:
-        notes.append(f"{', '.join(map(repr, moved))} and {base.name!r} have times of their own: values are held until the next, at those of {base.name!r}")
+        notes.append(
+            f"{', '.join(map(repr, moved))} and {base.name!r} have times of their own: values are held until the next, at those of {base.name!r}"
+        )
 
     def held(side: Found) -> Found:
         return {axis: _held(column, instants) for axis, column in side.items()}

@@ -13,8 +13,9 @@ from xy_sysid.errors import BadInput
 
 ROLES = ("time", "seq", "joint", "input", "output", "reference")
 OF_AN_AXIS = ("input", "output", "reference")
+OF_A_RESPONSE = ("frequency", "magnitude", "phase", "real", "imag", "coherence", "sigma")  # columns of a measured frequency response
 WHAT = "time, seq, joint, input, output, reference, or one axis's like x.input"
-PAIR = re.compile(r",(?=\s*[^,=]*?(?:time|seq|joint|input|output|reference)\s*=)", re.IGNORECASE)
+PAIR = re.compile(r",(?=\s*[^,=]*?(?:time|seq|joint|input|output|reference|frequency|magnitude|phase|real|imag|coherence|sigma)\s*=)", re.IGNORECASE)
 NUMBER = re.compile(r"[-+]?\d*\.?\d*(e[-+]?\d+)?", re.IGNORECASE)
 Value = TypeVar("Value")
 
@@ -56,7 +57,7 @@ class Reading:
             raise BadInput("rate", self.rate, "> 0 Hz", "Give the sampling rate in Hz.")
         for option, given in (("--map", self.columns), ("--unit", self.units), ("--scale", self.scales)):
             for what in given:
-                if what.rpartition(".")[2] not in (OF_AN_AXIS if "." in what else ROLES):
+                if what.rpartition(".")[2] not in (OF_AN_AXIS if "." in what else (*ROLES, *OF_A_RESPONSE)):
                     raise BadInput(option, repr(what), WHAT, f"Write for example {option} x.output=...")
         for what, unit in self.units.items():
             if NUMBER.fullmatch(unit.strip()) and unit.strip() != "1":  # 1 is a part of full scale

@@ -27,6 +27,7 @@ class Column:
 
     clock:  (n,) s, the instants of these values where the column has a time of its own
     starts: rows at which a stretch begins that does not follow the one before
+    full:   its name with those of its structs or groups, where ``name`` is without them
     """
 
     name: str
@@ -35,6 +36,7 @@ class Column:
     words: tuple[str, ...] = ()
     clock: FloatArray | None = None
     starts: tuple[int, ...] = ()
+    full: str = ""
 
     @property
     def step(self) -> float:
@@ -70,7 +72,7 @@ class Sheet:
     def find(self, name: str) -> Column:
         """The column of that name, in this spelling or another (case, blanks, signs), or of that number (1 is the first)."""
         for same in (lambda one: one == name, lambda one: one.casefold() == name.casefold(), lambda one: spoken(one) == spoken(name) != ()):
-            found = [column for column in self.columns if same(column.name)]
+            found = [column for column in self.columns if same(column.name) or (column.full and same(column.full))]
             if len(found) > 1:
                 raise BadRecording(self.path, f"the {self.kind} {name!r} is there twice", "Give every column its own name.")
             if found:
