@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from helpers.table_making import RATE, T, U, Y
 
 from xy_sysid.errors import MissingExtra, XySysidError
 from xy_sysid.imports import load
-from xy_sysid.imports.registry import FORMATS
+from xy_sysid.imports.registry import FORMATS, Format
 
 FAST = np.repeat(U, 2)  # the input, at twice the rate of the output
 
@@ -129,7 +130,7 @@ def as_parquet(path: Path) -> Path:
         (as_parquet, {"columns": {"input": "action[0]", "output": "observation.state[0]"}, "units": {"input": "V", "output": "rad"}}),
     ],
 )
-def test_what_a_library_wrote_is_read(tmp_path: Path, make: Callable[[Path], Path], options: dict[str, dict[str, str]]) -> None:
+def test_what_a_library_wrote_is_read(tmp_path: Path, make: Callable[[Path], Path], options: dict[str, Any]) -> None:
     """Input, output, units and instants come back; channels of other rates are held to the output's clock, and it is said."""
     found = load(make(tmp_path), **options)
     assert found.sampling_rate == pytest.approx(RATE, rel=1e-6) and (found.input_unit, found.output_unit) == ("V", "rad")
@@ -140,9 +141,9 @@ def test_what_a_library_wrote_is_read(tmp_path: Path, make: Callable[[Path], Pat
 
 
 @pytest.mark.parametrize("form", [form for form in FORMATS if form.extra], ids=lambda form: form.extra)
-def test_a_library_that_is_missing_is_one_line_that_names_the_extra(tmp_path: Path, form: object, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_library_that_is_missing_is_one_line_that_names_the_extra(tmp_path: Path, form: Format, monkeypatch: pytest.MonkeyPatch) -> None:
     """What to install stands in the line, and exists in setup.py; damaged files end in one line, too."""
-    ending, extra = form.endings[0], form.extra  # type: ignore[attr-defined]
+    ending, extra = form.endings[0], form.extra
     path = tmp_path / f"a{ending}"
     path.write_bytes(b"MATLAB 7.3 MAT-file" if extra == "mat73" else b"no such thing")
     with pytest.raises(XySysidError):

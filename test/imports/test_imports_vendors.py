@@ -12,7 +12,7 @@ from helpers.real_data import data
 from helpers.table_making import RATE, T, U, Y
 
 from xy_sysid.errors import BadInput, BadRecording
-from xy_sysid.imports import load
+from xy_sysid.imports import Reading, load
 from xy_sysid.imports.listing import listing
 from xy_sysid.imports.several import read_all
 
@@ -68,8 +68,8 @@ def test_a_codesys_trace_is_read(tmp_path: Path) -> None:
 
 def test_the_ctrlx_step_test_gives_its_gain() -> None:
     """1.075 rpm for each per cent, as its authors found."""
-    reading = {"columns": {"input": "HMI_SP_Local_Automatico", "output": "Velocidad_Scaled"}, "units": {"input": "%", "output": "rpm"}}
-    found = load(data("vendor_exports/ctrlx_step.trace.csv"), **reading)
+    columns = {"input": "HMI_SP_Local_Automatico", "output": "Velocidad_Scaled"}
+    found = load(data("vendor_exports/ctrlx_step.trace.csv"), columns=columns, units={"input": "%", "output": "rpm"})
     speed = np.diff(found.position[:, 0]) * found.sampling_rate * 60 / (2 * np.pi)
     low, high = (found.voltage[:-1, 0] == level for level in (0.25, 0.5))
     gain = float(np.median(speed[high]) - np.median(speed[low])) / 25.0
@@ -135,13 +135,13 @@ def test_input_and_output_in_two_files_are_joined_by_row_or_by_time(tmp_path: Pa
     one, other = tmp_path / "u.csv", tmp_path / "y.csv"
     np.savetxt(one, U)
     np.savetxt(other, Y)
-    options = {"columns": {"input": "u.csv:1", "output": "y.csv:1"}, "rate": RATE}
-    found = load(one, **options)
+    reading = Reading(columns={"input": "u.csv:1", "output": "y.csv:1"}, rate=RATE)
+    found = load(one, reading)
     assert np.array_equal(found.voltage[:, 0], U) and np.array_equal(found.position[:, 0], Y)
     assert any(note == "u.csv and y.csv are joined row by row" for note in found.notes)
     np.savetxt(other, Y[:-5])
     with pytest.raises(BadRecording, match="different numbers of rows"):
-        load(one, **options)
+        load(one, reading)
     for path, name, t, values in ((one, "motor", np.arange(2 * len(T)) / (2 * RATE), np.repeat(U, 2)), (other, "angle", T, Y)):
         np.savetxt(path, np.column_stack((t, values)), delimiter=",", header=f"time,{name}", comments="")
     by_time = load(one, columns={"input": "u.csv:motor", "output": "y.csv:angle"}, units={"output": "rad"})
@@ -189,6 +189,6 @@ def test_a_note_about_all_recordings_is_said_once(tmp_path: Path) -> None:
         paths.append(tmp_path / f"part{number}.csv")
         names = "time,motor_voltage,position" if number else "time,motor_voltage,position [mm]"
         np.savetxt(paths[-1], np.column_stack((T, U, Y)), delimiter=",", header=names, comments="")
-    notes = [note for one in read_all(paths, load.__globals__["Reading"]()) for note in one.notes]
+    notes = [note for one in read_all(paths, Reading()) for note in one.notes]
     assert sum("by their names" in note for note in notes) == 1 and any(note.startswith("all 6 recordings: by their names") for note in notes)
     assert any(note.startswith(f"{paths[0]}: ") and "mm" in note for note in notes)

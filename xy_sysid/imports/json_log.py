@@ -31,7 +31,7 @@ def sheet(path: Path) -> Sheet:
         raise BadRecording(path, "not a text file", "Save it as JSON in UTF-8.") from None
     except (ValueError, RecursionError) as error:
         raise BadRecording(path, f"not readable as JSON ({str(error)[:100]})", COPY) from None
-    columns = []
+    columns: list[Column] = []
     for name, values, starts in _columns("", document, 0):
         if len(columns) >= MOST_COLUMNS:
             raise BadRecording(path, f"more than {MOST_COLUMNS} arrays", "Store the signals alone.")

@@ -37,8 +37,8 @@ def of_several_files(path: Path, reading: Reading, notes: list[str]) -> tuple[Sh
     files = " and ".join(file.name for file in used)
     rows = {file.name: len(sheets[file].find(name).values) for file, name in chosen.values()}
     if not by_time and len(set(rows.values())) > 1:
-        told = ", ".join(f"{name} {count}" for name, count in rows.items())
-        raise BadRecording(path, f"the files have different numbers of rows ({told}) and not all have a time", "Cut them to the same samples.")
+        counts = ", ".join(f"{name} {count}" for name, count in rows.items())
+        raise BadRecording(path, f"the files have different numbers of rows ({counts}) and not all have a time", "Cut them to the same samples.")
     notes.append(f"{files} are joined {'by their times' if by_time else 'row by row'}")
     rate = next((sheets[file].fs for file in used if sheets[file].fs is not None), None)
     told = dict(zip(chosen, (column.name for column in columns), strict=True))
