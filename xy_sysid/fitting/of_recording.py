@@ -16,7 +16,7 @@ from xy_sysid.response.closed_loop import joint_input_output, loop_spectra
 from xy_sysid.response.frf import FrequencyResponse
 from xy_sysid.response.friction_hint import friction_hint, friction_note
 from xy_sysid.response.h1 import H1Options, frequency_response
-from xy_sysid.response.period import FEWEST, find_period, period_note
+from xy_sysid.response.period import FEWEST, find_half_period, find_period, half_periods, one_more, period_note
 from xy_sysid.response.window_check import stretches
 from xy_sysid.response.windows import WindowShape
 from xy_sysid.samples.block import FloatArray
@@ -25,6 +25,7 @@ from xy_sysid.samples.recording import Recording
 from xy_sysid.settings import IdentifierSettings
 
 HARDLY = 4.0  # standard deviations of the number of lines that chance makes coherent (neighbours are alike, hence the 2)
+HALVES = "The input repeats with the other sign every {half} samples ({seconds:.6g} s), half its period: windows of one period, made of each half and its negative."
 JOINT = "Closed loop: the joint input-output method, with the reference as instrument."
 FIXED = ("nllsfdi",)  # estimators of the paper's own structure: orders that are not asked for are 2/4
 WINDOWS, SHORTEST = 3, 16  # windows, side by side, that a record holds at least, and samples of the shortest
@@ -64,18 +65,27 @@ def estimate(recording: Recording, axis: str, settings: IdentifierSettings, peri
     runs = recording.runs()
     longest = recording.run(axis).rows
     notes: list[str] = []
+    half = None
     if period == 0:
         period = find_period(repeats[longest])
+        half = find_half_period(u[longest]) if period is None and r is None and settings.differenced else None
     elif period:
         notes += period_note(repeats[longest], period)
-    if period:
+    if half:
+        settings, period = replace_settings(settings, window="boxcar", length=2 * half, overlap=0.0), 2 * half
+        notes.append(HALVES.format(half=half, seconds=half / recording.sampling_rate))
+    elif period:
         settings, runs = _periodic(settings, runs, period, notes, recording.sampling_rate, "input" if r is None else "reference")
     else:
         settings = _fitting(settings, runs, notes)
-    _possible(settings, recording.sampling_rate, _samples(longest))
+    _possible(settings, recording.sampling_rate, _samples(longest) + (half or 0) + bool(period))
     shape = WindowShape.of(settings.window, settings.length, settings.overlap)
     grid = 0 if period or not _fits(recording, runs, shape, settings.differenced) else 1
     pieces = [(grid * int(recording.seq[run][0]), u[run], y[run]) for run in runs]
+    if half:
+        pieces = half_periods(u[longest], y[longest], half)
+    elif period and r is None and settings.differenced:
+        pieces = [(seq, *one_more(inputs, outputs, period)) for seq, inputs, outputs in pieces]
     frozen = max(round(settings.frozen * recording.sampling_rate), 2)
     kept, left_out = stretches(pieces, shape, settings.differenced, frozen)
     notes += left_out
@@ -257,7 +267,8 @@ def split(recording: Recording, held_out: float) -> tuple[Recording, Recording]:
 def few_periods(recording: Recording, held_out: float) -> bool:
     """Whether the input repeats itself so few times that without the part held out it would not be there twice."""
     rows = len(recording) - round(held_out * len(recording))
-    periods = [find_period(recording.run(axis).voltage) for axis in recording.axes]
+    inputs = [recording.run(axis).voltage for axis in recording.axes]
+    periods = [find_period(values) or find_half_period(values) for values in inputs]
     return any(period is not None and FEWEST * period > rows for period in periods)
 
 
