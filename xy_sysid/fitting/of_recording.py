@@ -25,7 +25,10 @@ from xy_sysid.samples.recording import Recording
 from xy_sysid.settings import IdentifierSettings
 
 HARDLY = 4.0  # standard deviations of the number of lines that chance makes coherent (neighbours are alike, hence the 2)
-HALVES = "The input repeats with the other sign every {half} samples ({seconds:.6g} s), half its period: windows of one period, made of each half and its negative."
+HALVES = (
+    "The input repeats with the other sign every {half} samples ({seconds:.6g} s), half its period: "
+    "windows of one period, made of each half and its negative."
+)
 JOINT = "Closed loop: the joint input-output method, with the reference as instrument."
 FIXED = ("nllsfdi",)  # estimators of the paper's own structure: orders that are not asked for are 2/4
 WINDOWS, SHORTEST = 3, 16  # windows, side by side, that a record holds at least, and samples of the shortest
