@@ -18,7 +18,7 @@ from xy_sysid.samples.recording import Recording
 from xy_sysid.settings import IdentifierSettings
 
 RATE = 500.0
-PLANT = signal.cont2discrete(([1.0], [1.0, 20.0, 0.0]), 1 / RATE)
+PLANT = signal.cont2discrete((np.array([1.0]), np.array([1.0, 20.0, 0.0])), 1 / RATE)
 
 
 def answer(u: FloatArray) -> FloatArray:

@@ -23,10 +23,10 @@ def as_mat73(path: Path) -> Path:
     """As MATLAB lays it out: arrays turned, text as numbers, a struct as a group, an array of structs as references."""
     h5py = pytest.importorskip("h5py")
 
-    def stored(group: object, name: str, values: object) -> object:
+    def stored(group: Any, name: str, values: Any) -> Any:
         text = isinstance(values, str)
         numbers = np.array([[ord(sign)] for sign in values], np.uint16) if isinstance(values, str) else np.atleast_2d(np.asarray(values)).T
-        made = group.create_dataset(name, data=numbers)  # type: ignore[attr-defined]
+        made = group.create_dataset(name, data=numbers)
         made.attrs["MATLAB_class"] = np.bytes_("char" if text else "double")
         return made
 
@@ -37,7 +37,7 @@ def as_mat73(path: Path) -> Path:
         stored(x, "Data", T)
         for field, both in (("Name", ("Model Root/u_motor", "Model Root/angle")), ("Unit", ("V", "deg")), ("Data", (U, np.rad2deg(Y)))):
             parts = [stored(hidden, f"{field}{number}", one) for number, one in enumerate(both)]
-            y.create_dataset(field, data=np.array([[part.ref] for part in parts], dtype=h5py.ref_dtype))  # type: ignore[attr-defined]
+            y.create_dataset(field, data=np.array([[part.ref] for part in parts], dtype=h5py.ref_dtype))
     whole = (path / "a.mat").read_bytes()
     (path / "a.mat").write_bytes(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + struct.pack("<HH", 0x0200, 0x4D49) + whole[128:])
     return path / "a.mat"

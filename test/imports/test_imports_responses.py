@@ -76,12 +76,13 @@ def test_a_response_from_a_file_is_fitted_and_exported(tmp_path: Path) -> None:
 
 def test_a_response_from_arrays_is_fitted_and_drawn() -> None:
     """With a sigma of one's own or without; the truth lies in the intervals; the picture is made."""
-    for known in ({}, {"sigma": 0.01 * abs(H)}):
-        response = xy.frf_from(F, H, axis="x", units=("V", "rad"), **known)
+    for sigma in (None, 0.01 * abs(H)):
+        response = xy.frf_from(F, H, axis="x", units={"input": "V", "output": "rad"}, sigma=sigma)
+        assert (response.input_unit, response.output_unit) == ("V", "rad")
         model = xy.fit(response)
         (found,) = [one for one in model.intervals_with_misfit if one.name == "resonance_1.frequency"]
         assert found.low < RESONANCE < found.high and found.high - found.low < 2.0 and model.ok
-        assert response._repr_html_()
+        assert xy.plot.bode(response, model) is not None
 
 
 def test_coherence_gives_the_uncertainty_with_its_averages() -> None:
@@ -125,18 +126,20 @@ def test_columns_without_names_are_said(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("frequency", "response", "known", "says"),
+    ("frequency", "response", "sigma", "says"),
     [
-        (F, H[:-1], {}, "250 frequencies and 249 values"),
-        (F[:5], H[:5], {}, "8 or more"),
-        (F, H, {"sigma": np.ones(3)}, "of 3 lines"),
-        (F, np.full(F.size, np.nan), {}, "0 lines"),
+        (F, H[:-1], None, "250 frequencies and 249 values"),
+        (F[:5], H[:5], None, "8 or more"),
+        (F, H, np.ones(3), "of 3 lines"),
+        (F, np.full(F.size, np.nan), None, "0 lines"),
     ],
 )
-def test_arrays_that_are_no_response_are_one_line(frequency: np.ndarray, response: np.ndarray, known: dict[str, np.ndarray], says: str) -> None:
-    """Lengths that differ, too few lines, no numbers."""
+def test_arrays_that_are_no_response_are_one_line(frequency: np.ndarray, response: np.ndarray, sigma: np.ndarray | None, says: str) -> None:
+    """Lengths that differ, too few lines, no numbers; and a name that is not known."""
     with pytest.raises(xy.BadInput, match=says):
-        xy.frf_from(frequency, response, **known)
+        xy.frf_from(frequency, response, sigma=sigma)
+    with pytest.raises(xy.BadInput, match="coherence"):
+        xy.frf_from(F, H, coherense=np.ones(F.size))
 
 
 @pytest.mark.parametrize(("name", "orders"), [("G_I_PI_300_DP.csv", 1), ("G_I_PID_300_DP.csv", 1), ("G_I_PID_300_AP.dat", 1)])

@@ -41,17 +41,17 @@ def leaves(path: Path, reader: str, extra: str = "") -> list[Leaf]:
     except subprocess.TimeoutExpired:
         raise BadRecording(path, f"not read as {path.suffix} within {LONGEST:.0f} s", COPY) from None
     line, _, data = done.stdout.partition(b"\n")
+    why = (done.stderr.decode("utf-8", "replace").strip().splitlines() or [""])[-1]
+    if done.returncode == 1 and why:  # what the library raised
+        raise BadRecording(path, f"not readable as {path.suffix} ({why[:120]})", COPY)
     if done.returncode != 0 or not line:
         how = f"signal {-done.returncode}" if done.returncode < 0 else f"exit code {done.returncode}"
-        why = done.stderr.decode("utf-8", "replace").strip().splitlines()[-1:] or [how]
-        raise BadRecording(path, f"not readable as {path.suffix}: the reader's own process died of it ({how}; {why[0][:100]})", COPY)
+        raise BadRecording(path, f"not readable as {path.suffix}: the reader's own process died of it ({how}; {(why or how)[:100]})", COPY)
     told = json.loads(line)
     if "missing" in told:
         raise MissingExtra(f"{told['missing']}, which reads {path.name},", extra)
     if "size" in told:
         fits(path, max(float(told["size"]), room() + 1.0))
-    if "problem" in told:
-        raise BadRecording(path, f"not readable as {path.suffix} ({told['problem']})", COPY)
     return list(_unpacked(told["leaves"], data))
 
 

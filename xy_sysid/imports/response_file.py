@@ -6,8 +6,8 @@ magnitude is in dB, the phase does: of a minimum-phase system it is 90 degrees f
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +18,10 @@ from xy_sysid.imports import csv
 from xy_sysid.imports.reading import Reading
 from xy_sysid.imports.sheet import Column, Sheet, spoken
 from xy_sysid.response.frf import FrequencyResponse
-from xy_sysid.response.given import given_response
+from xy_sysid.response.given import Known, given_response
 from xy_sysid.samples.block import FloatArray
+from xy_sysid.samples.recording import Origin
+from xy_sysid.settings import unknown_name
 
 NAMES: Mapping[str, str] = {
     "frequency": "frequency freq f omega w hz",
@@ -34,15 +36,6 @@ RADIAN = ("rad/s", "1/s", "rad/sec")  # units of an angular frequency
 TURN = 2 * np.pi
 JUMP = 0.5  # rad; a phase whose usual step from line to line is more, once turns are taken off, is no smooth one
 EXAMPLE = "Name them with --map frequency=1,magnitude=2,phase=3, or real= and imag= (see xy-sysid columns FILE)."
-
-
-@dataclass(frozen=True, slots=True)
-class Meant:
-    """Arrays of a response, in Hz and complex, and what was understood."""
-
-    frequency: FloatArray
-    response: Any
-    notes: tuple[str, ...]
 
 
 def sheet(path: Path) -> Sheet:
@@ -73,12 +66,18 @@ def frf_from(
     """A frequency response that was measured elsewhere, for ``fit``, ``plot`` and all that needs no samples.
 
     source:   a file, or (m,) frequencies in Hz with ``response``, (m,) complex
-    axis:     of a file of several; columns, units: of a file, as ``--map`` and ``--unit`` say them: {"frequency": "1"}, {"phase": "deg"}
-    known:    of arrays: sigma, coherence, averages, units of input and output, sampling_rate; see ``response.given.given_response``
+    axis:     its name, of a file of several the one to take; units: {"input": "V", "output": "rad"}, of a file also {"phase": "deg"}
+    columns:  of a file, as ``--map`` says them: {"frequency": "1", "magnitude": "2", "phase": "3"}
+    known:    of arrays: sigma, (m,) standard deviation of the complex error; coherence, (m,), with its averages; sampling_rate, Hz
     What was understood is in ``origin.notes``. Raises BadInput or BadRecording.
     """
     if not isinstance(source, str | Path):
-        return given_response(source, response, axis=axis or "", **known)
+        names = [field.name for field in dataclasses.fields(Known)]
+        for name in known:
+            if name not in names:
+                raise unknown_name(name, names, "frf_from")
+        told = units or {}
+        return given_response(source, response, Known(**known), (told.get("input", "in"), told.get("output", "out")), Origin(axis=axis or ""))
     from xy_sysid.imports.registry import format_of, sheet_of
 
     path = Path(source)
@@ -129,16 +128,9 @@ def _response(columns: Mapping[str, Column], rows: Any, axis: str, reading: Read
         phase = _radians(columns["phase"], values["phase"], reading, notes)
         size = _linear(columns["magnitude"], (frequency, values["magnitude"], phase), reading, notes)
         response = size * np.exp(1j * phase)
-    return given_response(
-        frequency,
-        response,
-        sigma=values.get("sigma"),
-        coherence=values.get("coherence"),
-        units=(reading.unit("input", axis) or "in", reading.unit("output", axis) or "out"),
-        sampling_rate=reading.rate,
-        axis=axis,
-        notes=tuple(notes),
-    )
+    known = Known(sigma=values.get("sigma"), coherence=values.get("coherence"), sampling_rate=reading.rate)
+    units = reading.unit("input", axis) or "in", reading.unit("output", axis) or "out"
+    return given_response(frequency, response, known, units, Origin(axis=axis, notes=tuple(notes)))
 
 
 def _hertz(column: Column, values: FloatArray, reading: Reading, notes: list[str]) -> FloatArray:

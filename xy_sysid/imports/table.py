@@ -63,7 +63,8 @@ class _Rows:
     def only(self, rows: NDArray[np.bool_] | slice) -> _Rows:
         """Some of them."""
         reference = None if self.reference is None else self.reference[rows]
-        return _Rows(self.time[rows], self.seq[rows], self.voltage[rows], self.position[rows], reference, self.stretch[rows])
+        kept = {name: getattr(self, name)[rows] for name in ("time", "seq", "voltage", "position", "stretch")}
+        return _Rows(**kept, reference=reference)
 
 
 def recording(path: Path, table: Table, reading: Reading, notes: list[str]) -> Recording:
@@ -119,7 +120,7 @@ def _finite(path: Path, table: Table, columns: list[int], time: FloatArray, note
     left_out = int(np.sum(keep & ~finite))
     if left_out:
         notes.append(f"{left_out} rows are not numbers; they are left out")
-    rows = _Rows(time, seq, voltage, position, reference, _stretches(table, time)).only(finite)
+    rows = _Rows(time=time, seq=seq, voltage=voltage, position=position, reference=reference, stretch=_stretches(table, time)).only(finite)
     if len(rows.time) < 2:
         raise BadRecording(path, f"{len(rows.time)} samples", "A recording needs 2 or more; record for longer.")
     return rows
@@ -183,7 +184,9 @@ def _by_time(path: Path, rows: _Rows, notes: list[str]) -> tuple[_Rows, float]:
     smooth = (rows.position,) if rows.reference is None else (rows.position, rows.reference)
     found = even(path, time, rows.voltage, smooth, notes)
     reference = None if rows.reference is None else found.values[2]
-    return _Rows(found.time, found.seq, found.values[0], found.values[1], reference, np.zeros(len(found.seq))), found.rate
+    whole = np.zeros(len(found.seq))
+    voltage, position = found.values[:2]
+    return _Rows(time=found.time, seq=found.seq, voltage=voltage, position=position, reference=reference, stretch=whole), found.rate
 
 
 def _each_once(path: Path, table: Table, rows: _Rows, notes: list[str]) -> _Rows:

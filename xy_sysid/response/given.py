@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,30 +18,36 @@ KNOWN = 100.0  # averages that a sigma which was given counts as: it is known to
 SMALLEST = 1e-6  # of the response: no line is more exact than what files keep
 
 
+@dataclass(frozen=True, slots=True)
+class Known:
+    """What is known of a response beside its values.
+
+    sigma: (m,) standard deviation of the complex error; coherence: (m,) 0..1; averages: independent averages behind the coherence
+    sampling_rate: Hz, twice the highest line if it is not known
+    """
+
+    sigma: Any = None
+    coherence: Any = None
+    averages: float | None = None
+    sampling_rate: float | None = None
+
+
 def given_response(
-    frequency: Any,
-    response: Any,
-    *,
-    sigma: Any = None,
-    coherence: Any = None,
-    averages: float | None = None,
-    units: tuple[str, str] = ("in", "out"),
-    sampling_rate: float | None = None,
-    axis: str = "",
-    notes: tuple[str, ...] = (),
+    frequency: Any, response: Any, known: Known, units: tuple[str, str] = ("in", "out"), origin: Origin | None = None
 ) -> FrequencyResponse:
     """A frequency response from arrays.
 
-    frequency: (m,) Hz; response: (m,) complex; sigma: (m,) standard deviation of the complex error; coherence: (m,) 0..1
-    averages:  independent averages behind a coherence; units: of input and output; sampling_rate: Hz, twice the highest line if not known
+    frequency: (m,) Hz; response: (m,) complex; units: of input and output; origin: axis and notes
     Without sigma, and without a coherence with its averages, sigma is the scatter of each line about its neighbours.
     Raises BadInput for arrays that do not fit together or are too short.
     """
+    origin = origin or Origin()
     f = np.asarray(frequency, dtype=np.float64).ravel()
     h = np.asarray(response, dtype=np.complex128).ravel()
     if f.shape != h.shape:
         raise BadInput("frequency response", f"{f.size} frequencies and {h.size} values", "one value for each frequency", "Give both alike.")
-    told = {name: np.asarray(values, dtype=np.float64).ravel() for name, values in (("sigma", sigma), ("coherence", coherence)) if values is not None}
+    given = {"sigma": known.sigma, "coherence": known.coherence}
+    told = {name: np.asarray(values, dtype=np.float64).ravel() for name, values in given.items() if values is not None}
     for name, values in told.items():
         if values.shape != f.shape:
             raise BadInput(name, f"of {values.size} lines", f"{f.size}, one for each frequency", "Give one value for each frequency.")
@@ -51,19 +58,19 @@ def given_response(
         raise BadInput("frequency response", f"{order.size} lines with a frequency above 0 and a value", f"{FEWEST} or more", "Measure more lines.")
     f, h = f[order], h[order]
     told = {name: values[order] for name, values in told.items()}
-    error, counted, said = _sigma(f, h, told, averages)
+    error, counted, said = _sigma(f, h, told, known.averages)
     return FrequencyResponse(
         frequency=f,
         response=h,
         coherence=np.clip(told["coherence"], 0.0, 1.0) if "coherence" in told else np.ones(f.size),
         sigma=np.maximum(error, SMALLEST * np.abs(h)),
         trusted=np.isfinite(error),
-        sampling_rate=float(sampling_rate) if sampling_rate else 2.0 * float(f[-1]),
+        sampling_rate=float(known.sampling_rate) if known.sampling_rate else 2.0 * float(f[-1]),
         averages=counted,
         resolution=0.0,
         input_unit=units[0],
         output_unit=units[1],
-        origin=Origin(axis=axis, notes=(*notes, said)),
+        origin=replace(origin, notes=(*origin.notes, said)),
     )
 
 

@@ -38,7 +38,8 @@ def leaves(path: str) -> Iterator[tuple[str, Any, str, str]]:
 
 def _getter(kind: str, record: Any) -> Callable[[], Any] | None:
     getters = {"double": "Double", "float": "Float", "int64": "Integer", "boolean": "Boolean"}
-    if kind in getters:
-        return getattr(record, f"get{getters[kind]}")  # type: ignore[no-any-return]
     of = getters.get(kind.removesuffix("[]"))
-    return getattr(record, f"get{of}Array") if of else None
+    if of is None:
+        return None
+    found: Callable[[], Any] = getattr(record, f"get{of}Array" if kind.endswith("[]") else f"get{of}")
+    return found
