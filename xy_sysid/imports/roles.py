@@ -66,7 +66,7 @@ def assigned(sheet: Sheet, reading: Reading, notes: list[str]) -> Roles:
 
 
 def _sides(sheet: Sheet, reading: Reading, said: Found, meanings: Mapping[str, Meaning], notes: list[str]) -> tuple[dict[str, Found], bool]:
-    """Input, output and reference of each axis: as said, else by the contract's names, else by words, else by units; whether words were understood."""
+    """Input, output and reference of each axis: as said, by the contract's names, by words, or by units; and whether words were understood."""
     found: dict[str, Found] = {}
     plain, guessed = _contract(sheet), False
     for role in OF_AN_AXIS:
