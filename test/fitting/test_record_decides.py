@@ -9,6 +9,7 @@ import pytest
 from helpers.real_data import data
 from scipy import signal
 
+from xy_sysid.errors import BadInput
 from xy_sysid.fitting.of_recording import estimate, few_periods
 from xy_sysid.fitting.of_run import fit, frf
 from xy_sysid.imports import load
@@ -119,3 +120,15 @@ def test_periods_of_measured_data_are_found() -> None:
     assert response.origin.notes and "other sign every 512" in " ".join(response.origin.notes)
     modes = [mode.frequency for mode in fit(response).tf.pole_modes()]
     assert any(mode == pytest.approx(63.35, abs=0.3) for mode in modes)
+
+
+def test_friction_that_holds_the_output_in_every_window_is_no_broken_encoder() -> None:
+    """An axis that sticks at each reversal is used and it is said; one whose encoder dies after the first window is refused."""
+    t = np.arange(6_000) / RATE
+    u = np.sin(2 * np.pi * 2.0 * t) + 0.01 * noise(t.size)
+    sticking = 1e-3 * np.cumsum(np.where(np.abs(u) > 0.7, u, 0.0))
+    found = estimate(Recording.from_arrays(RATE, u, sticking), "x", IdentifierSettings(frozen=0.05))
+    assert any("friction holds it, or its encoder is coarse" in note for note in found.notes) and found.windows >= 1
+    dead = np.where(np.arange(t.size) < 100, sticking, sticking[100])
+    with pytest.raises(BadInput, match="number of sound windows is 0"):
+        estimate(Recording.from_arrays(RATE, u, dead), "x", IdentifierSettings(frozen=0.05))

@@ -33,7 +33,7 @@ ANSWERS: dict[str, tuple[str, tuple[str, ...], str]] = {
     ),
     "daisy/robot_arm.dat": ("frf", ("--map", "input=1,output=2", "--rate", "500", "--unit", "input=N m,output=rad/s^2"), "95 of 511 lines trusted"),
     "f16/f-16.txt": ("frf", ("--map", "input=2,output=3", "--rate", "400", "--unit", "input=N,output=m/s^2"), "3 windows"),
-    "rm_arm/joint_3.npz": ("frf", ("--map", "input=tau_measured:3,output=q:3", "--unit", N_M, "--set", "frozen=60"), "rad/(N m)"),
+    "rm_arm/joint_3.npz": ("frf", ("--map", "input=tau_measured:3,output=q:3", "--unit", N_M), "rad/(N m)"),
     "ball_plate/Motor2_v73.mat": ("frf", ("--axis", "axis2", "--unit", "input=V"), "rad/V"),
     "ball_plate/motor1.npz": ("frf", (), "rad/V"),
     "vendor_exports/tc3_default.csv": ("frf", ("--map", "input=var_INT8,output=func_OS", "--set", "frozen=60"), "m/V"),

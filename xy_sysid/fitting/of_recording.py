@@ -269,6 +269,8 @@ def split(recording: Recording, held_out: float) -> tuple[Recording, Recording]:
 
 def few_periods(recording: Recording, held_out: float) -> bool:
     """Whether the input repeats itself so few times that without the part held out it would not be there twice."""
+    if not 0.0 <= held_out <= 0.9:
+        return False  # refused by ``split``
     rows = len(recording) - round(held_out * len(recording))
     inputs = [recording.run(axis).voltage for axis in recording.axes]
     periods = [find_period(values) or find_half_period(values) for values in inputs]
