@@ -34,6 +34,7 @@ FIXED = ("nllsfdi",)  # estimators of the paper's own structure: orders that are
 WINDOWS, SHORTEST = 3, 16  # windows, side by side, that a record holds at least, and samples of the shortest
 MOST_ON_GRID = 0.5  # of the windows that fit; where the grid holds fewer, each stretch has windows from its own beginning on
 COVERED = 0.5  # of the samples that such windows take in at least
+MANY = 6  # periods that must be there where feedback or friction shape the input
 TRANSIENT = 1  # periods left out at the start of a periodic recording
 USUAL = IdentifierSettings()
 ROUNDING = 1e-12  # of the response: no line of a made-up signal without noise is more exact than its numbers
@@ -71,7 +72,10 @@ def estimate(recording: Recording, axis: str, settings: IdentifierSettings, peri
     half = None
     if period == 0:
         period = find_period(repeats[longest])
-        half = find_half_period(u[longest]) if period is None and r is None and settings.differenced else None
+        if period and r is None and _samples(longest) < MANY * period and _distorted(recording, axis, longest):
+            period = None
+        alone = period is None and r is None and settings.differenced and not _closed_loop(recording, axis)
+        half = find_half_period(u[longest]) if alone else None
     elif period:
         notes += period_note(repeats[longest], period)
     if half:
@@ -115,6 +119,12 @@ def estimate(recording: Recording, axis: str, settings: IdentifierSettings, peri
     friction = friction_note(friction_hint(u[longest], y[longest], recording.sampling_rate))
     notes += [*(_closed_loop(recording, axis) if r is None else []), *([friction] if friction else [])]
     return AxisEstimate(axis=axis, frf=frf, period=period or None, windows=int(spectra.weight), notes=tuple(notes))
+
+
+def _distorted(recording: Recording, axis: str, rows: slice) -> bool:
+    """Whether feedback or friction shape the input: what they add repeats with it, so that few periods take it for the response."""
+    u, y = recording.axis(axis)
+    return bool(_closed_loop(recording, axis) or friction_note(friction_hint(u[rows], y[rows], recording.sampling_rate)))
 
 
 def _reference(recording: Recording, axis: str) -> FloatArray:
