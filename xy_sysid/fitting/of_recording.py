@@ -172,7 +172,8 @@ def _possible(settings: IdentifierSettings, rate: float, samples: int) -> None:
     """Raises BadInput, before any work is done, for windows longer than the data and for a band that they cannot show."""
     needed = settings.length + int(settings.differenced)
     if samples < needed:
-        act = f"Record for longer, or shorten the window with --set length={max(samples // 4, 16)}."
+        shorter = f", or shorten the window with --set length={max(samples // 4, SHORTEST)}" if settings.length > SHORTEST else ""
+        act = f"Record for longer{shorter}."
         raise BadInput("longest gap-free run", f"{samples} samples", f"{needed} or more", act)
     lowest, highest = rate / settings.length, 0.5 * rate
     if max(settings.band_low, lowest) > min(settings.band_high, highest):
