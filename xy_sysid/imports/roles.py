@@ -49,7 +49,7 @@ def assigned(sheet: Sheet, reading: Reading, notes: list[str]) -> Roles:
     meanings = {column.name: understood for column in sheet.columns if (understood := meaning(column.name, column.unit)) is not None}
     found, guessed = _sides(sheet, reading, said, meanings, notes)
     pairs = _named(sheet, found, notes)
-    time, understood = _time(sheet, said, meanings)
+    time, by_name = _time(sheet, said, meanings)
     counter = said.get("seq") or next((sheet.usable(column) for column in sheet.columns if column.name == "seq"), None)
     if time is None and counter is None and sheet.fs is None and reading.rate is None:
         taken = {column.name for columns in pairs.values() for column in columns.values()}
@@ -61,7 +61,7 @@ def assigned(sheet: Sheet, reading: Reading, notes: list[str]) -> Roles:
         inputs=pairs["input"],
         outputs=pairs["output"],
         references=pairs["reference"],
-        guessed=guessed or understood,
+        guessed=guessed or by_name,
     )
 
 
