@@ -12,12 +12,10 @@ Piece = tuple[int, FloatArray, FloatArray]
 """Counter of the first sample, input (n,), output (n,) of a gap-free stretch."""
 
 CREST_FACTOR = 10.0  # a step of the encoder counts as a leap when it stands out so many times more than the voltage does
+OFTEN = 0.1  # of the samples; an encoder that changes less often than that is broken rather than held
 CREST_USUAL = 4.0  # crest factor that any noise reaches in a few thousand samples
 
-HELD = (
-    "In every window the output stands at times while the input moves: friction holds it, or its encoder is coarse. "
-    "The {kept} of {total} in which it goes on are used."
-)
+HELD = "In every window the output stands at times while the input moves: friction holds it. The {kept} of {total} in which it goes on are used."
 REASONS = {
     "frozen": "the encoder repeated one value while the voltage moved",
     "leap": "the encoder leapt further than the voltage can explain",
@@ -53,9 +51,10 @@ def window_fault(voltage: FloatArray, position: FloatArray, frozen: int) -> str 
 
 
 def _resumes(voltage: FloatArray, position: FloatArray) -> bool:
-    """Whether a position (n,) that stands at times moves in the first and in the last quarter: friction holds it, and no encoder died."""
-    quarter = max(position.shape[0] // 4, 2)
-    return all(float(np.ptp(position[end])) > 0.0 for end in (slice(0, quarter), slice(-quarter, None))) and float(np.ptp(voltage)) > 0.0
+    """Whether a position (n,) that stands at times moves often, at the beginning and at the end too: friction holds it, and no encoder died."""
+    moves = np.diff(position) != 0.0
+    quarter = max(moves.shape[0] // 4, 1)
+    return bool(moves.mean() > OFTEN and moves[:quarter].any() and moves[-quarter:].any() and float(np.ptp(voltage)) > 0.0)
 
 
 def stretches(pieces: list[Piece], shape: WindowShape, differenced: bool, frozen: int) -> tuple[list[tuple[int, int, int]], list[str]]:
