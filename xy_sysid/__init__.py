@@ -5,7 +5,7 @@ In a notebook::
     import xy_sysid as xy
 
     run = xy.load("rec").run("x")            # the longest stretch of an axis without a gap
-    frf = xy.frf(run)                        # H1 with coherence and sigma
+    frf = xy.frf(run)                        # H1 with coherence and sigma; xy.frf_from("FRF.csv") of one that was measured elsewhere
     model = xy.fit(frf)                      # transfer function with delay; model.verdicts
     fails = xy.compare(run, model)           # where it fails
     found = xy.diagnose(run)                 # which effect is missing; found.sentence, found.runner_up
@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from xy_sysid.files.models import load_model, save
     from xy_sysid.fitting.of_run import LinearModel, fit, frf
     from xy_sysid.imports import load
+    from xy_sysid.imports.response_file import frf_from
     from xy_sysid.linear.reduction import balanced_truncation
     from xy_sysid.linear.to_others import to_control, to_scipy
     from xy_sysid.linear.transfer_function import TransferFunction
@@ -72,6 +73,7 @@ __all__ = [
     "diagnose",
     "fit",
     "frf",
+    "frf_from",
     "library",
     "load",
     "load_model",
@@ -97,6 +99,7 @@ _HOMES = {
     "comparison.of_run": ("better", "compare", "validate"),
     "diagnosis.of_run": ("diagnose", "refine"),
     "imports": ("load",),
+    "imports.response_file": ("frf_from",),
     "files.models": ("load_model", "save"),
     "cli.simulated_recording": ("simulate",),
     "errors": ("BadInput", "BadRecording", "MissingExtra", "XySysidError"),

@@ -286,11 +286,11 @@ def test_an_output_that_does_not_follow_the_input_is_said(tmp_path: Path) -> Non
 
 
 def test_a_recording_with_one_window_has_no_uncertainty_and_no_fit(tmp_path: Path) -> None:
-    """The response is shown and it is said that no line can be trusted; a fit is refused."""
-    path = npz(tmp_path / "r.npz", rows=4097)
-    said = cli("frf", path)
+    """Where somebody asks for such a window the response is shown, and it is said that no line can be trusted; a fit is refused."""
+    path, window = npz(tmp_path / "r.npz", rows=4097), ("--set", "length=4095")
+    said = cli("frf", path, *window)
     assert said.code == 0 and "0 of 1226 lines trusted" in said.out and "no uncertainty" in said.err
-    refusal = cli("fit", path, *RIGID, "--held-out", 0)
+    refusal = cli("fit", path, *window, *RIGID, "--held-out", 0)
     assert refusal.code == 2 and "independent windows is 1.0; allowed: 2 or more" in refusal.err
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from itertools import count
@@ -20,7 +19,6 @@ from helpers.simulated import recorded
 from xy_sim.parts import PARTS
 from xy_sysid.axis.model import STANDARD, Library
 from xy_sysid.cli import run
-from xy_sysid.hypotheses.criteria import AT_FLOOR, FEWEST
 from xy_sysid.diagnosis import rungs
 from xy_sysid.diagnosis.diagnose import Diagnosis, diagnose, judged
 from xy_sysid.diagnosis.ladder import Rival, Step, is_taken_for
@@ -28,9 +26,10 @@ from xy_sysid.diagnosis.refine import Effort, refine, refine_steps
 from xy_sysid.effects import EFFECTS, Effect
 from xy_sysid.greybox.axis_data import AxisData, prepare
 from xy_sysid.greybox.free_run import GreyboxFit, fit_base, fit_with
-from xy_sysid.imports import save
 from xy_sysid.hypotheses import one_step
 from xy_sysid.hypotheses.companions import grown
+from xy_sysid.hypotheses.criteria import AT_FLOOR, FEWEST
+from xy_sysid.imports import save
 
 
 @pytest.mark.parametrize("effect", ["coulomb_friction", "cogging", "dead_zone", "constant_load", "saturation", "lead_error"])

@@ -79,7 +79,7 @@ def test_a_periodic_input_is_found_and_leaves_no_leakage() -> None:
     """Windows of one period, the first left out; only excited lines are trusted; sigma is that of the noise."""
     u = multisine(1000, 12_000)
     found = estimate(recording(u, plant(u)), "x", SETTINGS)
-    assert found.period == 1000 and found.windows == 10  # of eleven, one sample is missing for the last difference
+    assert found.period == 1000 and found.windows == 11
     assert "repeats every 1000 samples (1 s)" in found.notes[0] and "first one left out" in found.notes[0]
     assert int(found.frf.trusted.sum()) == 40
     lines = found.frf.select(found.frf.trusted)

@@ -14,13 +14,13 @@ from xy_sim.effect_text import with_effects
 from xy_sim.machine import Machine
 from xy_sim.parts import PARTS
 from xy_sysid.axis.model import STANDARD, AxisModel, simulate
-from xy_sysid.hypotheses.criteria import AT_FLOOR
 from xy_sysid.errors import BadInput
 from xy_sysid.excitation.lockstep import drive
 from xy_sysid.greybox import least_squares
 from xy_sysid.greybox.floor import bands, count_size, encoder_noise
 from xy_sysid.greybox.free_run import AxisData, GreyboxFit, fit_base, fit_with, look, prepare
 from xy_sysid.greybox.one_step import one_step_fit
+from xy_sysid.hypotheses.criteria import AT_FLOOR
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.settings import AxisExcitation, ExcitationSettings, build
 

@@ -11,6 +11,7 @@ from scipy.signal import lfilter
 from xy_sim.effect_text import with_effects
 from xy_sim.machine import Machine
 from xy_sysid.axis.model import STANDARD, AxisModel, simulate, undoer
+from xy_sysid.diagnosis.rungs import with_one_more
 from xy_sysid.effects import EFFECTS
 from xy_sysid.effects._contract import Beside
 from xy_sysid.effects.backlash.innovations import Innovations, View
@@ -19,7 +20,6 @@ from xy_sysid.excitation.lockstep import drive
 from xy_sysid.greybox.axis_data import AxisData, prepare
 from xy_sysid.greybox.free_run import GreyboxFit, fit_base, fit_with
 from xy_sysid.greybox.one_step import one_step_fit
-from xy_sysid.diagnosis.rungs import with_one_more
 from xy_sysid.hypotheses.companions import grown
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.settings import AxisExcitation, ExcitationSettings, build

@@ -8,11 +8,11 @@ import pytest
 from helpers.foreign import across_gap
 
 from xy_sysid.axis.model import STANDARD
-from xy_sysid.hypotheses.criteria import SIZE
 from xy_sysid.effects._contract import Limits
 from xy_sysid.greybox.axis_data import AxisData, prepare
 from xy_sysid.greybox.free_run import GreyboxFit, fit_base
 from xy_sysid.hypotheses.companions import Grown, Wanted, grown
+from xy_sysid.hypotheses.criteria import SIZE
 
 BAR = 5e-3  # m/s one sample ahead: more than what any filter with this gap leaves
 

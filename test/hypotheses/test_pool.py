@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-
 import numpy as np
 import pytest
 from helpers.simulated import recorded
 
 from xy_sysid.axis.model import STANDARD
-from xy_sysid.diagnosis.rungs import with_one_more
 from xy_sysid.diagnosis.refine import Effort, refine
+from xy_sysid.diagnosis.rungs import with_one_more
 from xy_sysid.greybox.axis_data import AxisData, prepare
 from xy_sysid.greybox.free_run import fit_base
 from xy_sysid.hypotheses.compare import gain, size
@@ -133,5 +132,3 @@ def test_the_better_of_two_fits_gains_and_a_fit_gains_nothing_over_itself(both: 
     assert same.nats == 0.0 and same.probability == 0.5 and not same.is_sure
     assert size(best.fit, rigid.fit) > 100.0
     assert size(best.fit, best.fit) == 0.0
-
-

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from xy_sysid.axis.model import AxisModel
-from xy_sysid.hypotheses.criteria import SIZE, TELLS
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.hypotheses.companions import size_ahead
+from xy_sysid.hypotheses.criteria import SIZE, TELLS
 from xy_sysid.hypotheses.one_step import Filtered
 
 NOISE = 1e-3  # m/s

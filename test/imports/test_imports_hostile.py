@@ -85,7 +85,7 @@ def test_a_reader_that_crashes_is_said(tmp_path: Path, monkeypatch: pytest.Monke
     scipy.io.savemat(tmp_path / "a.mat", {"t": T, "u": U, "y": Y})
     child = tmp_path / "child.py"
     child.write_text("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)")
-    monkeypatch.setattr("xy_sysid.imports.matlab.CHILD", child)
+    monkeypatch.setattr("xy_sysid.imports.guarded.CHILD", child)
     assert "the reader's own process died of it (signal 11" in error_of(tmp_path / "a.mat")
 
 

@@ -55,13 +55,15 @@ def test_what_looks_wrong_is_said(tmp_path: Path, columns: dict[str, Any], says:
     assert time.process_time() - begun < 5.0
 
 
-def test_an_angle_that_wraps_is_said(tmp_path: Path) -> None:
-    """Kept within a turn, it leaps by one; the same angle as it is does not."""
+def test_an_angle_that_wraps_is_unwrapped_and_that_is_said(tmp_path: Path) -> None:
+    """Kept within a turn, it leaps by one and goes on all the same; the same angle as it is does not leap."""
     angle = 20 * Y / np.ptp(Y)
     turns = int(np.sum(np.abs(np.diff((angle + np.pi) % (2 * np.pi))) > 3.0))
     path = csv_of(tmp_path, {"time": T, "x_voltage": U, "x_position[rad]": (angle + np.pi) % (2 * np.pi) - np.pi})
-    (said,) = [note for note in load(path).notes if "wraps" in note]
-    assert f"leaps by a whole turn {turns} times" in said and "--velocity" in said
+    found = load(path)
+    (said,) = [note for note in found.notes if "wraps" in note]
+    assert f"leaps by a whole turn {turns} times" in said and "unwrapped" in said
+    assert np.allclose(np.diff(found.position[:, 0]), np.diff(angle), atol=1e-9)
     assert not any("wraps" in note for note in load(csv_of(tmp_path, {"time": T, "x_voltage": U, "x_position[rad]": angle})).notes)
 
 

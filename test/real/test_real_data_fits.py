@@ -102,7 +102,7 @@ def test_emps_gives_its_mass_and_warns_of_feedback_and_friction() -> None:
     found = fitted("emps/emps_train.npz", *RIGID)
     mass = 35.15065 / value(found, "numerator_0")
     assert mass == pytest.approx(97.1, abs=1.0) and mass == pytest.approx(95.1089, rel=0.03)
-    assert found["relative_error"] == pytest.approx(0.296, abs=0.02)
+    assert found["relative_error"] == pytest.approx(0.218, abs=0.02)
     assert any(note.startswith("Closed loop: the input follows the tracking error (correlation 0.71)") for note in found["warnings"])
     assert any(note.startswith("Friction: part of the input") for note in found["warnings"])
     assert not any("hardly follows" in note for note in found["warnings"])
@@ -113,17 +113,16 @@ def test_emps_gives_its_mass_and_warns_of_feedback_and_friction() -> None:
 
 
 def test_the_robot_reads_and_says_for_each_joint_why_not() -> None:
-    """Too short for the usual windows; with shorter ones, two joints without a coherent line, four with rigid models that simulate nothing."""
+    """Windows fit the 27 s by themselves; no joint has more coherent lines than chance gives, and fit says that none can be trusted."""
     bag = data("joint_state_bags/unisa_ur10_exciting")
-    assert "--set length=" in refused("fit", bag)
-    said = cli("fit", bag, "--set", "length=512", "--json")
+    said = cli("frf", bag, "--json")
     axes = said.json["axes"]
     assert said.code == 0 and len(axes) == 6
-    assert {name for name, found in axes.items() if "problem" in found} == {"shoulder_lift_joint", "elbow_joint"}
-    for name in ("shoulder_pan_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint"):
-        assert "simulation" in failed(axes[name]), name
-        assert axes[name]["transfer_function"]["output_unit"] == "position" and axes[name]["transfer_function"]["input_unit"] == "effort"
-    assert "unit" not in refused("fit", bag, "--set", "length=512", "--axis", "elbow_joint")
+    for name, found in axes.items():
+        assert any("the output hardly follows the input" in note for note in found["notes"]), name
+        assert (found["frf"]["input_unit"], found["frf"]["output_unit"]) == ("effort", "position")
+    line = refused("fit", bag)
+    assert "number of trusted lines is 0" in line and "length" not in line
 
 
 def test_the_malformed_bag_is_one_line() -> None:

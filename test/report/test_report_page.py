@@ -209,8 +209,8 @@ def test_the_command_writes_the_page_and_speaks_one_json_document(
 def test_wrong_use_of_the_command_is_one_line_and_exit_code_2(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A missing file, a missing folder, a span without its recording, data that are too short."""
     short = tmp_path / "short.npz"
-    seq = np.arange(100)
-    random = np.random.default_rng(1).normal(size=(100, 1))
+    seq = np.arange(12)
+    random = np.random.default_rng(1).normal(size=(12, 1))
     save(Recording(100.0, ("x",), seq, seq / 100.0, random, random.cumsum(axis=0)), short)
     for arguments in (
         [str(tmp_path / "none.npz")],

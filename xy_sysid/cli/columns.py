@@ -17,7 +17,7 @@ MOST = 60  # rows shown
 
 
 def columns(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="any file that may hold a recording: .csv, .npz, .mat, a rosbag2")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="any file that may hold a recording, a table or a rosbag2 (docs/files.md lists them)")],
     json: o.Json = False,
 ) -> None:
     """What is in a file: its columns, arrays or topics, what each is taken for, and how to say it otherwise."""

@@ -9,14 +9,17 @@ import typer
 
 from xy_sysid.cli import options as o
 from xy_sysid.cli.output import aside, emit, estimates, say
-from xy_sysid.cli.provenance import provenance
-from xy_sysid.cli.reading import chosen, each, named, read, reads
+from xy_sysid.cli.provenance import provenance, provenance_of_response
+from xy_sysid.cli.reading import chosen, each, measured_responses, named, read, reads
 
 if TYPE_CHECKING:
     from xy_sysid.fitting import Fit
     from xy_sysid.fitting.of_recording import AxisEstimate
+    from xy_sysid.fitting.of_run import Method
     from xy_sysid.fitting.verdicts import Validation
     from xy_sysid.imports.reading import Reading
+    from xy_sysid.response.frf import FrequencyResponse
+    from xy_sysid.settings import IdentifierSettings
 
 
 @reads
@@ -35,9 +38,10 @@ def fit(
     force: o.Force = False,
     json: o.Json = False,
 ) -> None:
-    """Transfer function with delay of each axis, 95 % intervals, and whether it can be trusted."""
+    """Transfer function with delay of each axis, 95 % intervals, and whether it can be trusted. REC may also be a measured frequency response."""
     from xy_sysid.files import linear_models
-    from xy_sysid.fitting.of_recording import estimate, split
+    from xy_sysid.fitting.of_given_response import band_of
+    from xy_sysid.fitting.of_recording import estimate, few_periods, split
     from xy_sysid.fitting.of_run import Method, fit_response
 
     settings = o.settings_from(params, set_)
@@ -46,16 +50,24 @@ def fit(
     samples = o.period_from(period)
     way = Method(method, weighting, domain)
     way.structure(settings)  # refuses what makes no sense, before any work is done
-    recording = read(recs, reading, json)
-    training, unseen = split(recording, held_out)
+    measured = measured_responses(recs, reading)
+    if measured is not None:
+        done, problems = each(tuple(measured), lambda name: _of_response(name, band_of(measured[name], settings), settings, way))
+        origin: dict[str, Any] = {**provenance_of_response(named(recs)), "notes": []}
+    else:
+        recording = read(recs, reading, json)
+        if len(recording) and few_periods(recording, held_out):
+            held_out = 0.0
+            aside.print("note: the input is there hardly more than twice, so nothing is held out for the check in time")
+        training, unseen = split(recording, held_out)
 
-    def work(name: str) -> tuple[AxisEstimate, Fit, Validation]:
-        found = estimate(training, name, settings, samples)
-        return found, *fit_response(found.frf, settings, way, unseen.run(name).signals if len(unseen) else None)
+        def work(name: str) -> tuple[AxisEstimate, Fit, Validation]:
+            found = estimate(training, name, settings, samples)
+            return found, *fit_response(found.frf, settings, way, unseen.run(name).signals if len(unseen) else None)
 
-    done, problems = each(chosen(recording, reading.axes), work)
+        done, problems = each(chosen(recording, reading.axes), work)
+        origin = provenance(named(recs), recording)
     fits = {name: result for name, (_, result, _) in done.items()}
-    origin = provenance(named(recs), recording)
     if model is not None:
         linear_models.write_model(model, fits, origin)
     if mat is not None:
@@ -68,6 +80,18 @@ def fit(
         _show(*parts)
     for name, text in problems.items():
         say(f"axis {name}: no model. {text}")
+
+
+def _of_response(name: str, response: FrequencyResponse, settings: IdentifierSettings, way: Method) -> tuple[AxisEstimate, Fit, Validation]:
+    """One axis of a file that holds a response and no samples."""
+    from xy_sysid.fitting.of_given_response import settings_for
+    from xy_sysid.fitting.of_recording import AxisEstimate
+    from xy_sysid.fitting.of_run import fit_response
+
+    taken = settings_for(response, settings)
+    note = f"fitted with {taken.integrators} integrator{'s' * (taken.integrators != 1)} and hold={taken.hold} (change them with --set)"
+    notes = (*response.origin.notes, note)
+    return AxisEstimate(axis=name, frf=response, period=None, windows=0, notes=notes), *fit_response(response, settings, way)
 
 
 def answer(found: AxisEstimate, result: Fit, verdicts: Validation) -> dict[str, Any]:
@@ -116,10 +140,8 @@ def _error(result: Fit) -> str:
 
 def _show(found: AxisEstimate, result: Fit, verdicts: Validation) -> None:
     f = result.frequency
-    say(
-        f"axis {found.axis}: {result.method}, {len(f)} lines from {f[0]:.3g} to {f[-1]:.4g} Hz, {found.windows} windows; {_error(result)}",
-        style="bold",
-    )
+    source = f"{found.windows} windows" if found.windows else "measured elsewhere"
+    say(f"axis {found.axis}: {result.method}, {len(f)} lines from {f[0]:.3g} to {f[-1]:.4g} Hz, {source}; {_error(result)}", style="bold")
     if not result.converged:
         say(f"The fit did not converge: {result.reason}", style="bold")
     estimates("", result.intervals_with_misfit)

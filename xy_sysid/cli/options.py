@@ -8,16 +8,20 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from xy_sysid.errors import BadInput
+from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.settings import IdentifierSettings, Settings, changed, unknown_name
 
 if TYPE_CHECKING:
     from xy_sysid.processes.run_plan import Told
 
-Rec = Annotated[Path, typer.Argument(metavar="REC", help="recording: a rosbag2 folder or file (.db3, .mcap), .csv, .mat or .npz")]
+Rec = Annotated[
+    Path, typer.Argument(metavar="REC", help="recording: a rosbag2 folder or file (.db3, .mcap), .csv, .mat, .npz or another of docs/files.md")
+]
 Recs = Annotated[
     list[Path],
-    typer.Argument(metavar="REC", help="recordings of one machine: each a rosbag2 folder or file (.db3, .mcap), .csv, .mat or .npz"),
+    typer.Argument(
+        metavar="REC", help="recordings of one machine: each a rosbag2 folder or file (.db3, .mcap), .csv, .mat, .npz or another of docs/files.md"
+    ),
 ]
 Axes = Annotated[list[str] | None, typer.Option("--axis", "-a", help="only this axis (may be repeated)")]
 Set = Annotated[

@@ -16,6 +16,19 @@ def fingerprint(recording: Recording, axis: str) -> str:
 
 def provenance(source: str, recording: Recording) -> dict[str, Any]:
     """Plain values for a model file or report."""
+    return {
+        **provenance_of_response(source),
+        "samples": len(recording),
+        "sampling_rate_hz": float(recording.sampling_rate),
+        "units": {"input": recording.input_unit, "output": recording.output_unit},
+        "measured": recording.measured,
+        "data_sha256": {axis: fingerprint(recording, axis) for axis in recording.axes},
+        "notes": list(recording.notes),
+    }
+
+
+def provenance_of_response(source: str) -> dict[str, Any]:
+    """The same of a file without samples."""
     from importlib.metadata import PackageNotFoundError, version
 
     versions = {"python": platform.python_version()}
@@ -24,17 +37,7 @@ def provenance(source: str, recording: Recording) -> dict[str, Any]:
             versions[name] = version(name)
         except PackageNotFoundError:
             versions[name] = "from source"
-    return {
-        "source": _printable(source),
-        "command": _printable(" ".join(["xy-sysid", *sys.argv[1:]])),
-        "samples": len(recording),
-        "sampling_rate_hz": float(recording.sampling_rate),
-        "units": {"input": recording.input_unit, "output": recording.output_unit},
-        "measured": recording.measured,
-        "data_sha256": {axis: fingerprint(recording, axis) for axis in recording.axes},
-        "versions": versions,
-        "notes": list(recording.notes),
-    }
+    return {"source": _printable(source), "command": _printable(" ".join(["xy-sysid", *sys.argv[1:]])), "versions": versions}
 
 
 def _printable(text: str) -> str:

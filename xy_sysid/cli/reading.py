@@ -17,6 +17,7 @@ from xy_sysid.samples.recording import Recording, Run
 
 if TYPE_CHECKING:
     from xy_sysid.imports.reading import Reading
+    from xy_sysid.response.frf import FrequencyResponse
 
 Found = TypeVar("Found")
 Command = Callable[..., None]
@@ -109,11 +110,32 @@ def read(paths: Sequence[Path], reading: Reading, quiet: bool) -> Recording:
     return joined(read_each(paths, reading, quiet))
 
 
-def runs_of(recordings: Sequence[Recording], axis: str) -> tuple[Run, ...]:
-    """The longest run of an axis in each recording. Raises BadInput where these do not belong together."""
-    from xy_sysid.diagnosis.of_run import runs_together
+def measured_responses(paths: Sequence[Path], reading: Reading) -> dict[str, FrequencyResponse] | None:
+    """The responses by axis where a file holds a measured frequency response and no samples, or is said to; None where it does not."""
+    from xy_sysid.imports.reading import OF_A_RESPONSE
+    from xy_sysid.imports.registry import format_of, sheet_of
+    from xy_sysid.imports.response_file import responses
 
-    return runs_together([recording.run(axis) for recording in recordings])
+    said = any(role in reading.columns for role in OF_A_RESPONSE)
+    try:
+        kinds = [format_of(path) for path in paths]
+        if not said and all(kind.kind != "response" for kind in kinds):
+            return None
+        if len(paths) > 1:
+            raise BadInput("frequency responses", f"{len(paths)} files", "one", "Fit them one by one.")
+        return responses(paths[0], sheet_of(paths[0], kinds[0]), reading)
+    except OSError:
+        return None  # said by whoever reads it as a recording
+
+
+def runs_of(recordings: Sequence[Recording], axis: str) -> tuple[Run, ...]:
+    """The stretches of an axis in all recordings. Raises BadInput where these do not belong together, or hold one move only."""
+    from xy_sysid.diagnosis.of_run import runs_together
+    from xy_sysid.samples.moves import several_moves
+
+    runs = runs_together([run for recording in recordings for run in recording.stretches(axis)])
+    several_moves(runs)
+    return runs
 
 
 def named(paths: Sequence[Path]) -> str:

@@ -46,7 +46,6 @@ def refine(
     json: o.Json = False,
 ) -> None:
     """Add physical effects to the rigid model, refit everything together, and print the ladder of falling errors."""
-    from xy_sysid.hypotheses.criteria import MOST_EFFECTS
     from xy_sysid.diagnosis.of_run import refined
     from xy_sysid.diagnosis.refine import Effort
     from xy_sysid.errors import BadInput
@@ -54,6 +53,7 @@ def refine(
     from xy_sysid.files.models import write_axis_mat, write_axis_models
     from xy_sysid.greybox.axis_data import prepare
     from xy_sysid.greybox.open_loop import open_loop, settled
+    from xy_sysid.hypotheses.criteria import MOST_EFFECTS
 
     if not add and not auto:
         raise BadInput("refine", "without --add and --auto", "--add NAME, or --auto", "Say what to do.")

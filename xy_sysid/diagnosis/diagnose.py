@@ -11,13 +11,13 @@ import numpy as np
 
 from xy_sysid.axis.model import STANDARD, Library
 from xy_sysid.comparison.where_it_fails import Comparison, compare_velocity
-from xy_sysid.hypotheses.criteria import AT_FLOOR, SIZE
 from xy_sysid.diagnosis.equal_laws import equals, likelihood
 from xy_sysid.diagnosis.ladder import Candidate, Ladder, contains, part_explained
 from xy_sysid.diagnosis.refine import Effort, never, refine
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.axis_data import AxisData, prepare_all
 from xy_sysid.greybox.free_run import GreyboxFit
+from xy_sysid.hypotheses.criteria import AT_FLOOR, SIZE
 from xy_sysid.hypotheses.enough_data import lacking
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import USUAL, Units, bare, moved

@@ -11,11 +11,11 @@ from typing import Any
 
 from xy_sysid.axis.model import Library
 from xy_sysid.comparison.where_it_fails import Place
-from xy_sysid.hypotheses.criteria import AT_FLOOR, DOUBTFUL
 from xy_sysid.diagnosis.diagnose import Diagnosis, Kind
 from xy_sysid.diagnosis.ladder import Candidate, Ladder
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.greybox.parameters import Estimate
+from xy_sysid.hypotheses.criteria import AT_FLOOR, DOUBTFUL
 from xy_sysid.units import USUAL, Units, bare, moved
 
 

@@ -10,7 +10,6 @@ from threadpoolctl import threadpool_limits
 
 from xy_sysid.axis.model import STANDARD, Library
 from xy_sysid.comparison.physical_model import PhysicalModel
-from xy_sysid.hypotheses.criteria import MOST_EFFECTS
 from xy_sysid.diagnosis import diagnose as one
 from xy_sysid.diagnosis.diagnose import Diagnosis
 from xy_sysid.diagnosis.ladder import Ladder
@@ -19,6 +18,7 @@ from xy_sysid.diagnosis.refine import refine as search
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.axis_data import prepare_all
 from xy_sysid.greybox.free_run import EPSILON, GreyboxFit
+from xy_sysid.hypotheses.criteria import MOST_EFFECTS
 from xy_sysid.samples.recording import Recording, Run, one_run
 from xy_sysid.units import bare, motion, moved
 

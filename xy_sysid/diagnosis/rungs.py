@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-
 from xy_sysid.axis.model import Library
 from xy_sysid.diagnosis.equal_laws import is_the_same, likely_names
 from xy_sysid.diagnosis.ladder import Candidate, Ladder, Rival, Step, contains, is_taken_for, part_explained
@@ -175,10 +174,8 @@ def _rungs(pool: Pool, given: Given, names: tuple[str, ...], final: GreyboxFit) 
             now = final
         else:
             known = pool.nodes.get(so_far)
-            if known is None or known.refused or not known.whole:
-                now = with_one_more(pool.data, pool.library, now, name)
-            else:
-                now = known.fit
+            is_known = known is not None and known.whole and not known.refused
+            now = known.fit if known is not None and is_known else with_one_more(pool.data, pool.library, now, name)
         if now is final or now.held_out_error < shown.held_out_error:
             steps.append(Step(name, now))
             shown = now

@@ -16,7 +16,7 @@ from xy_sysid.response.closed_loop import joint_input_output, loop_spectra
 from xy_sysid.response.frf import FrequencyResponse
 from xy_sysid.response.friction_hint import friction_hint, friction_note
 from xy_sysid.response.h1 import H1Options, frequency_response
-from xy_sysid.response.period import find_period, period_note
+from xy_sysid.response.period import FEWEST, find_half_period, find_period, half_periods, one_more, period_note
 from xy_sysid.response.window_check import stretches
 from xy_sysid.response.windows import WindowShape
 from xy_sysid.samples.block import FloatArray
@@ -25,9 +25,18 @@ from xy_sysid.samples.recording import Recording
 from xy_sysid.settings import IdentifierSettings
 
 HARDLY = 4.0  # standard deviations of the number of lines that chance makes coherent (neighbours are alike, hence the 2)
+HALVES = (
+    "The input repeats with the other sign every {half} samples ({seconds:.6g} s), half its period: "
+    "windows of one period, made of each half and its negative."
+)
 JOINT = "Closed loop: the joint input-output method, with the reference as instrument."
 FIXED = ("nllsfdi",)  # estimators of the paper's own structure: orders that are not asked for are 2/4
+WINDOWS, SHORTEST = 3, 16  # windows, side by side, that a record holds at least, and samples of the shortest
+MOST_ON_GRID = 0.5  # of the windows that fit; where the grid holds fewer, each stretch has windows from its own beginning on
+COVERED = 0.5  # of the samples that such windows take in at least
+MANY = 6  # periods that must be there where feedback or friction shape the input
 TRANSIENT = 1  # periods left out at the start of a periodic recording
+USUAL = IdentifierSettings()
 ROUNDING = 1e-12  # of the response: no line of a made-up signal without noise is more exact than its numbers
 SMALLEST, LARGEST = 1e-100, 1e100  # of what is measured: squares of more or less leave the range of numbers
 
@@ -60,16 +69,30 @@ def estimate(recording: Recording, axis: str, settings: IdentifierSettings, peri
     runs = recording.runs()
     longest = recording.run(axis).rows
     notes: list[str] = []
+    half = None
     if period == 0:
         period = find_period(repeats[longest])
+        if period and r is None and _samples(longest) < MANY * period and _distorted(recording, axis, longest):
+            period = None
+        alone = period is None and r is None and settings.differenced and not _closed_loop(recording, axis)
+        half = find_half_period(u[longest]) if alone else None
     elif period:
         notes += period_note(repeats[longest], period)
-    if period:
+    if half:
+        settings, period = replace_settings(settings, window="boxcar", length=2 * half, overlap=0.0), 2 * half
+        notes.append(HALVES.format(half=half, seconds=half / recording.sampling_rate))
+    elif period:
         settings, runs = _periodic(settings, runs, period, notes, recording.sampling_rate, "input" if r is None else "reference")
-    _possible(settings, recording.sampling_rate, _samples(longest))
+    else:
+        settings = _fitting(settings, runs, notes)
+    _possible(settings, recording.sampling_rate, _samples(longest) + (half or 0) + bool(period))
     shape = WindowShape.of(settings.window, settings.length, settings.overlap)
     grid = 0 if period or not _fits(recording, runs, shape, settings.differenced) else 1
     pieces = [(grid * int(recording.seq[run][0]), u[run], y[run]) for run in runs]
+    if half:
+        pieces = half_periods(u[longest], y[longest], half)
+    elif period and r is None and settings.differenced:
+        pieces = [(seq, *one_more(inputs, outputs, period)) for seq, inputs, outputs in pieces]
     frozen = max(round(settings.frozen * recording.sampling_rate), 2)
     kept, left_out = stretches(pieces, shape, settings.differenced, frozen)
     notes += left_out
@@ -98,6 +121,12 @@ def estimate(recording: Recording, axis: str, settings: IdentifierSettings, peri
     return AxisEstimate(axis=axis, frf=frf, period=period or None, windows=int(spectra.weight), notes=tuple(notes))
 
 
+def _distorted(recording: Recording, axis: str, rows: slice) -> bool:
+    """Whether feedback or friction shape the input: what they add repeats with it, so that few periods take it for the response."""
+    u, y = recording.axis(axis)
+    return bool(_closed_loop(recording, axis) or friction_note(friction_hint(u[rows], y[rows], recording.sampling_rate)))
+
+
 def _reference(recording: Recording, axis: str) -> FloatArray:
     """(n,) of one axis; raises BadInput if there is none, or one that does not move."""
     if recording.reference is None:
@@ -124,11 +153,27 @@ def _moving(axis: str, u: FloatArray, y: FloatArray, units: tuple[str, str], nam
             raise BadInput(f"{name} of axis {axis}", f"up to {size:.3g} {unit} in size", allowed, "Check its unit and how it was written.")
 
 
+def _fitting(settings: IdentifierSettings, runs: list[slice], notes: list[str]) -> IdentifierSettings:
+    """The settings with a window that the record holds often enough; as they are where somebody chose another length than the usual."""
+    if settings.length != USUAL.length:
+        return settings
+    length, sizes = settings.length, np.array([max(_samples(run) - 1, 0) for run in runs])
+    while length > SHORTEST and (np.sum(sizes // length) < WINDOWS or length * np.sum(sizes // length) < COVERED * np.sum(sizes)):
+        length //= 2
+    if length == settings.length:
+        return settings
+    used = int(np.sum(sizes >= length))
+    short = f"; {len(sizes) - used} of {len(sizes)} stretches are shorter than one and are not used" if used < len(sizes) else ""
+    notes.append(f"Windows of {length} samples ({settings.length} is usual), so that the record holds {WINDOWS} or more{short}.")
+    return replace_settings(settings, length=length)
+
+
 def _possible(settings: IdentifierSettings, rate: float, samples: int) -> None:
     """Raises BadInput, before any work is done, for windows longer than the data and for a band that they cannot show."""
     needed = settings.length + int(settings.differenced)
     if samples < needed:
-        act = f"Record for longer, or shorten the window with --set length={max(samples // 4, 16)}."
+        shorter = f", or shorten the window with --set length={max(samples // 4, SHORTEST)}" if settings.length > SHORTEST else ""
+        act = f"Record for longer{shorter}."
         raise BadInput("longest gap-free run", f"{samples} samples", f"{needed} or more", act)
     lowest, highest = rate / settings.length, 0.5 * rate
     if max(settings.band_low, lowest) > min(settings.band_high, highest):
@@ -139,8 +184,11 @@ def _possible(settings: IdentifierSettings, rate: float, samples: int) -> None:
 
 
 def _fits(recording: Recording, runs: list[slice], shape: WindowShape, differenced: bool) -> bool:
-    """Whether a window of the grid (see ``windows``) lies in any run; a short recording may lie between two."""
-    return any(-int(recording.seq[run.start]) % shape.hop + shape.length + int(differenced) <= _samples(run) for run in runs)
+    """Whether the grid of windows (see ``windows``) holds most of those that fit into the runs; short ones may lie between two."""
+    needed = shape.length + int(differenced)
+    rooms = [(_samples(run) - needed, -int(recording.seq[run.start]) % shape.hop) for run in runs if _samples(run) >= needed]
+    on_grid = sum((room - first) // shape.hop + 1 for room, first in rooms if room >= first)
+    return 0 < on_grid >= MOST_ON_GRID * sum(room // shape.hop + 1 for room, _ in rooms)
 
 
 def _coherence(frf: FrequencyResponse, settings: IdentifierSettings, periodic: bool) -> list[str]:
@@ -228,6 +276,16 @@ def split(recording: Recording, held_out: float) -> tuple[Recording, Recording]:
         raise BadInput("held-out part", held_out, "0 to 0.9", "Choose for example 0.2.")
     cut = len(recording) - round(held_out * len(recording))
     return part(recording, slice(0, cut)), part(recording, slice(cut, len(recording)))
+
+
+def few_periods(recording: Recording, held_out: float) -> bool:
+    """Whether the input repeats itself so few times that without the part held out it would not be there twice."""
+    if not 0.0 <= held_out <= 0.9:
+        return False  # refused by ``split``
+    rows = len(recording) - round(held_out * len(recording))
+    inputs = [recording.run(axis).voltage for axis in recording.axes]
+    periods = [find_period(values) or find_half_period(values) for values in inputs]
+    return any(period is not None and FEWEST * period > rows for period in periods)
 
 
 def part(recording: Recording, rows: slice) -> Recording:

@@ -9,6 +9,7 @@ import numpy as np
 
 from xy_sysid.errors import BadInput
 from xy_sysid.fitting import ESTIMATORS, Fit, identify
+from xy_sysid.fitting.of_given_response import settings_for
 from xy_sysid.fitting.of_recording import FIXED, estimate, judged, with_orders
 from xy_sysid.fitting.result import Interval
 from xy_sysid.fitting.structure import Structure, Weighting, structure_from
@@ -136,6 +137,7 @@ def fit_response(
 ) -> tuple[Fit, Validation]:
     """The fit and what speaks for it; unseen: samples that no fit saw, for the check in time. Raises BadInput as ``fit``."""
     judged(response)
+    settings = settings_for(response, settings)
     method, choice = method or Method(), None
     try:
         with np.errstate(all="ignore"):  # what overflows ends in a figure that the verdicts judge

@@ -1,7 +1,8 @@
 """Levenberg-Marquardt on the whitened error in velocity: the fit that minimises the objective.
 
-Levenberg 1944, Marquardt 1963. The error is divided by the spectrum that the objective gives it (``objective.spectrum``), which is worked out again
-before each round: iteratively reweighted least squares. A round that does not lower the objective is taken back, so a fit never ends worse than it starts.
+Levenberg 1944, Marquardt 1963. The error is divided by the spectrum that the objective gives it (``objective.spectrum``), which is worked
+out again before each round: iteratively reweighted least squares. A round that does not lower the objective is taken back, so that a fit
+never ends worse than it starts.
 Derivatives are forward differences of the simulation. They are computed again only where a step did not do what they promised, and are otherwise
 updated with what the step did (Broyden 1965).
 """

@@ -2,8 +2,9 @@
 
 The spectrum of the error in velocity is S(f) = N(f) + |G(f)|^2 s + v. N is the floor of the data and G the response of the model's linear part to
 a force at the motor. The power s of an unmodelled force and the power v of an unmodelled motion, both white, are estimated for each model.
-Where both are small this is output error in units of the noise; where v is large it is plain output error, and where s is large it is inverse dynamics
-(Ljung, System Identification, 2nd ed., sec. 3.2 and 10.1). The terms are Whittle's (1953): ln S + P / S for each line of each window.
+Where both are small this is output error in units of the noise; where v is large it is plain output error, and where s is large it is
+inverse dynamics (Ljung, System Identification, 2nd ed., sec. 3.2 and 10.1). The terms are Whittle's (1953): ln S + P / S for each line of
+each window.
 """
 
 from __future__ import annotations

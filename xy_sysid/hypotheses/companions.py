@@ -10,13 +10,13 @@ from math import inf, log, sqrt
 
 from xy_sysid.axis.loop_source import undoable
 from xy_sysid.axis.model import Library
-from xy_sysid.hypotheses.criteria import ALIKE, AT_FLOOR, LEAST, MOST_EFFECTS, OPTIMISM_AHEAD, SIZE, WORTH
 from xy_sysid.effects import Effect
 from xy_sysid.effects._contract import PATIENT, Followed, Limits
 from xy_sysid.greybox.free_run import AxisData, GreyboxFit
 from xy_sysid.greybox.innovation_test import traces
 from xy_sysid.greybox.one_step import AT_NOISE, Others, beside, error_without, followed
 from xy_sysid.greybox.score_test import Trace
+from xy_sysid.hypotheses.criteria import ALIKE, AT_FLOOR, LEAST, MOST_EFFECTS, OPTIMISM_AHEAD, SIZE, WORTH
 from xy_sysid.hypotheses.refusal import none_of
 
 

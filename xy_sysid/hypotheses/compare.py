@@ -11,6 +11,7 @@ from scipy.stats import t as student
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.hypotheses.criteria import CHANCE, OVERLAP
 
+
 @dataclass(frozen=True, slots=True)
 class Gain:
     """nats: by which one fit is better than another on all held-out windows; error: its standard error; windows: independent ones."""

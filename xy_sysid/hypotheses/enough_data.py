@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 import scipy.signal
 
-from xy_sysid.hypotheses.criteria import CHANCE, FEWEST, STILL
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.axis_data import AxisData, prepare_all
+from xy_sysid.hypotheses.criteria import CHANCE, FEWEST, STILL
 from xy_sysid.samples.block import FloatArray
 
 

@@ -43,7 +43,9 @@ def is_twice(library: Library, names: Iterable[str]) -> bool:
 
 
 def moves(data: AxisData, library: Library, now: GreyboxFit, brief: GreyboxFit, early: bool = True) -> list[Move]:
-    """What may be added, alone or two at once, and what may take the place of a relative or of a law that it is mistaken for; best first, of each kind.
+    """What may be added, alone or two at once, and what may take the place of a relative or of a law that it is mistaken for.
+
+    The best of each kind.
 
     brief: the same set on the first stage's data, which are looked at; early: else all data are
     """

@@ -8,10 +8,10 @@ from math import exp
 
 import numpy as np
 
+from xy_sysid.effects._contract import Limits
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.greybox.one_step import error_without
 from xy_sysid.greybox.whitened import enough, whitened_rms
-from xy_sysid.effects._contract import Limits
 from xy_sysid.hypotheses.companions import Grown, Wanted, grown, size_ahead, told_apart
 from xy_sysid.hypotheses.criteria import AT_FLOOR, FEWEST, FILTERED, SIZE, TELLS
 from xy_sysid.hypotheses.pool import Node, Pool
@@ -63,7 +63,10 @@ class OneStepTrials:
         return bool(self.names) and not self.asked and len(self.pool.nodes) > FEWEST and self.pool.best.fit.excess >= AT_FLOOR
 
     def tried(self, last: bool) -> Iterator[frozenset[str]]:
-        """Try each beside what a filter can have of the best set, and beside nothing; last: also with what it hides. Yields what is about to be fitted."""
+        """Try each beside what a filter can have of the best set, and beside nothing; last: also with what it hides.
+
+        Yields what is about to be fitted.
+        """
         best = self.pool.best
         self.asked.add(best.effects)
         for name in self.names:

@@ -6,10 +6,10 @@ import math
 from collections.abc import Sequence
 
 from xy_sysid.axis.model import Library
-from xy_sysid.hypotheses.criteria import FEWEST
 from xy_sysid.effects import Effect
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit
+from xy_sysid.hypotheses.criteria import FEWEST
 
 
 def refusal(data: AxisData, library: Library, found: GreyboxFit, given: frozenset[str] = frozenset()) -> str:

@@ -12,7 +12,9 @@ from xy_sysid.greybox.free_run import GreyboxFit, is_read, other_starts, scene_o
 from xy_sysid.greybox.score_test import bounded
 
 
-def added(data: AxisData, now: GreyboxFit, model: AxisModel, effect: Effect, traced: Sequence[float] | None, scene: Scene | None = None) -> list[AxisModel]:
+def added(
+    data: AxisData, now: GreyboxFit, model: AxisModel, effect: Effect, traced: Sequence[float] | None, scene: Scene | None = None
+) -> list[AxisModel]:
     """The model with one more effect: as its trace shows it, by inverse dynamics, and of base and effect together."""
     begun = [] if traced is None else [model.with_effect(effect.name, bounded(effect, traced, data.similar))]
     return [*begun, *other_starts(data, now, model, effect.name, scene)]

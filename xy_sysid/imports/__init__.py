@@ -1,8 +1,11 @@
-"""Recordings in and out, whatever the file: a rosbag2, CSV, NPZ or MAT.
+"""Recordings in and out, whatever the file.
 
 reading:              how a file is to be read: which columns mean what
 bag, paired_streams:  two streams of a bag, paired by sample number
-csv, arrays, matlab:  files as sheets of columns; mat_child reads MATLAB files in a process of its own
+registry:             which reader takes which file, a row for each kind
+csv, arrays, twincat, codesys, mitsubishi, json_log: files as sheets of columns
+libraries, guarded, leaves: files that a library of others reads, in a process of its own, as sheets of columns
+several_files, own_times: columns from several files, and columns with times of their own, as one table
 sheet, names, roles:  which column is what, by its name or as the user says
 sheet_table, table, even: columns in SI, numbered by their time, which may be uneven
 clock:                time against the sample counter
@@ -24,29 +27,24 @@ import numpy as np
 
 from xy_sysid.bags import POSITION, REFERENCE, VOLTAGE, BagWriter
 from xy_sysid.bags.atomic import taken, whole
-from xy_sysid.bags.opening import regular_file
 from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.imports import arrays, csv, sheet_table, table
 from xy_sysid.imports.bag import load_bag
-from xy_sysid.imports.limits import fits
-from xy_sysid.imports.matlab import read_mat
 from xy_sysid.imports.motion import as_position
 from xy_sysid.imports.plausible import meaningful, remarks, without_dead_parts
 from xy_sysid.imports.reading import Reading
-from xy_sysid.imports.sheet import Sheet
+from xy_sysid.imports.registry import BAG, TABLES, Format, format_of, sheet_of
+from xy_sysid.imports.several_files import of_several_files
 from xy_sysid.samples.block import Block
 from xy_sysid.samples.recording import Recording
 
 ROWS = 20  # samples in one message of a bag that is written here
-KINDS = "a rosbag2 folder, .db3, .mcap, .csv, .mat, .npz"
-TABLES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".lvm", ".prn", ".log", ".npz", ".mat")
-CSV_COPIES = 2  # bytes in memory for one in the file
 
-__all__ = ["Reading", "blocks", "kind_of", "load", "save", "sheet_of", "writer_of"]
+__all__ = ["TABLES", "Reading", "blocks", "format_of", "load", "save", "sheet_of", "writer_of"]
 
 
 def load(path: Path | str, reading: Reading | None = None, *, progress: Callable[[float], None] | None = None, **options: Any) -> Recording:
-    """A recording from a rosbag2 (folder or file), .csv, .npz or .mat, paired, checked and in SI.
+    """A recording from a rosbag2 (folder or file) or any file of ``registry.FORMATS``, paired, checked and in SI.
 
     reading:  which columns mean what, which part and which axes; see ``Reading``, whose fields may also be given by keyword
     progress: called with the part that has been read, 0..1
@@ -55,8 +53,8 @@ def load(path: Path | str, reading: Reading | None = None, *, progress: Callable
     path, reading = Path(path), dataclasses.replace(reading or Reading(), **options)
     with np.errstate(all="ignore"):  # damaged numbers are left out or said, and numpy need not add a word to it
         try:
-            kind = kind_of(path)
-            result = load_bag(path, reading, progress) if kind == "bag" else _from_table(path, kind, reading)
+            kind = format_of(path)
+            result = load_bag(path, reading, progress) if kind is BAG else _from_table(path, kind, reading)
         except OSError as error:
             raise BadRecording(path, f"cannot be read ({error.strerror or error})", "Check the path and the permissions.") from None
         if progress is not None:
@@ -66,40 +64,16 @@ def load(path: Path | str, reading: Reading | None = None, *, progress: Callable
         return dataclasses.replace(moved, notes=(*moved.notes, *remarks(moved, output)))
 
 
-def kind_of(path: Path) -> str:
-    """bag, csv, npz or mat; raises BadRecording for what is none of them, OSError for what is not there."""
-    suffix = "" if path.is_dir() else path.suffix.lower()
-    path.stat()
-    if suffix in ("", ".db3", ".mcap"):
-        return "bag"
-    if suffix not in TABLES:
-        raise BadRecording(path, f"a file of kind {path.suffix!r}, which is not a recording", f"Give {KINDS}.")
-    regular_file(path)
-    if path.stat().st_size == 0:
-        raise BadRecording(path, "the file is empty (0 bytes)", "Take another copy of the file.")
-    return suffix[1:] if suffix in (".npz", ".mat") else "csv"
-
-
-def sheet_of(path: Path, kind: str) -> Sheet:
-    """The columns of a CSV, NPZ or MAT file."""
-    if kind == "csv":
-        fits(path, float(CSV_COPIES * path.stat().st_size), "as numbers")
-        return csv.sheet(path)
-    return arrays.sheet(path, arrays.read_npz(path) if kind == "npz" else arrays.group(path, read_mat(path)))
-
-
-def _from_table(path: Path, kind: str, reading: Reading) -> Recording:
+def _from_table(path: Path, kind: Format, reading: Reading) -> Recording:
     topics = reading.voltage_topic, reading.position_topic, reading.joint_topic
     if reading.effort_as_voltage or reading.velocity or reading.joints or reading.effort_lag or topics != (VOLTAGE, POSITION, None):
         raise BadInput("--topic, --effort, --velocity or --joint", f"for {path}", "for a bag", "A table has columns: choose them with --map.")
+    if kind.kind == "response":
+        raise BadRecording(path, "a measured frequency response, which holds no samples in time", "Fit it: xy-sysid fit, or xy.frf_from in Python.")
     notes: list[str] = []
-    if kind == "csv":
-        found = sheet_table.table(sheet_of(path, kind), reading, notes)
-    else:
-        leaves = arrays.read_npz(path) if kind == "npz" else read_mat(path)
-        inside = arrays.group(path, leaves)
-        found = arrays.table(path, inside, reading, notes) or sheet_table.table(arrays.sheet(path, inside), reading, notes)
-    return table.recording(path, found, reading.axes, reading.start, reading.stop, notes)
+    sheet, reading = of_several_files(path, reading, notes) or (sheet_of(path, kind), reading)
+    found = arrays.table(sheet, reading, notes) or sheet_table.table(sheet, reading, notes)
+    return table.recording(path, found, reading, notes)
 
 
 def save(recording: Recording, path: Path | str) -> None:

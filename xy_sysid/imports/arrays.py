@@ -8,7 +8,8 @@ import struct
 import tokenize
 import zipfile
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from xy_sysid.imports.foreign_units import MOTIONS, Unit, to_si
 from xy_sysid.imports.limits import MOST_COLUMNS, fits
 from xy_sysid.imports.reading import Reading
 from xy_sysid.imports.sheet import Column, Sheet
-from xy_sysid.imports.sheet_table import in_seconds, scaled
+from xy_sysid.imports.sheet_table import in_seconds, same_unit, scaled
 from xy_sysid.imports.table import ONE_UNIT, Table, axis_names, places_of
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import Recording
@@ -33,11 +34,13 @@ DAMAGED = (
 )
 INPUTS, OUTPUTS, REFERENCES = ("u", "voltage", "InputData"), ("y", "position", "OutputData"), ("r", "reference")
 TIMES = ("t", "time", "SamplingInstants")
+INPUT_UNITS, OUTPUT_UNITS = ("u_unit", "voltage_unit", "InputData_unit", "InputUnit"), ("y_unit", "position_unit", "OutputData_unit", "OutputUnit")
+TIME_UNITS = ("t_unit", "TimeUnit")
 RATES = ("fs", "samplingrate", "samplerate", "samplingfrequency", "samplefrequency", "fsample", "rate")  # as ``_plain`` writes them
 PERIODS = ("ts", "dt", "samplingperiod", "sampleperiod", "samplingtime", "sampletime", "tsample", "samplinginterval", "sampleinterval")
 QUOTED = re.compile(r'"([^"]*)"')
 DULL = re.compile(r"Model Root|(In|Out)\d+", re.IGNORECASE)  # parts of a block's path that tell nothing
-VALUES, LABELS, UNITS = ("Data", "data", "values", "Values"), ("Name", "name", "label", "Label"), ("Unit", "unit", "Units", "units")
+VALUES, LABELS, UNITS = ("Data", "data", "values", "Values"), ("Name", "name", "label", "Label", "Path"), ("Unit", "unit", "Units", "units")
 
 
 def read_npz(path: Path) -> Arrays:
@@ -93,15 +96,42 @@ def _has(arrays: Arrays) -> bool:
     return any(name in arrays for name in INPUTS) and any(name in arrays for name in OUTPUTS)
 
 
-def table(path: Path, arrays: Arrays, reading: Reading, notes: list[str]) -> Table | None:
+def table(sheet: Sheet, reading: Reading, notes: list[str]) -> Table | None:
     """What arrays with the contract's names say; None if there are no such, or if others are to be taken."""
-    if not _has(arrays) or reading.columns:
+    arrays, path = sheet.arrays, sheet.path
+    if arrays is None or reading.columns:
         return None
-    input_name, output_name = (next(name for name in names if name in arrays) for names in (INPUTS, OUTPUTS))
     time_name = next((name for name in TIMES if name in arrays and (arrays[name].size or name != TIMES[-1])), None)
-    time = None if time_name is None else _vector(path, time_name, arrays[time_name])
-    fs = _rate(path, arrays)
-    rows = None if time is None else len(time)
+    stamps = None if time_name is None else _vector(path, time_name, arrays[time_name])
+    inputs, outputs, reference, axes = _sides(path, arrays, None if stamps is None else len(stamps), reading.axes)
+    time, fs = _time(path, arrays, reading, (time_name, stamps), notes)
+    if str(arrays.get("InterSample", np.array("zoh")).ravel()[:1]).find("foh") >= 0:
+        notes.append("the file says that its input goes straight from sample to sample (foh): fit it with --set hold=none")
+    input_unit, output_unit = (_unit(arrays, names, usual) for names, usual in ((INPUT_UNITS, "V"), (OUTPUT_UNITS, "m")))
+    u, input_si = _si(("input", inputs, input_unit), path, axes, reading, notes)
+    y, output_si = _si(("output", outputs, output_unit), path, axes, reading, notes)
+    if reference is not None:
+        r, reference_si = _si(("reference", reference, output_unit), path, axes, reading, [])
+        reference = r if same_unit(reading, reference_si, output_si, notes) else None
+    return Table(
+        axes=axes,
+        time=time,
+        fs=fs,
+        seq=_vector(path, "seq", arrays["seq"]) if "seq" in arrays and reading.rate is None else None,
+        input=u,
+        output=y,
+        reference=reference,
+        input_unit=input_si.name,
+        output_unit=output_si.name,
+        measured=output_si.quantity if output_si.quantity in MOTIONS else "position",
+    )
+
+
+def _sides(
+    path: Path, arrays: Arrays, rows: int | None, wanted: Sequence[str] | None
+) -> tuple[FloatArray, FloatArray, FloatArray | None, tuple[str, ...]]:
+    """Input, output and reference, (n, axes) each and the reference only if it has their shape, and the names of the axes that are wanted."""
+    input_name, output_name = (next(name for name in names if name in arrays) for names in (INPUTS, OUTPUTS))
     inputs, outputs = (_matrix(path, name, arrays[name], rows) for name in (input_name, output_name))
     if inputs.shape[1] != outputs.shape[1]:
         raise BadRecording(path, f"{input_name} has {inputs.shape[1]} axes and {output_name} {outputs.shape[1]}", "Give one column per axis in both.")
@@ -109,43 +139,27 @@ def table(path: Path, arrays: Arrays, reading: Reading, notes: list[str]) -> Tab
     reference = None if reference_name is None else _matrix(path, reference_name, arrays[reference_name], rows)
     names = np.atleast_1d(arrays["axes"]).astype(str).tolist() if "axes" in arrays else []
     every = tuple(name.strip() for name in names) if len(names) == inputs.shape[1] else axis_names(inputs.shape[1])
-    places = places_of(every, reading.axes)  # the units of those that are left out do not matter
-    if reference is not None and reference.shape == outputs.shape:
-        reference = reference[:, places]
-    axes, inputs, outputs = tuple(every[place] for place in places), inputs[:, places], outputs[:, places]
+    reference = reference if reference is not None and reference.shape == outputs.shape else None
+    places = places_of(every, wanted)  # the units of those that are left out do not matter
+    axes = tuple(every[place] for place in places)
+    return inputs[:, places], outputs[:, places], None if reference is None else reference[:, places], axes
+
+
+def _time(
+    path: Path, arrays: Arrays, reading: Reading, stamps: tuple[str | None, FloatArray | None], notes: list[str]
+) -> tuple[FloatArray | None, float | None]:
+    """Instants in s and the rate in Hz, as far as they are said. stamps: name and numbers of the time."""
+    (name, time), fs = stamps, rate_of(arrays)
     if time is None and fs is None and reading.rate is None:
         said = next((f"{name} ({value})" for name, value in arrays.items() if _plain(name) in RATES), "fs")
         raise BadRecording(path, f"neither a time column nor a usable {said}", "Add t in seconds or fs in Hz, or give --rate.")
     if reading.rate is not None:
         if time is not None:
-            notes.append(f"the samples are taken as they stand, {reading.rate:g} Hz; the time {time_name!r} is not used")
-        time, fs = None, reading.rate
-    elif time is not None:
-        unit_of_time = reading.unit("time") or _unit(arrays, "t", "t_unit", "s", "TimeUnit")
-        time = in_seconds(path, time * (reading.scale("time") or 1.0), unit_of_time, notes)
-    if str(arrays.get("InterSample", np.array("zoh")).ravel()[:1]).find("foh") >= 0:
-        notes.append("the file says that its input goes straight from sample to sample (foh): fit it with --set hold=none")
-    sides = []
-    for role, values, text in (
-        ("input", inputs, _unit(arrays, input_name, "u_unit", "V", "InputUnit")),
-        ("output", outputs, _unit(arrays, output_name, "y_unit", "m", "OutputUnit")),
-    ):
-        sides.append(_si((role, values, text), path, axes, reading, notes))
-    unit = sides[1][1]
-    if reference is not None and reference.shape == outputs.shape:
-        reference, _ = _si(("reference", reference, _unit(arrays, output_name, "y_unit", "m", "OutputUnit")), path, axes, reading, [])
-    return Table(
-        axes=axes,
-        time=time,
-        fs=fs,
-        seq=_vector(path, "seq", arrays["seq"]) if "seq" in arrays and reading.rate is None else None,
-        input=sides[0][0],
-        output=sides[1][0],
-        reference=reference if reference is not None and reference.shape == outputs.shape else None,
-        input_unit=sides[0][1].name,
-        output_unit=unit.name,
-        measured=unit.quantity if unit.quantity in MOTIONS else "position",
-    )
+            notes.append(f"the samples are taken as they stand, {reading.rate:g} Hz; the time {name!r} is not used")
+        return None, reading.rate
+    if time is None:
+        return None, fs
+    return in_seconds(path, time * (reading.scale("time") or 1.0), reading.unit("time") or _unit(arrays, TIME_UNITS, "s"), notes), fs
 
 
 def _si(side: tuple[str, FloatArray, str], path: Path, axes: tuple[str, ...], reading: Reading, notes: list[str]) -> tuple[FloatArray, Unit]:
@@ -166,7 +180,7 @@ def _si(side: tuple[str, FloatArray, str], path: Path, axes: tuple[str, ...], re
     return np.column_stack(columns), units[0]
 
 
-def _rate(path: Path, arrays: Arrays) -> float | None:
+def rate_of(arrays: Arrays) -> float | None:
     """Hz, from a rate or a period that the file says; None if it says none that can be."""
     plain = {_plain(name): value for name, value in arrays.items()}
     for names, invert in ((RATES, False), (PERIODS, True)):
@@ -184,7 +198,12 @@ def _plain(name: str) -> str:
     return re.sub(r"[_ ](hz|sec)$|(?<=\w\w)[_ ]s$|[_ ]", "", name.lower())
 
 
-def sheet(path: Path, arrays: Arrays) -> Sheet:
+def sheet(path: Path) -> Sheet:
+    """The arrays of an .npz file as columns."""
+    return sheet_of(path, group(path, read_npz(path)))
+
+
+def sheet_of(path: Path, arrays: Arrays) -> Sheet:
     """Every vector, and every column of a matrix (``data:3`` is its third), as a column."""
     columns: list[Column] = []
     rates: Arrays = {name.rpartition(".")[2]: value for name, value in arrays.items()}
@@ -199,13 +218,15 @@ def sheet(path: Path, arrays: Arrays) -> Sheet:
         turned = value.T if value.shape[1] > value.shape[0] else value
         for place in range(min(turned.shape[1], 64)):
             columns.append(Column(f"{shown}:{place + 1}", unit, np.asarray(turned[:, place], np.float64)))
-    return Sheet(path=path, columns=tuple(_short(columns)), kind="array", fs=_rate(path, rates))
+    return Sheet(path=path, columns=tuple(short(columns)), kind="array", fs=rate_of(rates), arrays=arrays if _has(arrays) else None)
 
 
-def _short(columns: list[Column]) -> list[Column]:
-    """Without the names of structs where that leaves no two alike."""
+def short(columns: list[Column]) -> list[Column]:
+    """Without the names of structs or groups where that leaves no two alike."""
     last = [column.name.rpartition(".")[2] for column in columns]
-    return [Column(short if last.count(short) == 1 else one.name, one.unit, one.values) for one, short in zip(columns, last, strict=True)]
+    return [
+        replace(one, name=name, full=one.name) if last.count(name) == 1 and name != one.name else one for one, name in zip(columns, last, strict=True)
+    ]
 
 
 def _label(arrays: Arrays, name: str) -> str:
@@ -213,11 +234,11 @@ def _label(arrays: Arrays, name: str) -> str:
     place, _, last = name.rpartition(".")
     if last not in VALUES:
         return name
-    said = next((str(arrays[f"{place}.{one}"].ravel()[0]) for one in LABELS if f"{place}.{one}" in arrays and arrays[f"{place}.{one}"].size), "")
-    parts = [part for part in QUOTED.findall(said) or said.split("/") if part and not DULL.fullmatch(part)]
-    if parts:
-        twice = sum(str(value.ravel()[0]) == said for key, value in arrays.items() if key.rpartition(".")[2] in LABELS and value.size)
-        return parts[-1].strip().replace(".", " ") if twice == 1 else name
+    for label in LABELS:
+        said = str(arrays[f"{place}.{label}"].ravel()[0]) if f"{place}.{label}" in arrays and arrays[f"{place}.{label}"].size else ""
+        parts = [part for part in QUOTED.findall(said) or said.split("/") if part and not DULL.fullmatch(part)]
+        if parts and sum(str(value.ravel()[0]) == said for key, value in arrays.items() if key.rpartition(".")[2] == label and value.size) == 1:
+            return parts[-1].strip().replace(".", " ")
     if place.rpartition(".")[2] == "X":
         return "time"
     return name if place.endswith(")") else place or name
@@ -230,8 +251,8 @@ def _unit_beside(arrays: Arrays, name: str) -> str:
     return next((str(arrays[one].ravel()[0]).strip() for one in beside if one in arrays and arrays[one].size), "")
 
 
-def _unit(arrays: Arrays, name: str, usual_name: str, usual: str, matlab: str = "") -> str:
-    for key in (f"{name}_unit", usual_name, matlab):
+def _unit(arrays: Arrays, names: Sequence[str], usual: str) -> str:
+    for key in names:
         if key in arrays and arrays[key].size and arrays[key].dtype.kind in "US":
             return str(arrays[key].ravel()[0]).strip() or usual
     return usual

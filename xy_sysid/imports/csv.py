@@ -27,7 +27,7 @@ LOOK = 200  # rows before the last one that show how its numbers are written
 
 def sheet(path: Path) -> Sheet:
     """The columns of a file; what is not a number is told when its column is used."""
-    text = _text(path)
+    text = text_of(path)
     notes: list[str] = []
     widest = max(line.count(sign) for line in text.split("\n", HEADS)[:HEADS] for sign in SEPARATORS)
     if widest >= MOST_COLUMNS:
@@ -41,7 +41,7 @@ def sheet(path: Path) -> Sheet:
     return Sheet(path=path, columns=stamped(columns) if found.stamped else columns, notes=tuple(notes), bad=bad)
 
 
-def _text(path: Path) -> str:
+def text_of(path: Path) -> str:
     """The file's text: UTF-8, UTF-16 if it begins so, or else as Windows writes it."""
     raw = _raw(path)
     for code in ("utf-16",) if raw.startswith((b"\xff\xfe", b"\xfe\xff")) else ("utf-8-sig", "cp1252"):
@@ -85,6 +85,11 @@ def _whole(rows: Rows, separator: str, width: int, notes: list[str]) -> Rows:
         return rows[:-1]
     notes.append("the file does not end with the end of a line; if it was cut short, its last number may be wrong")
     return rows
+
+
+def table_of(path: Path, names: Names, lines: list[str], first: int) -> tuple[Column, ...]:
+    """The columns of rows of numbers separated by commas. first: number in the file of the first row."""
+    return _columns(path, [(number, line) for number, line in enumerate(lines, first) if line.strip()], ",", names)[0]
 
 
 def _digits(cell: str) -> int:

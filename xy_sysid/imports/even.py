@@ -19,13 +19,14 @@ from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import rate_from_time
 
 GAP = 2.5  # periods; over a longer step nothing is interpolated
+BRIDGED = 10.0  # periods; the same where steps jitter so much that hardly LOCAL of them come without a gap
 LOCAL = 50  # samples over which the period is looked at
 STEADY = 0.005  # relative; a period that wanders by less is even enough: frequencies are off by no more
 BURST = 0.2  # of a period; more steps than BURSTS shorter than that are stamps that came in bursts
 BURSTS = 0.2
 STRETCH, APART = 200, 50  # samples over which a period is told from late, lost and jittering stamps; between two of them that are compared
 DRIFT = 0.02  # relative; a period that changes by more within a recording is not one
-LOST = 0.3  # of the time; in steps longer than GAP more than that is lost
+LOST = 0.3  # of the time; where steps jitter, more than that in steps longer than GAP is lost
 Values = tuple[FloatArray, ...]
 
 
@@ -103,14 +104,15 @@ def _resampled(path: Path, time: FloatArray, rate: float, held: FloatArray, smoo
     taken = "If the samples were taken evenly all the same, say so with --rate in Hz; else record again with a steady clock."
     if float(np.mean(steps < BURST)) > BURSTS:
         raise BadRecording(path, f"{uneven}; {100 * np.mean(steps < BURST):.0f} % of the stamps come in bursts", taken)
-    if float(np.sum(steps[steps > GAP])) > LOST * float(np.sum(steps)):
+    gap = BRIDGED if _scattered(steps) else GAP
+    if gap > GAP and float(np.sum(steps[steps > GAP])) > LOST * float(np.sum(steps)):
         raise BadRecording(path, f"{uneven}; {100 * np.sum(steps[steps > GAP]) / np.sum(steps):.0f} % of the time lies in gaps", taken)
     fresh = np.concatenate(([True], np.diff(time) > 1e-3 / rate))
     if not fresh.all():
         notes.append(f"{int(np.sum(~fresh))} samples are there twice; the first is kept")
         time, held, smooth = time[fresh], held[fresh], tuple(values[fresh] for values in smooth)
-    spread = float(np.std(np.diff(time)[np.diff(time) * rate < GAP])) * rate
-    edges = np.flatnonzero(np.diff(time) * rate > GAP) + 1
+    spread = float(np.std(np.diff(time)[np.diff(time) * rate < gap])) * rate
+    edges = np.flatnonzero(np.diff(time) * rate > gap) + 1
     numbers: list[FloatArray] = []
     parts: list[Values] = []
     for begin, end in zip([0, *edges.tolist()], [*edges.tolist(), len(time)], strict=True):
@@ -132,6 +134,13 @@ def _resampled(path: Path, time: FloatArray, rate: float, held: FloatArray, smoo
         "the input is held, the output interpolated"
     )
     return Even(seq, time[0] + seq / rate, rate, tuple(np.concatenate([part[place] for part in parts]) for place in range(1 + len(smooth))))
+
+
+def _scattered(steps: FloatArray) -> bool:
+    """Whether long steps lie among the others, as of a clock that jitters, rather than between stretches. steps: in periods."""
+    edges = np.concatenate(([0], np.flatnonzero(steps > GAP) + 1, [len(steps) + 1]))
+    sizes = np.diff(edges)
+    return float(np.median(np.repeat(sizes, sizes))) < LOCAL
 
 
 def _means(time: FloatArray, held: FloatArray, instants: FloatArray, period: float) -> FloatArray:

@@ -11,8 +11,9 @@ import numpy as np
 from xy_sysid.bags.cdr import ARRAY_TYPE, JOINT_TYPE, Unreadable, array_layout, joint_layout
 from xy_sysid.bags.reading import Bag
 from xy_sysid.errors import XySysidError
-from xy_sysid.imports import arrays, kind_of, load, roles, sheet_of
+from xy_sysid.imports import arrays, format_of, load, response_file, roles, sheet_of
 from xy_sysid.imports.reading import Reading
+from xy_sysid.imports.registry import BAG
 from xy_sysid.imports.sheet import Column, Sheet
 from xy_sysid.samples.block import FloatArray
 
@@ -36,7 +37,7 @@ class Listed:
 
 @dataclass(frozen=True, slots=True)
 class Listing:
-    """kind: csv, npz, mat or bag; reads: how it reads without options, or why not; notes: of that reading."""
+    """kind: of ``registry.FORMATS``, or bag; reads: how it reads without options, or why not; notes: of that reading."""
 
     kind: str
     columns: tuple[Listed, ...]
@@ -47,15 +48,18 @@ class Listing:
 
 def listing(path: Path) -> Listing:
     """Raises BadRecording for what cannot be opened at all."""
-    kind = kind_of(path)
-    if kind == "bag":
+    form = format_of(path)
+    kind = form.kind
+    if form is BAG:
         found = _topics(path)
         if sum(file.stat().st_size for file in (path.iterdir() if path.is_dir() else [path]) if file.is_file()) > LARGE:
             return Listing(kind=kind, columns=found, reads="large: not read", problem="", notes=())
     else:
-        sheet = sheet_of(path, kind)
+        sheet = sheet_of(path, form)
         taken = _taken(sheet)
         found = tuple(_listed(column, taken.get(column.name, "")) for column in sheet.columns)
+        if form.kind == "response":
+            return _of_response(path, sheet)
     try:
         recording = load(path)
     except XySysidError as problem:
@@ -73,10 +77,23 @@ def listing(path: Path) -> Listing:
     )
 
 
+def _of_response(path: Path, sheet: Sheet) -> Listing:
+    """Of a measured frequency response."""
+    roles_of = {column.name: role for role in response_file.NAMES if (column := response_file.column_of(sheet, role, Reading())) is not None}
+    found = tuple(_listed(column, roles_of.get(column.name, "")) for column in sheet.columns)
+    try:
+        measured = response_file.responses(path, sheet, Reading())
+    except XySysidError as problem:
+        return Listing(kind="response", columns=found, reads="", problem=str(problem), notes=())
+    said = [f"axis {name}, {len(one)} lines from {one.frequency[0]:.4g} to {one.frequency[-1]:.4g} Hz" for name, one in measured.items()]
+    notes = tuple(dict.fromkeys(note for one in measured.values() for note in one.origin.notes))
+    return Listing(kind="response", columns=found, reads=f"a measured frequency response: {'; '.join(said)}", problem="", notes=notes)
+
+
 def _taken(sheet: Sheet) -> Mapping[str, str]:
     """Role of each column as it is taken without --map."""
     contract = [(arrays.INPUTS, "input"), (arrays.OUTPUTS, "output"), (arrays.REFERENCES, "reference"), (arrays.TIMES, "time")]
-    if sheet.kind == "array":
+    if sheet.arrays is not None:
         found = {column.name: role for column in sheet.columns for names, role in contract if column.name.partition(":")[0] in names}
         if {"input", "output"} <= set(found.values()):
             return found

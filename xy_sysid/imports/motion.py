@@ -1,4 +1,4 @@
-"""Velocity or acceleration --> position, so that everything that works on positions works on them, by the law of ``samples.integral``."""
+"""Angles that wrap; and velocity or acceleration --> position, by the law of ``samples.integral``, so that all works on positions."""
 
 from __future__ import annotations
 
@@ -9,6 +9,16 @@ import numpy as np
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.integral import integral, integrated
 from xy_sysid.samples.recording import Recording
+
+TURN, NEARLY = 2 * np.pi, 0.5  # rad; a step that is a turn within so much, where others are smaller than that, is an angle that wraps
+LOOK = 200_000  # samples from which the usual step is taken
+
+
+def wraps(angle: FloatArray) -> int:
+    """How often an angle (n,), rad, leaps by a whole turn from one sample to the next, as one that is kept within a turn."""
+    steps = np.abs(np.diff(angle))
+    usual = float(np.quantile(steps[:LOOK], 0.9)) if steps.size else 0.0
+    return int(np.sum(np.abs(steps - TURN) < NEARLY)) if usual < NEARLY else 0
 
 
 def as_position(recording: Recording) -> Recording:

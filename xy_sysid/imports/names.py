@@ -30,7 +30,8 @@ REFERENCE = "reference ref set setpoint target desired des demand demanded comma
 ASKED = ("command", "cmd", *REFERENCE.split())
 OTHER = "error err fehler noise status state temperature temp bus supply limit diff id index flag mode sigma unit"
 FILLERS = (
-    "motor actual act measured meas ist value val signal sig raw filtered data feedback fb fbk joint joints states the axis achse in of root model"
+    "motor servo actual act measured meas ist value val signal sig raw filtered data feedback fb fbk "
+    "joint joints states the axis achse in of root model"
 )
 ANGLES = "angle winkel hoek theta phi omega drehzahl"
 LETTERS = ("t", "u", "y", "r", "q")  # roles of one letter give way to a word: y_position is of the axis y

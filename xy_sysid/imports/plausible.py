@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 
 from xy_sysid.errors import BadRecording
 from xy_sysid.imports.foreign_units import DRIVES, unit_of
+from xy_sysid.imports.motion import wraps
 from xy_sysid.samples.block import FloatArray
+from xy_sysid.samples.moves import ONE_MOVE, one_move
 from xy_sysid.samples.recording import SLOWEST, Recording
 
 HUGE = 1e100  # a number beyond it has no square, let alone the square of its derivative
 FAR, FAST = 20.0, 50.0  # m and m/s; longer or faster axes are asked about
 TURNING = 3000.0  # rad/s, 30,000 turns a minute
-TURN, NEARLY = 2 * np.pi, 0.5  # rad; a step that is a turn within so much, where others are smaller than that, is an angle that wraps
 TINY = {"m": 1e-8, "rad": 1e-8, "V": 1e-6, "A": 1e-6}  # a signal that moves less in all is asked about
 ROUGH = 0.5  # steps over spread; a position is smoother than that, noise is not
 SMOOTHER = 0.25  # of the output's roughness; an input that is that much smoother may be a position
@@ -113,7 +114,9 @@ def remarks(recording: Recording, output: FloatArray) -> list[str]:
     found = _of_time(recording)
     with np.errstate(all="ignore"):  # numbers near the end of their range have no square; what is odd about them is said
         for place, axis in enumerate(recording.axes):
-            found += [f"axis {axis}: {text}" for text in _of_axis(recording, recording.voltage[:, place], output[:, place])]
+            u = recording.voltage[:, place]
+            of_motion = _of_motion(recording, u, recording.position[:, place])
+            found += [f"axis {axis}: {text}" for text in (*_of_axis(recording, u, output[:, place]), *of_motion)]
     return found + _of_units(recording)
 
 
@@ -174,6 +177,14 @@ def _of_axis(recording: Recording, u: FloatArray, y: FloatArray) -> list[str]:
     return found
 
 
+def _of_motion(recording: Recording, u: FloatArray, y: FloatArray) -> list[str]:
+    """Too little of it to tell anything by."""
+    runs = recording.runs()
+    if len(runs) > 1 and float(np.ptp(u)) > 0.0 and all(float(np.ptp(u[run])) == 0.0 for run in runs):
+        return [f"the input keeps one value in each of the {len(runs)} stretches: only the speed that each leads to can be told"]
+    return [f"{ONE_MOVE}: friction, load and inertia cannot be told from each other"] if len(runs) == 1 and one_move(y) else []
+
+
 def _per(recording: Recording) -> str:
     return {"velocity": "/s", "acceleration": "/s^2"}.get(recording.measured, "")
 
@@ -188,8 +199,8 @@ def _of_size(recording: Recording, y: FloatArray, size: float) -> list[str]:
             found.append(f"the output moves over {size:.4g} m at {speed:.3g} m/s: is it in mm or counts? Say --unit output=mm, or --scale")
         if recording.output_unit == "rad" and speed > TURNING:
             found.append(f"the output turns at {speed:.3g} rad/s: is it in deg or counts? Say --unit output=deg, or --scale")
-        turns = int(np.sum(np.abs(np.abs(np.diff(y)) - TURN) < NEARLY))
-        if recording.output_unit == "rad" and turns and step < NEARLY:
+        turns = wraps(y) if recording.output_unit == "rad" else 0
+        if turns:
             often = "once" if turns == 1 else f"{turns} times"
             found.append(f"the output leaps by a whole turn {often}, as an angle that wraps: unwrap it, or of joint states say --velocity")
     largest = float(np.max(np.abs(y)))

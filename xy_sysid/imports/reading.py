@@ -13,8 +13,10 @@ from xy_sysid.errors import BadInput
 
 ROLES = ("time", "seq", "joint", "input", "output", "reference")
 OF_AN_AXIS = ("input", "output", "reference")
+OF_A_RESPONSE = ("frequency", "magnitude", "phase", "real", "imag", "coherence", "sigma")  # columns of a measured frequency response
 WHAT = "time, seq, joint, input, output, reference, or one axis's like x.input"
-PAIR = re.compile(r",(?=\s*[^,=]*?(?:time|seq|joint|input|output|reference)\s*=)", re.IGNORECASE)
+PAIR = re.compile(r",(?=\s*[^,=]*?(?:time|seq|joint|input|output|reference|frequency|magnitude|phase|real|imag|coherence|sigma)\s*=)", re.IGNORECASE)
+NUMBER = re.compile(r"[-+]?\d*\.?\d*(e[-+]?\d+)?", re.IGNORECASE)
 Value = TypeVar("Value")
 
 
@@ -55,8 +57,11 @@ class Reading:
             raise BadInput("rate", self.rate, "> 0 Hz", "Give the sampling rate in Hz.")
         for option, given in (("--map", self.columns), ("--unit", self.units), ("--scale", self.scales)):
             for what in given:
-                if what.rpartition(".")[2] not in (OF_AN_AXIS if "." in what else ROLES):
+                if what.rpartition(".")[2] not in (OF_AN_AXIS if "." in what else (*ROLES, *OF_A_RESPONSE)):
                     raise BadInput(option, repr(what), WHAT, f"Write for example {option} x.output=...")
+        for what, unit in self.units.items():
+            if NUMBER.fullmatch(unit.strip()) and unit.strip() != "1":  # 1 is a part of full scale
+                raise BadInput("--unit", f"{what}={unit}", "a unit like V, mm or rad/s, and no number", "A factor is given with --scale.")
         for what, scale in self.scales.items():
             if not (math.isfinite(scale) and scale != 0):
                 raise BadInput("--scale", f"{what}={scale}", "a number that is not 0", "Give the factor to SI.")

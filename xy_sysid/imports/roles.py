@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from xy_sysid.errors import BadRecording
 from xy_sysid.imports.names import Meaning, by_unit, meaning
-from xy_sysid.imports.reading import Reading
+from xy_sysid.imports.reading import OF_AN_AXIS, Reading
 from xy_sysid.imports.sheet import Column, Sheet, spoken
 from xy_sysid.samples.recording import SLOWEST
 
@@ -47,42 +47,53 @@ def assigned(sheet: Sheet, reading: Reading, notes: list[str]) -> Roles:
     """Which columns are what."""
     said = {what: sheet.find(name) for what, name in reading.columns.items() if "." in what or what in ("time", "seq", "joint")}
     meanings = {column.name: understood for column in sheet.columns if (understood := meaning(column.name, column.unit)) is not None}
+    found, guessed = _sides(sheet, reading, said, meanings, notes)
+    pairs = _named(sheet, found, notes)
+    time, by_name = _time(sheet, said, meanings)
+    counter = said.get("seq") or next((sheet.usable(column) for column in sheet.columns if column.name == "seq"), None)
+    if time is None and counter is None and sheet.fs is None and reading.rate is None:
+        taken = {column.name for columns in pairs.values() for column in columns.values()}
+        time = _by_steps(sheet, {*meanings, *taken}, notes)
+    return Roles(
+        time=time,
+        seq=counter,
+        joint=said.get("joint") or next((column for column in sheet.columns if column.words and set(spoken(column.name)) in JOINT_WORDS), None),
+        inputs=pairs["input"],
+        outputs=pairs["output"],
+        references=pairs["reference"],
+        guessed=guessed or by_name,
+    )
+
+
+def _sides(sheet: Sheet, reading: Reading, said: Found, meanings: Mapping[str, Meaning], notes: list[str]) -> tuple[dict[str, Found], bool]:
+    """Input, output and reference of each axis: as said, by the contract's names, by words, or by units; and whether words were understood."""
     found: dict[str, Found] = {}
-    plain, free = _contract(sheet), False
-    for role in ("input", "output", "reference"):
+    plain, guessed = _contract(sheet), False
+    for role in OF_AN_AXIS:
         given = {what.rpartition(".")[0]: column for what, column in said.items() if what.endswith(f".{role}")}
         if role in reading.columns:
             given |= _of_any_axis(sheet, reading.columns[role])
         found[role] = given or plain.get(role, {})
     if not _paired(found):
-        for role in ("input", "output", "reference"):
+        for role in OF_AN_AXIS:
             if not any(what == role or what.endswith(f".{role}") for what in reading.columns):
-                found[role], free = _by_words(sheet, meanings, role, notes) or found[role], True
+                found[role], guessed = _by_words(sheet, meanings, role, notes) or found[role], True
     for role in ("input", "output"):
         found[role] = found[role] or _by_unit(sheet, meanings, role)
         if not found[role]:
             raise BadRecording(sheet.path, f"no {WORDS[role]} {sheet.kind}; {sheet.names()}", EXAMPLE)
-    pairs = _named(sheet, found, notes)
-    times = [column for column in sheet.columns if column.name in ("time", "t")]
-    time = said.get("time") or (sheet.usable(times[0]) if times else None)
-    if time is None:
-        clocks = [column for column in sheet.columns if column.name in meanings and meanings[column.name].role == "time"]
-        time = sheet.usable(clocks[0]) if clocks else None
-        free |= time is not None
-    counters = [column for column in sheet.columns if column.name == "seq"]
-    if time is None and not counters and sheet.fs is None and reading.rate is None:
-        taken = {column.name for columns in pairs.values() for column in columns.values()}
-        time = _by_steps(sheet, {*meanings, *taken}, notes)
-    joints = [column for column in sheet.columns if column.words and set(spoken(column.name)) in JOINT_WORDS]
-    return Roles(
-        time=time,
-        seq=said.get("seq") or (sheet.usable(counters[0]) if counters else None),
-        joint=said.get("joint") or (joints[0] if joints else None),
-        inputs=pairs["input"],
-        outputs=pairs["output"],
-        references=pairs["reference"],
-        guessed=free,
-    )
+    return found, guessed
+
+
+def _time(sheet: Sheet, said: Found, meanings: Mapping[str, Meaning]) -> tuple[Column | None, bool]:
+    """The column of instants, and whether its name had to be understood."""
+    if "time" in said:
+        return said["time"], False
+    plain = next((column for column in sheet.columns if column.name in ("time", "t")), None)
+    if plain is not None:
+        return sheet.usable(plain), False
+    clock = next((column for column in sheet.columns if column.name in meanings and meanings[column.name].role == "time"), None)
+    return (None, False) if clock is None else (sheet.usable(clock), True)
 
 
 def _by_steps(sheet: Sheet, known: Container[str], notes: list[str]) -> Column | None:

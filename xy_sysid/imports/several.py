@@ -12,7 +12,10 @@ from xy_sysid.errors import BadInput
 from xy_sysid.imports import load
 from xy_sysid.imports.paired_streams import SAME_RATE
 from xy_sysid.imports.reading import Reading
+from xy_sysid.imports.several_files import others
 from xy_sysid.samples.recording import Recording
+
+NAMED = 3  # recordings that a note names
 
 
 def read_all(paths: Sequence[Path], reading: Reading, progress: Callable[[float], None] | None = None) -> tuple[Recording, ...]:
@@ -22,6 +25,8 @@ def read_all(paths: Sequence[Path], reading: Reading, progress: Callable[[float]
     """
     if not paths:
         raise BadInput("recordings", "none", "one or more", "Give a file.")
+    together = others(paths[0], reading.columns)
+    paths = [path for number, path in enumerate(paths) if number == 0 or path.resolve() not in together]  # columns of one recording
     found: list[Recording] = []
     for number, path in enumerate(paths):
 
@@ -32,7 +37,26 @@ def read_all(paths: Sequence[Path], reading: Reading, progress: Callable[[float]
         found.append(load(path, reading, progress=tell))
     if len(found) == 1:
         return tuple(found)
-    return tuple(_alike(found))
+    return _said_once(_alike(found))
+
+
+def _said_once(found: list[Recording]) -> tuple[Recording, ...]:
+    """The same with each note once, at the first recording that has it: of all of them, or of those that it names."""
+    whose: dict[str, list[str]] = {}
+    for one in found:
+        for note in dict.fromkeys(one.notes):
+            whose.setdefault(note, []).append(one.source)
+    kept: list[Recording] = []
+    for one in found:
+        mine = [note for note in dict.fromkeys(one.notes) if whose[note][0] == one.source]
+        kept.append(dataclasses.replace(one, notes=tuple(f"{_named(whose[note], len(found))}: {note}" for note in mine)))
+    return tuple(kept)
+
+
+def _named(sources: list[str], every: int) -> str:
+    if len(sources) == every:
+        return f"all {every} recordings"
+    return ", ".join(sources) if len(sources) <= NAMED else f"{', '.join(sources[: NAMED - 1])} and {len(sources) - NAMED + 1} others"
 
 
 def _alike(found: list[Recording]) -> list[Recording]:
@@ -48,9 +72,9 @@ def _alike(found: list[Recording]) -> list[Recording]:
         raise BadInput("axes of the recordings", given, "one in common", "Name the columns alike with --map.")
     alike = []
     for one in found:
-        notes = [f"{one.source}: {note}" for note in one.notes]
+        notes = list(one.notes)
         if set(one.axes) != set(axes):
-            notes.append(f"{one.source}: only {', '.join(axes)} is in all recordings; {', '.join(a for a in one.axes if a not in axes)} is left out")
+            notes.append(f"only {', '.join(axes)} is in all recordings; {', '.join(a for a in one.axes if a not in axes)} is left out")
         columns = [one.axes.index(axis) for axis in axes]
         reference = None if one.reference is None else one.reference[:, columns]
         alike.append(
@@ -75,7 +99,10 @@ def joined(recordings: Sequence[Recording]) -> Recording:
         seq.append(one.seq - one.seq[0] + end)
         time.append(one.time - one.time[0] + late)
         end, late = int(seq[-1][-1]) + 2, float(time[-1][-1]) + 2 / first.sampling_rate
-    sizes = ", ".join(f"{one.source} ({len(one) / one.sampling_rate:.4g} s)" for one in recordings)
+    seconds = [len(one) / one.sampling_rate for one in recordings]
+    sizes = ", ".join(f"{one.source} ({length:.4g} s)" for one, length in zip(recordings, seconds, strict=True))
+    if len(recordings) > NAMED:
+        sizes = f"{min(seconds):.4g} to {max(seconds):.4g} s each, {sum(seconds):.4g} s in all"
     references = [one.reference for one in recordings if one.reference is not None]
     return dataclasses.replace(
         first,

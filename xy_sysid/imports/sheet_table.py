@@ -12,6 +12,7 @@ from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.imports import instants
 from xy_sysid.imports.foreign_units import COUNTS, MOTIONS, Unit, to_si, unit_of
 from xy_sysid.imports.names import meaning, usual_unit
+from xy_sysid.imports.own_times import on_one_clock
 from xy_sysid.imports.reading import Reading
 from xy_sysid.imports.roles import Found, Roles, assigned
 from xy_sysid.imports.sheet import Column, Sheet, spoken
@@ -26,7 +27,7 @@ JOINTS = 64  # more names than that are no joints
 def table(sheet: Sheet, reading: Reading, notes: list[str]) -> Table:
     """What the sheet says about a recording; raises BadRecording that names the columns there are."""
     notes += sheet.notes
-    roles = assigned(sheet, reading, notes)
+    roles = on_one_clock(sheet.path, assigned(sheet, reading, notes), notes)
     if roles.joint is not None:
         roles = _by_joint(sheet, roles, notes)
     every = tuple(axis for axis in roles.inputs if axis in roles.outputs)
@@ -37,7 +38,7 @@ def table(sheet: Sheet, reading: Reading, notes: list[str]) -> Table:
     reference = None
     if axes and all(axis in roles.references for axis in axes):
         r, unit = _values(sheet, "reference", roles.references, axes, reading, [])
-        reference = r if unit == output_unit else None
+        reference = r if same_unit(reading, unit, output_unit, notes) else None
     read = [column.name for axis, column in roles.inputs.items() if axis in axes and MEASURED & set(spoken(column.name))]
     if read:
         notes.append(f"the input {', '.join(map(repr, read))} was measured, so it is hardly held from sample to sample: fit it with --set hold=none")
@@ -54,7 +55,29 @@ def table(sheet: Sheet, reading: Reading, notes: list[str]) -> Table:
         input_unit=input_unit.name,
         output_unit=output_unit.name,
         measured=output_unit.quantity if output_unit.quantity in MOTIONS else "position",
+        starts=_starts(sheet.path, roles, axes),
     )
+
+
+def _starts(path: Path, roles: Roles, axes: tuple[str, ...]) -> tuple[int, ...]:
+    """Rows at which a stretch begins, the same of all columns. Raises BadRecording where they differ."""
+    columns = [side[axis] for _, side in roles.sides() for axis in axes if axis in side]
+    for column in columns[1:]:
+        if column.starts != columns[0].starts:
+            problem = f"the stretches of {columns[0].name!r} and {column.name!r} begin at different rows"
+            raise BadRecording(path, problem, "Choose columns of the same stretches with --map.")
+    return columns[0].starts if columns else ()
+
+
+def same_unit(reading: Reading, unit: Unit, output: Unit, notes: list[str]) -> bool:
+    """Whether a reference is measured like the output; if not it is left out, with a note. Raises BadInput if its unit was given."""
+    if unit.name == output.name:
+        return True
+    given = next((f"{what}={text}" for what, text in reading.units.items() if what.endswith("reference")), "")
+    if given:
+        raise BadInput("--unit", given, f"a unit of the output's quantity, which is in {output.name}", "Give the reference in such a unit.")
+    notes.append(f"the reference is in {unit.name} and the output in {output.name}: the reference is left out")
+    return False
 
 
 def _time(sheet: Sheet, roles: Roles, reading: Reading, notes: list[str]) -> tuple[FloatArray | None, float | None]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,9 @@ from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.imports.clock import disagreements
 from xy_sysid.imports.even import even
 from xy_sysid.imports.foreign_units import Quantity
+from xy_sysid.imports.motion import wraps
 from xy_sysid.imports.paired_streams import LARGEST, cut, hollow, sane
+from xy_sysid.imports.reading import Reading
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import Recording, Sensed, rate_from_time
 
@@ -27,7 +29,7 @@ class Table:
     """What a file holds, in SI.
 
     time: (n,) s, or None with ``fs`` in Hz; seq: (n,) sample numbers if the file has them; values (n, axes) each
-    measured: what ``output`` is
+    measured: what ``output`` is; starts: rows at which a stretch begins that does not follow the one before
     """
 
     axes: tuple[str, ...]
@@ -40,6 +42,7 @@ class Table:
     input_unit: str
     output_unit: str
     measured: Quantity = "position"
+    starts: tuple[int, ...] = ()
 
 
 def axis_names(count: int) -> tuple[str, ...]:
@@ -47,74 +50,155 @@ def axis_names(count: int) -> tuple[str, ...]:
     return tuple(USUAL[i] if i < len(USUAL) else f"axis{i + 1}" for i in range(count))
 
 
-def recording(path: Path, table: Table, wanted: Sequence[str] | None, start: float, stop: float | None, notes: list[str]) -> Recording:
+@dataclass(frozen=True, slots=True)
+class _Rows:
+    """Samples on their way: time (n,) s, seq (n,) as far as it is known, values (n, axes); stretch (n,) numbers the stretches."""
+
+    time: FloatArray
+    seq: FloatArray
+    voltage: FloatArray
+    position: FloatArray
+    reference: FloatArray | None
+    stretch: FloatArray
+
+    def only(self, rows: NDArray[np.bool_] | slice) -> _Rows:
+        """Some of them."""
+        reference = None if self.reference is None else self.reference[rows]
+        kept = {name: getattr(self, name)[rows] for name in ("time", "seq", "voltage", "position", "stretch")}
+        return _Rows(**kept, reference=reference)
+
+
+def recording(path: Path, table: Table, reading: Reading, notes: list[str]) -> Recording:
     """Check, number and cut; raises BadRecording or BadInput."""
-    rows = len(table.input)
-    lengths = {"input": rows, "output": len(table.output)} | ({} if table.time is None else {"time": len(table.time)})
-    lengths |= {} if table.seq is None else {"seq": len(table.seq)}
-    if len(set(lengths.values())) > 1:
-        raise BadRecording(path, "lengths differ: " + ", ".join(f"{name} {count}" for name, count in lengths.items()), "Give one row per sample.")
-    if table.time is None:
-        if table.fs is None or not (np.isfinite(table.fs) and table.fs > 0):
-            raise BadRecording(path, f"neither a time column nor a usable fs ({table.fs})", "Add t in seconds or fs in Hz, or give --rate.")
-        time = (np.arange(rows) if table.seq is None else table.seq) / table.fs
-        notes.append(f"there is no time; fs = {table.fs:g} Hz is taken")
-    else:
-        time = table.time
-    columns = _whole(path, table, places_of(table.axes, wanted), notes)
-    voltage, position = table.input[:, columns], table.output[:, columns]
-    reference = None if table.reference is None else table.reference[:, columns]
-    seq = np.arange(rows, dtype=np.float64) if table.seq is None else table.seq
-    voltage, keep = _own_stamps(voltage, position, notes)
-    finite = keep & np.isfinite(time) & sane(voltage) & sane(position) & (np.abs(seq) < LARGEST)
-    if not finite.all():
-        left_out = int(np.sum(keep & ~finite))
-        if left_out:
-            notes.append(f"{left_out} rows are not numbers; they are left out")
-        seq, time, voltage, position = seq[finite], time[finite], voltage[finite], position[finite]
-        reference = None if reference is None else reference[finite]
-    if len(time) < 2:
-        raise BadRecording(path, f"{len(time)} samples", "A recording needs 2 or more; record for longer.")
-    first, rate = float(time[0]), 0.0
-    if table.seq is None:
-        smooth = (position,) if reference is None else (position, reference)
-        if table.time is None:
-            rate = float(table.fs or 0.0)
-        else:
-            evened = even(path, time, voltage, smooth, notes)
-            seq, time, rate = evened.seq, evened.time, evened.rate
-            voltage, position = evened.values[:2]
-            reference = None if reference is None else evened.values[2]
-    seq = np.rint(seq)
-    fresh = np.concatenate(([True], seq[1:] > np.maximum.accumulate(seq)[:-1]))
-    if not fresh.all():
-        if table.seq is not None and bool(np.any(np.diff(seq) < 0)):
-            raise BadRecording(path, "seq does not increase", "Sort the samples by seq.")
-        notes.append(f"{int(np.sum(~fresh))} samples are there twice; the first is kept")
-        seq, time, voltage, position = seq[fresh], time[fresh], voltage[fresh], position[fresh]
-        reference = None if reference is None else reference[fresh]
-    numbers = seq.astype(np.int64)
-    if table.seq is not None:
-        rate = table.fs if table.time is None and table.fs is not None else rate_from_time(time, numbers)
-        notes += disagreements("the file", seq, time, rate)
-    if table.time is not None and table.fs is not None and abs(table.fs / rate - 1) > 1e-3:
-        notes.append(f"fs says {table.fs:g} Hz, the time stamps {rate:.6g} Hz; the stamps are taken")
+    _same_length(path, table)
+    time = _time(path, table, notes)
+    columns = _whole(path, table, places_of(table.axes, reading.axes), notes)
+    rows = _unwrapped(table, _finite(path, table, columns, time, notes), notes)
+    first = float(rows.time[0])
+    rows, rate = _numbered(path, table, rows, notes)
     measured: Sensed = table.measured if table.measured in ("velocity", "acceleration") else "position"
     result = Recording(
         sampling_rate=rate,
         axes=tuple(table.axes[i] for i in columns),
-        seq=numbers,
-        time=time,
-        voltage=np.ascontiguousarray(voltage),
-        position=np.ascontiguousarray(position),
+        seq=rows.seq.astype(np.int64),
+        time=rows.time,
+        voltage=np.ascontiguousarray(rows.voltage),
+        position=np.ascontiguousarray(rows.position),
         input_unit=table.input_unit,
         output_unit=table.output_unit,
-        reference=None if reference is None else np.ascontiguousarray(reference),
+        reference=None if rows.reference is None else np.ascontiguousarray(rows.reference),
         source=str(path),
         notes=tuple(notes),
         measured=measured,
     )
-    return cut(result, first, start, stop)
+    return cut(result, first, reading.start, reading.stop)
+
+
+def _same_length(path: Path, table: Table) -> None:
+    lengths = {"input": len(table.input), "output": len(table.output)} | ({} if table.time is None else {"time": len(table.time)})
+    lengths |= {} if table.seq is None else {"seq": len(table.seq)}
+    if len(set(lengths.values())) > 1:
+        raise BadRecording(path, "lengths differ: " + ", ".join(f"{name} {count}" for name, count in lengths.items()), "Give one row per sample.")
+
+
+def _time(path: Path, table: Table, notes: list[str]) -> FloatArray:
+    """(n,) s of all rows."""
+    if table.time is not None:
+        return table.time
+    if table.fs is None or not (np.isfinite(table.fs) and table.fs > 0):
+        raise BadRecording(path, f"neither a time column nor a usable fs ({table.fs})", "Add t in seconds or fs in Hz, or give --rate.")
+    notes.append(f"there is no time; fs = {table.fs:g} Hz is taken")
+    return np.asarray((np.arange(len(table.input)) if table.seq is None else table.seq) / table.fs)
+
+
+def _finite(path: Path, table: Table, columns: list[int], time: FloatArray, notes: list[str]) -> _Rows:
+    """The rows that hold numbers."""
+    voltage, position = table.input[:, columns], table.output[:, columns]
+    reference = None if table.reference is None else table.reference[:, columns]
+    seq = np.arange(len(time), dtype=np.float64) if table.seq is None else table.seq
+    voltage, keep = _own_stamps(voltage, position, notes)
+    finite = keep & np.isfinite(time) & sane(voltage) & sane(position) & (np.abs(seq) < LARGEST)
+    left_out = int(np.sum(keep & ~finite))
+    if left_out:
+        notes.append(f"{left_out} rows are not numbers; they are left out")
+    rows = _Rows(time=time, seq=seq, voltage=voltage, position=position, reference=reference, stretch=_stretches(table, time)).only(finite)
+    if len(rows.time) < 2:
+        raise BadRecording(path, f"{len(rows.time)} samples", "A recording needs 2 or more; record for longer.")
+    return rows
+
+
+def _unwrapped(table: Table, rows: _Rows, notes: list[str]) -> _Rows:
+    """An angle that is kept within a turn goes on where it leaps by one: between two samples of it nothing could be interpolated."""
+    if table.output_unit != "rad" or table.measured != "position":
+        return rows
+    turns = [wraps(column) for column in rows.position.T]
+    if not any(turns):
+        return rows
+    notes.append(f"the output leaps by a whole turn {sum(turns)} times, as an angle that wraps; it is unwrapped")
+    position = np.column_stack([np.unwrap(column) if count else column for column, count in zip(rows.position.T, turns, strict=True)])
+    reference = rows.reference
+    if reference is not None:
+        reference = reference + position - rows.position
+    return replace(rows, position=position, reference=reference)
+
+
+def _stretches(table: Table, time: FloatArray) -> FloatArray:
+    """(n,) number of the stretch that each row belongs to: as the table says, or each time that the clock begins anew."""
+    begins = np.zeros(len(time))
+    if table.starts:
+        starts = np.array([start for start in table.starts[1:] if start < len(time)], dtype=np.int64)
+        np.add.at(begins, starts, 1.0)
+    elif table.seq is None and len(time) > 1:
+        begins[1:][(np.diff(time) < 0) & (time[1:] < float(time[0]) + 0.5 * abs(float(time[1] - time[0])))] = 1.0
+    return np.asarray(np.cumsum(begins))
+
+
+def _numbered(path: Path, table: Table, rows: _Rows, notes: list[str]) -> tuple[_Rows, float]:
+    """The rows by sample number, each once, and the rate in Hz."""
+    rate = 0.0
+    if table.seq is None:
+        stretches = int(rows.stretch[-1]) + 1
+        if stretches > 1:
+            notes.append(f"{stretches} stretches, one after the other with a gap between each and the next")
+        if table.time is None:
+            rate = float(table.fs or 0.0)
+            number = np.unique(rows.stretch, return_inverse=True)[1]
+            rows = replace(rows, seq=rows.seq + number, time=rows.time + number / rate)
+        else:
+            rows, rate = _by_time(path, rows, notes)
+    rows = _each_once(path, table, replace(rows, seq=np.rint(rows.seq)), notes)
+    if table.seq is not None:
+        rate = table.fs if table.time is None and table.fs is not None else rate_from_time(rows.time, rows.seq.astype(np.int64))
+        notes += disagreements("the file", rows.seq, rows.time, rate)
+    if table.time is not None and table.fs is not None and abs(table.fs / rate - 1) > 1e-3:
+        notes.append(f"fs says {table.fs:g} Hz, the time stamps {rate:.6g} Hz; the stamps are taken")
+    return rows, rate
+
+
+def _by_time(path: Path, rows: _Rows, notes: list[str]) -> tuple[_Rows, float]:
+    """Numbered by their instants; the time of a stretch that begins anew goes on after the one before."""
+    time, number = rows.time.copy(), rows.stretch
+    period = float(np.median(np.diff(time)))
+    for begin in np.flatnonzero(np.diff(number)) + 1:
+        if time[begin] <= time[begin - 1]:
+            time[begin:] += time[begin - 1] - time[begin] + 2 * period
+    smooth = (rows.position,) if rows.reference is None else (rows.position, rows.reference)
+    found = even(path, time, rows.voltage, smooth, notes)
+    reference = None if rows.reference is None else found.values[2]
+    whole = np.zeros(len(found.seq))
+    voltage, position = found.values[:2]
+    return _Rows(time=found.time, seq=found.seq, voltage=voltage, position=position, reference=reference, stretch=whole), found.rate
+
+
+def _each_once(path: Path, table: Table, rows: _Rows, notes: list[str]) -> _Rows:
+    """Of samples with one number the first."""
+    fresh = np.concatenate(([True], rows.seq[1:] > np.maximum.accumulate(rows.seq)[:-1]))
+    if fresh.all():
+        return rows
+    if table.seq is not None and bool(np.any(np.diff(rows.seq) < 0)):
+        raise BadRecording(path, "seq does not increase", "Sort the samples by seq.")
+    notes.append(f"{int(np.sum(~fresh))} samples are there twice; the first is kept")
+    return rows.only(fresh)
 
 
 def _whole(path: Path, table: Table, columns: list[int], notes: list[str]) -> list[int]:

@@ -15,7 +15,7 @@ async def open_dialog(session: Session) -> None:
     names = await run.io_bound(session.shelf.names)
     with ui.dialog() as dialog, ui.element("div").classes("card").style("min-width: min(90vw, 420px)"):
         ui.html("<h2>Open a recording</h2>", sanitize=False)
-        ui.label(f"Bags, CSV, NPZ and MAT files of {session.shelf.folder.name}").classes("soft small")
+        ui.label(f"Bags and tables of {session.shelf.folder.name}").classes("soft small")
         if names:
             choice = ui.select(names, value=names[0], label="recording", with_input=len(names) > 8).props("outlined dense")
         else:

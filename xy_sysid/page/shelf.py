@@ -6,8 +6,10 @@ import re
 from pathlib import Path
 
 from xy_sysid.errors import BadInput
+from xy_sysid.imports.registry import TABLES
 
-TABLES = (".csv", ".tsv", ".dat", ".npz", ".mat", ".mcap", ".db3")
+TEXTS = (".txt", ".log", ".json")  # which are mostly something else; as arguments of the command they are opened all the same
+LISTED = (*(ending for ending in TABLES if ending not in TEXTS), ".mcap", ".db3")
 MOST = 200  # recordings listed
 DEEP = 2  # folders below the shelf that are looked into
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
@@ -39,7 +41,7 @@ class Shelf:
                     found.append(name)
                 elif deep > 1 and len(found) < MOST:
                     self._look(entry, deep - 1, found)
-            elif entry.suffix.lower() in TABLES:
+            elif entry.suffix.lower() in LISTED:
                 found.append(name)
 
     def find(self, name: str) -> Path:

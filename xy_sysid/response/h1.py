@@ -158,7 +158,7 @@ def _excited(gxx: FloatArray, inside: slice, reach: int) -> NDArray[np.bool_]:
     """Lines whose input power, and that of all their neighbours within the window's main lobe, is not negligible."""
     own = gxx[inside]
     place = int(STRONG * (own.size - 1))
-    strong = float(np.partition(own, place)[place]) if own.size else 0.0
+    strong = max(float(np.partition(own, place)[place]), float(own.mean())) if own.size else 0.0  # of a narrow band the mean is more
     if reach == 0 and strong < float(own.max(initial=0.0)) * EXCITED:
         strong = float(own.max(initial=0.0))
     above = gxx > EXCITED * strong

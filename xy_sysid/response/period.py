@@ -10,11 +10,12 @@ from xy_sysid.samples.block import FloatArray
 
 LIKENESS = 0.98  # correlation of the input with itself one period later; measured inputs carry a little noise
 OFF_WHOLE = 0.1  # of a sample that the true period may be off: windows then slip against it by less than half a sample in five
-FEWEST = 6  # periods that must be there, so that five are left to average after the transient
+TONE, TONES = 0.1, 8  # of the largest, and how many of them an input has that repeats with the other sign
+FEWEST = 2  # periods that must be there: fewer do not repeat
 
 
 def find_period(u: FloatArray, shortest: int = 16) -> int | None:
-    """Period of a (n,) input in samples, or None if it does not repeat at least six times.
+    """Period of a (n,) input in samples, or None if it is not there twice.
 
     The first peak of the autocorrelation, checked and sharpened on the samples themselves.
     """
@@ -38,6 +39,53 @@ def find_period(u: FloatArray, shortest: int = 16) -> int | None:
     exact = [likeness(signal, int(lag)) for lag in near]
     best = int(np.argmax(exact))
     return int(near[best]) if exact[best] > LIKENESS and _whole(signal, int(near[best])) else None
+
+
+def find_half_period(u: FloatArray, shortest: int = 16) -> int | None:
+    """Samples after which a (n,) input comes again with the other sign, as an odd multisine does after half its period; None if none is there twice.
+
+    Of a few tones alone, like a sine, nothing is said: their half periods tell no more than windows do.
+    """
+    signal = u - u.mean()
+    number, power = signal.shape[0], float(np.dot(signal, signal))
+    if number < FEWEST * shortest or power == 0.0:
+        return None
+    size = fft.next_fast_len(2 * number, real=True)
+    correlation = fft.irfft(np.abs(fft.rfft(signal, size)) ** 2, size)[: number // FEWEST + 1]
+    alike = correlation / (power * (1.0 - np.arange(correlation.shape[0]) / number))
+    half = int(np.argmin(alike[shortest:])) + shortest
+    tones = _odd_lines(signal[:half])
+    several = int(np.sum(tones > TONE * tones.max())) >= TONES
+    return half if several and likeness(signal, half) < -LIKENESS else None
+
+
+def one_more(u: FloatArray, y: FloatArray, period: int) -> tuple[FloatArray, FloatArray]:
+    """Input and output (n,) of a periodic input with the sample that follows, by what followed a period before: the last difference needs it."""
+    if u.shape[0] <= period:
+        return u, y
+    return np.append(u, u[-period]), np.append(y, y[-1] + y[-period] - y[-period - 1])
+
+
+def half_periods(u: FloatArray, y: FloatArray, half: int) -> list[tuple[int, FloatArray, FloatArray]]:
+    """Each half period of input and output (n,) followed by its own negative: a whole period, in which nothing leaks, and one sample more.
+
+    The first is left out where more than two remain. Each is numbered as if they followed each other.
+    """
+    steps = np.append(np.diff(y), 0.0)
+    count = u.shape[0] // half
+    if u.shape[0] == count * half:
+        steps[-1] = -steps[-1 - half]  # the step after the last sample, by its twin
+    pieces = []
+    for number in range(int(count > FEWEST), count):
+        rows = slice(number * half, (number + 1) * half)
+        inputs, moved = np.concatenate((u[rows], -u[rows], u[rows][:1])), np.concatenate((steps[rows], -steps[rows]))
+        pieces.append((2 * half * number, inputs, np.concatenate(([0.0], np.cumsum(moved)))))
+    return pieces
+
+
+def _odd_lines(part: FloatArray) -> FloatArray:
+    """Sizes of the odd lines of a period that is this part (n,) and its negative."""
+    return np.asarray(np.abs(fft.rfft(np.concatenate((part, -part))))[1::2])
 
 
 def _whole(signal: FloatArray, period: int) -> bool:

@@ -12,8 +12,10 @@ Piece = tuple[int, FloatArray, FloatArray]
 """Counter of the first sample, input (n,), output (n,) of a gap-free stretch."""
 
 CREST_FACTOR = 10.0  # a step of the encoder counts as a leap when it stands out so many times more than the voltage does
+OFTEN = 0.1  # of the samples; an encoder that changes less often than that is broken rather than held
 CREST_USUAL = 4.0  # crest factor that any noise reaches in a few thousand samples
 
+HELD = "In every window the output stands at times while the input moves: friction holds it. The {kept} of {total} in which it goes on are used."
 REASONS = {
     "frozen": "the encoder repeated one value while the voltage moved",
     "leap": "the encoder leapt further than the voltage can explain",
@@ -48,12 +50,20 @@ def window_fault(voltage: FloatArray, position: FloatArray, frozen: int) -> str 
     return "leap" if float(np.max(np.abs(step))) > CREST_FACTOR * usual * rms else None
 
 
+def _resumes(voltage: FloatArray, position: FloatArray) -> bool:
+    """Whether a position (n,) that stands at times moves often, at the beginning and at the end too: friction holds it, and no encoder died."""
+    moves = np.diff(position) != 0.0
+    quarter = max(moves.shape[0] // 4, 1)
+    return bool(moves.mean() > OFTEN and moves[:quarter].any() and moves[-quarter:].any() and float(np.ptp(voltage)) > 0.0)
+
+
 def stretches(pieces: list[Piece], shape: WindowShape, differenced: bool, frozen: int) -> tuple[list[tuple[int, int, int]], list[str]]:
     """(number of the piece, first sample, last sample + 1) of what holds windows without a fault, and a sentence about those left out.
 
     differenced: a window needs one sample more. Raises BadInput if every window has a fault.
     """
     kept: list[tuple[int, int, int]] = []
+    held: list[tuple[int, int, int]] = []  # windows that stand at times and go on
     faults: dict[str, int] = {}
     total = 0
     for number, (seq, u, y) in enumerate(pieces):
@@ -62,6 +72,8 @@ def stretches(pieces: list[Piece], shape: WindowShape, differenced: bool, frozen
             stop = start + shape.length + int(differenced)
             fault = window_fault(u[start:stop], y[start:stop], frozen)
             total += 1
+            if fault == "frozen" and _resumes(u[start:stop], y[start:stop]):
+                held.append((number, start, stop))
             if fault is not None:
                 faults[fault] = faults.get(fault, 0) + 1
             elif follows:
@@ -72,6 +84,8 @@ def stretches(pieces: list[Piece], shape: WindowShape, differenced: bool, frozen
     if not faults:
         return [(number, 0, len(u)) for number, (_, u, _) in enumerate(pieces)], []
     why = "; ".join(f"in {count} {REASONS[name]}" for name, count in faults.items())
+    if not kept and held:
+        return held, [HELD.format(kept=len(held), total=total)]
     if not kept:
         raise BadInput("number of sound windows", f"0 of {total} ({why})", "1 or more", "Check the encoder; --set frozen= allows longer standstill.")
     return kept, [f"{sum(faults.values())} of {total} windows are left out: {why}."]

@@ -16,6 +16,8 @@ from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import SCALES, Units
 
 STANDS = 0.02  # part of the longest way of a second: an axis that goes less far, and is not driven, stands
+COMPARABLE = 0.5  # of the longest stretch; shorter ones hold too few of its windows
+MOST_STRETCHES = 24  # that are worked on together
 SLOWEST = 3.0  # Hz; slower samples show no machine's axis, but a wrong unit of time
 
 
@@ -223,10 +225,22 @@ class Recording:
 
         Raises BadInput if there is no such axis, or no sample.
         """
-        u, y = self.axis(axis)
         if len(self) == 0:
             raise BadInput("number of samples", 0, "1 or more", "Record for longer, or choose another part.")
-        whole = max(self.runs(), key=lambda part: part.stop - part.start)
+        return self._within(axis, max(self.runs(), key=_size))
+
+    def stretches(self, axis: str) -> tuple[Run, ...]:
+        """All stretches of one axis without a gap that are long enough to tell what the longest tells, in their order; of very many the longest.
+
+        Each is without the ends at which the axis is not driven and stands. Raises BadInput as ``run``.
+        """
+        least = COMPARABLE * _size(self.run(axis).rows)
+        found = [self._within(axis, part) for part in self.runs() if _size(part) >= least]
+        longest = sorted(found, key=len, reverse=True)[:MOST_STRETCHES]
+        return tuple(sorted(longest, key=lambda run: run.first))
+
+    def _within(self, axis: str, whole: slice) -> Run:
+        u, y = self.axis(axis)
         driven = _driven(u[whole], y[whole], max(round(self.sampling_rate), 1))
         rows = slice(whole.start + driven.start, whole.start + driven.stop)
         return Run(
@@ -238,6 +252,10 @@ class Recording:
             input_unit=self.input_unit,
             output_unit=self.output_unit,
         )
+
+
+def _size(rows: slice) -> int:
+    return int(rows.stop - rows.start)
 
 
 def _driven(voltage: FloatArray, position: FloatArray, second: int) -> slice:

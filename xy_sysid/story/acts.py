@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 from xy_sysid.axis.model import Library
-from xy_sysid.hypotheses.criteria import MOST_EFFECTS
 from xy_sysid.diagnosis.findings import Findings
 from xy_sysid.diagnosis.refine import never
+from xy_sysid.hypotheses.criteria import MOST_EFFECTS
 from xy_sysid.samples.recording import Run
 from xy_sysid.story.story import Story, added, begin, diagnosed, next_best, pruned, removed
 from xy_sysid.units import Units, bare, moved

@@ -12,15 +12,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from xy_sysid.axis.model import STANDARD, AxisModel, Library, simulate
-from xy_sysid.hypotheses.criteria import MOST_EFFECTS
 from xy_sysid.diagnosis.diagnose import not_enough
 from xy_sysid.diagnosis.findings import Findings, Rung, findings, rung
 from xy_sysid.diagnosis.of_run import diagnose
 from xy_sysid.diagnosis.refine import Effort, never, refine, settle
+from xy_sysid.diagnosis.rungs import with_one_more
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.free_run import EPSILON, AxisData, GreyboxFit, fit, fit_base, prepare
 from xy_sysid.greybox.one_step import follower, one_step_fit
-from xy_sysid.diagnosis.rungs import with_one_more
+from xy_sysid.hypotheses.criteria import MOST_EFFECTS
 from xy_sysid.hypotheses.enough_data import lacking
 from xy_sysid.samples.recording import Run
 from xy_sysid.settings import unknown_name
@@ -246,6 +246,9 @@ def _simulated(data: AxisData, step: Rung, base: Rung, library: Library) -> Grey
         held_out_error=step.held_out_error,
         noise_floor=step.noise_floor,
         excess=step.excess,
+        scores=np.zeros(data.held.begins.size),
+        forced=0.0,
+        force=0.0,
         simulated=simulated,
         error=data.velocity - simulated,
         runs=0,

@@ -1,0 +1,153 @@
+"""A frequency response that was measured elsewhere: read with its units, fitted, exported; what needs samples says so."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers.cli_tools import cli, refused
+from helpers.real_data import data
+
+import xy_sysid as xy
+from xy_sysid.imports import load
+from xy_sysid.imports.listing import listing
+from xy_sysid.response.frf import ComplexArray
+
+F = np.geomspace(1.0, 400.0, 250)
+DELAY, RESONANCE = 2e-3, 60.0
+
+
+def two_masses() -> ComplexArray:
+    """A mass with friction, an antiresonance of 45 Hz and a resonance of 60 Hz, a delay of 2 ms, and 1 % of noise."""
+    s, zero, pole = 2j * np.pi * F, 2 * np.pi * 45.0, 2 * np.pi * RESONANCE
+    plant = 50 / (s * (s + 30)) * (s * s + 0.05 * zero * s + zero**2) / (s * s + 0.06 * pole * s + pole**2) * (pole / zero) ** 2
+    random = np.random.default_rng(1)
+    noise = 1 + 0.01 * (random.standard_normal(F.size) + 1j * random.standard_normal(F.size)) / np.sqrt(2)
+    return np.asarray(plant * np.exp(-DELAY * s) * noise)
+
+
+H = two_masses()
+PHASE = np.unwrap(np.angle(H))
+
+
+def written(path: Path, head: str, columns: tuple[np.ndarray, ...], separator: str = ",") -> Path:
+    """A text file of these columns."""
+    np.savetxt(path, np.column_stack(columns), delimiter=separator, header=head, comments="")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("head", "columns", "says"),
+    [
+        ("Frequency (Hz),Gain (dB),Phase (deg)", (F, 20 * np.log10(abs(H)), np.rad2deg(PHASE)), ("in Hz", "in dB", "in degrees")),
+        ("w [rad/s],|H|,arg [rad]", (2 * np.pi * F, abs(H), PHASE), ("in rad/s", "linear", "in radians")),
+        (
+            "freq,mag,phase",
+            (F, 20 * np.log10(abs(H)) + 200.0, np.rad2deg(PHASE)),
+            ("in Hz, as", "dB, as their slope", "degrees, by their size"),
+        ),
+        ("freq,mag,phase", (F, abs(H) * 1e-3, np.angle(H)), ("in Hz", "linear, as their slope", "in radians, by their size")),
+        ("Frequency (Hz),Gain (dB),Phase (rad)", (F, 20 * np.log10(abs(H)), np.rad2deg(PHASE)), ("the header says rad", "in dB")),
+        ("f_Hz,real,imag", (F, H.real, H.imag), ("real and imaginary",)),
+    ],
+)
+def test_hertz_decibels_and_degrees_are_detected_and_said(tmp_path: Path, head: str, columns: tuple[np.ndarray, ...], says: tuple[str, ...]) -> None:
+    """By the headers, or by the numbers where these say nothing or cannot be."""
+    found = xy.frf_from(written(tmp_path / "frf.csv", head, columns))
+    ratio = found.response / H
+    assert np.allclose(found.frequency, F) and np.allclose(ratio, ratio[0], rtol=1e-6)
+    for text in says:
+        assert any(text in note for note in found.origin.notes), found.origin.notes
+
+
+def test_a_response_from_a_file_is_fitted_and_exported(tmp_path: Path) -> None:
+    """Resonance, delay and orders come back with intervals from the scatter of the lines; the model file reloads."""
+    path = written(tmp_path / "frf.csv", "Frequency (Hz);Gain (dB);Phase (deg)", (F, 20 * np.log10(abs(H)), np.rad2deg(PHASE)), ";")
+    said = cli("fit", path, "--model", tmp_path / "model.yaml", "--unit", "input=V,output=rad", "--json")
+    answer = said.json["axes"]["x"]
+    assert said.code == 0 and answer["estimates"]["resonance_1.frequency"]["value"] == pytest.approx(RESONANCE, rel=0.01)
+    assert answer["estimates"]["delay"]["value"] == pytest.approx(1e3 * DELAY if answer["estimates"]["delay"]["unit"] == "ms" else DELAY, rel=0.05)
+    assert answer["trustworthy"] and answer["transfer_function"]["output_unit"] == "rad"
+    assert any("1 integrator and hold=none" in note for note in answer["warnings"])
+    model = xy.load_model(tmp_path / "model.yaml")
+    assert "resonance" in repr(model)
+
+
+def test_a_response_from_arrays_is_fitted_and_drawn() -> None:
+    """With a sigma of one's own or without; the truth lies in the intervals; the picture is made."""
+    for sigma in (None, 0.01 * abs(H)):
+        response = xy.frf_from(F, H, axis="x", units={"input": "V", "output": "rad"}, sigma=sigma)
+        assert (response.input_unit, response.output_unit) == ("V", "rad")
+        model = xy.fit(response)
+        (found,) = [one for one in model.intervals_with_misfit if one.name == "resonance_1.frequency"]
+        assert found.low < RESONANCE < found.high and found.high - found.low < 2.0 and model.ok
+        assert xy.plot.bode(response, model) is not None
+
+
+def test_coherence_gives_the_uncertainty_with_its_averages() -> None:
+    """sigma^2 = |H|^2 (1 - c) / c / (averages - 1), Bendat & Piersol, table 9.6."""
+    response = xy.frf_from(F, H, coherence=np.full(F.size, 0.9), averages=11)
+    assert np.allclose(response.sigma, np.abs(H) * np.sqrt(0.1 / 0.9 / 10)) and response.averages == 11
+
+
+def test_what_frf_writes_is_read_again(tmp_path: Path) -> None:
+    """The CSV of ``frf --csv``, of two axes: real, imaginary, coherence and sigma."""
+    random = np.random.default_rng(3)
+    u = random.standard_normal((20_000, 2))
+    y = np.cumsum(np.cumsum(u, axis=0) * 1e-6, axis=0)
+    np.savez(tmp_path / "a.npz", u=u, y=y, fs=1000.0)
+    assert cli("frf", tmp_path / "a.npz", "--csv", tmp_path / "frf.csv").code == 0
+    found = xy.frf_from(tmp_path / "frf.csv", axis="y")
+    straight = xy.frf(xy.load(tmp_path / "a.npz").run("y"))
+    assert np.allclose(found.response, straight.response) and np.allclose(found.sigma, straight.sigma)
+    with pytest.raises(xy.BadInput, match="of 2 axes"):
+        xy.frf_from(tmp_path / "frf.csv")
+
+
+def test_what_needs_samples_says_so(tmp_path: Path) -> None:
+    """diagnose, compare and loading: one line that names the commands that work; columns lists what was understood."""
+    path = written(tmp_path / "frf.csv", "Frequency (Hz),Gain (dB),Phase (deg)", (F, 20 * np.log10(abs(H)), np.rad2deg(PHASE)))
+    for command in (("diagnose",), ("frf",), ("refine", "--auto")):
+        assert "holds no samples in time" in refused(command[0], path, *command[1:])
+    with pytest.raises(xy.BadRecording, match="xy-sysid fit"):
+        load(path)
+    assert "250 lines from 1 to 400 Hz" in listing(path).reads
+    assert [one.role for one in listing(path).columns] == ["frequency", "magnitude", "phase"]
+
+
+def test_columns_without_names_are_said(tmp_path: Path) -> None:
+    """--map names them by number; what is missing is named."""
+    path = tmp_path / "frf.txt"
+    np.savetxt(path, np.column_stack((F, 20 * np.log10(abs(H)), np.rad2deg(PHASE))))
+    said = cli("fit", path, "--map", "frequency=1,magnitude=2,phase=3", "--unit", "magnitude=dB,phase=deg")
+    assert said.code == 0 and "resonance_1.frequency" in said.out
+    assert "no magnitude with phase, or real with imag" in refused("fit", path, "--map", "frequency=1,phase=3")
+
+
+@pytest.mark.parametrize(
+    ("frequency", "response", "sigma", "says"),
+    [
+        (F, H[:-1], None, "250 frequencies and 249 values"),
+        (F[:5], H[:5], None, "8 or more"),
+        (F, H, np.ones(3), "of 3 lines"),
+        (F, np.full(F.size, np.nan), None, "0 lines"),
+    ],
+)
+def test_arrays_that_are_no_response_are_one_line(frequency: np.ndarray, response: np.ndarray, sigma: np.ndarray | None, says: str) -> None:
+    """Lengths that differ, too few lines, no numbers; and a name that is not known."""
+    with pytest.raises(xy.BadInput, match=says):
+        xy.frf_from(frequency, response, sigma=sigma)
+    with pytest.raises(xy.BadInput, match="coherence"):
+        xy.frf_from(F, H, coherense=np.ones(F.size))
+
+
+@pytest.mark.parametrize(("name", "orders"), [("G_I_PI_300_DP.csv", 1), ("G_I_PID_300_DP.csv", 1), ("G_I_PID_300_AP.dat", 1)])
+def test_responses_as_they_were_found(name: str, orders: int) -> None:
+    """Controllers, whose phase is in degrees though one header says rad: their high-frequency gain is met by a fit of first order."""
+    found = xy.frf_from(data(f"frf_file/{name}"))
+    assert len(found) == 300 and any("phases are in degrees" in note for note in found.origin.notes)
+    assert any("magnitudes are in dB" in note for note in found.origin.notes)
+    model = xy.fit(found, numerator_order=orders, denominator_order=orders, delay=False)
+    low = np.abs(model.tf.response(found.frequency[:20]) / found.response[:20])
+    assert float(np.median(np.abs(np.log(low)))) < np.log(2.0)

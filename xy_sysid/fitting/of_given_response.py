@@ -1,0 +1,40 @@
+"""How a response that was measured elsewhere is fitted: nothing was held between samples, and its low end tells whether it integrates."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from xy_sysid.response.frf import FrequencyResponse
+from xy_sysid.settings import IdentifierSettings
+
+LOW = 10  # lines at the low end whose slope tells
+USUAL = IdentifierSettings()
+
+
+def is_given(response: FrequencyResponse) -> bool:
+    """Whether it comes from no windows of samples."""
+    return response.resolution == 0.0
+
+
+def settings_for(response: FrequencyResponse, settings: IdentifierSettings) -> IdentifierSettings:
+    """The settings with the hold and the integrators of a response that was measured elsewhere, where they are the usual ones."""
+    if not is_given(response):
+        return settings
+    hold = "none" if settings.hold == USUAL.hold else settings.hold
+    integrators = _integrators(response) if settings.integrators == USUAL.integrators else settings.integrators
+    return settings.model_copy(update={"hold": hold, "integrators": integrators})
+
+
+def band_of(response: FrequencyResponse, settings: IdentifierSettings) -> FrequencyResponse:
+    """All lines of a response that was measured elsewhere, or those of a band that somebody chose."""
+    low = settings.band_low if settings.band_low != USUAL.band_low else 0.0
+    high = settings.band_high if settings.band_high != USUAL.band_high else np.inf
+    return response.band(low, high)
+
+
+def _integrators(response: FrequencyResponse) -> int:
+    """0, 1 or 2: as many as both the slope of the magnitude and the phase of the lowest lines show."""
+    lines = slice(0, LOW)
+    slope = float(np.polyfit(np.log(response.frequency[lines]), np.log(np.abs(response.response[lines])), 1)[0])
+    phase = float(np.angle(np.sum(response.response[lines] / np.abs(response.response[lines]))))
+    return int(np.clip(np.rint(min(-slope, abs(phase) / (0.5 * np.pi))), 0, 2))

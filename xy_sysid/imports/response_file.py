@@ -1,0 +1,187 @@
+"""A file with a measured frequency response: frequency, and magnitude with phase or real with imaginary part. There is no time in it.
+
+What numbers mean is told by the headers, and by the numbers where these contradict them; every choice is said. Where nothing else tells whether a
+magnitude is in dB, the phase does: of a minimum-phase system it is 90 degrees for each 20 dB a decade (Bode 1945, ch. XIV).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from xy_sysid.errors import BadInput, BadRecording
+from xy_sysid.imports import csv
+from xy_sysid.imports.reading import Reading
+from xy_sysid.imports.sheet import Column, Sheet, spoken
+from xy_sysid.response.frf import FrequencyResponse
+from xy_sysid.response.given import Known, given_response
+from xy_sysid.samples.block import FloatArray
+from xy_sysid.samples.recording import Origin
+from xy_sysid.settings import unknown_name
+
+NAMES: Mapping[str, str] = {
+    "frequency": "frequency freq f omega w hz",
+    "magnitude": "magnitude mag h gain amplitude ampl abs db ratio",
+    "phase": "phase ph arg angle argument",
+    "real": "real re",
+    "imag": "imag imaginary im",
+    "coherence": "coherence coh gamma",
+    "sigma": "sigma std deviation uncertainty",
+}
+RADIAN = ("rad/s", "1/s", "rad/sec")  # units of an angular frequency
+TURN = 2 * np.pi
+JUMP = 0.5  # rad; a phase whose usual step from line to line is more, once turns are taken off, is no smooth one
+EXAMPLE = "Name them with --map frequency=1,magnitude=2,phase=3, or real= and imag= (see xy-sysid columns FILE)."
+
+
+def sheet(path: Path) -> Sheet:
+    """The columns of the file."""
+    return csv.sheet(path)
+
+
+def responses(path: Path, sheet: Sheet, reading: Reading) -> dict[str, FrequencyResponse]:
+    """The response of each axis: of one, x, if the file names none. Raises BadRecording or BadInput that say what is missing."""
+    columns = {role: column for role in NAMES if (column := column_of(sheet, role, reading)) is not None}
+    _complete(path, sheet, columns)
+    axes = next((column for column in sheet.columns if column.words and spoken(column.name) == ("axis",)), None)
+    words = np.array(axes.words if axes is not None else ["x"] * len(columns["frequency"].values))
+    names = dict.fromkeys(words.tolist())
+    found = {name: _response(columns, words == name, name, reading) for name in names}
+    return found if reading.axes is None else {name: found[name] for name in _chosen(reading.axes, found)}
+
+
+def frf_from(
+    source: Path | str | Any,
+    response: Any = None,
+    *,
+    axis: str | None = None,
+    columns: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
+    **known: Any,
+) -> FrequencyResponse:
+    """A frequency response that was measured elsewhere, for ``fit``, ``plot`` and all that needs no samples.
+
+    source:   a file, or (m,) frequencies in Hz with ``response``, (m,) complex
+    axis:     its name, of a file of several the one to take; units: {"input": "V", "output": "rad"}, of a file also {"phase": "deg"}
+    columns:  of a file, as ``--map`` says them: {"frequency": "1", "magnitude": "2", "phase": "3"}
+    known:    of arrays: sigma, (m,) standard deviation of the complex error; coherence, (m,), with its averages; sampling_rate, Hz
+    What was understood is in ``origin.notes``. Raises BadInput or BadRecording.
+    """
+    if not isinstance(source, str | Path):
+        names = [field.name for field in dataclasses.fields(Known)]
+        for name in known:
+            if name not in names:
+                raise unknown_name(name, names, "frf_from")
+        told = units or {}
+        return given_response(source, response, Known(**known), (told.get("input", "in"), told.get("output", "out")), Origin(axis=axis or ""))
+    from xy_sysid.imports.registry import format_of, sheet_of
+
+    path = Path(source)
+    try:
+        content = sheet_of(path, format_of(path))
+    except OSError as error:
+        raise BadRecording(path, f"cannot be read ({error.strerror or error})", "Check the path and the permissions.") from None
+    found = responses(path, content, Reading(columns=columns or {}, units=units or {}, axes=None if axis is None else (axis,)))
+    if len(found) > 1:
+        raise BadInput("frequency response", f"of {len(found)} axes", "one axis", f"Choose one with axis=: {', '.join(found)}.")
+    return next(iter(found.values()))
+
+
+def column_of(sheet: Sheet, role: str, reading: Reading) -> Column | None:
+    """The column of a role: the one that was said, or whose first word is one of its names."""
+    if role in reading.columns:
+        return sheet.find(reading.columns[role])
+    known = NAMES[role].split()
+    return next((sheet.usable(one) for one in sheet.columns if not one.words and spoken(one.name) and spoken(one.name)[0] in known), None)
+
+
+def _complete(path: Path, sheet: Sheet, columns: Mapping[str, Column]) -> None:
+    if any("psd" in spoken(one.name) for one in sheet.columns) and "phase" not in columns:
+        act = "Record the acceleration itself, as raw data, together with the command."
+        raise BadRecording(path, "power spectra without a phase, which are no frequency response", act)
+    missing = [role for role in ("frequency",) if role not in columns]
+    if not ({"magnitude", "phase"} <= set(columns) or {"real", "imag"} <= set(columns)):
+        missing.append("magnitude with phase, or real with imag")
+    if missing:
+        raise BadRecording(path, f"no {' and no '.join(missing)}; {sheet.names()}", EXAMPLE)
+
+
+def _chosen(axes: Any, found: Mapping[str, FrequencyResponse]) -> list[str]:
+    for name in axes:
+        if name not in found:
+            raise BadInput("axis", name, ", ".join(found), "Choose some of these.")
+    return list(axes)
+
+
+def _response(columns: Mapping[str, Column], rows: Any, axis: str, reading: Reading) -> FrequencyResponse:
+    values = {role: column.values[rows] for role, column in columns.items()}
+    notes: list[str] = []
+    frequency = _hertz(columns["frequency"], values["frequency"], reading, notes)
+    if {"real", "imag"} <= set(values):
+        response = values["real"] + 1j * values["imag"]
+        notes.append("the response is read as real and imaginary part")
+    else:
+        phase = _radians(columns["phase"], values["phase"], reading, notes)
+        size = _linear(columns["magnitude"], (frequency, values["magnitude"], phase), reading, notes)
+        response = size * np.exp(1j * phase)
+    known = Known(sigma=values.get("sigma"), coherence=values.get("coherence"), sampling_rate=reading.rate)
+    units = reading.unit("input", axis) or "in", reading.unit("output", axis) or "out"
+    return given_response(frequency, response, known, units, Origin(axis=axis, notes=tuple(notes)))
+
+
+def _hertz(column: Column, values: FloatArray, reading: Reading, notes: list[str]) -> FloatArray:
+    said = reading.units.get("frequency") or column.unit
+    angular = said.replace(" ", "") in RADIAN if said else spoken(column.name)[0] in ("omega", "w")
+    notes.append(f"frequencies are in {'rad/s' if angular else 'Hz'}{'' if said else ', as nothing else is said'}")
+    scale = {"khz": 1e3, "mhz": 1e6 if said == "MHz" else 1e-3}.get((said or "").lower(), 1.0)
+    return values / TURN if angular else values * scale
+
+
+def _radians(column: Column, values: FloatArray, reading: Reading, notes: list[str]) -> FloatArray:
+    """Phases in rad. A header of rad is not believed where the phase would leap by turns from line to line."""
+    told = reading.units.get("phase", "")
+    words = {*spoken(column.name), *spoken(column.unit)}
+    degrees = bool(words & {"deg", "degree", "degrees"}) or "°" in column.name + column.unit
+    radians = bool(words & {"rad", "radian", "radians"})
+    finite = values[np.isfinite(values)]
+    within = float(np.max(np.abs(finite), initial=0.0)) <= TURN
+    smooth = float(np.median(np.abs(np.angle(np.exp(1j * np.diff(finite)))))) < JUMP if finite.size > 1 else True
+    if told:
+        degrees = told.lower() in ("deg", "degree", "degrees", "°")
+        why = ""
+    elif radians and not within and not smooth:
+        degrees, why = True, ": the header says rad, and in rad the phase would leap by turns from line to line (--unit phase=rad overrides)"
+    elif not degrees and not radians:
+        degrees, why = not within, ", by their size"
+    else:
+        why = ""
+    notes.append(f"phases are in {'degrees' if degrees else 'radians'}{why}")
+    return np.deg2rad(values) if degrees else values
+
+
+def _linear(column: Column, lines: tuple[FloatArray, FloatArray, FloatArray], reading: Reading, notes: list[str]) -> FloatArray:
+    """Magnitudes as they are, from dB where they are in dB. lines: frequency Hz, magnitude, phase rad."""
+    frequency, values, phase = lines
+    told, words = reading.units.get("magnitude", ""), {*spoken(column.name), *spoken(column.unit)}
+    if told or "db" in words:
+        decibels, why = (told.lower() == "db" if told else True), ""
+    elif bool(np.any(values[np.isfinite(values)] < 0)):
+        decibels, why = True, ", as some are negative"
+    else:
+        decibels, why = _slope_says_decibels(frequency, values, phase), ", as their slope fits the phase then"
+    notes.append(f"magnitudes are {'in dB' if decibels else 'linear'}{why}")
+    return np.asarray(10.0 ** (values / 20.0) if decibels else values)
+
+
+def _slope_says_decibels(frequency: FloatArray, values: FloatArray, phase: FloatArray) -> bool:
+    good = np.isfinite(frequency) & np.isfinite(values) & np.isfinite(phase) & (frequency > 0) & (values > 0)
+    if int(np.sum(good)) < 4:
+        return False
+    x = np.log(frequency[good])
+    slopes = (np.gradient(np.log(10.0) / 20.0 * values[good], x), np.gradient(np.log(values[good]), x))
+    off = [float(np.median(np.abs(np.angle(np.exp(1j * (phase[good] - 0.5 * np.pi * slope)))))) for slope in slopes]
+    return off[0] < off[1]

@@ -1,0 +1,80 @@
+"""Input and output in two files: ``--map input=u.csv:1,output=y.csv:2`` names a file and its column. They are joined by time or by row."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from xy_sysid.errors import BadRecording
+from xy_sysid.imports.names import meaning
+from xy_sysid.imports.reading import Reading
+from xy_sysid.imports.registry import BAG, format_of, sheet_of
+from xy_sysid.imports.sheet import Sheet
+from xy_sysid.samples.block import FloatArray
+
+
+def of_several_files(path: Path, reading: Reading, notes: list[str]) -> tuple[Sheet, Reading] | None:
+    """One sheet of the columns of all files that the reading names, and the reading that goes with it; None if it names no file.
+
+    Files that all have a time are joined by it, others by row. Raises BadRecording if their rows do not fit together.
+    """
+    named = {what: found for what, column in reading.columns.items() if (found := file_and_column(path, column)) is not None}
+    if not named:
+        return None
+    sheets = {file: sheet_of(file, format_of(file)) for file in dict.fromkeys([path, *(file for file, _ in named.values())]) if _is_table(file)}
+    chosen = {what: named.get(what, (path, column)) for what, column in reading.columns.items()}
+    used = dict.fromkeys(file for file, _ in chosen.values())
+    clocks = {file: _clock(sheets[file], reading) for file in used} if "time" not in reading.columns and reading.rate is None else {}
+    by_time = bool(clocks) and all(clock is not None for clock in clocks.values())
+    columns = [
+        replace(sheets[file].find(name), name=f"{what} in {file.name}", clock=clocks[file] if by_time else None)
+        for what, (file, name) in chosen.items()
+    ]
+    files = " and ".join(file.name for file in used)
+    rows = {file.name: len(sheets[file].find(name).values) for file, name in chosen.values()}
+    if not by_time and len(set(rows.values())) > 1:
+        counts = ", ".join(f"{name} {count}" for name, count in rows.items())
+        raise BadRecording(path, f"the files have different numbers of rows ({counts}) and not all have a time", "Cut them to the same samples.")
+    notes.append(f"{files} are joined {'by their times' if by_time else 'row by row'}")
+    rate = next((sheets[file].fs for file in used if sheets[file].fs is not None), None)
+    told = dict(zip(chosen, (column.name for column in columns), strict=True))
+    return Sheet(path=path, columns=tuple(columns), fs=rate), dataclasses.replace(reading, columns=told)
+
+
+def file_and_column(path: Path, text: str) -> tuple[Path, str] | None:
+    """The file and the column in it that FILE:COLUMN names; a file lies beside ``path`` or where it says. None if there is no such file."""
+    name, colon, column = text.rpartition(":")
+    if not (colon and name and column):
+        return None
+    for file in (path.parent / name, Path(name)):
+        try:
+            if file.is_file():
+                return file, column
+        except OSError:
+            continue
+    return None
+
+
+def others(path: Path, columns: Mapping[str, str]) -> set[Path]:
+    """The files that FILE:COLUMN name, each as one absolute path."""
+    return {found[0].resolve() for text in columns.values() if (found := file_and_column(path, text)) is not None}
+
+
+def _is_table(path: Path) -> bool:
+    return format_of(path) is not BAG
+
+
+def _clock(sheet: Sheet, reading: Reading) -> FloatArray | None:
+    """The instants of a file that has a column for them, in s."""
+    from xy_sysid.imports.sheet_table import in_seconds
+
+    for column in sheet.columns:
+        known = meaning(column.name, column.unit)
+        if known is not None and known.role == "time" and not column.words and np.all(np.isfinite(column.values)):
+            unit = reading.unit("time") or column.unit or known.unit or "s"
+            return np.asarray(in_seconds(sheet.path, column.values * (reading.scale("time") or 1.0), unit, []))
+    return None
