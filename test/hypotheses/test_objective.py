@@ -8,9 +8,10 @@ from helpers.simulated import recorded
 
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.greybox.axis_data import AxisData, prepare
-from xy_sysid.greybox.free_run import FINER, FIRST_LOOK, LONG, NEARER, finish, fit, fit_base, problem
+from xy_sysid.greybox.free_run import FINER, FIRST_LOOK, LONG, NEARER, finish, fit, fit_base
 from xy_sysid.greybox.least_squares import Target, solve
 from xy_sysid.greybox.objective import Objective, responder
+from xy_sysid.greybox.parameters import problem
 
 FLOOR = np.full(30, 1e-8)
 LINES = np.full(30, 20.0)

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from helpers.ros_tools import World, needs_ros, world_in
 
-from xy_sysid.live.messages import StatusMessage
+from xy_sysid.live.plain_messages import StatusMessage
 from xy_sysid.page.live import Live
 from xy_sysid.page.orders import Wish
 from xy_sysid.page.topics_state import TopicsState

@@ -11,7 +11,7 @@ from typing import Any
 from xy_sysid.axis.model import STANDARD
 from xy_sysid.errors import BadInput
 from xy_sysid.live.diagnoser import WAITS
-from xy_sysid.live.messages import topic_of
+from xy_sysid.live.plain_messages import topic_of
 from xy_sysid.page.facts import seconds_text
 from xy_sysid.page.link import Link
 from xy_sysid.page.orders import Order, OrderKind, OrderState
