@@ -85,7 +85,9 @@ def test_what_is_of_no_use_is_left_out_again() -> None:
     data = data_of("coulomb_friction")
     pool, _ = searched(data)
     crowded = frozenset({"coulomb_friction", "constant_load"})
-    pool.fitted(crowded, lambda: [pool.best.fit.model.with_effect("constant_load", (0.001,))])
+    node = pool.fitted(crowded, lambda: [pool.best.fit.model.with_effect("constant_load", (0.001,))])
+    assert node is not None
+    pool.finished(node)
     pool.nodes[frozenset({"coulomb_friction"})].leads = False
     pool.nodes[crowded].leads = True
     assert pool.best.effects == crowded

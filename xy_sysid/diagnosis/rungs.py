@@ -14,10 +14,10 @@ from xy_sysid.greybox.free_run import GreyboxFit, best_start, fit, fit_base, joi
 from xy_sysid.greybox.one_step import follower, one_step_fit
 from xy_sysid.hypotheses import starts
 from xy_sysid.hypotheses.companions import put_beside
-from xy_sysid.hypotheses.compare import gain, size
+from xy_sysid.hypotheses.compare import gain
 from xy_sysid.hypotheses.criteria import AT_FLOOR, PRICE, RIVAL, TELLS
 from xy_sysid.hypotheses.one_step import Filtered
-from xy_sysid.hypotheses.pool import Node, Pool
+from xy_sysid.hypotheses.pool import Node, Pool, alike
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,28 +66,29 @@ def ladder_of_given(data: AxisData, given: Given) -> Ladder:
 def ladder_of_search(pool: Pool, given: Given, filtered: Filtered | None) -> Ladder:
     """The ladder of the best set, or of what one-step prediction found instead."""
     data, library, node, base = pool.data, pool.library, pool.answer, given.steps[0].fit
-    alone = (item for item in pool.nodes.values() if len(item.effects) == 1)
-    tried = sorted((Candidate(next(iter(item.effects)), item.promised, item.fit) for item in alone), key=lambda item: item.fit.held_out_error if item.fit else math.inf)
+    tried = [Candidate(next(iter(item.effects)), item.promised, item.fit) for item in pool.nodes.values() if len(item.effects) == 1]
+    tried.sort(key=lambda item: item.fit.held_out_error if item.fit else math.inf)
     refused = tuple((tuple(sorted(item.effects)), item.refused) for item in pool.nodes.values() if item.refused)
     if filtered is not None:
         return _of_one_step(data, base, node, filtered, tried, refused, pool.late())
     final = joined(data, node.fit, pool.late)
-    own = {name: max(size(node.fit, pool.without(node, name).fit), 0.0) for name in node.effects - pool.kept}
+    own = {name: pool.size_without(node, name) for name in node.effects - pool.kept}
     names = tuple(name for name, _ in final.model.effects)
     parts = {name: [own[part] for part in _parts(library, name) if part in own] for name in names}
     ordered = _ordered(library, {name: max(each, default=0.0) for name, each in parts.items()})
     ordered = (*given.names, *(name for name in ordered if name not in given.names))
-    rivals = sorted(
-        (
-            Rival(tuple(sorted(item.effects)), item.fit, _doubt(node, item), item.refused)
-            for item in pool.nodes.values()
-            if item.whole and item is not node and 0 < len(item.effects) <= len(node.effects) and not item.effects < node.effects
-            if not contains(library, item.effects, node.effects)
-            if not is_the_same(library, (item.effects, item.fit), (node.effects, node.fit), AT_FLOOR)
-            if not item.refused or is_taken_for(library, item.effects, node.effects)  # it is no spring, but is it a wave?
-        ),
-        key=lambda item: item.fit.excess,
-    )
+    others = [
+        item
+        for item in pool.nodes.values()
+        if item is not node and 0 < len(item.effects) <= len(node.effects) and not item.effects < node.effects
+        if not contains(library, item.effects, node.effects)
+        if not is_the_same(library, (item.effects, item.fit), (node.effects, node.fit), AT_FLOOR)
+        if not item.refused or is_taken_for(library, item.effects, node.effects)  # it is no spring, but is it a wave?
+    ]
+    others.sort(key=lambda item: (-_doubt(node, item), item.brief.excess))
+    for item in others[:1]:
+        pool.finished(item)  # its error is shown
+    rivals = [Rival(tuple(sorted(item.effects)), item.fit, _doubt(node, item), item.refused) for item in others]
     whole = [item for item in pool.nodes.values() if item.whole and not item.refused]
     ladder = Ladder(
         steps=(*given.steps, *_rungs(pool, given, ordered, final)),
@@ -109,7 +110,7 @@ def ladder_of_search(pool: Pool, given: Given, filtered: Filtered | None) -> Lad
 
 def _doubt(node: Node, other: Node) -> float:
     """Probability that another set predicts better than the one that was taken, parameters at their price; at most a half, as it was not taken."""
-    found = gain(node.fit, other.fit)
+    found = gain(*alike(node, other))
     priced = replace(found, nats=found.nats + PRICE * (other.parameters - node.parameters))
     return min(1.0 - priced.probability, 0.5)
 
@@ -174,8 +175,8 @@ def _rungs(pool: Pool, given: Given, names: tuple[str, ...], final: GreyboxFit) 
             now = final
         else:
             known = pool.nodes.get(so_far)
-            is_known = known is not None and known.whole and not known.refused
-            now = known.fit if known is not None and is_known else with_one_more(pool.data, pool.library, now, name)
+            usable = known is not None and not known.refused
+            now = pool.finished(known).fit if known is not None and usable else with_one_more(pool.data, pool.library, now, name)
         if now is final or now.held_out_error < shown.held_out_error:
             steps.append(Step(name, now))
             shown = now

@@ -59,8 +59,10 @@ class OneStepTrials:
         return tuple(effect.name for effect in self.pool.library.acting if effect.one_step is not None and one)
 
     def due(self) -> bool:
-        """After the first simulations, once, where the best leaves something."""
-        return bool(self.names) and not self.asked and len(self.pool.nodes) > FEWEST and self.pool.best.fit.excess >= AT_FLOOR
+        """After the first simulations, once, where the best explains less than it leaves."""
+        best = self.pool.best
+        left = best.fit.excess >= AT_FLOOR and not self._explains(best)
+        return bool(self.names) and not self.asked and len(self.pool.nodes) > FEWEST and left
 
     def tried(self, last: bool) -> Iterator[frozenset[str]]:
         """Try each beside what a filter can have of the best set, and beside nothing; last: also with what it hides.
@@ -83,7 +85,7 @@ class OneStepTrials:
         return 2.0 * node.fit.held_out_error**2 < rigid.fit.held_out_error**2
 
     def _begins(self, best: Node) -> list[Node]:
-        """What a filter can have of the best set, as a large force beside a gap hides it; and the rigid base."""
+        """What a filter can have of the best set, as a large force beside a gap hides it; and the rigid base, unless that set explains most."""
         pool, library = self.pool, self.pool.library
         names = frozenset(name for name in best.effects if told_apart(library[name]) or library[name].is_dry)
         found = []
@@ -92,8 +94,8 @@ class OneStepTrials:
             for name in best.effects - names:
                 less = less.without(name)
             node = pool.fitted(names, lambda: [less])
-            found += [node] if node is not None else []
-        return list(dict.fromkeys((*found, pool.nodes[pool.kept])))
+            found += [pool.finished(node)] if node is not None else []
+        return found if found and self._explains(found[0]) else list(dict.fromkeys((*found, pool.nodes[pool.kept])))
 
     def ahead(self, found: GreyboxFit) -> float:
         """Error one sample ahead, m/s, held out, that an autoregressive model leaves of a simulation; 0 where the data are too few for that."""

@@ -89,13 +89,15 @@ class Pool:
     def remember(self, effects: frozenset[str], brief: GreyboxFit, found: GreyboxFit, leads: bool = True, promised: float = 0.0) -> Node:
         """A set with its fit, in the place of a worse one of the same set."""
         parameters = count(self.library, effects - self.kept)
-        refused = refusal(self.data, self.library, found, self.kept) if effects > self.kept else ""
-        node = Node(effects, parameters, brief, found, refused, leads, promised)
+        node = Node(effects, parameters, brief, found, self._refusal(effects, found), leads, promised)
         known = self.nodes.get(effects)
         if known is not None and known.whole and (not node.whole or (self.score(known) <= self.score(node) and not known.refused)):
             return known
         self.nodes[effects] = node
         return node
+
+    def _refusal(self, effects: frozenset[str], found: GreyboxFit) -> str:
+        return refusal(self.data, self.library, found, self.kept) if effects > self.kept else ""
 
     def search(self) -> Iterator[frozenset[str]]:
         """Try moves until none promises a better set; yields each set that is about to be fitted."""
@@ -169,9 +171,9 @@ class Pool:
 
         Of a richer law in the place of a simpler one WORTH is asked.
         """
-        better, new = gain(node.fit, simpler.fit), len(node.effects) - len(simpler.effects)
+        better, new = gain(*alike(node, simpler)), len(node.effects) - len(simpler.effects)
         least = (1.0 + self.worth) ** new - 1.0 if new > 0 else WORTH
-        return better.is_sure and better.nats > PRICE * (node.parameters - simpler.parameters) and size(node.fit, simpler.fit) >= least
+        return better.is_sure and better.nats > PRICE * (node.parameters - simpler.parameters) and size(*alike(node, simpler)) >= least
 
     def rivals(self, taken: frozenset[str], most: int = 2) -> Iterator[frozenset[str]]:
         """Fit on all data what promised nearly as much as what was taken, and was not tried as that did well; yields as ``search``."""
@@ -188,10 +190,12 @@ class Pool:
         while not self.late():
             best, simpler = self.best, None
             for effects, begun in self._simpler(best):
-                if effects not in self.nodes or not self.nodes[effects].whole:
+                if effects not in self.nodes:
                     yield effects
                 node = self.fitted(effects, begun)
-                if node is not None and not node.refused and not self._is_better(best, node):
+                if node is None or node.refused or self._is_better(best, node):
+                    continue
+                if not self._is_better(best, self.finished(node)):
                     simpler = node
                     break
             if simpler is None:
@@ -213,19 +217,29 @@ class Pool:
             yield best.effects - {name}, lambda n=name, a=alone: starts.dropped(data, best.fit, n, a)  # type: ignore[misc]
 
     def fitted(self, effects: frozenset[str], begun: Callable[[], Sequence[AxisModel]]) -> Node | None:
-        """A set fitted on all data; a known one again where a start is already better than its fit."""
+        """A set fitted on the first stage's data; a known one again where a start is already better than its fit."""
         known = self.nodes.get(effects)
         if self.late():
-            return known if known is not None and known.whole else None
+            return known
         start = best_start(self.data, list(begun()))
-        if known is not None and known.whole and first_excess(self.data, known.fit.model) <= first_excess(self.data, start) + PRICE / self.scale:
+        if known is not None and first_excess(self.data, known.fit.model) <= first_excess(self.data, start) + PRICE / self.scale:
             return known
         brief = fit(self.data, start, brief=True, late=self.late)
-        if not np.isfinite(brief.excess):
-            return known
-        return self.remember(effects, brief, finish(self.data, brief.model, brief.runs, self.late), leads=False)
+        return self.remember(effects, brief, brief, leads=False) if np.isfinite(brief.excess) else known
 
-    def without(self, node: Node, name: str) -> Node:
-        """The best of the sets with the same effects but for one."""
-        fewer = (item for item in self.nodes.values() if item.whole and item.effects <= node.effects - {name})
-        return min(fewer, key=lambda item: float(np.sum(item.fit.scores)))
+    def finished(self, node: Node) -> Node:
+        """The same node, fitted on all data."""
+        if not node.whole and not self.late():
+            node.fit = finish(self.data, node.brief.model, node.brief.runs, self.late)
+            node.refused = self._refusal(node.effects, node.fit)
+        return node
+
+    def size_without(self, node: Node, name: str) -> float:
+        """What an effect explains over what is left with it: against the best of the sets that have the same effects but for this one."""
+        fewer = (item for item in self.nodes.values() if item.effects <= node.effects - {name})
+        return max(min(size(*alike(node, item)) for item in fewer), 0.0)
+
+
+def alike(one: Node, other: Node) -> tuple[GreyboxFit, GreyboxFit]:
+    """Fits of two sets to the same data: to all if both have been fitted to all, else to those of the first stage."""
+    return (one.fit, other.fit) if one.whole and other.whole else (one.brief, other.brief)
