@@ -25,6 +25,11 @@ REST = 0.2  # part of the usual speed below which friction may be holding it
 FEW = 0.05  # part of the samples that must be in motion, else all are used
 
 
+def cutoffs(sampling_rate: float) -> list[float]:
+    """Hz, of the low-passes for this sampling rate: at most a fifth of it."""
+    return sorted({min(cutoff, 0.2 * sampling_rate) for cutoff in CUTOFFS})
+
+
 @dataclass(frozen=True, slots=True)
 class InverseStart:
     """gain: m/s/V; pole: rad/s; values: of the effect's parameters; sizes: of each force beside it, over what it was."""
@@ -45,14 +50,13 @@ def inverse_starts(
     """
     if effect.guesses is None or effect.is_behind:
         return []
-    cutoffs = [cutoff for cutoff in CUTOFFS if cutoff <= 0.2 * scene.sampling_rate]
-    guesses = effect.guessed(scene) if cutoffs else []
+    guesses = effect.guessed(scene)
     if not guesses:
         return []
     seen_forces = [scipy.fft.rfft(force[:samples]) for force in forces]
     seen_columns = [scipy.fft.rfft(guess.columns[:, :samples], axis=1) for guess in guesses]
     found = []
-    for cutoff in cutoffs:
+    for cutoff in cutoffs(scene.sampling_rate):
         slow, acceleration, velocity, voltage = _motion(scene, samples, cutoff)
         rows = slow.inside()
         if effect.is_dry or rubs:
@@ -81,9 +85,7 @@ def rigid_starts(scene: Scene) -> list[tuple[float, float]]:
     """(gain, pole) of a rigid axis by inverse dynamics, from each low-pass: alone, with a load, and with a load and Coulomb friction."""
     samples, found = scene.velocity.size, []
     direction, ones = scipy.fft.rfft(scene.direction()), scipy.fft.rfft(np.ones(samples))
-    for cutoff in CUTOFFS:
-        if cutoff > 0.2 * scene.sampling_rate:
-            continue
+    for cutoff in cutoffs(scene.sampling_rate):
         slow, acceleration, velocity, voltage = _motion(scene, samples, cutoff)
         rows = slow.inside()
         moving = minimum_filter1d(np.abs(velocity), 2 * int(0.5 * slow.rate / cutoff) + 1) > REST * float(np.std(velocity))

@@ -75,11 +75,18 @@ class Pool:
 
     @property
     def answer(self) -> Node:
-        """The best set whose held-out error in velocity (rms) is below that of the first, or the first."""
+        """The best set whose held-out error in velocity (rms) is below that of the first, or the first.
+
+        Of sets that are as good and have as many effects, that with dry friction, as every machine has it.
+        """
         first = self.nodes[self.kept]
         lower = (node for node in self.nodes.values() if node.leads and not node.refused and node.whole)
         better = [node for node in lower if node.fit.held_out_error < first.fit.held_out_error]
-        return min(better, key=self.score, default=first) if self.best is not first else first
+        if self.best is first or not better:
+            return first
+        best = min(better, key=self.score)
+        same = (node for node in better if len(node.effects) == len(best.effects) and self.score(node) < self.score(best) + PRICE)
+        return min(same, key=lambda node: (-sum(self.library[name].is_dry for name in node.effects), self.score(node)))
 
     def begin(self, start: GreyboxFit) -> Node:
         """The first set, from which the search begins."""
