@@ -29,6 +29,7 @@ from xy_sysid.units import moved
 
 COULOMB = "coulomb_friction"
 CUTOFF = 25.0  # Hz, of the low-pass of inverse dynamics
+POLES = (1e-3, 1e6)  # rad/s, between which output error looks
 REST = 0.05  # of the highest speed; inverse dynamics uses faster samples only
 SUB_STEPS = 4000.0  # Hz, of the simulation within a fit by output error
 GOAL = 1.15  # times the peer's held-out error
@@ -116,6 +117,7 @@ def output_error(data: AxisData, start: tuple[float, float, float], friction: bo
     low, high = np.full(size, -np.inf), np.full(size, np.inf)
     low[1], high[1] = 1.0, 1.0 + 0.25 * data.first
     low[2:], high[2:] = 1.0 - np.log(1e7), 1.0 + np.log(1e7)
+    low[2], high[2] = 1.0 + np.log(np.array(POLES) / pole)
     found = scipy.optimize.least_squares(left, np.ones(size), bounds=(low, high), diff_step=1e-4, x_scale="jac", max_nfev=60)
     return float(found.cost), model(found.x)
 

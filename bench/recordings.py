@@ -12,7 +12,7 @@ import typer
 from faults.shared import DATA, RECORDINGS, Shared
 from xy_sysid.cli import options as o
 from xy_sysid.cli.reading import read_each, reads, runs_of
-from xy_sysid.errors import BadInput
+from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.samples.recording import Recording, Run
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def axes(row: Shared) -> Iterator[Axis]:
 
     try:
         app([str(DATA / row.path), *row.options], standalone_mode=False)
-    except BadInput as refusal:
+    except (BadInput, BadRecording) as refusal:
         yield Axis(row.path, (), str(refusal))
         return
     for name in read[0].axes:
