@@ -17,13 +17,13 @@ import numpy as np
 import scipy.optimize
 import scipy.signal
 
-from bench.recordings import axes, rows, written
+from bench.recordings import axes, markdown, rows, written
 from xy_sysid.axis.model import FINE, STANDARD, AxisModel, simulator, start_of
-from xy_sysid.errors import BadInput
 from xy_sysid.greybox.axis_data import AxisData, prepare_all
 from xy_sysid.greybox.floor import Windows
 from xy_sysid.greybox.free_run import GreyboxFit, fit_base, fit_with
 from xy_sysid.greybox.objective import Objective, responder
+from xy_sysid.hypotheses.enough_data import lacking
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import moved
 
@@ -33,17 +33,16 @@ POLES = (1e-3, 1e6)  # rad/s, between which output error looks
 REST = 0.05  # of the highest speed; inverse dynamics uses faster samples only
 SUB_STEPS = 4000.0  # Hz, of the simulation within a fit by output error
 GOAL = 1.15  # times the peer's held-out error
-COLUMNS = ("recording", "structure", "ours", "peer", "which", "ratio", "score, ours / peer", "seconds, ours / peer")
+COLUMNS = ("recording", "structure", "ours", "peer", "which", "ratio", "objective, ours / peer", "seconds, ours / peer")
 
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """A model on data. error: rms of the velocity held out, m/s; score: of the same by our objective, seen: of the windows of the fit."""
+    """A model on data. error: rms of the velocity held out, m/s; score: by our objective, of the windows of the fit, nats a line."""
 
     model: AxisModel
     error: float
     score: float
-    seen: float
 
 
 def simulated(data: AxisData, model: AxisModel, fine: float = FINE) -> FloatArray:
@@ -64,9 +63,7 @@ def judged(data: AxisData, model: AxisModel) -> Judged:
         found = data.layout.power(windows.spectrum(error))
         return np.where(np.isfinite(found), found, np.inf)
 
-    objective = Objective.of(data.floor)
-    held, seen = power(data.held), power(data.fitted)
-    return Judged(model, data.layout.rms(held), objective.of_power(held, response), objective.of_power(seen, response))
+    return Judged(model, data.layout.rms(power(data.held)), Objective.of(data.floor).of_power(power(data.fitted), response))
 
 
 def made(gain: float, delay: float, pole: float, coulomb: float | None) -> AxisModel:
@@ -153,11 +150,9 @@ def compared(title: str, data: AxisData) -> list[tuple[str, ...]]:
         which = min(reached, key=lambda name: reached[name].error)
         peer, own = reached[which], judged(data, fit.model)
         ratio = f"{own.error / peer.error:.2f}"
-        sys.stderr.write(f"{title}, {structure}: {ratio} of {which}; seen {own.seen:.4f} / {peer.seen:.4f}\n")
-        for one in (own, *reached.values()):
-            sys.stderr.write(f"    {one.error:.4g} score {one.score:.4f} seen {one.seen:.4f} {one.model.values()}\n")
-        scores = f"{own.score:.2f} / {peer.score:.2f}"
-        found.append((title, structure, moved(own.error, unit), moved(peer.error, unit), which, ratio, scores, f"{seconds:.1f} / {spent:.1f}"))
+        sys.stderr.write(f"{title}, {structure}: {ratio} of {which}; objective {own.score:.4f} / {peer.score:.4f}\n")
+        objective = f"{own.score:.2f} / {peer.score:.2f}"
+        found.append((title, structure, moved(own.error, unit), moved(peer.error, unit), which, ratio, objective, f"{seconds:.1f} / {spent:.1f}"))
     return found
 
 
@@ -169,15 +164,13 @@ def main(short: bool = False) -> None:
         if words and not any(word in row.path for word in words):
             continue
         for axis in axes(row):
-            try:
-                if not axis.runs:
-                    raise BadInput("recording", axis.name, "", axis.refused)
-                data = prepare_all(axis.runs[0].sampling_rate, [(run.voltage, run.position) for run in axis.runs], units=axis.runs[0].units)
-                lines += compared(axis.name, data)
-            except BadInput as refusal:
-                refused.append(f"- {axis.name}: {axis.refused or refusal}")
-    head = f"| {' | '.join(COLUMNS)} |\n|{'---|' * len(COLUMNS)}\n"
-    table = head + "\n".join(f"| {' | '.join(line)} |" for line in lines)
+            signals = [(run.voltage, run.position) for run in axis.runs]
+            reason = axis.refused or lacking(axis.runs[0].sampling_rate, signals)
+            if reason:
+                refused.append(f"- {axis.name}: {reason}")
+            else:
+                lines += compared(axis.name, prepare_all(axis.runs[0].sampling_rate, signals, units=axis.runs[0].units))
+    table = markdown(COLUMNS, lines)
     above = sum(float(line[5]) > GOAL for line in lines)
     count = f"{len(lines) - above} of {len(lines)} rows are at most {GOAL:g} times the better peer."
     told = "\n\n".join([table, count, *(["Not compared:\n\n" + "\n".join(refused)] if refused else [])])
