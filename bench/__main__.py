@@ -1,7 +1,8 @@
 """python -m bench [--short] [name ...]: run the benchmarks and write docs/benchmarks.md.
 
-h1, fit, replay, bags, live and intervals run without a name; only by name: long_bag (a day of data, gigabytes on disk), axis_model, and of
-recordings of real machines in $XY_SYSID_DATA real_fits, peers and diagnoses, which write their tables to docs/real-machines.md. --short: a little of each, as the tests run it; nothing is written.
+h1, fit, replay, bags, live and intervals run without a name. Only by name: long_bag (a day of data, gigabytes on disk), axis_model, and of the
+recordings of real machines in $XY_SYSID_DATA real_fits, peers and diagnoses. The last two write their tables to docs/real-machines.md.
+--short: a little of each, as the tests run it; nothing is written.
 """
 
 from __future__ import annotations
