@@ -1,7 +1,8 @@
 """python -m bench [--short] [name ...]: run the benchmarks and write docs/benchmarks.md.
 
-h1, fit, replay, bags, live and intervals run without a name; only by name: long_bag (a day of data, gigabytes on disk), axis_model, and
-real_fits (recordings of real machines in $XY_SYSID_DATA). --short: a little of each, as the tests run it; nothing is written.
+h1, fit, replay, bags, live and intervals run without a name. Only by name: long_bag (a day of data, gigabytes on disk), axis_model, and of the
+recordings of real machines in $XY_SYSID_DATA real_fits, peers and diagnoses. The last two write their tables to docs/real-machines.md.
+--short: a little of each, as the tests run it; nothing is written.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from pathlib import Path
 from bench.tables import Table
 
 TABLES = ("h1", "fit", "replay", "bags", "live", "intervals")
-SCRIPTS = ("long_bag", "axis_model", "real_fits")
+SCRIPTS = ("long_bag", "axis_model", "real_fits", "peers", "diagnoses")
 PAGE = Path(__file__).parents[1] / "docs" / "benchmarks.md"
 
 

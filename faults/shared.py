@@ -63,7 +63,11 @@ RECORDINGS = (
     Shared("gap_foreign/gap_hertz_16um.npz", part=("--span", "0:1.5")),
     Shared("gap_foreign/gap_linear_12um.npz", part=("--span", "0:1.5")),
     Shared("gap_foreign/gap_linear_37um.npz", part=("--span", "0:1.5")),
-    Shared("generator/x_cc.csv", ("--rate", "1000")),
+    Shared(
+        "generator/x_cc.csv",
+        mapped("input=x_cc.csv:1,output=y_cc.csv:1", "--rate", "1000", "--unit", "output=rad/s"),
+        ("--span", "0:20"),
+    ),
     Shared("generator/y_cc.csv", ("--rate", "1000")),
     Shared("hsm150/hsm_pos_0.06_1.npz", part=("--span", "0:3")),
     Shared("joint_state_bags/roblab_hw4"),

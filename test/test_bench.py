@@ -8,14 +8,19 @@ import subprocess
 import sys
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 from helpers import ROOT
 from helpers.cli_tools import bare
 from helpers.real_data import data
 from helpers.ros_tools import needs_ros
 
+from bench import peers
 from bench.__main__ import SCRIPTS, TABLES, main, text
+from bench.recordings import between
 from bench.tables import Table
+from xy_sysid.axis.model import AxisModel, simulate
+from xy_sysid.greybox.axis_data import prepare
 
 HERE = [name for name in TABLES if name != "live"]  # which starts processes that talk to each other
 
@@ -56,17 +61,37 @@ def test_a_benchmark_that_is_asked_for_by_name_runs(name: str, monkeypatch: pyte
     if name == "real_fits":
         monkeypatch.setenv("XY_SYSID_DATA", os.fspath(data("two_inertia_bench").parent))
     monkeypatch.setattr("sys.argv", ["bench", "--short", name])
-    page = ROOT / "docs" / "benchmarks.md"
-    before = page.read_bytes()
+    if name in ("peers", "diagnoses"):
+        data("crane/crane_1.npz")
+    pages = [ROOT / "docs" / name for name in ("benchmarks.md", "real-machines.md")]
+    before = [page.read_bytes() for page in pages]
     assert main() == 0
     said = capsys.readouterr().out
     assert len(said.splitlines()) > 2 and " nan" not in said
-    assert page.read_bytes() == before
+    assert [page.read_bytes() for page in pages] == before
+
+
+def test_peers_reach_the_axis_that_made_the_data() -> None:
+    """Both structures, from voltage and position alone, so that to be no worse than a peer says something."""
+    truth = AxisModel(0.1, 0.0, 20.0).with_effect("coulomb_friction", (0.3,))
+    voltage = np.convolve(np.random.default_rng(2).normal(size=20_000), np.ones(20) / 4.0, "same")
+    velocity = simulate(truth, 1000.0, voltage, np.zeros(voltage.size))
+    data = prepare(1000.0, voltage, np.round(np.concatenate(([0.0], np.cumsum(velocity[1:]))) / 1000.0, 7))
+    reached = peers.peers(data, friction=True)
+    for name, part in (("output error", 0.01), ("inverse dynamics", 0.1)):
+        assert list(reached[name].model.values().values()) == pytest.approx(list(truth.values().values()), rel=part, abs=1e-4)
+        assert reached[name].error < 0.5 * peers.peers(data, friction=False)[name].error
+
+
+def test_a_table_takes_the_place_of_the_one_before() -> None:
+    """Between its marks; the rest of the page stays."""
+    page = "a\n\n<!-- made by python -m bench peers -->\n\nold\n\n<!-- end of peers -->\n\nb\n"
+    assert between(page, "peers", "new\n") == page.replace("old", "new")
 
 
 def test_every_benchmark_is_among_these() -> None:
     """A new file of bench/ has a short form, too."""
-    files = {path.stem for path in (ROOT / "bench").glob("*.py")} - {"__init__", "__main__", "tables"}
+    files = {path.stem for path in (ROOT / "bench").glob("*.py")} - {"__init__", "__main__", "recordings", "tables"}
     assert files == {*TABLES, *SCRIPTS}
 
 

@@ -24,6 +24,7 @@ from xy_sysid.jit import cores
 from xy_sysid.samples.block import FloatArray
 
 TRUSTED = 0.25  # a step whose fall differs by less than this part from the one expected needs no new derivatives; with 0.75 long valleys take longer
+HALVES = 4  # times that the way of a round is halved which does not lower the objective
 STEP = 1e-4  # of a logarithm, or of a parameter's scale: far above rounding, far below what bends
 
 
@@ -209,6 +210,12 @@ def solve(
                         converged = True
                         break
             expected, now = target.spectrum(error, scale.outer(inner))
+            for _ in range(HALVES):  # the weights held for a step that was too long
+                if now < score:
+                    break
+                inner, exact = scale.inner(scale.outer(0.5 * (before[0] + inner))), False
+                error, runs = left(inner), runs + 1
+                expected, now = target.spectrum(error, scale.outer(inner))
             if not now < score:
                 inner, error, change, exact = before
                 break
