@@ -67,7 +67,10 @@ def ladder_of_search(pool: Pool, given: Given, filtered: Filtered | None) -> Lad
     """The ladder of the best set, or of what one-step prediction found instead."""
     data, library, node, base = pool.data, pool.library, pool.answer, given.steps[0].fit
     alone = (item for item in pool.nodes.values() if len(item.effects) == 1)
-    tried = sorted((Candidate(next(iter(item.effects)), item.promised, item.fit) for item in alone), key=lambda item: item.fit.held_out_error if item.fit else math.inf)
+    tried = sorted(
+        (Candidate(next(iter(item.effects)), item.promised, item.fit) for item in alone),
+        key=lambda item: item.fit.held_out_error if item.fit else math.inf,
+    )
     refused = tuple((tuple(sorted(item.effects)), item.refused) for item in pool.nodes.values() if item.refused)
     if filtered is not None:
         return _of_one_step(data, base, node, filtered, tried, refused, pool.late())
