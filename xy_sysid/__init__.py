@@ -19,7 +19,7 @@ Packages in the order of the data; each imports only from those before it.
     response, linear, fitting: windows and spectra to a frequency response, transfer functions, their fits and verdicts
     effects, axis, greybox:    physical effects, an axis with them in time, its fit
     comparison:                where a model fails
-    criteria, judge, search, diagnosis: which effect is missing
+    hypotheses, diagnosis:     which effect is missing
     story, live:               what people are shown, and the online logic
     bags, imports, files, processes: reading, writing, other processes
     nodes, report, page, cli:  what people meet

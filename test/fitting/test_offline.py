@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -158,6 +159,14 @@ def test_friction_is_hinted_at_and_a_linear_machine_is_not_blamed() -> None:
     smooth = rigid(rows)
     assert friction_note(friction_hint(smooth["u"], smooth["y"], RATE)) == ""
     assert friction_note(None) == "" and friction_hint(np.zeros(100), np.zeros(100), RATE) is None
+
+
+def test_an_axis_that_never_turns_shows_no_friction() -> None:
+    """Friction against an even motion one way is the same as a load: nothing is computed of it, so there is no warning of numpy."""
+    drive = (np.arange(5_000) % 256 - 128).astype(np.float64)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert friction_hint(drive, np.arange(0.0, 1_000.0, 0.2), 5_000.0) is None
 
 
 def test_windows_with_a_frozen_or_leaping_encoder_are_left_out() -> None:

@@ -9,7 +9,7 @@ from helpers.simulated import recorded
 from xy_sysid.axis.model import AxisModel, simulate
 from xy_sysid.greybox.axis_data import AxisData, prepare
 from xy_sysid.greybox.free_run import FINER, FIRST_LOOK, LONG, NEARER, finish, fit, fit_base
-from xy_sysid.greybox.least_squares import Target, solve
+from xy_sysid.greybox.least_squares import Schedule, Target, solve
 from xy_sysid.greybox.objective import Objective, responder
 from xy_sysid.greybox.parameters import problem
 
@@ -59,14 +59,14 @@ def test_a_scaled_axis_scores_the_same() -> None:
     ids=["rigid", "coulomb_friction", "cogging", "base_resonance"],
 )
 @pytest.mark.parametrize("schedule", [FIRST_LOOK, NEARER, FINER, LONG], ids=["first look", "nearer", "finer", "long"])
-def test_a_fit_never_ends_worse_than_it_starts(data: AxisData, effects: tuple[tuple[str, tuple[float, ...]], ...], schedule: object) -> None:
+def test_a_fit_never_ends_worse_than_it_starts(data: AxisData, effects: tuple[tuple[str, tuple[float, ...]], ...], schedule: Schedule) -> None:
     """By the objective, from right and from wrong starts."""
     for gain, pole in ((0.1, 250.0), (0.02, 20.0)):
         model = AxisModel(gain, 1e-3, pole, effects)
         run, values, scale = problem(data, model, True, 2000.0)
         target = Target(data.begun(data.velocity), data.brief, data.floor, responder(data.layout, model))
         _, before = target.spectrum(target.measured - target.windows.spectrum(run(values)), values)
-        assert solve(run, target, scale, values, schedule).score <= before  # type: ignore[arg-type]
+        assert solve(run, target, scale, values, schedule).score <= before
 
 
 def test_a_round_that_goes_too_far_is_shortened() -> None:

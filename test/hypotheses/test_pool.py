@@ -12,7 +12,7 @@ from xy_sysid.diagnosis.rungs import with_one_more
 from xy_sysid.greybox.axis_data import AxisData, prepare
 from xy_sysid.greybox.free_run import fit_base
 from xy_sysid.hypotheses.compare import gain, size
-from xy_sysid.hypotheses.criteria import AT_FLOOR, SIZE
+from xy_sysid.hypotheses.criteria import AT_FLOOR, MOST_EFFECTS, SIZE
 from xy_sysid.hypotheses.moves import is_twice, moves
 from xy_sysid.hypotheses.pool import Pool
 
@@ -21,9 +21,9 @@ def data_of(effect: str, seconds: float = 20.0) -> AxisData:
     return prepare(2000.0, *recorded(effect, seconds=seconds).axis("x"))
 
 
-def searched(data: AxisData, **how: object) -> tuple[Pool, list[frozenset[str]]]:
+def searched(data: AxisData, most: int = MOST_EFFECTS) -> tuple[Pool, list[frozenset[str]]]:
     """The pool after a search, and the sets that were said to be tried."""
-    pool = Pool(data, STANDARD, worth=SIZE, **how)  # type: ignore[arg-type]
+    pool = Pool(data, STANDARD, worth=SIZE, most=most)
     pool.begin(fit_base(data))
     return pool, [*pool.search(), *pool.simplified()]
 

@@ -78,7 +78,7 @@ def refine_steps(
     def late() -> bool:
         return effort.now() > until or (effort.budget == math.inf and data.work.done > enough)
 
-    pool = Pool(data, library, frozenset(kept), effort.size, effort.most, late)
+    pool = Pool(data, library, frozenset(kept), worth=effort.size, most=effort.most, late=late)
     pool.begin(fixed.steps[-1].fit)
     trials = OneStepTrials(pool)
     yield from _sets(pool, None if kept else trials)

@@ -70,7 +70,7 @@ def ladder_of_search(pool: Pool, given: Given, filtered: Filtered | None) -> Lad
     tried.sort(key=lambda item: item.fit.held_out_error if item.fit else math.inf)
     refused = tuple((tuple(sorted(item.effects)), item.refused) for item in pool.nodes.values() if item.refused)
     if filtered is not None:
-        return _of_one_step(data, base, node, filtered, tried, refused, pool.late())
+        return _of_one_step(pool, base, filtered, tried, refused)
     final = joined(data, node.fit, pool.late)
     own = {name: pool.size_without(node, name) for name in node.effects - pool.kept}
     names = tuple(name for name, _ in final.model.effects)
@@ -116,15 +116,13 @@ def _doubt(node: Node, other: Node) -> float:
 
 
 def _of_one_step(
-    data: AxisData,
+    pool: Pool,
     base: GreyboxFit,
-    node: Node,
     filtered: Filtered,
     tried: Sequence[Candidate],
     refused: tuple[tuple[tuple[str, ...], str], ...],
-    stopped: bool,
 ) -> Ladder:
-    rungs, bar = filtered.rungs, filtered.bar
+    data, node, rungs, bar = pool.data, pool.answer, filtered.rungs, filtered.bar
     last = rungs[-1][1]
     names = tuple(name for name, _ in last.model.effects)
     noise = min(max(data.floor.encoder * data.sampling_rate, last.noise_floor), last.held_out_error)  # what is predicted is no noise
@@ -141,7 +139,7 @@ def _of_one_step(
         explained=1.0 - left / before,
         noise=noise,
         discrepancy=math.sqrt(left),
-        stopped=stopped,
+        stopped=pool.late(),
     )
 
 

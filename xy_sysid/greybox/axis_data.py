@@ -6,7 +6,7 @@ hold the motion that they judge. Of several recordings each is cut so.
 
 from __future__ import annotations
 
-import threading
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -40,13 +40,19 @@ class Work:
     """What was simulated so far: samples times sub-steps, the same on every machine and however busy it is."""
 
     def __init__(self) -> None:
-        self.done = 0.0
-        self._lock = threading.Lock()
+        self._sum = 0.0
+        self._new: deque[float] = deque()
 
     def add(self, samples: float) -> None:
         """From any thread."""
-        with self._lock:
-            self.done += samples
+        self._new.append(samples)
+
+    @property
+    def done(self) -> float:
+        """The sum, for the one thread that searches."""
+        while self._new:
+            self._sum += self._new.popleft()
+        return self._sum
 
 
 @dataclass(frozen=True)

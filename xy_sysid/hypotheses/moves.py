@@ -106,5 +106,5 @@ def _pairs(
         both = together((one, other))
         if RIVAL * both > gains[one]:
             names = (one, other)
-            found.append(Move(own | {one, other}, count(library, names), both, lambda names=names: starts(names)))  # type: ignore[misc]
+            found.append(Move(own | {one, other}, count(library, names), both, partial(starts, names)))
     return found

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from math import inf
 
 import numpy as np
@@ -96,7 +97,8 @@ class Pool:
     def remember(self, effects: frozenset[str], brief: GreyboxFit, found: GreyboxFit, leads: bool = True, promised: float = 0.0) -> Node:
         """A set with its fit, in the place of a worse one of the same set."""
         parameters = count(self.library, effects - self.kept)
-        node = Node(effects, parameters, brief, found, self._refusal(effects, found), leads, promised)
+        refused = self._refusal(effects, found)
+        node = Node(effects, parameters, brief, found, refused=refused, leads=leads, promised=promised)
         known = self.nodes.get(effects)
         if known is not None and known.whole and (not node.whole or (self.score(known) <= self.score(node) and not known.refused)):
             return known
@@ -220,8 +222,8 @@ class Pool:
             for relative in sorted(library.acting, key=lambda item: len(item.parameters)):
                 related = effect.family and relative.family == effect.family and relative.simulable and relative.name not in best.effects
                 if related and len(relative.parameters) < len(effect.parameters):
-                    yield best.effects - {name} | {relative.name}, lambda n=name, r=relative: starts.swapped(data, best.fit, n, r, None)  # type: ignore[misc]
-            yield best.effects - {name}, lambda n=name, a=alone: starts.dropped(data, best.fit, n, a)  # type: ignore[misc]
+                    yield best.effects - {name} | {relative.name}, partial(starts.swapped, data, best.fit, name, relative, None)
+            yield best.effects - {name}, partial(starts.dropped, data, best.fit, name, alone)
 
     def fitted(self, effects: frozenset[str], begun: Callable[[], Sequence[AxisModel]]) -> Node | None:
         """A set fitted on the first stage's data; a known one again where a start is already better than its fit."""

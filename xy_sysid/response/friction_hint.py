@@ -28,7 +28,7 @@ class FrictionHint:
 
 
 def friction_hint(u: FloatArray, y: FloatArray, sampling_rate: float) -> FrictionHint | None:
-    """The part of the input (n,) that follows the direction of the output's (n,) motion; None if there is too little motion."""
+    """The part of the input (n,) that follows the direction of the output's (n,) motion; None if there is too little motion, or none that turns."""
     step = max(int(0.25 / PART_OF_RATE), 1)
     if u.shape[0] < ENOUGH * step or float(np.ptp(y)) == 0.0:
         return None
@@ -49,10 +49,11 @@ def friction_hint(u: FloatArray, y: FloatArray, sampling_rate: float) -> Frictio
     if not bool(np.all(scale > 0)) or float(target @ target) == 0.0:
         return None
     without = _left_over(table[:, :3] / scale[:3], target)
-    solution, *_ = np.linalg.lstsq(table / scale, target, rcond=None)
+    solution, _, rank, _ = np.linalg.lstsq(table / scale, target, rcond=None)
+    if int(rank) < table.shape[1]:  # an axis that never turns shows no direction
+        return None
     rest = target - table / scale @ solution
-    inverse = np.linalg.pinv((table / scale).T @ (table / scale))
-    deviation = float(np.sqrt(rest @ rest / max(len(target) - 4, 1) * inverse[3, 3]))
+    deviation = float(np.sqrt(rest @ rest / max(len(target) - 4, 1)) * np.linalg.norm(np.linalg.pinv(table / scale)[3]))
     share = (without - float(rest @ rest)) / float(target @ target)
     way = -1.0 if solution[0] < 0 else 1.0  # input and output may be wired against each other
     return FrictionHint(way * float(solution[3] / scale[3]), deviation / float(scale[3]), share)
