@@ -119,19 +119,19 @@ def friction() -> Recording:
 class Sender:
     """Publishes a recording, block by block."""
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: World, recording: Recording) -> None:
         from std_msgs.msg import Float64MultiArray
 
         from xy_sysid.nodes.common import DATA_QOS
 
-        self.world = world
+        self.world, self.recording = world, recording
         self.publishers = {kind: world.node.create_publisher(Float64MultiArray, kind, DATA_QOS) for kind in ("voltage", "position")}
         assert world.until(lambda: all(p.get_subscription_count() > 0 for p in self.publishers.values()), 30.0)
 
     def send(self, first: int, last: int) -> None:
         from xy_sysid.nodes.convert import to_message
 
-        recording = friction()
+        recording = self.recording
         for start in range(first, last, 200):
             rows = slice(start, min(start + 200, last))
             seq = np.arange(rows.start, rows.stop, dtype=float)
@@ -144,7 +144,7 @@ def test_what_lacks_is_said_and_the_model_waits_for_data(world: World) -> None:
     """Nothing heard, too little, an effect set before there are data, a wrong name, cancelling, and data heard all the while."""
     results, statuses = Results(world), world.statuses()
     node = world.start(DIAGNOSER)
-    sender = Sender(world)
+    sender = Sender(world, friction())
     ok, text = trigger(world, "diagnose", 10.0, times=3)
     assert not ok and "no voltage and no position of axes x, y heard yet" in text
     sender.send(0, 6000)
@@ -179,6 +179,43 @@ def test_what_lacks_is_said_and_the_model_waits_for_data(world: World) -> None:
     node.send(signal.SIGINT)
     assert node.wait() == 0
     assert "Traceback" not in node.output()
+
+
+def test_a_resonance_is_found_alone_then_by_steps_after_a_reset(world: World) -> None:
+    """auto adds it; add_next goes on from a model that has it; after reset_model both find the same again, from the rigid model."""
+    results, statuses = Results(world), world.statuses()
+    node = world.start(DIAGNOSER)
+    Sender(world, recorded("x:base_resonance+x:coulomb_friction", seconds=20.0)).send(0, 40_000)
+    assert world.until(lambda: float(newest(statuses, "diagnoser").get("samples paired", "0")) == 40_000, 20.0)
+
+    def ladder() -> list[str | None]:
+        world.until(lambda: newest(results.diagnosis, "progress")["progress"] == "idle", 10.0)
+        return [row["added"] for row in json.loads(results.stories["x"][-1])["ladder"]]
+
+    def asked(act: str) -> str:
+        ok, text = trigger(world, f"{act}/x", 240.0)
+        assert ok, (text, node.output())
+        return text
+
+    asked("auto")
+    found = ladder()
+    errors = results.held_out("x")
+    assert found[0] is None and set(found[1:]) == {"base_resonance", "coulomb_friction"} and errors[-1] < 0.2 * errors[0]
+    assert "Nothing is left to explain" in asked("add_next")
+    assert ladder() == found
+    asked("reset_model")
+    assert world.until(lambda: len(results.held_out("x")) == 1, 20.0) and ladder() == [None]
+    asked("add_next")
+    assert ladder() == found[:2]
+    asked("add_next")
+    assert ladder() == found and results.held_out("x") == pytest.approx(errors, rel=1e-6)
+    asked("reset_model")
+    assert world.set_parameter("diagnoser", "effects.x", ["base_resonance"]) == (True, "")
+    assert world.until(lambda: len(results.held_out("x")) == 2, 60.0) and ladder() == [None, "base_resonance"]
+    asked("add_next")
+    assert ladder() == [None, "base_resonance", "coulomb_friction"]
+    node.send(signal.SIGINT)
+    assert node.wait() == 0 and "Traceback" not in node.output()
 
 
 def test_joint_states_and_an_effect_of_ones_own(world: World, tmp_path: Path) -> None:

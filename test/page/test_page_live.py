@@ -248,6 +248,27 @@ def test_stop_really_makes_the_excitation_inactive(scene: Scene, way: str) -> No
         cancel.click()
 
 
+def test_the_stop_of_another_is_overridden_with_its_name_seen(scene: Scene) -> None:
+    """The button and the state say that somebody else holds STOP; a dialog names the holder, and after the override Activate is only Activate."""
+    from std_msgs.msg import Bool
+
+    tab = scene.tab
+    scene.drive()
+    stop = scene.world.node.create_publisher(Bool, "stop", 1)
+    tab.until(stop.get_subscription_count, 20)
+    stop.publish(Bool(data=True))
+    activate = tab.page.locator("[data-act=activate]")
+    scene.lifecycle("STOP is on from test: it is released there, or overridden here")
+    tab.until(lambda: activate.text_content() == "Override STOP" and activate.is_enabled(), 15)
+    assert "STOP is on from test" in scene.nodes()
+    override = tab.page.locator("[data-act=override]")
+    tab.click_until(activate, override.is_visible, why="the dialog does not open")
+    assert "STOP is on from: test" in str(tab.page.locator(".card", has=override).text_content())
+    override.click()
+    tab.until(lambda: activate.text_content() == "Activate", 15, "STOP is not overridden")
+    scene.drive()
+
+
 def test_a_lost_node_is_named(scene: Scene) -> None:
     """kill -9 of the identifier: the page says that it is lost."""
     os.kill(scene.identifier.process.pid, 9)

@@ -14,6 +14,7 @@ from helpers import ROOT
 from xy_sysid.errors import BadInput
 from xy_sysid.linear.transfer_function import TransferFunction
 from xy_sysid.live.plain_messages import ArrayMessage, StatusMessage
+from xy_sysid.page.control import on_activate
 from xy_sysid.page.document_words import look_alike_lines, model_effects, verdict_words
 from xy_sysid.page.downloads import model_text, plain_name
 from xy_sysid.page.facts import coherence_fact, dropped_words, facts, polynomial, seconds_text, transfer_function_html
@@ -279,3 +280,12 @@ def test_a_stop_of_somebody_else_is_named_and_the_pages_own_is_not() -> None:
     for held, others in (("", ""), ("page_stop", ""), ("guard, page_stop", "guard"), ("page_stop (gone)", "page_stop (gone)")):
         heard.status(StatusMessage("excitation", 1, "", (("stop held by", held),)), 0.0)
         assert heard.stopped_by_others() == others
+
+
+def test_the_button_to_activate_says_what_it_does_with_stop() -> None:
+    """The page releases its own STOP by itself; that of somebody else it can only override, and both texts say so."""
+    assert on_activate(False, "") == ("Activate", "")
+    button, told = on_activate(True, "")
+    assert button == "Release STOP and activate" and "released before anything moves" in told
+    button, told = on_activate(True, "guard")
+    assert button == "Override STOP" and "from guard" in told and "overridden" in told

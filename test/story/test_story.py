@@ -146,3 +146,14 @@ def test_the_linear_part_has_resonances_and_lags_and_leaves_friction_out() -> No
     assert set(nonlinear(AxisModel(0.1, 0.0, 200.0, tuple((e.name, e.typical) for e in STANDARD.acting)))) == {
         e.name for e in STANDARD.acting if e.name not in ("screw_compliance", "base_resonance", "amplifier_lag")
     }
+
+
+def test_every_noise_floor_of_a_story_is_of_its_own_tolerance() -> None:
+    """A model may leave 2 % of the motion: the diagnosis, its ladder, the steps and the pictures have one floor, well above the encoder's noise."""
+    run = Run("x", RATE, *data())
+    story = next_best(diagnosed(begin(run, tolerance=0.02), run), run)
+    assert story.diagnosis is not None
+    rungs = [*story.diagnosis.ladder, *(step.rung for step in story.steps)]
+    (floor,) = {rung.noise_floor for rung in rungs}
+    assert floor > 2.0 * story.diagnosis.noise
+    assert document(story)["error"]["noise_floor"] == floor

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -20,7 +19,6 @@ if TYPE_CHECKING:
     from xy_sysid.diagnosis.diagnose import Diagnosis
     from xy_sysid.greybox.free_run import GreyboxFit
     from xy_sysid.imports.reading import Reading
-    from xy_sysid.samples.recording import Run
 
 Own = Annotated[list[Path] | None, typer.Option("--effect-file", metavar="FILE", help="a Python file with an effect of your own (may be repeated)")]
 
@@ -43,16 +41,12 @@ def diagnose(
     recordings = read_each(recs, reading, json)
     recording = recordings[0]
     names = chosen(recording, reading.axes)
-    floors: dict[str, float] = {}
     with progress() as bar:
         task = bar.add_task("diagnosing", total=len(names))
 
         def work(name: str) -> Diagnosis:
             bar.update(task, description=f"diagnosing axis {name}")
-            runs = runs_of(recordings, name)
-            found = logic(runs, known, math.inf if budget is None else budget, time.process_time)
-            if found.ladder is not None:
-                floors[name] = judged_by(runs)
+            found = logic(runs_of(recordings, name), known, math.inf if budget is None else budget, time.process_time)
             bar.advance(task)
             return found
 
@@ -60,18 +54,16 @@ def diagnose(
     seconds = time.perf_counter() - begun
     if json:
         answers: dict[str, Any] = {name: answer(findings(item, known)) for name, item in found.items()}
-        for name, floor in floors.items():
-            answers[name]["error"]["noise_floor"] = floor
         answers |= {name: {"verdict": "not_enough_data", "effect": None, "confidence": 1.0, "sentence": text} for name, text in refused.items()}
         emit({"axes": answers, "seconds": seconds, "notes": [note for one in recordings for note in one.notes]})
         return
     for name, item in found.items():
-        _show(name, item, known, floors.get(name, float("nan")))
+        _show(name, item, known)
     for name, text in refused.items():
         say(f"axis {name}: {text}")
 
 
-def _show(name: str, item: Diagnosis, known: Library, floor: float) -> None:
+def _show(name: str, item: Diagnosis, known: Library) -> None:
     from xy_sysid.diagnosis.findings import findings
 
     sure = "above 0.99" if item.confidence > 0.99 else f"{item.confidence:.2f}"
@@ -84,27 +76,17 @@ def _show(name: str, item: Diagnosis, known: Library, floor: float) -> None:
         tried = [(c, c.fit) for c in item.candidates if c.fit is not None]
         tried.sort(key=lambda pair: (float(f"{pair[1].held_out_error:.2g}"), pair[0].effect not in item.effects))  # by what each leaves
         parts = ["-" if fit.one_step else f"{100 * told.get(c.effect, 0.0):.3g} %" for c, fit in tried]  # of another error, one sample ahead
-        rows = [(*error_cells(c.effect, fit, floor), part) for (c, fit), part in zip(tried, parts, strict=True)]
+        rows = [(*error_cells(c.effect, fit), part) for (c, fit), part in zip(tried, parts, strict=True)]
         if rows:
             table("alone, least left first", ("effect", f"held-out error {motion(item.units.speed)[1]}", "times floor", "share of error"), rows)
         parameter_table(item.ladder.final)
     say(f"  Next experiment: {item.next_experiment}\n")
 
 
-def judged_by(runs: Sequence[Run], tolerance: float | None = None) -> float:
-    """The noise floor by which fits to these runs are judged, as on the page and in the report."""
-    from xy_sysid.greybox.axis_data import EPSILON, prepare_all
-    from xy_sysid.story.pictures import floor_of
-
-    signals = [(run.voltage, run.position) for run in runs]
-    return floor_of(prepare_all(runs[0].sampling_rate, signals, EPSILON if tolerance is None else tolerance, runs[0].units))
-
-
-def error_cells(name: str, fit: GreyboxFit, floor: float) -> tuple[str, str, str]:
+def error_cells(name: str, fit: GreyboxFit) -> tuple[str, str, str]:
     """Name, held-out error and what that is over the noise floor; where free simulation cannot judge, the name says what was judged."""
     label = f"{name} (error one sample ahead)" if fit.one_step else name
-    allowed = fit.noise_floor if fit.one_step else floor
-    return label, f"{motion(fit.units.speed)[0] * fit.held_out_error:.4g}", f"{fit.held_out_error / max(allowed, 1e-300):.2f}"
+    return label, f"{motion(fit.units.speed)[0] * fit.held_out_error:.4g}", f"{fit.held_out_error / max(fit.noise_floor, 1e-300):.2f}"
 
 
 def parameter_table(fit: GreyboxFit) -> None:

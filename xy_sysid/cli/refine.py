@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from xy_sysid.cli import options as o
-from xy_sysid.cli.diagnose import Own, error_cells, judged_by, parameter_table
+from xy_sysid.cli.diagnose import Own, error_cells, parameter_table
 from xy_sysid.cli.output import emit, progress, say, table
 from xy_sysid.cli.provenance import provenance
 from xy_sysid.cli.reading import chosen, each, named, read_each, reads, runs_of
@@ -67,7 +67,6 @@ def refine(
     recording = recordings[0]
     names = chosen(recording, reading.axes)
     alone: dict[str, OpenLoop] = {}
-    floors: dict[str, float] = {}
     with progress() as bar:
         task = bar.add_task("refining", total=len(names))
 
@@ -76,7 +75,6 @@ def refine(
             runs = runs_of(recordings, name)
             run, effort = runs[0], Effort(MOST_EFFECTS if auto else 0, math.inf if budget is None else budget, time.process_time)
             found = refined(runs, tuple(add or ()), known, effort, tolerance).ladder
-            floors[name] = judged_by(runs, tolerance)
             if not found.final.one_step and len(runs) == 1:  # free simulation says nothing about those
                 if simulate_alone:
                     data = prepare(run.sampling_rate, run.voltage, run.position, tolerance, run.units)
@@ -92,9 +90,7 @@ def refine(
     if mat is not None:
         write_axis_mat(mat, {name: ladder.final for name, ladder in found.items()})
     if json:
-        answers: dict[str, Any] = {
-            name: _answer(ladder, floors[name]) | _alone(alone.get(name), recording.output_unit) for name, ladder in found.items()
-        }
+        answers: dict[str, Any] = {name: _answer(ladder) | _alone(alone.get(name), recording.output_unit) for name, ladder in found.items()}
         emit({"recording": origin, "axes": answers, "refused": refused})
         return
     scale, unit = motion(recording.units.speed)
@@ -102,10 +98,10 @@ def refine(
         rows = [
             (label, f"{scale * step.fit.training_error:.4g}", held_out, over)
             for step in ladder.steps
-            for label, held_out, over in [error_cells(step.added or "rigid, with delay", step.fit, floors[name])]
+            for label, held_out, over in [error_cells(step.added or "rigid, with delay", step.fit)]
         ]
-        floor = ladder.final.noise_floor if ladder.final.one_step else floors[name]
-        table(f"axis {name}: {unit}, floor {scale * floor:.4g}", ("added", "training error", "held-out error", "times floor"), rows)
+        floor = scale * ladder.final.noise_floor
+        table(f"axis {name}: {unit}, floor {floor:.4g}", ("added", "training error", "held-out error", "times floor"), rows)
         say(f"  {_words(ladder)}")
         parameter_table(ladder.final)
         if name in alone:
@@ -148,7 +144,7 @@ def _alone(found: OpenLoop | None, unit: str) -> dict[str, Any]:
     return {"open_loop": {"rms": found.rms, "worst": found.worst, "share": found.share, "unit": unit}}
 
 
-def _answer(ladder: Ladder, floor: float) -> dict[str, Any]:
+def _answer(ladder: Ladder) -> dict[str, Any]:
     from xy_sysid.diagnosis.findings import parameters
 
     rungs = [
@@ -156,7 +152,7 @@ def _answer(ladder: Ladder, floor: float) -> dict[str, Any]:
             "added": step.added,
             "train_error": step.fit.training_error,
             "held_out_error": step.fit.held_out_error,
-            "noise_floor": step.fit.noise_floor if step.fit.one_step else floor,
+            "noise_floor": step.fit.noise_floor,
             "excess": step.fit.excess,
         }
         for step in ladder.steps

@@ -82,15 +82,15 @@ def diagnose_all(
     library: Library = STANDARD,
     budget: float = math.inf,
     clock: Callable[[], float] = never,
-    units: Units = USUAL,
 ) -> Diagnosis:
-    """Diagnose one axis from several recordings, (voltage (n,), position (n,)) each; units: what V and m stand for."""
+    """Diagnose one axis from several recordings, (voltage (n,), position (n,)) each."""
     missing = lacking(sampling_rate, recordings)
-    if missing:
-        return not_enough(missing, units)
-    data = prepare_all(sampling_rate, recordings, units=units)
-    ladder = refine(data, library, effort=Effort(budget=budget, clock=clock, size=SIZE))
-    return judged(data, ladder, library)
+    return not_enough(missing) if missing else diagnose_prepared(prepare_all(sampling_rate, recordings), library, budget, clock)
+
+
+def diagnose_prepared(data: AxisData, library: Library = STANDARD, budget: float = math.inf, clock: Callable[[], float] = never) -> Diagnosis:
+    """Diagnose one axis from data that suffice."""
+    return judged(data, refine(data, library, effort=Effort(budget=budget, clock=clock, size=SIZE)), library)
 
 
 def not_enough(missing: str, units: Units = USUAL) -> Diagnosis:
@@ -193,7 +193,7 @@ def _surest(data: AxisData, ladder: Ladder) -> tuple[Ladder, float]:
             effects=names,
             rivals=rivals,
             explained=explained,
-            discrepancy=math.sqrt(max(fit.held_out_error**2 - data.noise_floor**2, 0.0)),
+            discrepancy=math.sqrt(max(fit.held_out_error**2 - data.noise**2, 0.0)),
         )
         return told, confidence
     return ladder, _confidence(ladder, ladder.effects)

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from xy_sysid.axis.model import AxisModel, Library
-from xy_sysid.diagnosis.ladder import Candidate, Ladder, Rival, Step
+from xy_sysid.diagnosis.ladder import Ladder, Rival, Step
 from xy_sysid.effects import Effect
 from xy_sysid.effects._contract import USUAL_WITHIN
 from xy_sysid.greybox.free_run import GreyboxFit
@@ -78,7 +78,7 @@ def _renamed(ladder: Ladder, names: Mapping[str, str]) -> Ladder:
         steps=tuple(Step(step.added and word(step.added), fit(step.fit)) for step in ladder.steps),
         final=fit(ladder.final),
         effects=tuple(map(word, ladder.effects)),
-        tried=tuple(Candidate(word(item.effect), item.promised, item.fit and fit(item.fit)) for item in ladder.tried),
+        tried=tuple(replace(item, effect=word(item.effect), fit=item.fit and fit(item.fit)) for item in ladder.tried),
         rivals=tuple(map(rival, ladder.rivals)),
         kept_out=ladder.kept_out and rival(ladder.kept_out),
         sizes={word(name): size for name, size in ladder.sizes.items()},

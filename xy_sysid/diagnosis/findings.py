@@ -154,21 +154,18 @@ def findings(item: Diagnosis, library: Library) -> Findings:
 
 
 def _tried(item: Candidate, fit: GreyboxFit, base: GreyboxFit) -> Tried:
-    before, noise, unit = base.held_out_error, base.noise_floor, base.units.speed
+    before, unit = base.held_out_error, base.units.speed
     if fit.one_step:
-        share = 0.0
         evidence = (
             f"judged one sample ahead, as no free simulation can tell: with it {moved(fit.held_out_error, unit)} are left, "
             f"the encoder's noise alone is {bare(fit.noise_floor, unit)}"
         )
     else:
-        power = before**2 - noise**2
-        share = min(max(1.0 - (fit.held_out_error**2 - noise**2) / power, 0.0), 1.0) if power > 0.0 else 0.0
-        evidence = f"alone it takes away {100 * share:.3g} % of the error's power: {bare(before, unit)} -> {moved(fit.held_out_error, unit)}"
+        evidence = f"alone it takes away {100 * item.explained:.3g} % of the error's power: {bare(before, unit)} -> {moved(fit.held_out_error, unit)}"
     ratio = fit.held_out_error / before if before > 0 else None
     return Tried(
         effect=item.effect,
-        share=share,
+        share=item.explained,
         held_out_error=fit.held_out_error,
         error_ratio=ratio,
         excess=fit.excess,

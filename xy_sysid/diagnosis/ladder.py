@@ -14,11 +14,16 @@ from xy_sysid.greybox.free_run import GreyboxFit
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """One effect tried on the base: the excess that its trace promised to take away, nats, and its fit (None if that failed)."""
+    """One effect tried on the base.
+
+    promised: excess that its trace promised to take away, nats; fit: None if that failed; explained: part of the base's error power
+    beyond the noise that is gone with it, 0 for an effect that is judged one sample ahead
+    """
 
     effect: str
     promised: float
     fit: GreyboxFit | None
+    explained: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,6 +19,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.greybox.axis_data import prepare_all
 from xy_sysid.greybox.free_run import EPSILON, GreyboxFit
 from xy_sysid.hypotheses.criteria import MOST_EFFECTS
+from xy_sysid.hypotheses.enough_data import lacking
 from xy_sysid.samples.recording import Recording, Run, one_run
 from xy_sysid.units import bare, motion, moved
 
@@ -29,7 +30,8 @@ Data = Run | Recording | Sequence[Run | Recording]
 class RefinedStep:
     """One rung: the effect added (None for the rigid base alone) and the model with it.
 
-    held_out_error, training_error: rms, m/s, of data that no fit saw, and of those that it saw; noise_floor: what the encoder alone adds
+    held_out_error, training_error: rms, m/s, of data that no fit saw, and of those that it saw; noise_floor: the least
+    error that a model can be known to have
     """
 
     added: str | None
@@ -53,7 +55,7 @@ class RefinedStep:
 
     @property
     def noise_floor(self) -> float:
-        """m/s rms, what the encoder's noise alone makes."""
+        """m/s rms, the least error that a model can be known to have: of encoder noise and of the part of the motion that it may leave."""
         return self.fit.noise_floor
 
     def __repr__(self) -> str:
@@ -104,17 +106,29 @@ class Diagnosed(Diagnosis):
         return f"<Diagnosis: {self.sentence} Confidence {self.confidence:.2f}.>"
 
 
-def diagnose(data: Data, library: Library = STANDARD, budget: float = math.inf, clock: Callable[[], float] = never) -> Diagnosed:
+def diagnose(
+    data: Data,
+    library: Library = STANDARD,
+    budget: float = math.inf,
+    clock: Callable[[], float] = never,
+    tolerance: float = EPSILON,
+) -> Diagnosed:
     """Which physical effects the rigid model misses, with evidence and runner-up; or that nothing is missing, or that none is known.
 
     data:   a run or several of one axis, V and m; library: with effects of your own (``files.effects.library``)
     budget: s after which the best so far is said, if ``clock`` (for example ``time.process_time``) tells the time; without one the search
             ends after a fixed amount of work, and the same data give the same answer however busy the machine is
+    tolerance: part of the motion that a model may leave
     Too little data is an answer, ``not_enough_data``, and no error. Raises BadInput for runs that do not belong together.
     """
     runs = runs_together(data)
+    rate, signals, units = runs[0].sampling_rate, [(run.voltage, run.position) for run in runs], runs[0].units
+    missing = lacking(rate, signals)
     with threadpool_limits(1, "blas"):  # as in commands and nodes
-        found = one.diagnose_all(runs[0].sampling_rate, [(run.voltage, run.position) for run in runs], library, budget, clock, runs[0].units)
+        if missing:
+            found = one.not_enough(missing, units)
+        else:
+            found = one.diagnose_prepared(prepare_all(rate, signals, tolerance, units), library, budget, clock)
     values = {item.name: getattr(found, item.name) for item in fields(found)}
     return Diagnosed(**values, runs=runs)
 

@@ -53,20 +53,28 @@ def with_one_more(data: AxisData, library: Library, now: GreyboxFit, name: str) 
 def ladder_of_given(data: AxisData, given: Given) -> Ladder:
     """The ladder of these effects alone: nothing is searched."""
     final = given.steps[-1].fit
+    noise = final.noise_floor if final.one_step else data.noise
     return Ladder(
         steps=given.steps,
         final=final,
         effects=tuple(name for name, _ in final.model.effects),
         explained=part_explained(data, given.steps[0].fit, final),
-        noise=data.noise_floor,
-        discrepancy=math.sqrt(max(final.held_out_error**2 - final.noise_floor**2, 0.0)),
+        noise=noise,
+        discrepancy=math.sqrt(max(final.held_out_error**2 - noise**2, 0.0)),
     )
 
 
 def ladder_of_search(pool: Pool, given: Given, filtered: Filtered | None) -> Ladder:
     """The ladder of the best set, or of what one-step prediction found instead."""
     data, library, node, base = pool.data, pool.library, pool.answer, given.steps[0].fit
+<<<<<<< HEAD
     tried = [Candidate(next(iter(item.effects)), item.promised, item.fit) for item in pool.nodes.values() if len(item.effects) == 1]
+=======
+    alone = (item for item in pool.nodes.values() if len(item.effects) == 1)
+    tried = [
+        Candidate(next(iter(item.effects)), item.promised, item.fit, part_explained(data, base, item.fit) if item.fit else 0.0) for item in alone
+    ]
+>>>>>>> w-v1
     tried.sort(key=lambda item: item.fit.held_out_error if item.fit else math.inf)
     refused = tuple((tuple(sorted(item.effects)), item.refused) for item in pool.nodes.values() if item.refused)
     if filtered is not None:
@@ -101,8 +109,8 @@ def ladder_of_search(pool: Pool, given: Given, filtered: Filtered | None) -> Lad
         kept_out=_kept_out(pool, node),
         refused=refused,
         explained=part_explained(data, base, final),
-        noise=data.noise_floor,
-        discrepancy=math.sqrt(max(final.held_out_error**2 - data.noise_floor**2, 0.0)),
+        noise=data.noise,
+        discrepancy=math.sqrt(max(final.held_out_error**2 - data.noise**2, 0.0)),
         stopped=pool.late(),
     )
     return likely_names(ladder, given.names)

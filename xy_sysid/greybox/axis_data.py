@@ -85,6 +85,11 @@ class AxisData:
 
     @property
     def noise_floor(self) -> float:
+        """The least error that a model can be known to have: of encoder noise and of the part of the motion that a model may leave, m/s rms."""
+        return self.layout.rms(self.floor.power)
+
+    @property
+    def noise(self) -> float:
         """rms of the encoder's noise in velocity, below the top band, m/s."""
         return self.layout.rms(self.floor.noise)
 

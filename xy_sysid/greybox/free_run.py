@@ -60,7 +60,7 @@ class GreyboxFit:
     parameters:     gain, delay, pole, then ``effect.parameter``, with 95 % intervals
     training_error: rms in the windows of the fit, below the top band, m/s
     held_out_error: the same in those held out, which no fit saw
-    noise_floor:    what the encoder's noise alone makes, m/s
+    noise_floor:    what the encoder's noise makes, together with the part of the motion that a model may leave, m/s; one step ahead the noise alone
     excess:         score of the held-out error, nats a line above the floor (``objective``); scores: (windows,) nats of each window
     forced:         lines of a window in which the unmodelled force stands out of the floor
     force:          of the unmodelled force, V a sample (rms, white), that explains the held-out error beyond the floor

@@ -20,7 +20,13 @@ STATES = {
     "finalized": "shut down",
     "": "not there",
 }
-HELD = "STOP is on: it is released before anything moves"
+
+
+def on_activate(held: bool, others: str) -> tuple[str, str]:
+    """What the button to activate says, and what STOP asks for; the second is empty while STOP is off. others: who holds it but the page."""
+    if held and others:
+        return "Override STOP", f"STOP is on from {others}: it is released there, or overridden here"
+    return ("Release STOP and activate", "STOP is on: it is released before anything moves") if held else ("Activate", "")
 
 
 class Control:
@@ -52,8 +58,8 @@ class Control:
         """Show what is now; whether a button here is the next to be pressed. begun: there is a story, which comes first."""
         session = self._session
         heard, now = session.heard, time.monotonic()
-        held = heard.values("excitation").get("stop") == "on"
-        nodes = tuple((node.name, node.level, HELD if held and node.name == "excitation" else node.words) for node in heard.nodes(now))
+        activate, stop = on_activate(heard.values("excitation").get("stop") == "on", heard.stopped_by_others())
+        nodes = tuple((node.name, node.level, stop or node.words if node.name == "excitation" else node.words) for node in heard.nodes(now))
         if nodes != self._nodes_shown:
             self._nodes_shown = nodes
             self._nodes.clear()
@@ -72,8 +78,8 @@ class Control:
                         ui.label(name).style("font-weight:600")
                         ui.label(words).classes("bad" if level > 1 else "warn")
         state = heard.lifecycle
-        self._state.set_text(f"Excitation: {STATES.get(state, state)}{'. STOP is on; Activate releases it first.' if held else ''}")
-        self._activate.set_text("Release STOP and activate" if held else "Activate")
+        self._state.set_text(f"Excitation: {STATES.get(state, state)}{stop and f'. {stop}.'}")
+        self._activate.set_text(activate)
         self._configure.set_enabled(state == "unconfigured")
         self._activate.set_enabled(state == "inactive")
         self._reset.set_enabled("streams" in heard.statuses)
@@ -172,7 +178,7 @@ class Control:
         release()
         with ui.dialog() as dialog, ui.element("div").classes("card"):
             ui.html("<h2>Somebody else holds STOP</h2>", sanitize=False)
-            ui.label(f"STOP is on from: {held}. Look at the machine and ask there, before you override it. Then press Activate again.")
+            ui.label(f"STOP is on from: {held}. Look at the machine and ask there, before you override it. Then press Activate.")
             with ui.element("div").classes("buttons"):
                 ui.button("Override STOP", on_click=sure).props("unelevated no-caps data-act=override")
                 ui.button("Cancel", on_click=dialog.close).props("flat no-caps")

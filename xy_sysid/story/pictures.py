@@ -198,20 +198,15 @@ def _compared(data: AxisData, fitted: GreyboxFit) -> Comparison:
         predicted=nothing,
         position=nothing,
         error=fitted.held_out_error,
-        noise_floor=floor_of(data),
+        noise_floor=data.noise_floor,
         error_below_end=fitted.held_out_error,
-        floor_below_end=floor_of(data),
+        floor_below_end=data.noise_floor,
         band_end=float(edges[-1]),
         unit=data.units.speed,
         frequency=np.sqrt(np.maximum(edges[:-1], 0.5 * edges[1]) * edges[1:]),
         error_over_floor=ratio,
         places=(),
     )
-
-
-def floor_of(data: AxisData) -> float:
-    """The least error that a fit can be known to have, m/s rms: of the encoder's noise and of the part of the motion to which laws are trusted."""
-    return data.layout.rms(data.floor.power)
 
 
 def _stretches(data: AxisData) -> tuple[tuple[float, float], ...]:

@@ -24,7 +24,7 @@ from xy_sysid.hypotheses.criteria import MOST_EFFECTS
 from xy_sysid.hypotheses.enough_data import lacking
 from xy_sysid.samples.recording import Run
 from xy_sysid.settings import unknown_name
-from xy_sysid.story.pictures import Measured, Pictures, floor_of, measured, pictures
+from xy_sysid.story.pictures import Measured, Pictures, measured, pictures
 from xy_sysid.units import Units
 
 
@@ -84,12 +84,12 @@ def begin(run: Run, library: Library = STANDARD, tolerance: float = EPSILON) -> 
     data = prepare(sampling_rate, voltage, position, tolerance, run.units)
     base = fit_base(data, library)
     shown = measured(data, base)
-    return replace(empty, measured=shown, steps=(StoryStep(_rung(data, base), pictures(data, base, shown)),))
+    return replace(empty, measured=shown, steps=(StoryStep(rung(base), pictures(data, base, shown)),))
 
 
 def diagnosed(story: Story, run: Run, library: Library = STANDARD, clock: Callable[[], float] = never) -> Story:
     """With the answer to: which effect is missing in the rigid base? The model stays what it is."""
-    return replace(story, diagnosis=findings(diagnose(run, library, clock=clock), library), note="")
+    return replace(story, diagnosis=findings(diagnose(run, library, clock=clock, tolerance=story.tolerance), library), note="")
 
 
 def added(story: Story, run: Run, name: str, library: Library = STANDARD) -> Story:
@@ -204,20 +204,13 @@ def _shown(story: Story, data: AxisData, step: Rung, library: Library) -> Story:
     """The story with a step whose fit is known."""
     again = _simulated(data, step, story.steps[0].rung if story.steps else step, library)
     shown = story.measured or measured(data, again)
-    known = step if again.one_step else replace(step, noise_floor=floor_of(data))
-    return replace(story, measured=shown, steps=(*story.steps, StoryStep(known, pictures(data, again, shown))), note="")
+    return replace(story, measured=shown, steps=(*story.steps, StoryStep(step, pictures(data, again, shown))), note="")
 
 
 def _grown(story: Story, data: AxisData, found: GreyboxFit, name: str | None, gone: str | None) -> Story:
     assert story.measured is not None
-    step = StoryStep(_rung(data, found, name, gone), pictures(data, found, story.measured))
+    step = StoryStep(rung(found, name, gone), pictures(data, found, story.measured))
     return replace(story, steps=(*story.steps, step), note="")
-
-
-def _rung(data: AxisData, found: GreyboxFit, name: str | None = None, gone: str | None = None) -> Rung:
-    """The plain numbers of a fit, with the floor by which it is judged."""
-    made = rung(found, name, gone)
-    return made if found.one_step else replace(made, noise_floor=floor_of(data))
 
 
 def _model(story: Story, library: Library) -> AxisModel:
