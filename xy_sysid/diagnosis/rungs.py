@@ -67,14 +67,8 @@ def ladder_of_given(data: AxisData, given: Given) -> Ladder:
 def ladder_of_search(pool: Pool, given: Given, filtered: Filtered | None) -> Ladder:
     """The ladder of the best set, or of what one-step prediction found instead."""
     data, library, node, base = pool.data, pool.library, pool.answer, given.steps[0].fit
-<<<<<<< HEAD
-    tried = [Candidate(next(iter(item.effects)), item.promised, item.fit) for item in pool.nodes.values() if len(item.effects) == 1]
-=======
     alone = (item for item in pool.nodes.values() if len(item.effects) == 1)
-    tried = [
-        Candidate(next(iter(item.effects)), item.promised, item.fit, part_explained(data, base, item.fit) if item.fit else 0.0) for item in alone
-    ]
->>>>>>> w-v1
+    tried = [Candidate(next(iter(item.effects)), item.promised, item.fit, part_explained(data, base, item.fit)) for item in alone]
     tried.sort(key=lambda item: item.fit.held_out_error if item.fit else math.inf)
     refused = tuple((tuple(sorted(item.effects)), item.refused) for item in pool.nodes.values() if item.refused)
     if filtered is not None:
