@@ -142,7 +142,8 @@ def ours(data: AxisData) -> dict[str, tuple[GreyboxFit, float]]:
 
 def compared(title: str, data: AxisData) -> list[tuple[str, ...]]:
     """The rows of one axis."""
-    found, unit = [], data.units.speed
+    found: list[tuple[str, ...]] = []
+    unit = data.units.speed
     for structure, (fit, seconds) in ours(data).items():
         begun = time.process_time()
         reached = peers(data, COULOMB in fit.model)
