@@ -80,9 +80,10 @@ class OneStepTrials:
                     self._look(name, node, hidden)
 
     def _explains(self, node: Node) -> bool:
-        """The best set explains more of the error's power than it leaves."""
-        rigid = self.pool.nodes[self.pool.kept]
-        return 2.0 * node.fit.held_out_error**2 < rigid.fit.held_out_error**2
+        """A set explains more of the error's power than it leaves, by effects that a filter can have beside a gap: others may feign one."""
+        library, rigid = self.pool.library, self.pool.nodes[self.pool.kept]
+        apart = all(told_apart(library[name]) or library[name].is_dry for name in node.effects)
+        return apart and 2.0 * node.fit.held_out_error**2 < rigid.fit.held_out_error**2
 
     def _begins(self, best: Node) -> list[Node]:
         """What a filter can have of the best set, as a large force beside a gap hides it; and the rigid base, unless that set explains most."""
