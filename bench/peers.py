@@ -61,7 +61,7 @@ def judged(data: AxisData, model: AxisModel) -> Judged:
 
     def power(windows: Windows) -> FloatArray:
         found = data.layout.power(windows.spectrum(error))
-        return np.where(np.isfinite(found), found, np.inf)
+        return np.asarray(np.where(np.isfinite(found), found, np.inf))
 
     return Judged(model, data.layout.rms(power(data.held)), Objective.of(data.floor).of_power(power(data.fitted), response))
 
@@ -115,7 +115,7 @@ def output_error(data: AxisData, start: tuple[float, float, float], friction: bo
     low[1], high[1] = 1.0, 1.0 + 0.25 * data.first
     low[2:], high[2:] = 1.0 - np.log(1e7), 1.0 + np.log(1e7)
     low[2], high[2] = 1.0 + np.log(np.array(POLES) / pole)
-    found = scipy.optimize.least_squares(left, np.ones(size), bounds=(low, high), diff_step=1e-4, x_scale="jac", max_nfev=60)
+    found = scipy.optimize.least_squares(left, np.ones(size), bounds=(low, high), diff_step=np.full(size, 1e-4), x_scale="jac", max_nfev=60)
     return float(found.cost), model(found.x)
 
 

@@ -51,7 +51,7 @@ def axes(row: Shared) -> Iterator[Axis]:
     try:
         app([str(DATA / row.path), *row.options], standalone_mode=False)
     except (BadInput, BadRecording) as refusal:
-        yield Axis(row.path, (), str(refusal))
+        yield Axis(row.path, (), str(refusal).replace(f"{DATA}/", "").removeprefix(f"{row.path}: "))
         return
     for name in read[0].axes:
         title = row.path if len(read[0].axes) == 1 else f"{row.path}, {name}"
