@@ -37,7 +37,7 @@ def mapped(columns: str, *options: str) -> tuple[str, ...]:
 
 
 RECORDINGS = (
-    Shared("ball_plate/Motor2_v73.mat"),
+    Shared("ball_plate/Motor2_v73.mat", part=("--axis", "axis2", "--span", "0:2")),
     Shared("ball_plate/motor1.npz", part=("--span", "0:2")),
     Shared("bam_servo/bam_xl330_sin_time_square_kp800.csv"),
     Shared("bam_servo/bam_xl330_sin_time_square_kp800_even.npz"),
