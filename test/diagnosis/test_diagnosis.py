@@ -251,7 +251,7 @@ def test_what_two_sets_share_is_named_and_what_they_differ_in_is_not() -> None:
     found = judged(data, ladder, STANDARD)
     assert found.effects == ("coulomb_friction",)
     assert found.confidence > 0.9
-    assert "Perhaps constant_load beside it" in found.sentence
+    assert "constant_load may also be present (below 50 %)" in found.sentence
     assert found.ladder is not None
     assert found.ladder.final is alone.final
     assert tie not in found.ladder.rivals

@@ -43,7 +43,7 @@ def test_two_like_inertias_are_a_shaft_that_gives_and_the_sentence_says_what_els
     found = diagnose(1000.0, drive, position)
     assert found.effects == ("screw_compliance",), found.sentence
     assert 0.6 < found.confidence < 0.98
-    assert "No data tell screw_compliance from base_resonance" in found.sentence
+    assert "A motor encoder cannot distinguish screw_compliance from base_resonance" in found.sentence
     assert found.ladder is not None
     model = found.ladder.final.model
     zero, split = dict(model.effects)["screw_compliance"][1::-1]

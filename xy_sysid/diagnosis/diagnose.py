@@ -121,7 +121,8 @@ def judged(data: AxisData, ladder: Ladder, library: Library) -> Diagnosis:
         sentence = f"Missing: {_listed(names)}. {'They explain' if len(names) > 1 else 'It explains'} {_percent(explained)} of the error's power"
         sentence += f" ({bare(base.held_out_error, unit)} -> {moved(final.held_out_error, unit)}). {_left(data, ladder, left)}"
         if len(every) > len(names):
-            sentence += f" Perhaps {_listed(every[len(names) :])} beside {'them' if len(names) > 1 else 'it'}, which is less sure than not."
+            also = "may also be present (below 50 %)" if len(every) == len(names) + 1 else "may also be present (each below 50 %)"
+            sentence += f" {_listed(every[len(names) :])} {also}."
         sentence += _also_called(final, names)
         if ladder.rivals:
             rival = ladder.rivals[0]
@@ -129,7 +130,7 @@ def judged(data: AxisData, ladder: Ladder, library: Library) -> Diagnosis:
             sentence += f" Runner-up {' and '.join(rival.effects)}: {moved(rival.fit.held_out_error, unit)}{why}."
     elif base.excess < AT_FLOOR:
         verdict, names, explained, experiment = "nothing_missing", (), 0.0, "None is needed."
-        confidence = (1.0 - base.excess) * (1.0 - _hidden(hides, data.floor.epsilon))
+        confidence = (1.0 - max(base.excess, 0.0)) * (1.0 - _hidden(hides, data.floor.epsilon))
         sentence = f"Nothing is missing: the rigid model with delay leaves {moved(base.held_out_error, unit)}, the noise alone is {noise}."
         sentence += f" What changes the motion by less than {_percent(hides)} could hide in it."
     else:
@@ -233,7 +234,8 @@ def _also_called(final: GreyboxFit, names: Sequence[str]) -> str:
         others = [other.name for other in equals(library, name) if other.name != name] if name in names else []
         if others:
             sure = _percent(round(likelihood(library, name, values), 2))
-            said += f" No data tell {name} from {_listed(others)}: the law is one, and by what is usual it is rather the former ({sure})."
+            said += f" A motor encoder cannot distinguish {name} from {_listed(others)}: their equations are the same."
+            said += f" Typical values favour {name} ({sure})."
     return said
 
 

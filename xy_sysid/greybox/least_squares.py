@@ -179,8 +179,9 @@ def solve(
             damping, converged, fresh = 1e-3, False, False
             for _ in range(schedule.steps):
                 if not fresh:
-                    columns = (change * weight).reshape(size, -1).view(np.float64)
-                    normal, slope = columns @ columns.T, columns @ (error * weight).ravel().view(np.float64)
+                    with np.errstate(over="ignore", invalid="ignore"):  # of a model that runs away
+                        columns = (change * weight).reshape(size, -1).view(np.float64)
+                        normal, slope = columns @ columns.T, columns @ (error * weight).ravel().view(np.float64)
                     fresh = True
                 if schedule.late() or not (np.all(np.isfinite(normal)) and np.any(normal)):  # a model that runs away, or stands
                     break
