@@ -34,7 +34,7 @@ def test_a_limit_is_read_though_the_base_has_a_delay_that_the_axis_has_not() -> 
     late = replace(base, model=replace(base.model, delay=0.04))
     assert not other_starts(data, late, late.model, "saturation", replace(scene_of(data, late), prompt=None))
     read = min(other_starts(data, late, late.model, "saturation"), key=lambda start: first_excess(data, start))
-    assert first_excess(data, read) < first_excess(data, base.model) - 1.0
+    assert first_excess(data, read) < first_excess(data, late.model) - 1.0
     assert dict(read.effects)["saturation"][0] == pytest.approx(LIMITED.limit, rel=0.2)
 
 

@@ -213,10 +213,15 @@ def _confidence(ladder: Ladder, names: tuple[str, ...]) -> float:
 
 
 def _undetermined(final: GreyboxFit, name: str) -> bool:
-    """The size of an effect is not told from zero, or is known to worse than a factor of two."""
+    """The size of an effect is not distinguished from zero, or is known to worse than a factor of two, in every recording."""
     item = final.parameter(f"{name}.{final.model.library[name].parameters[0].name}")
-    low, high = sorted((abs(item.low), abs(item.high)))
-    return item.low * item.high <= 0.0 or not math.isfinite(high) or high > 4.0 * low
+    return not any(_is_known(one.low, one.high) for one in item.recordings or (item,))
+
+
+def _is_known(low: float, high: float) -> bool:
+    """An interval does not hold zero, and its ends differ by a factor of four at most."""
+    near, far = sorted((abs(low), abs(high)))
+    return low * high > 0.0 and math.isfinite(far) and far <= 4.0 * near
 
 
 def _hidden(left: float, trusted: float) -> float:

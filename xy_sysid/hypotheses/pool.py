@@ -178,11 +178,14 @@ class Pool:
     def _is_better(self, node: Node, simpler: Node) -> bool:
         """More than chance better than a simpler set, at the price of its parameters, and by as much as its effects must be worth.
 
-        Of a richer law in the place of a simpler one WORTH is asked.
+        Of a richer law in the place of a simpler one WORTH is asked. Beside a set at the floor nothing more is needed.
         """
-        better, new = gain(*alike(node, simpler)), len(node.effects) - len(simpler.effects)
+        one, other = alike(node, simpler)
+        if other.excess < AT_FLOOR:
+            return False
+        better, new = gain(one, other), len(node.effects) - len(simpler.effects)
         least = (1.0 + self.worth) ** new - 1.0 if new > 0 else WORTH
-        return better.is_sure and better.nats > PRICE * (node.parameters - simpler.parameters) and size(*alike(node, simpler)) >= least
+        return better.is_sure and better.nats > PRICE * (node.parameters - simpler.parameters) and size(one, other) >= least
 
     def rivals(self, taken: frozenset[str], most: int = 2) -> Iterator[frozenset[str]]:
         """Fit on all data what promised nearly as much as what was taken, and was not tried as that did well; yields as ``search``."""
