@@ -159,14 +159,14 @@ def test_two_laws_of_bristles_at_once_are_refused() -> None:
 
 
 def test_the_filter_without_a_gap_is_always_there_to_be_beaten() -> None:
-    """Where there is a gap it is far behind; where there is none it is as good, to a hundredth."""
+    """Where there is a gap it is far behind; where there is none it is as good, to a few hundredths."""
     data, base = machine("backlash=30e-6")
     fit, found = followed(data, base, GAP)
     assert found.without.shape == found.innovation.shape
     assert error_without(data, found) > 5.0 * fit.held_out_error
     data, base = machine("coulomb_friction=0.2")
     fit, found = followed(data, base, GAP)
-    assert error_without(data, found) < 1.01 * fit.held_out_error
+    assert error_without(data, found) < 1.03 * fit.held_out_error
     assert fit.excess > 0.15
 
 

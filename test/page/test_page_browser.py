@@ -192,6 +192,7 @@ def test_a_reload_in_the_middle_loses_nothing_and_a_fit_can_be_left(usual: Tab) 
     for _ in range(6):  # a short fit may be over before the click
         one.page.evaluate(LEAVE_AT_ONCE)
         one.until(free.is_enabled, 60)
+        one.page.wait_for_timeout(1000)  # the notice comes with the next push
         if "Left as it was" in one.notices():
             break
     assert "Left as it was" in one.notices() and len(one.ladder()) == 1

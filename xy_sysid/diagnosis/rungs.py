@@ -74,7 +74,7 @@ def ladder_of_search(pool: Pool, given: Given, filtered: Filtered | None) -> Lad
     if filtered is not None:
         return _of_one_step(pool, base, filtered, tried, refused)
     final = joined(data, node.fit, pool.late)
-    own = {name: pool.size_without(node, name) for name in node.effects - pool.kept}
+    own = {name: pool.size_without(node, name) for name in sorted(node.effects - pool.kept)}
     names = tuple(name for name, _ in final.model.effects)
     parts = {name: [own[part] for part in _parts(library, name) if part in own] for name in names}
     ordered = _ordered(library, {name: max(each, default=0.0) for name, each in parts.items()})

@@ -68,7 +68,7 @@ def moves(data: AxisData, library: Library, now: GreyboxFit, brief: GreyboxFit, 
         if not is_twice(library, own | {effect.name}):
             gain = promised([effect.name], other_starts(data, now, model, effect.name, scene, TOLD) if early else ())
             singles.append(Move(own | {effect.name}, len(effect.parameters), gain, partial(added, data, now, model, effect, traced)))
-        for name in own:
+        for name in sorted(own):
             related = bool(effect.family) and effect.family == library[name].family
             suspected = name in effect.suspects and (data.units.output == "rad" or not effect.angular)
             if related or suspected:

@@ -92,7 +92,7 @@ class OneStepTrials:
         found = []
         if names - {library[name].rubs for name in self.names}:
             less = best.fit.model
-            for name in best.effects - names:
+            for name in sorted(best.effects - names):
                 less = less.without(name)
             node = pool.fitted(names, lambda: [less])
             found += [pool.finished(node)] if node is not None else []

@@ -221,7 +221,7 @@ class Pool:
             if name in self.kept:
                 continue
             effect = library[name]
-            alone = [self.nodes[one].fit.model for other in best.effects - {name} if (one := self.kept | {other}) in self.nodes]
+            alone = [self.nodes[one].fit.model for other in sorted(best.effects - {name}) if (one := self.kept | {other}) in self.nodes]
             for relative in sorted(library.acting, key=lambda item: len(item.parameters)):
                 related = effect.family and relative.family == effect.family and relative.simulable and relative.name not in best.effects
                 if related and len(relative.parameters) < len(effect.parameters):
