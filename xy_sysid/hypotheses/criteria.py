@@ -38,7 +38,7 @@ WORTH = _number("worth adding", 0.25, "1", "the same for an effect that is added
 WIDTH = _number("width", 6, "moves", "from one set that are tried at most, of each kind: the truth was among the first four")
 RIVAL = _number("rival", 0.7, "1", "part of the gain promised by what was taken from which another effect is tried as its rival")
 OPTIMISM = _number("optimism", 3.0, "1", "a fit gains up to three times what a move promises to first order")
-HOPELESS = _number("hopeless", 0.3, "nats a line", "more than a quick fit may leave after its first round: none such ended near the best")
+HOPELESS = _number("hopeless", 1.5, "nats a line", "more than a quick fit may leave after its first round: none such ended near the best")
 NEAR = _number("near", 0.03, "1", "part of the best gain by which a quick fit may stand behind the best and is still fitted on all data")
 AT_FLOOR = _number(
     "at the floor", 0.2, "nats a line", "an error within a tenth of the floor (rms) is explained: clean axes have 0.03, the weakest effects 1"

@@ -116,11 +116,26 @@ class Pool:
                 return
             if best.moves is None and len(best.effects - self.kept) < self.most:
                 best.moves = self._moves(best)
+                yield from self._ways_back(best)
             move = self._next()
             if move is None:
                 return
             yield move[1].effects
             self._try(*move)
+
+    def _ways_back(self, best: Node) -> Iterator[frozenset[str]]:
+        """Ask for the moves from the best set without one of its effects, in whose place another may do better; yields as ``search``."""
+        for name in sorted(best.effects - self.kept) if len(best.effects - self.kept) > 1 else ():
+            effects = best.effects - {name}
+            if effects not in self.nodes:
+                yield effects
+            node = self.fitted(effects, partial(starts.dropped, self.data, best.fit, name, self._alone(effects)))
+            if node is not None and not node.refused and node.moves is None and self.finished(node).whole:
+                node.moves = self._moves(node)
+
+    def _alone(self, effects: frozenset[str]) -> list[AxisModel]:
+        """Models of single effects of a set, as far as they are known."""
+        return [self.nodes[one].fit.model for other in sorted(effects) if (one := self.kept | {other}) in self.nodes]
 
     def _moves(self, node: Node, early: bool = True) -> list[Move]:
         found = moves(self.data, self.library, node.fit, node.brief, early)
@@ -221,7 +236,7 @@ class Pool:
             if name in self.kept:
                 continue
             effect = library[name]
-            alone = [self.nodes[one].fit.model for other in sorted(best.effects - {name}) if (one := self.kept | {other}) in self.nodes]
+            alone = self._alone(best.effects - {name})
             for relative in sorted(library.acting, key=lambda item: len(item.parameters)):
                 related = effect.family and relative.family == effect.family and relative.simulable and relative.name not in best.effects
                 if related and len(relative.parameters) < len(effect.parameters):
