@@ -91,7 +91,7 @@ class Panel:
         elif found != self._views:  # other words for the same: what was chosen stays
             self._views = found
             self._view.set_options(found, value=self._view.value)
-        self._model.set_visibility(len(found) > 1)
+        self._model.classes(remove="idle" if len(found) > 1 else "", add="" if len(found) > 1 else "idle")  # its place is kept
         return view_of(str(self._view.value or NOW))
 
     def _head(self) -> None:
