@@ -62,16 +62,16 @@ test-busy: $(INSTALLED) ## every test with eight busy processes beside them (ARG
 	@PYTHONPATH=test $(BIN)/python -m helpers.busy 8 $(PYTEST) $(ARGS)
 
 bench: $(VENV)/.bench ## measure against other software, and write the table (ARGS names one)
-	@$(BIN)/python -m bench $(ARGS)
+	@$(BIN)/python -m campaigns.bench $(ARGS)
 
 blind: $(INSTALLED) ## name hidden effects on machines never tuned on, and write docs/blind.md (ARGS="--part 3" for a third)
-	@$(BIN)/python -m blind $(ARGS)
+	@$(BIN)/python -m campaigns.blind $(ARGS)
 
 faults: $(INSTALLED) ## attack everything with fixed seeds, and write docs/faults.md; a hole is an error (ARGS names groups)
-	@$(BIN)/python -m faults $(ARGS)
+	@$(BIN)/python -m campaigns.faults $(ARGS)
 
 soak: $(INSTALLED) ## a day of data through all nodes and the page, with memory and descriptors of each (ARGS="--minutes 20")
-	@$(BIN)/python -m faults soak $(ARGS)
+	@$(BIN)/python -m campaigns.faults soak $(ARGS)
 
 $(VENV)/.docs: $(INSTALLED)
 	@$(PIP) --no-build-isolation --config-settings editable_mode=compat --editable '.[docs]'
@@ -82,7 +82,7 @@ $(VENV)/.bench: $(INSTALLED)
 	@touch $@
 
 pictures: $(INSTALLED) ## make the pictures and the text of docs/reading-pictures.md (needs chromium; ARGS names some)
-	@$(BIN)/python -m pictures $(ARGS)
+	@$(BIN)/python -m campaigns.pictures $(ARGS)
 
 clean: ## remove what the other targets made
 	rm -rf $(VENV) build install log .mypy_cache .ruff_cache .pytest_cache .hypothesis *.egg-info

@@ -15,10 +15,10 @@ from helpers.cli_tools import bare
 from helpers.real_data import data
 from helpers.ros_tools import needs_ros
 
-from bench import peers
-from bench.__main__ import SCRIPTS, TABLES, main, text
-from bench.recordings import between
-from bench.tables import Table
+from campaigns.bench import peers
+from campaigns.bench.__main__ import SCRIPTS, TABLES, main, text
+from campaigns.bench.recordings import between
+from campaigns.bench.tables import Table
 from xy_sysid.axis.model import AxisModel, simulate
 from xy_sysid.greybox.axis_data import prepare
 
@@ -50,7 +50,9 @@ def test_what_is_compared_is_equal() -> None:
 @needs_ros
 def test_the_live_benchmark_gives_its_table() -> None:
     """Nodes as processes: all samples that were sent are paired."""
-    done = subprocess.run([sys.executable, "-m", "bench", "--short", "live"], cwd=ROOT, env=bare(), capture_output=True, text=True, timeout=300)
+    done = subprocess.run(
+        [sys.executable, "-m", "campaigns.bench", "--short", "live"], cwd=ROOT, env=bare(), capture_output=True, text=True, timeout=300
+    )
     assert done.returncode == 0, done.stderr
     assert "| lost, dropped or refused | none |" in done.stdout
 
@@ -61,7 +63,9 @@ def test_a_benchmark_that_is_asked_for_by_name_runs(name: str, monkeypatch: pyte
     if name == "real_fits":
         monkeypatch.setenv("XY_SYSID_DATA", os.fspath(data("two_inertia_bench").parent))
     if name == "long_bag":  # measures the memory of its process
-        done = subprocess.run([sys.executable, "-m", "bench", "--short", name], cwd=ROOT, env=bare(), capture_output=True, text=True, timeout=300)
+        done = subprocess.run(
+            [sys.executable, "-m", "campaigns.bench", "--short", name], cwd=ROOT, env=bare(), capture_output=True, text=True, timeout=300
+        )
         assert done.returncode == 0 and done.stdout, done.stderr
         return
     monkeypatch.setattr("sys.argv", ["bench", "--short", name])
@@ -89,13 +93,13 @@ def test_peers_reach_the_axis_that_made_the_data() -> None:
 
 def test_a_table_takes_the_place_of_the_one_before() -> None:
     """Between its marks; the rest of the page stays."""
-    page = "a\n\n<!-- made by python -m bench peers -->\n\nold\n\n<!-- end of peers -->\n\nb\n"
+    page = "a\n\n<!-- made by python -m campaigns.bench peers -->\n\nold\n\n<!-- end of peers -->\n\nb\n"
     assert between(page, "peers", "new\n") == page.replace("old", "new")
 
 
 def test_every_benchmark_is_among_these() -> None:
-    """A new file of bench/ has a short form, too."""
-    files = {path.stem for path in (ROOT / "bench").glob("*.py")} - {"__init__", "__main__", "recordings", "tables"}
+    """A new file of campaigns/bench/ has a short form, too."""
+    files = {path.stem for path in (ROOT / "campaigns" / "bench").glob("*.py")} - {"__init__", "__main__", "recordings", "tables"}
     assert files == {*TABLES, *SCRIPTS}
 
 

@@ -11,14 +11,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from blind import judge
-from blind.__main__ import main
-from blind.cases import EFFECTS, OUTSIDE, Case, _dirt, sets
-from blind.dirt import DIRT, FEWEST, MOST, change, moved
-from blind.judge import Judged, run
-from blind.page import hit, text, with_remarks
-from blind.recordings import file_name, recorded
-from blind.store import add, load
+from campaigns.blind import judge
+from campaigns.blind.__main__ import main
+from campaigns.blind.cases import EFFECTS, OUTSIDE, Case, _dirt, sets
+from campaigns.blind.dirt import DIRT, FEWEST, MOST, change, moved
+from campaigns.blind.judge import Judged, run
+from campaigns.blind.page import hit, text, with_remarks
+from campaigns.blind.recordings import file_name, recorded
+from campaigns.blind.store import add, load
 
 SHORT = 20.0
 OLD_COGGING = {"amplitude": 0.391866894694146, "per_revolution": 6.0, "phase": 0.6869931843997854}
@@ -211,7 +211,7 @@ def test_the_page_tells_hits_misses_and_goals() -> None:
     hit, clean = judged("coulomb_friction"), judged()
     miss = replace(hit, case=replace(hit.case, truth=("dead_zone",)), right=False, first=False, wrong=True, phantoms=("coulomb_friction",))
     items = [replace(item, case=replace(item.case, group="standard"), confidence=1.0) for item in (hit, clean, miss)]
-    page = text({"exact": items}, "development", "python -m blind", "")
+    page = text({"exact": items}, "development", "python -m campaigns.blind", "")
     assert "| coulomb_friction | 1 of 1 |" in page
     assert "| dead_zone | 0 of 1 |" in page
     assert "| exact: one effect | 1 of 2 (50 %) | >= 149 of 150 | 1 | 1 (50.0 %) | 1 (50.0 %) | 0 |" in page
@@ -224,7 +224,7 @@ def test_the_page_tells_whether_a_confidence_is_what_it_says() -> None:
     """Verdicts by confidence, over all sets; what is right beside a phantom is not right."""
     hit = judged("coulomb_friction")
     items = [replace(hit, confidence=0.95), replace(hit, confidence=0.95, phantoms=("backlash",)), replace(hit, confidence=0.6)]
-    page = text({"imperfect 1 %": items, "10 s": [replace(hit, confidence=1.0)]}, "development", "python -m blind", "")
+    page = text({"imperfect 1 %": items, "10 s": [replace(hit, confidence=1.0)]}, "development", "python -m campaigns.blind", "")
     assert "| 0.5 to 0.7 | 1 | 1 (100 %) | 0.60 |" in page
     assert "| 0.9 to 0.99 | 2 | 1 (50 %) | 0.95 |" in page
     assert "| 0.9 to 1 | 3 | 2 (67 %) | 0.97 |" in page

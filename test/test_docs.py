@@ -16,7 +16,7 @@ from xy_sysid.live.messages import COMPARISON_COLUMNS, FRF_COLUMNS, LADDER_COLUM
 from xy_sysid.response.window_check import REASONS as WINDOW_REASONS
 from xy_sysid.samples.pairing import REASONS as STREAM_REASONS
 
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), ROOT / "config" / "README.md"]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md")), ROOT / "config" / "README.md"]
 
 
 def test_the_settings_page_is_made_from_the_settings() -> None:
@@ -48,10 +48,10 @@ def test_the_architecture_names_files_that_are_there() -> None:
             assert hasattr(home, module) or (ROOT / "xy_sysid" / package / f"{module}.py").is_file(), name
 
 
-def test_the_readme_lists_every_command() -> None:
+def test_the_page_of_commands_lists_every_command() -> None:
     """No command is missing from the table, and none is made up."""
     names = {command.name for command in app.registered_commands}
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
     assert set(re.findall(r"^\| `xy-sysid (\w+)", text, re.MULTILINE)) == names
 
 

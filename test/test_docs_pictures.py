@@ -7,8 +7,8 @@ import re
 import pytest
 from helpers import ROOT
 
-from pictures.examples import EXAMPLES, Example, rigid_model
-from pictures.reading import page, picture
+from campaigns.pictures.examples import EXAMPLES, Example, rigid_model
+from campaigns.pictures.reading import page, picture
 from xy_sim.parts import PARTS
 from xy_sysid.axis.model import STANDARD
 from xy_sysid.effects import EFFECTS
@@ -17,7 +17,7 @@ DOCS = ROOT / "docs"
 
 
 def test_the_page_is_made_by_its_command() -> None:
-    """python -m pictures"""
+    """python -m campaigns.pictures"""
     assert (DOCS / "reading-pictures.md").read_text(encoding="utf-8") == page()
 
 

@@ -9,13 +9,13 @@ from pathlib import Path
 import pytest
 from helpers import ROOT
 
-from faults.__main__ import main
-from faults.attack import GOOD, Attack, Found, Row, attacked, judged
-from faults.groups import GROUPS
-from faults.report import section, text
+from campaigns.faults.__main__ import main
+from campaigns.faults.attack import GOOD, Attack, Found, Row, attacked, judged
+from campaigns.faults.groups import GROUPS
+from campaigns.faults.report import section, text
 from xy_sysid.errors import BadInput
 
-ROWS = [(group, attack) for group in GROUPS for attack in importlib.import_module(f"faults.{group}").ATTACKS]
+ROWS = [(group, attack) for group in GROUPS for attack in importlib.import_module(f"campaigns.faults.{group}").ATTACKS]
 QUICK = [(group, attack) for group, attack in ROWS if attack.short]
 
 
@@ -75,7 +75,7 @@ def test_a_group_that_was_not_run_keeps_its_table() -> None:
 
 def test_a_hole_ends_the_campaign_with_an_error(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Exit code 1, and the row names how to do it again; none: 0."""
-    module = importlib.import_module("faults.motion")
+    module = importlib.import_module("campaigns.faults.motion")
     for outcome, code in (("silent", 1), ("full", 0)):
         monkeypatch.setattr(module, "ATTACKS", (Attack("a", lambda *_, o=outcome: [Found(o, note="seed 9")], 1, 1),))
         monkeypatch.setattr("sys.argv", ["faults", "motion", "-o", str(tmp_path / "page.md")])

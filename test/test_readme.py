@@ -1,4 +1,4 @@
-"""Every code block of README runs, in its order, in one empty folder."""
+"""Every code block of README runs, in its order, in one empty folder, and then what the quick start goes on with."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ import textwrap
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-NOT_RUN = ("git clone", "axis x", "voltage, position")  # the way to the program itself (test_packaging), an answer, a diagram
+NOT_RUN = ("git clone", "axis x")  # the way to the program itself (test_packaging), an answer
+GOES_ON = "## The same in a notebook"  # from here on the quick start uses what README has made
 
 
 def blocks(text: str) -> list[str]:
@@ -24,7 +25,8 @@ def test_every_block_of_the_readme_runs_in_order_in_an_empty_folder(tmp_path: Pa
     bare = {name: os.environ[name] for name in ("HOME", "LANG", "TMPDIR") if name in os.environ}
     bare["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     ran = {"shell": 0, "notebook": 0}
-    for block in blocks((ROOT / "README.md").read_text(encoding="utf-8")):
+    readme, quick = ((ROOT / name).read_text(encoding="utf-8") for name in ("README.md", "docs/quick-start.md"))
+    for block in blocks(readme) + blocks(quick[quick.index(GOES_ON) :]):
         if block.startswith(NOT_RUN):
             continue
         before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
@@ -40,4 +42,4 @@ def test_every_block_of_the_readme_runs_in_order_in_an_empty_folder(tmp_path: Pa
         assert "Traceback" not in done.stderr
         for path, content in before.items():
             assert path.read_bytes() == content, f"{path.name} was overwritten by\n{block}"
-    assert ran["shell"] >= 2 and ran["notebook"] == 1
+    assert ran["shell"] >= 2 and ran["notebook"] == 2

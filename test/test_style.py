@@ -104,7 +104,7 @@ def test_only_what_everybody_knows_stands_beside_the_packages() -> None:
 
 def test_the_core_knows_no_ros_no_files_no_clock_and_does_not_print() -> None:
     """The core is told; it never asks: data, time and randomness are arguments."""
-    wrong = {}
+    wrong: dict[str, set[str]] = {}
     for path in [path for path in sources("xy_sysid") if place_of(module_of(path)) in CORE]:
         calls = {node.func.id for node in ast.walk(tree_of(path)) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)}
         touched = {name.split(".")[0] for name in imported(path)} & set(NOT_IN_CORE) | calls & NOT_CALLED_IN_CORE
@@ -198,7 +198,7 @@ def test_tests_share_helpers_and_never_each_other() -> None:
         assert not [name for name in taken if name.startswith("test_")], path
 
 
-EVERYWHERE = ("xy_sysid", "xy_sim", "faults", "blind", "bench", "pictures", "test")
+EVERYWHERE = ("xy_sysid", "xy_sim", "campaigns", "test")
 
 
 def test_nothing_silences_the_type_checker() -> None:

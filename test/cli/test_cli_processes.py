@@ -13,7 +13,7 @@ import pytest
 from helpers.busy import allowed
 from helpers.cli_tools import COMMAND, bare, cli
 
-from faults.strange import GOOD_EFFECT
+from campaigns.faults.strange import GOOD_EFFECT
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from helpers import ROOT
 
-from faults.encoder_faults import FAULTS, FROM_THE_START, frozen, run, scaled, settings
+from campaigns.faults.encoder_faults import FAULTS, FROM_THE_START, frozen, run, scaled, settings
 from xy_sim.machine import Machine
 from xy_sysid.excitation.drive import Drive
 from xy_sysid.samples.block import Block, FloatArray

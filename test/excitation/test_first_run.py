@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from faults.encoder_faults import settings
+from campaigns.faults.encoder_faults import settings
 from xy_sim.machine import Machine
 from xy_sysid.excitation.first_run import FirstRun, Push, PushResult
 from xy_sysid.samples.block import FloatArray

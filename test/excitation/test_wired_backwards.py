@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from helpers import ROOT
 
-from faults.backwards import LEVELS, TENTH, worst
+from campaigns.faults.backwards import LEVELS, TENTH, worst
 from xy_sysid.excitation.drive import Drive
 from xy_sysid.samples.block import Block, FloatArray
 from xy_sysid.settings import AxisExcitation, ExcitationSettings
@@ -75,7 +75,7 @@ def promised() -> dict[float, tuple[float, float]]:
 
 
 def test_the_docs_give_every_level_and_each_is_within_a_tenth_of_the_travel() -> None:
-    """From 0.1 V to the limit, as ``python -m faults.backwards`` has measured it."""
+    """From 0.1 V to the limit, as ``python -m campaigns.faults.backwards`` has measured it."""
     assert set(promised()) == set(LEVELS) and max(way for _, way in promised().values()) < TENTH
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from helpers.cli_tools import cli, npz
 
-from faults.strange import GOOD_EFFECT as GOOD
+from campaigns.faults.strange import GOOD_EFFECT as GOOD
 
 LOADED = {
     "exit": ("import sys\n\nsys.exit(3)\n", 3, "SystemExit: 3"),

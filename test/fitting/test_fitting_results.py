@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from helpers.fitting_data import held, lines, measured, paper_machine
 
-from bench.intervals import machine, trials, truths
+from campaigns.bench.intervals import machine, trials, truths
 from xy_sysid.errors import BadInput
 from xy_sysid.fitting import ESTIMATORS, Structure, identify
 from xy_sysid.fitting.finish import finish
@@ -45,7 +45,7 @@ def test_the_covariance_is_the_scatter_of_many_fits(name: str, weighting: Weight
 
 
 def test_intervals_hold_the_truth_in_simulated_recordings() -> None:
-    """25 recordings of 30 s through hold, window and estimate: about 95 of 100 intervals hold (``python -m bench coverage``: 400)."""
+    """25 recordings of 30 s through hold, window and estimate: about 95 of 100 intervals hold (``python -m campaigns.bench coverage``: 400)."""
     found, fits = trials(25, 30.0, 2e-6)
     exact = truths(machine(), fits[0])
     inside = [item.low <= exact[name] <= item.high for name, items in found.items() for item in items]

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from helpers.real_data import data
 
-from faults.attack import GOOD
-from faults.shared import COMMANDS, RECORDINGS, Shared, told, unnamed
+from campaigns.faults.attack import GOOD
+from campaigns.faults.shared import COMMANDS, RECORDINGS, Shared, told, unnamed
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -21,7 +21,7 @@ def test_a_command_answers_or_refuses_in_one_line(row: Shared, name: str, tmp_pa
 
 
 def test_every_file_is_in_the_table() -> None:
-    """A recording that is new is walked through, too: add it to faults/shared.py with the options that it needs."""
+    """A recording that is new is walked through, too: add it to campaigns/faults/shared.py with the options that it needs."""
     assert unnamed(data("")) == []
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from helpers import ROOT
 
-from blind.cases import EFFECTS
+from campaigns.blind.cases import EFFECTS
 from xy_sim import effect_text, tables
 from xy_sim.hidden import draw, hidden
 from xy_sim.machine import Machine

@@ -1,0 +1,72 @@
+"""python -m campaigns.bench [--short] [name ...]: run the benchmarks and write docs/benchmarks.md.
+
+h1, fit, replay, bags, live and intervals run without a name. Only by name: long_bag (a day of data, gigabytes on disk), axis_model, and of the
+recordings of real machines in $XY_SYSID_DATA real_fits, peers and diagnoses. The last two write their tables to docs/real-machines.md.
+--short: a little of each, as the tests run it; nothing is written.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+import platform
+import sys
+from datetime import date
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from campaigns.bench.tables import Table
+
+TABLES = ("h1", "fit", "replay", "bags", "live", "intervals")
+SCRIPTS = ("long_bag", "axis_model", "real_fits", "peers", "diagnoses")
+PAGE = Path(__file__).parents[2] / "docs" / "benchmarks.md"
+
+
+def facts() -> str:
+    """What this ran on."""
+    versions = []
+    for name in ("numpy", "scipy", "numba", "rosbags", "scikit-rf", "pyFRF"):
+        try:
+            versions.append(f"{name} {version(name)}")
+        except PackageNotFoundError:
+            versions.append(f"{name} not installed")
+    return f"{date.today()}, {os.cpu_count()} cores, {platform.machine()}, Python {platform.python_version()}, {', '.join(versions)}."
+
+
+def text(name: str, table: Table) -> str:
+    """One benchmark as Markdown."""
+    lines = [f"## {table.title}", "", f"`python -m campaigns.bench {name}`", "", table.text.strip(), ""]
+    lines += [f"| {' | '.join(table.columns)} |", "|" + "---|" * len(table.columns), *(f"| {' | '.join(row)} |" for row in table.rows), ""]
+    lines += ["| figure | measured | goal | met |", "|---|---|---|---|"]
+    lines += [f"| {c.what} | {c.measured} | {c.goal} | {'-' if c.met is None else 'yes' if c.met else 'no'} |" for c in table.checks]
+    return "\n".join(lines) + "\n"
+
+
+def main() -> int:
+    """Run what was asked for; the page is written when everything ran."""
+    for threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):  # before numpy comes in: one core for everybody
+        os.environ.setdefault(threads, "1")
+    asked = [word for word in sys.argv[1:] if word != "--short"]
+    short = len(asked) < len(sys.argv) - 1
+    unknown = [name for name in asked if name not in (*TABLES, *SCRIPTS)]
+    if unknown:
+        sys.stderr.write(f"bench: {unknown[0]} is not a benchmark; there are {', '.join((*TABLES, *SCRIPTS))}\n")
+        return 2
+    parts = []
+    for name in asked or TABLES:
+        if name in SCRIPTS:
+            sys.argv = [name]
+            importlib.import_module(f"bench.{name}").main(short)
+            continue
+        table: Table = importlib.import_module(f"bench.{name}").run(lambda line: sys.stderr.write(line + "\n"), short)
+        parts.append(text(name, table))
+        sys.stdout.write(parts[-1] + "\n")
+        sys.stdout.flush()
+    if not asked and not short:
+        head = f"# Benchmarks\n\nMade by `make bench`; every ratio is from one run, side by side. {facts()}\n"
+        PAGE.write_text("\n".join([head, *parts]), encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,78 @@
+"""The recordings of real machines, axis by axis, as a command reads them; and tables about them on docs/real-machines.md."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from campaigns.faults.shared import DATA, RECORDINGS, Shared
+from xy_sysid.cli import options as o
+from xy_sysid.cli.reading import read_each, reads, runs_of
+from xy_sysid.errors import BadInput, BadRecording
+from xy_sysid.samples.recording import Recording, Run
+
+if TYPE_CHECKING:
+    from xy_sysid.imports.reading import Reading
+
+PAGE = Path(__file__).parents[2] / "docs" / "real-machines.md"
+SHORT = ("crane/crane_1.npz",)  # recordings of the short forms: small ones
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """One axis of a recording. runs: its stretches, or none and the reason why there are none."""
+
+    name: str
+    runs: tuple[Run, ...]
+    refused: str = ""
+
+
+def rows(short: bool) -> tuple[Shared, ...]:
+    """The recordings that are there; raises BadInput if there are none."""
+    if not DATA.is_dir():
+        raise BadInput("recordings of real machines", str(DATA), "a folder with them", "Say where they are with XY_SYSID_DATA.")
+    return tuple(row for row in RECORDINGS if (DATA / row.path).exists() and (not short or row.path in SHORT))
+
+
+def axes(row: Shared) -> Iterator[Axis]:
+    """Every axis of a recording, read with the options of its row."""
+    read: list[Recording] = []
+    app = typer.Typer()
+
+    @app.command()
+    @reads
+    def load(recs: o.Recs, reading: Reading) -> None:
+        read.extend(read_each(recs, reading, quiet=True))
+
+    try:
+        app([str(DATA / row.path), *row.options], standalone_mode=False)
+    except (BadInput, BadRecording) as refusal:
+        yield Axis(row.path, (), str(refusal).replace(f"{DATA}/", "").removeprefix(f"{row.path}: "))
+        return
+    for name in read[0].axes:
+        title = row.path if len(read[0].axes) == 1 else f"{row.path}, {name}"
+        try:
+            yield Axis(title, runs_of(read, name))
+        except BadInput as refusal:
+            yield Axis(title, (), str(refusal))
+
+
+def markdown(columns: Sequence[str], cells: Iterable[Sequence[str]]) -> str:
+    """A table."""
+    return "\n".join(f"| {' | '.join(row)} |" for row in (columns, ["---"] * len(columns), *cells))
+
+
+def between(page: str, name: str, made: str) -> str:
+    """The page with a table in its place, between the marks of this name."""
+    begin, end = f"<!-- made by python -m campaigns.bench {name} -->", f"<!-- end of {name} -->"
+    before, rest = page.split(begin)
+    return f"{before}{begin}\n\n{made.strip()}\n\n{end}{rest.split(end)[1]}"
+
+
+def written(name: str, made: str) -> None:
+    """Puts a table into docs/real-machines.md."""
+    PAGE.write_text(between(PAGE.read_text(encoding="utf-8"), name, made), encoding="utf-8")

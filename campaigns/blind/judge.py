@@ -1,0 +1,167 @@
+"""One case, from the drive to the verdict on the verdict."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from campaigns.blind.cases import FRICTION, Case
+from campaigns.blind.recordings import recorded
+from xy_sim.machine import Machine
+from xy_sysid.axis.model import STANDARD
+from xy_sysid.diagnosis.diagnose import Diagnosis, diagnose
+from xy_sysid.errors import BadInput
+from xy_sysid.greybox.free_run import EPSILON, fit, prepare
+from xy_sysid.greybox.score_test import bounded
+
+CONFIDENT = 0.9
+FAINT = 0.1  # of noise and dirt together: what changes the motion less can hardly be seen in 60 s
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """What came of one case.
+
+    right:    the truth was said: every effect (and, of one effect, only that), nothing, or not in the library
+    first:    the first name is one of the truth's
+    wrong:    a name that is not in the truth came first, with confidence
+    phantoms: names, wherever they came, of what is not on the axis, whatever the confidence
+    ratio:    held-out error over that of a fit that began at the truth; for backlash innovation over noise; None if not named
+    errors:   parameter -> relative error; inside: parameter -> is the truth in its 95 % interval
+    change, noise, dirt, kinds: see ``recordings.Seen``
+    """
+
+    case: Case
+    verdict: str
+    effects: tuple[str, ...]
+    confidence: float
+    seconds: float
+    right: bool
+    first: bool
+    wrong: bool
+    phantoms: tuple[str, ...] = ()
+    ratio: float | None = None
+    errors: dict[str, float] = field(default_factory=dict)
+    inside: dict[str, bool] = field(default_factory=dict)
+    change: dict[str, float] = field(default_factory=dict)
+    noise: float = 0.0
+    dirt: float = 0.0
+    kinds: tuple[str, ...] = ()
+
+    @property
+    def phantom(self) -> bool:
+        """Something is named with confidence that is not there."""
+        return bool(self.phantoms) and self.confidence >= CONFIDENT
+
+    @property
+    def hidden(self) -> bool:
+        """An effect of the truth changes the motion so little that hardly anybody could see it beside noise and dirt."""
+        return bool(self.change) and min(self.change.values()) < FAINT * math.hypot(self.noise, self.dirt)
+
+
+def run(case: Case, folder: Path | None = None) -> Judged:
+    """Drive (or take the recording from the folder), diagnose, judge."""
+    recording = recorded(case, folder)
+    machine, seen = case.exact(), recording.seen
+    u, y = recording.voltage, recording.position
+    begun = time.process_time()
+    found = diagnose(recording.rate, u, y, clock=time.process_time)
+    seconds = time.process_time() - begun
+    named = found.effects if found.verdict == "missing_effect" else ()
+    one = len(case.truth) == 1 and not case.nuisance
+    if not case.known:
+        right = found.verdict in ("not_in_library", "nothing_missing")
+    elif not case.truth:
+        right = found.verdict == "nothing_missing" or (case.dirt > 0.0 and found.verdict == "not_in_library")
+    elif one:
+        right = _laws(named) == _laws(case.truth)
+    else:
+        right = _laws(case.truth) <= _laws(named)
+    first = bool(named) and (named[0] in case.truth or (right and _laws(named[:1]) <= _laws(case.truth)))
+    phantoms = tuple(name for name in named if not _laws((name,)) <= _there(machine))
+    stray = bool(named) and not first and not (case.nuisance and _laws(named[:1]) <= _there(machine))
+    wrong = stray and found.confidence >= CONFIDENT
+    ratio, errors, inside = _measured(case, machine, recording.rate, u, y, found) if right and one and case.known else (None, {}, {})
+    return Judged(
+        case=case,
+        verdict=found.verdict,
+        effects=tuple(found.effects),
+        confidence=float(found.confidence),
+        seconds=seconds,
+        right=right,
+        first=first,
+        wrong=wrong,
+        phantoms=phantoms,
+        ratio=ratio,
+        errors=errors,
+        inside=inside,
+        change=seen.change,
+        noise=seen.noise,
+        dirt=seen.dirt,
+        kinds=seen.kinds,
+    )
+
+
+def _laws(names: tuple[str, ...]) -> set[str]:
+    """Names, with those that are the sum of others taken apart: no data can tell these from the others together."""
+    sums = {name: whole.parts for name in names if name in STANDARD.effects and (whole := STANDARD[name].sum_of)}
+    return {part for name in names for part in sums.get(name, (name,))}
+
+
+def _there(machine: Machine) -> set[str]:
+    """Laws of every part of the machine; whatever dry friction slides with its constant level."""
+    parts = set(machine.spec.axes[0].parts)
+    return _laws(tuple(parts)) | parts | ({FRICTION[0]} if parts & set(FRICTION) else set())
+
+
+def true_values(case: Case, machine: Machine) -> dict[str, float]:
+    """What the hypothesis should find, by ``effect.parameter``."""
+    axis, truth = machine.spec.axes[0], machine.truth("x")
+    values: dict[str, float] = {}
+    for name in case.truth:
+        if name not in STANDARD.effects:
+            continue
+        own = dict(axis.parts[name])
+        if "per_revolution" in own:
+            own["period"] = axis.drive.lead / own.pop("per_revolution")
+        if name in ("base_resonance", "screw_compliance"):
+            own = {"frequency": truth["antiresonance_hz"], "split": truth["resonance_hz"] / truth["antiresonance_hz"] - 1.0}
+        if name == "backlash":
+            own = {"gap": own["gap"]}
+        values |= {f"{name}.{key}": float(value) for key, value in own.items() if key in STANDARD[name].names}
+    return values
+
+
+def _measured(case: Case, machine: Machine, fs: float, u: Any, y: Any, found: Diagnosis) -> tuple[float | None, dict[str, float], dict[str, bool]]:
+    values = true_values(case, machine)
+    errors: dict[str, float] = {}
+    inside: dict[str, bool] = {}
+    ladder = getattr(found, "ladder", None)
+    if ladder is None:
+        return None, errors, inside
+    final = ladder.final
+    for key, value in values.items():
+        try:
+            estimate = final.parameter(key)
+        except BadInput:
+            continue
+        angle = key.endswith("phase")
+        if value == 0.0 or angle:
+            continue
+        errors[key] = abs(estimate.value / value - 1.0)
+        inside[key] = estimate.low <= value <= estimate.high
+    if case.truth == ("backlash",):
+        return final.held_out_error / final.noise_floor, errors, inside
+    if not case.truth or case.dirt > 0.0:  # the best fit of a dirty axis does not begin at the truth
+        return None, errors, inside
+    model, data = final.model, prepare(fs, np.asarray(u), np.asarray(y), EPSILON)
+    for name in case.truth:
+        known = [values.get(f"{name}.{key}", old) for key, old in zip(STANDARD[name].names, dict(model.effects)[name], strict=True)]
+        model = model.with_effect(name, bounded(STANDARD[name], known, data.similar))
+    best = fit(data, model)
+    return final.held_out_error / best.held_out_error, errors, inside

@@ -1,0 +1,177 @@
+"""docs/blind.md from what came of the cases."""
+
+from __future__ import annotations
+
+import itertools
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from campaigns.blind.cases import EFFECTS
+from campaigns.blind.judge import CONFIDENT, FAINT, Judged
+
+WORDS = {
+    "imperfect 0.2 %": "dirt that changes the motion by 0.2 %",
+    "imperfect 1 %": "dirt, 1 %",
+    "imperfect 3 %": "dirt, 3 %",
+    "clean dirt": "no effect, dirt of 0.2, 1 and 3 %",
+    "outside": "outside the library, without dirt and with 0.2, 1 and 3 %",
+    "hard": "hard: mild friction, a 1 um encoder and a tenth of another effect besides",
+    "two effects": "two effects, all named",
+    "three effects": "three effects, all named",
+    "first order": "stops and contacts resolved to 25 us only",
+    "1 % two effects": "two effects with 1 % of dirt, all named",
+    "10 s": "10 s records",
+    "half": "half the excitation",
+    "5 um": "a 5 um encoder (without backlash)",
+    "quarter": "a quarter of the excitation",
+    "tenth": "effects at a tenth of their size",
+    "5 s": "5 s records",
+    "sweep": "swept sine",
+    "prbs": "PRBS",
+}
+REMARKS = "\n## Remarks\n"  # from here on people write, and the command leaves it
+GOALS = {"imperfect 0.2 %": 97, "imperfect 1 %": 95, "imperfect 3 %": 90, "hard": 97, "two effects": 97, "three effects": 85}  # % right
+BINS = (0.0, 0.3, 0.5, 0.7, 0.9, 0.99, 1.0)  # of confidence; the last one is closed
+
+
+def text(results: dict[str, list[Judged]], draws: str, command: str, facts: str) -> str:
+    """The whole page."""
+    head = [
+        "# Blind campaigns",
+        "",
+        f"Made by `{command}`: machines of `xy_sim` with hidden effects and hidden base parameters, {draws} draws. {facts}",
+        "",
+        "Development draws (another random stream) were used for tuning; reporting draws never were.",
+        "",
+        "- **Right**: the truth is named first (`hard`: anywhere; several effects: all of them); of a clean axis, nothing is missing; of "
+        f"dirt alone and of what is outside the library, nothing is named with confidence {CONFIDENT:g} or more.",
+        f"- **Phantom**: something is named with confidence {CONFIDENT:g} or more that is not on the axis, be it beside the truth.",
+        f"- **Wrong**: the first name is not in the truth, with confidence {CONFIDENT:g} or more.",
+        f"- **Hidden**: of what is not right, an effect changes the motion by less than {100 * FAINT:.0f} % of what noise and dirt do.",
+        "- Effects count by law: asymmetric friction is Coulomb friction with a constant load. Whatever dry friction slides has Coulomb friction.",
+        "- Seconds are of one core's time.",
+        "",
+    ]
+    parts = [*head, *_table(results), *_reliability(results)]
+    if "exact" in results:
+        parts += _standard(results["exact"])
+    parts += _phantoms(results) + _misses(results)
+    return "\n".join(parts) + "\n"
+
+
+def _rows(results: dict[str, list[Judged]]) -> Iterator[tuple[str, str, list[Judged]]]:
+    """Name, goal and axes of each row; the exact set is three."""
+    for name, items in results.items():
+        if name == "exact":
+            yield "exact: one effect", ">= 149 of 150", [item for item in items if item.case.known and item.case.truth]
+            yield "exact: no effect", "all", [item for item in items if not item.case.truth]
+            yield "exact: outside the library", "all", [item for item in items if not item.case.known]
+        else:
+            goal = f">= {GOALS[name]} %" if name in GOALS else "all" if name in ("clean dirt", "outside") else "-"
+            yield f"`{name}`: {WORDS[name]}" if name in WORDS else f"`{name}`", goal, items
+
+
+def _table(results: dict[str, list[Judged]]) -> list[str]:
+    rows = [
+        "| set | right | goal | of these named first | phantoms | wrong | hidden | intervals that hold the truth | time: median, worst |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
+    every = [item for items in results.values() for item in items]
+    for name, goal, items in [*_rows(results), ("**all**", "phantoms and wrong <= 1 %", every)]:
+        if not items:
+            continue
+        count, right = len(items), [item for item in items if hit(item)]
+        inside = [value for item in items for value in item.inside.values()]
+        seconds = [item.seconds for item in items]
+        rows.append(
+            f"| {name} | {len(right)} of {count} ({100 * len(right) / count:.0f} %) | {goal} | {sum(item.first for item in right)} "
+            f"| {_part(sum(item.phantom for item in items), count)} | {_part(sum(item.wrong for item in items), count)} "
+            f"| {sum(item.hidden and not hit(item) for item in items)} "
+            f"| {f'{100 * float(np.mean(inside)):.0f} % of {len(inside)}' if inside else '-'} | {np.median(seconds):.2f} s, {max(seconds):.1f} s |"
+        )
+    return [*rows, "", "Goals: intervals 90 to 98 %; time median 1 s exact, 2 s with dirt, worst 10 s.", ""]
+
+
+def _part(some: int, count: int) -> str:
+    return f"{some} ({100 * some / count:.1f} %)" if some else "0"
+
+
+def _reliability(results: dict[str, list[Judged]]) -> list[str]:
+    """Is a confidence what it says?"""
+    every = [item for items in results.values() for item in items if item.verdict != "not_enough_data"]
+    rows = [
+        "## Is a confidence what it says?",
+        "",
+        f"Over all sets; without phantom and right, by confidence of the verdict (goal: 95 % from {CONFIDENT:g} on).",
+        "",
+        "| confidence | verdicts | right | mean confidence |",
+        "|---|---|---|---|",
+    ]
+    ends = [*itertools.pairwise(BINS), (CONFIDENT, 1.0)]
+    for low, high in ends:
+        inside = [item for item in every if low <= item.confidence < high or (high == 1.0 and item.confidence >= high)]
+        if inside:
+            good = sum(hit(item) and not item.phantoms for item in inside)
+            mean = float(np.mean([item.confidence for item in inside]))
+            rows.append(f"| {low:g} to {high:g} | {len(inside)} | {good} ({100 * good / len(inside):.0f} %) | {mean:.2f} |")
+    return [*rows, ""]
+
+
+def with_remarks(made: str, old: str) -> str:
+    """The page, with the remarks that people wrote at the end of the old one."""
+    _, mark, remarks = old.partition(REMARKS)
+    return f"{made}\n{mark.lstrip()}{remarks}" if mark else made
+
+
+def _standard(items: Sequence[Judged]) -> list[str]:
+    one = [item for item in items if item.case.known and item.case.truth]
+    rows = [
+        "## One effect, exact, 60 s",
+        "",
+        "| effect | named | held-out error over that of the truth | largest parameter error: median, worst |",
+        "|---|---|---|---|",
+    ]
+    for name in EFFECTS:
+        own = [item for item in one if item.case.truth == (name,)]
+        ratios = [item.ratio for item in own if item.ratio is not None]
+        worst = [max(item.errors.values()) for item in own if item.errors]
+        ratio = f"{max(ratios):.3g}{' (innovation over noise)' if name == 'backlash' else ''}" if ratios else "-"
+        error = f"{100 * float(np.median(worst)):.2g} %, {100 * max(worst):.2g} %" if worst else "-"
+        rows.append(f"| {name} | {sum(item.right for item in own)} of {len(own)} | {ratio} | {error} |")
+    return [*rows, "", *_confusion(items)]
+
+
+def _confusion(items: Sequence[Judged]) -> list[str]:
+    table: dict[str, Counter[str]] = defaultdict(Counter)
+    for item in items:
+        said = item.effects[0] if item.verdict == "missing_effect" and item.effects else item.verdict
+        table["+".join(item.case.truth) or "none"][said] += 1
+    rows = ["Truth, and what was said first:", "", "| truth | said |", "|---|---|"]
+    return [*rows, *(f"| {name} | {', '.join(f'{said} {count}' for said, count in row.most_common())} |" for name, row in table.items()), ""]
+
+
+def hit(item: Judged) -> bool:
+    """Right for the set that it is of."""
+    if not item.case.known or (item.case.dirt and not item.case.truth):
+        return not (item.verdict == "missing_effect" and item.confidence >= CONFIDENT)
+    alone = len(item.case.truth) == 1 and not item.case.nuisance and item.case.group != "standard"
+    return item.first if alone else item.right
+
+
+def _line(item: Judged) -> str:
+    seen = [f"{name} {100 * part:.2g} %" for name, part in item.change.items()] + [f"noise {100 * item.noise:.2g} %"] * bool(item.change)
+    seen += [f"dirt {100 * item.dirt:.2g} % ({', '.join(item.kinds)})"] if item.kinds else []
+    said = f"- {item.case.name}: {item.verdict} {' + '.join(item.effects) or '-'} (confidence {item.confidence:.2f})"
+    return said + (f"; of the motion: {', '.join(seen)}" if seen else "") + ("; hidden" if item.hidden else "")
+
+
+def _phantoms(results: dict[str, list[Judged]]) -> list[str]:
+    lines = [f"{_line(item)}; not there: {', '.join(item.phantoms)}" for items in results.values() for item in items if item.phantom]
+    return ["## Every phantom", "", *(lines or ["None."]), ""]
+
+
+def _misses(results: dict[str, list[Judged]]) -> list[str]:
+    lines = [_line(item) for items in results.values() for item in items if not hit(item)]
+    return ["## Every miss", "", *(lines or ["None."])]

@@ -1,0 +1,39 @@
+"""What came of cases, kept in a file of one JSON line each, so that a campaign can be stopped and gone on with."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+from campaigns.blind.cases import Case
+from campaigns.blind.judge import Judged
+
+
+def load(path: Path) -> dict[Case, Judged]:
+    """Every case of the file that was judged to its end; none if there is no file."""
+    found = {}
+    for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else ():
+        try:
+            row = json.loads(line)
+        except ValueError:  # the last line of a run that was killed
+            continue
+        case = Case(**row.pop("case") | {"truth": tuple(row.pop("truth"))})
+        found[case] = Judged(case, **row | {name: tuple(row[name]) for name in ("effects", "phantoms", "kinds") if name in row})
+    return found
+
+
+def add(path: Path, item: Judged) -> None:
+    """One more line."""
+    row = asdict(item)
+    row["truth"] = list(row["case"].pop("truth"))
+    with path.open("a", encoding="utf-8") as file:
+        file.write(json.dumps(row, default=_plain) + "\n")
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, np.generic):
+        return value.item()
+    raise TypeError(type(value).__name__)

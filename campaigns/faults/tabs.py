@@ -1,0 +1,308 @@
+"""The page under load: fifty tabs, a client that reads nothing, a lost WebSocket, a server that is killed; STOP meanwhile."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.request
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from campaigns.faults.attack import Attack, Found, environment
+from campaigns.faults.door import frame, upgrade
+from campaigns.faults.soak import NODES, memory
+from xy_sysid.samples.block import Block
+
+WORDS = (
+    "The live page with all nodes over DDS, and a machine that is driven. STOP is by the page's own POST /stop; it counts when the server "
+    "says that the machine has confirmed it and the last voltage heard is zero. Longest: from STOP to that answer."
+)
+CHROMIUM = next((path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None)
+STOPS = 3.0  # s
+DRAWN = 600.0  # s until every tab of fifty is drawn; all of them share the processors of this one computer
+MORE = 60.0  # MB
+
+
+def _why_not() -> str:
+    if importlib.util.find_spec("rclpy") is None:
+        return "ROS 2 is not installed"
+    if CHROMIUM is None or importlib.util.find_spec("playwright") is None:
+        return "no Chromium, or no playwright"
+    return ""
+
+
+@dataclass
+class Scene:
+    """Nodes, a page's server and somebody who listens to the voltage."""
+
+    folder: Path
+    monitor: Any
+    address: str = ""
+    voltage: list[Block] = field(default_factory=list)
+    processes: dict[str, Any] = field(default_factory=dict)
+
+    def start(self, name: str, *words: str) -> None:
+        """One process."""
+        with (self.folder / f"{name}.log").open("ab") as log:
+            self.processes[name] = subprocess.Popen([sys.executable, *words], stdin=subprocess.DEVNULL, stdout=log, stderr=log, env=environment())
+
+    def serve(self, port: int = 0) -> None:
+        """The page; its address is the first line that it says."""
+        begun = len(self.said("page"))
+        self.start("page", "-m", "xy_sysid", "page", "--port", str(port), "--no-browse", "--folder", str(self.folder))
+        self.until(lambda: "http://" in self.said("page")[begun:], 60.0)
+        self.address = self.said("page")[begun:].partition("http://")[2].partition("\n")[0].strip()
+        self.address = f"http://{self.address}"
+
+    def said(self, name: str) -> str:
+        """All that it wrote."""
+        path = self.folder / f"{name}.log"
+        return path.read_text("utf-8", "replace") if path.exists() else ""
+
+    def until(self, done: Callable[[], bool], seconds: float) -> bool:
+        """Listen until it is done."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            if done():
+                return True
+            self.monitor.spin(0.02)
+        return done()
+
+    def drive(self) -> None:
+        """STOP is released, then configure and activate, by the page's own means of ROS."""
+        from lifecycle_msgs.msg import Transition
+        from std_srvs.srv import Trigger
+
+        release = self.monitor._node.create_client(Trigger, "excitation/release_stop")
+        assert self.until(release.service_is_ready, 60.0), self.said("excitation")
+        for _ in range(2):  # the first names whose STOP it is
+            answer = release.call_async(Trigger.Request())
+            assert self.until(answer.done, 30.0), self.said("excitation")
+        self.monitor._wanted = [Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE]
+
+        def moving() -> bool:
+            call = self.monitor._call
+            if call is not None and call.done() and call.result() is not None and not call.result().success:
+                self.monitor._wanted, self.monitor._call = [Transition.TRANSITION_ACTIVATE], None
+            self.monitor.start_when_ready()
+            return bool(self.voltage) and bool(self.voltage[-1].values.any())
+
+        assert self.until(moving, 150.0), (self.said("excitation"), self.monitor.statuses)
+        self.monitor._node.destroy_client(release)
+
+    def stop(self, what: str) -> Found:
+        """POST /stop, and what came of it."""
+        begun = time.monotonic()
+        asked = urllib.request.Request(f"{self.address.rstrip('/')}/stop", method="POST", headers={"X-Requested-With": "xy_sysid"})
+        try:
+            with urllib.request.urlopen(asked, timeout=20.0) as answer:
+                told = json.load(answer)
+        except OSError as problem:
+            return Found("too late", note=f"{what}: {problem}")
+        seconds = time.monotonic() - begun
+        self.monitor.spin(0.3)
+        zero = bool(self.voltage) and not self.voltage[-1].values.any()
+        good = told["stopped"] and zero and seconds < STOPS
+        return Found("zero volts" if good else "too late", seconds, note="" if good else f"{what}: {told}, {seconds:.1f} s, zero {zero}")
+
+
+@contextmanager
+def scene(folder: Path) -> Iterator[Scene]:
+    """Everything that is needed, driven."""
+    from std_msgs.msg import Float64MultiArray
+
+    from xy_sysid.cli.monitor import Monitor
+    from xy_sysid.nodes.common import DATA_QOS
+    from xy_sysid.nodes.convert import from_message
+
+    os.environ.update(ROS_DOMAIN_ID=str(os.getpid() % 90 + 10), ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST")
+    made = Scene(folder, Monitor(("x", "y"), listeners=2))
+    made.monitor._node.create_subscription(Float64MultiArray, "voltage", lambda message: made.voltage.append(from_message(message)), DATA_QOS)
+    try:
+        for name, module in NODES.items():
+            extra = ["-p", "watchdog:=2.0"] if name == "excitation" else ["-p", "refit:=0.5"] if name == "identifier" else []
+            made.start(name, "-m", module, "--ros-args", "-r", "__ns:=/xy", *extra)
+        made.serve()
+        made.drive()
+        yield made
+    finally:
+        for process in made.processes.values():
+            process.terminate()
+        for process in made.processes.values():
+            try:
+                process.wait(10)
+            except subprocess.TimeoutExpired:
+                process.kill()
+        made.monitor.close()
+
+
+@contextmanager
+def browser() -> Iterator[Any]:
+    """One context of a real one, which steps back behind everything else: the tabs of others have other computers."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as play, tempfile.TemporaryDirectory(prefix="browser_") as name:
+        polite = Path(name) / "chromium"
+        polite.write_text(f'#!/bin/sh\nexec nice -n 19 {CHROMIUM} "$@"\n')
+        polite.chmod(0o755)
+        made = play.chromium.launch(executable_path=polite, args=["--headless", "--no-sandbox", "--disable-gpu"])
+        try:
+            yield made.new_context()
+        finally:
+            made.close()
+
+
+def _tab(made: Any, address: str) -> Any:
+    tab = made.new_page()
+    tab.goto(address, wait_until="commit", timeout=60_000)
+    return tab
+
+
+def _drawn(tab: Any) -> bool:
+    return bool(tab.locator("[data-part=nodes]").count())
+
+
+def _tells(tab: Any) -> bool:
+    """Whether a tab tells of the STOP; one that loads the page anew at this moment does not yet."""
+    from playwright.sync_api import Error
+
+    try:
+        return "stopp" in str(tab.content()).lower()
+    except Error:
+        return False
+
+
+def fifty(count: int, folder: Path) -> Iterator[Found]:
+    """Fifty tabs, each drawn; STOP; memory and descriptors after they have gone."""
+    with scene(folder) as here, browser() as made:
+        before = memory(here.processes["page"].pid)
+        begun = time.monotonic()
+        tabs = [_tab(made, here.address) for _ in range(50)]
+        end, drawn = time.monotonic() + DRAWN, 0
+        while time.monotonic() < end and (drawn := sum(_drawn(tab) for tab in tabs)) < 50:
+            tabs[0].wait_for_timeout(500)
+            here.monitor.spin(0.1)
+        seconds = time.monotonic() - begun
+        full = memory(here.processes["page"].pid)
+        found = here.stop("with fifty tabs")
+        here.until(lambda: all(_tells(tab) for tab in tabs), 60.0)
+        told = sum(_tells(tab) for tab in tabs)
+        for tab in tabs:
+            tab.close()
+        here.until(lambda: memory(here.processes["page"].pid)[1] <= before[1] + 5, 90.0)
+        after = memory(here.processes["page"].pid)
+        note = f"{drawn} of 50 drawn within {seconds:.0f} s; MB and descriptors of the server: {before[0]:.0f} and {before[1]} before, "
+        note += f"{full[0]:.0f} and {full[1]} with them, {after[0]:.0f} and {after[1]} after; {told} tabs tell of the STOP"
+        good = found.outcome == "zero volts" and drawn == 50 and told == 50 and after[1] <= before[1] + 5 and "Traceback" not in here.said("page")
+        yield Found("zero volts" if good else "too late", found.seconds, note=note if good else f"{note}; {found.note} {here.said('page')[-300:]}")
+
+
+def stalled(count: int, folder: Path) -> Iterator[Found]:
+    """Ten clients that open a WebSocket, and read nothing any more."""
+    with scene(folder) as here, browser() as made:
+        port = int(here.address.rstrip("/").rpartition(":")[2])
+        tab = _tab(made, here.address)
+        here.until(lambda: _drawn(tab), 60.0)
+        before = memory(here.processes["page"].pid)[0]
+        lines = [upgrade(port) for _ in range(10)]
+        for line in lines:
+            with suppress(OSError):
+                line.sendall(frame(b"40"))
+        here.monitor.spin(20.0)
+        grown = memory(here.processes["page"].pid)[0] - before
+        found = here.stop("with stalled clients")
+        for line in lines:
+            line.close()
+        good = found.outcome == "zero volts" and grown < MORE
+        note = f"the server grew by {grown:.0f} MB in 20 s"
+        yield Found("zero volts" if good else "too late", found.seconds, note=note if good else f"{note}; {found.note}")
+
+
+def lost_socket(count: int, folder: Path) -> Iterator[Found]:
+    """The tab's WebSocket is gone, and its STOP button is pressed; a fit runs meanwhile."""
+    with scene(folder) as here, browser() as made:
+        tab = _tab(made, here.address)
+        tab.wait_for_selector("#stop", timeout=60_000)
+        for number in range(count):
+            if number:
+                here.drive()
+            tab.evaluate("window.socket && window.socket.disconnect()")
+            begun = time.monotonic()
+            tab.evaluate("window.xyStop()")
+            zero = here.until(lambda: not here.voltage[-1].values.any(), STOPS)
+            seconds = time.monotonic() - begun
+            here.monitor.spin(0.3)
+            good = zero and not here.voltage[-1].values.any()
+            yield Found("zero volts" if good else "too late", seconds, note="" if good else f"try {number}: {here.said('excitation')[-300:]}")
+            tab.reload()
+            tab.wait_for_selector("#stop", timeout=60_000)
+
+
+def restarted(count: int, folder: Path) -> Iterator[Found]:
+    """kill -9 of the server while it drives, and another on the same port: an open tab is drawn again by itself or by a reload, and STOP works."""
+    with scene(folder) as here, browser() as made:
+        tab = _tab(made, here.address)
+        tab.wait_for_selector("#stop", timeout=60_000)
+        port = int(here.address.rstrip("/").rpartition(":")[2])
+        sent = len(here.voltage)
+        here.processes["page"].send_signal(signal.SIGKILL)
+        here.processes["page"].wait()
+        here.monitor.spin(1.0)
+        goes_on = len(here.voltage) > sent + 10 and bool(np.any(here.voltage[-1].values))
+        here.serve(port)
+        back = int(here.address.rstrip("/").rpartition(":")[2]) == port
+        tab.goto(here.address)
+        tab.wait_for_selector("#stop", timeout=60_000)
+        found = here.stop("after a restart of the server")
+        good = goes_on and back and found.outcome == "zero volts"
+        yield Found("zero volts" if good else "too late", found.seconds, note="" if good else f"drives on {goes_on}, same port {back}; {found.note}")
+
+
+def killed_nodes(count: int, folder: Path) -> Iterator[Found]:
+    """kill -9 of the identifier and of the machine while a tab is open: it says who is lost, and STOP works."""
+    with scene(folder) as here, browser() as made:
+        tab = _tab(made, here.address)
+        tab.wait_for_selector("#stop", timeout=60_000)
+        here.processes["identifier"].send_signal(signal.SIGKILL)
+        begun = time.monotonic()
+        lost, words = False, ""
+        while time.monotonic() - begun < 20.0 and not lost:
+            here.monitor.spin(0.2)
+            words = str(tab.locator("[data-part=nodes]").first.text_content())
+            lost = "lost" in words or "does not answer" in words
+        told = time.monotonic() - begun
+        found = here.stop("with a dead identifier")
+        good = lost and found.outcome == "zero volts"
+        note = f"the tab says after {told:.0f} s that the identifier does not answer"
+        yield Found("zero volts" if good else "not told", found.seconds, note=note if good else f"{words!r}; {found.note}")
+
+
+def _needed(work: Callable[[int, Path], Iterator[Found]]) -> Callable[[int, Path], Iterator[Found]]:
+    def tries(count: int, folder: Path) -> Iterator[Found]:
+        if _why_not():
+            yield Found("skipped", note=_why_not())
+            return
+        yield from work(count, folder)
+
+    return tries
+
+
+ATTACKS = (
+    Attack("fifty tabs", _needed(fifty), 1, 0, "3 s"),
+    Attack("ten stalled clients", _needed(stalled), 1, 0, "3 s, 60 MB"),
+    Attack("STOP with a lost WebSocket, while fits run", _needed(lost_socket), 3, 0, "3 s"),
+    Attack("kill -9 of the server, and another", _needed(restarted), 1, 0, "3 s"),
+    Attack("kill -9 of the identifier", _needed(killed_nodes), 1, 0, "3 s"),
+)

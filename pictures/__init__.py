@@ -1,1 +1,0 @@
-"""Pictures and pages of the documentation, made from the simulated machine: ``python -m pictures``."""
