@@ -14,7 +14,8 @@ ROOT = Path(__file__).parents[1]
 def on_files(files: Files, config: Any) -> Files:
     """README as index.md, with links as seen from docs/; pages outside docs/ are named and not linked."""
     text = (ROOT / "README.md").read_text(encoding="utf-8").replace("](docs/", "](")
-    files.append(File.generated(config, "index.md", content=re.sub(r"\[([^]]+)\]\((config/[^)]+|CHANGELOG\.md|CONTRIBUTING\.md|CITATION\.cff)\)", r"\1", text)))
+    outside = r"\[([^]]+)\]\((config/[^)]+|CHANGELOG\.md|CONTRIBUTING\.md|CITATION\.cff)\)"
+    files.append(File.generated(config, "index.md", content=re.sub(outside, r"\1", text)))
     return files
 
 

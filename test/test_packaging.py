@@ -39,7 +39,7 @@ def text(manifest: ElementTree.Element, tag: str) -> str:
 
 
 def test_package_xml_and_setup_py_say_the_same(setup_arguments: dict[str, Any], manifest: ElementTree.Element) -> None:
-    """Name, version, licence and maintainer are one, also where it is said how to cite; the mail address is valid, or colcon would not see a ROS package."""
+    """Name, version, licence and maintainer are one; the mail address is valid, or colcon sees no ROS package."""
     assert text(manifest, "name") == setup_arguments["name"] == "xy_sysid"
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     assert text(manifest, "version") == setup_arguments["version"] == citation["version"]
