@@ -45,6 +45,7 @@ setup(
         ],
         "page": ["nicegui>=3.13,<4"],
         "figures": ["matplotlib"],
+        "frames": ["pandas"],
         "control": ["control"],
         "docs": ["mkdocs-material", "mkdocstrings[python]"],
         "mat73": ["h5py"],
@@ -56,6 +57,7 @@ setup(
         "bench": ["scikit-rf", "pyFRF"],
         "test": [
             "matplotlib",
+            "pandas",
             "nicegui>=3.13,<4",
             "playwright",
             "pytest",

@@ -20,7 +20,7 @@ def names(text: str) -> list[str]:
 
 # Upstream first, in the order of the data: a file imports from its own package and from what stands before it.
 CORE = names("""
-errors units settings jit
+errors units settings jit tables
 samples excitation
 response linear fitting
 effects axis greybox comparison hypotheses diagnosis
@@ -28,10 +28,10 @@ story live
 """)
 EDGE = names("""
 bags imports files processes
-nodes report page cli
+nodes report page cli front_door
 """)
 ORDER = [*CORE, *EDGE]
-ALONE = {"__init__", "__main__", "errors", "settings", "units", "jit"}  # files that stand beside the packages
+ALONE = {"__init__", "__main__", "errors", "settings", "units", "jit", "tables"}  # files that stand beside the packages
 
 NOT_IN_CORE = names("""
 rclpy std_msgs sensor_msgs diagnostic_msgs rosbags typer rich plotly yaml

@@ -23,6 +23,7 @@ Packages in the order of the data; each imports only from those before it.
     story, live:               what people are shown, and the online logic
     bags, imports, files, processes: reading, writing, other processes
     nodes, report, page, cli:  what people meet
+    front_door:                the public functions as people call them
 
 What everybody knows stands beside them: ``errors``, ``settings``, ``units``, ``jit``. The names of ``__all__`` are for everybody, each made
 when it is first used; all other modules may change.
@@ -113,15 +114,22 @@ def __getattr__(name: str) -> Any:
     if name == "__version__":
         value: Any = _version()
     elif name == "plot":
-        value = importlib.import_module("xy_sysid.report.plots")
+        value = _calls().pictures(importlib.import_module("xy_sysid.report.plots"))
     elif name in _HOME:
         home = importlib.import_module(f"xy_sysid.{_HOME[name]}")
         _show_as_pictures(home)
         value = getattr(home, name)
+        if not isinstance(value, type):
+            value = _calls().for_people(value, f"xy.{name}")
     else:
         raise AttributeError(f"module 'xy_sysid' has no attribute {name!r}; it has {', '.join(__all__)}")
     globals()[name] = value
     return value
+
+
+def _calls() -> Any:
+    """A call as people make it: a path for what is in the file, a run for its response; a wrong type is one line."""
+    return importlib.import_module("xy_sysid.front_door.calls")
 
 
 def _show_as_pictures(home: Any) -> None:

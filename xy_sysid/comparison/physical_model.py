@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from xy_sysid.axis.linear_part import linear_part
 from xy_sysid.axis.model import AxisModel, simulate
 from xy_sysid.greybox.free_run import GreyboxFit
-from xy_sysid.greybox.parameters import Estimate
+from xy_sysid.greybox.parameters import Estimate, parameter_table
 from xy_sysid.linear.transfer_function import TransferFunction
 from xy_sysid.samples.block import FloatArray
+from xy_sysid.tables import Table
 from xy_sysid.units import USUAL, Units, moved
 
 
@@ -54,6 +55,18 @@ class PhysicalModel:
     def label(self) -> str:
         """A few words for a legend."""
         return f"rigid with {' and '.join(self.effects).replace('_', ' ')}" if self.effects else "rigid"
+
+    @property
+    def table(self) -> Table:
+        """Each parameter with its 95 % interval; without intervals of a model from a file."""
+        if self.fit is None:
+            rows = [(name, value, None, None, "") for name, value in self.model.values().items()]
+            return Table(("parameter", "value", "from", "to", "unit"), tuple(rows))
+        return parameter_table(self.parameters)
+
+    def __str__(self) -> str:
+        """What it is made of, the formula of its linear part, and the table of the parameters."""
+        return "\n\n".join((repr(self)[1:-1], f"linear part:\n{self.tf}", str(self.table)))
 
     def velocity(self, sampling_rate: float, voltage: FloatArray, position: FloatArray) -> FloatArray:
         """(n - 1,) simulated mean velocity of each sample, m/s, from the speed with which the position begins."""

@@ -18,9 +18,11 @@ from xy_sysid.diagnosis.refine import refine as search
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.axis_data import prepare_all
 from xy_sysid.greybox.free_run import EPSILON, GreyboxFit
+from xy_sysid.greybox.parameters import parameter_table
 from xy_sysid.hypotheses.criteria import MOST_EFFECTS
 from xy_sysid.hypotheses.enough_data import lacking
 from xy_sysid.samples.recording import Recording, Run, one_run
+from xy_sysid.tables import Table
 from xy_sysid.units import bare, motion, moved
 
 Data = Run | Recording | Sequence[Run | Recording]
@@ -80,6 +82,15 @@ class Refinement:
         return self.steps[place]
 
     @property
+    def table(self) -> Table:
+        """The falling error: one row for each step."""
+        return ladder_table([(step.added, step.fit) for step in self.steps])
+
+    def __str__(self) -> str:
+        """The falling error, and the parameters of the last model."""
+        return f"{self.table}\n\n{self.model.table}"
+
+    @property
     def model(self) -> PhysicalModel:
         """The last one, with every effect."""
         return self.steps[-1].model
@@ -101,6 +112,21 @@ class Diagnosed(Diagnosis):
         """The next best set of effects; None if nothing else was near."""
         rivals = self.ladder.rivals if self.ladder is not None else ()
         return " and ".join(rivals[0].effects) if rivals else None
+
+    @property
+    def table(self) -> Table:
+        """The falling error: one row for each step; empty if the data do not suffice."""
+        return ladder_table([(step.added, step.fit) for step in self.ladder.steps] if self.ladder is not None else [])
+
+    @property
+    def parameters(self) -> Table:
+        """The parameters of the model with all effects that are named, with 95 % intervals."""
+        return parameter_table(self.ladder.final.parameters if self.ladder is not None else ())
+
+    def __str__(self) -> str:
+        """The sentence, the falling error and the parameters."""
+        tables = (str(self.table), str(self.parameters)) if self.ladder is not None else ()
+        return "\n\n".join((f"{self.sentence} Confidence {self.confidence:.2f}.", *tables))
 
     def __repr__(self) -> str:
         return f"<Diagnosis: {self.sentence} Confidence {self.confidence:.2f}.>"
@@ -164,6 +190,13 @@ def refined(data: Data, names: tuple[str, ...], library: Library, effort: Effort
         for step in ladder.steps
     )
     return Refinement(steps, ladder)
+
+
+def ladder_table(steps: Sequence[tuple[str | None, GreyboxFit]]) -> Table:
+    """One row for each step: effect, its errors as people read them, and the noise floor."""
+    factor, unit = motion(steps[0][1].units.speed) if steps else (1.0, "")
+    rows = ((added or "rigid", factor * fit.training_error, factor * fit.held_out_error, factor * fit.noise_floor) for added, fit in steps)
+    return Table(("added", f"training error ({unit})", f"held-out error ({unit})", f"noise floor ({unit})"), tuple(rows))
 
 
 def runs_together(data: Data) -> tuple[Run, ...]:

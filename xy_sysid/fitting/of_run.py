@@ -20,6 +20,7 @@ from xy_sysid.response.frf import FrequencyResponse
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import Origin, Recording, Run, one_run
 from xy_sysid.settings import IdentifierSettings, build, changed
+from xy_sysid.tables import Table
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +64,16 @@ class LinearModel:
     def ok(self) -> bool:
         """Every verdict is good."""
         return all(verdict.ok for verdict in self.verdicts)
+
+    @property
+    def table(self) -> Table:
+        """Each number with its 95 % interval, widened by what the model leaves beyond noise."""
+        rows = ((item.name, item.value, item.low, item.high, item.unit) for item in self.intervals_with_misfit)
+        return Table(("parameter", "value", "from", "to", "unit"), tuple(rows))
+
+    def __str__(self) -> str:
+        """Formula, and the table of the parameters."""
+        return "\n\n".join((repr(self)[1:-1], str(self.tf), *([str(self.table)] if self.intervals else [])))
 
     def velocity(self, sampling_rate: float, voltage: FloatArray, position: FloatArray) -> FloatArray:
         """(n - 1,) simulated mean velocity of each sample, m/s, from rest."""

@@ -16,6 +16,7 @@ from xy_sysid.effects import Parameter
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.least_squares import Scale, Solution
 from xy_sysid.samples.block import FloatArray
+from xy_sysid.tables import Table
 
 Z95 = 1.959964
 BEGINS = 2000.0  # Hz: sub-steps in which a start is looked for
@@ -31,6 +32,11 @@ class Estimate:
     low: float
     high: float
     recordings: tuple[Estimate, ...] = ()
+
+
+def parameter_table(parameters: tuple[Estimate, ...]) -> Table:
+    """Each parameter with its 95 % interval."""
+    return Table(("parameter", "value", "from", "to", "unit"), tuple((item.name, item.value, item.low, item.high, item.unit) for item in parameters))
 
 
 def problem(data: AxisData, model: AxisModel, early: bool, fine: float = FINE) -> tuple[Callable[[FloatArray], FloatArray], FloatArray, Scale]:

@@ -47,6 +47,17 @@ class TransferFunction:
         if self.denominator.size == 0 or not np.any(self.denominator != 0):
             raise BadInput("denominator", "zero", "at least one coefficient that is not 0", "Give its coefficients in falling powers.")
 
+    def __str__(self) -> str:
+        """The formula, in three lines."""
+        variable = "s" if self.sampling_time is None else "z"
+        above, below = (_polynomial(items, variable) for items in (self.numerator, self.denominator))
+        wide = max(len(above), len(below))
+        delay = f" exp(-{self.delay:.4g} s)" if self.delay and self.sampling_time is None else ""
+        if self.delay and self.sampling_time is not None:
+            delay = f" z^-{round(self.delay / self.sampling_time)}"
+        left = f"G({variable}) = "
+        return "\n".join((" " * len(left) + above.center(wide).rstrip(), f"{left}{'-' * wide}{delay}", " " * len(left) + below.center(wide).rstrip()))
+
     def response(self, frequency: FloatArray) -> ComplexArray:
         """(m,) response at frequencies in Hz, of the function itself: no hold, no sampling of a continuous function."""
         omega = 2 * np.pi * np.asarray(frequency, dtype=np.float64)
@@ -129,6 +140,19 @@ class TransferFunction:
 
 def _rational(tf: TransferFunction, variable: ComplexArray) -> ComplexArray:
     return np.asarray(np.polyval(tf.numerator, variable) / np.polyval(tf.denominator, variable), dtype=np.complex128)
+
+
+def _polynomial(coefficients: FloatArray, variable: str) -> str:
+    """Falling powers with four digits, what is zero left out."""
+    text = ""
+    for power, value in zip(range(coefficients.size - 1, -1, -1), coefficients.tolist(), strict=True):
+        if value == 0.0:
+            continue
+        factor = {0: "", 1: variable}.get(power, f"{variable}^{power}")
+        size = f"{abs(value):.4g}"
+        item = factor if factor and size == "1" else f"{size} {factor}".rstrip()
+        text += f" {'-' if value < 0 else '+'} {item}" if text else f"{'-' if value < 0 else ''}{item}"
+    return text or "0"
 
 
 def _roots(coefficients: FloatArray) -> ComplexArray:

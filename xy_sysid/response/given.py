@@ -42,8 +42,11 @@ def given_response(
     Raises BadInput for arrays that do not fit together or are too short.
     """
     origin = origin or Origin()
-    f = np.asarray(frequency, dtype=np.float64).ravel()
-    h = np.asarray(response, dtype=np.complex128).ravel()
+    try:
+        f = np.asarray(frequency, dtype=np.float64).ravel()
+        h = np.asarray(response, dtype=np.complex128).ravel()
+    except (TypeError, ValueError):
+        raise BadInput("frequency response", "not of numbers", "frequencies in Hz, and complex values", "Give two arrays of numbers.") from None
     if f.shape != h.shape:
         raise BadInput("frequency response", f"{f.size} frequencies and {h.size} values", "one value for each frequency", "Give both alike.")
     given = {"sigma": known.sigma, "coherence": known.coherence}
