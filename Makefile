@@ -54,7 +54,7 @@ laws: $(INSTALLED) # compiled here once if they changed, and not by each of the 
 	@$(LAWS)
 
 docs: $(VENV)/.docs ## the documentation site in build/site (index.html); a broken link is an error
-	@$(BIN)/python -m xy_sysid.files.architecture_doc --write
+	@$(BIN)/python -m campaigns.documents.architecture --write
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict $(ARGS)
 	@echo "build/site/index.html"
 

@@ -1,1 +1,1 @@
-"""Long measurements, commands of their own: against other software (bench), on hidden machines (blind), under attack (faults), and the pictures."""
+"""Long measurements, commands of their own: bench (other software), blind (hidden machines), faults (attacks); pictures and documents."""

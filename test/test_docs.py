@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 from helpers import ROOT
 
+from campaigns.documents.architecture import picture, reduced
+from campaigns.documents.settings import document
 from xy_sysid.cli.app import app
-from xy_sysid.files.architecture_doc import picture, reduced
-from xy_sysid.files.settings_doc import document
 from xy_sysid.live.messages import COMPARISON_COLUMNS, FRF_COLUMNS, LADDER_COLUMNS
 from xy_sysid.response.window_check import REASONS as WINDOW_REASONS
 from xy_sysid.samples.pairing import REASONS as STREAM_REASONS
@@ -20,12 +20,12 @@ PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").g
 
 
 def test_the_settings_page_is_made_from_the_settings() -> None:
-    """python -m xy_sysid.files.settings_doc > docs/settings.md"""
+    """python -m campaigns.documents.settings > docs/settings.md"""
     assert (ROOT / "docs" / "settings.md").read_text(encoding="utf-8") == document()
 
 
 def test_the_picture_of_the_packages_is_made_from_the_imports() -> None:
-    """python -m xy_sysid.files.architecture_doc --write"""
+    """python -m campaigns.documents.architecture --write"""
     assert picture(ROOT / "xy_sysid") in (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
 
 

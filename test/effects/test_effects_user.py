@@ -13,6 +13,7 @@ from helpers import ROOT
 from scipy.signal import butter, sosfilt
 from typer.testing import CliRunner
 
+from campaigns.documents.effects import document
 from xy_sysid.axis.model import STANDARD, simulate
 from xy_sysid.cli.effects import effects as command
 from xy_sysid.effects import EFFECTS
@@ -20,7 +21,6 @@ from xy_sysid.effects._binding import law_texts
 from xy_sysid.effects._contract import WORDS
 from xy_sysid.errors import BadInput
 from xy_sysid.files.effects import from_file, library
-from xy_sysid.files.effects_doc import document
 from xy_sysid.greybox.free_run import fit_base, fit_with, look, prepare
 
 DOCS = ROOT / "docs"
@@ -45,7 +45,7 @@ def app() -> typer.Typer:
 
 
 def test_the_page_of_effects_is_made_from_the_folder() -> None:
-    """python -m xy_sysid.files.effects_doc > docs/effects.md"""
+    """python -m campaigns.documents.effects > docs/effects.md"""
     assert (DOCS / "effects.md").read_text(encoding="utf-8") == document()
 
 

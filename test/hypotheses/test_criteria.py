@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from helpers import ROOT
 
-from xy_sysid.files.search_doc import document
+from campaigns.documents.search import document
 from xy_sysid.hypotheses import criteria
 
 CRITERIA = ROOT / "xy_sysid" / "hypotheses" / "criteria.py"
@@ -70,5 +70,5 @@ def test_no_other_module_of_the_search_holds_a_number_of_its_own(path: Path) -> 
 
 
 def test_the_page_of_the_search_has_the_table() -> None:
-    """python -m xy_sysid.files.search_doc --write"""
+    """python -m campaigns.documents.search --write"""
     assert document() in (ROOT / "docs" / "search.md").read_text(encoding="utf-8")

@@ -53,10 +53,8 @@ def _list(effect: Effect) -> None:
 
 
 def _show(effect: Effect) -> None:
-    from xy_sysid.files.effects_doc import bounds
-
     say(f"{effect.name}: {effect.meaning}\n\n    {effect.law}\n")
-    rows = [(item.name, item.unit or "1", bounds(item), f"{item.typical:g}", item.meaning) for item in effect.parameters]
+    rows = [(item.name, item.unit or "1", item.bounds, f"{item.typical:g}", item.meaning) for item in effect.parameters]
     table("parameters", ("name", "unit", "allowed", "usual", "meaning"), rows)
     told = {"valid for": effect.validity, "shows as": effect.shows, "taken for": ", ".join(effect.look_alikes)}
     told |= {"told apart by": effect.experiment, "source": effect.source}

@@ -223,6 +223,11 @@ class Parameter:
         factor = similar.factor(self.unit)
         return replace(self, low=self.low * factor, high=self.high * factor, typical=self.typical * factor)
 
+    @property
+    def bounds(self) -> str:
+        """What a fit may reach on the usual machine, in words."""
+        return f"{self.low:g} to {self.high:g}"
+
     def allows(self, value: float) -> bool:
         """Whether some machine may have it: a number within its bounds; of what has a unit, any number of the right sign."""
         return self.low <= value <= self.high if not self.unit else math.isfinite(value) and (value > 0.0 or not self.positive)

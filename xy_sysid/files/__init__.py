@@ -1,4 +1,4 @@
-"""Files that are not recordings: models, settings, effects, layouts, pages of the docs.
+"""Files that are not recordings: models, settings, effects, layouts.
 
 package_files:  where the files are that come with the package
 linear_models:  a transfer function for other tools
@@ -7,6 +7,4 @@ state:          the identifier's memory on disk
 ros_parameters: parameter files of ROS, checked and written
 effects:        effects from outside
 viewer_layouts: layouts for PlotJuggler and Foxglove
-settings_doc:   docs/settings.md
-effects_doc:    docs/effects.md
 """

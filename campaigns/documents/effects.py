@@ -1,14 +1,14 @@
-"""docs/effects.md, made from the folder of effects: python -m xy_sysid.files.effects_doc > docs/effects.md"""
+"""docs/effects.md, made from the folder of effects: python -m campaigns.documents.effects > docs/effects.md"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
-from xy_sysid.effects import EFFECTS, Effect, Parameter
+from xy_sysid.effects import EFFECTS, Effect
 
 HEAD = """# Effects
 
-Every physical effect that a diagnosis can name, made from `xy_sysid/effects/` by `python -m xy_sysid.files.effects_doc > docs/effects.md`.
+Every physical effect that a diagnosis can name, made from `xy_sysid/effects/` by `python -m campaigns.documents.effects > docs/effects.md`.
 `xy-sysid effects` prints the same. Bounds and usual sizes are those of one usual machine (25 mm/s and 1 V rms at 2 kHz), and are carried
 over to the motion at hand by each unit. Forces are in volts of the drive (the voltage that overcomes them): times the drive's
 force per volt they are newtons. F is a force against the drive, u_eff the voltage that acts, v velocity, x position; the
@@ -28,18 +28,13 @@ def document(effects: Iterable[Effect] = EFFECTS.values()) -> str:
     return HEAD + "\n".join(rows) + "\n" + "".join(_section(effect) for effect in shown)
 
 
-def bounds(parameter: Parameter) -> str:
-    """What a fit may reach, as text."""
-    return f"{parameter.low:g} to {parameter.high:g}"
-
-
 def _cell(text: str) -> str:
     return text.replace("|", "\\|")
 
 
 def _section(e: Effect) -> str:
     rows = [
-        f"| `{item.name}` | {item.unit} | {bounds(item)} | {item.typical:g} | {_cell(item.meaning)}{OWN if item.per_recording else ''} |"
+        f"| `{item.name}` | {item.unit} | {item.bounds} | {item.typical:g} | {_cell(item.meaning)}{OWN if item.per_recording else ''} |"
         for item in e.parameters
     ]
     table = "\n".join(["| parameter | unit | allowed | usual | meaning |", "|---|---|---|---|---|", *rows])

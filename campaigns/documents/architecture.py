@@ -1,7 +1,7 @@
 """The picture of the packages in docs/architecture.md, made from what the files import.
 
-python -m xy_sysid.files.architecture_doc           # the picture
-python -m xy_sysid.files.architecture_doc --write   # put it into the page
+python -m campaigns.documents.architecture           # the picture
+python -m campaigns.documents.architecture --write   # put it into the page
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ from pathlib import Path
 
 from xy_sysid.errors import BadInput
 
-BEGIN, END = "<!-- the picture: python -m xy_sysid.files.architecture_doc --write -->", "<!-- the end of the picture -->"
-COMMON = ("errors", "settings", "units", "jit")  # what everybody imports, so that it tells nothing
+BEGIN, END = "<!-- the picture: python -m campaigns.documents.architecture --write -->", "<!-- the end of the picture -->"
+COMMON = ("errors", "settings", "units", "jit", "tables")  # what everybody imports, so that it tells nothing
 FLOORS = {
     "what arrives": ("samples", "excitation"),
     "in frequency": ("response", "linear", "fitting"),
     "in time": ("effects", "axis", "greybox", "comparison", "hypotheses", "diagnosis"),
     "told": ("story", "live"),
     "the edge": ("bags", "imports", "files", "processes"),
-    "surfaces": ("nodes", "report", "page", "cli"),
+    "surfaces": ("nodes", "report", "page", "cli", "front_door"),
 }
 
 
@@ -69,7 +69,7 @@ def picture(package: Path) -> str:
     there = sorted(path.parent.name for path in package.glob("*/__init__.py"))
     if sorted(known) != there:
         odd = sorted(set(known) ^ set(there))
-        raise BadInput("packages", ", ".join(odd), "those of FLOORS", "Say in xy_sysid/files/architecture_doc.py on which floor they are.")
+        raise BadInput("packages", ", ".join(odd), "those of FLOORS", "Say in campaigns/documents/architecture.py on which floor they are.")
     lines = ["flowchart TB"]
     for number, (floor, names) in enumerate(FLOORS.items()):
         lines += [f'  subgraph floor{number}["{floor}"]', "    direction LR", *(f"    {name}" for name in names), "  end"]

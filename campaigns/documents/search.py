@@ -1,4 +1,4 @@
-"""The table of docs/search.md, made from the search's criteria: python -m xy_sysid.files.search_doc --write"""
+"""The table of docs/search.md, made from the search's criteria: python -m campaigns.documents.search --write"""
 
 from __future__ import annotations
 

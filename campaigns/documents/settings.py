@@ -1,4 +1,4 @@
-"""docs/settings.md, made from the settings: python -m xy_sysid.files.settings_doc > docs/settings.md"""
+"""docs/settings.md, made from the settings: python -m campaigns.documents.settings > docs/settings.md"""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from xy_sysid.settings import Knob, knobs
 
 HEAD = """# Settings
 
-Every knob of every node, made from `xy_sysid/settings.py` by `python -m xy_sysid.files.settings_doc > docs/settings.md`. They are ROS
+Every knob of every node, made from `xy_sysid/settings.py` by `python -m campaigns.documents.settings > docs/settings.md`. They are ROS
 parameters of the node; the identifier's are also `--set NAME=VALUE` of `xy-sysid frf`, `fit`, `replay`, `validate`, `report` and `study`, and
 the excitation's axis settings are `--excite NAME=VALUE` of `xy-sysid simulate`. Units are SI. `x` stands for any axis.
 """
