@@ -56,9 +56,9 @@ def main() -> int:
     for name in asked or TABLES:
         if name in SCRIPTS:
             sys.argv = [name]
-            importlib.import_module(f"bench.{name}").main(short)
+            importlib.import_module(f"campaigns.bench.{name}").main(short)
             continue
-        table: Table = importlib.import_module(f"bench.{name}").run(lambda line: sys.stderr.write(line + "\n"), short)
+        table: Table = importlib.import_module(f"campaigns.bench.{name}").run(lambda line: sys.stderr.write(line + "\n"), short)
         parts.append(text(name, table))
         sys.stdout.write(parts[-1] + "\n")
         sys.stdout.flush()

@@ -47,7 +47,7 @@ def main() -> int:
     facts = f"{platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}."
     holes = 0
     for name in asked.groups or GROUPS:
-        module = importlib.import_module(f"faults.{name}")
+        module = importlib.import_module(f"campaigns.faults.{name}")
         rows = []
         for number, attack in enumerate(module.ATTACKS):
             if asked.only not in attack.name or (asked.short and not attack.short):

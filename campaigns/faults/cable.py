@@ -66,7 +66,7 @@ def hosts(folder: Path) -> Iterator[Hosts]:
     try:
         for name in names:
             _run("ip", "netns", "add", name)
-        words = [sys.executable, "-m", "faults.cable", orders, *names]
+        words = [sys.executable, "-m", "campaigns.faults.cable", orders, *names]
         cable = subprocess.Popen(words, cwd=Path(__file__).parents[2], stdout=subprocess.PIPE, text=True)
         assert cable.stdout is not None and cable.stdout.readline() == "ready\n"
         for name, address in zip(names, (MACHINE, DESK), strict=True):

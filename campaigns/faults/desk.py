@@ -222,7 +222,9 @@ def clocks(desk: Desk, seconds: float) -> dict[str, Any]:
     desk.start("identifier")
     place = ["ip", "netns", "exec", desk.hosts.machine]
     with (desk.folder / "source.log").open("ab") as log:
-        desk.processes["source"] = subprocess.Popen([*place, sys.executable, "-m", "faults.source"], stdin=subprocess.DEVNULL, stdout=log, stderr=log)
+        desk.processes["source"] = subprocess.Popen(
+            [*place, sys.executable, "-m", "campaigns.faults.source"], stdin=subprocess.DEVNULL, stdout=log, stderr=log
+        )
     first = desk.until(lambda: desk.value("axis x", "windows") > 0, READY)
     ended = desk.until(lambda: desk.processes["source"].poll() is not None, READY)
     desk.monitor.spin(2.0)

@@ -47,7 +47,7 @@ def measure(folder: Path, scenario: str, *arguments: Any, profile: bool = True, 
             "remote": remote,
             "hosts": {"machine": made.machine, "desk": made.desk, "orders": made.orders},
         }
-        words = ["ip", "netns", "exec", made.desk, sys.executable, "-m", "faults.desk", json.dumps(asked)]
+        words = ["ip", "netns", "exec", made.desk, sys.executable, "-m", "campaigns.faults.desk", json.dumps(asked)]
         surroundings = environment(ROS_DOMAIN_ID=str(os.getpid() % 90 + 10), ROS_AUTOMATIC_DISCOVERY_RANGE="SUBNET")
         surroundings.pop("FASTRTPS_DEFAULT_PROFILES_FILE", None)
         if profile:
