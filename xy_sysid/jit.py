@@ -30,6 +30,19 @@ def spent_compiling() -> float:
     return float(_COMPILING.duration) if _COMPILING.done else 0.0
 
 
+def tell_compiling(tell: Callable[[], None]) -> None:
+    """Call it when this process first makes machine code, which the disk then keeps for all others; never if the disk has all that is needed."""
+
+    waiting = [tell]
+
+    def begins(listener: object, happening: object) -> None:
+        if waiting:
+            waiting.pop()()
+
+    listener = type("Told", (event.Listener,), {"on_start": begins, "on_end": lambda listener, happening: None})
+    cast("Callable[..., None]", event.register)("numba:compile", listener())
+
+
 REORDERED = frozenset({"contract", "reassoc", "arcp", "nsz"})
 
 

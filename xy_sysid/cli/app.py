@@ -27,7 +27,6 @@ from xy_sysid.cli.validate import validate
 app = typer.Typer(
     name="xy-sysid",
     help="Identify the axes of a machine: frequency response, transfer function with delay, and how far both can be trusted.",
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},

@@ -92,7 +92,10 @@ def reads(command: Command) -> Command:
 def read_each(paths: Sequence[Path], reading: Reading, quiet: bool) -> tuple[Recording, ...]:
     """The recordings; their notes go to stderr unless ``quiet``."""
     from xy_sysid.imports.several import read_all
+    from xy_sysid.jit import tell_compiling
 
+    if aside.is_terminal:
+        tell_compiling(lambda: aside.print("compiling the effect laws, once on this machine: half a minute or so"))
     with progress() as bar:
         task = bar.add_task(f"reading {', '.join(path.name for path in paths)}", total=1.0)
         found = read_all(paths, reading, lambda part: bar.update(task, completed=part))
