@@ -93,7 +93,7 @@ def diagnosed(story: Story, run: Run, library: Library = STANDARD, clock: Callab
 
 
 def added(story: Story, run: Run, name: str, library: Library = STANDARD) -> Story:
-    """With one more effect, everything refitted together; a relative of the same family is replaced.
+    """With one more effect, everything refitted together, as the diagnosis did if it was its next step; a relative of the same family is replaced.
 
     Raises BadInput for a name that is unknown, in every model, or in this one.
     """
@@ -101,6 +101,9 @@ def added(story: Story, run: Run, name: str, library: Library = STANDARD) -> Sto
     if name in story.effects:
         raise BadInput("effect", repr(name), "one that is not in the model yet", f"It has {', '.join(story.effects)}.")
     data = prepare(run.sampling_rate, run.voltage, run.position, story.tolerance, run.units)
+    planned = _planned(story)
+    if planned is not None and planned.added == name:
+        return _shown(story, data, planned, library)
     now = _fit_of(story, data, library)
     relative = next((own for own in story.effects if library[own].family and library[own].family == library[name].family), None)
     before = now if relative is None else fit(data, now.model.without(relative))
