@@ -6,15 +6,20 @@ and delay enter by correcting the data with the last model: what it predicts thr
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from xy_sysid.fitting.basis import basis
+from xy_sysid.fitting.plan import plan_for
 from xy_sysid.fitting.problem import Point, Problem, cost, rational, response
 from xy_sysid.fitting.structure import FitOptions
 from xy_sysid.response.frf import ComplexArray
 from xy_sysid.samples.block import FloatArray
 
 SCAN_STEPS = 4  # re-weightings at each delay of the scan: enough to rank delays
+MOST_DELAYS = 400  # of one scan; of more, lower lines tell first which
+FOLLOWED = 6  # best delays of the lower lines around which the fine grid is looked through
 
 
 def linear_step(task: Problem, delay: float, last: Point | None, correct: bool) -> Point:
@@ -62,16 +67,32 @@ def reweighted(task: Problem, delay: float, steps: int, start: Point | None = No
 
 
 def scan(task: Problem, steps: int, options: FitOptions) -> list[tuple[float, float, Point]]:
-    """(cost, delay, point) at the best delays, best first: local minima of the cost over a grid of delays."""
-    structure = task.structure
+    """(cost, delay, point) at the best delays, best first: local minima of the cost over a grid of delays.
+
+    Where the largest delay is very many periods of the highest frequency, the lines below a lower one tell first where the fine grid is needed.
+    """
+    structure, top = task.structure, float(task.frf.frequency[-1])
     if structure.delay != "free":
         point, value, _ = reweighted(task, structure.delay, steps)
         return [(value, structure.delay, point)]
     if structure.domain == "z":
-        delays = np.arange(int(structure.delay_max * task.frf.sampling_rate + 1e-9) + 1) / task.frf.sampling_rate
-    else:
-        step = options.delay_step / float(task.frf.frequency[-1])
-        delays = np.linspace(0.0, structure.delay_max, max(int(np.ceil(structure.delay_max / step)), 1) + 1)
+        return _minima(task, np.arange(int(structure.delay_max * task.frf.sampling_rate + 1e-9) + 1) / task.frf.sampling_rate, steps)
+    step = options.delay_step / top
+    count = max(int(np.ceil(structure.delay_max / step)), 1) + 1
+    delays = np.linspace(0.0, structure.delay_max, count)
+    part = task.frf.frequency <= top * MOST_DELAYS / count
+    if count > MOST_DELAYS and 2 * int(part.sum()) > structure.parameters:
+        coarse = scan(
+            replace(task, frf=task.frf.select(part), plan=plan_for(task.frf.select(part), structure), weight=task.weight[part]), steps, options
+        )
+        width = options.delay_step / float(task.frf.frequency[part][-1])
+        near = [np.abs(delays - delay) <= width for _, delay, _ in coarse[:FOLLOWED]]
+        delays = delays[np.any(near, axis=0)]
+    return _minima(task, delays, steps)
+
+
+def _minima(task: Problem, delays: FloatArray, steps: int) -> list[tuple[float, float, Point]]:
+    """(cost, delay, point) at the local minima of the cost over some delays, best first."""
     found: list[tuple[float, float, Point]] = []
     for delay in delays:
         point = linear_step(task, float(delay), None, False)
