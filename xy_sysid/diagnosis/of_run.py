@@ -21,7 +21,7 @@ from xy_sysid.greybox.free_run import EPSILON, GreyboxFit
 from xy_sysid.hypotheses.criteria import MOST_EFFECTS
 from xy_sysid.hypotheses.enough_data import lacking
 from xy_sysid.samples.recording import Recording, Run, one_run
-from xy_sysid.units import bare, motion, moved
+from xy_sysid.units import bare, motion, moved, over
 
 Data = Run | Recording | Sequence[Run | Recording]
 
@@ -59,7 +59,7 @@ class RefinedStep:
         return self.fit.noise_floor
 
     def __repr__(self) -> str:
-        unit = self.model.units.speed
+        unit = self.model.units.judged
         return f"<RefinedStep {self.added or 'rigid'}: held-out error {moved(self.held_out_error, unit)}, floor {bare(self.noise_floor, unit)}>"
 
 
@@ -85,7 +85,7 @@ class Refinement:
         return self.steps[-1].model
 
     def __repr__(self) -> str:
-        unit = self.model.units.speed
+        unit = self.model.units.judged
         rungs = (f"{step.added or 'rigid'} {bare(step.held_out_error, unit)}" for step in self.steps)
         return f"<Refinement: {' -> '.join(rungs)} {motion(unit)[1]}, floor {bare(self.steps[-1].noise_floor, unit)}>"
 
@@ -123,7 +123,7 @@ def diagnose(
     """
     runs = runs_together(data)
     rate, signals, units = runs[0].sampling_rate, [(run.voltage, run.position) for run in runs], runs[0].units
-    missing = lacking(rate, signals)
+    missing = lacking(rate, signals, units)
     with threadpool_limits(1, "blas"):  # as in commands and nodes
         if missing:
             found = one.not_enough(missing, units)
@@ -174,7 +174,7 @@ def runs_together(data: Data) -> tuple[Run, ...]:
     for what, values in (
         ("sampling rate", [f"{run.sampling_rate:g} Hz" for run in runs]),
         ("axis", [run.axis for run in runs]),
-        ("units", ["/".join(reversed(run.units)) for run in runs]),
+        ("units", [over(run.units.measured, run.units.input) for run in runs]),
     ):
         if len(set(values)) > 1:
             raise BadInput(f"{what} of the runs", " and ".join(dict.fromkeys(values)), "one and the same", "Give runs of one axis.")

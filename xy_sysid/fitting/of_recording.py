@@ -9,7 +9,7 @@ import numpy as np
 
 from xy_sysid.errors import BadInput
 from xy_sysid.fitting import Fit, identify
-from xy_sysid.fitting.choose_orders import Choice, choose
+from xy_sysid.fitting.choose_orders import Choice, choose, choose_among
 from xy_sysid.fitting.structure import structure_from
 from xy_sysid.response.batch_spectra import batch_spectra
 from xy_sysid.response.closed_loop import joint_input_output, loop_spectra
@@ -21,8 +21,9 @@ from xy_sysid.response.window_check import stretches
 from xy_sysid.response.windows import WindowShape
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.rate import error_of_rate
-from xy_sysid.samples.recording import Recording
+from xy_sysid.samples.recording import Recording, as_sensed
 from xy_sysid.settings import IdentifierSettings
+from xy_sysid.units import derivative_of
 
 HARDLY = 4.0  # standard deviations of the number of lines that chance makes coherent (neighbours are alike, hence the 2)
 HALVES = (
@@ -56,7 +57,7 @@ class AxisEstimate:
 
 
 def estimate(recording: Recording, axis: str, settings: IdentifierSettings, period: int | None = 0) -> AxisEstimate:
-    """The response of one axis, by H1 or, with ``settings.response``, by the joint input-output method.
+    """The response of one axis in the quantity that its sensor reads, by H1 or, with ``settings.response``, by the joint input-output method.
 
     period: samples of a period (the window becomes one period, without a taper), 0 to look for one, None for none
     Windows in which the encoder stands still or leaps are left out, as online, and a note says so.
@@ -65,8 +66,11 @@ def estimate(recording: Recording, axis: str, settings: IdentifierSettings, peri
     u, y = recording.axis(axis)
     r = _reference(recording, axis) if settings.response == "joint_input_output" else None
     repeats = u if r is None else r
-    _moving(axis, u, y, recording.units)
+    _moving(axis, u, y, (recording.units.input, recording.units.measured))
     runs = recording.runs()
+    integrated = recording.measured != "position"
+    if integrated:
+        settings = replace_settings(settings, differenced=False)  # what was measured itself has no drift whose ends would leak
     longest = recording.run(axis).rows
     notes: list[str] = []
     half = None
@@ -74,7 +78,7 @@ def estimate(recording: Recording, axis: str, settings: IdentifierSettings, peri
         period = find_period(repeats[longest])
         if period and r is None and _samples(longest) < MANY * period and _distorted(recording, axis, longest):
             period = None
-        alone = period is None and r is None and settings.differenced and not _closed_loop(recording, axis)
+        alone = period is None and r is None and (settings.differenced or integrated) and not _closed_loop(recording, axis)
         half = find_half_period(u[longest]) if alone else None
     elif period:
         notes += period_note(repeats[longest], period)
@@ -90,7 +94,8 @@ def estimate(recording: Recording, axis: str, settings: IdentifierSettings, peri
     grid = 0 if period or not _fits(recording, runs, shape, settings.differenced) else 1
     pieces = [(grid * int(recording.seq[run][0]), u[run], y[run]) for run in runs]
     if half:
-        pieces = half_periods(u[longest], y[longest], half)
+        y = _sensed(recording, y, half, -1.0)
+        pieces = half_periods(u[longest], y[longest], half, settings.differenced)
     elif period and r is None and settings.differenced:
         pieces = [(seq, *one_more(inputs, outputs, period)) for seq, inputs, outputs in pieces]
     frozen = max(round(settings.frozen * recording.sampling_rate), 2)
@@ -101,9 +106,12 @@ def estimate(recording: Recording, axis: str, settings: IdentifierSettings, peri
         periodic=bool(period),
         band=(settings.band_low, settings.band_high),
         min_coherence=settings.min_coherence,
-        units=recording.units,
+        units=(recording.units.input, recording.units.measured),
         rate_error=error_of_rate(recording.time, recording.seq),
     )
+    if integrated and not half:
+        y, r = _sensed(recording, y, period or 0), None if r is None else _sensed(recording, r, period or 0)
+        pieces = [(seq, inputs, y[run]) for (seq, inputs, _), run in zip(pieces, runs, strict=True)]
     cut = [(pieces[k][0] + start, pieces[k][1][start:stop], pieces[k][2][start:stop]) for k, start, stop in kept]
     if r is None:
         spectra = batch_spectra(cut, shape, settings.differenced)
@@ -119,6 +127,18 @@ def estimate(recording: Recording, axis: str, settings: IdentifierSettings, peri
     friction = friction_note(friction_hint(u[longest], y[longest], recording.sampling_rate))
     notes += [*(_closed_loop(recording, axis) if r is None else []), *([friction] if friction else [])]
     return AxisEstimate(axis=axis, frf=frf, period=period or None, windows=int(spectra.weight), notes=tuple(notes))
+
+
+def _sensed(recording: Recording, y: FloatArray, period: int, sign: float = 1.0) -> FloatArray:
+    """(n,) as the sensor reads it. The last of each run, which its integral does not hold, are as a period before, or as the one before them."""
+    found = np.zeros_like(y)
+    for run in recording.runs():
+        own = as_sensed(y[run], recording.sampling_rate, recording.measured)
+        ends = y[run].size - own.size
+        if 0 < period <= own.size:
+            own = np.append(own, sign * own[own.size - period : own.size - period + ends])
+        found[run] = own if own.size == y[run].size else np.append(own, np.full(ends, own[-1] if own.size else 0.0))
+    return found
 
 
 def _distorted(recording: Recording, axis: str, rows: slice) -> bool:
@@ -258,9 +278,15 @@ def with_orders(frf: FrequencyResponse, settings: IdentifierSettings) -> tuple[I
     """The settings with the orders that the response tells, and why; unchanged, and None, where somebody asked for orders."""
     if not settings.orders_from_data:
         return settings, None
-    choice = choose(frf, structure_from(settings))
+    family = structure_from(settings)
+    open_question = derivative_of(frf.output_unit) == 2 and settings.integrators == USUAL.integrators
+    choice = choose_among(frf, [replace(family, integrators=count) for count in (2, 1, 0)]) if open_question else choose(frf, family)
     structure = choice.fit.structure
-    orders = {"numerator_order": structure.numerator_order, "denominator_order": structure.denominator_order}
+    orders = {
+        "numerator_order": structure.numerator_order,
+        "denominator_order": structure.denominator_order,
+        "integrators": structure.integrators,
+    }
     return settings.model_copy(update=orders), choice
 
 

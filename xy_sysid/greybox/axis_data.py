@@ -94,6 +94,11 @@ class AxisData:
         return self.layout.rms(self.floor.noise)
 
     @property
+    def encoder(self) -> float:
+        """rms of the sensor's noise as that of a position, from one sample to the next, m."""
+        return self.floor.encoder / self.sampling_rate ** {"position": 0, "velocity": 1, "acceleration": 2}[self.units.sensed]
+
+    @property
     def runs(self) -> tuple[slice, ...]:
         """The samples of each recording."""
         return tuple(slice(a, b) for a, b in zip(self.starts, (*self.starts[1:], self.voltage.size), strict=True))
@@ -195,11 +200,11 @@ def prepare_all(
     starts = tuple(int(start) for start in np.cumsum([0, *sizes[:-1]]))
     velocities = [sample_velocity(sampling_rate, position) for _, position in recordings]
     velocity = np.concatenate(velocities)
-    layout = bands(sampling_rate, int(max(sizes) / WINDOWS))
+    layout = bands(sampling_rate, int(max(sizes) / WINDOWS), sensed=units.sensed)
     edges = np.cumsum([0, *(item.size for item in velocities)])
     spans = [(int(a), int(b)) for a, b in pairwise(edges)]
     whole = Windows(layout, np.concatenate([_begins(layout.length, *span) for span in spans]))
-    encoder = max(encoder_noise(sampling_rate, position) for _, position in recordings)
+    encoder = max(encoder_noise(sampling_rate, position, units.sensed, voltage) for voltage, position in recordings)
     fitted, held = _split(layout, spans, velocity)
     least = floor(whole, velocity, encoder, epsilon)
     steps = [slice(*span) for span in spans]

@@ -12,9 +12,10 @@ from xy_sysid.errors import BadInput
 from xy_sysid.greybox.axis_data import AxisData, prepare_all
 from xy_sysid.hypotheses.criteria import CHANCE, FEWEST, STILL
 from xy_sysid.samples.block import FloatArray
+from xy_sysid.units import USUAL, Units
 
 
-def lacking(sampling_rate: float, recordings: Sequence[tuple[FloatArray, FloatArray]]) -> str:
+def lacking(sampling_rate: float, recordings: Sequence[tuple[FloatArray, FloatArray]], units: Units = USUAL) -> str:
     """What is missing in the data, in words; empty if they will do."""
     voltage, position = max(recordings, key=lambda pair: pair[0].size)
     if float(voltage.std()) == 0.0:
@@ -22,7 +23,7 @@ def lacking(sampling_rate: float, recordings: Sequence[tuple[FloatArray, FloatAr
     if float(position.std()) == 0.0:
         return "the output does not move; excite more, or check the encoder."
     try:
-        data = prepare_all(sampling_rate, recordings)
+        data = prepare_all(sampling_rate, recordings, units=units)
     except BadInput as problem:
         return str(problem)
     if data.held is data.fitted:
