@@ -115,7 +115,7 @@ def diagnose(
 ) -> Diagnosed:
     """Which physical effects the rigid model misses, with evidence and runner-up; or that nothing is missing, or that none is known.
 
-    data:   a run or several of one axis, V and m; library: with effects of your own (``files.effects.library``)
+    data:   a run or several of one axis, or a recording of one axis with all its stretches, V and m; library: with effects of your own (``files.effects.library``)
     budget: s after which the best so far is said, if ``clock`` (for example ``time.process_time``) tells the time; without one the search
             ends after a fixed amount of work, and the same data give the same answer however busy the machine is
     tolerance: part of the motion that a model may leave
@@ -166,9 +166,15 @@ def refined(data: Data, names: tuple[str, ...], library: Library, effort: Effort
     return Refinement(steps, ladder)
 
 
+def _stretches(data: Run | Recording) -> tuple[Run, ...]:
+    if isinstance(data, Recording) and len(data.axes) == 1 and len(data):
+        return data.stretches(data.axes[0])
+    return (one_run(data),)
+
+
 def runs_together(data: Data) -> tuple[Run, ...]:
-    """One or several runs of the same axis."""
-    runs = tuple(one_run(item) for item in (data if isinstance(data, Sequence) else (data,)))
+    """One or several runs of the same axis; of a recording all stretches that tell something."""
+    runs = tuple(run for item in (data if isinstance(data, Sequence) else (data,)) for run in _stretches(item))
     if not runs:
         raise BadInput("data", "empty", "a run, or several of one axis", "Give at least one.")
     for what, values in (
