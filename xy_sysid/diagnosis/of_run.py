@@ -115,7 +115,8 @@ def diagnose(
 ) -> Diagnosed:
     """Which physical effects the rigid model misses, with evidence and runner-up; or that nothing is missing, or that none is known.
 
-    data:   a run or several of one axis, or a recording of one axis with all its stretches, V and m; library: with effects of your own (``files.effects.library``)
+    data:   a run or several of one axis, or a recording of one axis with all its stretches, V and m
+    library: with effects of your own (``files.effects.library``)
     budget: s after which the best so far is said, if ``clock`` (for example ``time.process_time``) tells the time; without one the search
             ends after a fixed amount of work, and the same data give the same answer however busy the machine is
     tolerance: part of the motion that a model may leave
