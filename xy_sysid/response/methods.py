@@ -17,7 +17,7 @@ from xy_sysid.response.spectra import RunningSpectra, State, Transformer
 from xy_sysid.response.windows import Window, WindowShape
 from xy_sysid.samples.block import FloatArray
 
-Piece = tuple[int, FloatArray, FloatArray, FloatArray]
+Stretch = tuple[int, FloatArray, FloatArray, FloatArray]
 """Counter of the first sample, reference (n,) or (0,), input (n,), output (n,) of a gap-free stretch."""
 
 
@@ -51,7 +51,7 @@ class ResponseMethod:
     tapered: bool
     transform: Callable[[WindowShape, bool], Callable[[Window], list[Any]]]
     running: Callable[[WindowShape, float, int], Running]
-    whole: Callable[[list[Piece], WindowShape, bool], Any]
+    whole: Callable[[list[Stretch], WindowShape, bool], Any]
     estimate: Callable[[Any, WindowShape, float, H1Options], FrequencyResponse]
     windows: Callable[[Any], float]
     note: str = ""
@@ -61,8 +61,8 @@ class ResponseMethod:
         return WindowShape.of(window, length, overlap) if self.tapered else WindowShape.of("boxcar", length, 0.0)
 
 
-def _whole_local(rational: bool) -> Callable[[list[Piece], WindowShape, bool], Any]:
-    def summed(pieces: list[Piece], shape: WindowShape, differenced: bool) -> Any:
+def _whole_local(rational: bool) -> Callable[[list[Stretch], WindowShape, bool], Any]:
+    def summed(pieces: list[Stretch], shape: WindowShape, differenced: bool) -> Any:
         total = None
         for seq, _, u, y in pieces:
             output = np.diff(y) if differenced else y
