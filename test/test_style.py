@@ -22,7 +22,7 @@ def names(text: str) -> list[str]:
 CORE = names("""
 errors units settings jit tables
 samples excitation
-response linear fitting
+response linear fitting time_models
 effects axis greybox comparison hypotheses diagnosis
 story live
 """)

@@ -154,8 +154,8 @@ class IdentifierSettings(Settings):
     window: Literal["hann", "hamming", "blackman", "blackmanharris", "flattop", "boxcar"] = knob("hann", "window of the spectra")
     length: int = knob(4096, "samples in a window", "", ge=16, le=2**22)
     overlap: float = knob(0.5, "part of a window shared with the next", "", ge=0.0, le=0.95)
-    response: Literal["h1", "joint_input_output"] = knob(
-        "h1", "output over input (h1), or in closed loop, with the reference as instrument: what it does to output over what it does to input"
+    response: Literal["h1", "joint_input_output", "local_polynomial", "local_rational"] = knob(
+        "h1", "output over input (h1); in closed loop by the reference (joint_input_output); with transients removed, for few windows (local_*)"
     )
     differenced: bool = knob(True, "put the window on the position's difference (no leakage of the integrator); off is the paper's plain variant")
     memory: float = knob(0.0, "forget exponentially with this time constant; 0 remembers everything", "s", ge=0.0, le=1e9)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 SCALES = {
     "V": ("V", 1.0),
@@ -47,16 +47,35 @@ def told(value: float, digits: int = 3) -> str:
     return f"{float(text):.0f}" if "e+" in text else text
 
 
+Sensed = Literal["position", "velocity", "acceleration"]
+PER_TIME: dict[Sensed, str] = {"position": "", "velocity": "/s", "acceleration": "/s^2"}
+
+
 class Units(NamedTuple):
-    """What the input and the output of an axis are counted in."""
+    """What the input and the output of an axis are counted in; output: the position, also where a velocity or an acceleration was measured."""
 
     input: str = "V"
     output: str = "m"
 
     @property
+    def sensed(self) -> Sensed:
+        """What the sensor of the output measures."""
+        return "position"
+
+    @property
     def speed(self) -> str:
         """Of the output's velocity."""
         return f"{self.output}/s"
+
+    @property
+    def measured(self) -> str:
+        """Of the output as its sensor reads it."""
+        return f"{self.output}{PER_TIME[self.sensed]}"
+
+    @property
+    def judged(self) -> str:
+        """Of the errors by which a model is judged: the acceleration where that was measured, otherwise the velocity."""
+        return f"{self.output}/s^2" if self.sensed == "acceleration" else self.speed
 
     def of(self, unit: str) -> str:
         """A unit of the models for this axis: m/s/V becomes rad/s/(N m), V/m3 becomes N m/rad3."""
@@ -68,6 +87,29 @@ class Units(NamedTuple):
         return MODEL_UNIT.sub(named, unit)
 
 
+class OfVelocity(Units):
+    """Where the output's velocity was measured."""
+
+    __slots__ = ()
+
+    @property
+    def sensed(self) -> Sensed:
+        """What the sensor of the output measures."""
+        return "velocity"
+
+
+class OfAcceleration(Units):
+    """Where the output's acceleration was measured."""
+
+    __slots__ = ()
+
+    @property
+    def sensed(self) -> Sensed:
+        """What the sensor of the output measures."""
+        return "acceleration"
+
+
+OF: dict[Sensed, type[Units]] = {"position": Units, "velocity": OfVelocity, "acceleration": OfAcceleration}
 USUAL = Units()
 MODEL_UNIT = re.compile(r"(/?)(?<![A-Za-z])([Vm])(?![A-Za-z])")
 
@@ -96,6 +138,16 @@ def bare(value: float, unit: str, digits: int = 3) -> str:
 def _counted(unit: str) -> str:
     """What is counted, whatever it is over: the m of m/s/V."""
     return re.split("[/^]", unit)[0]
+
+
+def derivative_of(unit: str) -> int:
+    """How often a position was differentiated to give this unit: 0 for m, 1 for m/s, 2 for m/s^2."""
+    return 2 if unit.endswith("/s^2") else int(unit.endswith("/s"))
+
+
+def position_of(unit: str) -> str:
+    """The unit of the position that a velocity or an acceleration has: m of m/s^2."""
+    return unit.removesuffix("/s^2").removesuffix("/s")
 
 
 def over(top: str, bottom: str) -> str:

@@ -29,10 +29,10 @@ ANSWERS: dict[str, tuple[str, tuple[str, ...], str]] = {
     "generator/x_cc.csv": (
         "frf",
         ("--map", "input=x_cc.csv:1,output=y_cc.csv:1", "--rate", "1000", "--unit", "input=V,output=rad/s"),
-        "rad/V",
+        "rad/s/V",
     ),
-    "daisy/robot_arm.dat": ("frf", ("--map", "input=1,output=2", "--rate", "500", "--unit", "input=N m,output=rad/s^2"), "95 of 511 lines trusted"),
-    "f16/f-16.txt": ("frf", ("--map", "input=2,output=3", "--rate", "400", "--unit", "input=N,output=m/s^2"), "3 windows"),
+    "daisy/robot_arm.dat": ("frf", ("--map", "input=1,output=2", "--rate", "500", "--unit", "input=N m,output=rad/s^2"), "100 of 511 lines trusted"),
+    "f16/f-16.txt": ("frf", ("--map", "input=2,output=3", "--rate", "400", "--unit", "input=N,output=m/s^2"), "m/s^2/N"),
     "rm_arm/joint_3.npz": ("frf", ("--map", "input=tau_measured:3,output=q:3", "--unit", N_M), "rad/(N m)"),
     "ball_plate/Motor2_v73.mat": ("frf", ("--axis", "axis2", "--unit", "input=V"), "rad/V"),
     "ball_plate/motor1.npz": ("frf", (), "rad/V"),
@@ -41,9 +41,9 @@ ANSWERS: dict[str, tuple[str, tuple[str, ...], str]] = {
     "vendor_exports/ctrlx_step.trace.csv": (
         "frf",
         ("--map", "input=HMI_SP_Local_Automatico,output=Velocidad_Scaled", "--unit", "input=%,output=rpm"),
-        "rad/FS",
+        "rad/s/FS",
     ),
-    "vendor_exports/dspace_bldc.mat": ("frf", ("--map", "input=Switch,output=Sum3", "--unit", "input=V,output=rpm"), "rad/V"),
+    "vendor_exports/dspace_bldc.mat": ("frf", ("--map", "input=Switch,output=Sum3", "--unit", "input=V,output=rpm"), "rad/s/V"),
     "servo_target/response.json": (
         "frf",
         ("--map", "input=data[*].actions,output=data[*].sensor_data", "--rate", "50", "--unit", "input=rad,output=rad"),

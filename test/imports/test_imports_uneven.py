@@ -122,15 +122,15 @@ def test_a_measured_velocity_becomes_the_position_with_that_mean_velocity(tmp_pa
 
 
 def test_a_velocity_gives_the_axis_that_its_position_gives(tmp_path: Path) -> None:
-    """The fit of tachometer data: same gain and pole as from the encoder, and the half sample of delay that the note names."""
+    """The fit of tachometer data, in m/s/V: same gain and pole as from the encoder, and no delay."""
     answer = solve_ivp(lambda t, s: [-100.0 * s[0] + 0.1 * U[min(int(t * RATE + 1e-9), 2999)]], (0, T[-1]), [0.0], t_eval=T, max_step=2e-4, rtol=1e-8)
     assert answer.success
     options = ("--set", "length=512", "--set", "numerator_order=0", "--set", "denominator_order=2", "--json")
     recorded = csv_of(tmp_path, {"time": T, "Voltage": U, "Velocity (m/s)": answer.y[0] + 1e-6 * np.random.default_rng(2).normal(size=len(T))})
     found = cli("fit", recorded, *options).json
     axis = found["axes"]["x"]
-    assert found["recording"]["measured"] == "velocity" and axis["transfer_function"]["output_unit"] == "m"
-    assert axis["transfer_function"]["delay"] == pytest.approx(0.5e-3, abs=0.05e-3)
+    assert found["recording"]["measured"] == "velocity" and axis["transfer_function"]["output_unit"] == "m/s"
+    assert axis["transfer_function"]["delay"] == pytest.approx(0.0, abs=0.05e-3)
     assert axis["estimates"]["gain"]["value"] == pytest.approx(1e-3, rel=0.05)
 
 
@@ -141,7 +141,7 @@ def test_an_acceleration_is_integrated_twice(tmp_path: Path) -> None:
     assert (recording.measured, recording.output_unit) == ("acceleration", "m")
     back = np.diff(recording.position[:, 0], 2) * RATE**2
     assert float(np.corrcoef(back, a[:-2])[0, 1]) > 0.999 and abs(back.mean()) < 0.05
-    assert any("integrated twice" in note and "constant load cannot be seen" in note for note in recording.notes)
+    assert any("those of the acceleration" in note and "constant load cannot be seen" in note for note in recording.notes)
 
 
 def test_a_gap_keeps_the_speed_right_on_both_sides() -> None:

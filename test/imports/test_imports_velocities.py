@@ -114,15 +114,15 @@ def test_gaps_of_a_bag_of_velocities_leave_both_sides_right(tmp_path: Path) -> N
 
 
 def test_fit_and_diagnose_of_wheels_answer_in_rad(tmp_path: Path) -> None:
-    """Gain of each wheel in rad/s/(N m), the sample of delay of a drive that differences its encoder, and nothing missing."""
+    """Gain of each wheel in rad/s/(N m), the half sample of delay of a drive that differences its encoder, and nothing missing."""
     wheel_bag(tmp_path / "bag")
     said = ("--effort", "--unit", "input=N m,output=rad")
     options = ("--set", "length=512", "--set", "band_high=60", "--set", "numerator_order=0", "--set", "denominator_order=2", "--json")
     axes = cli("fit", tmp_path / "bag", *said, *options).json["axes"]
     for name, gain in (("left", 3.0), ("right", 6.0)):
         function, estimates = axes[name]["transfer_function"], axes[name]["estimates"]
-        assert (function["input_unit"], function["output_unit"]) == ("N m", "rad")
-        assert estimates["gain"]["value"] == pytest.approx(gain, rel=0.02) and function["delay"] == pytest.approx(1 / RATE, rel=0.02)
+        assert (function["input_unit"], function["output_unit"]) == ("N m", "rad/s")
+        assert estimates["gain"]["value"] == pytest.approx(gain, rel=0.02) and function["delay"] == pytest.approx(0.5 / RATE, rel=0.02)
     named = cli("diagnose", tmp_path / "bag", *said, "--axis", "left", "--json").json["axes"]["left"]
     assert named["verdict"] == "nothing_missing"
     table = tmp_path / "table.csv"

@@ -19,8 +19,10 @@ from xy_sysid.cli.record import record
 from xy_sysid.cli.refine import refine
 from xy_sysid.cli.replay import replay
 from xy_sysid.cli.report import report
+from xy_sysid.cli.servo import servo
 from xy_sysid.cli.simulate import simulate
 from xy_sysid.cli.start import run
+from xy_sysid.cli.steps import steps
 from xy_sysid.cli.study import study
 from xy_sysid.cli.validate import validate
 
@@ -48,5 +50,7 @@ def _program(
     pass
 
 
-for command in (demo, page, run, record, replay, simulate, columns, frf, fit, validate, compare, diagnose, refine, effects, study, report, figures):
+for command in (
+    demo, page, run, record, replay, simulate, columns, frf, fit, steps, servo, validate, compare, diagnose, refine, effects, study, report, figures
+):  # fmt: skip
     app.command(name=command.__name__)(command)

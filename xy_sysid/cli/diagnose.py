@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from xy_sysid.cli import options as o
+from xy_sysid.cli.mechanics import Gear, Kt, mechanics_document, mechanics_table
 from xy_sysid.cli.output import emit, estimate, progress, say, table
 from xy_sysid.cli.reading import chosen, each, read_each, reads, runs_of
 from xy_sysid.units import motion
 
 if TYPE_CHECKING:
+    from xy_sysid.axis.mechanics import Transmission
     from xy_sysid.axis.model import Library
     from xy_sysid.diagnosis.diagnose import Diagnosis
     from xy_sysid.greybox.free_run import GreyboxFit
@@ -28,10 +30,13 @@ def diagnose(
     recs: o.Recs,
     reading: Reading,
     effect_file: Own = None,
+    kt: Kt = None,
+    gear: Gear = "",
     budget: o.Budget = None,
     json: o.Json = False,
 ) -> None:
     """Name the physical effect that the rigid model of each axis misses, with evidence, or say that none is known."""
+    from xy_sysid.axis.mechanics import drive_from
     from xy_sysid.diagnosis.findings import answer, findings
     from xy_sysid.diagnosis.of_run import diagnose as logic
     from xy_sysid.files.effects import library
@@ -41,6 +46,7 @@ def diagnose(
     recordings = read_each(recs, reading, json)
     recording = recordings[0]
     names = chosen(recording, reading.axes)
+    drive = drive_from(kt, gear, recording.units)
     with progress() as bar:
         task = bar.add_task("diagnosing", total=len(names))
 
@@ -53,17 +59,22 @@ def diagnose(
         found, refused = each(names, work)
     seconds = time.perf_counter() - begun
     if json:
-        answers: dict[str, Any] = {name: answer(findings(item, known)) for name, item in found.items()}
+        answers: dict[str, Any] = {name: answer(findings(item, known)) | _mechanics(item, drive) for name, item in found.items()}
         answers |= {name: {"verdict": "not_enough_data", "effect": None, "confidence": 1.0, "sentence": text} for name, text in refused.items()}
         emit({"axes": answers, "seconds": seconds, "notes": [note for one in recordings for note in one.notes]})
         return
     for name, item in found.items():
-        _show(name, item, known)
+        _show(name, item, known, drive)
     for name, text in refused.items():
         say(f"axis {name}: {text}")
 
 
-def _show(name: str, item: Diagnosis, known: Library) -> None:
+def _mechanics(item: Diagnosis, drive: Transmission) -> dict[str, Any]:
+    figures = item.ladder.final.parameters if item.ladder is not None else ()
+    return {"mechanics": mechanics_document(figures, item.units, drive)}
+
+
+def _show(name: str, item: Diagnosis, known: Library, drive: Transmission) -> None:
     from xy_sysid.diagnosis.findings import findings
 
     sure = "above 0.99" if item.confidence > 0.99 else f"{item.confidence:.2f}"
@@ -78,15 +89,16 @@ def _show(name: str, item: Diagnosis, known: Library) -> None:
         parts = ["-" if fit.one_step else f"{100 * told.get(c.effect, 0.0):.3g} %" for c, fit in tried]  # of another error, one sample ahead
         rows = [(*error_cells(c.effect, fit), part) for (c, fit), part in zip(tried, parts, strict=True)]
         if rows:
-            table("alone, least left first", ("effect", f"held-out error {motion(item.units.speed)[1]}", "times floor", "share of error"), rows)
+            table("alone, least left first", ("effect", f"held-out error {motion(item.units.judged)[1]}", "times floor", "share of error"), rows)
         parameter_table(item.ladder.final)
+        mechanics_table(item.ladder.final.parameters, item.units, drive)
     say(f"  Next experiment: {item.next_experiment}\n")
 
 
 def error_cells(name: str, fit: GreyboxFit) -> tuple[str, str, str]:
     """Name, held-out error and what that is over the noise floor; where free simulation cannot judge, the name says what was judged."""
     label = f"{name} (error one sample ahead)" if fit.one_step else name
-    return label, f"{motion(fit.units.speed)[0] * fit.held_out_error:.4g}", f"{fit.held_out_error / max(fit.noise_floor, 1e-300):.2f}"
+    return label, f"{motion(fit.units.judged)[0] * fit.held_out_error:.4g}", f"{fit.held_out_error / max(fit.noise_floor, 1e-300):.2f}"
 
 
 def parameter_table(fit: GreyboxFit) -> None:

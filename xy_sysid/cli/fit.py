@@ -63,7 +63,7 @@ def fit(
 
         def work(name: str) -> tuple[AxisEstimate, Fit, Validation]:
             found = estimate(training, name, settings, samples)
-            return found, *fit_response(found.frf, settings, way, unseen.run(name).signals if len(unseen) else None)
+            return found, *fit_response(found.frf, settings, way, unseen.run(name).sensed if len(unseen) else None)
 
         done, problems = each(chosen(recording, reading.axes), work)
         origin = provenance(named(recs), recording)

@@ -141,6 +141,13 @@ def runs_of(recordings: Sequence[Recording], axis: str) -> tuple[Run, ...]:
     return runs
 
 
+def stretches_of(recordings: Sequence[Recording], axis: str) -> tuple[Run, ...]:
+    """Every stretch of an axis in all recordings, however short. Raises BadInput where these do not belong together."""
+    from xy_sysid.diagnosis.of_run import runs_together
+
+    return runs_together([run for recording in recordings for run in recording.every_stretch(axis)])
+
+
 def named(paths: Sequence[Path]) -> str:
     """The recordings in a word."""
     return ", ".join(map(str, paths))

@@ -12,6 +12,7 @@ import typer
 
 from xy_sysid.cli import options as o
 from xy_sysid.cli.diagnose import Own, error_cells, parameter_table
+from xy_sysid.cli.mechanics import Gear, Kt, mechanics_document, mechanics_table
 from xy_sysid.cli.output import emit, progress, say, table
 from xy_sysid.cli.provenance import provenance
 from xy_sysid.cli.reading import chosen, each, named, read_each, reads, runs_of
@@ -42,10 +43,13 @@ def refine(
     model: Annotated[Path | None, typer.Option("--model", metavar="FILE", help="write the model with its physical parameters as YAML")] = None,
     mat: Annotated[Path | None, typer.Option("--mat", metavar="FILE", help="write the linear part and all parameters for MATLAB")] = None,
     force: o.Force = False,
+    kt: Kt = None,
+    gear: Gear = "",
     budget: o.Budget = None,
     json: o.Json = False,
 ) -> None:
     """Add physical effects to the rigid model, refit everything together, and print the ladder of falling errors."""
+    from xy_sysid.axis.mechanics import drive_from
     from xy_sysid.diagnosis.of_run import refined
     from xy_sysid.diagnosis.refine import Effort
     from xy_sysid.errors import BadInput
@@ -66,6 +70,7 @@ def refine(
     recordings = read_each(recs, reading, json)
     recording = recordings[0]
     names = chosen(recording, reading.axes)
+    drive = drive_from(kt, gear, recording.units)
     alone: dict[str, OpenLoop] = {}
     with progress() as bar:
         task = bar.add_task("refining", total=len(names))
@@ -90,10 +95,15 @@ def refine(
     if mat is not None:
         write_axis_mat(mat, {name: ladder.final for name, ladder in found.items()})
     if json:
-        answers: dict[str, Any] = {name: _answer(ladder) | _alone(alone.get(name), recording.output_unit) for name, ladder in found.items()}
+        answers: dict[str, Any] = {
+            name: _answer(ladder)
+            | _alone(alone.get(name), recording.output_unit)
+            | {"mechanics": mechanics_document(ladder.final.parameters, recording.units, drive)}
+            for name, ladder in found.items()
+        }
         emit({"recording": origin, "axes": answers, "refused": refused})
         return
-    scale, unit = motion(recording.units.speed)
+    scale, unit = motion(recording.units.judged)
     for name, ladder in found.items():
         rows = [
             (label, f"{scale * step.fit.training_error:.4g}", held_out, over)
@@ -104,6 +114,7 @@ def refine(
         table(f"axis {name}: {unit}, floor {floor:.4g}", ("added", "training error", "held-out error", "times floor"), rows)
         say(f"  {_words(ladder)}")
         parameter_table(ladder.final)
+        mechanics_table(ladder.final.parameters, recording.units, drive)
         if name in alone:
             say(f"  {_alone_in_words(alone[name], recording.output_unit)}")
         say()
@@ -124,7 +135,7 @@ def verdict(ladder: Ladder) -> str:
 
 def _words(ladder: Ladder) -> str:
     names = ", ".join(ladder.effects) or "nothing"
-    left = f"what is left beyond the noise is {moved(ladder.discrepancy, ladder.final.units.speed)}"
+    left = f"what is left beyond the noise is {moved(ladder.discrepancy, ladder.final.units.judged)}"
     said = {
         "explained": f"Explained by the base and {names}: the held-out error is at the noise floor.",
         "partly": f"{names} explain {100 * ladder.explained:.3g} % of the error's power; {left}.",
@@ -159,7 +170,7 @@ def _answer(ladder: Ladder) -> dict[str, Any]:
     ]
     return {
         "ladder": rungs,
-        "unit": ladder.final.units.speed,
+        "unit": ladder.final.units.judged,
         "verdict": verdict(ladder),
         "effects": ladder.effects,
         "explained": ladder.explained,

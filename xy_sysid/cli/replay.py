@@ -150,7 +150,7 @@ def replay(
         estimates(f"axis {name}: relative error {100 * part.fit.relative_error:.2g} %", part.fit.intervals_with_misfit)
     for name, story in stories.items():
         say(words(story))
-        scale, unit = motion(story.units.speed)
+        scale, unit = motion(story.units.judged)
         rows = [(step.rung.label, *(f"{scale * value:.4g}" for value in errors(step.rung))) for step in story.steps]
         table(f"axis {name}: {unit}", ("step", "training error", "held-out error", "noise floor"), rows)
 

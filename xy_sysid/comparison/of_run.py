@@ -69,7 +69,7 @@ def better(data: Run | Recording, before: AnyModel, after: AnyModel) -> Paired:
     run = one_run(data)
     first = held(run) if run.digest in (*before.data, *after.data) else 0
     old, new = (model.velocity(run.sampling_rate, run.voltage, run.position)[first:] for model in (before, after))
-    return paired(old, new, run.position[first:], run.sampling_rate, run.units.speed)
+    return paired(old, new, run.position[first:], run.sampling_rate, run.units)
 
 
 def judge(recording: Recording, axis: str, model: AnyModel | None, settings: IdentifierSettings) -> Judgement:
@@ -83,7 +83,7 @@ def judge(recording: Recording, axis: str, model: AnyModel | None, settings: Ide
     first = held(run) if seen else 0
     velocity = model.velocity(run.sampling_rate, run.voltage, run.position)[first:]
     with np.errstate(over="ignore"):  # positions of any size
-        encoder = encoder_noise(run.sampling_rate, recording.run(axis).position)
+        encoder = encoder_noise(run.sampling_rate, recording.run(axis).position, run.measured, recording.run(axis).voltage)
     unseen = Unseen(run.voltage[first:], run.position[first:], run.sampling_rate, run.units, encoder=encoder)
     where = compare_motion(velocity, unseen)
     notes = tuple(text for text in (model.doubt, SEEN if seen else "") if text)
@@ -101,7 +101,8 @@ def in_frequency(
     judged(found.frf)
     run = recording.run(axis)
     if isinstance(model, LinearModel):
-        return check(model.tf, found.frf, run.voltage, run.position, model.hold), found.notes
+        inputs, output, _ = run.sensed
+        return check(model.tf, found.frf, inputs, output, model.hold), found.notes
     moved = estimate(simulated(recording, axis, model), axis, settings, period)
     velocity = model.velocity(run.sampling_rate, run.voltage, run.position)
     return check_motion(velocity, moved.frf, found.frf, run.position), (*found.notes, *([model.doubt] if model.doubt else []))

@@ -74,5 +74,5 @@ class PhysicalModel:
 
     def __repr__(self) -> str:
         told = f" of axis {self.axis}" if self.axis else ""
-        error = f", held-out error {moved(self.fit.held_out_error, self.units.speed)}" if self.fit is not None else ""
+        error = f", held-out error {moved(self.fit.held_out_error, self.units.judged)}" if self.fit is not None else ""
         return f"<PhysicalModel{told}: {self.label}{error}>"

@@ -54,9 +54,9 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """A model against unseen samples, in velocity.
+    """A model against unseen samples, in velocity, or in acceleration where that was measured.
 
-    time: (n,) s; measured, predicted: (n,) m/s; position: (n,) m
+    time: (n,) s; measured, predicted: (n,) in ``unit``; position: (n,) m
     error, noise_floor: rms, m/s, up to the top band
     band_end: Hz, where motion and noise meet; error_below_end, floor_below_end: rms up to there, m/s
     frequency: (bands,) Hz centres; error_over_floor: (bands,) amplitude ratio; places: worst first
@@ -111,8 +111,8 @@ class Unseen:
         """Windows that are judged, and the floor there. measured: (n,) velocity."""
         if self.held is not None:
             return self.held
-        encoder = encoder_noise(self.sampling_rate, self.position) if self.encoder is None else self.encoder
-        layout = bands(self.sampling_rate, measured.size // WINDOWS)
+        encoder = encoder_noise(self.sampling_rate, self.position, self.units.sensed, self.voltage) if self.encoder is None else self.encoder
+        layout = bands(self.sampling_rate, measured.size // WINDOWS, sensed=self.units.sensed)
         every = Windows(layout, np.arange(0, max(measured.size - layout.length, 0) + 1, layout.length // 2))
         return every, floor(every, measured, encoder, EPSILON)
 
@@ -134,7 +134,7 @@ def compare_velocity(model: FloatArray, u: FloatArray, y: FloatArray, sampling_r
 
 def compare_motion(model: FloatArray, unseen: Unseen) -> Comparison:
     """A simulated mean velocity (n - 1,) of any model against the measured output (n,)."""
-    unit, sampling_rate, y = unseen.units.speed, unseen.sampling_rate, unseen.position
+    unit, sampling_rate, y = unseen.units.judged, unseen.sampling_rate, unseen.position
     if y.shape[0] < SHORTEST_RUN or model.shape[0] != y.shape[0] - 1:
         raise BadInput("number of samples", y.shape[0], f"{SHORTEST_RUN} or more", "Give a longer recording.")
     first = unseen.skipped
@@ -143,7 +143,8 @@ def compare_motion(model: FloatArray, unseen: Unseen) -> Comparison:
     windows, least = unseen.windows(measured)
     counts = _inside(windows, error.size) if unseen.held is not None else slice(None)
     layout = windows.layout
-    offset = float(np.mean(error[counts]))
+    accelerated = unseen.units.sensed == "acceleration"
+    offset = 0.0 if accelerated else float(np.mean(error[counts]))  # a constant velocity leaves no trace in an acceleration
     power = layout.power(windows.spectrum(error - offset))
     edges = layout.edges()
     centres = np.append(0.5 * edges[1], np.sqrt(edges[2:] * edges[1:-1]))
@@ -153,7 +154,10 @@ def compare_motion(model: FloatArray, unseen: Unseen) -> Comparison:
     seen = int(audible[-1]) + 1 if audible.size else layout.count
     end = float(edges[seen])
     whole, allowed = float(np.hypot(layout.rms(power), offset)), layout.rms(least.power)
-    low_error, low_speed = (_low_pass(values, end, sampling_rate) for values in (error, measured))
+    low_speed = _low_pass(measured, end, sampling_rate)
+    if accelerated:
+        error, measured, predicted = (np.diff(values, append=values[-1:]) * sampling_rate for values in (error, measured, predicted))
+    low_error = _low_pass(error, end, sampling_rate)
     time = unseen.begins + (np.arange(error.shape[0]) + first) / sampling_rate
     total = float(np.sqrt(np.mean(low_error[counts] ** 2)))
     noise = total * allowed / max(whole, 1e-300)  # so that the bins have the ratio of the whole in their mean
@@ -166,7 +170,7 @@ def compare_motion(model: FloatArray, unseen: Unseen) -> Comparison:
         power_in = np.asarray(signal.oaconvolve(unseen.voltage[first:-1] ** 2, np.full(width, 1.0 / width), mode="same"), dtype=np.float64)
         envelope, here = np.sqrt(np.maximum(power_in, 0.0))[counts], y[first:-1][counts]
         off, speed = low_error[counts], low_speed[counts]
-        places += _binned("speed", (np.abs(speed), unit), SPEED_BINS, off, noise)
+        places += _binned("speed", (np.abs(speed), unseen.units.speed), SPEED_BINS, off, noise)
         places += _direction(speed, off, noise, unit)
         places += _binned("position", (here, unseen.units.output), POSITION_BINS, off, noise)
         places += _periodic(here, off, noise, unseen.units.output)

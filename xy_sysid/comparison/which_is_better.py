@@ -16,7 +16,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.greybox.floor import Windows, bands, encoder_noise, floor
 from xy_sysid.greybox.free_run import EPSILON
 from xy_sysid.samples.block import FloatArray
-from xy_sysid.units import bare, moved
+from xy_sysid.units import USUAL, Units, bare, moved
 
 ABOVE = 1.2  # times the floor's power that one of the two errors must have for a change to matter
 SKIP = 0.5  # s at the start, in which a simulation forgets that it started from rest
@@ -93,13 +93,13 @@ class Paired:
         return f"after is {word}: {figures}; {test}" + ("; " + "; ".join(where) if where else "") + "."
 
 
-def paired(before: FloatArray, after: FloatArray, position: FloatArray, sampling_rate: float, unit: str = "m/s") -> Paired:
+def paired(before: FloatArray, after: FloatArray, position: FloatArray, sampling_rate: float, units: Units = USUAL) -> Paired:
     """Two simulated velocities (n - 1,) against the measured position (n,). Raises BadInput for too little data."""
     skip = int(SKIP * sampling_rate)
     measured = np.diff(position)[skip:] * sampling_rate
     if before.shape != after.shape or before.size != position.size - 1:
         raise BadInput("length of the simulations", f"{before.size} and {after.size}", f"{position.size - 1}", "Simulate the same data.")
-    layout = bands(sampling_rate, measured.size // WANTED)
+    layout = bands(sampling_rate, measured.size // WANTED, sensed=units.sensed)
     every = Windows(layout, np.arange(0, max(measured.size - layout.length, 0) + 1, layout.length // 2))
     errors = [every.spectrum(measured - values[skip:]) for values in (before, after)]
     power = [np.abs(error[::2]) ** 2 for error in errors]  # every other window: side by side
@@ -107,7 +107,7 @@ def paired(before: FloatArray, after: FloatArray, position: FloatArray, sampling
     if windows < FEWEST:
         needed = (FEWEST + 1) * layout.length / sampling_rate + SKIP
         raise BadInput("unseen data", f"{position.size / sampling_rate:.3g} s", f"{needed:.3g} s or more", "Give a longer recording.")
-    least = floor(every, measured, encoder_noise(sampling_rate, position), EPSILON)
+    least = floor(every, measured, encoder_noise(sampling_rate, position, units.sensed), EPSILON)
     lines = np.bincount(layout.band, minlength=layout.count)
     whole = [float(np.sqrt(np.sum(lines * layout.power(error)) * 2.0 / layout.length)) for error in errors]
     total = _log_ratio(power[0].sum(axis=1), power[1].sum(axis=1))
@@ -127,7 +127,7 @@ def paired(before: FloatArray, after: FloatArray, position: FloatArray, sampling
     noise = layout.rms(least.noise)
     ratio, low, high = (float(np.exp(value)) for value in (mean, mean - reach, mean + reach))
     return Paired(
-        unit=unit,
+        unit=units.judged,
         windows=windows,
         top=float(edges[-1]),
         before=whole[0],

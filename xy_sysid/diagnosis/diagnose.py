@@ -112,7 +112,7 @@ def judged(data: AxisData, ladder: Ladder, library: Library) -> Diagnosis:
     base, final, names = ladder.base, ladder.final, ladder.effects
     motion = max(data.layout.rms(data.floor.motion), 1e-300)
     left = ladder.discrepancy / motion
-    where, unit = where_base_fails(data, base), data.units.speed
+    where, unit = where_base_fails(data, base), data.units.judged
     explained, noise = ladder.explained, moved(ladder.noise, unit)
     hides = math.sqrt(math.expm1(AT_FLOOR)) * data.layout.rms(data.floor.power) / motion  # in the noise
     if names and (explained >= 1.0 - explained or final.excess < AT_FLOOR):
@@ -245,7 +245,7 @@ def _also_called(final: GreyboxFit, names: Sequence[str]) -> str:
 
 
 def _left(data: AxisData, ladder: Ladder, left: float) -> str:
-    noise, beyond = (moved(value, data.units.speed) for value in (ladder.noise, ladder.discrepancy))
+    noise, beyond = (moved(value, data.units.judged) for value in (ladder.noise, ladder.discrepancy))
     if ladder.final.excess < AT_FLOOR or not ladder.discrepancy > 0.0:
         return f"What is left is the encoder's noise ({noise})."
     words = "" if ladder.final.one_step else f", {_percent(left)} of the motion"

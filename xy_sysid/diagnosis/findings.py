@@ -154,7 +154,7 @@ def findings(item: Diagnosis, library: Library) -> Findings:
 
 
 def _tried(item: Candidate, fit: GreyboxFit, base: GreyboxFit) -> Tried:
-    before, unit = base.held_out_error, base.units.speed
+    before, unit = base.held_out_error, base.units.judged
     if fit.one_step:
         evidence = (
             f"judged one sample ahead, as no free simulation can tell: with it {moved(fit.held_out_error, unit)} are left, "
@@ -181,7 +181,7 @@ def _runner_up(ladder: Ladder) -> tuple[str, str] | None:
     rival = ladder.rivals[0]
     name, taken = " and ".join(rival.effects), " and ".join(ladder.effects)
     if rival.doubt < DOUBTFUL:
-        left, right = (moved(fit.held_out_error, fit.units.speed) for fit in (rival.fit, ladder.final))
+        left, right = (moved(fit.held_out_error, fit.units.judged) for fit in (rival.fit, ladder.final))
         return name, f"with {name} instead of {taken} the held-out error is {left}, not {right}."
     if rival.refused:
         return name, f"{name} does nearly as well as {taken}, but {rival.refused}."
@@ -204,7 +204,7 @@ def _look_alikes(fitted: list[tuple[Candidate, GreyboxFit]], name: str, library:
         elif fits[other].excess > fits[name].excess + AT_FLOOR:
             apart = True
             left, least = fits[other], fits[name].held_out_error
-            text = f"{other} leaves {moved(left.held_out_error, left.units.speed)}, {name} {bare(least, left.units.speed)}"
+            text = f"{other} leaves {moved(left.held_out_error, left.units.judged)}, {name} {bare(least, left.units.judged)}"
         elif library[other].family and library[other].family == library[name].family and richer:
             apart, text = False, f"{other} contains {name} and does as well; nothing in these data asks for more than {name}"
         else:
@@ -224,7 +224,7 @@ def answer(item: Findings) -> dict[str, Any]:
         "tolerance": item.tolerance,
         "sentence": item.sentence,
         "error": {
-            "unit": item.units.speed,
+            "unit": item.units.judged,
             "now": first.held_out_error if first else None,
             "noise_floor": first.noise_floor if first else None,
             "held_out": last.held_out_error if last else None,

@@ -23,7 +23,7 @@ from xy_sysid.hypotheses.criteria import MOST_EFFECTS
 from xy_sysid.hypotheses.enough_data import lacking
 from xy_sysid.samples.recording import Recording, Run, one_run
 from xy_sysid.tables import Table
-from xy_sysid.units import bare, motion, moved
+from xy_sysid.units import bare, motion, moved, over
 
 Data = Run | Recording | Sequence[Run | Recording]
 
@@ -61,7 +61,7 @@ class RefinedStep:
         return self.fit.noise_floor
 
     def __repr__(self) -> str:
-        unit = self.model.units.speed
+        unit = self.model.units.judged
         return f"<RefinedStep {self.added or 'rigid'}: held-out error {moved(self.held_out_error, unit)}, floor {bare(self.noise_floor, unit)}>"
 
 
@@ -96,7 +96,7 @@ class Refinement:
         return self.steps[-1].model
 
     def __repr__(self) -> str:
-        unit = self.model.units.speed
+        unit = self.model.units.judged
         rungs = (f"{step.added or 'rigid'} {bare(step.held_out_error, unit)}" for step in self.steps)
         return f"<Refinement: {' -> '.join(rungs)} {motion(unit)[1]}, floor {bare(self.steps[-1].noise_floor, unit)}>"
 
@@ -141,7 +141,8 @@ def diagnose(
 ) -> Diagnosed:
     """Which physical effects the rigid model misses, with evidence and runner-up; or that nothing is missing, or that none is known.
 
-    data:   a run or several of one axis, V and m; library: with effects of your own (``files.effects.library``)
+    data:   a run or several of one axis, or a recording of one axis with all its stretches, V and m
+    library: with effects of your own (``files.effects.library``)
     budget: s after which the best so far is said, if ``clock`` (for example ``time.process_time``) tells the time; without one the search
             ends after a fixed amount of work, and the same data give the same answer however busy the machine is
     tolerance: part of the motion that a model may leave
@@ -149,7 +150,7 @@ def diagnose(
     """
     runs = runs_together(data)
     rate, signals, units = runs[0].sampling_rate, [(run.voltage, run.position) for run in runs], runs[0].units
-    missing = lacking(rate, signals)
+    missing = lacking(rate, signals, units)
     with threadpool_limits(1, "blas"):  # as in commands and nodes
         if missing:
             found = one.not_enough(missing, units)
@@ -199,15 +200,21 @@ def ladder_table(steps: Sequence[tuple[str | None, GreyboxFit]]) -> Table:
     return Table(("added", f"training error ({unit})", f"held-out error ({unit})", f"noise floor ({unit})"), tuple(rows))
 
 
+def _stretches(data: Run | Recording) -> tuple[Run, ...]:
+    if isinstance(data, Recording) and len(data.axes) == 1 and len(data):
+        return data.stretches(data.axes[0])
+    return (one_run(data),)
+
+
 def runs_together(data: Data) -> tuple[Run, ...]:
-    """One or several runs of the same axis."""
-    runs = tuple(one_run(item) for item in (data if isinstance(data, Sequence) else (data,)))
+    """One or several runs of the same axis; of a recording all stretches that tell something."""
+    runs = tuple(run for item in (data if isinstance(data, Sequence) else (data,)) for run in _stretches(item))
     if not runs:
         raise BadInput("data", "empty", "a run, or several of one axis", "Give at least one.")
     for what, values in (
         ("sampling rate", [f"{run.sampling_rate:g} Hz" for run in runs]),
         ("axis", [run.axis for run in runs]),
-        ("units", ["/".join(reversed(run.units)) for run in runs]),
+        ("units", [over(run.units.measured, run.units.input) for run in runs]),
     ):
         if len(set(values)) > 1:
             raise BadInput(f"{what} of the runs", " and ".join(dict.fromkeys(values)), "one and the same", "Give runs of one axis.")

@@ -127,7 +127,7 @@ def _of_one_step(
     data, node, rungs, bar = pool.data, pool.answer, filtered.rungs, filtered.bar
     last = rungs[-1][1]
     names = tuple(name for name, _ in last.model.effects)
-    noise = min(max(data.floor.encoder * data.sampling_rate, last.noise_floor), last.held_out_error)  # what is predicted is no noise
+    noise = min(max(data.encoder * data.sampling_rate, last.noise_floor), last.held_out_error)  # what is predicted is no noise
     left, before = (error**2 - noise**2 for error in (last.held_out_error, bar))
     doubt = 0.5 * (last.held_out_error / bar) ** (2.0 / TELLS)
     return Ladder(

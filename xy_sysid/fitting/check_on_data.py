@@ -13,7 +13,7 @@ from xy_sysid.linear.transfer_function import TransferFunction
 from xy_sysid.response.frf import ComplexArray, FrequencyResponse
 from xy_sysid.response.h1 import divisor
 from xy_sysid.samples.block import FloatArray
-from xy_sysid.units import over, told
+from xy_sysid.units import over, position_of, told
 
 AT_THE_FLOOR = 1.3  # rms residual in sigma up to which a model that was fitted elsewhere is as good as noise allows
 
@@ -79,7 +79,7 @@ def check(tf: TransferFunction, frf: FrequencyResponse, u: FloatArray, y: FloatA
         raise BadInput("response of the model", "not finite", "finite in the band of the recording", "Check the coefficients of the model.")
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # an unstable model runs away, and the figure says so
-            simulated = simulation_error(tf, frf.sampling_rate, u, y)
+            simulated = simulation_error(tf, frf.sampling_rate, u, y, hold=hold)
     except BadInput:
         simulated = None
     return _judged(lines, predicted, simulated)
@@ -95,7 +95,7 @@ def check_motion(velocity: FloatArray, simulated: FrequencyResponse, frf: Freque
         raise BadInput("number of trusted lines", 0, "1 or more", "Record longer, excite more, or widen the band.")
     predicted = np.interp(lines.frequency, simulated.frequency, simulated.response.real)
     predicted = predicted + 1j * np.interp(lines.frequency, simulated.frequency, simulated.response.imag)
-    return _judged(lines, np.asarray(predicted), velocity_error(velocity, frf.sampling_rate, y, f"{frf.output_unit}/s"))
+    return _judged(lines, np.asarray(predicted), velocity_error(velocity, frf.sampling_rate, y, f"{position_of(frf.output_unit)}/s"))
 
 
 def _judged(lines: FrequencyResponse, predicted: ComplexArray, simulated: SimulationError | None) -> ModelCheck:

@@ -10,6 +10,7 @@ could be a machine: stable, with roots in the band, of which none cancel and non
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,6 +22,7 @@ from xy_sysid.fitting.result import Fit
 from xy_sysid.fitting.structure import Structure
 from xy_sysid.linear.transfer_function import Mode
 from xy_sysid.response.frf import FrequencyResponse
+from xy_sysid.units import derivative_of
 
 STEPS = ((0, 1), (2, 2), (0, 2), (1, 2), (4, 4))  # zeros and poles added at once; two pairs, where one alone finds no minimum
 MOST_POLES = 9  # beside the integrators
@@ -86,6 +88,16 @@ def choose(frf: FrequencyResponse, family: Structure, thorough: bool = True) -> 
     return Choice(now, tuple(ranked), reason)
 
 
+def choose_among(frf: FrequencyResponse, families: Sequence[Structure]) -> Choice:
+    """The orders and the family that the data tell: a mass that floats (two integrators of its position), with drag (one), or on a spring (none).
+
+    An acceleration shows neither by a slope, as a position does, so each is tried. Raises BadInput as ``choose``.
+    """
+    choices = [choose(frf, family) for family in families]
+    scale = max(1.0, min(excess(choice.fit) for choice in choices))
+    return min(choices, key=lambda choice: description_length(choice.fit, independent_data(frf, len(choice.fit.frequency)), scale))
+
+
 def excess(fit: Fit) -> float:
     """Cost over what noise alone lets expect; 1 where that is not known."""
     return fit.cost / fit.expected_cost if fit.expected_cost > 0.0 else 1.0
@@ -93,8 +105,11 @@ def excess(fit: Fit) -> float:
 
 def _rigid(frf: FrequencyResponse, family: Structure) -> Fit:
     """A mass with drag (or on a spring, without integrators) and delay; one pole less where the last is not seen, or nothing stable is found."""
-    order = max(2, family.integrators + 1)
+    floats = family.integrators == 2 and derivative_of(frf.output_unit) == 2  # a mass without drag answers a force by its acceleration
+    order = 2 if floats else max(2, family.integrators + 1)
     rigid = identify(frf, replace(family, numerator_order=0, denominator_order=order))
+    if floats:
+        return rigid
     if rigid.converged and rigid.tf.is_stable and rigid.tf.pole_modes()[-1].frequency < FAR_ABOVE * rigid.frequency[-1]:
         return rigid
     bare = identify(frf, replace(family, numerator_order=0, denominator_order=order - 1))
@@ -142,7 +157,7 @@ def _doubt(now: Fit, fit: Fit, added: tuple[Mode, ...], poles: int) -> str:
     if len(added) < max(poles // 2, 1):
         return "its poles are no resonance" if poles > 1 else "its pole is not real"
     for kind, modes in (("pole", added), ("zero", fit.tf.zero_modes())):
-        outside = [mode.frequency for mode in modes if not low <= mode.frequency <= high]
+        outside = [mode.frequency for mode in modes if not low <= mode.frequency <= high and mode.frequency > 0.0]
         if outside:
             return f"its {kind} at {outside[0]:.3g} Hz lies outside the band of {low:.3g} to {high:.4g} Hz"
     if any(mode.damping < -LIGHT for mode in fit.tf.zero_modes()):

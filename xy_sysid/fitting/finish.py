@@ -27,8 +27,9 @@ def finish(task: Problem, at: Point, method: str, end: Ended, start: str, table:
         return _failed(task, at, method, end, start)
     inner, expected, deviation = covariance(task, at, table)
     to_numerator, to_denominator = _to_coefficients(task, at)
-    numerator = (at.b @ to_numerator)[::-1]
-    denominator = np.concatenate(((at.a @ to_denominator)[::-1], np.zeros(structure.integrators)))
+    own = (at.b @ to_numerator)[::-1]
+    numerator = np.concatenate((own, np.zeros(max(-structure.power, 0))))
+    denominator = np.concatenate(((at.a @ to_denominator)[::-1], np.zeros(max(structure.power, 0))))
     if structure.domain == "z":
         denominator = denominator[: structure.free_order + 1]
         for _ in range(structure.integrators):
@@ -47,9 +48,10 @@ def finish(task: Problem, at: Point, method: str, end: Ended, start: str, table:
     jacobian: FloatArray = np.asarray(table[:-1].T @ np.linalg.inv(map_all), dtype=np.float64)
     poles = at.denominator.roots(at.a)
     zeros = at.numerator.roots(at.b)
-    rest = np.full(structure.integrators, 0.0 if structure.domain == "s" else 1.0)
+    rest = np.full(max(structure.power, 0), 0.0 if structure.domain == "s" else 1.0)
+    still = np.zeros(max(-structure.power, 0))
     relative = float(np.sqrt(np.mean(np.abs((frf.response - predicted) / frf.response) ** 2)))
-    values = np.concatenate((tf.numerator, (at.a @ to_denominator)[:-1][::-1], [at.delay] if structure.free_delay else []))
+    values = np.concatenate((own, (at.a @ to_denominator)[:-1][::-1], [at.delay] if structure.free_delay else []))
     coefficients = coefficient_estimates(names, values, reported)
     gain = gain_estimate(task, at, inner)
     roots = *root_estimates(task, at, poles, inner, "pole"), *root_estimates(task, at, zeros, inner, "zero")
@@ -83,7 +85,7 @@ def finish(task: Problem, at: Point, method: str, end: Ended, start: str, table:
         covariance=reported,
         jacobian=jacobian,
         poles=np.concatenate((_ordered(poles) * plan.scale, rest)),
-        zeros=_ordered(zeros) * plan.scale,
+        zeros=np.concatenate((_ordered(zeros) * plan.scale, still)),
         intervals=with_rate((*coefficients, gain, *roots), frf.rate_error, structure),
         iterations=end.iterations,
         converged=end.converged,
@@ -97,7 +99,7 @@ def _failed(task: Problem, at: Point, method: str, end: Ended, start: str) -> Fi
     """Nothing could be estimated: numbers ran out of range. Everything that is not known is NaN."""
     structure, frf, nan = task.structure, task.frf, float("nan")
     lines, names = np.full(len(frf), np.nan), _names(task)
-    bottom = np.zeros(structure.denominator_order + 1)
+    bottom = np.zeros(structure.free_order + max(structure.power, 0) + 1)
     bottom[0] = 1.0
     period = None if structure.domain == "s" else task.plan.period
     return Fit(
@@ -142,7 +144,8 @@ def _to_coefficients(task: Problem, at: Point) -> tuple[FloatArray, FloatArray]:
     """(m + 1, m + 1) and (n + 1, n + 1): row k is what parameter k adds to the coefficients of rising powers of s."""
     up, down = at.numerator.powers(), at.denominator.powers()
     lead = down[-1, -1] * at.a[-1]
-    scale, order, free = task.plan.scale, float(task.structure.denominator_order), float(task.structure.free_order)
+    scale, free = task.plan.scale, float(task.structure.free_order)
+    order = free + task.structure.power
     return up / lead * scale ** (order - np.arange(up.shape[1])), down / lead * scale ** (free - np.arange(down.shape[1]))
 
 
@@ -160,7 +163,7 @@ def _parameter_map(task: Problem, to_numerator: FloatArray, to_denominator: Floa
 def _names(task: Problem) -> tuple[str, ...]:
     """numerator_k and denominator_k are the coefficients of s^k (z^k, in the z domain of the part without integrators)."""
     structure = task.structure
-    shift = structure.integrators if structure.domain == "s" else 0
-    top = [f"numerator_{k}" for k in range(structure.numerator_order, -1, -1)]
+    shift, above = (max(structure.power, 0), max(-structure.power, 0)) if structure.domain == "s" else (0, 0)
+    top = [f"numerator_{k + above}" for k in range(structure.numerator_order, -1, -1)]
     bottom = [f"denominator_{k + shift}" for k in range(structure.free_order - 1, -1, -1)]
     return tuple(top + bottom + (["delay"] if structure.free_delay else []))

@@ -14,7 +14,7 @@ from xy_sysid.fitting.result import Interval
 from xy_sysid.fitting.structure import Structure
 from xy_sysid.response.frf import Z95, ComplexArray
 from xy_sysid.samples.block import FloatArray
-from xy_sysid.units import over
+from xy_sysid.units import over, position_of
 
 BEYOND = 1e3  # standard error over the value from which an interval says nothing: it is told as unlimited
 PAIRS = {"pole": "resonance", "zero": "antiresonance"}
@@ -46,10 +46,10 @@ def _power(name: str, structure: Structure) -> int:
     if kind == "delay" or (kind in PAIRS.values() and rest.endswith("frequency")):
         return 1
     if kind == "gain":
-        return structure.integrators
+        return structure.power
     if structure.domain == "z" or kind in PAIRS.values():
         return 0
-    return 1 if kind in PAIRS else structure.denominator_order - int(rest)
+    return 1 if kind in PAIRS else structure.free_order + max(structure.power, 0) - int(rest)
 
 
 def coefficient_estimates(names: tuple[str, ...], values: FloatArray, covariance: FloatArray) -> tuple[Interval, ...]:
@@ -61,18 +61,19 @@ def coefficient_estimates(names: tuple[str, ...], values: FloatArray, covariance
 
 
 def gain_estimate(task: Problem, at: Point, inner: FloatArray) -> Interval:
-    """Of s^integrators H at s = 0: the static gain, with one integrator the velocity gain."""
+    """Of s^integrators times the position's response at s = 0: the static gain, with one integrator the velocity gain."""
     structure, frf = task.structure, task.frf
     where = np.array([0.0 + 0.0j if structure.domain == "s" else 1.0 + 0.0j])
     up, down = at.numerator.values(where)[0].real, at.denominator.values(where)[0].real
     bottom = float(down @ at.a)
     value = float(up @ at.b) / bottom
-    scale = task.plan.scale**structure.integrators if structure.domain == "s" else task.plan.period ** -float(structure.integrators)
+    scale = task.plan.scale**structure.power if structure.domain == "s" else task.plan.period ** -float(structure.integrators)
     slope = np.zeros(inner.shape[0])
     slope[: at.b.size] = up / bottom
     slope[at.b.size : at.b.size + at.a.size - 1] = -value * down[:-1] / bottom
     per = ("", "/s", "/s^2")[structure.integrators]
-    return _estimate("gain", value * scale, float(slope @ inner @ slope) * scale**2, over(f"{frf.output_unit}{per}", frf.input_unit))
+    unit = over(f"{position_of(frf.output_unit)}{per}", frf.input_unit)
+    return _estimate("gain", value * scale, float(slope @ inner @ slope) * scale**2, unit)
 
 
 def root_estimates(task: Problem, at: Point, roots: ComplexArray, inner: FloatArray, name: Literal["pole", "zero"]) -> list[Interval]:

@@ -6,6 +6,7 @@ import numpy as np
 
 from xy_sysid.response.frf import FrequencyResponse
 from xy_sysid.settings import IdentifierSettings
+from xy_sysid.units import derivative_of
 
 LOW = 10  # lines at the low end whose slope tells
 USUAL = IdentifierSettings()
@@ -21,7 +22,9 @@ def settings_for(response: FrequencyResponse, settings: IdentifierSettings) -> I
     if not is_given(response):
         return settings
     hold = "none" if settings.hold == USUAL.hold else settings.hold
-    integrators = _integrators(response) if settings.integrators == USUAL.integrators else settings.integrators
+    integrators = (
+        min(_integrators(response) + derivative_of(response.output_unit), 2) if settings.integrators == USUAL.integrators else settings.integrators
+    )
     return settings.model_copy(update={"hold": hold, "integrators": integrators})
 
 

@@ -9,29 +9,29 @@ import numpy as np
 
 from xy_sysid.errors import BadInput
 from xy_sysid.fitting import Fit, identify
-from xy_sysid.fitting.choose_orders import Choice, choose
+from xy_sysid.fitting.choose_orders import Choice, choose, choose_among
 from xy_sysid.fitting.structure import structure_from
-from xy_sysid.response.batch_spectra import batch_spectra
-from xy_sysid.response.closed_loop import joint_input_output, loop_spectra
 from xy_sysid.response.frf import FrequencyResponse
 from xy_sysid.response.friction_hint import friction_hint, friction_note
-from xy_sysid.response.h1 import H1Options, frequency_response
+from xy_sysid.response.h1 import H1Options
+from xy_sysid.response.methods import METHODS
 from xy_sysid.response.period import FEWEST, find_half_period, find_period, half_periods, one_more, period_note
 from xy_sysid.response.window_check import stretches
 from xy_sysid.response.windows import WindowShape
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.rate import error_of_rate
-from xy_sysid.samples.recording import Recording
+from xy_sysid.samples.recording import Recording, as_sensed
 from xy_sysid.settings import IdentifierSettings
+from xy_sysid.units import derivative_of
 
 HARDLY = 4.0  # standard deviations of the number of lines that chance makes coherent (neighbours are alike, hence the 2)
 HALVES = (
     "The input repeats with the other sign every {half} samples ({seconds:.6g} s), half its period: "
     "windows of one period, made of each half and its negative."
 )
-JOINT = "Closed loop: the joint input-output method, with the reference as instrument."
 FIXED = ("nllsfdi",)  # estimators of the paper's own structure: orders that are not asked for are 2/4
 WINDOWS, SHORTEST = 3, 16  # windows, side by side, that a record holds at least, and samples of the shortest
+LONGEST = 16_384  # samples of a window of which one will do
 MOST_ON_GRID = 0.5  # of the windows that fit; where the grid holds fewer, each stretch has windows from its own beginning on
 COVERED = 0.5  # of the samples that such windows take in at least
 MANY = 6  # periods that must be there where feedback or friction shape the input
@@ -56,17 +56,21 @@ class AxisEstimate:
 
 
 def estimate(recording: Recording, axis: str, settings: IdentifierSettings, period: int | None = 0) -> AxisEstimate:
-    """The response of one axis, by H1 or, with ``settings.response``, by the joint input-output method.
+    """The response of one axis in the quantity that its sensor reads, by the method that ``settings.response`` names.
 
     period: samples of a period (the window becomes one period, without a taper), 0 to look for one, None for none
     Windows in which the encoder stands still or leaps are left out, as online, and a note says so.
     Raises BadInput if the axis is not there, was not excited, or the data are too short for one window.
     """
     u, y = recording.axis(axis)
-    r = _reference(recording, axis) if settings.response == "joint_input_output" else None
+    method = METHODS[settings.response]
+    r = _reference(recording, axis) if method.reference else None
     repeats = u if r is None else r
-    _moving(axis, u, y, recording.units)
+    _moving(axis, u, y, (recording.units.input, recording.units.measured))
     runs = recording.runs()
+    integrated = recording.measured != "position"
+    if integrated:
+        settings = replace_settings(settings, differenced=False)  # what was measured itself has no drift whose ends would leak
     longest = recording.run(axis).rows
     notes: list[str] = []
     half = None
@@ -74,7 +78,7 @@ def estimate(recording: Recording, axis: str, settings: IdentifierSettings, peri
         period = find_period(repeats[longest])
         if period and r is None and _samples(longest) < MANY * period and _distorted(recording, axis, longest):
             period = None
-        alone = period is None and r is None and settings.differenced and not _closed_loop(recording, axis)
+        alone = period is None and r is None and method.tapered and (settings.differenced or integrated) and not _closed_loop(recording, axis)
         half = find_half_period(u[longest]) if alone else None
     elif period:
         notes += period_note(repeats[longest], period)
@@ -84,13 +88,14 @@ def estimate(recording: Recording, axis: str, settings: IdentifierSettings, peri
     elif period:
         settings, runs = _periodic(settings, runs, period, notes, recording.sampling_rate, "input" if r is None else "reference")
     else:
-        settings = _fitting(settings, runs, notes)
+        settings = _fitting(settings, runs, notes, method.tapered)
     _possible(settings, recording.sampling_rate, _samples(longest) + (half or 0) + bool(period))
-    shape = WindowShape.of(settings.window, settings.length, settings.overlap)
+    shape = method.shape(settings.window, settings.length, settings.overlap)
     grid = 0 if period or not _fits(recording, runs, shape, settings.differenced) else 1
     pieces = [(grid * int(recording.seq[run][0]), u[run], y[run]) for run in runs]
     if half:
-        pieces = half_periods(u[longest], y[longest], half)
+        y = _sensed(recording, y, half, -1.0)
+        pieces = half_periods(u[longest], y[longest], half, settings.differenced)
     elif period and r is None and settings.differenced:
         pieces = [(seq, *one_more(inputs, outputs, period)) for seq, inputs, outputs in pieces]
     frozen = max(round(settings.frozen * recording.sampling_rate), 2)
@@ -101,24 +106,38 @@ def estimate(recording: Recording, axis: str, settings: IdentifierSettings, peri
         periodic=bool(period),
         band=(settings.band_low, settings.band_high),
         min_coherence=settings.min_coherence,
-        units=recording.units,
+        units=(recording.units.input, recording.units.measured),
         rate_error=error_of_rate(recording.time, recording.seq),
     )
-    cut = [(pieces[k][0] + start, pieces[k][1][start:stop], pieces[k][2][start:stop]) for k, start, stop in kept]
-    if r is None:
-        spectra = batch_spectra(cut, shape, settings.differenced)
-        frf = frequency_response(spectra, shape, recording.sampling_rate, options)
-    else:
-        references = [r[runs[k]][start:stop] for k, start, stop in kept]
-        loop = loop_spectra([(seq, ref, one, other) for ref, (seq, one, other) in zip(references, cut, strict=True)], shape, settings.differenced)
-        spectra, frf = loop.output, joint_input_output(loop, shape, recording.sampling_rate, options)
-        notes.append(JOINT)
+    if integrated and not half:
+        y, r = _sensed(recording, y, period or 0), None if r is None else _sensed(recording, r, period or 0)
+        pieces = [(seq, inputs, y[run]) for (seq, inputs, _), run in zip(pieces, runs, strict=True)]
+    none = np.zeros(0)
+    cut = [
+        (pieces[k][0] + start, none if r is None else r[runs[k]][start:stop], pieces[k][1][start:stop], pieces[k][2][start:stop])
+        for k, start, stop in kept
+    ]
+    sums = method.whole(cut, shape, settings.differenced)
+    frf = method.estimate(sums, shape, recording.sampling_rate, options)
+    notes += [method.note] if method.note else []
     frf = replace(frf, sigma=np.maximum(frf.sigma, ROUNDING * np.abs(frf.response)))
     notes += _coherence(frf, settings, bool(period))
     longest = max(runs, key=_samples)
     friction = friction_note(friction_hint(u[longest], y[longest], recording.sampling_rate))
     notes += [*(_closed_loop(recording, axis) if r is None else []), *([friction] if friction else [])]
-    return AxisEstimate(axis=axis, frf=frf, period=period or None, windows=int(spectra.weight), notes=tuple(notes))
+    return AxisEstimate(axis=axis, frf=frf, period=period or None, windows=int(method.windows(sums)), notes=tuple(notes))
+
+
+def _sensed(recording: Recording, y: FloatArray, period: int, sign: float = 1.0) -> FloatArray:
+    """(n,) as the sensor reads it. The last of each run, which its integral does not hold, are as a period before, or as the one before them."""
+    found = np.zeros_like(y)
+    for run in recording.runs():
+        own = as_sensed(y[run], recording.sampling_rate, recording.measured)
+        ends = y[run].size - own.size
+        if 0 < period <= own.size:
+            own = np.append(own, sign * own[own.size - period : own.size - period + ends])
+        found[run] = own if own.size == y[run].size else np.append(own, np.full(ends, own[-1] if own.size else 0.0))
+    return found
 
 
 def _distorted(recording: Recording, axis: str, rows: slice) -> bool:
@@ -153,18 +172,23 @@ def _moving(axis: str, u: FloatArray, y: FloatArray, units: tuple[str, str], nam
             raise BadInput(f"{name} of axis {axis}", f"up to {size:.3g} {unit} in size", allowed, "Check its unit and how it was written.")
 
 
-def _fitting(settings: IdentifierSettings, runs: list[slice], notes: list[str]) -> IdentifierSettings:
-    """The settings with a window that the record holds often enough; as they are where somebody chose another length than the usual."""
+def _fitting(settings: IdentifierSettings, runs: list[slice], notes: list[str], tapered: bool) -> IdentifierSettings:
+    """The settings with a window that the record holds often enough; as they are where somebody chose another length than the usual.
+
+    tapered: several windows are averaged; otherwise lines are, so that one window will do, and the longer it is, the finer they lie
+    """
     if settings.length != USUAL.length:
         return settings
-    length, sizes = settings.length, np.array([max(_samples(run) - 1, 0) for run in runs])
-    while length > SHORTEST and (np.sum(sizes // length) < WINDOWS or length * np.sum(sizes // length) < COVERED * np.sum(sizes)):
+    sizes = np.array([max(_samples(run) - 1, 0) for run in runs])
+    length = settings.length if tapered else min(LONGEST, int(np.max(sizes)) // 2 * 2)
+    while length > SHORTEST and (np.sum(sizes // length) < (WINDOWS if tapered else 1) or length * np.sum(sizes // length) < COVERED * np.sum(sizes)):
         length //= 2
     if length == settings.length:
         return settings
     used = int(np.sum(sizes >= length))
     short = f"; {len(sizes) - used} of {len(sizes)} stretches are shorter than one and are not used" if used < len(sizes) else ""
-    notes.append(f"Windows of {length} samples ({settings.length} is usual), so that the record holds {WINDOWS} or more{short}.")
+    if tapered:
+        notes.append(f"Windows of {length} samples ({settings.length} is usual), so that the record holds {WINDOWS} or more{short}.")
     return replace_settings(settings, length=length)
 
 
@@ -258,9 +282,15 @@ def with_orders(frf: FrequencyResponse, settings: IdentifierSettings) -> tuple[I
     """The settings with the orders that the response tells, and why; unchanged, and None, where somebody asked for orders."""
     if not settings.orders_from_data:
         return settings, None
-    choice = choose(frf, structure_from(settings))
+    family = structure_from(settings)
+    open_question = derivative_of(frf.output_unit) == 2 and settings.integrators == USUAL.integrators
+    choice = choose_among(frf, [replace(family, integrators=count) for count in (2, 1, 0)]) if open_question else choose(frf, family)
     structure = choice.fit.structure
-    orders = {"numerator_order": structure.numerator_order, "denominator_order": structure.denominator_order}
+    orders = {
+        "numerator_order": structure.numerator_order,
+        "denominator_order": structure.denominator_order,
+        "integrators": structure.integrators,
+    }
     return settings.model_copy(update=orders), choice
 
 

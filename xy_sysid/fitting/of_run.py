@@ -14,13 +14,15 @@ from xy_sysid.fitting.of_recording import FIXED, estimate, judged, with_orders
 from xy_sysid.fitting.result import Interval
 from xy_sysid.fitting.structure import Structure, Weighting, structure_from
 from xy_sysid.fitting.verdicts import HeldOut, Validation, Verdict, validate
-from xy_sysid.linear.simulate import simulate
+from xy_sysid.linear.simulate import simulate_sampled
 from xy_sysid.linear.transfer_function import TransferFunction
 from xy_sysid.response.frf import FrequencyResponse
 from xy_sysid.samples.block import FloatArray
+from xy_sysid.samples.integral import detrended
 from xy_sysid.samples.recording import Origin, Recording, Run, one_run
 from xy_sysid.settings import IdentifierSettings, build, changed
 from xy_sysid.tables import Table
+from xy_sysid.units import derivative_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,9 +78,13 @@ class LinearModel:
         return "\n\n".join((repr(self)[1:-1], str(self.tf), *([str(self.table)] if self.intervals else [])))
 
     def velocity(self, sampling_rate: float, voltage: FloatArray, position: FloatArray) -> FloatArray:
-        """(n - 1,) simulated mean velocity of each sample, m/s, from rest."""
+        """(n - 1,) simulated mean velocity of each sample, m/s, from rest; of an acceleration its integral without mean and slow drift."""
         with np.errstate(over="ignore", invalid="ignore"):  # what runs away is told as such
-            return np.asarray(np.diff(simulate(self.tf, sampling_rate, voltage)) * sampling_rate)
+            moved, derivative = simulate_sampled(self.tf, sampling_rate, voltage, self.hold), derivative_of(self.tf.output_unit)
+            if derivative == 2:
+                steps = (moved - np.mean(moved))[:-2] / sampling_rate
+                return detrended(np.concatenate(([0.0], np.cumsum(steps))))
+            return np.asarray(moved[:-1] if derivative else np.diff(moved) * sampling_rate)
 
     def __repr__(self) -> str:
         told = f" of axis {self.axis}" if self.axis else ""

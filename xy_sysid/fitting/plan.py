@@ -74,7 +74,7 @@ def plan_for(frf: FrequencyResponse, structure: Structure) -> Plan:
             rate=frf.sampling_rate,
             resolution=frf.resolution,
             differenced=frf.differenced,
-            integrators=structure.integrators,
+            integrators=structure.power,
             held=structure.hold == "zoh" and structure.domain == "s",
             domain=structure.domain,
         )

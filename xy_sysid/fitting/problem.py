@@ -14,6 +14,7 @@ from xy_sysid.fitting.structure import Structure
 from xy_sysid.linear.transfer_function import TransferFunction
 from xy_sysid.response.frf import ComplexArray, FrequencyResponse
 from xy_sysid.samples.block import FloatArray
+from xy_sysid.units import derivative_of
 
 SMALLEST, LARGEST = 1e-100, 1e100  # of |FRF|: squares of more or less leave the range of numbers
 SMALLEST_SIGMA = 1e-13  # of |FRF|: below this the response is exact in double precision
@@ -43,6 +44,7 @@ class Point:
 
 def problem(frf: FrequencyResponse, structure: Structure) -> Problem:
     """Select the trusted lines and weigh them. Raises BadInput if they cannot determine the parameters."""
+    structure = of_quantity(structure, frf)
     usable = frf.trusted & np.isfinite(frf.response) & (frf.frequency > 0) & (np.abs(frf.response) > 0)
     chosen = frf.select(usable)
     if 2 * len(chosen) <= structure.parameters:
@@ -72,9 +74,17 @@ def problem(frf: FrequencyResponse, structure: Structure) -> Problem:
     return Problem(frf=chosen, structure=structure, plan=plan_for(chosen, structure), weight=weight, sigma=sigma)
 
 
+def of_quantity(structure: Structure, frf: FrequencyResponse) -> Structure:
+    """The same family for a response of position, velocity or acceleration; the last would jump with a held input, so nothing is held."""
+    derivative = derivative_of(frf.output_unit) if structure.domain == "s" else 0
+    if derivative == structure.derivative:
+        return structure
+    return replace(structure, derivative=derivative, hold="none" if derivative == 2 else structure.hold)
+
+
 def model(task: Problem, at: Point) -> Model:
     """The point's bases, evaluated on the problem's grid."""
-    return model_for(task.plan, task.structure.integrators, at.numerator, at.denominator)
+    return model_for(task.plan, task.structure.power, at.numerator, at.denominator)
 
 
 def response(task: Problem, at: Point) -> ComplexArray:
@@ -127,9 +137,11 @@ def from_transfer_function(task: Problem, tf: TransferFunction) -> Point | None:
     numerator, denominator = tf.numerator[np.argmax(tf.numerator != 0) :], tf.denominator[np.argmax(tf.denominator != 0) :]
     if (tf.sampling_time is None) != (structure.domain == "s") or not numerator.size or numerator.size > structure.numerator_order + 1:
         return None
-    if denominator.size != structure.denominator_order + 1:
+    if structure.power < 0:
+        numerator = np.trim_zeros(numerator, "b")
+    if denominator.size != structure.free_order + max(structure.power, 0) + 1:
         return None
-    for _ in range(structure.integrators):
+    for _ in range(max(structure.power, 0)):
         if structure.domain == "s":
             if abs(denominator[-1]) > 1e-9 * float(np.max(np.abs(denominator))):
                 return None
@@ -139,7 +151,7 @@ def from_transfer_function(task: Problem, tf: TransferFunction) -> Point | None:
             if float(np.max(np.abs(rest))) > 1e-6 * float(np.max(np.abs(tf.denominator))):
                 return None
     line, power = task.plan.line, task.plan.scale
-    up = numerator * power ** (np.arange(numerator.size)[::-1] - float(structure.denominator_order))
+    up = numerator * power ** (np.arange(numerator.size)[::-1] - float(structure.free_order + structure.power))
     down = denominator * power ** (np.arange(denominator.size)[::-1] - float(structure.free_order))
     n_values: ComplexArray = np.asarray(np.polyval(up, line), dtype=np.complex128)
     d_values: ComplexArray = np.asarray(np.polyval(down, line), dtype=np.complex128)

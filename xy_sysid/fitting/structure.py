@@ -23,6 +23,8 @@ class Structure:
     hold:        "zoh": the input is constant between samples; "none": it is band-limited (s domain only)
     domain:      "s" continuous or "z" discrete
     weighting:   of one line's error: "sigma" 1 / sigma, "relative" 1 / |FRF| (the paper's), "uniform" 1
+    derivative:  of the position in the response: 0, 1 where it is of a velocity, 2 of an acceleration; orders and integrators are
+                 those of the position
     Raises BadInput for orders that make no sense.
     """
 
@@ -34,6 +36,7 @@ class Structure:
     hold: Literal["zoh", "none"] = "zoh"
     domain: Literal["s", "z"] = "s"
     weighting: Weighting = "sigma"
+    derivative: int = 0
 
     def __post_init__(self) -> None:
         if not 1 <= self.denominator_order <= LARGEST_ORDER:
@@ -53,6 +56,11 @@ class Structure:
     def free_order(self) -> int:
         """Poles to be estimated."""
         return self.denominator_order - self.integrators
+
+    @property
+    def power(self) -> int:
+        """Poles at 0 of the response; negative: zeros."""
+        return self.integrators - self.derivative
 
     @property
     def free_delay(self) -> bool:

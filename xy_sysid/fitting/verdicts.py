@@ -243,7 +243,7 @@ def _simulated(fit: Fit, unseen: HeldOut | None) -> SimulationError | None:
     u, y, rate = unseen
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # an unstable model runs away, and the figure says so
-            return simulation_error(fit.tf, rate, u, y)
+            return simulation_error(fit.tf, rate, u, y, hold=fit.structure.hold)
     except BadInput:
         return None
 

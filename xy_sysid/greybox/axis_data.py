@@ -28,8 +28,9 @@ FIRST = 28_000  # samples of the first stage of a fit, of all recordings togethe
 TRAINING = 2.0 / 3.0  # of the record, for what must run through from the start (one-step prediction)
 EPSILON = 1e-3  # part of the motion to which laws and their integration are trusted
 LIKE = 0.1  # of the whole power in each excited band that the first stage must hold
-FEWEST = 256  # samples
-WINDOWS = 14.0  # window lengths that a record must hold at least; else they are made shorter
+FEWEST = 256  # samples of all recordings
+SHORTEST = 16  # samples of each
+WINDOWS, ROOM = 14.0, 4.0  # window lengths that all recordings together, and the longest, must hold at least; else they are made shorter
 SEEN, HELD = 3.0, 1.5  # window lengths of a block that a fit sees, and of one that is held out
 LOOK = 0.05  # s between two looks at the way that was gone: noise adds nothing to it
 ONCE = 1.2  # times the travel, which a way must be at least for places to be passed again
@@ -92,6 +93,11 @@ class AxisData:
     def noise(self) -> float:
         """rms of the encoder's noise in velocity, below the top band, m/s."""
         return self.layout.rms(self.floor.noise)
+
+    @property
+    def encoder(self) -> float:
+        """rms of the sensor's noise as that of a position, from one sample to the next, m."""
+        return self.floor.encoder / self.sampling_rate ** {"position": 0, "velocity": 1, "acceleration": 2}[self.units.sensed]
 
     @property
     def runs(self) -> tuple[slice, ...]:
@@ -187,19 +193,21 @@ def prepare_all(
     for voltage, position in recordings:
         if voltage.shape != position.shape or voltage.ndim != 1:
             raise BadInput("shape of voltage and position", f"{voltage.shape} and {position.shape}", "one and the same (n,)", "Give one axis.")
-        if voltage.size < FEWEST:
-            raise BadInput("number of samples", voltage.size, f"{FEWEST} or more", "Record for longer.")
+        if voltage.size < SHORTEST:
+            raise BadInput("number of samples of a recording", voltage.size, f"{SHORTEST} or more", "Leave it out.")
         if not (np.all(np.isfinite(voltage)) and np.all(np.isfinite(position))):
             raise BadInput("samples", "not finite", "finite numbers", "Remove what is not a number.")
     sizes = [voltage.size for voltage, _ in recordings]
+    if sum(sizes) < FEWEST:
+        raise BadInput("number of samples", sum(sizes), f"{FEWEST} or more", "Record for longer.")
     starts = tuple(int(start) for start in np.cumsum([0, *sizes[:-1]]))
     velocities = [sample_velocity(sampling_rate, position) for _, position in recordings]
     velocity = np.concatenate(velocities)
-    layout = bands(sampling_rate, int(max(sizes) / WINDOWS))
+    layout = bands(sampling_rate, int(min(sum(sizes) / WINDOWS, max(sizes) / ROOM)), sensed=units.sensed)
     edges = np.cumsum([0, *(item.size for item in velocities)])
     spans = [(int(a), int(b)) for a, b in pairwise(edges)]
     whole = Windows(layout, np.concatenate([_begins(layout.length, *span) for span in spans]))
-    encoder = max(encoder_noise(sampling_rate, position) for _, position in recordings)
+    encoder = max(encoder_noise(sampling_rate, position, units.sensed, voltage) for voltage, position in recordings)
     fitted, held = _split(layout, spans, velocity)
     least = floor(whole, velocity, encoder, epsilon)
     steps = [slice(*span) for span in spans]

@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 
 from xy_sysid.response.frf import ComplexArray
 from xy_sysid.samples.block import FloatArray
+from xy_sysid.samples.recording import as_sensed
+from xy_sysid.units import Sensed
 
 TOP = 700.0  # Hz; above, at 2 kHz, differences of an encoder's position are all noise
 TOP_SHARE = 0.35  # of the sampling rate, for slow sampling
@@ -33,12 +35,21 @@ class Bands:
     """Windows and bands of one sampling rate.
 
     length: samples of a window; band: (lines,) number of the band that each line of the spectrum up to the top is in
+    sensed: what was measured; where it is an acceleration, spectra are of that, and m/s is m/s^2 wherever a power or an rms is named
     """
 
     sampling_rate: float
     length: int
     band: NDArray[np.int64]
     count: int
+    sensed: Sensed = "position"
+
+    @property
+    def amplitude(self) -> FloatArray:
+        """(lines,) that the spectrum of a velocity is multiplied by: 1, or what makes an acceleration of it."""
+        if self.sensed != "acceleration":
+            return np.ones(self.band.size)
+        return np.asarray(2.0 * np.sin(np.pi * self.frequency / self.sampling_rate) * self.sampling_rate)
 
     @property
     def frequency(self) -> FloatArray:
@@ -87,7 +98,8 @@ class Windows:
         cut, taper = np.empty((*signal.shape[:-1], self.begins.size, length)), _taper(length)
         for place, begin in enumerate(self.begins.tolist()):
             np.multiply(signal[..., begin : begin + length], taper, out=cut[..., place, :])
-        return np.asarray(scipy.fft.rfft(cut)[..., : self.layout.band.size])
+        found = np.asarray(scipy.fft.rfft(cut)[..., : self.layout.band.size])
+        return found * self.layout.amplitude if self.layout.sensed == "acceleration" else found
 
     def before(self, samples: int) -> Windows:
         """Those that end within the first samples."""
@@ -105,7 +117,7 @@ def _taper(length: int) -> FloatArray:
     return np.asarray(np.sqrt(2.0 / 0.75 / length) * np.sin(np.pi * (np.arange(length) + 0.5) / length) ** 2)
 
 
-def bands(sampling_rate: float, samples: int, count: int = 36) -> Bands:
+def bands(sampling_rate: float, samples: int, count: int = 36, sensed: Sensed = "position") -> Bands:
     """Windows of about 2 s (less for short data) and ``count`` bands or fewer, evenly spaced in the logarithm."""
     wanted = min(WINDOW * sampling_rate, samples)
     length = 2 ** max(int(np.round(np.log2(max(wanted, 16.0)))), 4)
@@ -113,7 +125,7 @@ def bands(sampling_rate: float, samples: int, count: int = 36) -> Bands:
     last = max(int(top * length / sampling_rate), 2)
     edges = np.unique(np.round(np.geomspace(2.0, last + 1, count + 1)).astype(np.int64))
     band = np.maximum(np.searchsorted(edges, np.arange(last + 1), side="right") - 1, 0)
-    return Bands(sampling_rate, length, band, int(band[-1]) + 1)
+    return Bands(sampling_rate=sampling_rate, length=length, band=band, count=int(band[-1]) + 1, sensed=sensed)
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +134,8 @@ class Floor:
 
     noise:   (bands,) of the encoder alone, m^2/s^2, as of ``Bands.power``; power: with what laws and their integration are not trusted to
     motion:  (bands,) of what is measured; excited: (bands,) bool
-    encoder: rms of the encoder's noise in position, m; epsilon: part of the motion to which laws are trusted; lines: (bands,) in each
+    encoder: rms of the sensor's white noise, in the unit of what it measures
+    epsilon: part of the motion to which laws are trusted; lines: (bands,) in each
     """
 
     noise: FloatArray
@@ -152,16 +165,32 @@ class Floor:
         return lambda power: max(float(np.sum(weight * (power - self.noise))) / whole, share)
 
 
-def encoder_noise(sampling_rate: float, position: FloatArray) -> float:
-    """rms of white noise in position, m: from the quietest band below Nyquist, not below what counting alone makes."""
-    velocity = np.diff(position) * sampling_rate
-    length = min(4096, velocity.size // 2 * 2)
-    windows = np.lib.stride_tricks.sliding_window_view(velocity, length)[:: length // 2] * np.hanning(length)
-    power = np.mean(np.abs(scipy.fft.rfft(windows, axis=1)) ** 2, axis=0) / np.sum(np.hanning(length) ** 2)
+def encoder_noise(sampling_rate: float, position: FloatArray, sensed: Sensed = "position", driven_by: FloatArray | None = None) -> float:
+    """rms of the sensor's white noise: from the quietest band below Nyquist, not below what counting alone makes.
+
+    sensed: what it measures, of which position (n,) is the integral; the noise is in the unit of that
+    driven_by: input (n,); what it explains is no noise of a velocity or an acceleration, which go on up to Nyquist
+    """
+    measured = as_sensed(position, sampling_rate, sensed)
+    stationary = np.diff(position) * sampling_rate if sensed == "position" else measured
+    length = min(4096, stationary.size // 2 * 2)
+    if sensed != "position" and driven_by is not None:
+        length = min(length, max(2 ** int(np.log2(max(stationary.size / 8.0, 32.0))), 32), stationary.size // 2 * 2)
+    windows = np.lib.stride_tricks.sliding_window_view(stationary, length)[:: length // 2] * np.hanning(length)
+    spectrum = scipy.fft.rfft(windows, axis=1)
+    power = np.mean(np.abs(spectrum) ** 2, axis=0)
+    if sensed != "position" and driven_by is not None and windows.shape[0] > 2:
+        inputs = np.lib.stride_tricks.sliding_window_view(driven_by[: stationary.size], length)[:: length // 2] * np.hanning(length)
+        drive = scipy.fft.rfft(inputs - inputs.mean(axis=1, keepdims=True), axis=1)
+        shared = np.abs(np.mean(spectrum * drive.conj(), axis=0)) ** 2 / np.maximum(np.mean(np.abs(drive) ** 2, axis=0), 1e-300)
+        power = np.maximum(power - shared, 0.0) * windows.shape[0] / (windows.shape[0] - 1.0)
+    power = power / np.sum(np.hanning(length) ** 2)
     share = np.arange(1, power.size) / (length / 2.0)  # without the mean, which no noise in position makes
-    white = power[1:] / np.maximum((2.0 * np.sin(0.5 * np.pi * share) * sampling_rate) ** 2, 1e-300)
+    white = power[1:]
+    if sensed == "position":
+        white = white / np.maximum((2.0 * np.sin(0.5 * np.pi * share) * sampling_rate) ** 2, 1e-300)
     seen = [float(np.median(white[(share >= low) & (share < low + 0.05)])) for low in np.arange(*NOISE_BAND, 0.05)]
-    return float(np.sqrt(max(min(seen), count_size(position) ** 2 / 12.0)))
+    return float(np.sqrt(max(min(seen), count_size(measured) ** 2 / 12.0)))
 
 
 def count_size(position: FloatArray) -> float:
@@ -182,10 +211,12 @@ def count_size(position: FloatArray) -> float:
 def floor(windows: Windows, velocity: FloatArray, encoder: float, epsilon: float) -> Floor:
     """The floor of data with this measured velocity (n,), m/s."""
     layout = windows.layout
-    unit = (2.0 * np.sin(np.pi * layout.frequency / layout.sampling_rate) * layout.sampling_rate) ** 2  # of white noise in position, by line
+    unit = np.ones(layout.band.size)  # of the sensor's white noise, by line
+    if layout.sensed == "position":
+        unit = (2.0 * np.sin(np.pi * layout.frequency / layout.sampling_rate) * layout.sampling_rate) ** 2
     signal = layout.power(windows.spectrum(velocity))
     noise = np.bincount(layout.band, unit, layout.count) / layout.lines * encoder**2
-    count = count_size(np.cumsum(velocity) / layout.sampling_rate)
+    count = count_size(np.cumsum(velocity) / layout.sampling_rate) if layout.sensed == "position" else 0.0  # others count white
     if count > 0.0:
         seen = np.flatnonzero(signal > SEEN * noise)
         top = float(layout.edges()[(seen[-1] if seen.size else 0) + 1])

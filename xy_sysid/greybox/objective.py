@@ -108,9 +108,10 @@ def likeliest(floor: FloatArray, power: FloatArray, response: FloatArray, lines:
 
 
 def responder(layout: Bands, model: AxisModel) -> Callable[[FloatArray], FloatArray]:
-    """A function from a row of the model's parameters (see ``axis.simulator``) to (bands,) |G|^2, (m/s/V)^2: the power of its response to a force."""
+    """A function from a row of the model's parameters (see ``axis.simulator``) to (bands,) |G|^2, (m/s/V)^2: its response to a force."""
     turn = np.exp(-2j * np.pi * layout.frequency / layout.sampling_rate)
     omega2 = (2.0 * np.pi * layout.frequency) ** 2
+    as_judged = layout.amplitude**2
     sections = []
     at = 3
     for name, values in model.effects:
@@ -121,7 +122,7 @@ def responder(layout: Bands, model: AxisModel) -> Callable[[FloatArray], FloatAr
 
     def respond(row: FloatArray) -> FloatArray:
         gain, pole = float(row[0]), float(row[2])
-        power = (gain * pole) ** 2 / (omega2 + pole**2)
+        power = as_judged * (gain * pole) ** 2 / (omega2 + pole**2)
         for effect, place in sections:
             own = dict(zip(effect.names, row[place : place + len(effect.names)].tolist(), strict=True))
             section = effect.functions["section"]

@@ -140,7 +140,7 @@ def _innovation(data: AxisData, model: AxisModel, effect: Effect) -> FloatArray:
 def noise_of(data: AxisData) -> float:
     """Standard deviation of the encoder, m."""
     count = count_size(data.position)
-    return min(data.floor.encoder, max(count / np.sqrt(12.0), 1e-12)) if count > 0.0 else data.floor.encoder
+    return min(data.encoder, max(count / np.sqrt(12.0), 1e-12)) if count > 0.0 else data.encoder
 
 
 def as_beside(data: AxisData, library: Library, others: Others) -> Beside:

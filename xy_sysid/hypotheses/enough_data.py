@@ -12,17 +12,18 @@ from xy_sysid.errors import BadInput
 from xy_sysid.greybox.axis_data import AxisData, prepare_all
 from xy_sysid.hypotheses.criteria import CHANCE, FEWEST, STILL
 from xy_sysid.samples.block import FloatArray
+from xy_sysid.units import USUAL, Units
 
 
-def lacking(sampling_rate: float, recordings: Sequence[tuple[FloatArray, FloatArray]]) -> str:
+def lacking(sampling_rate: float, recordings: Sequence[tuple[FloatArray, FloatArray]], units: Units = USUAL) -> str:
     """What is missing in the data, in words; empty if they will do."""
-    voltage, position = max(recordings, key=lambda pair: pair[0].size)
+    voltage, position = _one_after_the_other(recordings)
     if float(voltage.std()) == 0.0:
         return "the input does not move; excite the axis."
     if float(position.std()) == 0.0:
         return "the output does not move; excite more, or check the encoder."
     try:
-        data = prepare_all(sampling_rate, recordings)
+        data = prepare_all(sampling_rate, recordings, units=units)
     except BadInput as problem:
         return str(problem)
     if data.held is data.fitted:
@@ -33,10 +34,12 @@ def lacking(sampling_rate: float, recordings: Sequence[tuple[FloatArray, FloatAr
         return f"the output does not follow the input (coherence {followed:.2g} at best, {least:.2g} is the least); check which signals these are."
     moving = [_moving(data, begins) for begins in (data.fitted.begins, data.held.begins)]
     if moving[0] < 2 * FEWEST or moving[1] < FEWEST:
-        seconds = data.layout.length / sampling_rate
+        seconds, every = data.layout.length / sampling_rate, data.fitted.begins.size + data.held.begins.size
+        goes = sum(_moving(data, begins, about_mean=False) for begins in (data.fitted.begins, data.held.begins))
+        what = "stands most of the time: it moves" if goes <= sum(moving) else "keeps its speed most of the time: it changes"
         return (
-            f"the axis stands most of the time: it moves in {moving[0] + moving[1]} of {data.fitted.begins.size + data.held.begins.size} windows "
-            f"of {seconds:.2g} s; let it move for longer, in all of its directions and speeds."
+            f"the axis {what} in {sum(moving)} of {every} windows of {seconds:.2g} s; "
+            "let it move for longer, in all of its directions and speeds. For short step tests use steps."
         )
     if _tones(voltage) < FEWEST:
         return "the input holds one tone only; use noise, a multisine over the whole band, or steps."
@@ -46,13 +49,22 @@ def lacking(sampling_rate: float, recordings: Sequence[tuple[FloatArray, FloatAr
     return ""
 
 
-def _moving(data: AxisData, begins: np.ndarray) -> int:
-    """How many windows hold motion, against the liveliest tenth of all."""
+def _one_after_the_other(recordings: Sequence[tuple[FloatArray, FloatArray]]) -> tuple[FloatArray, FloatArray]:
+    """(n,) input and output of all recordings, each going on where the last one ended."""
+    if len(recordings) == 1:
+        return recordings[0]
+    steps = [np.diff(position) for _, position in recordings]
+    return np.concatenate([voltage[1:] for voltage, _ in recordings]), np.cumsum(np.concatenate(steps))
+
+
+def _moving(data: AxisData, begins: np.ndarray, about_mean: bool = True) -> int:
+    """How many windows hold motion, against the liveliest tenth of all; about_mean: speed that changes, otherwise any."""
     every = np.concatenate((data.fitted.begins, data.held.begins))
     length = data.layout.length
 
     def sizes(starts: np.ndarray) -> FloatArray:
-        return np.array([float(np.std(data.velocity[start : start + length])) for start in starts])
+        parts = (data.velocity[start : start + length] for start in starts)
+        return np.array([float(np.std(part) if about_mean else np.sqrt(np.mean(part**2))) for part in parts])
 
     return int(np.sum(sizes(begins) > STILL * float(np.quantile(sizes(every), 0.9))))
 

@@ -108,7 +108,7 @@ class OneStepTrials:
         pool = self.pool
         bar = min(self.ahead(each.fit) for each in {node, pool.best})
         key = (name, node.effects, hidden)
-        if not FILTERED * bar > pool.data.floor.encoder * pool.data.sampling_rate or key in self.fitted:
+        if not FILTERED * bar > pool.data.encoder * pool.data.sampling_rate or key in self.fitted:
             return
         wanted = Wanted(Limits(FILTERED * bar, pool.late), pool.worth, lambda fit: refusal(pool.data, pool.library, fit), hidden)
         grew = grown(pool.data, node.fit, pool.library[name], wanted)

@@ -11,7 +11,8 @@ from xy_sysid.imports.foreign_units import Unit, to_si, unit_of
 from xy_sysid.imports.reading import Reading
 from xy_sysid.imports.sheet_table import scaled
 from xy_sysid.samples.block import FloatArray
-from xy_sysid.samples.recording import Recording, Sensed
+from xy_sysid.samples.recording import Recording
+from xy_sysid.units import Sensed
 
 
 def in_units(recording: Recording, reading: Reading) -> Recording:

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 
 from xy_sysid.samples.block import FloatArray
-from xy_sysid.samples.integral import integral, integrated
+from xy_sysid.samples.integral import detrended, integral
 from xy_sysid.samples.recording import Recording
 
 TURN, NEARLY = 2 * np.pi, 0.5  # rad; a step that is a turn within so much, where others are smaller than that, is an angle that wraps
@@ -32,11 +32,16 @@ def as_position(recording: Recording) -> Recording:
         values = _integral(recording, values - values.mean(axis=0))
         values = _without_line(recording, values)
         notes.append(
-            f"the output is an acceleration ({unit}): it is integrated twice, without its mean and slow drift, so a constant load "
-            f"cannot be seen; a delay found from it contains a whole sample ({1e3 / recording.sampling_rate:.3g} ms)"
+            f"the output is an acceleration ({unit}): responses and errors are those of the acceleration; positions and speeds are its integrals "
+            f"without mean and slow drift, so a constant load cannot be seen, and a delay that diagnose and refine find contains a whole sample "
+            f"({1e3 / recording.sampling_rate:.3g} ms)"
         )
     else:
-        notes.append(integrated(unit, recording.sampling_rate))
+        notes.append(
+            f"the output is a velocity ({unit}): responses and errors are those of the velocity; positions are its integral and count from 0, "
+            f"and a delay that diagnose and refine find contains half a sample ({0.5e3 / recording.sampling_rate:.3g} ms), "
+            "or a whole one if the drive differences its encoder"
+        )
     measured = _integral(recording, values)
     reference = None if recording.reference is None else _integral(recording, recording.reference)
     if recording.measured == "acceleration":
@@ -54,8 +59,5 @@ def _without_line(recording: Recording, values: FloatArray) -> FloatArray:
     """Each run less its straight line."""
     values = values.copy()
     for run in recording.runs():
-        size = run.stop - run.start
-        if size > 2:
-            line = np.column_stack((np.ones(size), np.arange(size) / size))
-            values[run] -= line @ np.linalg.lstsq(line, values[run], rcond=None)[0]
+        values[run] = np.column_stack([detrended(column) for column in values[run].T])
     return values

@@ -147,7 +147,9 @@ def _of_units(recording: Recording) -> list[str]:
     found = []
     drive, motion = unit_of(recording.input_unit).quantity, unit_of(recording.output_unit).quantity
     if drive not in (*DRIVES, "unknown"):
-        found.append(f"the input is in {recording.input_unit}, which drives nothing: are columns swapped, or is it a reference?")
+        found.append(
+            f"the input is in {recording.input_unit}, which drives nothing: are columns swapped, or is it a target? xy-sysid servo models those"
+        )
     if motion in DRIVES:
         found.append(f"the output is in {recording.output_unit}, which is no motion: are columns swapped, or is it a sensor's voltage (--scale)?")
     if drive == "current":

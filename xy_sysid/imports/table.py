@@ -17,7 +17,8 @@ from xy_sysid.imports.motion import wraps
 from xy_sysid.imports.paired_streams import LARGEST, cut, hollow, sane
 from xy_sysid.imports.reading import Reading
 from xy_sysid.samples.block import FloatArray
-from xy_sysid.samples.recording import Recording, Sensed, rate_from_time
+from xy_sysid.samples.recording import Recording, rate_from_time
+from xy_sysid.units import Sensed
 
 USUAL = ("x", "y", "z")
 ONE_UNIT = "Give all axes of one kind the same unit, or choose axes of one unit with --axis."

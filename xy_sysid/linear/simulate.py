@@ -7,6 +7,7 @@ Computer-Controlled Systems, 3rd ed., sec. 2.3 and 3.2).
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 import scipy.linalg
@@ -18,6 +19,7 @@ from xy_sysid.linear.transfer_function import TransferFunction
 from xy_sysid.response.frf import ComplexArray
 from xy_sysid.samples.block import FloatArray
 
+FINER = 8  # steps in a sample of an input that is not held
 WHOLE = 1e-9  # a delay within this part of a sample is a whole number of samples
 
 
@@ -175,7 +177,25 @@ class SimulationError:
     seconds: float
 
 
-def simulation_error(tf: TransferFunction, sampling_rate: float, held_input: FloatArray, measured: FloatArray, skip: float = 0.5) -> SimulationError:
+def simulate_sampled(tf: TransferFunction, sampling_rate: float, values: FloatArray, hold: Literal["zoh", "none"] = "zoh") -> FloatArray:
+    """(n,) answer, from rest, to an input of which the samples (n,) are known: held from each to the next, or band-limited between them."""
+    if hold == "zoh" or tf.sampling_time is not None:
+        return simulate(tf, sampling_rate, values)
+    from scipy.signal import resample_poly
+
+    fine = np.asarray(resample_poly(values, FINER, 1, padtype="line"), dtype=np.float64)
+    middle = 0.5 * (fine + np.append(fine[1:], fine[-1:]))
+    return simulate(tf, FINER * sampling_rate, middle)[::FINER]
+
+
+def simulation_error(
+    tf: TransferFunction,
+    sampling_rate: float,
+    held_input: FloatArray,
+    measured: FloatArray,
+    skip: float = 0.5,
+    hold: Literal["zoh", "none"] = "zoh",
+) -> SimulationError:
     """Simulate from the measured input and compare with the measured output.
 
     An integrating model is compared in velocity, as its position drifts from any tiny offset. Constant parts are removed
@@ -187,7 +207,7 @@ def simulation_error(tf: TransferFunction, sampling_rate: float, held_input: Flo
     first = int(skip * sampling_rate)
     if measured.size < first + 16:
         raise BadInput("number of samples", measured.size, f"{first + 16} or more", "Give a longer recording.")
-    predicted = simulate(tf, sampling_rate, held_input - np.mean(held_input))
+    predicted = simulate_sampled(tf, sampling_rate, held_input - np.mean(held_input), hold)
     compared, unit, target = "output", tf.output_unit, measured
     if tf.integrators:
         compared, unit = "velocity", f"{tf.output_unit}/s"

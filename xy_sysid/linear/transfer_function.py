@@ -11,6 +11,7 @@ import numpy as np
 from xy_sysid.errors import BadInput
 from xy_sysid.response.frf import ComplexArray
 from xy_sysid.samples.block import FloatArray
+from xy_sysid.units import derivative_of
 
 ON_THE_EDGE = 1e-9  # relative distance from the stability limit that counts as on it
 
@@ -84,10 +85,16 @@ class TransferFunction:
 
     @property
     def gain(self) -> float:
-        """Limit of s^integrators H(s) at s = 0: static gain; with one integrator the velocity gain."""
+        """Limit of s^integrators H(s) at s = 0: static gain; with one integrator the velocity gain.
+
+        Of a velocity or an acceleration that of the position: the zeros at s = 0 that differentiating it makes are divided out.
+        """
         count = self.integrators
         if self.sampling_time is None:
-            return float(self.numerator[-1] / self.denominator[self.denominator.size - 1 - count])
+            top = self.numerator
+            for _ in range(derivative_of(self.output_unit)):
+                top = top[:-1] if top.size > 1 and top[-1] == 0.0 else top
+            return float(top[-1] / self.denominator[self.denominator.size - 1 - count])
         reduced = self.denominator
         for _ in range(count):
             reduced = np.polydiv(reduced, np.array([1.0, -1.0]))[0]

@@ -7,20 +7,18 @@ sample counter, and a fit falls due after a set number of seconds of data, never
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
 from xy_sysid.errors import BadInput
 from xy_sysid.live.recent import Recent
-from xy_sysid.response.closed_loop import LoopTransformer, RunningLoop, joint_input_output
 from xy_sysid.response.frf import FrequencyResponse
-from xy_sysid.response.h1 import H1Options, frequency_response
-from xy_sysid.response.spectra import RunningSpectra, State, Transformer
+from xy_sysid.response.h1 import H1Options
+from xy_sysid.response.methods import METHODS, Running
+from xy_sysid.response.spectra import State
 from xy_sysid.response.window_check import window_fault
-from xy_sysid.response.windows import Window, Windower, WindowShape
+from xy_sysid.response.windows import Window, Windower
 from xy_sysid.samples.block import Block, Samples, StreamName
 from xy_sysid.samples.pairing import QUANTITIES, RATE_TOLERANCE, Gap, Pairer
 from xy_sysid.samples.rate import StampLine
@@ -73,9 +71,9 @@ class Identifier:
         self.settings = settings
         self.axes = axes
         self._units = units
-        self._shape = WindowShape.of(settings.window, settings.length, settings.overlap)
-        self._loop = settings.response == "joint_input_output"
-        self._transform: Callable[[Window], list[Any]] = (LoopTransformer if self._loop else Transformer)(self._shape, settings.differenced)
+        self._method = METHODS[settings.response]
+        self._shape = self._method.shape(settings.window, settings.length, settings.overlap)
+        self._transform = self._method.transform(self._shape, settings.differenced)
         self.reset()
 
     def reset(self) -> None:
@@ -83,10 +81,10 @@ class Identifier:
         self._pairer: Pairer | None = None
         self._rate: float | None = None
         self._line = StampLine()
-        self._hold = ReferenceHold(self.axes, self.settings.reorder) if self._loop else None
-        self._windower = Windower(self._shape, len(self.axes), int(self.settings.differenced), self._loop)
-        self._main: dict[str, RunningSpectra | RunningLoop] = {}
-        self._recent: dict[str, RunningSpectra | RunningLoop] = {}
+        self._hold = ReferenceHold(self.axes, self.settings.reorder) if self._method.reference else None
+        self._windower = Windower(self._shape, len(self.axes), int(self.settings.differenced), self._method.reference)
+        self._main: dict[str, Running] = {}
+        self._recent: dict[str, Running] = {}
         self._used: Counter[str] = Counter()
         self._dropped: dict[str, Counter[str]] = {axis: Counter() for axis in self.axes}
         self._counts: Counter[str] = Counter()
@@ -214,11 +212,8 @@ class Identifier:
         memory = self.settings.memory
         forget = float(np.exp(-self._shape.hop / rate / memory)) if memory > 0 else 1.0
         for axis in self.axes:
-            self._main[axis] = self._running(forget, self.settings.sliding)
-            self._recent[axis] = self._running(1.0, self.settings.alarm_windows)
-
-    def _running(self, forget: float, sliding: int) -> Any:
-        return (RunningLoop if self._loop else RunningSpectra)(self._shape, forget, sliding)
+            self._main[axis] = self._method.running(self._shape, forget, self.settings.sliding)
+            self._recent[axis] = self._method.running(self._shape, 1.0, self.settings.alarm_windows)
 
     def request(self, seq: int, rate: float) -> FitRequest:
         """What there is to fit now."""
@@ -240,7 +235,7 @@ class Identifier:
             )
         return FitRequest(number=self._number, seq=seq, seconds=seconds, sampling_rate=rate, axes=axes, faults=self.faults, going_on=going_on)
 
-    def _frf(self, running: RunningSpectra | RunningLoop, rate: float) -> FrequencyResponse:
+    def _frf(self, running: Running, rate: float) -> FrequencyResponse:
         settings = self.settings
         options = H1Options(
             differenced=settings.differenced,
@@ -249,9 +244,7 @@ class Identifier:
             units=self._units,
             rate_error=self._line.error,
         )
-        if isinstance(running, RunningLoop):
-            return joint_input_output(running.get(), self._shape, rate, options)
-        return frequency_response(running.get(), self._shape, rate, options)
+        return self._method.estimate(running.get(), self._shape, rate, options)
 
     def state(self) -> State:
         """Everything learnt, as named arrays, to go on after a restart."""
@@ -259,7 +252,7 @@ class Identifier:
         state: State = {
             "version": np.array([STATE_VERSION], dtype=np.float64),
             "axes": np.array(self.axes),
-            "key": np.array([settings.window, str(settings.length), str(settings.overlap), str(settings.differenced), *self._method]),
+            "key": np.array([settings.window, str(settings.length), str(settings.overlap), str(settings.differenced), *self._named]),
             "numbers": np.array([self._rate or 0.0, self._samples, self._number], dtype=np.float64),
             "clock": np.array([self._line.rate or 0.0, self._line.error], dtype=np.float64),
             "used": np.array([self._used[axis] for axis in self.axes], dtype=np.float64),
@@ -270,9 +263,9 @@ class Identifier:
         return state
 
     @property
-    def _method(self) -> tuple[str, ...]:
+    def _named(self) -> tuple[str, ...]:
         """What states of output over input, the first method, do not name."""
-        return (self.settings.response,) if self._loop else ()
+        return () if self.settings.response == "h1" else (self.settings.response,)
 
     def restore(self, state: State) -> None:
         """Go on from a saved state; raises BadInput if it was made with other axes or windows."""

@@ -71,7 +71,7 @@ def diagnosis_status(story: Story) -> StatusMessage:
             "confidence (1)": f"{found.confidence:.3f}",
         }
     if now is not None:
-        speed = story.units.speed
+        speed = story.units.judged
         values |= {
             f"error of the rigid model ({speed})": f"{story.steps[0].rung.held_out_error:.6g}",
             f"error now ({speed})": f"{now.held_out_error:.6g}",

@@ -83,7 +83,7 @@ def _studied(recording: Recording, axis: str, settings: IdentifierSettings, peri
             if not studied.fits or studied.frf is None:
                 return studied, None
             judged(studied.frf)
-            return studied, validate(studied.fits["ML"], studied.frf, unseen.run(axis).signals if len(unseen) else None, choice=studied.choice)
+            return studied, validate(studied.fits["ML"], studied.frf, unseen.run(axis).sensed if len(unseen) else None, choice=studied.choice)
     except BadInput as refusal:
         return replace(studied, fits={}, pair=None, problem=str(refusal)), None
     except (np.linalg.LinAlgError, ZeroDivisionError):

@@ -202,7 +202,7 @@ def pair_figure(change: BeforeAfter) -> go.Figure:
         fit = pair.fit
         chosen = (fit.frequency >= low) & (fit.frequency <= high)
         frequency, measured, model = fit.frequency[chosen], fit.measured[chosen], fit.response[chosen]
-        factor = 2j * np.pi * frequency if fit.structure.integrators else np.ones_like(measured)
+        factor = 2j * np.pi * frequency if fit.structure.power > 0 else np.ones_like(measured)
         sigma = 1.0 / fit.weight[chosen] if fit.structure.weighting == "sigma" else np.zeros(frequency.size)
         part = Z95 * sigma / np.sqrt(2) / np.abs(measured)
         phase = phase_of(measured * factor)
@@ -237,7 +237,7 @@ def pair_figure(change: BeforeAfter) -> go.Figure:
         figure.add_vline(x=0, line={"color": METHODS["measured"], "width": 1}, row=3, col=1)
         figure.update_xaxes(title_text=f"shift, {change.after_name} − {change.before_name} (Hz)", row=3, col=1)
         figure.update_yaxes(range=[-0.6, len(shifts) - 0.4], row=3, col=1)
-    speed = bool(known) and known[0][1].fit.structure.integrators > 0
+    speed = bool(known) and known[0][1].fit.structure.power > 0
     tf = known[0][1].fit.tf if known else None
     ratio = over(f"{readable(tf.output_unit)[1]}{'/s' if speed else ''}", tf.input_unit) if tf is not None else ""
     figure.update_yaxes(title_text=f"dB re {plain(ratio)}", row=1, col=1)

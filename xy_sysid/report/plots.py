@@ -99,5 +99,5 @@ def _document(found: Diagnosis | Refinement | Ladder) -> dict[str, Any]:
     return {
         "ladder": [rung_document(rung(step.fit, step.added)) for step in steps],
         "sentence": found.sentence if isinstance(found, Diagnosis) else "",
-        "units": {"input": units.input, "output": units.output},
+        "units": {"input": units.input, "output": units.output, "judged": units.judged},
     }

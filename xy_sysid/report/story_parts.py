@@ -38,8 +38,8 @@ def pictured(document: Document, step: int | None = None) -> Mapping[str, Any] |
 
 
 def speed_unit(document: Document) -> tuple[float, str]:
-    """Factor and name of people's unit of velocity: 1000 and mm/s for m."""
-    return motion(f"{document['units']['output']}/s")
+    """Factor and name of people's unit of errors: 1000 and mm/s for m."""
+    return motion(document["units"].get("judged", f"{document['units']['output']}/s"))
 
 
 def drawing(heights: list[float], height: int, mode: str, gap: float = 0.07, shared: bool = True) -> go.Figure:

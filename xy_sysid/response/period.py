@@ -66,11 +66,16 @@ def one_more(u: FloatArray, y: FloatArray, period: int) -> tuple[FloatArray, Flo
     return np.append(u, u[-period]), np.append(y, y[-1] + y[-period] - y[-period - 1])
 
 
-def half_periods(u: FloatArray, y: FloatArray, half: int) -> list[tuple[int, FloatArray, FloatArray]]:
-    """Each half period of input and output (n,) followed by its own negative: a whole period, in which nothing leaks, and one sample more.
+def half_periods(u: FloatArray, y: FloatArray, half: int, differenced: bool = True) -> list[tuple[int, FloatArray, FloatArray]]:
+    """Each half period of input and output (n,) followed by its own negative: a whole period, in which nothing leaks.
 
+    differenced: by the steps of the output, and with one sample more, as its differences need it
     The first is left out where more than two remain. Each is numbered as if they followed each other.
     """
+    if not differenced:
+        count = y.shape[0] // half
+        parts = [slice(k * half, (k + 1) * half) for k in range(int(count > FEWEST), count)]
+        return [(2 * part.start, np.concatenate((u[part], -u[part])), np.concatenate((y[part], -y[part]))) for part in parts]
     steps = np.append(np.diff(y), 0.0)
     count = u.shape[0] // half
     if u.shape[0] == count * half:

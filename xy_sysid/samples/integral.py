@@ -22,6 +22,14 @@ def integral(values: FloatArray, lasting: FloatArray, start: FloatArray | float 
     return np.asarray(np.cumsum(np.concatenate((first, values[:-1] * lasting[:, None])), axis=0))
 
 
+def detrended(values: FloatArray) -> FloatArray:
+    """(n,) less their straight line."""
+    if values.size < 3:
+        return values
+    line = np.column_stack((np.ones(values.size), np.arange(values.size) / values.size))
+    return np.asarray(values - line @ np.linalg.lstsq(line, values, rcond=None)[0])
+
+
 def integrated(unit: str = "", rate: float | None = None) -> str:
     """What is to be known of a velocity that was integrated. unit: its own; rate: Hz; where they are known."""
     named, half = f" ({unit})" if unit else "", "" if rate is None else f" ({0.5e3 / rate:.3g} ms)"

@@ -6,14 +6,14 @@ import hashlib
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from xy_sysid.errors import BadInput
 from xy_sysid.samples.block import FloatArray
-from xy_sysid.units import SCALES, Units
+from xy_sysid.units import OF, SCALES, Sensed, Units
 
 STANDS = 0.02  # part of the longest way of a second: an axis that goes less far, and is not driven, stands
 COMPARABLE = 0.5  # of the longest stretch; shorter ones hold too few of its windows
@@ -30,9 +30,6 @@ class Origin:
     notes: tuple[str, ...] = ()
 
 
-Sensed = Literal["position", "velocity", "acceleration"]
-
-
 @dataclass(frozen=True, slots=True)
 class Run:
     """Consecutive samples of one axis, without a gap.
@@ -41,6 +38,7 @@ class Run:
     voltage:       (n,) input in ``input_unit``, held from its instant to the next
     position:      (n,) output in ``output_unit`` at its instant
     first:         row of the first sample in the recording
+    measured:      what the sensor reads; ``position`` is the integral of a velocity or an acceleration
     """
 
     axis: str
@@ -50,6 +48,7 @@ class Run:
     first: int = 0
     input_unit: str = "V"
     output_unit: str = "m"
+    measured: Sensed = "position"
 
     def __len__(self) -> int:
         return int(self.voltage.shape[0])
@@ -76,7 +75,7 @@ class Run:
     @property
     def units(self) -> Units:
         """Of input and output."""
-        return Units(self.input_unit, self.output_unit)
+        return OF[self.measured](self.input_unit, self.output_unit)
 
     @property
     def digest(self) -> str:
@@ -95,6 +94,7 @@ class Run:
             position=self.position[:, None],
             input_unit=self.input_unit,
             output_unit=self.output_unit,
+            measured=self.measured,
         )
 
     @property
@@ -102,9 +102,15 @@ class Run:
         """(voltage, position, sampling rate): what a simulation is compared with."""
         return self.voltage, self.position, self.sampling_rate
 
+    @property
+    def sensed(self) -> tuple[FloatArray, FloatArray, float]:
+        """(voltage, output as its sensor reads it, sampling rate): what a transfer function is compared with."""
+        output = as_sensed(self.position, self.sampling_rate, self.measured)
+        return self.voltage[: output.size], output, self.sampling_rate
+
     def __repr__(self) -> str:
         length = f"{len(self)} samples, {self.seconds:.6g} s at {self.sampling_rate:g} Hz"
-        return f"<Run of axis {self.axis}: {length}, {self.input_unit} -> {self.output_unit}>"
+        return f"<Run of axis {self.axis}: {length}, {self.input_unit} -> {self.units.measured}>"
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +144,7 @@ class Recording:
     @property
     def units(self) -> Units:
         """Of input and output."""
-        return Units(self.input_unit, self.output_unit)
+        return OF[self.measured](self.input_unit, self.output_unit)
 
     @classmethod
     def from_arrays(
@@ -239,10 +245,17 @@ class Recording:
         longest = sorted(found, key=len, reverse=True)[:MOST_STRETCHES]
         return tuple(sorted(longest, key=lambda run: run.first))
 
+    def every_stretch(self, axis: str) -> tuple[Run, ...]:
+        """All stretches of one axis without a gap, however short, whole as they were recorded. Raises BadInput if there is no such axis."""
+        u, y = self.axis(axis)
+        return tuple(self._run(axis, u, y, part) for part in self.runs())
+
     def _within(self, axis: str, whole: slice) -> Run:
         u, y = self.axis(axis)
         driven = _driven(u[whole], y[whole], max(round(self.sampling_rate), 1))
-        rows = slice(whole.start + driven.start, whole.start + driven.stop)
+        return self._run(axis, u, y, slice(whole.start + driven.start, whole.start + driven.stop))
+
+    def _run(self, axis: str, u: FloatArray, y: FloatArray, rows: slice) -> Run:
         return Run(
             axis=axis,
             sampling_rate=self.sampling_rate,
@@ -251,7 +264,17 @@ class Recording:
             first=rows.start,
             input_unit=self.input_unit,
             output_unit=self.output_unit,
+            measured=self.measured,
         )
+
+
+def as_sensed(position: FloatArray, sampling_rate: float, measured: Sensed) -> FloatArray:
+    """The output as its sensor reads it, from the position (n,) that it was integrated to: (n,), (n - 1,) or (n - 2,) samples.
+
+    The inverse of ``samples.integral``, so a velocity comes back as it was measured, an acceleration without its mean and slow drift.
+    """
+    order = {"position": 0, "velocity": 1, "acceleration": 2}[measured]
+    return np.asarray(np.diff(position, n=order) * sampling_rate**order) if order else position
 
 
 def _size(rows: slice) -> int:

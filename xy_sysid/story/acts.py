@@ -98,5 +98,5 @@ def sentence(story: Story) -> str:
         return f"axis {story.axis}: {told}"
     if now is None or not now.effects:
         return f"axis {story.axis}: {told}{f' {story.note}' if story.note else ''}"
-    error = f"held-out error {moved(now.held_out_error, story.units.speed)} (floor {bare(now.noise_floor, story.units.speed)})"
+    error = f"held-out error {moved(now.held_out_error, story.units.judged)} (floor {bare(now.noise_floor, story.units.judged)})"
     return f"axis {story.axis}: {told} In the model: {', '.join(now.effects)}; {error}.{f' {story.note}' if story.note else ''}"

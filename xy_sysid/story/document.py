@@ -38,11 +38,11 @@ def document(story: Story) -> dict[str, Any]:
         "axis": story.axis,
         "seconds": story.seconds,
         "sampling_rate": story.sampling_rate,
-        "units": {"input": story.units.input, "output": story.units.output},
+        "units": {"input": story.units.input, "output": story.units.output, "judged": story.units.judged},
         **told,
         "tolerance": story.tolerance,
         "error": {
-            "unit": story.units.speed,
+            "unit": story.units.judged,
             "now": base.held_out_error if base else None,
             "noise_floor": now.noise_floor if now else None,
             "held_out": now.held_out_error if now else None,

@@ -202,7 +202,7 @@ def _compared(data: AxisData, fitted: GreyboxFit) -> Comparison:
         error_below_end=fitted.held_out_error,
         floor_below_end=data.noise_floor,
         band_end=float(edges[-1]),
-        unit=data.units.speed,
+        unit=data.units.judged,
         frequency=np.sqrt(np.maximum(edges[:-1], 0.5 * edges[1]) * edges[1:]),
         error_over_floor=ratio,
         places=(),

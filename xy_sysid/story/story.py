@@ -78,7 +78,7 @@ def begin(run: Run, library: Library = STANDARD, tolerance: float = EPSILON) -> 
         measured=None,
         steps=(),
     )
-    missing = lacking(sampling_rate, [(voltage, position)])
+    missing = lacking(sampling_rate, [(voltage, position)], run.units)
     if missing:
         return replace(empty, diagnosis=findings(not_enough(missing, run.units), library))
     data = prepare(sampling_rate, voltage, position, tolerance, run.units)

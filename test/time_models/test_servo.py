@@ -1,0 +1,83 @@
+"""Position-controlled servos: the controller is part of the model."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from helpers.cli_tools import cli
+from helpers.real_data import data
+
+from xy_sysid.errors import BadInput
+from xy_sysid.samples.block import FloatArray
+from xy_sysid.samples.recording import Run
+from xy_sysid.time_models.as_words import robot_parameters, servo_words
+from xy_sysid.time_models.servo import servo
+
+RATE, STIFFNESS, DAMPING, FRICTION, LIMIT, DELAY = 100.0, 900.0, 40.0, 4.0, 60.0, 0.025
+
+
+def followed(target: FloatArray, limit: float, seed: int) -> Run:
+    """A joint behind its controller, in steps of 20 us, with an encoder of 1 mrad."""
+    steps = 500
+    q, v, late, angles = 0.0, 0.0, round(DELAY * RATE * steps), []
+    held = np.concatenate((np.zeros(late), np.repeat(target, steps)))
+    for n in range(len(target)):
+        angles.append(q)
+        for wanted in held[n * steps : (n + 1) * steps]:
+            drive = float(np.clip(STIFFNESS * (wanted - q), -limit, limit)) - DAMPING * v
+            drive -= FRICTION * np.sign(v) if v else float(np.clip(drive, -FRICTION, FRICTION))
+            after = v + drive / RATE / steps
+            v = 0.0 if v * after < 0.0 else after
+            q += v / RATE / steps
+    noise = np.random.default_rng(seed).uniform(-5e-4, 5e-4, len(target))
+    return Run("x", RATE, target, np.array(angles) + noise, input_unit="rad", output_unit="rad")
+
+
+@pytest.fixture(scope="module")
+def runs() -> list[Run]:
+    """Eight short recordings: steps, ramps and chirps of several sizes, the large ones at the torque's limit."""
+    t = np.arange(90) / RATE
+    targets = [size * np.sign(np.sin(7.0 * t + size)) for size in (0.05, 0.2, 0.6, 0.8)]
+    targets += [size * np.sin(2 * np.pi * (0.5 + 2.5 * t) * t) for size in (0.1, 0.3, 0.5)] + [0.4 * t]
+    return [followed(np.where(t > 0.05, target, 0.0), LIMIT, k) for k, target in enumerate(targets)]
+
+
+def test_short_recordings_together_tell_controller_friction_limit_and_delay(runs: list[Run]) -> None:
+    """Every number over the inertia within ten per cent; the simulation of recordings that no fit saw is nearly right."""
+    found = servo(runs)
+    for name, true in (("stiffness", STIFFNESS), ("damping", DAMPING), ("friction", FRICTION), ("limit", LIMIT)):
+        assert found[name].value == pytest.approx(true, rel=0.1), name
+    assert found["delay"].value == pytest.approx(DELAY, abs=0.002)
+    assert found.explained > 0.99 and found.at_limit > 0.05
+
+
+def test_what_target_and_angle_cannot_tell_is_said(runs: list[Run]) -> None:
+    """Without an inertia there are ratios only; with one, MuJoCo's numbers in SI."""
+    found = servo(runs)
+    assert any("Only ratios to the inertia" in text for text in servo_words(found, None))
+    assert any("derivative gain" in text for text in servo_words(found, 0.01))
+    known = {item.name: item for item in robot_parameters(found, 0.01)}
+    assert set(known) == {"armature", "kp", "damping", "frictionloss", "forcerange"}
+    assert known["kp"].value == pytest.approx(9.0, rel=0.1) and known["kp"].unit == "N m/rad"
+
+
+def test_a_limit_that_is_never_reached_is_not_told(runs: list[Run]) -> None:
+    """Small motions: the answer is a bound, and how to get a number."""
+    small = [followed(0.03 * run.voltage, 1e9, k) for k, run in enumerate(runs[2:5])]
+    found = servo(small)
+    assert "limit" not in [item.name for item in found.quantities]
+    assert any("limit is not reached" in text for text in servo_words(found, None))
+
+
+def test_a_voltage_is_no_target(runs: list[Run]) -> None:
+    """Input and output need one and the same unit."""
+    with pytest.raises(BadInput, match="a target and a position"):
+        servo([Run("x", RATE, runs[0].voltage, runs[0].position, input_unit="V", output_unit="rad")])
+
+
+def test_96_short_recordings_of_a_hobby_servo_are_used_together() -> None:
+    """Each has 150 samples at most; the simulation from the target alone explains most of what no fit saw."""
+    said = ("--map", "input=data[*].actions,output=data[*].sensor_data", "--rate", "50", "--unit", "input=rad,output=rad", "--json")
+    found = cli("servo", data("servo_target/response.json"), *said, "--inertia", "0.002").json["axes"]["x"]
+    assert found["recordings"] > 60 and found["explained"] > 0.95
+    assert found["quantities"]["delay"]["value"] == pytest.approx(0.044, abs=0.004) and found["quantities"]["kp"]["unit"] == "N m/rad"

@@ -1,0 +1,55 @@
+"""xy-sysid servo: a position-controlled joint of which target and angle are known."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from xy_sysid.cli import options as o
+from xy_sysid.cli.output import emit, estimate, say, table
+from xy_sysid.cli.reading import chosen, each, read_each, reads, stretches_of
+
+if TYPE_CHECKING:
+    from xy_sysid.imports.reading import Reading
+
+Inertia = Annotated[
+    float | None,
+    typer.Option("--inertia", metavar="KG_M2", min=1e-12, help="of the joint with its load: parameters in SI, as MuJoCo names them"),
+]
+
+
+@reads
+def servo(recs: o.Recs, reading: Reading, inertia: Inertia = None, json: o.Json = False) -> None:
+    """Controller, damping, friction, torque limit and delay of a servo, from its target (the input) to its angle (the output)."""
+    from xy_sysid.time_models.as_words import robot_parameters, servo_words
+    from xy_sysid.time_models.servo import servo as logic
+
+    recordings = read_each(recs, reading, json)
+    found, refused = each(chosen(recordings[0], reading.axes), lambda name: logic(stretches_of(recordings, name)))
+    if json:
+        answers: dict[str, Any] = {}
+        for name, item in found.items():
+            known = (*item.quantities, *(robot_parameters(item, inertia) if inertia is not None else ()))
+            answers[name] = {
+                "quantities": {q.name: {"value": q.value, "ci95": [q.low, q.high], "unit": q.unit} for q in known},
+                "explained": item.explained,
+                "error": {"unit": item.units.output, "rms": item.error},
+                "recordings": item.recordings,
+                "sentences": servo_words(item, inertia),
+            }
+        emit({"axes": answers | {name: {"problem": text} for name, text in refused.items()}})
+        return
+    for name, item in found.items():
+        first, *rest = servo_words(item, inertia)
+        say(f"axis {name}: {first}", style="bold")
+        rows = [estimate(q.name, (q.value, q.low, q.high), q.unit) for q in item.quantities]
+        table("", ("over the inertia", "value", "95 % interval", "unit"), rows)
+        if inertia is not None:
+            made = [estimate(q.name, (q.value, q.low, q.high), q.unit) for q in robot_parameters(item, inertia)]
+            table(f"with an inertia of {inertia:g} kg m^2", ("MuJoCo, URDF", "value", "95 % interval", "unit"), made)
+        for sentence in rest:
+            say(f"  {sentence}")
+        say()
+    for name, text in refused.items():
+        say(f"axis {name}: {text}")

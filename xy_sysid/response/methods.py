@@ -1,0 +1,111 @@
+"""The ways to a frequency response: each turns windows into sums, adds them up, and makes a response of the sums. One row of METHODS each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from xy_sysid.response.batch_spectra import batch_spectra
+from xy_sysid.response.closed_loop import LoopTransformer, RunningLoop, joint_input_output, loop_spectra
+from xy_sysid.response.frf import FrequencyResponse
+from xy_sysid.response.h1 import H1Options, frequency_response
+from xy_sysid.response.local_polynomial import LocalTransformer, RunningLocal, added, local_response, of_window
+from xy_sysid.response.spectra import RunningSpectra, State, Transformer
+from xy_sysid.response.windows import Window, WindowShape
+from xy_sysid.samples.block import FloatArray
+
+Stretch = tuple[int, FloatArray, FloatArray, FloatArray]
+"""Counter of the first sample, reference (n,) or (0,), input (n,), output (n,) of a gap-free stretch."""
+
+
+class Running(Protocol):
+    """Sums over windows."""
+
+    def update(self, window: Any) -> None:
+        """Take one more window."""
+
+    def get(self) -> Any:
+        """The sums so far."""
+
+    def state(self) -> State:
+        """Everything needed to go on later, as arrays."""
+
+    def restore(self, state: State) -> None:
+        """Go on from a state of the same shape."""
+
+
+@dataclass(frozen=True, slots=True)
+class ResponseMethod:
+    """How a frequency response is estimated.
+
+    reference: it needs one; tapered: windows overlap and have a taper, as the settings say, else they lie side by side as they are
+    transform: (shape, differenced) -> what turns a window into what ``running`` adds up; running: (shape, forget, sliding)
+    whole:     (pieces, shape, differenced) -> the sums of whole stretches; estimate: (sums, shape, rate, options) -> the response
+    windows:   sums -> how many windows are in them
+    """
+
+    reference: bool
+    tapered: bool
+    transform: Callable[[WindowShape, bool], Callable[[Window], list[Any]]]
+    running: Callable[[WindowShape, float, int], Running]
+    whole: Callable[[list[Stretch], WindowShape, bool], Any]
+    estimate: Callable[[Any, WindowShape, float, H1Options], FrequencyResponse]
+    windows: Callable[[Any], float]
+    note: str = ""
+
+    def shape(self, window: str, length: int, overlap: float) -> WindowShape:
+        """Of the windows that it takes."""
+        return WindowShape.of(window, length, overlap) if self.tapered else WindowShape.of("boxcar", length, 0.0)
+
+
+def _whole_local(rational: bool) -> Callable[[list[Stretch], WindowShape, bool], Any]:
+    def summed(pieces: list[Stretch], shape: WindowShape, differenced: bool) -> Any:
+        total = None
+        for seq, _, u, y in pieces:
+            output = np.diff(y) if differenced else y
+            for begin in range(-seq % shape.hop, output.shape[0] - shape.length + 1, shape.hop):
+                total = added(total, of_window(u[begin : begin + shape.length], output[begin : begin + shape.length], rational))
+        return total
+
+    return summed
+
+
+def _local(rational: bool, note: str) -> ResponseMethod:
+    return ResponseMethod(
+        reference=False,
+        tapered=False,
+        transform=lambda _shape, differenced: LocalTransformer(differenced, rational),
+        running=lambda _shape, forget, sliding: RunningLocal(forget, sliding),
+        whole=_whole_local(rational),
+        estimate=local_response,
+        windows=lambda sums: float(sums.weight),
+        note=note,
+    )
+
+
+METHODS: dict[str, ResponseMethod] = {
+    "h1": ResponseMethod(
+        reference=False,
+        tapered=True,
+        transform=Transformer,
+        running=RunningSpectra,
+        whole=lambda pieces, shape, differenced: batch_spectra([(seq, u, y) for seq, _, u, y in pieces], shape, differenced),
+        estimate=frequency_response,
+        windows=lambda sums: float(sums.weight),
+    ),
+    "joint_input_output": ResponseMethod(
+        reference=True,
+        tapered=True,
+        transform=LoopTransformer,
+        running=RunningLoop,
+        whole=loop_spectra,
+        estimate=joint_input_output,
+        windows=lambda sums: float(sums.output.weight),
+        note="Closed loop: the joint input-output method, with the reference as instrument.",
+    ),
+    "local_polynomial": _local(False, "Local polynomial method: windows without a taper, their transients estimated and removed."),
+    "local_rational": _local(True, "Local rational method: windows without a taper, their transients estimated and removed."),
+}
