@@ -1,0 +1,127 @@
+"""The experiment that distinguishes some sets of effects soonest, of those that keep within the limits.
+
+First every proposal is judged by the likeliest model of each set, then the best by draws of their parameters, and then the neighbours of the
+best. An experiment is judged by the seconds after which the true set is told from its rivals with 95 % probability, in the mean over sets
+and draws; where none gets there, by the probability at its end.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from xy_sysid.axis.model import AxisModel
+from xy_sysid.experiment_design.beliefs import Belief
+from xy_sysid.experiment_design.evidence import SURE, Power, powers, seconds_needed, settled
+from xy_sysid.experiment_design.experiment import RAMP, Experiment
+from xy_sysid.experiment_design.limits import Limits
+from xy_sysid.experiment_design.prediction import LOOKED, Recorded, Setting, recorded
+from xy_sysid.experiment_design.proposals import neighbours, proposals
+
+FINAL = 6  # proposals that are judged by draws
+SHORTEST = 4.0  # s of motion at least: a few windows that judge
+BLOCK = 2.0  # s: experiments last whole multiples
+
+
+@dataclass(frozen=True)
+class Judged:
+    """An experiment with what it is worth.
+
+    seconds: of steady motion after which the sets are distinguished with 95 %, infinite if ``most`` do not suffice; probability: that they
+    are at the end; each: powers of each draw; broken: which limit it would come too near to, or nothing
+    """
+
+    experiment: Experiment
+    seconds: float = math.inf
+    probability: float = 0.0
+    each: tuple[tuple[Power, ...], ...] = ()
+    broken: str = ""
+
+    @property
+    def order(self) -> tuple[float, float, float]:
+        """Least is best; where none gets anywhere the evidence a second decides."""
+        rate = sum(min((one.rate for one in item), default=0.0) for item in self.each)
+        return self.seconds, -self.probability, -rate
+
+
+@dataclass(frozen=True)
+class Design:
+    """beliefs: the sets that are to be distinguished; best: the experiment that does it soonest; tried: all that were judged."""
+
+    beliefs: tuple[Belief, ...]
+    limits: Limits
+    best: Judged | None
+    tried: tuple[Judged, ...]
+
+    @property
+    def possible(self) -> bool:
+        """Whether an experiment within the limits distinguishes the sets with 95 %."""
+        return self.best is not None and math.isfinite(self.best.seconds)
+
+    @property
+    def helps(self) -> bool:
+        """Whether the best experiment is more likely than not to tell."""
+        return self.best is not None and self.best.probability >= 0.5
+
+
+def design(setting: Setting, beliefs: Sequence[Belief], limits: Limits, seed: int = 1, tell: Callable[[float], None] = lambda part: None) -> Design:
+    """The experiment for some beliefs; tell: called with the part that is done."""
+    rate = setting.layout.sampling_rate
+    first = proposals(limits, rate, seed)
+    judged = []
+    for number, item in enumerate(first):
+        judged.append(judge(setting, beliefs, limits, item, draws=1))
+        tell(0.6 * (number + 1) / len(first))
+    allowed = sorted((item for item in judged if not item.broken), key=lambda item: item.order)
+    final = [judge(setting, beliefs, limits, item.experiment) for item in allowed[:FINAL]]
+    tell(0.8)
+    final = sorted((item for item in final if not item.broken), key=lambda item: item.order)
+    if final:
+        near = (judge(setting, beliefs, limits, item) for item in neighbours(final[0].experiment, limits, rate))
+        final = sorted([*final, *(item for item in near if not item.broken)], key=lambda item: item.order)
+    tell(1.0)
+    best = _timed(final[0], limits) if final else None
+    return Design(tuple(beliefs), limits, best, tuple([*final, *judged]))
+
+
+def judge(setting: Setting, beliefs: Sequence[Belief], limits: Limits, experiment: Experiment, draws: int | None = None) -> Judged:
+    """What one experiment is worth; draws: of each set that are looked at, None is all."""
+    told = experiment.excitation
+    seconds = max(LOOKED, min(2.0 * told.slow_period * (told.slow > 0.0), limits.seconds) + RAMP)
+    each = []
+    for number, belief in enumerate(beliefs):
+        for model in belief.draws[:draws]:
+            found = _seen(setting, experiment, model, limits, seconds)
+            if isinstance(found, str):
+                return Judged(experiment, broken=found)
+            each.append(tuple(powers(beliefs, number, model, found)))
+    most = limits.seconds - RAMP
+    return Judged(experiment, seconds=seconds_needed(each, most), probability=settled(each, most), each=tuple(each))
+
+
+def _seen(setting: Setting, experiment: Experiment, model: AxisModel, limits: Limits, seconds: float) -> Recorded | str:
+    """What would be recorded, or which limit would be broken."""
+    item = recorded(setting, experiment, model, limits.start, seconds)
+    return limits.broken(item.motion) or item
+
+
+def _timed(item: Judged, limits: Limits) -> Judged:
+    """With the seconds that it should last."""
+    wanted = item.seconds if math.isfinite(item.seconds) else limits.seconds
+    seconds = min(max(BLOCK * math.ceil((wanted + RAMP) / BLOCK), SHORTEST), limits.seconds)
+    return Judged(item.experiment.lasting(seconds), item.seconds, item.probability, item.each)
+
+
+def expects(found: Design) -> str:
+    """What the best experiment promises, in a sentence."""
+    names = f"{found.beliefs[0].name} and {' or '.join(item.name for item in found.beliefs[1:])}"
+    if found.best is None:
+        why = sorted({item.broken for item in found.tried if item.broken})
+        return f"No experiment within the limits can distinguish {names}: all come too near to the limit of {' or '.join(why)}."
+    chance = f"{100.0 * found.best.probability:.0f} %"
+    if found.possible:
+        return f"After {found.best.experiment.seconds:.0f} s, {names} are distinguished with {100.0 * SURE:.0f} % probability."
+    if found.helps:
+        return f"No experiment within the limits is sure to distinguish {names}: the best does with {chance} probability."
+    return f"No experiment within the limits can distinguish {names}: the best would with {chance} probability."
