@@ -50,10 +50,10 @@ PAIRS = (
         "cogging or lead error, over less than three periods",
         (("cogging",), ("lead_error",)),
         (
-            {"cogging": {"amplitude": 0.02, "per_revolution": 0.5, "phase": 1.0}},
-            {"lead_error": {"amplitude": 4e-5, "period": 0.01, "phase": 1.0}},
+            {"cogging": {"amplitude": 0.005, "per_revolution": 0.5, "phase": 1.0}},
+            {"lead_error": {"amplitude": 8e-5, "per_revolution": 0.5, "phase": 1.0}},
         ),
-        {"low": 5.0, "high": 100.0, "offset": 0.07, "rms": 0.02, "centring": 0.0},
+        {"low": 5.0, "high": 100.0, "offset": 0.07, "rms": 0.005, "centring": 0.0},
         sized=("amplitude",),
     ),
     Pair(
@@ -100,7 +100,7 @@ PAIRS = (
         "gain or drag that varies along the travel",
         (("position_dependent_gain",), ("position_dependent_drag",)),
         (
-            {"position_dependent_gain": {"depth": 0.1, "period": 0.15, "phase": 0.0}},
+            {"position_dependent_gain": {"depth": 0.1, "period": 0.15}},
             {"position_dependent_drag": {"slope": 4.0}},
         ),
         {"kind": "off", "rms": 0.0, "slow": 3.5, "slow_period": 1.5, "centring": 0.0},

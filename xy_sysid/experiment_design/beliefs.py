@@ -136,26 +136,28 @@ def believed(evidence: Evidence, found: GreyboxFit, count: int, seed: int = 0) -
     return _belief(evidence, model, draws, scale, precision)
 
 
-def hidden(evidence: Evidence, rest: AxisModel, name: str, count: int, seed: int = 0) -> Belief | None:
+def hidden(evidence: Evidence, rest: AxisModel, name: str, best: float, draws: tuple[int, int]) -> Belief | None:
     """An effect of which the data show nothing, beside a model that explains them: its usual sizes, as far as they allow these.
 
     A relative in the model gives way, and what it calls by the same name is taken over. None where the data allow no such size.
+    best: nats of what explains the data best; draws: how many are wanted, and their seed
     """
-    best, draws = evidence.nats(rest), []
+    count, seed = draws
+    found: list[AxisModel] = []
     shared = _shared(rest, name)
     own = {key for key in rest.library[name].names if key not in shared}
     for drawn in _usual(evidence.data, rest, name, TRIES * count, seed):
         model = _settled(evidence, drawn, {f"{name}.{key}" for key in own})
         if evidence.nats(model) - best < ALLOWED:
-            draws.append(model)
-        if len(draws) >= count:
+            found.append(model)
+        if len(found) >= count:
             break
-    if not draws:
+    if not found:
         return None
-    model = draws[0]
+    model = found[0]
     scale = _scale(evidence.data, model)
     slopes, _ = evidence.whitened(model, scale)
-    return _belief(evidence, model, draws, scale, slopes @ slopes.T + usual_precision(model, scale))
+    return _belief(evidence, model, found, scale, slopes @ slopes.T + usual_precision(model, scale))
 
 
 def _relative(model: AxisModel, name: str) -> str | None:

@@ -20,6 +20,8 @@ from xy_sysid.experiment_design.prediction import LOOKED, Recorded, Setting, rec
 from xy_sysid.experiment_design.proposals import neighbours, proposals
 
 FINAL = 6  # proposals that are judged by draws
+ALIKE = 0.1  # probabilities that differ by less are alike: they are means over few draws
+ENOUGH = 0.95  # part of what an experiment can reach at all, after which more of it is a waste
 SHORTEST = 4.0  # s of motion at least: a few windows that judge
 BLOCK = 2.0  # s: experiments last whole multiples
 
@@ -42,7 +44,9 @@ class Judged:
     def order(self) -> tuple[float, float, float]:
         """Least is best; where none gets anywhere the evidence a second decides."""
         rate = sum(min((one.rate for one in item), default=0.0) for item in self.each)
-        return self.seconds, -self.probability, -rate
+        if math.isfinite(self.seconds):
+            return max(self.seconds, shortest(self.experiment)), 0.0, -rate
+        return math.inf, -round(self.probability / ALIKE), -rate
 
 
 @dataclass(frozen=True)
@@ -106,10 +110,20 @@ def _seen(setting: Setting, experiment: Experiment, model: AxisModel, limits: Li
     return limits.broken(item.motion) or item
 
 
+def shortest(experiment: Experiment) -> float:
+    """s of an experiment that is what it was judged by: a few windows, and a whole period of a slow sine."""
+    told = experiment.excitation
+    return max(SHORTEST, told.slow_period + RAMP if told.slow > 0.0 else 0.0)
+
+
 def _timed(item: Judged, limits: Limits) -> Judged:
     """With the seconds that it should last."""
-    wanted = item.seconds if math.isfinite(item.seconds) else limits.seconds
-    seconds = min(max(BLOCK * math.ceil((wanted + RAMP) / BLOCK), SHORTEST), limits.seconds)
+    most = limits.seconds - RAMP
+    steps = (BLOCK * k for k in range(1, math.ceil(most / BLOCK)))
+    wanted = item.seconds
+    if not math.isfinite(wanted):
+        wanted = next((step for step in steps if settled(item.each, step) >= ENOUGH * item.probability), most)
+    seconds = min(BLOCK * math.ceil(max(wanted + RAMP, shortest(item.experiment)) / BLOCK), limits.seconds)
     return Judged(item.experiment.lasting(seconds), item.seconds, item.probability, item.each)
 
 

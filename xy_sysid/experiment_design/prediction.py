@@ -11,8 +11,8 @@ from xy_sysid.axis.forward import Motion, move
 from xy_sysid.axis.model import AxisModel, simulator
 from xy_sysid.experiment_design.beliefs import Belief, with_row
 from xy_sysid.experiment_design.experiment import RAMP, Experiment
-from xy_sysid.greybox.axis_data import AxisData
-from xy_sysid.greybox.floor import Bands, Windows, floor
+from xy_sysid.greybox.axis_data import WINDOWS, AxisData
+from xy_sysid.greybox.floor import Bands, Windows, bands, floor
 from xy_sysid.greybox.least_squares import STEP
 from xy_sysid.greybox.objective import Objective, responder
 from xy_sysid.samples.block import FloatArray
@@ -31,8 +31,9 @@ class Setting:
 
     @staticmethod
     def of(data: AxisData) -> Setting:
-        """As some data were seen."""
-        return Setting(data.layout, data.floor.encoder, data.floor.epsilon)
+        """As some data were seen, in windows for recordings as long as those that are simulated."""
+        longest = max(LOOKED, *(size / data.sampling_rate for size in data.counts(early=False)))
+        return Setting(bands(data.sampling_rate, int(longest * data.sampling_rate / WINDOWS)), data.floor.encoder, data.floor.epsilon)
 
 
 @dataclass(frozen=True)

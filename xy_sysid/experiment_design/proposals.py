@@ -11,7 +11,9 @@ from xy_sysid.experiment_design.limits import Limits
 from xy_sysid.settings import AxisExcitation
 
 CREST = 4.2  # peak of Gaussian noise over its rms: one sample in 40,000 is beyond
+PART = {"noise": 1.0 / CREST, "sweep": 0.7, "step": 0.95}  # largest rms (height of a step) over the limit of the voltage
 HALVES = (1.0, 0.5, 0.25, 0.125, 0.0625)  # parts of the largest amplitude
+FINER = tuple(2.0 ** (-0.5 * k) for k in range(11))  # of a slow sine, which goes as far as its amplitude says
 TOP = 0.15  # of the sampling rate: highest frequency that is proposed
 NEAR = {"rms": (0.7, 1.4), "slow": (0.7, 1.4), "slow_period": (0.6, 1.6), "period": (0.6, 1.6), "low": (0.4, 2.5), "high": (0.5, 2.0)}
 LONGEST = 10.0  # s, of a slow sine
@@ -43,10 +45,10 @@ def _grid(limits: Limits, sampling_rate: float) -> Iterator[dict[str, Any]]:
         if low < high:
             yield {"kind": "noise", "low": low, "high": min(high, top), "rms": part * most / CREST}
     for part in HALVES[:3]:
-        yield {"kind": "sweep", "low": 0.5, "high": top, "period": 4.0, "rms": part * 0.7 * most}
+        yield {"kind": "sweep", "low": 0.5, "high": top, "period": 4.0, "rms": part * PART["sweep"] * most}
     for part, period in product(HALVES, (0.1, 0.4, 1.6)):
-        yield {"kind": "step", "period": period, "rms": 0.95 * part * most}
-    for part, period in product((*HALVES, 0.03125), (1.0, 3.0, LONGEST)):
+        yield {"kind": "step", "period": period, "rms": part * PART["step"] * most}
+    for part, period in product(FINER, (1.0, 3.0, LONGEST)):
         yield {"kind": "off", "rms": 0.0, "slow": 0.95 * part * most, "slow_period": period}
     for part, quiet, period in product(HALVES[1:], (0.25, 0.0625), (3.0, LONGEST)):
         yield {"kind": "noise", "low": 0.1, "high": top, "rms": quiet * most / CREST, "slow": 0.7 * part * most, "slow_period": period}
@@ -57,6 +59,8 @@ def _experiment(limits: Limits, sampling_rate: float, told: dict[str, Any]) -> E
     told = {**told, "limit": limits.voltage, "travel_min": limits.travel[0], "travel_max": limits.travel[1]}
     told["brake"] = min(AxisExcitation.model_fields["brake"].default, 0.2 * (limits.travel[1] - limits.travel[0]))
     told["centring"] = _centring(limits)
+    told["rms"] = min(told["rms"], PART.get(told["kind"], 0.0) * limits.voltage)
+    told["slow"] = min(told.get("slow", 0.0), max(0.95 * limits.voltage - told["rms"] / PART.get(told["kind"], 1.0), 0.0))
     if "high" in told and told.get("kind") != "off":
         told["high"] = min(told["high"], 0.45 * sampling_rate)
         told["low"] = min(told.get("low", 0.1), 0.5 * told["high"])

@@ -10,14 +10,14 @@ import numpy as np
 from xy_sysid.axis.model import AxisModel, Library
 from xy_sysid.diagnosis.ladder import Ladder, contains
 from xy_sysid.diagnosis.rungs import Given
+from xy_sysid.effects._contract import BEGUN
 from xy_sysid.errors import BadInput
-from xy_sysid.experiment_design.beliefs import Belief, Evidence, believed, hidden
+from xy_sysid.experiment_design.beliefs import ALLOWED, Belief, Evidence, believed, hidden
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit, best_start, fit
 from xy_sysid.hypotheses import starts
 from xy_sysid.hypotheses.compare import gain
 from xy_sysid.hypotheses.criteria import CHANCE, DOUBTFUL, PRICE
-from xy_sysid.hypotheses.refusal import none_of
 
 DRAWS = 6  # of the parameters of each set
 
@@ -88,15 +88,24 @@ def _belief(
     rest = frozenset(name for name, _ in best.model.effects)
     new = [name for name in names if name not in rest]
     holds = contains(library, frozenset(names), rest)  # then it cannot do worse, and a fit that does has not found what there is
-    if len(new) == 1 and ((holds and not gain(own, best).is_sure) or none_of(evidence.data, own)):
-        model = best.model
+    better = gain(best, own)
+    if len(new) == 1 and holds and not gain(own, best).is_sure:
+        model, least = best.model, evidence.nats(best.model)
         for name in rest - frozenset(names):
             model = model if _gives_way(library, new[0], name) else model.without(name)
-        return hidden(evidence, model, new[0], draws, seed)
-    better = gain(best, own)
-    if not holds and better.probability > CHANCE and better.nats > PRICE:
+        unseen = hidden(evidence, model, new[0], least, (draws, seed))
+        if unseen is not None or _is_gone(evidence.data, own, new[0]) or evidence.nats(own.model) > least + ALLOWED:
+            return unseen
+    elif not holds and better.probability > CHANCE and better.nats > PRICE:
         return None
     return believed(evidence, own, draws, seed)
+
+
+def _is_gone(data: AxisData, found: GreyboxFit, name: str) -> bool:
+    """A fit has made an effect so small that no fit would begin there: what is left is the model without it."""
+    effect = found.model.library[name]
+    pairs = zip(effect.on(data.similar), dict(found.model.effects)[name], strict=True)
+    return any(item.positive and (k == 0 or "V" in item.unit) and value < BEGUN * abs(item.typical) for k, (item, value) in enumerate(pairs))
 
 
 def _gives_way(library: Library, name: str, other: str) -> bool:
