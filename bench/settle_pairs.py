@@ -23,7 +23,7 @@ class Pair:
 
     sets: of effects, that which holds first; parts: of the machine, if the first or the second is true, with sizes that a draw multiplies
     first: excitation of the recording that does not tell; seconds, skipped: of it, and left out at its begin
-    voltage, reach: V, and m to either side, that experiments may use
+    voltage, reach: V, and m to either side, that experiments may use; noise: of the encoder, a coarse one, m (rad of a joint)
     """
 
     name: str
@@ -35,6 +35,7 @@ class Pair:
     voltage: float = 5.0
     reach: float = 0.14
     machine: str = "rigid.yaml"
+    noise: float = 4e-6
     sized: tuple[str, ...] = field(default=())
 
 
@@ -72,6 +73,7 @@ PAIRS = (
         voltage=1.2,
         reach=2.5,
         machine="joint.yaml",
+        noise=2e-4,
         sized=("amplitude", "stiffness"),
     ),
     Pair(
@@ -125,7 +127,9 @@ def machine(pair: Pair, truth: int, seed: int) -> Machine:
         name: {key: value * (factor if key in pair.sized else 1.0) for key, value in values.items()} for name, values in pair.parts[truth].items()
     }
     made = Machine.from_file(pair.machine, seed)
-    single = Machine(replace(made.spec, axes=made.spec.axes[:1]), seed)
+    axis = made.spec.axes[0]
+    coarse = replace(axis, drive=replace(axis.drive, encoder_noise=pair.noise))
+    single = Machine(replace(made.spec, axes=(coarse,)), seed)
     return single.with_parts(parts)
 
 

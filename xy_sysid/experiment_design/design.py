@@ -18,6 +18,7 @@ from xy_sysid.experiment_design.experiment import RAMP, Experiment
 from xy_sysid.experiment_design.limits import Limits
 from xy_sysid.experiment_design.prediction import LOOKED, Recorded, Setting, recorded
 from xy_sysid.experiment_design.proposals import neighbours, proposals
+from xy_sysid.hypotheses.criteria import DOUBTFUL
 
 FINAL = 6  # proposals that are judged by draws
 ALIKE = 0.1  # probabilities that differ by less are alike: they are means over few draws
@@ -65,8 +66,8 @@ class Design:
 
     @property
     def helps(self) -> bool:
-        """Whether the best experiment is more likely than not to tell."""
-        return self.best is not None and self.best.probability >= 0.5
+        """Whether the best experiment may tell, or teaches what a better one needs."""
+        return self.best is not None and self.best.probability >= DOUBTFUL
 
 
 def design(setting: Setting, beliefs: Sequence[Belief], limits: Limits, seed: int = 1, tell: Callable[[float], None] = lambda part: None) -> Design:

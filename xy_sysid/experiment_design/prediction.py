@@ -41,6 +41,7 @@ class Recorded:
     """What would be recorded without noise.
 
     windows: of the steady part; seconds: of it; velocity: (windows, lines) spectrum; objective: scores an error of it
+    trusted: part of the motion to which laws are trusted
     """
 
     motion: Motion
@@ -48,6 +49,7 @@ class Recorded:
     seconds: float
     velocity: NDArray[np.complex128]
     objective: Objective
+    trusted: float
 
 
 def recorded(setting: Setting, experiment: Experiment, model: AxisModel, start: float, seconds: float = LOOKED) -> Recorded:
@@ -64,7 +66,14 @@ def seen(setting: Setting, motion: Motion) -> Recorded:
     windows = Windows(setting.layout, np.arange(first, max(velocity.size - length, first) + 1, max(length // 2, 1), dtype=np.int64))
     least = floor(windows, velocity, setting.encoder, setting.epsilon)
     steady = (windows.end - first) / rate
-    return Recorded(motion, windows, steady, windows.spectrum(velocity), Objective.of(least))
+    return Recorded(
+        motion=motion,
+        windows=windows,
+        seconds=steady,
+        velocity=windows.spectrum(velocity),
+        objective=Objective.of(least),
+        trusted=setting.epsilon,
+    )
 
 
 def predicted(item: Recorded, model: AxisModel) -> NDArray[np.complex128]:

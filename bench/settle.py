@@ -1,0 +1,162 @@
+"""python -m bench settle [PAIR ...]: pairs of effects that one recording does not distinguish, and the experiments that do.
+
+Each pair is drawn with either effect true. A short recording comes first. Then at most two designed experiments with 60 s of motion in all
+are run on the machine, and the same seconds of broadband noise, and of D-optimal experiments; for those two the seconds are doubled, twice at
+most, until they settle the pair, too. Every line of the answer is written to build/settle.jsonl; the table is made from all lines there.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from bench.settle_pairs import PAIRS, Pair, carry_out, first_recording, left_limits, limits, machine
+from xy_sysid.axis.model import STANDARD
+from xy_sysid.experiment_design.beliefs import Belief
+from xy_sysid.experiment_design.design import judge
+from xy_sysid.experiment_design.experiment import Experiment
+from xy_sysid.experiment_design.limits import Limits
+from xy_sysid.experiment_design.loop import Budget, Question, Settled, Signals, best_design, settle
+from xy_sysid.experiment_design.precision import informations, volume
+from xy_sysid.experiment_design.prediction import Setting
+from xy_sysid.experiment_design.proposals import proposals
+
+PLACE = Path(os.environ.get("SETTLE_FILE", "build/settle.jsonl"))
+SEEDS = range(101, 103)  # never used while this was developed
+MOST = 60.0  # s of motion
+LONGER = 4.0  # times the designed seconds, up to which another way is tried
+
+
+def noise(setting: Setting, beliefs: Sequence[Belief], asked: Limits) -> Experiment | None:
+    """Broadband noise, as loud as the limits allow for what is believed."""
+    for item in proposals(asked, setting.layout.sampling_rate):
+        told = item.excitation
+        if told.kind == "noise" and told.slow == 0.0 and told.low == 0.1 and told.high > 50.0:
+            if not judge(setting, beliefs, asked, item).broken:
+                return item
+    return None
+
+
+def d_optimal(setting: Setting, beliefs: Sequence[Belief], asked: Limits) -> Experiment | None:
+    """The experiment that makes the parameters of all sets known best, together."""
+    best: tuple[float, Experiment] | None = None
+    for item in proposals(asked, setting.layout.sampling_rate):
+        total = 0.0
+        for belief in beliefs:
+            found = informations(setting, belief, asked, item, draws=1)
+            total += volume(belief, found, 10.0) if found else math.inf
+        if math.isfinite(total) and (best is None or total < best[0]):
+            best = (total, item)
+    return None if best is None else best[1]
+
+
+def case(pair: Pair, truth: int, seed: int, short: bool = False) -> dict[str, Any]:
+    """One draw of one pair, with all three ways to choose experiments."""
+    made, asked = machine(pair, truth, seed), limits(pair)
+    first = first_recording(pair, made, seed)
+    question = Question(made.rate, [first], pair.sets, STANDARD)
+    told: list[str] = []
+
+    def run(experiment: Experiment) -> Signals:
+        told.append(f"{experiment.words}, {experiment.seconds:.0f} s")
+        return carry_out(made, experiment)
+
+    begun = time.process_time()
+    found = settle(question, asked, run, Budget(experiments=2, seconds=MOST), best_design)
+    line: dict[str, Any] = {
+        "pair": pair.name,
+        "truth": truth,
+        "seed": seed,
+        "first_right": found.steps[0].standing.chosen == truth,
+        "first_left": len(found.steps[0].left),
+        "first_settled": len(found.steps[0].left) == 1 and found.steps[0].standing.chosen == truth,
+        "right": found.effects == pair.sets[truth],
+        "ended": found.ended,
+        "seconds": found.seconds,
+        "experiments": told,
+        "runs": len(found.recordings),
+        "outside": left_limits(pair, found.recordings),
+        "processor": time.process_time() - begun,
+    }
+    for name, choose in () if short or not found.recordings else (("noise", noise), ("d_optimal", d_optimal)):
+        line[name] = _needed(question, asked, pair, (truth, seed), choose, found.seconds)
+    return line
+
+
+def _needed(question: Question, asked: Limits, pair: Pair, draw: tuple[int, int], choose: Any, seconds: float) -> dict[str, Any]:
+    """Whether another way settles a case in the same seconds, and how many it needs; infinite beyond four times as many, and beyond 60 s."""
+    made = machine(pair, *draw)
+    at = seconds
+    same, outside, runs = False, 0, 0
+    while True:
+
+        def chosen(setting: Setting, beliefs: Sequence[Belief], among: Limits, lasts: float = at) -> Experiment | None:
+            item = choose(setting, beliefs, among)
+            return None if item is None else item.lasting(lasts)
+
+        found: Settled = settle(question, asked, lambda item: carry_out(made, item), Budget(experiments=1, seconds=at), chosen)
+        right = found.ended == "settled" and found.effects == pair.sets[draw[0]]
+        outside, runs = outside + left_limits(pair, found.recordings), runs + len(found.recordings)
+        same = same or (right and at == seconds)
+        if right or at >= min(MOST, LONGER * seconds) or not found.recordings:
+            return {"same": same, "needed": at if right else math.inf, "outside": outside, "runs": runs}
+        at = min(2.0 * at, MOST)
+
+
+def table(lines: Sequence[dict[str, Any]]) -> str:
+    """All lines as Markdown."""
+    rows = ["| pair | one recording settles | right before | settled | right after | seconds | same seconds of noise | of D-optimal | times as long: noise | D-optimal |"]
+    rows.append("|" + "---|" * 10)
+    names = list(dict.fromkeys(line["pair"] for line in lines))
+    for name in [*names, "all"]:
+        own = [line for line in lines if name in ("all", line["pair"])]
+        count = len(own)
+
+        def part(key: str, own: Sequence[dict[str, Any]] = own) -> str:
+            return f"{sum(bool(line[key]) for line in own)} of {len(own)}"
+
+        good = [line for line in own if line["ended"] == "settled" and line["right"]]
+        compared = [line for line in good if "noise" in line]
+        seconds = sorted(line["seconds"] for line in good)
+        cells = [name, part("first_settled"), part("first_right"), f"{len(good)} of {count}", part("right"), f"{seconds[len(seconds) // 2]:.0f}" if seconds else "-"]
+        for way in ("noise", "d_optimal"):
+            cells.append(f"{sum(line[way]['same'] for line in compared)} of {len(compared)}")
+        for way in ("noise", "d_optimal"):
+            times = sorted(line[way]["needed"] / line["seconds"] for line in compared)
+            middle = times[len(times) // 2] if times else math.nan
+            cells.append("-" if not times else f"{middle:.2g}" if math.isfinite(middle) else "over 4")
+        rows.append(f"| {' | '.join(cells)} |")
+    runs = sum(line["runs"] for line in lines)
+    rows.append("")
+    rows.append(f"Designed experiments that were run: {runs}; that left a limit: {sum(line['outside'] for line in lines)}.")
+    return "\n".join(rows)
+
+
+def main(short: bool = False) -> None:
+    """Run what is not in the file yet, and print the table."""
+    PLACE.parent.mkdir(exist_ok=True)
+    seeds = [int(word) for word in os.environ.get("SETTLE_SEEDS", "").split(",") if word] or list(SEEDS)
+    done = [json.loads(text) for text in PLACE.read_text(encoding="utf-8").splitlines()] if PLACE.exists() and not short else []
+    known = {(line["pair"], line["truth"], line["seed"]) for line in done}
+    for seed in seeds[: 1 if short else None]:
+        for pair in PAIRS[: 1 if short else None]:
+            for truth in (0, 1):
+                if (pair.name, truth, seed) in known:
+                    continue
+                line = case(pair, truth, seed, short)
+                done.append(line)
+                sys.stderr.write(json.dumps(line) + "\n")
+                if not short:
+                    with PLACE.open("a", encoding="utf-8") as file:
+                        file.write(json.dumps(line) + "\n")
+    sys.stdout.write(table(done) + "\n")
+
+
+if __name__ == "__main__":
+    main()
