@@ -1,8 +1,8 @@
-"""python -m bench settle [PAIR ...]: pairs of effects that one recording does not distinguish, and the experiments that do.
+"""python -m bench settle: pairs of effects that one recording does not distinguish, and the experiments that do.
 
 Each pair is drawn with either effect true. A short recording comes first. Then at most two designed experiments with 60 s of motion in all
-are run on the machine, and the same seconds of broadband noise, and of D-optimal experiments; for those two the seconds are doubled, twice at
-most, until they settle the pair, too. Every line of the answer is written to build/settle.jsonl; the table is made from all lines there.
+are run on the machine; for comparison the same seconds of broadband noise, and of a D-optimal experiment. Every case is a line of
+build/settle.jsonl, and the table is made from all lines there: a campaign that was stopped goes on.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from xy_sysid.axis.model import STANDARD
 from xy_sysid.experiment_design.beliefs import Belief
 from xy_sysid.experiment_design.design import judge
 from xy_sysid.experiment_design.experiment import Experiment
-from xy_sysid.experiment_design.limits import Limits
-from xy_sysid.experiment_design.loop import Budget, Question, Settled, Signals, best_design, settle
+from xy_sysid.experiment_design.limits import MachineLimits
+from xy_sysid.experiment_design.loop import Budget, Choose, Question, Signals, best_design, settle
 from xy_sysid.experiment_design.precision import informations, volume
 from xy_sysid.experiment_design.prediction import Setting
 from xy_sysid.experiment_design.proposals import proposals
@@ -30,20 +30,21 @@ from xy_sysid.experiment_design.proposals import proposals
 PLACE = Path(os.environ.get("SETTLE_FILE", "build/settle.jsonl"))
 SEEDS = range(101, 103)  # never used while this was developed
 MOST = 60.0  # s of motion
-LONGER = 4.0  # times the designed seconds, up to which another way is tried
+DRAWS = 4  # of the parameters of each set
+COLUMNS = ("pair", "one recording settles", "right before", "settled", "right after", "seconds", "noise, same seconds", "D-optimal, same seconds")
 
 
-def noise(setting: Setting, beliefs: Sequence[Belief], asked: Limits) -> Experiment | None:
+def noise(setting: Setting, beliefs: Sequence[Belief], asked: MachineLimits) -> Experiment | None:
     """Broadband noise, as loud as the limits allow for what is believed."""
     for item in proposals(asked, setting.layout.sampling_rate):
         told = item.excitation
-        if told.kind == "noise" and told.slow == 0.0 and told.low == 0.1 and told.high > 50.0:
-            if not judge(setting, beliefs, asked, item).broken:
-                return item
+        broadband = told.kind == "noise" and told.slow == 0.0 and told.low == 0.1 and told.high > 50.0
+        if broadband and not judge(setting, beliefs, asked, item).broken:
+            return item
     return None
 
 
-def d_optimal(setting: Setting, beliefs: Sequence[Belief], asked: Limits) -> Experiment | None:
+def d_optimal(setting: Setting, beliefs: Sequence[Belief], asked: MachineLimits) -> Experiment | None:
     """The experiment that makes the parameters of all sets known best, together."""
     best: tuple[float, Experiment] | None = None
     for item in proposals(asked, setting.layout.sampling_rate):
@@ -68,7 +69,7 @@ def case(pair: Pair, truth: int, seed: int, short: bool = False) -> dict[str, An
         return carry_out(made, experiment)
 
     begun = time.process_time()
-    found = settle(question, asked, run, Budget(experiments=2, seconds=MOST), best_design)
+    found = settle(question, asked, run, Budget(experiments=2, seconds=MOST, draws=DRAWS), best_design)
     line: dict[str, Any] = {
         "pair": pair.name,
         "truth": truth,
@@ -85,34 +86,26 @@ def case(pair: Pair, truth: int, seed: int, short: bool = False) -> dict[str, An
         "processor": time.process_time() - begun,
     }
     for name, choose in () if short or not found.recordings else (("noise", noise), ("d_optimal", d_optimal)):
-        line[name] = _needed(question, asked, pair, (truth, seed), choose, found.seconds)
+        line[name] = _same(question, asked, pair, (truth, seed), choose, found.seconds)
     return line
 
 
-def _needed(question: Question, asked: Limits, pair: Pair, draw: tuple[int, int], choose: Any, seconds: float) -> dict[str, Any]:
-    """Whether another way settles a case in the same seconds, and how many it needs; infinite beyond four times as many, and beyond 60 s."""
+def _same(question: Question, asked: MachineLimits, pair: Pair, draw: tuple[int, int], choose: Choose, seconds: float) -> dict[str, Any]:
+    """Whether another way settles a case in the same seconds, and names it rightly."""
     made = machine(pair, *draw)
-    at = seconds
-    same, outside, runs = False, 0, 0
-    while True:
 
-        def chosen(setting: Setting, beliefs: Sequence[Belief], among: Limits, lasts: float = at) -> Experiment | None:
-            item = choose(setting, beliefs, among)
-            return None if item is None else item.lasting(lasts)
+    def chosen(setting: Setting, beliefs: Sequence[Belief], among: MachineLimits) -> Experiment | None:
+        item = choose(setting, beliefs, among)
+        return None if item is None else item.lasting(seconds)
 
-        found: Settled = settle(question, asked, lambda item: carry_out(made, item), Budget(experiments=1, seconds=at), chosen)
-        right = found.ended == "settled" and found.effects == pair.sets[draw[0]]
-        outside, runs = outside + left_limits(pair, found.recordings), runs + len(found.recordings)
-        same = same or (right and at == seconds)
-        if right or at >= min(MOST, LONGER * seconds) or not found.recordings:
-            return {"same": same, "needed": at if right else math.inf, "outside": outside, "runs": runs}
-        at = min(2.0 * at, MOST)
+    found = settle(question, asked, lambda item: carry_out(made, item), Budget(experiments=1, seconds=seconds, draws=DRAWS), chosen)
+    right = found.effects == pair.sets[draw[0]]
+    return {"settled": right and found.ended == "settled", "right": right, "outside": left_limits(pair, found.recordings)}
 
 
 def table(lines: Sequence[dict[str, Any]]) -> str:
     """All lines as Markdown."""
-    rows = ["| pair | one recording settles | right before | settled | right after | seconds | same seconds of noise | of D-optimal | times as long: noise | D-optimal |"]
-    rows.append("|" + "---|" * 10)
+    rows = [f"| {' | '.join(COLUMNS)} |", "|" + "---|" * len(COLUMNS)]
     names = list(dict.fromkeys(line["pair"] for line in lines))
     for name in [*names, "all"]:
         own = [line for line in lines if name in ("all", line["pair"])]
@@ -122,15 +115,11 @@ def table(lines: Sequence[dict[str, Any]]) -> str:
             return f"{sum(bool(line[key]) for line in own)} of {len(own)}"
 
         good = [line for line in own if line["ended"] == "settled" and line["right"]]
-        compared = [line for line in good if "noise" in line]
-        seconds = sorted(line["seconds"] for line in good)
-        cells = [name, part("first_settled"), part("first_right"), f"{len(good)} of {count}", part("right"), f"{seconds[len(seconds) // 2]:.0f}" if seconds else "-"]
-        for way in ("noise", "d_optimal"):
-            cells.append(f"{sum(line[way]['same'] for line in compared)} of {len(compared)}")
-        for way in ("noise", "d_optimal"):
-            times = sorted(line[way]["needed"] / line["seconds"] for line in compared)
-            middle = times[len(times) // 2] if times else math.nan
-            cells.append("-" if not times else f"{middle:.2g}" if math.isfinite(middle) else "over 4")
+        compared = [line for line in own if "noise" in line]
+        seconds = sorted(line["seconds"] for line in own if line["seconds"] > 0.0)
+        middle = f"{seconds[len(seconds) // 2]:.0f}" if seconds else "-"
+        cells = [name, part("first_settled"), part("first_right"), f"{len(good)} of {count}", part("right"), middle]
+        cells += [f"{sum(line[way]['settled'] for line in compared)} of {len(compared)}" for way in ("noise", "d_optimal")]
         rows.append(f"| {' | '.join(cells)} |")
     runs = sum(line["runs"] for line in lines)
     rows.append("")

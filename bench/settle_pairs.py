@@ -10,10 +10,11 @@ import numpy as np
 from xy_sim.machine import Machine
 from xy_sysid.excitation.lockstep import drive
 from xy_sysid.experiment_design.experiment import Experiment
-from xy_sysid.experiment_design.limits import Limits
+from xy_sysid.experiment_design.limits import MachineLimits
 from xy_sysid.experiment_design.loop import Signals
 from xy_sysid.settings import AxisExcitation, ExcitationSettings
 
+SMALLEST = 0.25  # of the sizes in the table, evenly by their logarithm
 Parts = Mapping[str, Mapping[str, float]]
 
 
@@ -79,7 +80,7 @@ PAIRS = (
     Pair(
         "a saturation that is never reached",
         ((), ("saturation",)),
-        ({}, {"saturation": {"limit": 2.5}}),
+        ({}, {"saturation": {"limit": 5.0}}),
         {"low": 0.5, "high": 200.0, "rms": 0.3},
         voltage=6.0,
         sized=("limit",),
@@ -120,22 +121,22 @@ PAIRS = (
 
 
 def machine(pair: Pair, truth: int, seed: int) -> Machine:
-    """The machine of one axis where the first or the second set is true, its sizes drawn within a factor of 1.5."""
+    """The machine of one axis where the first or the second set is true, its sizes drawn down to a quarter."""
     random = np.random.default_rng([seed, truth])
-    factor = float(1.5 ** random.uniform(-1.0, 1.0))
+    factor = float(SMALLEST ** random.uniform(0.0, 1.0))
     parts = {
         name: {key: value * (factor if key in pair.sized else 1.0) for key, value in values.items()} for name, values in pair.parts[truth].items()
     }
     made = Machine.from_file(pair.machine, seed)
     axis = made.spec.axes[0]
-    coarse = replace(axis, drive=replace(axis.drive, encoder_noise=pair.noise))
+    coarse = replace(axis, drive=axis.drive.model_copy(update={"encoder_noise": pair.noise}))
     single = Machine(replace(made.spec, axes=(coarse,)), seed)
     return single.with_parts(parts)
 
 
-def limits(pair: Pair) -> Limits:
+def limits(pair: Pair) -> MachineLimits:
     """What experiments may ask of the machine of a pair."""
-    return Limits(voltage=pair.voltage, travel=(-pair.reach, pair.reach))
+    return MachineLimits(voltage=pair.voltage, travel=(-pair.reach, pair.reach))
 
 
 def recording(made: Machine, told: AxisExcitation, seconds: float) -> Signals:

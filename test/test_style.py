@@ -23,7 +23,7 @@ CORE = names("""
 errors units settings jit
 samples excitation
 response linear fitting
-effects axis greybox comparison hypotheses diagnosis
+effects axis greybox comparison hypotheses diagnosis experiment_design
 story live
 """)
 EDGE = names("""

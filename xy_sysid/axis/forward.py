@@ -16,7 +16,7 @@ from xy_sysid.samples.block import FloatArray
 
 
 @dataclass(frozen=True, slots=True)
-class Drive:
+class DriveInput:
     """What drives the axis.
 
     voltage: (n,) V, without the pull; pull: (n,) V/m back to the start; limit: V; seen: samples by which the place is old where it pulls
@@ -39,7 +39,7 @@ class Motion:
     position: FloatArray
 
 
-def move(model: AxisModel, sampling_rate: float, drive: Drive, fine: float = FINE) -> Motion:
+def move(model: AxisModel, sampling_rate: float, drive: DriveInput, fine: float = FINE) -> Motion:
     """The motion of an axis model from rest; fine: Hz, sub-steps for laws that heed speed."""
     chosen = [model.library[name] for name, _ in model.effects]
     library = model.library.looped(chosen)

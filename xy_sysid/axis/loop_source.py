@@ -41,7 +41,13 @@ def moving(name: str, effects: Sequence[Effect]) -> str:
     As ``text``, but x: (n + 1,) its first value is the place at the start, and the rest receives the place of the axis, m; u: (n,) the voltage
     wanted, V; centring: (n,) V/m back to the start, of the place ``ago`` samples ago; most: V; sent: (n,) receives the voltage applied, V.
     """
-    own = {"more": ", centring, most, ago, sent", "begins": _own_begins(effects), "ends": _own_ends(), "places": "    encoded = False", "inputs": "    pass"}
+    own = {
+        "more": ", centring, most, ago, sent",
+        "begins": _own_begins(effects),
+        "ends": _own_ends(),
+        "places": "    encoded = False",
+        "inputs": "    pass",
+    }
     return _loop(name, effects, own, _own_encoders(effects))
 
 

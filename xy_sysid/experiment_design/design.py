@@ -11,12 +11,12 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from xy_sysid.axis.model import AxisModel
+from xy_sysid.axis.forward import move
 from xy_sysid.experiment_design.beliefs import Belief
-from xy_sysid.experiment_design.evidence import SURE, Power, powers, seconds_needed, settled
+from xy_sysid.experiment_design.evidence import ROUNDS, SURE, Power, powers, seconds_needed, settled
 from xy_sysid.experiment_design.experiment import RAMP, Experiment
-from xy_sysid.experiment_design.limits import Limits
-from xy_sysid.experiment_design.prediction import LOOKED, Recorded, Setting, recorded
+from xy_sysid.experiment_design.limits import MachineLimits
+from xy_sysid.experiment_design.prediction import COARSE, LOOKED, Setting, seen
 from xy_sysid.experiment_design.proposals import neighbours, proposals
 from xy_sysid.hypotheses.criteria import DOUBTFUL
 
@@ -55,7 +55,7 @@ class Design:
     """beliefs: the sets that are to be distinguished; best: the experiment that does it soonest; tried: all that were judged."""
 
     beliefs: tuple[Belief, ...]
-    limits: Limits
+    limits: MachineLimits
     best: Judged | None
     tried: tuple[Judged, ...]
 
@@ -70,7 +70,9 @@ class Design:
         return self.best is not None and self.best.probability >= DOUBTFUL
 
 
-def design(setting: Setting, beliefs: Sequence[Belief], limits: Limits, seed: int = 1, tell: Callable[[float], None] = lambda part: None) -> Design:
+def design(
+    setting: Setting, beliefs: Sequence[Belief], limits: MachineLimits, seed: int = 1, tell: Callable[[float], None] = lambda part: None
+) -> Design:
     """The experiment for some beliefs; tell: called with the part that is done."""
     rate = setting.layout.sampling_rate
     first = proposals(limits, rate, seed)
@@ -79,36 +81,38 @@ def design(setting: Setting, beliefs: Sequence[Belief], limits: Limits, seed: in
         judged.append(judge(setting, beliefs, limits, item, draws=1))
         tell(0.6 * (number + 1) / len(first))
     allowed = sorted((item for item in judged if not item.broken), key=lambda item: item.order)
-    final = [judge(setting, beliefs, limits, item.experiment) for item in allowed[:FINAL]]
+    final: list[Judged] = []
+    for item in allowed:
+        closer = judge(setting, beliefs, limits, item.experiment)
+        final += [] if closer.broken else [closer]
+        if len(final) == FINAL:
+            break
     tell(0.8)
-    final = sorted((item for item in final if not item.broken), key=lambda item: item.order)
+    final.sort(key=lambda item: item.order)
     if final:
         near = (judge(setting, beliefs, limits, item) for item in neighbours(final[0].experiment, limits, rate))
         final = sorted([*final, *(item for item in near if not item.broken)], key=lambda item: item.order)
     tell(1.0)
     best = _timed(final[0], limits) if final else None
-    return Design(tuple(beliefs), limits, best, tuple([*final, *judged]))
+    return Design(tuple(beliefs), limits, best, (*final, *judged))
 
 
-def judge(setting: Setting, beliefs: Sequence[Belief], limits: Limits, experiment: Experiment, draws: int | None = None) -> Judged:
+def judge(setting: Setting, beliefs: Sequence[Belief], limits: MachineLimits, experiment: Experiment, draws: int | None = None) -> Judged:
     """What one experiment is worth; draws: of each set that are looked at, None is all."""
     told = experiment.excitation
     seconds = max(LOOKED, min(2.0 * told.slow_period * (told.slow > 0.0), limits.seconds) + RAMP)
-    each = []
-    for number, belief in enumerate(beliefs):
-        for model in belief.draws[:draws]:
-            found = _seen(setting, experiment, model, limits, seconds)
-            if isinstance(found, str):
-                return Judged(experiment, broken=found)
-            each.append(tuple(powers(beliefs, number, model, found)))
+    looked = [(number, model) for number, belief in enumerate(beliefs) for model in belief.draws[:draws]]
+    motions = []
+    for _, model in looked:
+        motions.append(move(model, setting.layout.sampling_rate, experiment.drive(setting.layout.sampling_rate, seconds, limits.start), COARSE))
+        broken = limits.broken(motions[-1])
+        if broken:
+            return Judged(experiment, broken=broken)
+    rounds = 1 if draws else ROUNDS
+    pairs = zip(looked, motions, strict=True)
+    each = [tuple(powers(beliefs, number, model, seen(setting, motion), rounds)) for (number, model), motion in pairs]
     most = limits.seconds - RAMP
     return Judged(experiment, seconds=seconds_needed(each, most), probability=settled(each, most), each=tuple(each))
-
-
-def _seen(setting: Setting, experiment: Experiment, model: AxisModel, limits: Limits, seconds: float) -> Recorded | str:
-    """What would be recorded, or which limit would be broken."""
-    item = recorded(setting, experiment, model, limits.start, seconds)
-    return limits.broken(item.motion) or item
 
 
 def shortest(experiment: Experiment) -> float:
@@ -117,7 +121,7 @@ def shortest(experiment: Experiment) -> float:
     return max(SHORTEST, told.slow_period + RAMP if told.slow > 0.0 else 0.0)
 
 
-def _timed(item: Judged, limits: Limits) -> Judged:
+def _timed(item: Judged, limits: MachineLimits) -> Judged:
     """With the seconds that it should last."""
     most = limits.seconds - RAMP
     steps = (BLOCK * k for k in range(1, math.ceil(most / BLOCK)))

@@ -45,7 +45,7 @@ class Power:
         return float(ndtr((mean - ODDS - self.price) / math.sqrt(2.0 * mean)))
 
 
-def powers(beliefs: Sequence[Belief], truth: int, model: AxisModel, item: Recorded) -> list[Power]:
+def powers(beliefs: Sequence[Belief], truth: int, model: AxisModel, item: Recorded, rounds: int = ROUNDS) -> list[Power]:
     """Of what one draw of a set would record: of the first set against every other, and of each other set against the first.
 
     A rival that holds the set as a special case is left out: it explains all that the set does, and is judged where it is the truth.
@@ -55,19 +55,20 @@ def powers(beliefs: Sequence[Belief], truth: int, model: AxisModel, item: Record
     for number, rival in enumerate(beliefs):
         if number == truth or 0 not in (number, truth) or contains(library, frozenset(rival.effects), frozenset(own.effects)):
             continue
-        found.append(Power(truth, number, nats(own, rival, model, item) / item.seconds, PRICE * max(own.free - rival.free, 0)))
+        found.append(Power(truth, number, nats((own, rival), model, item, rounds) / item.seconds, PRICE * max(own.free - rival.free, 0)))
     return found
 
 
-def nats(own: Belief, rival: Belief, model: AxisModel, item: Recorded) -> float:
-    """Expected ratio of likelihoods of the windows of a recording that a model makes, against a rival that suits itself to it."""
+def nats(sets: tuple[Belief, Belief], model: AxisModel, item: Recorded, rounds: int = ROUNDS) -> float:
+    """Expected ratio of likelihoods of the windows of a recording that a model of the first set makes, against the second that suits itself to it."""
+    own, rival = sets
     least, response = expected_error(item, own, model)
     lines = item.objective.lines > 0.0
     weight = (lines / np.sqrt(least))[item.windows.layout.band]
     centre = rival.inner(rival.model)
     inner = centre.copy()
     best = math.inf
-    for last in range(ROUNDS + 1):
+    for last in range(rounds + 1):
         other = rival.moved(inner)
         now = predicted(item, other)
         error = item.velocity - now
@@ -77,7 +78,7 @@ def nats(own: Belief, rival: Belief, model: AxisModel, item: Recorded) -> float:
         off = inner - centre
         score = item.objective.of_power(least + power, responder(item.windows.layout, other)(other.row))
         best = min(best, _all(item, score) + 0.5 * float(off @ rival.precision @ off))
-        if last == ROUNDS:
+        if last == rounds:
             break
         columns = (slopes(item, rival, other, now) * weight).reshape(inner.size, -1).view(np.float64)
         left = (error * weight).ravel().view(np.float64)

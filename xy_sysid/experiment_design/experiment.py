@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from xy_sysid.axis.forward import Drive
+from xy_sysid.axis.forward import DriveInput
 from xy_sysid.excitation import signal
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.settings import AxisExcitation, ExcitationSettings
@@ -27,13 +27,13 @@ class Experiment:
         """The same for another time."""
         return replace(self, seconds=seconds)
 
-    def drive(self, sampling_rate: float, seconds: float, start: float) -> Drive:
+    def drive(self, sampling_rate: float, seconds: float, start: float) -> DriveInput:
         """What it makes of an axis that stands at ``start``, as ``excitation.drive.Drive`` does between its guards."""
         told, n = self.excitation, round(seconds * sampling_rate)
         time = np.arange(n) / sampling_rate
         fade = 0.5 * (1.0 - np.cos(np.pi * np.minimum(time / RAMP, 1.0)))
         voltage = told.rms * self._signal(sampling_rate, n) + told.offset + told.slow * np.sin(2.0 * np.pi * time / told.slow_period)
-        return Drive(
+        return DriveInput(
             voltage=np.asarray(voltage * fade), pull=told.centring * fade, limit=told.limit, seen=round(AGE * sampling_rate), start=start
         )
 

@@ -17,7 +17,7 @@ SECONDS = 60.0  # s of motion for one experiment at most
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class MachineLimits:
     """Of one axis.
 
     voltage: V, of each sample; rms: V, that the drive stands for long (its current); speed: m/s; acceleration: m/s^2
@@ -70,14 +70,14 @@ class Limits:
         return next((name for name, value, most in checks if value > most), "")
 
 
-def as_recorded(runs: Sequence[Run]) -> Limits:
+def as_recorded(runs: Sequence[Run]) -> MachineLimits:
     """Nothing beyond what some recordings show: their largest voltage, and their travel about where the last one ends."""
     voltage = max(_peak(run.voltage) for run in runs)
     low, high = min(float(np.min(run.position)) for run in runs), max(float(np.max(run.position)) for run in runs)
     if not (voltage > 0.0 and high > low):
         raise BadInput("recordings", "without voltage or motion", "an axis that moves", "Give the limits: voltage and travel.")
     start, least = float(runs[-1].position[-1]), 0.1 * (high - low)
-    return Limits(voltage=voltage, travel=(min(low, start - least), max(high, start + least)), start=start)
+    return MachineLimits(voltage=voltage, travel=(min(low, start - least), max(high, start + least)), start=start)
 
 
 def _peak(values: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> float:

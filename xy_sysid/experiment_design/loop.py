@@ -13,17 +13,17 @@ from xy_sysid.axis.model import Library
 from xy_sysid.experiment_design.beliefs import Belief
 from xy_sysid.experiment_design.design import Design, design
 from xy_sysid.experiment_design.experiment import Experiment
-from xy_sysid.experiment_design.limits import Limits
+from xy_sysid.experiment_design.limits import MachineLimits
 from xy_sysid.experiment_design.prediction import Setting
 from xy_sysid.experiment_design.rivals import Standing, beliefs_of, standing
 from xy_sysid.greybox.axis_data import EPSILON, prepare_all
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import USUAL, Units
 
-Ended = Literal["settled", "impossible", "experiments", "seconds", "stopped"]
+Ending = Literal["settled", "impossible", "experiments", "seconds", "stopped"]
 Signals = tuple[FloatArray, FloatArray]  # voltage and position, (n,) each
-Run = Callable[[Experiment], Signals | None]  # carries an experiment out; None if somebody stopped it
-Choose = Callable[[Setting, Sequence[Belief], Limits], Experiment | None]
+CarryOut = Callable[[Experiment], Signals | None]  # carries an experiment out; None if somebody stopped it
+Choose = Callable[[Setting, Sequence[Belief], MachineLimits], Experiment | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +48,7 @@ class Decision:
 class Settled:
     """ended: why; steps: each decision, after the first recordings and after each experiment; recordings: of the experiments; seconds: of motion."""
 
-    ended: Ended
+    ended: Ending
     steps: tuple[Decision, ...]
     recordings: tuple[Signals, ...]
     seconds: float
@@ -72,13 +72,15 @@ class Question:
     units: Units = USUAL
 
 
-def best_design(setting: Setting, beliefs: Sequence[Belief], limits: Limits) -> Experiment | None:
+def best_design(setting: Setting, beliefs: Sequence[Belief], limits: MachineLimits) -> Experiment | None:
     """The experiment of ``design``; None where none is more likely than not to tell."""
     found: Design = design(setting, beliefs, limits)
     return found.best.experiment if found.best is not None and found.helps else None
 
 
-def decide(question: Question, more: Sequence[Signals], limits: Limits, choose: Choose, before: Standing | None = None, draws: int = 6) -> Decision:
+def decide(
+    question: Question, more: Sequence[Signals], limits: MachineLimits, choose: Choose, before: Standing | None = None, draws: int = 6
+) -> Decision:
     """What the recordings say, and what to measure next."""
     data = prepare_all(question.sampling_rate, [*question.recordings, *more], question.tolerance, question.units)
     known = tuple(found.model for found in before.fits) if before is not None else ()
@@ -88,7 +90,7 @@ def decide(question: Question, more: Sequence[Signals], limits: Limits, choose: 
     return Decision(now, tuple(item.effects for item in beliefs), then)
 
 
-def settle(question: Question, limits: Limits, run: Run, budget: Budget | None = None, choose: Choose = best_design) -> Settled:
+def settle(question: Question, limits: MachineLimits, run: CarryOut, budget: Budget | None = None, choose: Choose = best_design) -> Settled:
     """Go on until one set is left, no experiment can tell, or the budget is spent."""
     budget = budget or Budget()
     recordings: list[Signals] = []

@@ -17,7 +17,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.experiment_design.beliefs import Belief
 from xy_sysid.experiment_design.design import FINAL, SHORTEST
 from xy_sysid.experiment_design.experiment import RAMP, Experiment
-from xy_sysid.experiment_design.limits import Limits
+from xy_sysid.experiment_design.limits import MachineLimits
 from xy_sysid.experiment_design.prediction import Recorded, Setting, expected_error, predicted, recorded, slopes
 from xy_sysid.experiment_design.proposals import neighbours, proposals
 from xy_sysid.greybox.axis_data import HELD, SEEN
@@ -55,7 +55,7 @@ def information(belief: Belief, model: AxisModel, item: Recorded) -> Information
 
 @dataclass(frozen=True)
 class Sharpest:
-    """experiment: the best, or None where none is within the limits; width: half of the 95 % interval that is expected, as ``Target`` says
+    """experiment: the best, or None where none is within the limits; width: half of the 95 % interval that is expected, as ``Wanted`` says
     possible: whether that is as narrow as asked for; before: half of the interval by the data at hand
     """
 
@@ -66,7 +66,7 @@ class Sharpest:
 
 
 @dataclass(frozen=True)
-class Target:
+class Wanted:
     """parameter: as ``gain`` or ``effect.parameter``; width: half of the 95 % interval, as a part of a positive value, else in its unit."""
 
     parameter: str
@@ -90,7 +90,7 @@ class Target:
         return spread / value if place < 1 else spread
 
 
-def sharpest(setting: Setting, belief: Belief, limits: Limits, target: Target, seed: int = 1) -> Sharpest:
+def sharpest(setting: Setting, belief: Belief, limits: MachineLimits, target: Wanted, seed: int = 1) -> Sharpest:
     """The experiment after which a parameter is known as well as asked for in the least time, or best where none gets there."""
     before = target.half_width(belief, _inverse(belief.precision))
     most = limits.seconds - RAMP
@@ -106,11 +106,11 @@ def sharpest(setting: Setting, belief: Belief, limits: Limits, target: Target, s
     return Sharpest(best.lasting(float(lasts)), width, math.isfinite(seconds), before)
 
 
-def _rounds(setting: Setting, belief: Belief, limits: Limits, target: Target, seed: int) -> Sequence[Experiment]:
+def _rounds(setting: Setting, belief: Belief, limits: MachineLimits, target: Wanted, seed: int) -> Sequence[Experiment]:
     """Proposals, and neighbours of the best of them."""
     rate, most = setting.layout.sampling_rate, limits.seconds - RAMP
     first = proposals(limits, rate, seed)
-    judged = []
+    judged: list[tuple[float, float, int, Experiment]] = []
     for experiment in first:
         found = informations(setting, belief, limits, experiment, draws=1)
         if found:
@@ -119,7 +119,7 @@ def _rounds(setting: Setting, belief: Belief, limits: Limits, target: Target, se
     return [*best, *(neighbours(best[0], limits, rate) if best else ())]
 
 
-def informations(setting: Setting, belief: Belief, limits: Limits, experiment: Experiment, draws: int = DRAWS) -> list[Information]:
+def informations(setting: Setting, belief: Belief, limits: MachineLimits, experiment: Experiment, draws: int = DRAWS) -> list[Information]:
     """Of one experiment, for some draws; none where a draw would break a limit."""
     found = []
     for model in belief.draws[:draws]:
@@ -130,7 +130,7 @@ def informations(setting: Setting, belief: Belief, limits: Limits, experiment: E
     return found
 
 
-def _needed(belief: Belief, found: Sequence[Information], target: Target, most: float) -> tuple[float, float]:
+def _needed(belief: Belief, found: Sequence[Information], target: Wanted, most: float) -> tuple[float, float]:
     """s until the mean interval over draws is as narrow as asked for, infinite if ``most`` do not suffice; and half its width there."""
 
     def width(seconds: float) -> float:

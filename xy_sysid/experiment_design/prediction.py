@@ -17,7 +17,7 @@ from xy_sysid.greybox.least_squares import STEP
 from xy_sysid.greybox.objective import Objective, responder
 from xy_sysid.samples.block import FloatArray
 
-LOOKED = 12.0  # s of each experiment that are simulated: longer ones go on as they began
+LOOKED = 8.0  # s of each experiment that are simulated: longer ones go on as they began
 COARSE = 4000.0  # Hz: sub-steps
 
 

@@ -7,7 +7,7 @@ from itertools import product
 from typing import Any
 
 from xy_sysid.experiment_design.experiment import Experiment
-from xy_sysid.experiment_design.limits import Limits
+from xy_sysid.experiment_design.limits import MachineLimits
 from xy_sysid.settings import AxisExcitation
 
 CREST = 4.2  # peak of Gaussian noise over its rms: one sample in 40,000 is beyond
@@ -19,12 +19,12 @@ NEAR = {"rms": (0.7, 1.4), "slow": (0.7, 1.4), "slow_period": (0.6, 1.6), "perio
 LONGEST = 10.0  # s, of a slow sine
 
 
-def proposals(limits: Limits, sampling_rate: float, seed: int = 1) -> list[Experiment]:
+def proposals(limits: MachineLimits, sampling_rate: float, seed: int = 1) -> list[Experiment]:
     """Experiments from loud to quiet; those that would break a limit are among them."""
     return [_experiment(limits, sampling_rate, {"seed": seed, **told}) for told in _grid(limits, sampling_rate)]
 
 
-def neighbours(experiment: Experiment, limits: Limits, sampling_rate: float) -> Iterator[Experiment]:
+def neighbours(experiment: Experiment, limits: MachineLimits, sampling_rate: float) -> Iterator[Experiment]:
     """The same experiment with one number changed."""
     told = experiment.excitation
     values = {name: getattr(told, name) for name in AxisExcitation.model_fields}
@@ -38,7 +38,7 @@ def neighbours(experiment: Experiment, limits: Limits, sampling_rate: float) -> 
             yield _experiment(limits, sampling_rate, {**values, name: values[name] * factor})
 
 
-def _grid(limits: Limits, sampling_rate: float) -> Iterator[dict[str, Any]]:
+def _grid(limits: MachineLimits, sampling_rate: float) -> Iterator[dict[str, Any]]:
     most, top = limits.voltage, min(300.0, TOP * sampling_rate)
     bands = [(0.1, 10.0), (0.1, 50.0), (0.1, top), (20.0, top)]
     for (low, high), part in product(bands, HALVES[:4]):
@@ -54,7 +54,7 @@ def _grid(limits: Limits, sampling_rate: float) -> Iterator[dict[str, Any]]:
         yield {"kind": "noise", "low": 0.1, "high": top, "rms": quiet * most / CREST, "slow": 0.7 * part * most, "slow_period": period}
 
 
-def _experiment(limits: Limits, sampling_rate: float, told: dict[str, Any]) -> Experiment:
+def _experiment(limits: MachineLimits, sampling_rate: float, told: dict[str, Any]) -> Experiment:
     """With the limits of the axis, and numbers that its settings allow."""
     told = {**told, "limit": limits.voltage, "travel_min": limits.travel[0], "travel_max": limits.travel[1]}
     told["brake"] = min(AxisExcitation.model_fields["brake"].default, 0.2 * (limits.travel[1] - limits.travel[0]))
@@ -67,6 +67,6 @@ def _experiment(limits: Limits, sampling_rate: float, told: dict[str, Any]) -> E
     return Experiment(AxisExcitation(**told))
 
 
-def _centring(limits: Limits) -> float:
+def _centring(limits: MachineLimits) -> float:
     """V/m: a fiftieth of the voltage at the nearer end; enough against drift, too little to matter else."""
     return min(0.02 * limits.voltage / limits.room, 1e4)
