@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from xy_sysid.imports.reading import Reading
     from xy_sysid.samples.recording import Run
 
+NOTHING = "nothing"  # is known
 Between = Annotated[
     list[str] | None,
     typer.Option("--between", metavar="EFFECTS", help="a set of effects, as a+b, or rigid; give it for each set that is to be distinguished"),
@@ -31,12 +33,19 @@ Between = Annotated[
 
 @reads
 def next_(
-    recs: o.Recs,
     reading: Reading,
+    recs: Annotated[
+        list[Path] | None, typer.Argument(metavar="[REC]", help="recordings of one machine, as of diagnose; none with --for nothing")
+    ] = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", metavar="FILE", help="write the experiment for the excitation node")] = None,
     between: Between = None,
     precision: Annotated[
-        str | None, typer.Option("--for", metavar="PARAMETER", help="instead make this parameter precise: gain, pole or effect.parameter")
+        str | None,
+        typer.Option(
+            "--for",
+            metavar="PARAMETER",
+            help="make this parameter precise (gain, pole, effect.parameter), or nothing: a first experiment for an unknown axis",
+        ),
     ] = None,
     to: Annotated[float, typer.Option("--to", metavar="PART", help="with --for: half of the 95 % interval, as a part of the value", min=1e-6)] = 0.02,
     run_file: Annotated[
@@ -57,20 +66,28 @@ def next_(
     """Design the experiment that settles what the recordings leave open, within the machine's limits."""
     from xy_sysid.diagnosis.of_run import diagnose
     from xy_sysid.experiment_design.of_run import next_experiment, sharpen
+    from xy_sysid.experiment_design.rivals import check
     from xy_sysid.files.effects import library
-    from xy_sysid.files.experiment import document, write_experiment
 
-    known = library(effect_file or [])
     o.output_file("--output", output, force)
+    asked = partial(_asked, voltage=voltage, travel=travel, speed=speed, acceleration=acceleration)
+    if precision == NOTHING:
+        unknown = _first(reading, run_file, asked, rms, seconds)
+        _answered(unknown, output, json)
+        return
+    if not recs:
+        raise BadInput("REC", "missing", "recordings, or --for nothing", "Give a recording of the axis.")
+    known = library(effect_file or [])
     if precision is not None and between:
         raise BadInput("--for", f"{precision} together with --between", "one of them", "Leave one out.")
     sets = _sets(between)
+    check(known, sets)
     recordings = read_each(recs, reading, json)
     names = chosen(recordings[0], reading.axes)
     if len(names) > 1:
         raise BadInput("--axis", "several axes", f"one of {', '.join(names)}", "An experiment is for one axis: add --axis.")
     runs = runs_of(recordings, names[0])
-    limits = _limits(runs, _own_limits(run_file, names[0]), _asked(runs[0].units.output, voltage, travel, speed, acceleration), rms, seconds)
+    limits = _limits(runs, _own_limits(run_file, names[0]), asked(runs[0].units.output), rms, seconds)
     with progress() as bar:
         task = bar.add_task(f"diagnosing axis {names[0]}", total=1.0)
         found = diagnose(runs, known, math.inf if budget is None else budget, time.process_time)
@@ -79,13 +96,38 @@ def next_(
             answer = sharpen(found, precision, to, limits)
         else:
             answer = next_experiment(found, limits, sets, known, tell=lambda part: bar.update(task, completed=part))
+    if not json:
+        say(f"axis {names[0]}: {found.sentence.rstrip()}")
+    _answered(answer, output, json)
+
+
+def _answered(answer: NextExperiment, output: Path | None, json: bool) -> None:
+    """Write the file, and say what was found."""
+    from xy_sysid.files.experiment import document, write_experiment
+
     if output is not None and answer.experiment is not None:
         write_experiment(output, answer)
     if json:
-        emit({"axis": names[0], "sentence": answer.sentence, **_plain(answer), "file": document(answer) if answer.experiment else None})
+        emit({"axis": answer.axis, "sentence": answer.sentence, **_plain(answer), "file": document(answer) if answer.experiment else None})
         return
-    say(f"axis {names[0]}: {found.sentence.rstrip()}")
     _show(answer, output)
+
+
+def _first(reading: Reading, run_file: Path | None, asked: Callable[[str], dict[str, Any]], rms: float | None, seconds: float) -> NextExperiment:
+    """For an unknown axis with the limits of a run file, or with those that were typed."""
+    from xy_sysid.experiment_design.first import first_experiment
+    from xy_sysid.experiment_design.limits import MachineLimits
+    from xy_sysid.settings import ExcitationSettings
+
+    axis = (reading.axes or ("x",))[0]
+    told = o.told_to("excitation", run_file).parameters if run_file is not None else {}
+    values = {**_own_limits(run_file, axis), **asked(str(told.get("unit", "m"))), **({} if rms is None else {"rms": rms})}
+    for name in ("voltage", "travel"):
+        if name not in values:
+            raise BadInput("--for nothing", f"without the limit of {name}", f"--{name}, or --params with a run file", "Say what the machine may do.")
+    rate = float(told.get("rate", reading.rate or ExcitationSettings().rate))
+    middle = 0.5 * (values["travel"][0] + values["travel"][1])
+    return first_experiment(axis, rate, MachineLimits(start=middle, seconds=seconds, **values))
 
 
 def _plain(answer: NextExperiment) -> dict[str, Any]:

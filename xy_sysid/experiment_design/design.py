@@ -77,8 +77,8 @@ def design(
     rate = setting.layout.sampling_rate
     first = proposals(limits, rate, seed)
     judged = []
-    for number, item in enumerate(first):
-        judged.append(judge(setting, beliefs, limits, item, draws=1))
+    for number, proposal in enumerate(first):
+        judged.append(judge(setting, beliefs, limits, proposal, draws=1))
         tell(0.6 * (number + 1) / len(first))
     allowed = sorted((item for item in judged if not item.broken), key=lambda item: item.order)
     final: list[Judged] = []

@@ -99,7 +99,7 @@ def sharpen(found: Diagnosed, parameter: str, width: float, limits: MachineLimit
     limits = limits or as_recorded(found.runs)
     with threadpool_limits(1, "blas"):
         belief = believed(Evidence(data), _ladder(found).final, DRAWS)
-        best = sharpest(Setting.of(data), belief, limits, Wanted(parameter, width))
+        best = sharpest(data, belief, limits, Wanted(parameter, width))
     to = f"{100.0 * best.width:.2g} %"
     if best.experiment is None:
         sentence = f"No experiment is within the limits; {parameter} is known to {100.0 * best.before:.2g} %."

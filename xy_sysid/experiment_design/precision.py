@@ -12,21 +12,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from xy_sysid.axis.forward import move
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.errors import BadInput
 from xy_sysid.experiment_design.beliefs import Belief
 from xy_sysid.experiment_design.design import FINAL, SHORTEST
 from xy_sysid.experiment_design.experiment import RAMP, Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
-from xy_sysid.experiment_design.prediction import Recorded, Setting, expected_error, predicted, recorded, slopes
+from xy_sysid.experiment_design.prediction import COARSE, Recorded, Setting, expected_error, predicted, recorded, slopes
 from xy_sysid.experiment_design.proposals import neighbours, proposals
-from xy_sysid.greybox.axis_data import HELD, SEEN
+from xy_sysid.greybox.axis_data import HELD, SEEN, AxisData, prepare_all
+from xy_sysid.greybox.free_run import finish
 from xy_sysid.greybox.least_squares import of_the_law
-from xy_sysid.greybox.parameters import Z95
+from xy_sysid.greybox.parameters import Z95, Estimate
 from xy_sysid.samples.block import FloatArray
 
 FITTED = SEEN / (SEEN + HELD)  # part of a record that a fit sees
 DRAWS = 2  # of the parameters that are looked at
+LONGER = 1.4  # times as long, where a rehearsal does not reach what was asked for
 
 
 @dataclass(frozen=True)
@@ -67,7 +70,7 @@ class Sharpest:
 
 @dataclass(frozen=True)
 class Wanted:
-    """parameter: as ``gain`` or ``effect.parameter``; width: half of the 95 % interval, as a part of a positive value, else in its unit."""
+    """parameter: as ``gain`` or ``effect.parameter``; width: half of the 95 % interval, as a part of the value."""
 
     parameter: str
     width: float
@@ -79,6 +82,11 @@ class Wanted:
             raise BadInput("parameter", repr(self.parameter), ", ".join(names), "Choose one of these.")
         return names.index(self.parameter)
 
+    def of_interval(self, found: Estimate) -> float:
+        """The same of an estimate of a fit."""
+        half = 0.5 * (found.high - found.low)
+        return half / abs(found.value) if found.value else math.inf
+
     def half_width(self, belief: Belief, covariance: FloatArray) -> float:
         """Of the interval that a covariance of the coordinates means."""
         place = self.place(belief)
@@ -86,24 +94,41 @@ class Wanted:
         if belief.scale.positive[place]:
             return math.expm1(min(spread, 50.0))
         value = abs(float(belief.model.row[place]))
-        spread *= float(belief.scale.unit[place])
-        return spread / value if place < 1 else spread
+        return spread * float(belief.scale.unit[place]) / value if value else math.inf
 
 
-def sharpest(setting: Setting, belief: Belief, limits: MachineLimits, target: Wanted, seed: int = 1) -> Sharpest:
-    """The experiment after which a parameter is known as well as asked for in the least time, or best where none gets there."""
+def sharpest(data: AxisData, belief: Belief, limits: MachineLimits, target: Wanted, seed: int = 1) -> Sharpest:
+    """The experiment after which a parameter is known as well as asked for in the least time, or best where none gets there.
+
+    The experiment is chosen by its information. How long it has to last is found by a rehearsal: the fit of a simulated recording with noise.
+    """
+    setting = Setting.of(data)
     before = target.half_width(belief, _inverse(belief.precision))
     most = limits.seconds - RAMP
-    judged = []
+    judged: list[tuple[float, float, int, Experiment, list[Information]]] = []
     for experiment in _rounds(setting, belief, limits, target, seed):
         found = informations(setting, belief, limits, experiment)
         if found:
-            judged.append((*_needed(belief, found, target, most), experiment))
+            judged.append((*_needed(belief, found, target, most), len(judged), experiment, found))
     if not judged:
         return Sharpest(None, before, before <= target.width, before)
-    seconds, width, best = min(judged, key=lambda item: item[:2])
+    seconds, _, _, best, _ = min(judged, key=lambda item: item[:3])
     lasts = min(max(math.ceil((seconds if math.isfinite(seconds) else most) + RAMP), SHORTEST), limits.seconds)
-    return Sharpest(best.lasting(float(lasts)), width, math.isfinite(seconds), before)
+    while True:
+        width = rehearsed(data, belief, best.lasting(float(lasts)), limits, target)
+        if width <= target.width or lasts >= limits.seconds:
+            return Sharpest(best.lasting(float(lasts)), width, width <= target.width, before)
+        lasts = min(math.ceil(LONGER * lasts), limits.seconds)
+
+
+def rehearsed(data: AxisData, belief: Belief, experiment: Experiment, limits: MachineLimits, target: Wanted) -> float:
+    """Half of the interval that a fit reports of the data at hand and of a recording that the experiment would make, with the encoder's noise."""
+    rate = data.sampling_rate
+    motion = move(belief.model, rate, experiment.drive(rate, experiment.seconds, limits.start), COARSE)
+    noise = data.floor.encoder * np.random.default_rng(0).standard_normal(motion.position.size)
+    recordings = [(data.voltage[run], data.position[run]) for run in data.runs]
+    both = prepare_all(rate, [*recordings, (motion.voltage, motion.position + noise)], data.floor.epsilon, data.units)
+    return target.of_interval(finish(both, belief.model).parameter(target.parameter))
 
 
 def _rounds(setting: Setting, belief: Belief, limits: MachineLimits, target: Wanted, seed: int) -> Sequence[Experiment]:
@@ -133,16 +158,18 @@ def informations(setting: Setting, belief: Belief, limits: MachineLimits, experi
 def _needed(belief: Belief, found: Sequence[Information], target: Wanted, most: float) -> tuple[float, float]:
     """s until the mean interval over draws is as narrow as asked for, infinite if ``most`` do not suffice; and half its width there."""
 
-    def width(seconds: float) -> float:
-        return float(np.mean([target.half_width(belief, item.covariance(belief.precision, seconds)) for item in found]))
-
-    if width(most) > target.width:
-        return math.inf, width(most)
+    if _width(belief, found, target, most) > target.width:
+        return math.inf, _width(belief, found, target, most)
     low, high = 0.0, most
     for _ in range(30):
         middle = 0.5 * (low + high)
-        low, high = (low, middle) if width(middle) <= target.width else (middle, high)
-    return high, width(high)
+        low, high = (low, middle) if _width(belief, found, target, middle) <= target.width else (middle, high)
+    return high, _width(belief, found, target, high)
+
+
+def _width(belief: Belief, found: Sequence[Information], target: Wanted, seconds: float) -> float:
+    """Half of the 95 % interval after some seconds, in the mean over draws."""
+    return float(np.mean([target.half_width(belief, item.covariance(belief.precision, seconds)) for item in found]))
 
 
 def volume(belief: Belief, found: Sequence[Information], seconds: float) -> float:

@@ -38,6 +38,7 @@ class Standing:
 
 def standing(data: AxisData, library: Library, sets: Sequence[Sequence[str]], known: Sequence[AxisModel | None] = ()) -> Standing:
     """Fit some sets and compare them on the held-out windows; known: a model of each that was fitted to other data."""
+    check(library, sets)
     names = tuple(tuple(each) for each in sets)
     before = tuple(known) or (None,) * len(names)
     fits = tuple(_fitted(data, library, each, model) for each, model in zip(names, before, strict=True))
@@ -48,16 +49,20 @@ def standing(data: AxisData, library: Library, sets: Sequence[Sequence[str]], kn
     return Standing(names, fits, chosen, max(doubts, default=0.0))
 
 
+def check(library: Library, sets: Iterable[Sequence[str]]) -> None:
+    """Raises BadInput for an effect that is unknown, in every model already, or that no free simulation predicts."""
+    for name in (name for each in sets for name in each):
+        if not library[name].simulable or library[name].category == "base":
+            act = "It is judged one sample ahead; see its experiment in xy-sysid effects." if not library[name].simulable else "Leave it out."
+            raise BadInput("effect", name, "effects that free simulation can predict", act)
+
+
 def _doubt(one: GreyboxFit, other: GreyboxFit, price: float) -> float:
     found = gain(one, other)
     return min(1.0 - type(found)(found.nats + price, found.error, found.windows).probability, 0.5)
 
 
 def _fitted(data: AxisData, library: Library, names: Sequence[str], known: AxisModel | None) -> GreyboxFit:
-    for name in names:
-        if not library[name].simulable or library[name].category == "base":
-            act = "It is judged one sample ahead; see its experiment in xy-sysid effects." if not library[name].simulable else "Leave it out."
-            raise BadInput("effect", name, "effects that free simulation can predict", act)
     found = Given.of(data, library, tuple(names)).steps[-1].fit
     if known is None:
         return found
