@@ -54,6 +54,7 @@ setup(
         "wpilog": ["robotpy-wpiutil"],
         "parquet": ["pyarrow"],
         "bench": ["scikit-rf", "pyFRF"],
+        "foreign": ["mujoco"],
         "test": [
             "matplotlib",
             "nicegui>=3.13,<4",

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Protocol
 
 import numpy as np
 
+from bench.mujoco_machine import MujocoMachine
 from xy_sim.machine import Machine
 from xy_sysid.excitation.lockstep import drive
 from xy_sysid.experiment_design.experiment import Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
 from xy_sysid.experiment_design.loop import Signals
+from xy_sysid.samples.block import FloatArray
 from xy_sysid.settings import AxisExcitation, ExcitationSettings
 
 SMALLEST = 0.25  # of the sizes in the table, evenly by their logarithm
@@ -103,11 +106,10 @@ PAIRS = (
         "gain or drag that varies along the travel",
         (("position_dependent_gain",), ("position_dependent_drag",)),
         (
-            {"position_dependent_gain": {"depth": 0.1, "period": 0.15}},
+            {"position_dependent_gain": {"depth": 0.15, "period": 0.3}},
             {"position_dependent_drag": {"slope": 4.0}},
         ),
-        {"kind": "off", "rms": 0.0, "slow": 3.5, "slow_period": 1.5, "centring": 0.0},
-        seconds=8.0,
+        {"kind": "off", "rms": 0.0, "slow": 1.2, "slow_period": 1.5, "centring": 0.0},
         sized=("depth", "slope"),
     ),
     Pair(
@@ -117,16 +119,56 @@ PAIRS = (
         {"low": 0.5, "high": 100.0, "rms": 0.5},
         sized=("cubic",),
     ),
+    Pair(
+        "gravity or a spring, near hanging (MuJoCo)",
+        (("gravity",), ("return_spring",)),
+        ({"gravity": {"amplitude": 0.5}}, {"return_spring": {"stiffness": 0.5}}),
+        {"low": 0.5, "high": 20.0, "rms": 0.08, "centring": 0.0},
+        seconds=12.0,
+        voltage=1.2,
+        reach=2.5,
+        machine="mujoco hinge",
+        noise=2e-4,
+        sized=("amplitude", "stiffness"),
+    ),
+    Pair(
+        "load or Coulomb friction, seen in one direction (MuJoCo)",
+        (("constant_load",), ("coulomb_friction",)),
+        ({"constant_load": {"load": 0.15}}, {"coulomb_friction": {"coulomb": 0.15}}),
+        {"low": 5.0, "high": 100.0, "offset": 0.45, "rms": 0.05, "centring": 0.0},
+        machine="mujoco slide",
+        sized=("load", "coulomb"),
+    ),
 )
 
 
-def machine(pair: Pair, truth: int, seed: int) -> Machine:
+class Rig(Protocol):
+    """A machine of one axis x: ``step`` as of ``excitation.lockstep.Machine``, and back to rest at the origin."""
+
+    @property
+    def rate(self) -> float:
+        """Samples per second, Hz."""
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Names, one per column."""
+
+    def step(self, voltage: FloatArray) -> FloatArray:
+        """(n, axes) V, held -> (n, axes) positions at the same instants."""
+
+    def reset(self) -> None:
+        """Back to rest at the origin."""
+
+
+def machine(pair: Pair, truth: int, seed: int) -> Rig:
     """The machine of one axis where the first or the second set is true, its sizes drawn down to a quarter."""
     random = np.random.default_rng([seed, truth])
     factor = float(SMALLEST ** random.uniform(0.0, 1.0))
     parts = {
         name: {key: value * (factor if key in pair.sized else 1.0) for key, value in values.items()} for name, values in pair.parts[truth].items()
     }
+    if pair.machine.startswith("mujoco "):
+        return MujocoMachine(pair.machine.removeprefix("mujoco "), parts, pair.noise, seed)
     made = Machine.from_file(pair.machine, seed)
     axis = made.spec.axes[0]
     coarse = replace(axis, drive=axis.drive.model_copy(update={"encoder_noise": pair.noise}))
@@ -139,7 +181,7 @@ def limits(pair: Pair) -> MachineLimits:
     return MachineLimits(voltage=pair.voltage, travel=(-pair.reach, pair.reach))
 
 
-def recording(made: Machine, told: AxisExcitation, seconds: float) -> Signals:
+def recording(made: Rig, told: AxisExcitation, seconds: float) -> Signals:
     """Voltage and position of an excitation from rest at the origin."""
     made.reset()
     settings = ExcitationSettings(rate=made.rate, lockstep=True, speed=0.0, axes={"x": told})
@@ -147,7 +189,7 @@ def recording(made: Machine, told: AxisExcitation, seconds: float) -> Signals:
     return found.voltage[:, 0], found.position[:, 0]
 
 
-def first_recording(pair: Pair, made: Machine, seed: int) -> Signals:
+def first_recording(pair: Pair, made: Rig, seed: int) -> Signals:
     """The short one that does not tell."""
     ends = {"limit": pair.voltage, "travel_min": -pair.reach, "travel_max": pair.reach}
     voltage, position = recording(made, AxisExcitation(**{**ends, **pair.first, "seed": seed}), pair.seconds)
@@ -155,7 +197,7 @@ def first_recording(pair: Pair, made: Machine, seed: int) -> Signals:
     return voltage[begin:], position[begin:]
 
 
-def carry_out(made: Machine, experiment: Experiment) -> Signals:
+def carry_out(made: Rig, experiment: Experiment) -> Signals:
     """What an experiment records."""
     return recording(made, experiment.excitation, experiment.seconds)
 
