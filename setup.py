@@ -55,6 +55,7 @@ setup(
         "wpilog": ["robotpy-wpiutil"],
         "parquet": ["pyarrow"],
         "bench": ["scikit-rf", "pyFRF"],
+        "foreign": ["mujoco"],
         "test": [
             "matplotlib",
             "pandas",

@@ -27,7 +27,7 @@ HERE = [name for name in TABLES if name != "live"]  # which starts processes tha
 
 def short(name: str) -> Table:
     """The short form of a benchmark in this process."""
-    run: Callable[..., Table] = importlib.import_module(f"bench.{name}").run
+    run: Callable[..., Table] = importlib.import_module(f"campaigns.bench.{name}").run
     return run(lambda line: None, short=True)
 
 

@@ -23,7 +23,7 @@ CORE = names("""
 errors units settings jit tables
 samples excitation
 response linear fitting time_models
-effects axis greybox comparison hypotheses diagnosis
+effects axis greybox comparison hypotheses diagnosis experiment_design
 story live
 """)
 EDGE = names("""

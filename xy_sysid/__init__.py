@@ -20,6 +20,7 @@ Packages in the order of the data; each imports only from those before it.
     effects, axis, greybox:    physical effects, an axis with them in time, its fit
     comparison:                where a model fails
     hypotheses, diagnosis:     which effect is missing
+    experiment_design:         what to measure next
     story, live:               what people are shown, and the online logic
     bags, imports, files, processes: reading, writing, other processes
     nodes, report, page, cli:  what people meet
@@ -41,6 +42,8 @@ if TYPE_CHECKING:
     from xy_sysid.comparison.physical_model import PhysicalModel
     from xy_sysid.diagnosis.of_run import diagnose, refine
     from xy_sysid.errors import BadInput, BadRecording, MissingExtra, XySysidError
+    from xy_sysid.experiment_design.limits import MachineLimits
+    from xy_sysid.experiment_design.of_run import next_experiment, sharpen
     from xy_sysid.files.effects import library
     from xy_sysid.files.models import load_model, save
     from xy_sysid.fitting.of_run import LinearModel, fit, frf
@@ -61,6 +64,7 @@ __all__ = [
     "BadRecording",
     "FrequencyResponse",
     "LinearModel",
+    "MachineLimits",
     "MissingExtra",
     "PhysicalModel",
     "Recording",
@@ -78,9 +82,11 @@ __all__ = [
     "library",
     "load",
     "load_model",
+    "next_experiment",
     "plot",
     "refine",
     "save",
+    "sharpen",
     "simulate",
     "to_control",
     "to_scipy",
@@ -99,6 +105,8 @@ _HOMES = {
     "comparison.physical_model": ("PhysicalModel",),
     "comparison.of_run": ("better", "compare", "validate"),
     "diagnosis.of_run": ("diagnose", "refine"),
+    "experiment_design.limits": ("MachineLimits",),
+    "experiment_design.of_run": ("next_experiment", "sharpen"),
     "imports": ("load",),
     "imports.response_file": ("frf_from",),
     "files.models": ("load_model", "save"),

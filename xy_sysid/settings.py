@@ -88,6 +88,7 @@ class ExcitationSettings(Settings):
     watchdog: float = knob(0.05, "without a position for so long while active, ramp to zero and go inactive", "s", gt=0.0, le=10.0)
     abort_ramp: float = knob(0.02, "time to fade out when a guard trips, and on deactivate", "s", ge=0.0, le=10.0)
     patience: float = knob(10.0, "how long to wait for the first position, at 0 V, and with lockstep for any answer", "s", gt=0.0, le=3600.0)
+    experiment: str = knob("", "file of xy-sysid next that is taken over at configure, if it keeps within limit and travel; empty is none")
     autostart: bool = knob(False, "configure and activate without being told, once a machine is there")
     output: Literal["blocks", "commands"] = knob("blocks", "blocks of voltage for a driver, or commands for a controller of ros2_control")
     interface: Literal["effort", "velocity", "position"] = knob(

@@ -19,7 +19,7 @@ COMMON = ("errors", "settings", "units", "jit", "tables")  # what everybody impo
 FLOORS = {
     "what arrives": ("samples", "excitation"),
     "in frequency": ("response", "linear", "fitting"),
-    "in time": ("time_models", "effects", "axis", "greybox", "comparison", "hypotheses", "diagnosis"),
+    "in time": ("time_models", "effects", "axis", "greybox", "comparison", "hypotheses", "diagnosis", "experiment_design"),
     "told": ("story", "live"),
     "the edge": ("bags", "imports", "files", "processes"),
     "surfaces": ("nodes", "report", "page", "cli", "front_door"),

@@ -13,9 +13,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from helpers import ROOT
 from helpers.ros_tools import World, needs_ros, world_in
 
+from xy_sysid.excitation.designed import document_of
 from xy_sysid.excitation.drive import Drive
 from xy_sysid.samples.block import Block
 from xy_sysid.settings import AxisExcitation, ExcitationSettings
@@ -308,3 +310,18 @@ def test_without_ros_it_says_in_one_line_what_to_install() -> None:
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=30, check=False)
     assert done.returncode == 2 and done.stdout == ""
     assert done.stderr.splitlines() == ["ROS 2 (rclpy) is not installed. Install it with: pip install 'xy_sysid[ros]'"]
+
+
+@needs_ros
+def test_a_designed_experiment_is_loaded_and_one_beyond_the_limits_is_refused(world: World, tmp_path: Path) -> None:
+    """Parameter experiment: at configure the file is checked against the node's own limits; refused, nothing can be activated."""
+    loud, good = (tmp_path / name for name in ("loud.yaml", "good.yaml"))
+    slow = AxisExcitation(kind="off", rms=0.0, slow=2.0, slow_period=3.0)
+    for place, volts in ((loud, 12.0), (good, 2.0)):
+        place.write_text(yaml.safe_dump(document_of("x", 2000.0, 12.0, slow, (volts, (-0.05, 0.05)))))
+    process = world.start(MODULE, {"experiment": str(loud)})
+    assert not world.transition("excitation", "configure")
+    assert world.until(lambda: "loud.yaml: voltage of axis x is 12 V" in process.output())
+    assert world.set_parameter("excitation", "experiment", str(good)) == (True, "")
+    assert world.transition("excitation", "configure")
+    assert world.set_parameter("excitation", "x.limit", 5.0)[0]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xy_sysid.axis import interpolation, resonant_loop
-from xy_sysid.axis.loop_source import text, undoable, undoing
+from xy_sysid.axis.loop_source import moving, text, undoable, undoing
 from xy_sysid.effects import _pole_zero_pair
 from xy_sysid.effects._binding import law_names, law_texts
 from xy_sysid.effects._contract import Effect
@@ -19,12 +19,18 @@ from xy_sysid.jit import compiled_text
 from xy_sysid.samples.block import FloatArray
 
 Undoing = Callable[[FloatArray, FloatArray, FloatArray, NDArray[np.uint8], float, FloatArray, FloatArray, FloatArray], float]
+Moving = Callable[..., None]
 Kernel = Callable[[FloatArray, FloatArray, FloatArray, NDArray[np.uint8], float, float, float, FloatArray], None]
 
 
 def build(effects: Sequence[Effect]) -> Kernel:
     """The compiled loop of these effects; compiling happens at its first call, or never if the disk has it."""
     return cast("Kernel", _compiled(text, effects))
+
+
+def build_moving(effects: Sequence[Effect]) -> Moving:
+    """The compiled loop of an axis whose position follows from its own motion; see ``loop_source.moving``."""
+    return cast("Moving", _compiled(moving, effects))
 
 
 def build_undoing(effects: Sequence[Effect]) -> Undoing:

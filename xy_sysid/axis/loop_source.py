@@ -32,7 +32,28 @@ def text(name: str, effects: Sequence[Effect]) -> str:
     fs: Hz; fine: Hz, sub-steps of what heeds speed; start: speed at the first sample, m/s;
     out: (n,) receives the mean velocity of each sample, m/s.
     """
+    return _loop(name, effects, {"more": "", "begins": "", "ends": "", "places": _places(effects), "inputs": _inputs(effects)}, _encoders(effects))
+
+
+def moving(name: str, effects: Sequence[Effect]) -> str:
+    """Source of ``name(u, x, p, on, fs, fine, start, out, centring, most, ago, sent)``: an axis whose position follows from its own motion.
+
+    As ``text``, but x: (n + 1,) its first value is the place at the start, and the rest receives the place of the axis, m; u: (n,) the voltage
+    wanted, V; centring: (n,) V/m back to the start, of the place ``ago`` samples ago; most: V; sent: (n,) receives the voltage applied, V.
+    """
+    own = {
+        "more": ", centring, most, ago, sent",
+        "begins": _own_begins(effects),
+        "ends": _own_ends(),
+        "places": "    encoded = False",
+        "inputs": "    pass",
+    }
+    return _loop(name, effects, own, _own_encoders(effects))
+
+
+def _loop(name: str, effects: Sequence[Effect], how: Mapping[str, str], encoders: str) -> str:
     return TEMPLATE.substitute(
+        how,
         name=name,
         stiff=f"{STIFF:.2f}",
         most=f"{CUTS}",
@@ -40,8 +61,6 @@ def text(name: str, effects: Sequence[Effect]) -> str:
         gauss=f"{GAUSS:.12f}",
         unpack=_unpack(effects),
         flags=_flags(effects),
-        places=_places(effects),
-        inputs=_inputs(effects),
         levels=_levels(effects),
         slopes=_slopes(effects),
         states=_states(effects),
@@ -56,7 +75,7 @@ def text(name: str, effects: Sequence[Effect]) -> str:
         bristle_hung=_bristle(effects, hung=True),
         hang=_hang(effects),
         motions=_motions(effects),
-        encoders=_encoders(effects),
+        encoders=encoders,
     )
 
 
@@ -323,3 +342,26 @@ def _places(effects: Sequence[Effect]) -> str:
 
 def _encoders(effects: Sequence[Effect]) -> str:
     return _lines(1, ["if encoded:", "    for i in range(n):", "        out[i] += ((shown[i + 1] - x[i + 1]) - (shown[i] - x[i])) * fs"])
+
+
+def _own_begins(effects: Sequence[Effect]) -> str:
+    """At the begin of a sample: its voltage, and the place at its end by the speed of the sample before."""
+    lines = ["asked = u[i] + centring[i] * (x[0] - x[max(i - ago, 0)])", "sent[i] = held[i] = min(max(asked, -most), most)"]
+    words = {"u": "held[i]", "t": "i / fs", "x": "x[i]"}
+    for effect in _of(effects, "input"):
+        lines += [f"if has_{effect.name}:", f"    held[i] = {_call(effect, 'output', words)}"]
+    lines += ["last = out[i - 1] / fs if i > 0 else start / fs", "x[i + 1] = x[i] + last", "if i + 2 <= n:", "    x[i + 2] = x[i + 1] + last"]
+    return "\n" + _lines(3, lines)
+
+
+def _own_ends() -> str:
+    return "\n" + _lines(3, ["x[i + 1] = x[i] + out[i] / fs"])
+
+
+def _own_encoders(effects: Sequence[Effect]) -> str:
+    """What the encoder shows of the motion: the place is known."""
+    lines = []
+    for effect in _of(effects, "encoder"):
+        ends = [_call(effect, "error", {"x": place}) for place in ("x[i + 1]", "x[i]")]
+        lines += [f"if has_{effect.name}:", "    for i in range(n):", f"        out[i] += ({ends[0]} - {ends[1]}) * fs"]
+    return _lines(1, lines)

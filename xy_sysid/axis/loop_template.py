@@ -3,6 +3,7 @@
 Three ways through it: forces that are constant between switching instants, or straight lines of speed there, exactly; laws that
 bend with speed, in sub-steps; and an axis with resonances, with these inside (``resonant_loop``): exactly, and in sub-steps where
 laws heed the speed.
+In ``more``, ``begins`` and ``ends`` stands what an axis needs whose position is not measured but follows from its own motion.
 The second frame takes effects out of a recording, for those that only one-step prediction can judge.
 """
 
@@ -11,7 +12,7 @@ from __future__ import annotations
 from string import Template
 
 TEMPLATE = Template("""\
-def $name(u, x, p, on, fs, fine, start, out):
+def $name(u, x, p, on, fs, fine, start, out${more}):
     n = out.shape[0]
     gain, delay, pole = p[0], p[1], p[2]
 $unpack
@@ -52,7 +53,7 @@ $hang
         swung, spare, series = np.zeros(size), np.zeros(size), np.zeros(($terms, size))
         swung[1], swung[2] = start, start / top[0]  # what hangs on it moves along
         for i in range(n):
-            moved = 0.0
+            moved = 0.0${begins}
             for piece in range(2):
                 if piece == 0:
                     h, cuts, middle_of = h_old, cuts_old, 0.5 * part
@@ -113,7 +114,7 @@ $level_middle
                         moved += step(moving, piece, swung, force, spare)
                     else:
                         moved += stop(generator_moving, generator_still, swung, push, force, plus, minus, h, series)
-            out[i] = moved * fs
+            out[i] = moved * fs${ends}
     elif not curved:
         # v runs in the direction of the voltage here; forth and back are directions of motion, each with a drag of its own
         v = turn * start
@@ -126,7 +127,7 @@ $level_middle
         spents_old = (-math.expm1(-poles[0] * h_old) / poles[0], -math.expm1(-poles[1] * h_old) / poles[1])
         spents_new = (-math.expm1(-poles[0] * h_new) / poles[0], -math.expm1(-poles[1] * h_new) / poles[1])
         for i in range(n):
-            moved = 0.0
+            moved = 0.0${begins}
             for piece in range(2):
                 if piece == 0:
                     h, decays, spents, middle_of = h_old, decays_old, spents_old, 0.5 * part
@@ -175,10 +176,10 @@ $pulls
                 grown = -math.expm1(-poles[side] * left)
                 moved += reach * (left - grown / poles[side])
                 v = reach * grown
-            out[i] = turn * moved * fs
+            out[i] = turn * moved * fs${ends}
     else:
         for i in range(n):
-            moved = 0.0
+            moved = 0.0${begins}
             for piece in range(2):
                 if piece == 0:
                     h, cuts, decay, spent, middle_of = h_old, cuts_old, decay_old, spent_old, 0.5 * part
@@ -249,7 +250,7 @@ $level_middle
                         grown = -math.expm1(-pole * left)
                         moved += reach * (left - grown / pole)
                         v = reach * grown
-            out[i] = moved * fs
+            out[i] = moved * fs${ends}
 $motions
 $encoders
 """)

@@ -16,7 +16,7 @@ from typing import Protocol
 
 import numpy as np
 
-from xy_sysid.axis.loop_compile import Kernel, Undoing, build, build_undoing
+from xy_sysid.axis.loop_compile import Kernel, Moving, Undoing, build, build_moving, build_undoing
 from xy_sysid.axis.loop_source import BASE, slots, undoable
 from xy_sysid.axis.start_speed import start_speed
 from xy_sysid.effects import EFFECTS, Effect
@@ -39,6 +39,7 @@ class Library:
         self.places: Mapping[str, int] = slots(self.acting)
         self._kernel: Kernel | None = None
         self._undoing: Undoing | None = None
+        self._moving: Moving | None = None
 
     def __getitem__(self, name: str) -> Effect:
         """The effect of this name; raises BadInput with the nearest spelling."""
@@ -59,6 +60,13 @@ class Library:
         if self._undoing is None:
             self._undoing = build_undoing(self.acting)
         return self._undoing
+
+    @property
+    def moving(self) -> Moving:
+        """The compiled loop of an axis whose position follows from its own motion; see ``loop_source.moving``."""
+        if self._moving is None:
+            self._moving = build_moving(self.acting)
+        return self._moving
 
     def looped(self, active: Iterable[Effect]) -> Library:
         """Whose loop these effects run in: the built-in library's, which the disk has, unless one of them is of another make."""

@@ -14,6 +14,7 @@ from xy_sysid.cli.effects import effects
 from xy_sysid.cli.figures import figures
 from xy_sysid.cli.fit import fit
 from xy_sysid.cli.frf import frf
+from xy_sysid.cli.next import next_
 from xy_sysid.cli.page import page
 from xy_sysid.cli.record import record
 from xy_sysid.cli.refine import refine
@@ -54,3 +55,4 @@ for command in (
     demo, page, run, record, replay, simulate, columns, frf, fit, steps, servo, validate, compare, diagnose, refine, effects, study, report, figures
 ):  # fmt: skip
     app.command(name=command.__name__)(command)
+app.command(name="next")(next_)

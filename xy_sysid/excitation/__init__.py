@@ -7,6 +7,7 @@
     drive:                                         from a signal to the voltage that is really applied: ramps, centring, limits
     motion_check:                                  does each axis do what its voltage can do?
     travel_limits:                                 the guard of the ends of travel
+    designed:                                      an experiment from a file, within the machine's own limits
     pacing:                                        when the next block is due
     lockstep:                                      a machine driven without a clock: recordings for tests and simulations
 """

@@ -125,7 +125,7 @@ class Solution:
             share = np.nan_to_num(beyond / tolerance(layout, self.error, least), nan=1.0, posinf=1.0)
         repeats = 1.0 + (windows.begins.size - 1) * share
         known = _that_repeats(whitened, np.sqrt(repeats)[layout.band], noise)
-        return known + _of_the_law(whitened, least.epsilon * self.target.measured * self.weight, layout, noise)
+        return known + of_the_law(whitened, least.epsilon * self.target.measured * self.weight, layout, noise)
 
 
 def solve(
@@ -295,7 +295,7 @@ def _that_repeats(change: NDArray[np.complex128], times: FloatArray, noise: Floa
     return found
 
 
-def _of_the_law(change: NDArray[np.complex128], motion: NDArray[np.complex128], layout: Bands, noise: FloatArray) -> FloatArray:
+def of_the_law(change: NDArray[np.complex128], motion: NDArray[np.complex128], layout: Bands, noise: FloatArray) -> FloatArray:
     """(k, k) what laws and integration that are not exact add to the covariance, however long the record.
 
     In each band the model's motion may be off by one common complex factor. change: (k, windows, lines), whitened; motion: (windows, lines),

@@ -10,18 +10,21 @@ import math
 import re
 import threading
 import time
+from pathlib import Path
 
 import numpy as np
 from rclpy.clock import Clock as RosClock
 from rclpy.clock_type import ClockType
 from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.parameter import Parameter
 from rclpy.timer import Timer
 from std_msgs.msg import Float64MultiArray
 
 from xy_sysid.errors import BadInput
 from xy_sysid.excitation.drive import Drive
 from xy_sysid.excitation.pacing import CATCH_UP, Answers, Clock
+from xy_sysid.files.experiment import read_experiment
 from xy_sysid.live.recent import Recent
 from xy_sysid.nodes.commands import Beat, Commands
 from xy_sysid.nodes.common import DATA_QOS, NAMESPACE, declare
@@ -110,11 +113,22 @@ class ExcitationNode(Overridable, LifecycleNode):
         if rivals:
             return self._refuse(f"{rivals}: no configure beside it. End one of the two. {KILLED}")
         try:
+            self._take_experiment()
             self._drive = Drive(self._knobs.settings)
         except BadInput as error:
-            self.get_logger().error(str(error))
-            return TransitionCallbackReturn.FAILURE
+            return self._refuse(str(error))
         return super().on_configure(state)
+
+    def _take_experiment(self) -> None:
+        """Set what the file of a designed experiment asks for. Raises BadInput for one that asks for more than the own limits."""
+        settings = self._knobs.settings
+        if not settings.experiment:
+            return
+        wanted, before = read_experiment(settings, Path(settings.experiment)), {item.name: item.value for item in knobs(settings)}
+        new = [Parameter(item.name, value=item.value) for item in knobs(wanted) if item.value != before[item.name]]
+        answer = self.set_parameters_atomically(new)
+        if not answer.successful:
+            raise BadInput(settings.experiment, "an experiment", "one that the parameters allow", answer.reason)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Begin, at 0 V until the first position; refused while STOP is on."""

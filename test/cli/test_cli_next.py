@@ -1,0 +1,58 @@
+"""xy-sysid next: which experiment settles what the recordings leave open?"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from helpers.cli_tools import cli, refused
+
+from campaigns.bench.settle_pairs import PAIRS, first_recording, machine
+
+LAG = next(pair for pair in PAIRS if "amplifier_lag" in pair.sets[1])
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A recording in a narrow band, in which lag and delay look the same."""
+    voltage, position = first_recording(LAG, machine(LAG, 1, 1), 1)
+    place = tmp_path_factory.mktemp("next") / "narrow.npz"
+    np.savez(place, fs=2000.0, u=voltage[:, None], y=position[:, None], axes=np.array(["x"]))
+    return place
+
+
+def test_it_says_what_to_run_and_what_to_expect_and_writes_the_file(recording: Path, tmp_path: Path) -> None:
+    """A sentence with the seconds and the probability, and a file that the excitation node loads."""
+    out = tmp_path / "next.yaml"
+    sets = ("--between", "rigid", "--between", "amplifier_lag")
+    said = cli("next", recording, *sets, "--voltage", 5, "--travel=-140:140", "-o", out)
+    assert said.code == 0, said
+    assert "the rigid model and amplifier_lag are distinguished with 95 % probability" in said.out
+    told = yaml.safe_load(out.read_text())["experiment"]
+    assert told["axis"] == "x" and told["needs"]["voltage"] <= 5.0
+    assert told["excitation"]["high"] > 8.0  # beyond the band of the recording
+    assert "not there yet" in refused("next", recording, *sets, "-o", out)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--between", "coulomb_friction"), "two sets"),
+        (("--between", "rigid", "--between", "lag", "--for", "gain"), "--between"),
+        (("--between", "rigid", "--between", "amplifier_lagg"), "amplifier_lag"),
+        (("--between", "rigid", "--between", "backlash"), "backlash"),
+        (("--travel", "140"), "LOW:HIGH"),
+        (("--voltage", "-1"), "voltage"),
+    ],
+)
+def test_wrong_use_is_refused_in_one_line(recording: Path, options: tuple[str, ...], words: str) -> None:
+    """What is wrong, and what to write."""
+    assert words in refused("next", recording, *options)
+
+
+def test_without_a_recording_it_asks_for_one() -> None:
+    """Or for --for nothing, with the limits of the machine."""
+    assert "--for nothing" in refused("next")
+    assert "travel" in refused("next", "--for", "nothing", "--voltage", "3")

@@ -1,0 +1,77 @@
+"""An experiment from a file, on a machine that has limits of its own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from xy_sysid.errors import BadInput
+from xy_sysid.excitation.designed import document_of, with_experiment
+from xy_sysid.experiment_design.experiment import Experiment
+from xy_sysid.experiment_design.limits import MachineLimits
+from xy_sysid.experiment_design.of_run import NextExperiment
+from xy_sysid.files.experiment import read_experiment, write_experiment
+from xy_sysid.settings import AxisExcitation, ExcitationSettings
+
+OWN = ExcitationSettings(axes={"x": AxisExcitation(limit=3.0), "y": AxisExcitation(limit=3.0)})
+SLOW = AxisExcitation(kind="off", rms=0.0, slow=2.0, slow_period=3.0, limit=5.0)
+
+
+def document(**changes: Any) -> dict[str, Any]:
+    made = document_of("x", 2000.0, 12.0, SLOW, (2.0, (-0.05, 0.05)))
+    made["experiment"] |= changes
+    return made
+
+
+def test_an_experiment_takes_the_place_of_the_signal_and_not_of_the_limits() -> None:
+    """Kind, amplitude and time are the experiment's; limit, travel and guards stay the machine's; the other axis is held."""
+    found = with_experiment(OWN, document(), "next.yaml")
+    x, y = found.axes["x"], found.axes["y"]
+    assert (x.kind, x.slow, x.slow_period, found.duration) == ("off", 2.0, 3.0, 12.0)
+    assert (x.limit, x.travel_min, x.brake) == (3.0, OWN.axes["x"].travel_min, OWN.axes["x"].brake)
+    assert (y.kind, y.offset) == ("off", 0.0)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"needs": {"voltage": 3.5, "travel": [-0.05, 0.05]}}, "next.yaml: voltage of axis x is 3.5 V"),
+        ({"needs": {"voltage": 2.0, "travel": [-0.05, 0.2]}}, "next.yaml: travel of axis x is -0.05 to 0.2 m"),
+        ({"rate": 1000.0}, "rate is 1000 Hz"),
+        ({"axis": "z"}, "axis is 'z'"),
+        ({"excitation": {"kind": "noise", "limit": 50.0}}, "'limit'"),
+        ({"excitation": {"kind": "noise", "rms": -1.0}}, "rms"),
+        ({"needs": {"voltage": True, "travel": [-0.05, 0.05]}}, "needs"),
+        ({"seconds": 0.0}, "seconds is 0"),
+        ({"colour": "red"}, "'colour'"),
+    ],
+)
+def test_a_file_that_asks_for_more_is_refused_in_one_line(changes: dict[str, Any], words: str) -> None:
+    """Which value, what is allowed, what to do."""
+    with pytest.raises(BadInput) as refusal:
+        with_experiment(OWN, document(**changes), "next.yaml")
+    assert words in str(refusal.value) and "\n" not in str(refusal.value)
+
+
+def test_a_designed_experiment_is_written_and_read_again(tmp_path: Path) -> None:
+    """The file of xy-sysid next is what the node loads."""
+    limits = MachineLimits(voltage=5.0, travel=(-0.14, 0.14))
+    made = NextExperiment(
+        axis="x",
+        sampling_rate=2000.0,
+        sentence="After 12 s they are distinguished.",
+        limits=limits,
+        experiment=Experiment(SLOW, 12.0),
+        sets=(("coulomb_friction",), ("stribeck_friction",)),
+        voltage=2.0,
+        travel=(-0.05, 0.05),
+    )
+    place = tmp_path / "next.yaml"
+    write_experiment(place, made)
+    assert yaml.safe_load(place.read_text())["experiment"]["expects"] == made.sentence
+    assert read_experiment(OWN, place).axes["x"].slow == 2.0
+    with pytest.raises(BadInput, match="Check the path"):
+        read_experiment(OWN, tmp_path / "none.yaml")

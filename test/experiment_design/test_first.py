@@ -1,0 +1,46 @@
+"""A first experiment for an axis of which nothing is known but its limits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from xy_sim.machine import Machine
+from xy_sysid.excitation.lockstep import drive
+from xy_sysid.experiment_design.experiment import Experiment
+from xy_sysid.experiment_design.first import first_experiment
+from xy_sysid.experiment_design.limits import MachineLimits
+from xy_sysid.experiment_design.of_run import NextExperiment
+from xy_sysid.settings import ExcitationSettings
+
+LIMITS = MachineLimits(voltage=5.0, travel=(-0.14, 0.14))
+
+
+@pytest.fixture(scope="module")
+def found() -> NextExperiment:
+    return first_experiment("x", 500.0, LIMITS)
+
+
+def test_it_says_how_loud_which_band_and_how_long(found: NextExperiment) -> None:
+    """Within the voltage and the travel, with margin, for every axis that may be there."""
+    assert isinstance(found.experiment, Experiment)
+    assert 0.0 < found.voltage <= 5.0 and found.seconds >= 30.0
+    assert -0.14 <= found.travel[0] < found.travel[1] <= 0.14
+    assert "known to 5 %" in found.sentence
+
+
+def test_a_table_that_nobody_described_stays_within_its_limits(found: NextExperiment) -> None:
+    """The simulated table carries it out: neither voltage nor travel is left, and the guards have nothing to do."""
+    assert found.experiment is not None
+    made = Machine.from_file("rigid.yaml")
+    axes = dict.fromkeys(made.axes, found.experiment.excitation)
+    record = drive(made, ExcitationSettings(rate=made.rate, lockstep=True, speed=0.0, axes=axes), 10.0)
+    assert float(np.max(np.abs(record.voltage))) <= 5.0
+    assert found.travel[0] <= float(record.position.min()) and float(record.position.max()) <= found.travel[1]
+
+
+def test_where_no_experiment_is_safe_it_says_what_to_do() -> None:
+    """A travel that the fastest axis leaves at once: no experiment, and the way to the first run."""
+    tight = MachineLimits(voltage=5.0, travel=(-0.14, 0.14), speed=1e-9)
+    none = first_experiment("x", 500.0, tight)
+    assert none.experiment is None and "run --first" in none.sentence

@@ -1,0 +1,65 @@
+"""What an experiment may ask of the machine."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from xy_sysid.axis.forward import Motion
+from xy_sysid.errors import BadInput
+from xy_sysid.experiment_design.limits import MachineLimits, as_recorded
+from xy_sysid.experiment_design.proposals import neighbours, proposals
+from xy_sysid.samples.recording import Recording
+
+RATE = 1000.0
+
+
+def motion(amplitude: float, volts: float = 1.0) -> Motion:
+    """A sine of 1 Hz."""
+    time = np.arange(2000) / RATE
+    return Motion(RATE, volts * np.sin(2 * np.pi * time), amplitude * np.sin(2 * np.pi * time))
+
+
+def test_it_says_which_limit_a_motion_comes_too_near_to() -> None:
+    """Voltage up to the limit; speed, acceleration and travel with a margin."""
+    limits = MachineLimits(voltage=2.0, travel=(-0.1, 0.1), speed=0.5, acceleration=3.0, rms=1.0)
+    assert limits.broken(motion(0.05)) == ""
+    assert limits.broken(motion(0.09)) == "speed"
+    assert limits.broken(motion(0.01, 2.1)) == "voltage"
+    assert limits.broken(motion(0.01, 1.9)) == "rms"
+    assert MachineLimits(voltage=2.0, travel=(-0.1, 0.1)).broken(motion(0.09)) == "travel"
+    assert MachineLimits(voltage=2.0, travel=(-0.1, 0.1), acceleration=1.0).broken(motion(0.05)) == "acceleration"
+    assert limits.broken(Motion(RATE, np.ones(9), np.full(9, np.nan))) == "a model that runs away"
+
+
+def test_without_limits_an_experiment_stays_within_what_was_recorded() -> None:
+    """The largest voltage and the travel of the recordings, from where the last one ends."""
+    item = motion(0.05, 3.0)
+    run = Recording.from_arrays(RATE, item.voltage, item.position + 0.02, units=("V", "m")).run("x")
+    limits = as_recorded([run])
+    assert limits.voltage == pytest.approx(3.0, rel=1e-3)
+    assert limits.travel == pytest.approx((-0.03, 0.07), abs=1e-3)
+    assert limits.start == run.position[-1]
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"), [("voltage", 0.0, "voltage"), ("seconds", -1.0, "seconds"), ("margin", 1.0, "margin"), ("start", 0.2, "travel")]
+)
+def test_limits_that_make_no_sense_are_refused(name: str, value: Any, words: str) -> None:
+    """One line that names the value."""
+    values: dict[str, Any] = {"voltage": 2.0, "travel": (-0.1, 0.1), name: value}
+    with pytest.raises(BadInput, match=words):
+        MachineLimits(**values)
+
+
+def test_no_proposal_asks_for_more_than_the_voltage() -> None:
+    """Neither a proposal nor its neighbour: the peak of its signal and its slow sine together stay within the limit."""
+    limits = MachineLimits(voltage=3.0, travel=(-0.1, 0.1))
+    first = proposals(limits, RATE)
+    assert len(first) > 50
+    for item in [*first[::3], *(near for one in first[::30] for near in neighbours(one, limits, RATE))]:
+        drive = item.drive(RATE, 4.0, 0.0)
+        assert item.excitation.limit == 3.0
+        assert float(np.max(np.abs(drive.voltage))) < 3.0 * 1.1, item.words  # Gaussian noise has a tail, which the drive clips

@@ -1,0 +1,110 @@
+"""From one short recording that does not tell to the experiments that do, on the simulated machine."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from campaigns.bench.settle import table
+from campaigns.bench.settle_pairs import PAIRS, carry_out, first_recording, left_limits, limits, machine
+from xy_sysid.axis.model import STANDARD
+from xy_sysid.errors import BadInput
+from xy_sysid.experiment_design.beliefs import Evidence, believed
+from xy_sysid.experiment_design.evidence import ODDS, Power, nats, seconds_needed, settled
+from xy_sysid.experiment_design.experiment import Experiment
+from xy_sysid.experiment_design.loop import Budget, Question, Signals, settle
+from xy_sysid.experiment_design.precision import Wanted, sharpest
+from xy_sysid.experiment_design.prediction import Setting, recorded
+from xy_sysid.experiment_design.rivals import standing
+from xy_sysid.greybox.axis_data import AxisData, prepare_all
+from xy_sysid.greybox.free_run import fit
+from xy_sysid.settings import AxisExcitation
+
+LAG = next(pair for pair in PAIRS if "amplifier_lag" in pair.sets[1])
+LOUD = Experiment(AxisExcitation(kind="noise", rms=1.0), 4.0)
+FEW = Budget(experiments=2, seconds=30.0, draws=2)
+
+
+@pytest.fixture(scope="module")
+def short() -> Signals:
+    """A recording in a narrow band of a machine with an amplifier lag."""
+    return first_recording(LAG, machine(LAG, 1, 1), 1)
+
+
+@pytest.fixture(scope="module")
+def data(short: Signals) -> AxisData:
+    return prepare_all(2000.0, [short])
+
+
+def test_what_one_recording_leaves_open_is_settled_by_an_experiment_within_the_limits(short: Signals) -> None:
+    """The recording names the wrong set, and says that two are possible; after the experiment the right one is left. Replayed, it is the same."""
+    made = machine(LAG, 1, 1)
+    asked: list[Experiment] = []
+
+    def run(experiment: Experiment) -> Signals:
+        asked.append(experiment)
+        return carry_out(made, experiment)
+
+    question = Question(2000.0, [short], LAG.sets, STANDARD)
+    found = settle(question, limits(LAG), run, FEW)
+    assert found.steps[0].standing.chosen == 0
+    assert set(found.steps[0].left) == set(LAG.sets)
+    assert found.ended == "settled"
+    assert found.effects == ("amplifier_lag",)
+    assert left_limits(LAG, found.recordings) == 0
+    kept = iter(found.recordings)
+    again = settle(question, limits(LAG), lambda experiment: next(kept), FEW)
+    assert [step.then for step in again.steps] == [step.then for step in found.steps]
+    assert again.effects == found.effects
+
+
+def test_it_ends_when_somebody_stops_it(short: Signals) -> None:
+    """STOP is an ordinary end: nothing is claimed."""
+    found = settle(Question(2000.0, [short], LAG.sets, STANDARD), limits(LAG), lambda experiment: None, FEW, lambda *_: LOUD)
+    assert found.ended == "stopped"
+    assert found.seconds == 0.0
+
+
+def test_sets_with_the_same_equations_are_told_by_no_experiment(data: AxisData) -> None:
+    """What predicts the same motion has no evidence against it, however loud the experiment."""
+    fits = standing(data, STANDARD, [("constant_load",)]).fits
+    evidence = Evidence(data)
+    own, other = (believed(evidence, fits[0], 1, seed) for seed in (0, 1))
+    item = recorded(Setting.of(data), LOUD, own.model, 0.0, 4.0)
+    assert nats((own, other), own.model, item) < 1e-6
+
+
+def test_probability_follows_from_the_evidence_and_needs_seconds() -> None:
+    """Evidence of zero never tells; ten times the odds do; the seconds needed are those at which 95 % is reached."""
+    one = Power(truth=0, rival=1, rate=1.0, price=0.0)
+    assert Power(0, 1, 0.0, 0.0).probability(60.0) == 0.0
+    assert one.probability(30.0 * ODDS) > 0.999
+    needed = seconds_needed([[one]], 1000.0)
+    assert settled([[one]], needed) == pytest.approx(0.95, abs=1e-6)
+    assert seconds_needed([[one]], 0.5 * needed) == np.inf
+
+
+def test_an_effect_that_no_simulation_follows_is_refused(data: AxisData) -> None:
+    """Backlash is judged one sample ahead: one line says so."""
+    with pytest.raises(BadInput, match="backlash"):
+        standing(data, STANDARD, [(), ("backlash",)])
+
+
+def test_an_interval_is_as_narrow_as_was_predicted(data: AxisData) -> None:
+    """The experiment for the pole of the rigid model: the interval of a fit of both recordings is within a quarter of what was expected."""
+    made = machine(LAG, 0, 3)
+    first = prepare_all(2000.0, [first_recording(LAG, made, 3)])
+    belief = believed(Evidence(first), standing(first, STANDARD, [()]).fits[0], 1)
+    best = sharpest(first, belief, limits(LAG), Wanted("pole", 0.005))
+    assert best.possible and best.experiment is not None and best.width < best.before
+    both = prepare_all(2000.0, [first_recording(LAG, made, 3), carry_out(made, best.experiment)])
+    pole = fit(both, belief.model).parameter("pole")
+    assert 0.5 * (pole.high - pole.low) / pole.value == pytest.approx(best.width, rel=0.25)
+
+
+def test_the_campaign_makes_a_table_of_its_lines() -> None:
+    """A line of a case is counted once for its pair, and once for all."""
+    line = {"pair": "lag", "first_settled": False, "first_right": True, "right": True, "ended": "settled", "seconds": 4.0, "runs": 1, "outside": 0}
+    said = table([line, {**line, "right": False, "ended": "experiments"}])
+    assert "| lag | 0 of 2 | 2 of 2 | 1 of 2 | 1 of 2 | 4 |" in said
+    assert "that left a limit: 0" in said

@@ -1,0 +1,201 @@
+"""xy-sysid next: which experiment settles what the recordings leave open?"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from xy_sysid.cli import options as o
+from xy_sysid.cli.diagnose import Own
+from xy_sysid.cli.output import emit, progress, say
+from xy_sysid.cli.reading import chosen, read_each, reads, runs_of
+from xy_sysid.errors import BadInput
+from xy_sysid.units import readable
+
+if TYPE_CHECKING:
+    from xy_sysid.experiment_design.limits import MachineLimits
+    from xy_sysid.experiment_design.of_run import NextExperiment
+    from xy_sysid.imports.reading import Reading
+    from xy_sysid.samples.recording import Run
+
+NOTHING = "nothing"  # is known
+Between = Annotated[
+    list[str] | None,
+    typer.Option("--between", metavar="EFFECTS", help="a set of effects, as a+b, or rigid; give it for each set that is to be distinguished"),
+]
+
+
+@reads
+def next_(
+    reading: Reading,
+    recs: Annotated[
+        list[Path] | None, typer.Argument(metavar="[REC]", help="recordings of one machine, as of diagnose; none with --for nothing")
+    ] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", metavar="FILE", help="write the experiment for the excitation node")] = None,
+    between: Between = None,
+    precision: Annotated[
+        str | None,
+        typer.Option(
+            "--for",
+            metavar="PARAMETER",
+            help="make this parameter precise (gain, pole, effect.parameter), or nothing: a first experiment for an unknown axis",
+        ),
+    ] = None,
+    to: Annotated[float, typer.Option("--to", metavar="PART", help="with --for: half of the 95 % interval, as a part of the value", min=1e-6)] = 0.02,
+    run_file: Annotated[
+        Path | None,
+        typer.Option("--params", metavar="FILE", help="ROS parameter file or run file; limit and travel of the excitation are the limits"),
+    ] = None,
+    voltage: Annotated[float | None, typer.Option(help="largest voltage, V; without limits: what the recordings show")] = None,
+    travel: Annotated[str, typer.Option(metavar="LOW:HIGH", help="ends of the travel, mm (degrees of a joint)")] = "",
+    speed: Annotated[float | None, typer.Option(help="largest speed, mm/s (degrees/s)")] = None,
+    acceleration: Annotated[float | None, typer.Option(help="largest acceleration, m/s^2 (rad/s^2)")] = None,
+    rms: Annotated[float | None, typer.Option(help="largest rms of the voltage, which the drive's current allows for long, V")] = None,
+    seconds: Annotated[float, typer.Option(help="seconds of motion at most", min=2.0, max=3600.0)] = 60.0,
+    effect_file: Own = None,
+    budget: o.Budget = None,
+    force: o.Force = False,
+    json: o.Json = False,
+) -> None:
+    """Design the experiment that settles what the recordings leave open, within the machine's limits."""
+    from xy_sysid.diagnosis.of_run import diagnose
+    from xy_sysid.experiment_design.of_run import next_experiment, sharpen
+    from xy_sysid.experiment_design.rivals import check
+    from xy_sysid.files.effects import library
+
+    o.output_file("--output", output, force)
+    asked = partial(_asked, voltage=voltage, travel=travel, speed=speed, acceleration=acceleration)
+    if precision == NOTHING:
+        unknown = _first(reading, run_file, asked, rms, seconds)
+        _answered(unknown, output, json)
+        return
+    if not recs:
+        raise BadInput("REC", "missing", "recordings, or --for nothing", "Give a recording of the axis.")
+    known = library(effect_file or [])
+    if precision is not None and between:
+        raise BadInput("--for", f"{precision} together with --between", "one of them", "Leave one out.")
+    sets = _sets(between)
+    check(known, sets)
+    recordings = read_each(recs, reading, json)
+    names = chosen(recordings[0], reading.axes)
+    if len(names) > 1:
+        raise BadInput("--axis", "several axes", f"one of {', '.join(names)}", "An experiment is for one axis: add --axis.")
+    runs = runs_of(recordings, names[0])
+    limits = _limits(runs, _own_limits(run_file, names[0]), asked(runs[0].units.output), rms, seconds)
+    with progress() as bar:
+        task = bar.add_task(f"diagnosing axis {names[0]}", total=1.0)
+        found = diagnose(runs, known, math.inf if budget is None else budget, time.process_time)
+        bar.update(task, description="comparing experiments")
+        if precision is not None:
+            answer = sharpen(found, precision, to, limits)
+        else:
+            answer = next_experiment(found, limits, sets, known, tell=lambda part: bar.update(task, completed=part))
+    if not json:
+        say(f"axis {names[0]}: {found.sentence.rstrip()}")
+    _answered(answer, output, json)
+
+
+def _answered(answer: NextExperiment, output: Path | None, json: bool) -> None:
+    """Write the file, and say what was found."""
+    from xy_sysid.files.experiment import document, write_experiment
+
+    if output is not None and answer.experiment is not None:
+        write_experiment(output, answer)
+    if json:
+        emit({"axis": answer.axis, "sentence": answer.sentence, **_plain(answer), "file": document(answer) if answer.experiment else None})
+        return
+    _show(answer, output)
+
+
+def _first(reading: Reading, run_file: Path | None, asked: Callable[[str], dict[str, Any]], rms: float | None, seconds: float) -> NextExperiment:
+    """For an unknown axis with the limits of a run file, or with those that were typed."""
+    from xy_sysid.experiment_design.first import first_experiment
+    from xy_sysid.experiment_design.limits import MachineLimits
+    from xy_sysid.settings import ExcitationSettings
+
+    axis = (reading.axes or ("x",))[0]
+    told = o.told_to("excitation", run_file).parameters if run_file is not None else {}
+    values = {**_own_limits(run_file, axis), **asked(str(told.get("unit", "m"))), **({} if rms is None else {"rms": rms})}
+    for name in ("voltage", "travel"):
+        if name not in values:
+            raise BadInput("--for nothing", f"without the limit of {name}", f"--{name}, or --params with a run file", "Say what the machine may do.")
+    rate = float(told.get("rate", reading.rate or ExcitationSettings().rate))
+    middle = 0.5 * (values["travel"][0] + values["travel"][1])
+    return first_experiment(axis, rate, MachineLimits(start=middle, seconds=seconds, **values))
+
+
+def _plain(answer: NextExperiment) -> dict[str, Any]:
+    return {
+        "sets": answer.sets,
+        "probability": answer.probability,
+        "settles": answer.settles,
+        "seconds": answer.seconds,
+        "ask": answer.ask or None,
+        "needs": {"voltage": answer.voltage, "travel": answer.travel},
+    }
+
+
+def _show(answer: NextExperiment, output: Path | None) -> None:
+    say(f"  {answer.sentence}")
+    if answer.experiment is not None:
+        scale, unit = readable("m")
+        low, high = (f"{scale * end:.4g}" for end in answer.travel)
+        say(f"  Experiment: {answer.experiment.words}, for {answer.seconds:.0f} s.")
+        say(f"  It needs up to {answer.voltage:.3g} V and the travel from {low} to {high} {unit}, with margin.")
+    if answer.ask:
+        say(f"  Somebody has to help: {answer.ask}")
+    if output is not None and answer.experiment is not None:
+        say(f"  {output}: run it with parameter experiment of the excitation node, then diagnose all recordings together.")
+
+
+def _sets(between: list[str] | None) -> list[tuple[str, ...]]:
+    if between is None:
+        return []
+    if len(between) < 2:
+        raise BadInput("--between", between[0], "two sets of effects or more", "Give it once for each set, for example --between coulomb_friction.")
+    return [() if words == "rigid" else tuple(word.strip() for word in words.split("+")) for words in between]
+
+
+def _asked(unit: str, voltage: float | None, travel: str, speed: float | None, acceleration: float | None) -> dict[str, Any]:
+    """MachineLimits by name, SI, from what a person typed."""
+    scale = readable(unit)[0]
+    asked: dict[str, Any] = {}
+    if travel:
+        low, colon, high = travel.partition(":")
+        try:
+            asked["travel"] = (float(low) / scale, float(high) / scale)
+        except ValueError:
+            colon = ""
+        if not colon:
+            raise BadInput("--travel", repr(travel), "LOW:HIGH", "Write for example --travel -140:140.")
+    if speed is not None:
+        asked["speed"] = speed / scale
+    return asked | {name: value for name, value in (("voltage", voltage), ("acceleration", acceleration)) if value is not None}
+
+
+def _own_limits(run_file: Path | None, axis: str) -> dict[str, Any]:
+    """MachineLimits of the excitation in a parameter file."""
+    if run_file is None:
+        return {}
+    told: Mapping[str, Any] = o.told_to("excitation", run_file).parameters
+    found: dict[str, Any] = {}
+    if f"{axis}.limit" in told:
+        found["voltage"] = float(told[f"{axis}.limit"])
+    if f"{axis}.travel_min" in told and f"{axis}.travel_max" in told:
+        found["travel"] = (float(told[f"{axis}.travel_min"]), float(told[f"{axis}.travel_max"]))
+    return found
+
+
+def _limits(runs: tuple[Run, ...], own: Mapping[str, Any], asked: Mapping[str, Any], rms: float | None, seconds: float) -> MachineLimits:
+    from dataclasses import replace
+
+    from xy_sysid.experiment_design.limits import as_recorded
+
+    values = {**own, **asked, **({} if rms is None else {"rms": rms})}
+    return replace(as_recorded(runs), **values, seconds=seconds)

@@ -1,0 +1,82 @@
+"""An experiment that was designed, on a machine that has limits of its own: taken over only where it keeps within them.
+
+The document is that of ``xy-sysid next``: which axis, for how long, what drives it, and the voltage and travel that it needs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from xy_sysid.errors import BadInput
+from xy_sysid.settings import AxisExcitation, ExcitationSettings, changed, unknown_name
+
+KEYS = ("axis", "rate", "seconds", "excitation", "needs", "expects", "sets", "made_by")
+DRIVES = ("kind", "rms", "low", "high", "period", "steps", "offset", "seed", "centring", "slow", "slow_period")  # settings that it may have
+NEEDS = ("voltage", "travel")
+AGAIN = "Design it again within these limits: xy-sysid next with --params."
+
+
+def with_experiment(settings: ExcitationSettings, document: object, where: str) -> ExcitationSettings:
+    """The settings of the excitation with a designed experiment on one axis, and the other axes held at 0 V.
+
+    Raises BadInput, in one line, for a document that is none, and for one that asks for more than the settings allow.
+    """
+    told = _checked(document, where)
+    axis = told["axis"]
+    if axis not in settings.axes:
+        raise BadInput(f"{where}: axis", repr(axis), ", ".join(settings.axes), "Design it for one of these.")
+    if told["rate"] != settings.rate:
+        raise BadInput(
+            f"{where}: rate", f"{told['rate']:g} Hz", f"{settings.rate:g} Hz, that of the excitation", "Design it from recordings of this rate."
+        )
+    own, unit = settings.axes[axis], settings.unit
+    voltage, (low, high) = told["needs"]["voltage"], told["needs"]["travel"]
+    if not 0.0 <= voltage <= own.limit * (1.0 + 1e-9):
+        raise BadInput(f"{where}: voltage of axis {axis}", f"{voltage:.4g} V", f"up to its limit of {own.limit:g} V", AGAIN)
+    if not own.travel_min <= low < high <= own.travel_max:
+        asked, allowed = f"{low:.4g} to {high:.4g} {unit}", f"{own.travel_min:g} to {own.travel_max:g} {unit}"
+        raise BadInput(f"{where}: travel of axis {axis}", asked, f"within {allowed}", AGAIN)
+    values: dict[str, Any] = {f"{axis}.{name}": value for name, value in told["excitation"].items()}
+    values |= {
+        f"{other}.{name}": value for other in settings.axes if other != axis for name, value in (("kind", "off"), ("offset", 0.0), ("slow", 0.0))
+    }
+    return changed(settings, {**values, "duration": told["seconds"]})
+
+
+def _checked(document: object, where: str) -> Mapping[str, Any]:
+    """The experiment of a document, its numbers as numbers."""
+    if not isinstance(document, Mapping) or not isinstance(document.get("experiment"), Mapping):
+        raise BadInput(where, "no experiment", "a file of xy-sysid next", "Make one: xy-sysid next REC -o next.yaml.")
+    told = dict(document["experiment"])
+    for name in told:
+        if name not in KEYS:
+            raise unknown_name(str(name), list(KEYS), where)
+    for name, kind in (("axis", str), ("excitation", Mapping), ("needs", Mapping)):
+        if not isinstance(told.get(name), kind):
+            raise BadInput(f"{where}: {name}", repr(told.get(name)), "what xy-sysid next writes", "Make the file again.")
+    for name in told["excitation"]:
+        if name not in DRIVES:
+            raise unknown_name(str(name), list(DRIVES), f"{where}: excitation")
+    travel = told["needs"].get("travel")
+    numbers = [told.get("rate"), told.get("seconds"), told["needs"].get("voltage"), *(travel if isinstance(travel, list | tuple) else ())]
+    if len(numbers) != 5 or not all(isinstance(value, int | float) and not isinstance(value, bool) for value in numbers):
+        raise BadInput(f"{where}: rate, seconds, needs", repr(numbers), "numbers", "Make the file again.")
+    if not 0.0 < told["seconds"] <= 3600.0:
+        raise BadInput(f"{where}: seconds", told["seconds"], "above 0, up to 3600", "Make the file again.")
+    return told
+
+
+def document_of(axis: str, rate: float, seconds: float, excitation: AxisExcitation, needs: tuple[float, tuple[float, float]]) -> dict[str, Any]:
+    """The document of an experiment. needs: the voltage, V, and the travel, m."""
+    values = excitation.model_dump()
+    drives = {name: values[name] for name in DRIVES}
+    return {
+        "experiment": {
+            "axis": axis,
+            "rate": rate,
+            "seconds": seconds,
+            "excitation": drives,
+            "needs": {"voltage": needs[0], "travel": list(needs[1])},
+        }
+    }

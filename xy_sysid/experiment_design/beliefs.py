@@ -1,0 +1,235 @@
+"""A set of effects with its parameters, and how well the data at hand know them.
+
+Parameters are Gaussian in the coordinates of the fit (``greybox.least_squares.Scale``: the logarithm of what is positive). Their precision is
+the information of the data, and a little more: a positive number is known to a factor of two before anything is measured. Draws that the
+data contradict are left out. An effect of which the data show nothing keeps its usual size, as far as they allow it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xy_sysid.axis.model import AxisModel
+from xy_sysid.effects._contract import USUAL_WITHIN
+from xy_sysid.effects._similarity import Similarity
+from xy_sysid.greybox.axis_data import AxisData
+from xy_sysid.greybox.floor import Windows
+from xy_sysid.greybox.free_run import MIDDLING, GreyboxFit
+from xy_sysid.greybox.least_squares import STEP, Scale
+from xy_sysid.greybox.objective import Objective, responder
+from xy_sysid.greybox.parameters import problem
+from xy_sysid.samples.block import FloatArray
+
+ALLOWED = 3.0  # nats by which a draw may explain the data at hand worse than the best: a factor of twenty in likelihood
+TRIES = 12  # draws for each one that is wanted, at most
+STEPS = 3  # of Gauss and Newton
+FACTOR = math.log(USUAL_WITHIN)  # standard deviation of the logarithm of a positive number before anything is measured
+
+
+@dataclass(frozen=True)
+class Belief:
+    """effects: their names; model: the likeliest; draws: models that the data allow, the likeliest first
+    scale: how each parameter moves; precision: (k, k) in its coordinates; free: parameters of the effects
+    force, motion: power of the unmodelled force, V^2, and of the unmodelled motion, m^2/s^2
+    """
+
+    effects: tuple[str, ...]
+    model: AxisModel
+    draws: tuple[AxisModel, ...]
+    scale: Scale
+    precision: FloatArray
+    free: int
+    force: float
+    motion: float
+
+    @property
+    def name(self) -> str:
+        """Its effects in words."""
+        return " and ".join(self.effects) or "the rigid model"
+
+    def inner(self, model: AxisModel) -> FloatArray:
+        """(k,) coordinates of a model with the same effects."""
+        return self.scale.inner(model.row)
+
+    def moved(self, inner: FloatArray) -> AxisModel:
+        """The model at these coordinates."""
+        return with_row(self.model, self.scale.outer(inner))
+
+
+class Evidence:
+    """How well models explain the data at hand: in nats over every window, fitted or held out."""
+
+    def __init__(self, data: AxisData) -> None:
+        self.data, self.windows = data, Windows(data.layout, np.sort(np.concatenate((data.fitted.begins, data.held.begins))))
+        self.objective = Objective.of(data.floor)
+        self.measured = self.windows.spectrum(data.velocity)
+
+    def error(self, model: AxisModel) -> NDArray[np.complex128]:
+        """(windows, lines) of a model."""
+        run, values, _ = problem(self.data, model, False, MIDDLING)
+        return np.asarray(self.measured - self.windows.spectrum(run(values)))
+
+    def nats(self, model: AxisModel, error: NDArray[np.complex128] | None = None) -> float:
+        """Above an error that is the floor alone; infinite for a model that runs away."""
+        error = self.error(model) if error is None else error
+        power = self.data.layout.power(error)
+        if not np.all(np.isfinite(power)):
+            return math.inf
+        score = self.objective.of_power(power, responder(self.data.layout, model)(model.row))
+        return 0.5 * self.objective.count * score * self.windows.begins.size
+
+    def spectrum(self, model: AxisModel, error: NDArray[np.complex128]) -> tuple[FloatArray, float, float]:
+        """(bands,) expected power of the error of a model, and the powers of the unmodelled force and motion."""
+        response = responder(self.data.layout, model)(model.row)
+        force, motion = self.objective.unmodelled(self.data.layout.power(error), response)
+        return self.objective.floor + force * response + motion, force, motion
+
+    def whitened(self, model: AxisModel, scale: Scale) -> tuple[FloatArray, FloatArray]:
+        """(k, m) derivatives of the error by the coordinates, and (m,) the error itself, both over its expected size."""
+        error, inner = self.error(model), scale.inner(model.row)
+        spectrum, _, _ = self.spectrum(model, error)
+        weight = ((self.objective.lines > 0.0) / np.sqrt(spectrum))[self.data.layout.band]
+        rows = []
+        for k in range(inner.size):
+            step = STEP if scale.outer(inner)[k] < scale.high[k] else -STEP
+            moved = inner.copy()
+            moved[k] += step
+            rows.append(((self.error(with_row(model, scale.outer(moved))) - error) / step * weight).ravel().view(np.float64))
+        return np.nan_to_num(np.array(rows)), np.nan_to_num((error * weight).ravel().view(np.float64))
+
+
+def with_row(model: AxisModel, row: FloatArray) -> AxisModel:
+    """The model with these parameters, in the order of ``AxisModel.row``."""
+    rest = iter(row[3:].tolist())
+    effects = tuple((name, tuple(next(rest) for _ in values)) for name, values in model.effects)
+    return replace(model, gain=float(row[0]), delay=float(row[1]), pole=float(row[2]), effects=effects, per_recording=())
+
+
+def usual_precision(model: AxisModel, scale: Scale) -> FloatArray:
+    """(k, k) before anything is measured: a factor of two of what is positive, its own size of the rest."""
+    each = np.where(scale.positive, 1.0 / FACTOR**2, 1.0)
+    each[:3] = 1e-6  # the base is what the data know best
+    return np.diag(each)
+
+
+def believed(evidence: Evidence, found: GreyboxFit, count: int, seed: int = 0) -> Belief:
+    """What a fit says: draws about it, as wide as the data leave them."""
+    model = replace(found.model, per_recording=())
+    scale = _scale(evidence.data, model)
+    slopes, _ = evidence.whitened(model, scale)
+    precision = slopes @ slopes.T + usual_precision(model, scale)
+    spread = _root(precision)
+    random, best, draws = np.random.default_rng(seed), evidence.nats(model), [model]
+    inner = scale.inner(model.row)
+    for tried in range(TRIES * count):
+        if len(draws) >= count:
+            break
+        width = 0.5 ** (3.0 * tried / (TRIES * count))  # where the likelihood bends, nearer ones
+        drawn = with_row(model, scale.outer(inner + width * spread @ random.standard_normal(inner.size)))
+        if evidence.nats(drawn) - best < ALLOWED:
+            draws.append(drawn)
+    return _belief(evidence, model, draws, scale, precision)
+
+
+def hidden(evidence: Evidence, rest: AxisModel, name: str, best: float, draws: tuple[int, int]) -> Belief | None:
+    """An effect of which the data show nothing, beside a model that explains them: its usual sizes, as far as they allow these.
+
+    A relative in the model gives way, and what it calls by the same name is taken over. None where the data allow no such size.
+    best: nats of what explains the data best; draws: how many are wanted, and their seed
+    """
+    count, seed = draws
+    found: list[AxisModel] = []
+    shared = _shared(rest, name)
+    own = {key for key in rest.library[name].names if key not in shared}
+    for drawn in _usual(evidence.data, rest, name, TRIES * count, seed):
+        model = _settled(evidence, drawn, {f"{name}.{key}" for key in own})
+        if evidence.nats(model) - best < ALLOWED:
+            found.append(model)
+        if len(found) >= count:
+            break
+    if not found:
+        return None
+    model = found[0]
+    scale = _scale(evidence.data, model)
+    slopes, _ = evidence.whitened(model, scale)
+    return _belief(evidence, model, found, scale, slopes @ slopes.T + usual_precision(model, scale))
+
+
+def _relative(model: AxisModel, name: str) -> str | None:
+    """The effect of a model whose place another takes."""
+    effect = model.library[name]
+    return next((own for own, _ in model.effects if effect.family and model.library[own].family == effect.family), None)
+
+
+def _shared(model: AxisModel, name: str) -> dict[str, float]:
+    """Values of a relative's parameters that an effect calls by the same name."""
+    relative = _relative(model, name)
+    known = dict(zip(model.library[relative].names, dict(model.effects)[relative], strict=True)) if relative else {}
+    return {key: known[key] for key in model.library[name].names if key in known}
+
+
+def _usual(data: AxisData, rest: AxisModel, name: str, count: int, seed: int) -> Iterator[AxisModel]:
+    random = np.random.default_rng([seed, 1])
+    both = [np.concatenate((signal, -signal)) for signal in (data.voltage, data.velocity)]  # an offset is a part of the size
+    items, shared = rest.library[name].on(Similarity.of(data.sampling_rate, *both)), _shared(rest, name)
+    relative = _relative(rest, name)
+    less = rest if relative is None else rest.without(relative)
+    for number in range(count):
+        z = random.standard_normal(len(items)) if number else np.zeros(len(items))
+        values = []
+        for item, value in zip(items, z.tolist(), strict=True):
+            size = abs(item.typical) or min(1.0, item.high - item.low)
+            drawn = item.typical * math.exp(FACTOR * value) if item.positive else item.typical + size * value
+            values.append(shared.get(item.name, min(max(drawn, item.low), item.high)))
+        yield less.with_effect(name, values)
+
+
+def _settled(evidence: Evidence, model: AxisModel, fixed: set[str]) -> AxisModel:
+    """Steps of Gauss and Newton of all parameters but some, so that the others make room for these."""
+    scale = _scale(evidence.data, model)
+    free = np.array([key not in fixed for key in model.values()])
+    now = evidence.nats(model)
+    for _ in range(STEPS):
+        slopes, error = evidence.whitened(model, scale)
+        normal = slopes[free] @ slopes[free].T
+        normal += 1e-9 * np.trace(normal) / normal.shape[0] * np.eye(normal.shape[0])
+        inner = scale.inner(model.row)
+        inner[free] -= np.clip(np.linalg.solve(normal, slopes[free] @ error), -0.5, 0.5)
+        moved = with_row(model, scale.outer(inner))
+        then = evidence.nats(moved)
+        if not then < now - 0.1:
+            break
+        model, now = moved, then
+    return model
+
+
+def _scale(data: AxisData, model: AxisModel) -> Scale:
+    _, values, scale = problem(data, model, False, MIDDLING)
+    size = model.row.size
+    return Scale(scale.low[:size], scale.high[:size], scale.positive[:size], scale.unit[:size]) if values.size > size else scale
+
+
+def _root(precision: FloatArray) -> FloatArray:
+    """(k, k) whose product with standard normal numbers has this precision."""
+    unit = np.sqrt(np.diag(precision))
+    values, vectors = np.linalg.eigh(precision / np.outer(unit, unit))
+    return np.asarray(vectors / np.sqrt(np.maximum(values, 1e-12)) / unit[:, None])
+
+
+def _belief(evidence: Evidence, model: AxisModel, draws: list[AxisModel], scale: Scale, precision: FloatArray) -> Belief:
+    _, force, motion = evidence.spectrum(model, evidence.error(model))
+    return Belief(
+        effects=tuple(name for name, _ in model.effects),
+        model=model,
+        draws=tuple(draws),
+        scale=scale,
+        precision=precision,
+        free=sum(len(values) for _, values in model.effects),
+        force=force,
+        motion=motion,
+    )

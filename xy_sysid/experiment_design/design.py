@@ -1,0 +1,146 @@
+"""The experiment that distinguishes some sets of effects soonest, of those that keep within the limits.
+
+First every proposal is judged by the likeliest model of each set, then the best by draws of their parameters, and then the neighbours of the
+best. An experiment is judged by the seconds after which the true set is told from its rivals with 95 % probability, in the mean over sets
+and draws; where none gets there, by the probability at its end.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from xy_sysid.axis.forward import move
+from xy_sysid.experiment_design.beliefs import Belief
+from xy_sysid.experiment_design.evidence import ROUNDS, SURE, Power, powers, seconds_needed, settled
+from xy_sysid.experiment_design.experiment import RAMP, Experiment
+from xy_sysid.experiment_design.limits import MachineLimits
+from xy_sysid.experiment_design.prediction import COARSE, LOOKED, Setting, seen
+from xy_sysid.experiment_design.proposals import neighbours, proposals
+from xy_sysid.hypotheses.criteria import DOUBTFUL
+
+FINAL = 6  # proposals that are judged by draws
+ALIKE = 0.1  # probabilities that differ by less are alike: they are means over few draws
+ENOUGH = 0.95  # part of what an experiment can reach at all, after which more of it is a waste
+SHORTEST = 4.0  # s of motion at least: a few windows that judge
+BLOCK = 2.0  # s: experiments last whole multiples
+
+
+@dataclass(frozen=True)
+class Judged:
+    """An experiment with what it is worth.
+
+    seconds: of steady motion after which the sets are distinguished with 95 %, infinite if ``most`` do not suffice; probability: that they
+    are at the end; each: powers of each draw; broken: which limit it would come too near to, or nothing
+    """
+
+    experiment: Experiment
+    seconds: float = math.inf
+    probability: float = 0.0
+    each: tuple[tuple[Power, ...], ...] = ()
+    broken: str = ""
+
+    @property
+    def order(self) -> tuple[float, float, float]:
+        """Least is best; where none gets anywhere the evidence a second decides."""
+        rate = sum(min((one.rate for one in item), default=0.0) for item in self.each)
+        if math.isfinite(self.seconds):
+            return max(self.seconds, shortest(self.experiment)), 0.0, -rate
+        return math.inf, -round(self.probability / ALIKE), -rate
+
+
+@dataclass(frozen=True)
+class Design:
+    """beliefs: the sets that are to be distinguished; best: the experiment that does it soonest; tried: all that were judged."""
+
+    beliefs: tuple[Belief, ...]
+    limits: MachineLimits
+    best: Judged | None
+    tried: tuple[Judged, ...]
+
+    @property
+    def possible(self) -> bool:
+        """Whether an experiment within the limits distinguishes the sets with 95 %."""
+        return self.best is not None and math.isfinite(self.best.seconds)
+
+    @property
+    def helps(self) -> bool:
+        """Whether the best experiment may tell, or teaches what a better one needs."""
+        return self.best is not None and self.best.probability >= DOUBTFUL
+
+
+def design(
+    setting: Setting, beliefs: Sequence[Belief], limits: MachineLimits, seed: int = 1, tell: Callable[[float], None] = lambda part: None
+) -> Design:
+    """The experiment for some beliefs; tell: called with the part that is done."""
+    rate = setting.layout.sampling_rate
+    first = proposals(limits, rate, seed)
+    judged = []
+    for number, proposal in enumerate(first):
+        judged.append(judge(setting, beliefs, limits, proposal, draws=1))
+        tell(0.6 * (number + 1) / len(first))
+    allowed = sorted((item for item in judged if not item.broken), key=lambda item: item.order)
+    final: list[Judged] = []
+    for item in allowed:
+        closer = judge(setting, beliefs, limits, item.experiment)
+        final += [] if closer.broken else [closer]
+        if len(final) == FINAL:
+            break
+    tell(0.8)
+    final.sort(key=lambda item: item.order)
+    if final:
+        near = (judge(setting, beliefs, limits, item) for item in neighbours(final[0].experiment, limits, rate))
+        final = sorted([*final, *(item for item in near if not item.broken)], key=lambda item: item.order)
+    tell(1.0)
+    best = _timed(final[0], limits) if final else None
+    return Design(tuple(beliefs), limits, best, (*final, *judged))
+
+
+def judge(setting: Setting, beliefs: Sequence[Belief], limits: MachineLimits, experiment: Experiment, draws: int | None = None) -> Judged:
+    """What one experiment is worth; draws: of each set that are looked at, None is all."""
+    told = experiment.excitation
+    seconds = max(LOOKED, min(2.0 * told.slow_period * (told.slow > 0.0), limits.seconds) + RAMP)
+    looked = [(number, model) for number, belief in enumerate(beliefs) for model in belief.draws[:draws]]
+    motions = []
+    for _, model in looked:
+        motions.append(move(model, setting.layout.sampling_rate, experiment.drive(setting.layout.sampling_rate, seconds, limits.start), COARSE))
+        broken = limits.broken(motions[-1])
+        if broken:
+            return Judged(experiment, broken=broken)
+    rounds = 1 if draws else ROUNDS
+    pairs = zip(looked, motions, strict=True)
+    each = [tuple(powers(beliefs, number, model, seen(setting, motion), rounds)) for (number, model), motion in pairs]
+    most = limits.seconds - RAMP
+    return Judged(experiment, seconds=seconds_needed(each, most), probability=settled(each, most), each=tuple(each))
+
+
+def shortest(experiment: Experiment) -> float:
+    """s of an experiment that is what it was judged by: a few windows, and a whole period of a slow sine."""
+    told = experiment.excitation
+    return max(SHORTEST, told.slow_period + RAMP if told.slow > 0.0 else 0.0)
+
+
+def _timed(item: Judged, limits: MachineLimits) -> Judged:
+    """With the seconds that it should last."""
+    most = limits.seconds - RAMP
+    steps = (BLOCK * k for k in range(1, math.ceil(most / BLOCK)))
+    wanted = item.seconds
+    if not math.isfinite(wanted):
+        wanted = next((step for step in steps if settled(item.each, step) >= ENOUGH * item.probability), most)
+    seconds = min(BLOCK * math.ceil(max(wanted + RAMP, shortest(item.experiment)) / BLOCK), limits.seconds)
+    return Judged(item.experiment.lasting(seconds), item.seconds, item.probability, item.each)
+
+
+def expects(found: Design) -> str:
+    """What the best experiment promises, in a sentence."""
+    names = f"{found.beliefs[0].name} and {' or '.join(item.name for item in found.beliefs[1:])}"
+    if found.best is None:
+        why = sorted({item.broken for item in found.tried if item.broken})
+        return f"No experiment within the limits can distinguish {names}: all come too near to the limit of {' or '.join(why)}."
+    chance = f"{100.0 * found.best.probability:.0f} %"
+    if found.possible:
+        return f"After {found.best.experiment.seconds:.0f} s, {names} are distinguished with {100.0 * SURE:.0f} % probability."
+    if found.helps:
+        return f"No experiment within the limits is sure to distinguish {names}: the best does with {chance} probability."
+    return f"No experiment within the limits can distinguish {names}: the best would with {chance} probability."

@@ -1,0 +1,120 @@
+"""How well a rival would explain what is recorded if a set of effects were true, and how sure one would be after so many seconds.
+
+T-optimality (Atkinson & Fedorov, The design of experiments for discriminating between two rival models, Biometrika 62, 1975): the error that
+the rival leaves with the parameters that suit the experiment best. These may move as far as the data at hand allow. The error is scored by the
+objective of every fit here (``greybox.objective``), so what noise, an unmodelled force or an unmodelled motion explains does not count.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import ndtr
+
+from xy_sysid.axis.model import AxisModel
+from xy_sysid.diagnosis.ladder import contains
+from xy_sysid.experiment_design.beliefs import Belief
+from xy_sysid.experiment_design.prediction import Recorded, expected_error, predicted, slopes
+from xy_sysid.greybox.axis_data import HELD, SEEN
+from xy_sysid.greybox.objective import responder
+from xy_sysid.hypotheses.criteria import PRICE
+
+SURE = 0.95  # probability that is asked for
+ODDS = math.log(SURE / (1.0 - SURE))  # nats: likelihood ratio at which one of two is that probable (Wald 1945)
+JUDGED = HELD / (SEEN + HELD)  # part of a record that judges
+ROUNDS = 2  # of Gauss and Newton for the rival
+
+
+@dataclass(frozen=True, slots=True)
+class Power:
+    """Evidence for one draw of one set against one rival: nats a second; price: nats that its further parameters cost."""
+
+    truth: int
+    rival: int
+    rate: float
+    price: float
+
+    def probability(self, seconds: float) -> float:
+        """That the rival is refuted after some seconds: the ratio of likelihoods is normal with twice its mean as variance."""
+        mean = self.rate * JUDGED * max(seconds, 0.0)
+        if mean <= 0.0:
+            return 0.0
+        return float(ndtr((mean - ODDS - self.price) / math.sqrt(2.0 * mean)))
+
+
+def powers(beliefs: Sequence[Belief], truth: int, model: AxisModel, item: Recorded, rounds: int = ROUNDS) -> list[Power]:
+    """Of what one draw of a set would record: of the first set against every other, and of each other set against the first.
+
+    A rival that holds the set as a special case is left out: it explains all that the set does, and is judged where it is the truth.
+    """
+    own, library = beliefs[truth], model.library
+    found = []
+    for number, rival in enumerate(beliefs):
+        if number == truth or 0 not in (number, truth) or contains(library, frozenset(rival.effects), frozenset(own.effects)):
+            continue
+        found.append(Power(truth, number, nats((own, rival), model, item, rounds) / item.seconds, PRICE * max(own.free - rival.free, 0)))
+    return found
+
+
+def nats(sets: tuple[Belief, Belief], model: AxisModel, item: Recorded, rounds: int = ROUNDS) -> float:
+    """Expected ratio of likelihoods of the windows of a recording that a model of the first set makes, against the second that suits itself to it."""
+    own, rival = sets
+    least, response = expected_error(item, own, model)
+    lines = item.objective.lines > 0.0
+    weight = (lines / np.sqrt(least))[item.windows.layout.band]
+    centre = rival.inner(rival.model)
+    inner = centre.copy()
+    best = math.inf
+    for last in range(rounds + 1):
+        other = rival.moved(inner)
+        now = predicted(item, other)
+        error = item.velocity - now
+        power = item.windows.layout.power(error)
+        if not np.all(np.isfinite(power)):
+            break
+        off = inner - centre
+        score = item.objective.of_power(least + power, responder(item.windows.layout, other)(other.row))
+        best = min(best, _all(item, score) + 0.5 * float(off @ rival.precision @ off))
+        if last == rounds:
+            break
+        columns = (slopes(item, rival, other, now) * weight).reshape(inner.size, -1).view(np.float64)
+        left = (error * weight).ravel().view(np.float64)
+        inner = inner + np.linalg.solve(columns @ columns.T + rival.precision, columns @ left - rival.precision @ off)
+        inner = rival.scale.inner(rival.scale.outer(inner))
+    truth = _all(item, item.objective.of_power(least, response))
+    return max(best - truth, 0.0) if math.isfinite(best) else 1e6
+
+
+def _all(item: Recorded, score: float) -> float:
+    """Nats of all windows for a score in nats a line."""
+    return 0.5 * item.objective.count * score * item.windows.begins.size
+
+
+def settled(each: Sequence[Sequence[Power]], seconds: float) -> float:
+    """Probability that the true set is told from every rival after some seconds, over sets and draws with the same weight.
+
+    each: for one draw of one set its powers, the sets that have none left out
+    """
+    judged = [item for item in each if item]
+    if not judged:
+        return 0.0
+    truths = {item[0].truth for item in judged}
+    chances = []
+    for truth in sorted(truths):
+        own = [min(one.probability(seconds) for one in item) for item in judged if item[0].truth == truth]
+        chances.append(float(np.mean(own)))
+    return float(np.mean(chances))
+
+
+def seconds_needed(each: Sequence[Sequence[Power]], most: float) -> float:
+    """s after which the sets are distinguished with 95 %; infinite where ``most`` seconds do not suffice."""
+    if settled(each, most) < SURE:
+        return math.inf
+    low, high = 0.0, most
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if settled(each, middle) >= SURE else (middle, high)
+    return high

@@ -1,0 +1,58 @@
+"""One experiment: what drives the axis, and for how long."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from xy_sysid.axis.forward import DriveInput
+from xy_sysid.excitation import signal
+from xy_sysid.samples.block import FloatArray
+from xy_sysid.settings import AxisExcitation, ExcitationSettings
+
+RAMP = float(ExcitationSettings.model_fields["ramp"].default)  # s in which the excitation fades in
+AGE = 0.04  # s: age of the position by which the excitation pulls back to the start
+BANDED = ("noise", "multisine", "multisine_odd", "multisine_detect", "sweep", "stepped_sine", "prbs")  # kinds that have a band
+
+
+@dataclass(frozen=True, slots=True)
+class Experiment:
+    """excitation: of the axis, with its limits; seconds: of motion."""
+
+    excitation: AxisExcitation
+    seconds: float = 0.0
+
+    def lasting(self, seconds: float) -> Experiment:
+        """The same for another time."""
+        return replace(self, seconds=seconds)
+
+    def drive(self, sampling_rate: float, seconds: float, start: float) -> DriveInput:
+        """What it makes of an axis that stands at ``start``, as ``excitation.drive.Drive`` does between its guards."""
+        told, n = self.excitation, round(seconds * sampling_rate)
+        time = np.arange(n) / sampling_rate
+        fade = 0.5 * (1.0 - np.cos(np.pi * np.minimum(time / RAMP, 1.0)))
+        voltage = told.rms * self._signal(sampling_rate, n) + told.offset + told.slow * np.sin(2.0 * np.pi * time / told.slow_period)
+        return DriveInput(
+            voltage=np.asarray(voltage * fade), pull=told.centring * fade, limit=told.limit, seen=round(AGE * sampling_rate), start=start
+        )
+
+    def _signal(self, sampling_rate: float, n: int) -> FloatArray:
+        """(n,) of rms 1."""
+        if self.excitation.kind == "off" or self.excitation.rms == 0.0:
+            return np.zeros(n)
+        return signal(self.excitation.model_copy(update={"rms": 1.0}), sampling_rate).next(n)
+
+    @property
+    def words(self) -> str:
+        """What it is, as people say it."""
+        told, parts = self.excitation, []
+        if told.rms > 0.0 and told.kind in BANDED:
+            parts.append(f"{told.kind} of {told.rms:.3g} V rms from {told.low:.3g} to {told.high:.3g} Hz")
+        elif told.rms > 0.0 and told.kind != "off":
+            parts.append(f"{told.kind} of {told.rms:.3g} V, each for {told.period:.3g} s")
+        if told.slow > 0.0:
+            parts.append(f"a slow sine of {told.slow:.3g} V with a period of {told.slow_period:.3g} s")
+        if told.offset != 0.0:
+            parts.append(f"an offset of {told.offset:.3g} V")
+        return " and ".join(parts) or "nothing"

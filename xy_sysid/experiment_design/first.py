@@ -1,0 +1,113 @@
+"""A first experiment for an axis of which nothing is known but its limits.
+
+An axis is taken to cross its travel at full voltage in between a third of a second and ten seconds, with any pole, delay and dry friction that
+machines have. The experiment keeps within the limits for every draw of these, and tells most about gain, delay and pole in the mean over them.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from xy_sysid.axis.forward import move
+from xy_sysid.axis.model import AxisModel
+from xy_sysid.experiment_design.beliefs import Belief
+from xy_sysid.experiment_design.experiment import RAMP, Experiment
+from xy_sysid.experiment_design.limits import MachineLimits
+from xy_sysid.experiment_design.of_run import NextExperiment
+from xy_sysid.experiment_design.precision import FITTED, Information, information
+from xy_sysid.experiment_design.prediction import COARSE, LOOKED, Setting, seen
+from xy_sysid.experiment_design.proposals import proposals
+from xy_sysid.greybox.axis_data import EPSILON, WINDOWS
+from xy_sysid.greybox.floor import bands
+from xy_sysid.greybox.least_squares import Scale
+from xy_sysid.greybox.parameters import Z95
+
+CROSSES = (0.3, 10.0)  # s in which an axis crosses its travel at full voltage
+POLE = (5.0, 500.0)  # rad/s
+DELAY = (0.5e-3, 5e-3)  # s
+FRICTION = (0.01, 0.2)  # of the full voltage
+COUNTS = 1e5  # of the encoder within the travel, at least
+WIDTH = 0.05  # half of the 95 % interval of gain and pole that is asked for
+DRAWS = 12
+SHORTEST = 30.0  # s: a diagnosis needs windows that judge, whatever gain and pole need
+
+
+def first_experiment(axis: str, sampling_rate: float, limits: MachineLimits, seed: int = 1) -> NextExperiment:
+    """A good first experiment for an unknown axis: how loud, which band, how long. Raises BadInput for limits that make no sense."""
+    encoder = (limits.travel[1] - limits.travel[0]) / COUNTS / math.sqrt(12.0)
+    setting = Setting(bands(sampling_rate, int(LOOKED * sampling_rate / WINDOWS)), encoder, EPSILON)
+    models = _draws(limits, seed)
+    judged = []
+    with threadpool_limits(1, "blas"):
+        for number, experiment in enumerate(proposals(limits, sampling_rate, seed)):
+            found = _informations(setting, models, limits, experiment)
+            if found:
+                tells = float(np.mean([np.linalg.slogdet(item.each_second[:3, :3] + np.eye(3))[1] for item in found]))
+                judged.append((-tells, number, experiment, found))
+    if not judged:
+        sentence = "No experiment is within the limits for every axis that may be there: widen the travel, or start with xy-sysid run --first."
+        return NextExperiment(axis=axis, sampling_rate=sampling_rate, sentence=sentence, limits=limits)
+    _, _, best, found = min(judged, key=lambda item: item[:2])
+    seconds = min(max(math.ceil(_seconds(found, limits.seconds)), SHORTEST), limits.seconds)
+    drive = best.drive(sampling_rate, seconds, limits.start)
+    motions = [move(model, sampling_rate, drive, COARSE) for model in models]
+    free = 1.0 - limits.margin
+    low, high = (float(end([end(motion.position) for motion in motions])) - limits.start for end in (np.min, np.max))
+    share = float(np.mean([_width(item, seconds) <= WIDTH for item in found]))
+    sentence = f"After {seconds:.0f} s, gain and pole are known to {100.0 * WIDTH:.0f} % on {100.0 * share:.0f} % of the axes that may be there."
+    return NextExperiment(
+        axis=axis,
+        sampling_rate=sampling_rate,
+        sentence=sentence,
+        limits=limits,
+        experiment=best.lasting(float(seconds)),
+        probability=share,
+        voltage=max(float(np.max(np.abs(motion.voltage))) for motion in motions),
+        travel=(max(limits.start + low / free, limits.travel[0]), min(limits.start + high / free, limits.travel[1])),
+    )
+
+
+def _draws(limits: MachineLimits, seed: int) -> list[AxisModel]:
+    """Axes that may be there, the fastest among them."""
+    random = np.random.default_rng(seed)
+    found = []
+    for number in range(DRAWS):
+        crosses, pole, delay, friction = (low * (high / low) ** random.uniform() for low, high in (CROSSES, POLE, DELAY, FRICTION))
+        gain = (limits.travel[1] - limits.travel[0]) / (limits.voltage * (crosses if number else CROSSES[0]))
+        rubs = friction if number else FRICTION[0]
+        found.append(AxisModel(gain, delay, pole).with_effect("coulomb_friction", (rubs * limits.voltage,)))
+    return found
+
+
+def _informations(setting: Setting, models: list[AxisModel], limits: MachineLimits, experiment: Experiment) -> list[Information]:
+    rate = setting.layout.sampling_rate
+    told = experiment.excitation
+    seconds = max(LOOKED, (told.slow_period + RAMP) * (told.slow > 0.0))
+    motions = []
+    for model in models:
+        motions.append(move(model, rate, experiment.drive(rate, seconds, limits.start), COARSE))
+        if limits.broken(motions[-1]):
+            return []
+    return [information(_believed(model), model, seen(setting, motion)) for model, motion in zip(models, motions, strict=True)]
+
+
+def _believed(model: AxisModel) -> Belief:
+    """A draw as if it were known, so that its sensitivities can be asked for."""
+    low, high = np.array([-np.inf, 0.0, 1e-2, 1e-9]), np.array([np.inf, 1.0, 1e5, 1e3])
+    scale = Scale(low, high, np.array([False, False, True, True]), np.array([model.gain, model.delay, 1.0, 1.0]))
+    return Belief(effects=("coulomb_friction",), model=model, draws=(model,), scale=scale, precision=np.eye(4), free=1, force=0.0, motion=0.0)
+
+
+def _width(item: Information, seconds: float) -> float:
+    """The wider of the half intervals of gain and pole, as parts of them."""
+    covariance = item.covariance(1e-6 * np.eye(item.each_second.shape[0]), FITTED * seconds)
+    return Z95 * math.sqrt(max(float(covariance[0, 0]), float(covariance[2, 2])))
+
+
+def _seconds(found: list[Information], most: float) -> float:
+    """s after which the mean of the intervals is as narrow as asked for, ``most`` at most."""
+    steps = np.arange(2.0, most + 1.0, 2.0)
+    return next((float(step) for step in steps if float(np.median([_width(item, float(step)) for item in found])) <= WIDTH), most)

@@ -1,0 +1,84 @@
+"""What an experiment may ask of the machine."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from xy_sysid.axis.forward import Motion
+from xy_sysid.errors import BadInput
+from xy_sysid.samples.recording import Run
+
+MARGIN = 0.15  # part of each limit that is kept free for what the models do not know
+SECONDS = 60.0  # s of motion for one experiment at most
+
+
+@dataclass(frozen=True, slots=True)
+class MachineLimits:
+    """Of one axis.
+
+    voltage: V, of each sample; rms: V, that the drive stands for long (its current); speed: m/s; acceleration: m/s^2
+    travel: (low, high) m; start: m, where the axis stands when an experiment begins
+    margin: part of speed, acceleration and travel that is kept free; seconds: s of one experiment at most
+    """
+
+    voltage: float
+    travel: tuple[float, float]
+    start: float = 0.0
+    rms: float = math.inf
+    speed: float = math.inf
+    acceleration: float = math.inf
+    margin: float = MARGIN
+    seconds: float = SECONDS
+
+    def __post_init__(self) -> None:
+        for name in ("voltage", "rms", "speed", "acceleration", "seconds"):
+            if not getattr(self, name) > 0.0:
+                raise BadInput(f"limit of {name}", getattr(self, name), "above 0", "Give what the machine may do.")
+        if not 0.0 <= self.margin < 1.0:
+            raise BadInput("margin", self.margin, "0 to below 1", "Give the part of each limit that is kept free.")
+        if not self.travel[0] < self.start < self.travel[1]:
+            low, high = (f"{1e3 * end:.4g}" for end in self.travel)
+            allowed = f"where the axis stands, {1e3 * self.start:.4g} mm, between its ends"
+            raise BadInput("travel", f"{low} to {high} mm", allowed, "Give the ends of the travel, or move the axis between them.")
+
+    @property
+    def room(self) -> float:
+        """m from the start to the nearer end, with the margin."""
+        return (1.0 - self.margin) * min(self.start - self.travel[0], self.travel[1] - self.start)
+
+    def broken(self, motion: Motion) -> str:
+        """Which limit a motion would come too near to, in a word, or nothing."""
+        if not np.all(np.isfinite(motion.position)):
+            return "a model that runs away"
+        speed = np.diff(motion.position) * motion.sampling_rate
+        count = max(round(1e-3 * motion.sampling_rate), 1)  # over a millisecond
+        acceleration = np.diff(speed[::count]) * motion.sampling_rate / count
+        free = 1.0 - self.margin
+        away = motion.position - self.start
+        checks = (
+            ("voltage", _peak(motion.voltage), self.voltage * (1.0 + 1e-9)),
+            ("rms", float(np.sqrt(np.mean(motion.voltage**2))), self.rms),
+            ("speed", _peak(speed), free * self.speed),
+            ("acceleration", _peak(acceleration), free * self.acceleration),
+            ("travel", float(np.max(away)), free * (self.travel[1] - self.start)),
+            ("travel", -float(np.min(away)), free * (self.start - self.travel[0])),
+        )
+        return next((name for name, value, most in checks if value > most), "")
+
+
+def as_recorded(runs: Sequence[Run]) -> MachineLimits:
+    """Nothing beyond what some recordings show: their largest voltage, and their travel about where the last one ends."""
+    voltage = max(_peak(run.voltage) for run in runs)
+    low, high = min(float(np.min(run.position)) for run in runs), max(float(np.max(run.position)) for run in runs)
+    if not (voltage > 0.0 and high > low):
+        raise BadInput("recordings", "without voltage or motion", "an axis that moves", "Give the limits: voltage and travel.")
+    start, least = float(runs[-1].position[-1]), 0.1 * (high - low)
+    return MachineLimits(voltage=voltage, travel=(min(low, start - least), max(high, start + least)), start=start)
+
+
+def _peak(values: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> float:
+    return float(np.max(np.abs(values), initial=0.0))

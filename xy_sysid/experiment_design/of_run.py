@@ -1,0 +1,175 @@
+"""One call for a diagnosis: what to measure next, and what that is expected to bring."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from xy_sysid.axis.forward import move
+from xy_sysid.axis.model import STANDARD, Library
+from xy_sysid.diagnosis.equal_laws import equals
+from xy_sysid.diagnosis.ladder import Ladder
+from xy_sysid.diagnosis.of_run import Diagnosed
+from xy_sysid.errors import BadInput
+from xy_sysid.experiment_design.beliefs import Belief, Evidence, believed
+from xy_sysid.experiment_design.design import Design, design, expects
+from xy_sysid.experiment_design.experiment import Experiment
+from xy_sysid.experiment_design.limits import MachineLimits, as_recorded
+from xy_sysid.experiment_design.precision import DRAWS, Wanted, sharpest
+from xy_sysid.experiment_design.prediction import COARSE, Setting
+from xy_sysid.experiment_design.rivals import beliefs_of, names_of, possible, standing
+from xy_sysid.greybox.axis_data import EPSILON, AxisData, prepare_all
+
+Tell = Callable[[float], None]
+
+
+@dataclass(frozen=True, slots=True)
+class NextExperiment:
+    """What to measure next on one axis.
+
+    experiment: None where none helps; sentence: what it is expected to bring; sets: of effects that it is to distinguish
+    probability: that it tells; settles: whether that is 95 % or more; ask: what a person would have to change, or nothing
+    voltage, travel: the largest voltage, V, and the places, m, that it needs; limits: within which it was chosen
+    """
+
+    axis: str
+    sampling_rate: float
+    sentence: str
+    limits: MachineLimits
+    experiment: Experiment | None = None
+    sets: tuple[tuple[str, ...], ...] = ()
+    probability: float = 0.0
+    settles: bool = False
+    ask: str = ""
+    voltage: float = 0.0
+    travel: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def seconds(self) -> float:
+        """s of motion; 0 where there is no experiment."""
+        return self.experiment.seconds if self.experiment is not None else 0.0
+
+    def __repr__(self) -> str:
+        what = self.experiment.words if self.experiment is not None else "none"
+        return f"<Next experiment of axis {self.axis}: {what}. {self.sentence}>"
+
+
+def next_experiment(
+    found: Diagnosed,
+    limits: MachineLimits | None = None,
+    between: Sequence[Sequence[str]] = (),
+    library: Library = STANDARD,
+    tolerance: float = EPSILON,
+    tell: Tell = lambda part: None,
+) -> NextExperiment:
+    """The experiment that best distinguishes what a diagnosis left open.
+
+    found:   of ``diagnose``; limits: what the experiment may ask of the machine, None: nothing beyond what the recordings show
+    between: sets of effects that are to be distinguished, instead of those that the diagnosis leaves possible
+    Raises BadInput for a diagnosis without enough data, and for effects that free simulation cannot predict.
+    """
+    data = _data(found, tolerance)
+    limits = limits or as_recorded(found.runs)
+    axis, rate = found.runs[0].axis, data.sampling_rate
+    sets = [tuple(each) for each in between] or possible(data, library, _ladder(found))
+    with threadpool_limits(1, "blas"):
+        now = standing(data, library, sets)
+        beliefs = beliefs_of(data, library, now)
+        if len(beliefs) < 2:
+            chosen = names_of([now.names[now.chosen]])
+            sentence = f"Nothing is left to settle: of {names_of(sets)} these data leave only {chosen}."
+            return NextExperiment(axis=axis, sampling_rate=rate, sentence=sentence, limits=limits, sets=tuple(sets))
+        made = design(Setting.of(data), beliefs, limits, tell=tell)
+    return _answer(axis, rate, made, _ask(library, made))
+
+
+def sharpen(found: Diagnosed, parameter: str, width: float, limits: MachineLimits | None = None, tolerance: float = EPSILON) -> NextExperiment:
+    """The experiment that makes a parameter of the diagnosed model known as well as asked for in the least time.
+
+    parameter: ``gain``, ``pole`` or ``effect.parameter``; width: half of the 95 % interval, as a part of the value (0.02: 2 %)
+    Raises BadInput as ``next_experiment``, and for a parameter that the model does not have.
+    """
+    if not 0.0 < width < math.inf:
+        raise BadInput("width", width, "above 0", "Give half of the interval, for example 0.02 for 2 %.")
+    data = _data(found, tolerance)
+    limits = limits or as_recorded(found.runs)
+    with threadpool_limits(1, "blas"):
+        belief = believed(Evidence(data), _ladder(found).final, DRAWS)
+        best = sharpest(data, belief, limits, Wanted(parameter, width))
+    to = f"{100.0 * best.width:.2g} %"
+    if best.experiment is None:
+        sentence = f"No experiment is within the limits; {parameter} is known to {100.0 * best.before:.2g} %."
+    elif best.possible:
+        sentence = f"After {best.experiment.seconds:.0f} s, {parameter} is known to {to} (95 %), now {100.0 * best.before:.2g} %."
+    else:
+        sentence = f"No experiment within the limits makes {parameter} known to {100.0 * width:.2g} %: the best reaches {to}."
+    return _needs(
+        NextExperiment(
+            axis=found.runs[0].axis,
+            sampling_rate=data.sampling_rate,
+            sentence=sentence,
+            limits=limits,
+            experiment=best.experiment,
+            settles=best.possible,
+        ),
+        [belief],
+    )
+
+
+def _data(found: Diagnosed, tolerance: float) -> AxisData:
+    _ladder(found)
+    runs = found.runs
+    return prepare_all(runs[0].sampling_rate, [(run.voltage, run.position) for run in runs], tolerance, runs[0].units)
+
+
+def _ladder(found: Diagnosed) -> Ladder:
+    if found.ladder is None or not found.runs:
+        raise BadInput("diagnosis", found.verdict, "one of data that suffice", "Record for longer, or ask for a first experiment (--for nothing).")
+    return found.ladder
+
+
+def _answer(axis: str, rate: float, made: Design, ask: str) -> NextExperiment:
+    best = made.best if made.helps else None
+    found = NextExperiment(
+        axis=axis,
+        sampling_rate=rate,
+        sentence=expects(made),
+        limits=made.limits,
+        experiment=best.experiment if best is not None else None,
+        sets=tuple(item.effects for item in made.beliefs),
+        probability=made.best.probability if made.best is not None else 0.0,
+        settles=made.possible,
+        ask=ask,
+    )
+    return _needs(found, made.beliefs)
+
+
+def _ask(library: Library, made: Design) -> str:
+    """What a person would have to change where no experiment can tell."""
+    if made.helps:
+        return ""
+    own, other = made.beliefs[0].effects, made.beliefs[1].effects
+    new = [name for name in own if name not in other] or [name for name in other if name not in own]
+    same = [name for name in new if any(one.name in other for one in equals(library, name))]
+    if same:
+        return "Their equations are the same. Change the payload and record again: the mode that moves with it belongs to the table."
+    return f"{library[new[0]].experiment[:1].upper()}{library[new[0]].experiment[1:]}." if new else ""
+
+
+def _needs(found: NextExperiment, beliefs: Sequence[Belief]) -> NextExperiment:
+    """With the voltage and the travel that the experiment needs by any draw of its models, and the margin."""
+    if found.experiment is None:
+        return found
+    limits, rate = found.limits, found.sampling_rate
+    drive = found.experiment.drive(rate, found.seconds, limits.start)
+    motions = [move(model, rate, drive, COARSE) for belief in beliefs for model in belief.draws]
+    free = 1.0 - limits.margin
+    low = min(float(np.min(motion.position)) for motion in motions) - limits.start
+    high = max(float(np.max(motion.position)) for motion in motions) - limits.start
+    travel = max(limits.start + low / free, limits.travel[0]), min(limits.start + high / free, limits.travel[1])
+    voltage = max(float(np.max(np.abs(motion.voltage))) for motion in motions)
+    return replace(found, voltage=voltage, travel=travel)

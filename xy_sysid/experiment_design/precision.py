@@ -1,0 +1,182 @@
+"""The experiment that makes parameters known best: one of them to an interval that is asked for (c-optimality), or all of them (D-optimality).
+
+The covariance that a fit will report is predicted from the sensitivities of the simulated motion: the inverse of the information of the data at
+hand and of the experiment, and what laws that are not exact add however long it lasts (Fedorov, Theory of optimal experiments, 1972).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from xy_sysid.axis.forward import move
+from xy_sysid.axis.model import AxisModel
+from xy_sysid.errors import BadInput
+from xy_sysid.experiment_design.beliefs import Belief
+from xy_sysid.experiment_design.design import FINAL, SHORTEST
+from xy_sysid.experiment_design.experiment import RAMP, Experiment
+from xy_sysid.experiment_design.limits import MachineLimits
+from xy_sysid.experiment_design.prediction import COARSE, Recorded, Setting, expected_error, predicted, recorded, slopes
+from xy_sysid.experiment_design.proposals import neighbours, proposals
+from xy_sysid.greybox.axis_data import HELD, SEEN, AxisData, prepare_all
+from xy_sysid.greybox.free_run import finish
+from xy_sysid.greybox.least_squares import of_the_law
+from xy_sysid.greybox.parameters import Z95, Estimate
+from xy_sysid.samples.block import FloatArray
+
+FITTED = SEEN / (SEEN + HELD)  # part of a record that a fit sees
+DRAWS = 2  # of the parameters that are looked at
+LONGER = 1.4  # times as long, where a rehearsal does not reach what was asked for
+
+
+@dataclass(frozen=True)
+class Information:
+    """What an experiment tells of the parameters of a belief. each_second: (k, k); law: (k, k) covariance that does not fall with time."""
+
+    each_second: FloatArray
+    law: FloatArray
+
+    def covariance(self, before: FloatArray, seconds: float) -> FloatArray:
+        """(k, k) of the coordinates after some seconds; before: (k, k) information of the data at hand."""
+        return _inverse(before + FITTED * seconds * self.each_second) + self.law
+
+
+def information(belief: Belief, model: AxisModel, item: Recorded) -> Information:
+    """Of a recording that a model would make."""
+    least, _ = expected_error(item, belief, model)
+    layout = item.windows.layout
+    weight = ((item.objective.lines > 0.0) / np.sqrt(least))[layout.band]
+    change = slopes(item, belief, model, predicted(item, model)) * weight
+    columns = change.reshape(change.shape[0], -1).view(np.float64)
+    normal = columns @ columns.T
+    law = of_the_law(change, item.trusted * item.velocity * weight, layout, _inverse(normal))
+    return Information(normal / item.seconds, law)
+
+
+@dataclass(frozen=True)
+class Sharpest:
+    """experiment: the best, or None where none is within the limits; width: half of the 95 % interval that is expected, as ``Wanted`` says
+    possible: whether that is as narrow as asked for; before: half of the interval by the data at hand
+    """
+
+    experiment: Experiment | None
+    width: float
+    possible: bool
+    before: float
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """parameter: as ``gain`` or ``effect.parameter``; width: half of the 95 % interval, as a part of the value."""
+
+    parameter: str
+    width: float
+
+    def place(self, belief: Belief) -> int:
+        """Of the parameter among the coordinates."""
+        names = list(belief.model.values())
+        if self.parameter not in names:
+            raise BadInput("parameter", repr(self.parameter), ", ".join(names), "Choose one of these.")
+        return names.index(self.parameter)
+
+    def of_interval(self, found: Estimate) -> float:
+        """The same of an estimate of a fit."""
+        half = 0.5 * (found.high - found.low)
+        return half / abs(found.value) if found.value else math.inf
+
+    def half_width(self, belief: Belief, covariance: FloatArray) -> float:
+        """Of the interval that a covariance of the coordinates means."""
+        place = self.place(belief)
+        spread = Z95 * math.sqrt(max(float(covariance[place, place]), 0.0))
+        if belief.scale.positive[place]:
+            return math.expm1(min(spread, 50.0))
+        value = abs(float(belief.model.row[place]))
+        return spread * float(belief.scale.unit[place]) / value if value else math.inf
+
+
+def sharpest(data: AxisData, belief: Belief, limits: MachineLimits, target: Wanted, seed: int = 1) -> Sharpest:
+    """The experiment after which a parameter is known as well as asked for in the least time, or best where none gets there.
+
+    The experiment is chosen by its information. How long it has to last is found by a rehearsal: the fit of a simulated recording with noise.
+    """
+    setting = Setting.of(data)
+    before = target.half_width(belief, _inverse(belief.precision))
+    most = limits.seconds - RAMP
+    judged: list[tuple[float, float, int, Experiment, list[Information]]] = []
+    for experiment in _rounds(setting, belief, limits, target, seed):
+        found = informations(setting, belief, limits, experiment)
+        if found:
+            judged.append((*_needed(belief, found, target, most), len(judged), experiment, found))
+    if not judged:
+        return Sharpest(None, before, before <= target.width, before)
+    seconds, _, _, best, _ = min(judged, key=lambda item: item[:3])
+    lasts = min(max(math.ceil((seconds if math.isfinite(seconds) else most) + RAMP), SHORTEST), limits.seconds)
+    while True:
+        width = rehearsed(data, belief, best.lasting(float(lasts)), limits, target)
+        if width <= target.width or lasts >= limits.seconds:
+            return Sharpest(best.lasting(float(lasts)), width, width <= target.width, before)
+        lasts = min(math.ceil(LONGER * lasts), limits.seconds)
+
+
+def rehearsed(data: AxisData, belief: Belief, experiment: Experiment, limits: MachineLimits, target: Wanted) -> float:
+    """Half of the interval that a fit reports of the data at hand and of a recording that the experiment would make, with the encoder's noise."""
+    rate = data.sampling_rate
+    motion = move(belief.model, rate, experiment.drive(rate, experiment.seconds, limits.start), COARSE)
+    noise = data.floor.encoder * np.random.default_rng(0).standard_normal(motion.position.size)
+    recordings = [(data.voltage[run], data.position[run]) for run in data.runs]
+    both = prepare_all(rate, [*recordings, (motion.voltage, motion.position + noise)], data.floor.epsilon, data.units)
+    return target.of_interval(finish(both, belief.model).parameter(target.parameter))
+
+
+def _rounds(setting: Setting, belief: Belief, limits: MachineLimits, target: Wanted, seed: int) -> Sequence[Experiment]:
+    """Proposals, and neighbours of the best of them."""
+    rate, most = setting.layout.sampling_rate, limits.seconds - RAMP
+    first = proposals(limits, rate, seed)
+    judged: list[tuple[float, float, int, Experiment]] = []
+    for experiment in first:
+        found = informations(setting, belief, limits, experiment, draws=1)
+        if found:
+            judged.append((*_needed(belief, found, target, most), len(judged), experiment))
+    best = [item[-1] for item in sorted(judged, key=lambda item: item[:3])[:FINAL]]
+    return [*best, *(neighbours(best[0], limits, rate) if best else ())]
+
+
+def informations(setting: Setting, belief: Belief, limits: MachineLimits, experiment: Experiment, draws: int = DRAWS) -> list[Information]:
+    """Of one experiment, for some draws; none where a draw would break a limit."""
+    found = []
+    for model in belief.draws[:draws]:
+        item = recorded(setting, experiment, model, limits.start)
+        if limits.broken(item.motion):
+            return []
+        found.append(information(belief, model, item))
+    return found
+
+
+def _needed(belief: Belief, found: Sequence[Information], target: Wanted, most: float) -> tuple[float, float]:
+    """s until the mean interval over draws is as narrow as asked for, infinite if ``most`` do not suffice; and half its width there."""
+
+    if _width(belief, found, target, most) > target.width:
+        return math.inf, _width(belief, found, target, most)
+    low, high = 0.0, most
+    for _ in range(30):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if _width(belief, found, target, middle) <= target.width else (middle, high)
+    return high, _width(belief, found, target, high)
+
+
+def _width(belief: Belief, found: Sequence[Information], target: Wanted, seconds: float) -> float:
+    """Half of the 95 % interval after some seconds, in the mean over draws."""
+    return float(np.mean([target.half_width(belief, item.covariance(belief.precision, seconds)) for item in found]))
+
+
+def volume(belief: Belief, found: Sequence[Information], seconds: float) -> float:
+    """Logarithm of the volume of the region in which the parameters lie after an experiment (D-optimality), in the mean over draws."""
+    return float(np.mean([-0.5 * np.linalg.slogdet(belief.precision + FITTED * seconds * item.each_second)[1] for item in found]))
+
+
+def _inverse(matrix: FloatArray) -> FloatArray:
+    unit = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    return np.asarray(np.linalg.pinv(matrix / np.outer(unit, unit), rcond=1e-13, hermitian=True) / np.outer(unit, unit))

@@ -1,0 +1,102 @@
+"""What an experiment would record if a model were true, and how a rival would then predict it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xy_sysid.axis.forward import Motion, move
+from xy_sysid.axis.model import AxisModel, simulator
+from xy_sysid.experiment_design.beliefs import Belief, with_row
+from xy_sysid.experiment_design.experiment import RAMP, Experiment
+from xy_sysid.greybox.axis_data import WINDOWS, AxisData
+from xy_sysid.greybox.floor import Bands, Windows, bands, floor
+from xy_sysid.greybox.least_squares import STEP
+from xy_sysid.greybox.objective import Objective, responder
+from xy_sysid.samples.block import FloatArray
+
+LOOKED = 8.0  # s of each experiment that are simulated: longer ones go on as they began
+COARSE = 4000.0  # Hz: sub-steps
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What an experiment is seen through. layout: windows and bands; encoder: m; epsilon: part of the motion to which laws are trusted."""
+
+    layout: Bands
+    encoder: float
+    epsilon: float
+
+    @staticmethod
+    def of(data: AxisData) -> Setting:
+        """As some data were seen, in windows for recordings as long as those that are simulated."""
+        longest = max(LOOKED, *(size / data.sampling_rate for size in data.counts(early=False)))
+        return Setting(bands(data.sampling_rate, int(longest * data.sampling_rate / WINDOWS)), data.floor.encoder, data.floor.epsilon)
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """What would be recorded without noise.
+
+    windows: of the steady part; seconds: of it; velocity: (windows, lines) spectrum; objective: scores an error of it
+    trusted: part of the motion to which laws are trusted
+    """
+
+    motion: Motion
+    windows: Windows
+    seconds: float
+    velocity: NDArray[np.complex128]
+    objective: Objective
+    trusted: float
+
+
+def recorded(setting: Setting, experiment: Experiment, model: AxisModel, start: float, seconds: float = LOOKED) -> Recorded:
+    """What an experiment of some seconds would record if a model were true."""
+    rate = setting.layout.sampling_rate
+    return seen(setting, move(model, rate, experiment.drive(rate, seconds, start), COARSE))
+
+
+def seen(setting: Setting, motion: Motion) -> Recorded:
+    """A motion as an objective sees it, from the end of the ramp on."""
+    rate, length = motion.sampling_rate, setting.layout.length
+    velocity = np.diff(motion.position) * rate
+    first = min(round(RAMP * rate), max(velocity.size - length, 0))
+    windows = Windows(setting.layout, np.arange(first, max(velocity.size - length, first) + 1, max(length // 2, 1), dtype=np.int64))
+    least = floor(windows, velocity, setting.encoder, setting.epsilon)
+    steady = (windows.end - first) / rate
+    return Recorded(
+        motion=motion,
+        windows=windows,
+        seconds=steady,
+        velocity=windows.spectrum(velocity),
+        objective=Objective.of(least),
+        trusted=setting.epsilon,
+    )
+
+
+def predicted(item: Recorded, model: AxisModel) -> NDArray[np.complex128]:
+    """(windows, lines) spectrum of the velocity that a model predicts from the voltage and position of a recording."""
+    motion = item.motion
+    names = [name for name, _ in model.effects]
+    run = simulator(model.library, names, motion.sampling_rate, motion.voltage, motion.position, COARSE)
+    return item.windows.spectrum(run(model.row))
+
+
+def slopes(item: Recorded, belief: Belief, model: AxisModel, now: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """(k, windows, lines) derivatives of what a model predicts, by the coordinates of its belief."""
+    inner = belief.inner(model)
+    found = []
+    for k in range(inner.size):
+        step = STEP if belief.scale.outer(inner)[k] < belief.scale.high[k] else -STEP
+        moved = inner.copy()
+        moved[k] += step
+        found.append((predicted(item, with_row(model, belief.scale.outer(moved))) - now) / step)
+    return np.nan_to_num(np.array(found))
+
+
+def expected_error(item: Recorded, belief: Belief, model: AxisModel) -> tuple[FloatArray, FloatArray]:
+    """(bands,) power of a model's error where the model is true, m^2/s^2: noise, unmodelled force and motion; and its |G|^2."""
+    response = responder(item.windows.layout, model)(model.row)
+    return item.objective.floor + belief.force * response + belief.motion, response

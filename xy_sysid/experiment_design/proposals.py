@@ -1,0 +1,72 @@
+"""The experiments that are compared: a grid over kind, band, amplitude and period, and their neighbours."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import product
+from typing import Any
+
+from xy_sysid.experiment_design.experiment import Experiment
+from xy_sysid.experiment_design.limits import MachineLimits
+from xy_sysid.settings import AxisExcitation
+
+CREST = 4.2  # peak of Gaussian noise over its rms: one sample in 40,000 is beyond
+PART = {"noise": 1.0 / CREST, "sweep": 0.7, "step": 0.95}  # largest rms (height of a step) over the limit of the voltage
+HALVES = (1.0, 0.5, 0.25, 0.125, 0.0625)  # parts of the largest amplitude
+FINER = tuple(2.0 ** (-0.5 * k) for k in range(11))  # of a slow sine, which goes as far as its amplitude says
+TOP = 0.15  # of the sampling rate: highest frequency that is proposed
+NEAR = {"rms": (0.7, 1.4), "slow": (0.7, 1.4), "slow_period": (0.6, 1.6), "period": (0.6, 1.6), "low": (0.4, 2.5), "high": (0.5, 2.0)}
+LONGEST = 10.0  # s, of a slow sine
+
+
+def proposals(limits: MachineLimits, sampling_rate: float, seed: int = 1) -> list[Experiment]:
+    """Experiments from loud to quiet; those that would break a limit are among them."""
+    return [_experiment(limits, sampling_rate, {"seed": seed, **told}) for told in _grid(limits, sampling_rate)]
+
+
+def neighbours(experiment: Experiment, limits: MachineLimits, sampling_rate: float) -> Iterator[Experiment]:
+    """The same experiment with one number changed."""
+    told = experiment.excitation
+    values = {name: getattr(told, name) for name in AxisExcitation.model_fields}
+    for name, factors in NEAR.items():
+        banded = name in ("low", "high") and told.kind in ("noise", "sweep") and told.rms > 0.0
+        if name in ("low", "high") and not banded:
+            continue
+        if values[name] <= 0.0 or (name == "slow_period" and told.slow == 0.0) or (name == "period" and told.kind not in ("step", "sweep")):
+            continue
+        for factor in factors:
+            yield _experiment(limits, sampling_rate, {**values, name: values[name] * factor})
+
+
+def _grid(limits: MachineLimits, sampling_rate: float) -> Iterator[dict[str, Any]]:
+    most, top = limits.voltage, min(300.0, TOP * sampling_rate)
+    bands = [(0.1, 10.0), (0.1, 50.0), (0.1, top), (20.0, top)]
+    for (low, high), part in product(bands, HALVES[:4]):
+        if low < high:
+            yield {"kind": "noise", "low": low, "high": min(high, top), "rms": part * most / CREST}
+    for part in HALVES[:3]:
+        yield {"kind": "sweep", "low": 0.5, "high": top, "period": 4.0, "rms": part * PART["sweep"] * most}
+    for part, period in product(HALVES, (0.1, 0.4, 1.6)):
+        yield {"kind": "step", "period": period, "rms": part * PART["step"] * most}
+    for part, period in product(FINER, (1.0, 3.0, LONGEST)):
+        yield {"kind": "off", "rms": 0.0, "slow": 0.95 * part * most, "slow_period": period}
+    for part, quiet, period in product(HALVES[1:], (0.25, 0.0625), (3.0, LONGEST)):
+        yield {"kind": "noise", "low": 0.1, "high": top, "rms": quiet * most / CREST, "slow": 0.7 * part * most, "slow_period": period}
+
+
+def _experiment(limits: MachineLimits, sampling_rate: float, told: dict[str, Any]) -> Experiment:
+    """With the limits of the axis, and numbers that its settings allow."""
+    told = {**told, "limit": limits.voltage, "travel_min": limits.travel[0], "travel_max": limits.travel[1]}
+    told["brake"] = min(AxisExcitation.model_fields["brake"].default, 0.2 * (limits.travel[1] - limits.travel[0]))
+    told["centring"] = _centring(limits)
+    told["rms"] = min(told["rms"], PART.get(told["kind"], 0.0) * limits.voltage)
+    told["slow"] = min(told.get("slow", 0.0), max(0.95 * limits.voltage - told["rms"] / PART.get(told["kind"], 1.0), 0.0))
+    if "high" in told and told.get("kind") != "off":
+        told["high"] = min(told["high"], 0.45 * sampling_rate)
+        told["low"] = min(told.get("low", 0.1), 0.5 * told["high"])
+    return Experiment(AxisExcitation(**told))
+
+
+def _centring(limits: MachineLimits) -> float:
+    """V/m: a fiftieth of the voltage at the nearer end; enough against drift, too little to matter else."""
+    return min(0.02 * limits.voltage / limits.room, 1e4)

@@ -1,0 +1,159 @@
+"""The sets of effects that the data at hand leave possible: what was named, what predicts as well, and what may hide in the noise."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from xy_sysid.axis.model import AxisModel, Library
+from xy_sysid.diagnosis.ladder import Ladder, contains
+from xy_sysid.diagnosis.rungs import Given
+from xy_sysid.effects._contract import BEGUN
+from xy_sysid.errors import BadInput
+from xy_sysid.experiment_design.beliefs import ALLOWED, Belief, Evidence, believed, hidden
+from xy_sysid.greybox.axis_data import AxisData
+from xy_sysid.greybox.free_run import GreyboxFit, best_start, fit
+from xy_sysid.hypotheses import starts
+from xy_sysid.hypotheses.compare import gain
+from xy_sysid.hypotheses.criteria import CHANCE, DOUBTFUL, PRICE
+
+DRAWS = 6  # of the parameters of each set
+
+
+@dataclass(frozen=True)
+class Standing:
+    """Sets of effects on the same data.
+
+    names: of each; fits: of each, on all data; chosen: the one whose score is best, parameters at their price
+    doubt: probability that one of the others predicts better, at most a half
+    """
+
+    names: tuple[tuple[str, ...], ...]
+    fits: tuple[GreyboxFit, ...]
+    chosen: int
+    doubt: float
+
+
+def standing(data: AxisData, library: Library, sets: Sequence[Sequence[str]], known: Sequence[AxisModel | None] = ()) -> Standing:
+    """Fit some sets and compare them on the held-out windows; known: a model of each that was fitted to other data."""
+    check(library, sets)
+    names = tuple(tuple(each) for each in sets)
+    before = tuple(known) or (None,) * len(names)
+    fits = tuple(_fitted(data, library, each, model) for each, model in zip(names, before, strict=True))
+    prices = [PRICE * sum(len(library[name].parameters) for name in each) for each in names]
+    scores = [float(np.sum(found.scores)) + price for found, price in zip(fits, prices, strict=True)]
+    chosen = int(np.argmin(scores))
+    doubts = [_doubt(fits[chosen], other, prices[k] - prices[chosen]) for k, other in enumerate(fits) if k != chosen]
+    return Standing(names, fits, chosen, max(doubts, default=0.0))
+
+
+def check(library: Library, sets: Iterable[Sequence[str]]) -> None:
+    """Raises BadInput for an effect that is unknown, in every model already, or that no free simulation predicts."""
+    for name in (name for each in sets for name in each):
+        if not library[name].simulable or library[name].category == "base":
+            act = "It is judged one sample ahead; see its experiment in xy-sysid effects." if not library[name].simulable else "Leave it out."
+            raise BadInput("effect", name, "effects that free simulation can predict", act)
+
+
+def _doubt(one: GreyboxFit, other: GreyboxFit, price: float) -> float:
+    found = gain(one, other)
+    return min(1.0 - type(found)(found.nats + price, found.error, found.windows).probability, 0.5)
+
+
+def _fitted(data: AxisData, library: Library, names: Sequence[str], known: AxisModel | None) -> GreyboxFit:
+    found = Given.of(data, library, tuple(names)).steps[-1].fit
+    if known is None:
+        return found
+    other = fit(data, known)
+    return other if float(np.sum(other.scores)) < float(np.sum(found.scores)) else found
+
+
+def beliefs_of(data: AxisData, library: Library, found: Standing, draws: int = DRAWS, seed: int = 0) -> list[Belief]:
+    """What each set says, that which was chosen first; sets that the data rule out are left out."""
+    evidence = Evidence(data)
+    order = sorted(range(len(found.names)), key=lambda k: k != found.chosen)
+    best = found.fits[found.chosen]
+    beliefs = []
+    for k in order:
+        belief = _belief(evidence, library, found.names[k], (found.fits[k], best), draws, seed)
+        if belief is not None:
+            beliefs.append(belief)
+    return beliefs
+
+
+def _belief(
+    evidence: Evidence, library: Library, names: tuple[str, ...], fits: tuple[GreyboxFit, GreyboxFit], draws: int, seed: int
+) -> Belief | None:
+    """fits: of this set, and of the chosen one."""
+    own, best = fits
+    if own is best:
+        return believed(evidence, own, draws, seed)
+    rest = frozenset(name for name, _ in best.model.effects)
+    new = [name for name in names if name not in rest]
+    holds = contains(library, frozenset(names), rest)  # then it cannot do worse, and a fit that does has not found what there is
+    better = gain(best, own)
+    if len(new) == 1 and holds and not gain(own, best).is_sure:
+        model, least = best.model, evidence.nats(best.model)
+        for name in rest - frozenset(names):
+            model = model if _gives_way(library, new[0], name) else model.without(name)
+        unseen = hidden(evidence, model, new[0], least, (draws, seed))
+        if unseen is not None or _is_gone(evidence.data, own, new[0]) or evidence.nats(own.model) > least + ALLOWED:
+            return unseen
+    elif not holds and better.probability > CHANCE and better.nats > PRICE:
+        return None
+    return believed(evidence, own, draws, seed)
+
+
+def _is_gone(data: AxisData, found: GreyboxFit, name: str) -> bool:
+    """A fit has made an effect so small that no fit would begin there: what is left is the model without it."""
+    effect = found.model.library[name]
+    pairs = zip(effect.on(data.similar), dict(found.model.effects)[name], strict=True)
+    return any(item.positive and (k == 0 or "V" in item.unit) and value < BEGUN * abs(item.typical) for k, (item, value) in enumerate(pairs))
+
+
+def _gives_way(library: Library, name: str, other: str) -> bool:
+    return bool(library[name].family) and library[name].family == library[other].family
+
+
+def possible(data: AxisData, library: Library, ladder: Ladder, most: int = 4) -> list[tuple[str, ...]]:
+    """The set that was named, then those that may be true instead, the likeliest first: rivals that predict nearly as well, and look-alikes."""
+    named = ladder.effects
+    rivals = [item.effects for item in ladder.rivals if item.doubt >= DOUBTFUL and not item.refused]
+    alike = [
+        tuple(sorted({*named} - {name} | {other}))
+        for name in named
+        for other in look_alikes(library, name)
+        if other not in named and _may_be(data, library, other)
+    ]
+    hiding = [(other.name,) for other in library.acting if not named and _may_be(data, library, other.name)]
+    found = dict.fromkeys(tuple(each) for each in (named, *rivals, *alike, *hiding) if all(library[name].simulable for name in each))
+    return list(found)[: 1 + most] if named else list(found)
+
+
+def look_alikes(library: Library, name: str) -> list[str]:
+    """Effects that one can be taken for, as either of the two says, and its relatives."""
+    effect = library[name]
+    others = [other for other in library.acting if other.name != name]
+    return [
+        other.name
+        for other in others
+        if other.name in effect.look_alikes or name in other.look_alikes or (effect.family and other.family == effect.family)
+    ]
+
+
+def _may_be(data: AxisData, library: Library, name: str) -> bool:
+    effect = library[name]
+    return effect.simulable and (data.units.output == "rad" or not effect.angular)
+
+
+def begun(data: AxisData, now: GreyboxFit, name: str, other: str) -> GreyboxFit:
+    """A fit with another effect in the place of one."""
+    library = now.model.library
+    return fit(data, best_start(data, starts.swapped(data, now, name, library[other], None)))
+
+
+def names_of(sets: Iterable[Sequence[str]]) -> str:
+    """Sets in words."""
+    return ", ".join(" and ".join(each) or "the rigid model" for each in sets)

@@ -1,0 +1,54 @@
+"""Files of designed experiments: written by ``xy-sysid next``, read by the node that carries them out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from xy_sysid.bags.atomic import write_text
+from xy_sysid.errors import BadInput
+from xy_sysid.excitation.designed import document_of, with_experiment
+from xy_sysid.experiment_design.of_run import NextExperiment
+from xy_sysid.files.ros_parameters import load
+from xy_sysid.settings import ExcitationSettings
+
+
+def document(found: NextExperiment) -> dict[str, Any]:
+    """What the file of an experiment holds. Raises BadInput where there is none."""
+    if found.experiment is None:
+        raise BadInput("experiment", "none", "one that helps", found.sentence)
+    made = document_of(
+        found.axis, found.sampling_rate, found.seconds, found.experiment.excitation, (found.voltage, (found.travel[0], found.travel[1]))
+    )
+    made["experiment"] |= {"expects": found.sentence, "sets": [list(names) for names in found.sets]}
+    return made
+
+
+def write_experiment(path: Path, found: NextExperiment) -> None:
+    """The file of an experiment, for parameter ``experiment`` of the excitation node."""
+    text = yaml.safe_dump(_quoted(document(found)), sort_keys=False, width=120, allow_unicode=True)
+    head = (
+        "# Made by xy-sysid next. Run it: parameter experiment of the excitation node. It is refused where it asks for more than the node's limits.\n"
+    )
+    write_text(path, head + text)
+
+
+def read_experiment(settings: ExcitationSettings, path: Path) -> ExcitationSettings:
+    """Settings with the experiment of a file; raises BadInput for a file that cannot be read, or that asks for more than the settings allow."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as problem:
+        why = getattr(problem, "strerror", None) or "not text"
+        raise BadInput("experiment", f"{path}: {why}", "a file of xy-sysid next", "Check the path.") from None
+    return with_experiment(settings, load(text, path.name), path.name)
+
+
+def _quoted(value: Any) -> Any:
+    """Plain numbers, texts and lists."""
+    if isinstance(value, dict):
+        return {key: _quoted(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_quoted(item) for item in value]
+    return float(f"{value:.6g}") if isinstance(value, float) else value
