@@ -24,7 +24,7 @@ errors units settings jit
 samples excitation
 response linear fitting
 effects axis greybox comparison hypotheses diagnosis
-story live
+story live control_design
 """)
 EDGE = names("""
 bags imports files processes

@@ -22,6 +22,7 @@ from xy_sysid.cli.report import report
 from xy_sysid.cli.simulate import simulate
 from xy_sysid.cli.start import run
 from xy_sysid.cli.study import study
+from xy_sysid.cli.use import use
 from xy_sysid.cli.validate import validate
 
 app = typer.Typer(
@@ -49,5 +50,6 @@ def _program(
     pass
 
 
-for command in (demo, page, run, record, replay, simulate, columns, frf, fit, validate, compare, diagnose, refine, effects, study, report, figures):
+ORDER = (demo, page, run, record, replay, simulate, columns, frf, fit, validate, compare, diagnose, refine, use, effects, study, report, figures)
+for command in ORDER:
     app.command(name=command.__name__)(command)
