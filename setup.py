@@ -53,6 +53,7 @@ setup(
         "ulog": ["pyulog"],
         "wpilog": ["robotpy-wpiutil"],
         "parquet": ["pyarrow"],
+        "mujoco": ["mujoco"],
         "bench": ["scikit-rf", "pyFRF"],
         "test": [
             "matplotlib",
@@ -75,6 +76,8 @@ setup(
             "pyulog",
             f"robotpy-wpiutil; {ROS_WHEELS}",
             "pyarrow",
+            "mujoco",
+            "FMPy",
             "colcon-core",
             "colcon-ros",
             "colcon-bash",

@@ -80,6 +80,8 @@ def use(
         _show(name, used)
         for target, item in files[name].items():
             if out is None:
+                if item.archive or item.mat:
+                    raise BadInput(f"--to {target}", "without a folder", "--out DIR", "Its files are no text.")
                 for file, text in item.files.items():
                     say(f"--- {file}")
                     typer.echo(text, nl=False)
@@ -117,19 +119,32 @@ def _run(recording: Recording | None, model: PhysicalModel) -> Any:
 
 def _write(folder: Path, files: dict[str, dict[str, Exported]], force: bool) -> list[str]:
     """Every file of every target into a folder that may be made."""
-    from xy_sysid.bags.atomic import write_text
+    from scipy.io import savemat
+
+    from xy_sysid.bags.atomic import whole, write_text
     from xy_sysid.errors import BadInput
+    from xy_sysid.files.fmu import write_fmu
     from xy_sysid.files.unasked import free
 
     if folder.exists() and not folder.is_dir():
         raise BadInput("--out", str(folder), "a folder", "Choose another name.")
     folder.mkdir(parents=True, exist_ok=True)
-    every = {folder / name: text for axis in files.values() for item in axis.values() for name, text in item.files.items()}
-    for path in every:
+    exported = [item for axis in files.values() for item in axis.values()]
+    texts = {folder / name: text for item in exported if not item.archive for name, text in item.files.items()}
+    mats = {folder / name: content for item in exported for name, content in item.mat.items()}
+    archives = {folder / item.archive: item for item in exported if item.archive}
+    for path in (*texts, *mats, *archives):
         free("--out", path, force, "add --force")
-    for path, text in every.items():
+    for path, text in texts.items():
         write_text(path, text)
-    return [str(path) for path in every]
+    for path, content in mats.items():
+        with whole(path) as part:
+            savemat(part, content, oned_as="row", long_field_names=True, appendmat=False)
+    for path, item in archives.items():
+        missing = write_fmu(path, path.stem, item.files)
+        if missing:
+            say(f"{path}: {missing}", aside)
+    return [str(path) for path in (*texts, *mats, *archives)]
 
 
 def _show(name: str, used: Used) -> None:

@@ -53,8 +53,7 @@ def parts_of_sample(ready: Plant) -> int:
 def feedforward(model: AxisModel, path: Motion) -> Feedforward:
     """The voltage along a path, with delay, hold, lag, resonances and amplifier undone; see ``not_undone`` for the rest."""
     ready = plant(model, path.sampling_rate)
-    lags = sum(lag_of(model.library[name], values) is not None for name, values in model.effects)
-    ahead = model.delay + HALF * (1 + lags) / path.sampling_rate
+    ahead = ahead_of(model, path.sampling_rate)
     wanted = path.ahead(ahead)
     library = model.library.looped([model.library[name] for name, _ in model.effects])
     out = np.empty(wanted.position.size)
@@ -62,6 +61,12 @@ def feedforward(model: AxisModel, path: Motion) -> Feedforward:
     moving = (wanted.position, wanted.speed, wanted.acceleration, 1.0 / path.sampling_rate, parts_of_sample(ready))
     run(*moving, ready.parameters, ready.flags, ready.numbers, ready.moving, guided(ready), ready.rest(), np.zeros(ROOM * ready.order), out)
     return Feedforward(out, ahead, not_undone(model))
+
+
+def ahead_of(model: AxisModel, sampling_rate: float) -> float:
+    """s by which a path is looked at ahead: delay, half a sample of the hold, and half a sample of each lag's."""
+    lags = sum(lag_of(model.library[name], values) is not None for name, values in model.effects)
+    return model.delay + HALF * (1 + lags) / sampling_rate
 
 
 def not_undone(model: AxisModel) -> tuple[tuple[str, str], ...]:
@@ -96,7 +101,7 @@ def _along(writer: InverseText, name: str) -> str:
     lines = [
         f"def {name}(rs, vs, accs, h, cuts, p, on, z, moving, guided, s, w, out):",
         "    for i in range(out.size):",
-        "        r, v, a = rs[i], vs[i], accs[i]",
+        "        r, v, acc = rs[i], vs[i], accs[i]",
         *("    " + line.replace("return total", "out[i] = total") for line in body),
     ]
     return "\n".join(lines) + "\n"

@@ -24,36 +24,25 @@ def $name($signature):
 $encoder
     s[0] = x
     s[1] = v
-    effort = a
+    effort = acc
     for j in range(1, $n - 1):
         effort -= moving[$n + j] * s[j]
     effort = effort / moving[$n + $n - 1]
     for _ in range($cuts):
-        unfold(guided, $n, s, a, w)
+        unfold(guided, $n, s, acc, w)
         follow($n, w, h / $cuts, s)
     s[0] = x
     s[1] = v
     direction = 0.0
-    if v > 0.0 or (v == 0.0 and a > 0.0):
+    if v > 0.0 or (v == 0.0 and acc > 0.0):
         direction = 1.0
-    if v < 0.0 or (v == 0.0 and a < 0.0):
+    if v < 0.0 or (v == 0.0 and acc < 0.0):
         direction = -1.0
 $friction
     total = effort
-    for _ in range($passes):
-        pull = 0.0
 $forces
-        total = effort + pull
 $lag
-    wanted = total
-    for _ in range($tries):
-        held = total
 $inputs
-        total = total + (wanted - held)
-    held = total
-$inputs_last
-    if abs(held - wanted) > 1e-6 * abs(wanted):
-        total = held
     return total
 """)
 
@@ -66,25 +55,22 @@ class InverseText(LawText):
         super().__init__(StateLayout(kept, hanging), model, numbers or given_numbers())
 
     def text(self, name: str) -> str:
-        """Source of ``name(r, v, a, h, cuts, p, on, z, moving, guided, s, w)``, or of one model ``name(r, v, a, h, cuts, moving, guided, s, w)``: V.
+        """Source of ``name(r, v, acc, h, cuts, p, on, z, moving, guided, s, w)``, V; of one model without ``p, on, z``.
 
-        r, v, a: position, speed and acceleration wanted; h: a sample, s; cuts: parts of it, so short that the series holds;
+        r, v, acc: position, speed and acceleration wanted; h: a sample, s; cuts: parts of it, so short that the series holds;
         guided: the generator of what hangs on an axis that is moved; s: a state of the same layout as the simulation's, but without a ring
         """
         n = self.numbers["n"]
         return TEMPLATE.substitute(
             name=name,
-            signature="r, v, a, h, cuts, p, on, z, moving, guided, s, w" if self.guarded else "r, v, a, h, cuts, moving, guided, s, w",
+            signature="r, v, acc, h, cuts, p, on, z, moving, guided, s, w" if self.guarded else "r, v, acc, h, cuts, moving, guided, s, w",
             n=n,
             cuts="cuts",
-            passes=PASSES if self._asks_voltage() else 1,
-            tries=TRIES if self.of("input") else 0,
             encoder=_lines(1, self._encoder()),
             friction=_lines(1, self._friction()),
-            forces=_lines(2, self._forces()),
+            forces=_lines(1, self._forces()),
             lag=_lines(1, self._lag()),
-            inputs=_lines(2, self._inputs()),
-            inputs_last=_lines(1, self._inputs()),
+            inputs=_lines(1, self._inputs()),
         )
 
     def _asks_voltage(self) -> bool:
@@ -109,7 +95,7 @@ class InverseText(LawText):
             lines += [*error(place), f"{kept} = wrong"]
         lines.append(f"slope = 1.0 + (ahead - behind) / {2.0 * NUDGE}")
         lines.append("v = v / slope")
-        lines.append(f"a = (a - (ahead - 2.0 * here + behind) / {NUDGE * NUDGE} * v * v) / slope")
+        lines.append(f"acc = (acc - (ahead - 2.0 * here + behind) / {NUDGE * NUDGE} * v * v) / slope")
         return lines
 
     def _friction(self) -> list[str]:
@@ -131,11 +117,15 @@ class InverseText(LawText):
         return [*lines, f"if not ({self.acts(self.of('bristle'))}):", f"    {rubbing}", *bristled] if self.guarded else [*lines, *bristled]
 
     def _forces(self) -> list[str]:
-        lines: list[str] = []
+        """Added once; as often as needed where one asks for the voltage itself."""
+        if not self.of("force"):
+            return []
+        lines: list[str] = ["pull = 0.0"]
         for effect in self.of("force"):
             words = {"u": "total", "v": "v", "x": "x", "t": "0.0"}
             lines += self.guard(effect, [f"pull += {self.call(effect, 'force', words)}"])
-        return lines
+        lines.append("total = effort + pull")
+        return [f"for _ in range({PASSES}):", *("    " + line for line in lines)] if self._asks_voltage() else lines
 
     def _lag(self) -> list[str]:
         """A first-order lag needs more by its time constant times the rate of change; where it stands still it needs none."""
@@ -149,10 +139,15 @@ class InverseText(LawText):
         return lines
 
     def _inputs(self) -> list[str]:
-        lines: list[str] = []
+        """What comes out is compared with what is wanted, and as much is added; what cannot come out is not asked for."""
+        if not self.of("input"):
+            return []
+        lines = ["held = total"]
         for effect in self.of("input"):
             lines += self.guard(effect, [f"held = {self.call(effect, 'output', {'u': 'held', 't': '0.0', 'x': 'x'})}"])
-        return lines
+        tried = [*lines, "total = total + (wanted - held)"]
+        last = [*lines, "if abs(held - wanted) > 1e-6 * abs(wanted):", "    total = held"]
+        return ["wanted = total", f"for _ in range({TRIES}):", *("    " + line for line in tried), *last]
 
 
 def _lines(depth: int, lines: Sequence[str]) -> str:
