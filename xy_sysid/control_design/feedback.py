@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -149,7 +149,8 @@ def feedback(
             " and ".join(doubtful), "known to worse than a factor of two", "numbers that the data determine", "Record a livelier motion first."
         )
     filters = np.zeros((0, 5)) if sections is None else sections
-    systems = [sampled(item, sampling_rate) for item in samples(model, COUNT)]
+    own = samples(model, COUNT)
+    systems = [sampled(item, sampling_rate) for item in (*own, *_within_a_gap(own[0]))]
     if bandwidth is not None:
         if not 0.0 < bandwidth <= HIGHEST * sampling_rate:
             raise BadInput("bandwidth", f"{bandwidth:g} Hz", f"above 0, up to {HIGHEST * sampling_rate:g} Hz", "Give another.")
@@ -169,6 +170,16 @@ def feedback(
     said = f"phase margin {worst.phase:.3g} degrees and gain margin {worst.gain:.3g}" if worst.stable else "unstable"
     what = f"{bandwidth:g} Hz" if bandwidth is not None else "any"
     raise BadInput("bandwidth", f"{what}: {said}", f"at least {PHASE_MARGIN:g} degrees and {GAIN_MARGIN:g}", ADVICE)
+
+
+def _within_a_gap(model: AxisModel) -> tuple[AxisModel, ...]:
+    """The motor alone, where an effect says what share of the mass it has: across an open gap the loop meets less mass, and must hold there, too."""
+    found = []
+    for name, values in model.effects:
+        share = dict(zip(model.library[name].names, values, strict=True)).get("share")
+        if share is not None:
+            found.append(replace(model, pole=model.pole / share))
+    return tuple(found)
 
 
 def _holds(found: Margins) -> bool:
