@@ -54,6 +54,7 @@ setup(
         "ulog": ["pyulog"],
         "wpilog": ["robotpy-wpiutil"],
         "parquet": ["pyarrow"],
+        "mujoco": ["mujoco"],
         "bench": ["scikit-rf", "pyFRF"],
         "foreign": ["mujoco"],
         "test": [
@@ -78,6 +79,8 @@ setup(
             "pyulog",
             f"robotpy-wpiutil; {ROS_WHEELS}",
             "pyarrow",
+            "mujoco",
+            "FMPy",
             "colcon-core",
             "colcon-ros",
             "colcon-bash",

@@ -71,7 +71,9 @@ def test_a_benchmark_that_is_asked_for_by_name_runs(name: str, monkeypatch: pyte
     monkeypatch.setattr("sys.argv", ["bench", "--short", name])
     if name in ("peers", "diagnoses"):
         data("crane/crane_1.npz")
-    pages = [ROOT / "docs" / name for name in ("benchmarks.md", "real-machines.md")]
+    if name == "emps_force":
+        data("emps/emps_train.npz")
+    pages = [ROOT / "docs" / name for name in ("benchmarks.md", "real-machines.md", "use.md")]
     before = [page.read_bytes() for page in pages]
     assert main() == 0
     said = capsys.readouterr().out

@@ -24,7 +24,7 @@ errors units settings jit tables
 samples excitation
 response linear fitting time_models
 effects axis greybox comparison hypotheses diagnosis experiment_design
-story live
+story live control_design
 """)
 EDGE = names("""
 bags imports files processes

@@ -12,6 +12,7 @@ In a notebook::
     for step in xy.refine(run):
         print(step.added, step.held_out_error)
     xy.save(step.model, "axis.yaml")
+    used = xy.use(step.model, run)           # kS, kV, kA, tables, feedback, limits: used.gains, used.feedback, used.tracking
 
 Packages in the order of the data; each imports only from those before it.
 
@@ -22,6 +23,7 @@ Packages in the order of the data; each imports only from those before it.
     hypotheses, diagnosis:     which effect is missing
     experiment_design:         what to measure next
     story, live:               what people are shown, and the online logic
+    control_design:            what to do with the model
     bags, imports, files, processes: reading, writing, other processes
     nodes, report, page, cli:  what people meet
     front_door:                the public functions as people call them
@@ -40,6 +42,7 @@ if TYPE_CHECKING:
     from xy_sysid.cli.simulated_recording import simulate
     from xy_sysid.comparison.of_run import better, compare, validate
     from xy_sysid.comparison.physical_model import PhysicalModel
+    from xy_sysid.control_design.use import use
     from xy_sysid.diagnosis.of_run import diagnose, refine
     from xy_sysid.errors import BadInput, BadRecording, MissingExtra, XySysidError
     from xy_sysid.experiment_design.limits import MachineLimits
@@ -90,6 +93,7 @@ __all__ = [
     "simulate",
     "to_control",
     "to_scipy",
+    "use",
     "validate",
 ]
 
@@ -101,6 +105,7 @@ _HOMES = {
     "linear.to_others": ("to_control", "to_scipy"),
     "fitting.of_run": ("LinearModel", "fit", "frf"),
     "axis.model": ("AxisModel",),
+    "control_design.use": ("use",),
     "files.effects": ("library",),
     "comparison.physical_model": ("PhysicalModel",),
     "comparison.of_run": ("better", "compare", "validate"),

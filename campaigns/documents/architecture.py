@@ -20,7 +20,7 @@ FLOORS = {
     "what arrives": ("samples", "excitation"),
     "in frequency": ("response", "linear", "fitting"),
     "in time": ("time_models", "effects", "axis", "greybox", "comparison", "hypotheses", "diagnosis", "experiment_design"),
-    "told": ("story", "live"),
+    "told": ("story", "live", "control_design"),
     "the edge": ("bags", "imports", "files", "processes"),
     "surfaces": ("nodes", "report", "page", "cli", "front_door"),
 }

@@ -40,7 +40,7 @@ def _section(effect: Effect, values: tuple[float, ...]) -> tuple[Any, Any]:
     if effect.category == "motion":
         b0, b1, b2, a1, a2 = effect.functions["section"](**_bound(effect.functions["section"], effect, values, {"fs": FINE}))
         return _polynomial([b0, b1, b2]), _polynomial([1.0, a1, a2])
-    lag = _lag(effect, values) if effect.category == "state" and len(effect.states) == 1 else None
+    lag = lag_of(effect, values)
     return ([1.0], [1.0]) if lag is None else ([1.0], [lag, 1.0])
 
 
@@ -52,8 +52,10 @@ def _polynomial(discrete: list[float]) -> Any:
     return found / found[-1]
 
 
-def _lag(effect: Effect, values: tuple[float, ...]) -> float | None:
-    """The time constant if the law is a first-order lag of the voltage, whatever speed, place and time."""
+def lag_of(effect: Effect, values: tuple[float, ...]) -> float | None:
+    """The time constant if the law is a first-order lag of the voltage, whatever speed, place and time; None of any other effect."""
+    if effect.category != "state" or len(effect.states) != 1:
+        return None
 
     def end(u: float, state: float, v: float) -> float:
         words = {"u": u, effect.states[0]: state, "v": v, "x": v, "t": abs(v), "h": STEP, "gain": 0.1, "pole": 100.0}

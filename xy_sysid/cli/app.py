@@ -25,6 +25,7 @@ from xy_sysid.cli.simulate import simulate
 from xy_sysid.cli.start import run
 from xy_sysid.cli.steps import steps
 from xy_sysid.cli.study import study
+from xy_sysid.cli.use import use
 from xy_sysid.cli.validate import validate
 
 app = typer.Typer(
@@ -51,8 +52,9 @@ def _program(
     pass
 
 
-for command in (
-    demo, page, run, record, replay, simulate, columns, frf, fit, steps, servo, validate, compare, diagnose, refine, effects, study, report, figures
-):  # fmt: skip
+WATCH = (demo, page, run, record, replay)
+IDENTIFY = (simulate, columns, frf, fit, steps, servo, validate)
+EXPLAIN = (compare, diagnose, refine, effects, use, study, report, figures)
+for command in (*WATCH, *IDENTIFY, *EXPLAIN):
     app.command(name=command.__name__)(command)
 app.command(name="next")(next_)

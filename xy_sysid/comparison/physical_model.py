@@ -20,6 +20,7 @@ class PhysicalModel:
 
     model: gain, delay, pole and the effects with their values; fit: with intervals and errors, None of a model from a file
     axis:  its name; data: SHA-256 of the samples of each recording that it was fitted to; units: of input and output
+    known: its parameters with intervals, of a model from a file
     """
 
     model: AxisModel
@@ -27,6 +28,7 @@ class PhysicalModel:
     data: tuple[str, ...] = ()
     units: Units = USUAL
     fit: GreyboxFit | None = None
+    known: tuple[Estimate, ...] = ()
 
     @property
     def tf(self) -> TransferFunction:
@@ -40,8 +42,8 @@ class PhysicalModel:
 
     @property
     def parameters(self) -> tuple[Estimate, ...]:
-        """gain, delay, pole, then ``effect.parameter``, with 95 % intervals; empty of a model from a file (``model.values()`` has the values)."""
-        return self.fit.parameters if self.fit is not None else ()
+        """gain, delay, pole, then ``effect.parameter``, with 95 % intervals; empty where nobody knows these (``model.values()`` has the values)."""
+        return self.fit.parameters if self.fit is not None else self.known
 
     @property
     def doubt(self) -> str:

@@ -20,6 +20,7 @@ from xy_sysid.files.seal import sealed
 from xy_sysid.files.unasked import free
 from xy_sysid.fitting.of_run import LinearModel
 from xy_sysid.greybox.free_run import GreyboxFit
+from xy_sysid.greybox.parameters import Estimate
 from xy_sysid.units import USUAL, Units
 
 AXIS_FORMAT = "xy_sysid axis model 1"
@@ -82,6 +83,8 @@ def _axis(fit: GreyboxFit) -> dict[str, Any]:
 def _physical(item: PhysicalModel) -> dict[str, Any]:
     if item.fit is not None:
         return _axis(item.fit)
+    if item.known:
+        return _written(item.model, item.units, dict(parameters(item.known)), {})
     return _written(item.model, item.units, {name: {"value": float(value)} for name, value in item.model.values().items()}, {})
 
 
@@ -134,8 +137,20 @@ def read_models(path: Path, library: Library) -> Mapping[str, Model]:
     for axis, part in document["axes"].items():
         model = _model(path, str(axis), part, library)
         units = Units(str(part.get("input_unit", USUAL.input)), str(part.get("output_unit", USUAL.output)))
-        found[str(axis)] = PhysicalModel(model, str(axis), fitted_to(origin, str(axis)), units)
+        found[str(axis)] = PhysicalModel(model, str(axis), fitted_to(origin, str(axis)), units, known=_known(part["parameters"], model))
     return found
+
+
+def _known(written: Mapping[str, Any], model: AxisModel) -> tuple[Estimate, ...]:
+    """The parameters with the intervals that the file gives; none if one of them lacks it."""
+    found = []
+    for name, value in model.values().items():
+        item = written.get(name, {})
+        ends = item.get("ci95")
+        if not (isinstance(ends, list) and len(ends) == 2 and all(isinstance(end, int | float) for end in ends)):
+            return ()
+        found.append(Estimate(name=name, value=value, unit=str(item.get("unit", "")), low=float(ends[0]), high=float(ends[1])))
+    return tuple(found)
 
 
 def _model(path: Path, axis: str, part: Any, library: Library) -> AxisModel:

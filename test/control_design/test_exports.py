@@ -1,0 +1,227 @@
+"""A used model in other programs' words: each is loaded by a program that is not ours."""
+
+from __future__ import annotations
+
+import ctypes
+import subprocess
+import sys
+import types
+from collections.abc import Callable
+from pathlib import Path
+
+import fmpy
+import fmpy.validation
+import mujoco
+import numpy as np
+import pytest
+import scipy.io
+from helpers.cli_tools import cli
+from helpers.known_models import axis, known
+from helpers.simulated import recorded
+from scipy import signal
+
+import xy_sysid as xy
+from xy_sysid.axis.model import STANDARD, AxisModel
+from xy_sysid.control_design import to_c, to_python
+from xy_sysid.control_design.exports import export
+from xy_sysid.control_design.inverse import feedforward
+from xy_sysid.control_design.mjcf import Mjcf, mjcf
+from xy_sysid.control_design.path import Bounds, s_curve
+from xy_sysid.control_design.program import program
+from xy_sysid.control_design.sample_step import simulate_alone
+from xy_sysid.control_design.use import use
+from xy_sysid.effects import Effect, Parameter, law
+from xy_sysid.samples.block import FloatArray
+
+RATE = 2000.0
+ALL = [effect.name for effect in STANDARD.acting]
+MIXED = ("base_resonance", "coulomb_friction", "cogging", "lead_error", "saturation", "amplifier_lag")
+LOST = {"asymmetric_viscous_friction", "backlash", "dead_zone", "gain_drift", "lead_error", "position_dependent_drag", "position_dependent_gain"}
+
+
+def noise(count: int = 500) -> FloatArray:
+    raw = np.random.default_rng(2).standard_normal(count)
+    shaped = signal.lfilter(*signal.butter(2, 300.0, fs=RATE), raw)
+    return np.asarray(1.2 * shaped / np.std(shaped))
+
+
+def in_c(model: AxisModel, folder: Path, voltage: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Positions, and the feedforward of a path with what it should be, from the compiled C source."""
+    of = program(model, RATE)
+    header, text = to_c.source(of, "axis", "a test")
+    (folder / "axis.h").write_text(header)
+    (folder / "axis.c").write_text(text)
+    made = folder / f"axis{len(list(folder.iterdir()))}.so"
+    strict = ("-O1", "-std=c99", "-Wall", "-Wextra", "-Wno-unused", "-Werror", "-ffp-contract=off")
+    subprocess.run(["gcc", *strict, "-shared", "-fPIC", "-o", made, folder / "axis.c", "-lm"], check=True)
+    library = ctypes.CDLL(str(made))
+    step, inverse = library.axis_step, library.axis_feedforward
+    step.restype = inverse.restype = ctypes.c_double
+    state = ctypes.create_string_buffer(8 * (of.states + of.room))
+    library.axis_reset(state)
+    shown = [0.0, *(step(state, ctypes.c_double(volts)) for volts in voltage[:-1])]
+    path = s_curve([0.0, 0.005, 0.0], Bounds(0.1, 2.0, 100.0), RATE, settle=0.01)
+    wanted = feedforward(model, path)
+    early = path.ahead(wanted.ahead)
+    library.axis_reset(state)
+    rows = zip(early.position, early.speed, early.acceleration, strict=True)
+    return np.array(shown), np.array([inverse(state, *map(ctypes.c_double, row)) for row in rows]), wanted.voltage
+
+
+def test_c_source_is_the_simulation_and_its_inverse(tmp_path: Path) -> None:
+    """Every effect at once that can act together, and a gap: compiled without a warning by gcc, bit for bit the same numbers."""
+    rest = tuple(name for name in ALL if name not in ("backlash", "coulomb_friction", "stribeck_friction", "asymmetric_friction"))
+    for names in (MIXED, rest, ("backlash", "stribeck_friction", "asymmetric_friction")):
+        shown, voltage, wanted = in_c(axis(*names), tmp_path, noise())
+        assert np.array_equal(shown, simulate_alone(axis(*names), RATE, noise())) and np.array_equal(voltage, wanted), names
+
+
+def test_python_source_needs_nothing_and_is_the_same(tmp_path: Path) -> None:
+    """The module imports math alone; an interpreter without our packages runs it to the same numbers."""
+    file = tmp_path / "axis.py"
+    file.write_text(to_python.source(program(axis(*MIXED), RATE), "a test"))
+    voltage = noise(200)
+    code = "import sys, axis; a = axis.Axis(); print([0.0] + [a.step(float(u)) for u in sys.argv[1].split()][:-1])"
+    said = subprocess.run([sys.executable, "-S", "-c", code, " ".join(map(repr, voltage.tolist()))], cwd=tmp_path, capture_output=True, check=True)
+    assert np.array_equal(np.array(eval(said.stdout)), simulate_alone(axis(*MIXED), RATE, voltage))
+    module = types.ModuleType("axis")
+    exec(file.read_text(), vars(module))
+    path = s_curve([0.0, 0.005], Bounds(0.1, 2.0, 100.0), RATE, settle=0.01)
+    early, own = path.ahead(module.AHEAD), module.Feedforward()
+    found = [own.input(*map(float, row)) for row in zip(early.position, early.speed, early.acceleration, strict=True)]
+    assert np.array_equal(np.array(found), feedforward(axis(*MIXED), path).voltage)
+
+
+@law
+def _push(size: float, x: float) -> float:
+    return float(size * (1.0 if x > 0.0 else -1.0) * abs(x) ** 0.5)
+
+
+@law
+def _strange(size: float, x: float) -> float:
+    return size * float(np.sum(np.array([x, x])))
+
+
+def _own(function: Callable[..., float]) -> AxisModel:
+    effect = Effect(
+        name="own_effect",
+        law="F",
+        meaning="a test",
+        validity="a test",
+        source="a test",
+        category="force",
+        parameters=(Parameter("size", "V", 0.0, 10.0, 0.3, "size"),),
+        shows="",
+        look_alikes=(),
+        experiment="",
+        functions={"force": function},  # either of the two above
+    )
+    return AxisModel(0.097, 1.63e-3, 236.0, library=STANDARD.extended([effect])).with_effect("own_effect")
+
+
+def test_an_effect_of_ones_own_is_printed_or_refused(tmp_path: Path) -> None:
+    """A user's law in numbers, ifs and powers goes into C; one that does more is refused in one line."""
+    of = program(_own(_push), RATE)
+    header, text = to_c.source(of, "axis", "a test")
+    (tmp_path / "axis.h").write_text(header)
+    main = 'int main(void) { axis_state s; axis_reset(&s); for (int k = 0; k < 400; k++) printf("%.17g\\n", axis_step(&s, k % 50 - 20.0)); }'
+    (tmp_path / "main.c").write_text(f"#include <stdio.h>\n{text}{main}\n")
+    subprocess.run(["gcc", "-ffp-contract=off", "-o", tmp_path / "main", tmp_path / "main.c", "-lm"], check=True)
+    said = subprocess.run([tmp_path / "main"], capture_output=True, text=True, check=True).stdout.split()
+    module = types.ModuleType("axis")
+    exec(to_python.source(of, "a test"), vars(module))
+    own = module.Axis()
+    assert [float(word) for word in said] == [own.step(k % 50 - 20.0) for k in range(400)]
+    with pytest.raises(xy.BadInput, match="Write it in simpler terms"):
+        to_c.source(program(_own(_strange), RATE), "axis", "a test")
+
+
+def test_an_fmu_is_run_by_fmpy_to_our_numbers(tmp_path: Path) -> None:
+    """FMPy validates the description, loads the binary and simulates within 1e-6 of the rms of our simulation, with friction and a resonance."""
+    model = known(*MIXED)
+    file = tmp_path / "axes.yaml"
+    xy.save(model, file)
+    assert cli("use", file, "--limit", "5", "--controller-rate", RATE, "--to", "fmu", "-o", tmp_path).code == 0
+    packed = tmp_path / "axis_x.fmu"
+    assert fmpy.validation.validate_fmu(str(packed)) == []
+    voltage = noise(2000)
+    at = np.arange(voltage.size) / RATE
+    given = np.array(list(zip(at, voltage, strict=True)), dtype=[("time", float), ("u", float)])
+    found = fmpy.simulate_fmu(
+        str(packed), start_time=0.0, stop_time=at[-1], step_size=1 / RATE, output_interval=1 / RATE, input=given, output=["y", "v"], validate=True
+    )
+    ours = simulate_alone(model.model, RATE, voltage)
+    size = float(np.sqrt(np.mean(ours**2)))
+    assert found["y"].size == ours.size and float(np.sqrt(np.mean((found["y"] - ours) ** 2))) < 1e-6 * size
+
+
+def in_mujoco(made: Mjcf, voltage: FloatArray) -> FloatArray:
+    """(n,) the joint's position at each sample."""
+    model = mujoco.MjModel.from_xml_string(made.text)
+    data = mujoco.MjData(model)
+    place, shown = model.joint("axis").qposadr[0], np.empty(voltage.size)
+    for k, volts in enumerate(voltage):
+        shown[k] = data.qpos[place]
+        data.ctrl[0] = volts
+        mujoco.mj_step(model, data, made.steps)
+    return shown
+
+
+def speeds_apart(model: AxisModel, voltage: FloatArray) -> float:
+    """rms of the difference of the speeds in MuJoCo and here, as a part of the motion."""
+    theirs, ours = (np.diff(position) for position in (in_mujoco(mjcf(model, RATE), voltage), simulate_alone(model, RATE, voltage)))
+    return float(np.sqrt(np.mean((theirs - ours) ** 2) / np.mean(ours**2)))
+
+
+def test_mujoco_says_each_effect_or_names_it_as_lost() -> None:
+    """What is not named as lost moves in MuJoCo as here, within 1 % of the motion, most within 0.3 %."""
+    voltage = noise(1500)
+    for names in [(), *((name,) for name in ALL)]:
+        model = axis(*names)
+        lost = {name for name, _ in mjcf(model, RATE).lost}
+        assert lost == set(names) & (LOST | {"stribeck_friction"}), names
+        if not lost:
+            assert speeds_apart(model, voltage) < 0.01, names
+
+
+@pytest.mark.parametrize("effect", ["coulomb_friction=0.3", "cogging=0.2", "presliding_hysteresis=0.3"])
+def test_the_circle_through_mujoco_closes(effect: str) -> None:
+    """From a recording to a model to MuJoCo: driven with the recorded input, its error on held-out data is at most 1.05 times ours."""
+    run, judge = recorded(effect, 10.0).run("x"), recorded(effect, 3.0, seed=99).run("x")
+    model = xy.refine(run, add=[effect.partition("=")[0]], auto=False).model.model
+    measured = np.diff(judge.position)
+    ours, theirs = (np.diff(position) for position in (simulate_alone(model, RATE, judge.voltage), in_mujoco(mjcf(model, RATE), judge.voltage)))
+    error, other = (float(np.sqrt(np.mean((moved - measured) ** 2))) for moved in (ours, theirs))
+    assert other <= 1.05 * error
+
+
+def test_a_urdf_is_parsed_by_mujoco_and_names_what_it_loses() -> None:
+    """Mass, damping, friction and limits come out of another parser; each effect that URDF cannot say is in a comment and in the note."""
+    made = export(use(known("coulomb_friction", "cogging"), limit=5.0), "urdf")
+    (text,) = made.files.values()
+    model = mujoco.MjModel.from_xml_string(text)
+    assert model.dof_damping[0] == pytest.approx(1 / 0.097) and model.dof_frictionloss[0] == pytest.approx(0.2)
+    assert model.jnt_range[0] == pytest.approx([-0.025, 0.025]) and model.body_mass[1] == pytest.approx(1 / (0.097 * 236.0))
+    assert "<!-- lost: cogging" in text and "cogging" in made.note and "delay" in made.note
+
+
+def test_matlab_gets_parameters_and_a_function(tmp_path: Path) -> None:
+    """The .mat file is read back by scipy; the function's ifs, fors and functions are all closed."""
+    file = tmp_path / "axes.yaml"
+    xy.save(known(*MIXED), file)
+    assert cli("use", file, "--limit", "5", "--to", "matlab", "-o", tmp_path).code == 0
+    found = scipy.io.loadmat(tmp_path / "axis_x.mat", simplify_cells=True)
+    assert found["parameters"]["coulomb_friction_coulomb"] == 0.2 and found["gains"]["kV"] == pytest.approx(1 / 0.097)
+    assert list(found["ci95"]["pole"]) == pytest.approx([0.98 * 236.0, 1.02 * 236.0])
+    words = [line.split("(")[0].split()[0] for line in (tmp_path / "axis_x.m").read_text().splitlines() if line.strip()]
+    assert words.count("end") == sum(words.count(word) for word in ("function", "if", "for"))
+
+
+def test_every_target_writes_for_an_axis_that_has_all_of_it(tmp_path: Path) -> None:
+    """--to all writes what it can, and names what it cannot."""
+    file = tmp_path / "axes.yaml"
+    xy.save(known(*MIXED), file)
+    said = cli("use", file, "--limit", "5", "--to", "all", "-o", tmp_path / "out")
+    assert said.code == 0, said
+    names = {path.suffix for path in (tmp_path / "out").iterdir()}
+    assert {".c", ".h", ".py", ".m", ".mat", ".fmu", ".xml", ".urdf", ".yaml", ".cfg", ".hal", ".csv"} <= names

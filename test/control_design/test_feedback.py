@@ -1,0 +1,122 @@
+"""The sampled loop, its margins, and controllers that keep them for every sample of the parameters."""
+
+from __future__ import annotations
+
+import control
+import numpy as np
+import pytest
+from helpers.known_models import axis, known
+
+from xy_sysid.control_design.closed_loop import Controller, Encoder, follow_path
+from xy_sysid.control_design.feedback import GAIN_MARGIN, PHASE_MARGIN, feedback, margins
+from xy_sysid.control_design.path import Bounds, s_curve
+from xy_sysid.control_design.sample_step import simulate_alone
+from xy_sysid.control_design.sampled import closed_poles, controller_response, controller_system, noise_to_voltage, sampled
+from xy_sysid.control_design.uncertain import samples
+from xy_sysid.errors import BadInput
+
+RATE = 2000.0
+LINEAR = (), ("base_resonance",), ("screw_compliance", "amplifier_lag")
+
+
+def test_the_sampled_plant_is_the_model_sample_by_sample() -> None:
+    """Base, resonances, lag, hold and a delay of any length: the matrices give the same positions as the simulation."""
+    voltage = np.random.default_rng(1).standard_normal(400)
+    for names in LINEAR:
+        system = sampled(axis(*names), RATE)
+        a, b, c = system.whole_system()
+        state, shown = np.zeros(b.size), []
+        for volts in voltage:
+            shown.append(c @ state)
+            state = a @ state + b * volts
+        alone = simulate_alone(axis(*names), RATE, voltage)
+        assert np.max(np.abs(np.array(shown) - alone)) < 1e-4 * np.ptp(alone), names
+
+
+def test_margins_are_those_of_python_control() -> None:
+    """Another library reads the same phase and gain margins from the same loop."""
+    system = sampled(axis("base_resonance"), RATE)
+    controller = feedback(known("base_resonance"), RATE).controller
+    w = np.geomspace(1.0, 0.999 * np.pi * RATE, 20_000)
+    loop = system.response(w / (2 * np.pi)) * controller_response(controller, w / (2 * np.pi), RATE)
+    theirs = control.stability_margins(control.FRD(loop, w))
+    ours = margins(system, controller)
+    assert ours.phase == pytest.approx(theirs[1], abs=2.0) and ours.gain == pytest.approx(theirs[0], rel=0.05)
+    assert 1.0 / ours.sensitivity == pytest.approx(theirs[2], rel=0.02)
+
+
+def test_a_controllers_matrices_are_its_response() -> None:
+    """PID, derivative filter and a section: state space and response agree at every frequency."""
+    own = Controller(300.0, 2000.0, 5.0, 1e-3, sections=np.array([[0.9, -1.2, 0.5, -1.1, 0.4]]))
+    a, b, c, d = controller_system(own, RATE)
+    for f in (3.0, 50.0, 700.0):
+        z = np.exp(2j * np.pi * f / RATE)
+        found = c @ np.linalg.solve(z * np.eye(b.size) - a, b) + d
+        assert found == pytest.approx(controller_response(own, np.array([f]), RATE)[0], rel=1e-9)
+
+
+def test_every_sample_of_the_parameters_keeps_the_margins() -> None:
+    """The worst case over the intervals counts: wider intervals cost bandwidth, and each sample's loop is stable with the margins asked for."""
+    sure, unsure = feedback(known("base_resonance", spread=0.01), RATE), feedback(known("base_resonance", spread=0.3, delay=0.5), RATE)
+    assert unsure.crossover < sure.crossover
+    for item in samples(known("base_resonance", spread=0.3, delay=0.5), 24):
+        found = margins(sampled(item, RATE), unsure.controller)
+        assert found.stable and found.phase >= PHASE_MARGIN and found.gain >= GAIN_MARGIN
+
+
+def test_a_bandwidth_that_cannot_be_had_is_refused() -> None:
+    """Asked for more than delay and margins allow, it says what the margins would be; no such gains are given."""
+    with pytest.raises(BadInput, match=r"bandwidth is 400 Hz: .*Ask for less"):
+        feedback(known(), RATE, 400.0)
+    asked = feedback(known(), RATE, 10.0)
+    assert asked.nominal.crossover == pytest.approx(10.0, rel=0.02) and asked.worst.phase > PHASE_MARGIN
+
+
+def test_gains_of_an_undetermined_axis_are_refused() -> None:
+    """A gain or a pole that nobody knows to a factor of two makes no controller."""
+    with pytest.raises(BadInput, match=r"gain is known to worse than a factor of two"):
+        feedback(known(gain=0.9), RATE)
+
+
+def test_a_drive_that_is_wired_backwards_gets_negative_gains() -> None:
+    """The loop of an axis with a negative gain is stable all the same."""
+    from dataclasses import replace
+
+    model = known()
+    turned = replace(model, model=replace(model.model, gain=-model.model.gain), known=())
+    found = feedback(turned, RATE)
+    assert found.controller.kp < 0.0 and found.nominal.stable
+
+
+def test_the_same_gains_are_a_pid_and_a_servo_drives_cascade() -> None:
+    """kd (s + position gain) (s + 1 / integral time) / s: what the drive's fields say is the same controller."""
+    found = feedback(known(), RATE)
+    product = np.polymul([1.0, found.position_gain], [1.0, 1.0 / found.integral_time]) * found.velocity_gain
+    assert product == pytest.approx([found.controller.kd, found.controller.kp, found.controller.ki])
+
+
+def test_encoder_noise_makes_as_much_voltage_as_is_said() -> None:
+    """The loop at rest under encoder noise: the simulated voltage's rms is the predicted one."""
+    model = known()
+    found = feedback(model, RATE, 30.0, encoder=Encoder(noise=1e-6))
+    still = s_curve([0.0, 0.0], Bounds(1.0, 1.0, 1.0), RATE, settle=10.0)
+    run = follow_path(model.model, still, found.controller, encoder=Encoder(noise=1e-6), seed=3)
+    predicted = 1e-6 * noise_to_voltage(sampled(model.model, RATE), found.controller)
+    assert float(np.std(run.voltage[1000:])) == pytest.approx(predicted, rel=0.03) and found.noise == pytest.approx(predicted, rel=0.1)
+
+
+def test_the_integral_stands_still_while_the_drive_is_at_its_limit() -> None:
+    """A step far beyond what the drive can do overshoots little: the integral does not wind up."""
+    model = known()
+    found = feedback(model, RATE, 20.0, limit=1.0)
+    step = s_curve([0.0, 0.05], Bounds(1e3, 1e6, 1e9), RATE, settle=3.0)
+    run = follow_path(model.model, step, found.controller)
+    assert np.max(np.abs(run.voltage)) == 1.0 and np.max(run.position) < 1.25 * 0.05
+    assert abs(run.error[-1]) < 1e-5
+
+
+def test_the_poles_of_the_closed_loop_tell_an_unstable_one() -> None:
+    """Ten times the gains leave the unit circle."""
+    found = feedback(known(), RATE)
+    wild = Controller(10 * found.controller.kp, 10 * found.controller.ki, 10 * found.controller.kd, found.controller.derivative_time)
+    assert np.max(np.abs(closed_poles(sampled(axis(), RATE), wild))) > 1.0 and not margins(sampled(axis(), RATE), wild).stable

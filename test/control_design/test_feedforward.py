@@ -1,0 +1,163 @@
+"""The refined model sample by sample, its inverse, and the numbers and tables that follow from it."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+
+import numpy as np
+import pytest
+from helpers.known_models import DELAY, GAIN, POLE, axis, known, unknown
+from scipy import signal
+
+from xy_sysid.axis.model import STANDARD, simulate
+from xy_sysid.control_design.gains import gains, simple_feedforward
+from xy_sysid.control_design.inverse import feedforward, not_undone
+from xy_sysid.control_design.limits import fastest
+from xy_sysid.control_design.path import Bounds, Motion, recorded, s_curve
+from xy_sysid.control_design.sample_step import simulate_alone
+from xy_sysid.control_design.tables import friction_table, position_tables
+from xy_sysid.control_design.uncertain import samples, undetermined
+from xy_sysid.errors import BadInput
+from xy_sysid.samples.block import FloatArray
+
+RATE = 2000.0
+EFFECTS = [effect.name for effect in STANDARD.acting]
+LEFT = {"gain_drift", "backlash"}  # effects that no feedforward along a path undoes
+
+
+def noise(count: int = 6000, rms: float = 1.0) -> FloatArray:
+    """(count,) V, up to 300 Hz."""
+    raw = np.random.default_rng(5).standard_normal(count)
+    shaped = signal.lfilter(*signal.butter(2, 300.0, fs=RATE), raw)
+    return np.asarray(rms * shaped / np.std(shaped))
+
+
+def path() -> Motion:
+    return s_curve([0.0, 0.03, -0.02, 0.0], Bounds(0.1, 2.0, 100.0), RATE)
+
+
+def rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def test_the_model_moves_alone_as_it_does_along_a_recording_of_itself() -> None:
+    """One physics: sample by sample, where its own motion brings it, a model moves as ``axis.model`` says along the measured position."""
+    for names in [
+        (),
+        *((name,) for name in EFFECTS),
+        ("coulomb_friction", "base_resonance"),
+        ("screw_compliance", "base_resonance", "amplifier_lag"),
+    ]:
+        model, voltage = axis(*names), noise()
+        position = simulate_alone(model, RATE, voltage)
+        alone, along = np.diff(position) * RATE, simulate(model, RATE, voltage, position)
+        assert rms(alone - along) < 2e-4 * rms(along), names
+
+
+def test_the_whole_feedforward_brings_the_model_along_the_path_without_any_feedback() -> None:
+    """Delay, hold, lag, resonances, friction with its memory, forces, encoder and amplifier are undone: under 0.5 % of what the base alone leaves."""
+    wanted = path()
+    simple = feedforward(axis(), wanted).voltage
+    for name in [name for name in EFFECTS if name not in LEFT]:
+        model = axis(name)
+        error = rms(simulate_alone(model, RATE, feedforward(model, wanted).voltage) - wanted.position)
+        without = rms(simulate_alone(model, RATE, simple) - wanted.position)
+        assert error < max(0.005 * without, 1.5e-6), name
+
+
+def test_what_is_not_undone_is_named() -> None:
+    """A change with time and a gap are left, and the answer says so."""
+    assert {name for name, _ in not_undone(axis("gain_drift", "backlash", "coulomb_friction"))} == LEFT
+
+
+def test_ks_kv_ka_follow_from_the_parameters_with_their_intervals() -> None:
+    """kV is 1 / gain, kA is 1 / (gain pole), kS the friction; each interval is made of the parameters', and each names the one that makes it wide."""
+    found = gains(known("coulomb_friction", pole=0.1))
+    coulomb = STANDARD["coulomb_friction"].typical[0]
+    assert found["kS"].value == pytest.approx(coulomb) and (found["kS"].low, found["kS"].high) == pytest.approx((0.98 * coulomb, 1.02 * coulomb))
+    assert found["kV"].value == pytest.approx(1.0 / GAIN) and found["kV"].high == pytest.approx(1.0 / (0.98 * GAIN))
+    assert found["kA"].value == pytest.approx(1.0 / (GAIN * POLE)) and found["kA"].because[0][0] == "pole"
+    assert found["kA"].low == pytest.approx(
+        found["kA"].value - math.hypot(1 / (GAIN * POLE) * (1 - 1 / 1.02), 1 / (GAIN * POLE) * (1 - 1 / 1.1)), rel=1e-6
+    )
+
+
+def test_what_differs_by_direction_and_what_a_load_holds_have_gains_of_their_own() -> None:
+    """kS and kV forth and back, breakaway, kG and kCos appear where the model has them, and only there."""
+    names = {item.name for item in gains(known("coulomb_friction")).items}
+    assert names == {"kS", "kV", "kA"}
+    assert {"kS forth", "kS back"} <= {item.name for item in gains(known("asymmetric_friction")).items}
+    assert {"kV forth", "kV back"} <= {item.name for item in gains(known("asymmetric_viscous_friction")).items}
+    assert "breakaway" in {item.name for item in gains(known("stribeck_friction")).items}
+    assert gains(known("constant_load"))["kG"].value == pytest.approx(0.15)
+    arm = gains(known("gravity"))
+    angle = arm["zero"].value
+    held = [arm["kCos"].value * math.cos(x - angle) for x in (0.3, 2.0)]
+    assert held == pytest.approx([0.5 * math.sin(x) for x in (0.3, 2.0)])
+
+
+def test_a_number_that_the_data_do_not_determine_says_so() -> None:
+    """Known to worse than a factor of two, or without any interval, a gain is marked; it is never passed off as sure."""
+    wide = gains(known("coulomb_friction", coulomb_friction__coulomb=1.5))["kS"]
+    assert not wide.determined and "coulomb_friction.coulomb" in wide.doubt
+    assert not any(item.determined for item in gains(unknown("coulomb_friction")).items)
+    assert undetermined(known(gain=0.8), ("gain", "pole")) == ("gain",)
+
+
+def test_the_simple_feedforward_leaves_friction_where_ks_is_known_nothing() -> None:
+    """kS sign(v) + kV v + kA a, early by the delay, is the whole feedforward of an axis with Coulomb friction."""
+    model, wanted = known("coulomb_friction"), path()
+    early = wanted.ahead(DELAY + 0.5 / RATE)
+    simple, whole = simple_feedforward(gains(model), early), feedforward(model.model, wanted).voltage
+    moving = np.abs(early.speed) > 1e-3
+    assert rms((simple - whole)[moving]) < 1e-3 * rms(whole)
+
+
+def test_a_path_keeps_its_bounds_and_stands_at_its_ends() -> None:
+    """Speed, acceleration and jerk stay within their bounds, and each place is reached."""
+    bounds = Bounds(0.1, 2.0, 100.0)
+    wanted = s_curve([0.0, 0.03, -0.02], bounds, RATE)
+    assert np.max(np.abs(wanted.speed)) <= 1.0001 * bounds.speed
+    assert np.max(np.abs(wanted.acceleration)) <= 1.0001 * bounds.acceleration
+    assert np.max(np.abs(np.diff(wanted.acceleration))) * RATE <= 1.001 * bounds.jerk
+    assert wanted.position[-1] == pytest.approx(-0.02) and np.max(wanted.position) == pytest.approx(0.03)
+
+
+def test_the_fastest_path_uses_what_the_drive_has_and_not_more() -> None:
+    """Its voltage stays below the limit less the reserve, for every sample of the parameters; a weaker drive takes longer."""
+    models = samples(known("coulomb_friction"), 4)
+    strong, weak = (fastest(models, [0.0, 0.05], limit, RATE) for limit in (6.0, 3.0))
+    for found, limit in ((strong, 6.0), (weak, 3.0)):
+        assert 0.6 * limit < max(float(np.max(np.abs(feedforward(model, found.path).voltage))) for model in models) <= 0.8 * limit + 1e-9
+    assert strong.path.seconds < weak.path.seconds
+    with pytest.raises(BadInput, match=r"which friction and load need"):
+        fastest(samples(known("coulomb_friction"), 1), [0.0, 0.05], 0.1, RATE)
+
+
+def test_tables_hold_the_laws_and_what_their_intervals_leave() -> None:
+    """Force and scale error by position, friction by speed: the values of the laws, intervals around them, and units in the header."""
+    model = known("cogging", "lead_error", "stribeck_friction", spread=0.01)
+    found = {item.name: item for item in position_tables(model, (-0.01, 0.01))}
+    assert set(found) == {"force", "scale"}
+    amplitude, period, phase = STANDARD["cogging"].typical
+    assert found["force"].value == pytest.approx(amplitude * np.sin(2 * np.pi * found["force"].at / period + phase), abs=1e-9)
+    assert found["force"].after < 0.1 * found["force"].before
+    rows = list(csv.DictReader(io.StringIO(found["scale"].csv())))
+    assert list(rows[0]) == ["position_m", "scale_m", "low", "high"] and len(rows) == found["scale"].at.size
+    rubbing = friction_table(model, 0.2)
+    assert rubbing is not None
+    assert rubbing.value[-1] == pytest.approx(0.15) and max(rubbing.value) == pytest.approx(0.35) and min(rubbing.value) == pytest.approx(-0.35)
+    assert friction_table(known("cogging"), 0.2) is None
+
+
+def test_a_recorded_motion_becomes_a_path_without_delay() -> None:
+    """Below the frequency asked for, position, speed and acceleration are those of the recording."""
+    t = np.arange(4000) / RATE
+    wanted = recorded(0.01 * np.sin(2 * np.pi * 3.0 * t), RATE, 50.0)
+    inside = slice(400, -400)
+    assert wanted.position[inside] == pytest.approx(0.01 * np.sin(2 * np.pi * 3.0 * t[inside]), abs=1e-5)
+    assert wanted.speed[inside] == pytest.approx(0.01 * 6 * np.pi * np.cos(2 * np.pi * 3.0 * t[inside]), abs=1e-3)
+    with pytest.raises(BadInput, match="64 or more"):
+        recorded(np.zeros(10), RATE, 50.0)

@@ -1,0 +1,71 @@
+"""Input shapers and notches for the modes of a model."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from helpers.known_models import known
+from scipy import signal
+
+from xy_sysid.axis.model import STANDARD
+from xy_sysid.control_design.filters import best_shaper, low_pass, modes, notch, shapers, vibration
+from xy_sysid.control_design.path import Bounds, s_curve
+
+RATE = 2000.0
+
+
+def test_a_mode_is_the_models_resonance_with_its_interval() -> None:
+    """Antiresonance with the encoder's side held, resonance of the free axis, in Hz; a rigid axis has none."""
+    split, frequency, damping, pole_damping = STANDARD["base_resonance"].typical
+    (mode,) = modes(known("base_resonance"))
+    assert mode.held.value == pytest.approx(frequency, rel=1e-4) and mode.held.high == pytest.approx(1.02 * frequency, rel=1e-3)
+    assert mode.free.value == pytest.approx(frequency * (1 + split), rel=1e-4)
+    assert (mode.held_damping, mode.free_damping) == pytest.approx((damping, pole_damping), rel=1e-3)
+    assert modes(known("coulomb_friction")) == ()
+
+
+def test_shapers_leave_what_their_names_promise() -> None:
+    """ZV, ZVD and MZV leave nothing of the vibration at their frequency and EI a twentieth; over an interval ZVD and EI leave less than ZV."""
+    (mode,) = modes(known("base_resonance", spread=0.1))
+    found = {item.name: item for item in shapers(mode)}
+    assert set(found) == {"zv", "mzv", "zvd", "ei"}
+    for item in found.values():
+        assert sum(item.amplitudes) == pytest.approx(1.0) and min(item.amplitudes) > 0.0
+    assert found["zv"].vibration < 1e-6 and found["zvd"].vibration < 1e-6 and found["mzv"].vibration < 0.01
+    assert found["ei"].vibration == pytest.approx(0.05, abs=0.01)
+    assert found["zvd"].worst < found["zv"].worst and found["ei"].worst < found["zv"].worst
+    assert found["zv"].duration < found["mzv"].duration < found["zvd"].duration
+    assert best_shaper(tuple(found.values())).worst <= 0.05
+    assert vibration((1.0,), (0.0,), mode.held.value, mode.held_damping) == pytest.approx(1.0)
+
+
+def test_a_shaped_path_arrives_and_excites_less() -> None:
+    """A quick move through the shaper ends at the same place, and a mass on a spring that is carried along rings a twentieth as much afterwards."""
+    (mode,) = modes(known("screw_compliance"))
+    quick = s_curve([0.0, 0.01], Bounds(0.2, 20.0, 1e4), RATE, settle=0.1)
+    shaped = best_shaper(shapers(mode)).shape(quick)
+    assert shaped.position[-1] == pytest.approx(0.01)
+    w = 2 * np.pi * mode.held.value
+    carried = [2 * mode.held_damping * w, w * w], [1.0, 2 * mode.held_damping * w, w * w]
+    rings = []
+    for path in (quick, shaped):
+        _, place, _ = signal.lsim(carried, path.position, np.arange(path.position.size) / RATE)
+        arrived = int(np.flatnonzero(np.abs(path.position - 0.01) > 1e-9)[-1])
+        rings.append(float(np.ptp((place - path.position)[arrived : arrived + 100])))
+    assert rings[1] < 0.06 * rings[0]
+
+
+def test_a_notch_takes_the_resonance_and_says_what_it_costs() -> None:
+    """Its response at the resonance is its depth, 1 far below, and its phase at the crossover is what it says."""
+    (mode,) = modes(known("screw_compliance"))
+    made = notch(mode, RATE, 30.0)
+
+    def response(f: float) -> complex:
+        z = np.exp(2j * np.pi * f / RATE)
+        b0, b1, b2, a1, a2 = made.section
+        return complex((b0 + b1 / z + b2 / z**2) / (1 + a1 / z + a2 / z**2))
+
+    assert abs(response(made.frequency)) == pytest.approx(made.depth, rel=1e-3) and abs(response(0.1)) == pytest.approx(1.0, abs=1e-3)
+    assert -np.degrees(np.angle(response(30.0))) == pytest.approx(made.phase_cost) and made.phase_cost > 0.0 and made.covers
+    section, cost = low_pass(200.0, RATE, 30.0)
+    assert section.shape == (5,) and 5.0 < cost < 30.0

@@ -1,0 +1,154 @@
+"""Everything together: xy.use, xy-sysid use, and the snippets that they write."""
+
+from __future__ import annotations
+
+import ast
+import configparser
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from helpers.cli_tools import cli, refused
+from helpers.known_models import known, unknown
+from helpers.simulated import recorded
+
+import xy_sysid as xy
+from xy_sysid.control_design.exports import export
+from xy_sysid.control_design.use import use
+from xy_sysid.units import Units
+
+
+@pytest.fixture(scope="module")
+def model() -> xy.PhysicalModel:
+    """Of a table with dry friction, from half a minute."""
+    return xy.refine(recorded("coulomb_friction=0.3", 12.0).run("x"), add=["coulomb_friction"], auto=False).model
+
+
+@pytest.fixture(scope="module")
+def other() -> xy.Run:
+    """Another recording of the same table."""
+    return recorded("coulomb_friction=0.3", 6.0, seed=77).run("x")
+
+
+def test_before_and_after_are_told_on_the_machines_own_recording(model: xy.PhysicalModel, other: xy.Run) -> None:
+    """The recorded input is predicted from the recorded motion, and each feedforward makes the simulated tracking error smaller, within the limit."""
+    used = use(model, other)
+    assert used.predicted is not None and used.refused == ()
+    assert used.predicted.whole < 1.01 * used.predicted.simple < 0.5 * used.predicted.inertia < used.predicted.voltage
+    assert [item.path for item in used.tracking] == ["S-curve over the travel", "the recorded motion"]
+    for item in used.tracking:
+        assert item.whole < item.simple / 3.0 and item.whole < item.feedback / 10.0
+        assert item.worst >= item.whole and item.largest <= item.limit == np.max(np.abs(other.voltage))
+    assert used.gains["kS"].low < 0.3 < used.gains["kS"].high
+    assert not used.notes
+    assert "fitted to this very recording" in " ".join(use(model, recorded("coulomb_friction=0.3", 12.0).run("x")).notes)
+
+
+def test_a_model_without_intervals_is_used_with_a_warning() -> None:
+    """Nobody knows how sure its numbers are, and the answer says so."""
+    used = use(unknown("coulomb_friction"))
+    assert "no intervals" in used.notes[0] and used.feedback is not None and used.feedback.count == 1
+
+
+def test_what_cannot_be_designed_safely_is_refused_and_the_rest_is_told() -> None:
+    """An undetermined gain makes no controller; the gains are marked; tables are still there."""
+    used = use(known("cogging", gain=0.9), limit=5.0)
+    assert used.feedback is None and not used.tracking
+    assert dict(used.refused)["feedback"].startswith("gain is known to worse than a factor of two")
+    assert any("kV is not determined" in note for note in used.notes) and used.tables
+
+
+def test_backlash_becomes_a_correction_by_direction() -> None:
+    """The gap with its interval, and how it is used."""
+    used = use(known("backlash"))
+    assert used.gap is not None and used.gap.value == pytest.approx(20e-6) and "half of it" in used.gap.meaning
+    assert dict(used.not_undone)["backlash"]
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"rate": 0.0001}, "rate is 0.0001 Hz"),
+        ({"limit": -1.0}, "limit is -1 V"),
+        ({"travel": (0.1, 0.0)}, "travel is 0.1 to 0"),
+    ],
+)
+def test_values_out_of_range_are_refused_in_one_line(values: dict[str, Any], words: str) -> None:
+    """What was given, what is allowed, what to do."""
+    with pytest.raises(xy.BadInput, match=words):
+        use(known(), **values)  # a wrong value on purpose
+
+
+def test_a_transfer_function_is_refused() -> None:
+    """Only a model with physical effects knows friction, limits and places."""
+    linear = xy.LinearModel(known().tf)
+    with pytest.raises(xy.BadInput, match="a model with physical effects"):
+        use(linear)  # a wrong type on purpose
+
+
+def test_a_ros2_control_snippet_is_yaml_with_the_names_of_pid_controller() -> None:
+    """Gains, clamps and strategy under the joint's name."""
+    used = use(known("coulomb_friction"), limit=5.0)
+    (text,) = export(used, "ros2_control").files.values()
+    own = yaml.safe_load(text)["pid_controller"]["ros__parameters"]
+    assert own["dof_names"] == ["x"] and used.feedback is not None
+    assert own["gains"]["x"]["p"] == pytest.approx(used.feedback.controller.kp, rel=1e-5) and own["gains"]["x"]["u_clamp_min"] == -5.0
+    assert set(own["gains"]["x"]) == {"p", "i", "d", "u_clamp_max", "u_clamp_min", "antiwindup_strategy"}
+
+
+def test_a_klipper_snippet_is_a_section_that_its_parser_reads() -> None:
+    """[input_shaper] with type, frequency and damping; an axis without a mode has none."""
+    (text,) = export(use(known("base_resonance")), "klipper").files.values()
+    read = configparser.RawConfigParser()
+    read.read_string(text)
+    section = read["input_shaper"]
+    assert section["shaper_type_x"] in ("zv", "mzv", "zvd", "ei") and float(section["shaper_freq_x"]) == pytest.approx(46.0, abs=0.1)
+    with pytest.raises(xy.BadInput, match="nothing to shape"):
+        export(use(known()), "klipper")
+
+
+def test_a_linuxcnc_snippet_is_hal_commands_with_the_pins_of_pid() -> None:
+    """One setp for each pin, in V and mm."""
+    used = use(known("coulomb_friction"), limit=5.0)
+    (text,) = export(used, "linuxcnc").files.values()
+    lines = [line for line in text.splitlines() if not line.startswith("#")]
+    found = {m[1]: float(m[2]) for line in lines if (m := re.fullmatch(r"setp pid\.x\.(\w+) (-?[\d.e+-]+)", line))}
+    assert len(found) == len(lines) and set(found) == {"Pgain", "Igain", "Dgain", "FF1", "FF2", "bias", "maxoutput"}
+    assert found["FF1"] == pytest.approx(1e-3 * used.gains["kV"].value, rel=1e-5)
+
+
+def test_an_odrive_snippet_is_python_in_turns() -> None:
+    """Assignments that odrivetool takes; an axis in volts is refused, as ODrive commands a torque."""
+    (text,) = export(use(known("coulomb_friction", units=Units("N m", "rad"))), "odrive").files.values()
+    targets = [ast.unparse(node.targets[0]) for node in ast.parse(text).body if isinstance(node, ast.Assign)]
+    assert targets == [f"odrv0.axis0.controller.config.{name}" for name in ("pos_gain", "vel_gain", "vel_integrator_gain", "inertia")]
+    with pytest.raises(xy.BadInput, match="ODrive commands a torque"):
+        export(use(known()), "odrive")
+
+
+def test_the_command_tells_gains_and_writes_files(tmp_path: Path, model: xy.PhysicalModel) -> None:
+    """kS, kV and kA with intervals and units, margins, and each target's file; a file is replaced only with --force; --json is one document."""
+    file = tmp_path / "axes.yaml"
+    xy.save(model, file)
+    said = cli("use", file, "--limit", "5", "--to", "tables", "--to", "ros2_control", "-o", tmp_path / "out")
+    assert said.code == 0, said
+    assert {"kS", "kV", "kA"} <= set(said.out.split()) and "phase margin" in said.out
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"x_friction.csv", "x_ros2_control_controllers.yaml"}
+    assert "add --force" in refused("use", file, "--to", "tables", "-o", tmp_path / "out")
+    found = cli("use", file, "--limit", "5", "--json").json["axes"]["x"]
+    assert found["gains"]["kS"]["unit"] == "V" and found["gains"]["kS"]["determined"]
+    assert found["feedback"]["worst"]["phase"] >= 45.0 and found["tracking"][0]["whole"] < found["tracking"][0]["feedback"]
+
+
+def test_an_unknown_target_or_a_linear_model_is_refused_in_one_line(tmp_path: Path, model: xy.PhysicalModel) -> None:
+    """With the nearest spelling, or with what to do."""
+    file = tmp_path / "axes.yaml"
+    xy.save(model, file)
+    assert "klipper" in refused("use", file, "--to", "kliper")
+    linear = tmp_path / "linear.yaml"
+    xy.save(xy.LinearModel(known().tf), linear)
+    assert "xy-sysid refine --model" in refused("use", linear)
+    assert "axis" in refused("use", file, "--axis", "z")

@@ -1,0 +1,44 @@
+"""Models whose numbers and intervals are known, as a fit would give them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from xy_sysid.axis.model import AxisModel
+from xy_sysid.comparison.physical_model import PhysicalModel
+from xy_sysid.greybox.parameters import Estimate
+from xy_sysid.units import USUAL, Units
+
+GAIN, DELAY, POLE = 0.097, 1.63e-3, 236.0  # m/s/V, s, rad/s: the table of the paper
+
+
+def axis(*effects: str, delay: float = DELAY) -> AxisModel:
+    """The rigid table with effects of their typical sizes."""
+    model = AxisModel(GAIN, delay, POLE)
+    for name in effects:
+        model = model.with_effect(name)
+    return model
+
+
+def known(*effects: str, spread: float = 0.02, units: Units = USUAL, **wider: float) -> PhysicalModel:
+    """The same with intervals of so many times each number on both sides; wider: of some parameters, ``effect__parameter``, another part."""
+    model = axis(*effects)
+    parts = {name.replace("__", "."): part for name, part in wider.items()}
+    items = []
+    for name, value in model.values().items():
+        half = abs(value) * parts.get(name, spread)
+        items.append(Estimate(name=name, value=value, unit=_unit(model, name), low=value - half, high=value + half))
+    return PhysicalModel(model, "x", units=units, known=tuple(items))
+
+
+def _unit(model: AxisModel, name: str) -> str:
+    base = {"gain": "m/s/V", "delay": "s", "pole": "rad/s"}
+    if name in base:
+        return base[name]
+    effect, key = name.split(".")
+    return next(item.unit for item in model.library[effect].parameters if item.name == key)
+
+
+def unknown(*effects: str) -> PhysicalModel:
+    """The same without intervals."""
+    return replace(known(*effects), known=())

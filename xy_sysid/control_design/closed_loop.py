@@ -1,0 +1,128 @@
+"""A refined model under a controller: PID on the position's error, filters, feedforward, limit, encoder noise and counts."""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from xy_sysid.axis.model import AxisModel, Library
+from xy_sysid.control_design.path import Motion
+from xy_sysid.control_design.sample_step import begin, plant, step_of
+from xy_sysid.control_design.step_text import ROOM
+from xy_sysid.jit import compiled_text
+from xy_sysid.samples.block import FloatArray
+
+NO_LIMIT = 1e12  # V
+
+
+@dataclass(frozen=True, slots=True)
+class Controller:
+    """u = filters(kp e + ki int e + kd de/dt) + feedforward, e = path - encoder, sampled with the path, clipped at ``limit``.
+
+    kp: V/m; ki: V/m/s; kd: V s/m; derivative_time: s, of the first-order low-pass on de/dt (0: none)
+    sections: (k, 5) second-order sections b0, b1, b2, a1, a2 that the feedback's voltage passes
+    limit: V; the integral stands still while the voltage is clipped and the error would drive it further (clamping)
+    """
+
+    kp: float
+    ki: float
+    kd: float
+    derivative_time: float = 0.0
+    sections: FloatArray = field(default_factory=lambda: np.zeros((0, 5)))
+    limit: float = NO_LIMIT
+
+    def keeps(self, sampling_rate: float) -> float:
+        """What is left of the filtered derivative after a sample."""
+        return float(np.exp(-1.0 / (sampling_rate * self.derivative_time))) if self.derivative_time > 0.0 else 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Encoder:
+    """noise: rms of white noise, m; count: step, m (0: none)."""
+
+    noise: float = 0.0
+    count: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Tracked:
+    """position: (n,) what the encoder would show without noise, m; shown: (n,) what it shows; voltage: (n,) V; error: (n,) path - position."""
+
+    position: FloatArray
+    shown: FloatArray
+    voltage: FloatArray
+    error: FloatArray
+
+    @property
+    def rms(self) -> float:
+        """Tracking error, m rms; infinite where the loop ran away."""
+        value = float(np.sqrt(np.mean(self.error**2)))
+        return value if np.isfinite(value) else float("inf")
+
+
+def loop_text(name: str) -> str:
+    """Source of the loop; its arguments are those of ``follow_path`` in numbers."""
+    return f"""\
+def {name}(path, extra, gains, sections, noise, count, p, on, z, a, still, s, w, position, shown, voltage):
+    kp, ki, kd, keeps, limit, h = gains[0], gains[1], gains[2], gains[3], gains[4], gains[5]
+    inside = np.zeros((sections.shape[0], 2))
+    place = s[0]
+    total = rate = before = 0.0
+    for i in range(path.size):
+        position[i] = place
+        seen = place + noise[i]
+        if count > 0.0:
+            seen = math.floor(seen / count + 0.5) * count
+        shown[i] = seen
+        error = path[i] - seen
+        if i == 0:
+            before = error
+        rate = keeps * rate + (1.0 - keeps) * (error - before) / h
+        before = error
+        u = kp * error + total + kd * rate
+        for j in range(sections.shape[0]):
+            out = sections[j, 0] * u + inside[j, 0]
+            inside[j, 0] = sections[j, 1] * u - sections[j, 3] * out + inside[j, 1]
+            inside[j, 1] = sections[j, 2] * u - sections[j, 4] * out
+            u = out
+        u += extra[i]
+        held = min(max(u, -limit), limit)
+        if held == u or (u - held) * ki * error < 0.0:
+            total += ki * error * h
+        voltage[i] = held
+        place = step(held, p, on, z, a, still, s, w)
+"""
+
+
+_COMPILED: dict[int, Callable[..., None]] = {}
+
+
+def _loop_of(library: Library) -> Callable[..., None]:
+    if id(library) not in _COMPILED:
+        step = step_of(library)
+        _COMPILED[id(library)] = compiled_text(loop_text, {"math": math, "np": np, "step": step}, [inspect.getsource(loop_text), step.__name__])
+    return _COMPILED[id(library)]
+
+
+def follow_path(
+    model: AxisModel, path: Motion, controller: Controller, extra: FloatArray | None = None, encoder: Encoder | None = None, seed: int = 0
+) -> Tracked:
+    """The axis along a path, from its begin and speed; extra: (n,) V of feedforward; seed: of the encoder's noise."""
+    ready, encoder = plant(model, path.sampling_rate), encoder or Encoder()
+    library = model.library.looped([model.library[name] for name, _ in model.effects])
+    count = path.position.size
+    state, room = ready.rest(), np.zeros(ROOM * ready.order)
+    begin(ready, state, float(path.speed[0]), float(path.position[0]))
+    noise = encoder.noise * np.random.default_rng(seed).standard_normal(count)
+    h = 1.0 / path.sampling_rate
+    gains = np.array([controller.kp, controller.ki, controller.kd, controller.keeps(path.sampling_rate), controller.limit, h])
+    position, shown, voltage = np.empty(count), np.empty(count), np.empty(count)
+    given = np.zeros(count) if extra is None else np.ascontiguousarray(extra, dtype=np.float64)
+    sections = np.ascontiguousarray(controller.sections, dtype=np.float64)
+    numbers = (ready.parameters, ready.flags, ready.numbers, ready.moving, ready.still, state, room)
+    _loop_of(library)(np.ascontiguousarray(path.position), given, gains, sections, noise, encoder.count, *numbers, position, shown, voltage)
+    return Tracked(position, shown, voltage, path.position - position)

@@ -1,0 +1,130 @@
+"""Targets to which a used model can be written: name -> files by name. Each target says what it cannot."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from xy_sysid.control_design import fmu, snippets, to_c, to_matlab, to_python
+from xy_sysid.control_design.mjcf import mjcf
+from xy_sysid.control_design.program import Program, program
+from xy_sysid.control_design.urdf import urdf
+from xy_sysid.control_design.use import Used
+from xy_sysid.errors import BadInput
+from xy_sysid.settings import unknown_name
+
+
+@dataclass(frozen=True, slots=True)
+class Exported:
+    """What a target gets.
+
+    files: text by name; note: what the target cannot say, or how the text is used
+    archive: the name of a functional mock-up unit into which the files are packed; mat: name of a .mat file -> its variables
+    """
+
+    files: Mapping[str, str]
+    note: str = ""
+    archive: str = ""
+    mat: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+
+
+def tables(used: Used) -> Exported:
+    """The correction tables as CSV."""
+    every = [*used.tables, *([used.friction] if used.friction is not None else [])]
+    if not every:
+        raise BadInput(
+            "tables", f"axis {used.axis}, which has nothing by place and no dry friction", "a model with some", "There is nothing to correct."
+        )
+    return Exported({f"{used.axis}_{item.name}.csv": item.csv() for item in every}, "; ".join(f"{item.name}: {item.meaning}" for item in every))
+
+
+def _snippet(write: Callable[[snippets.Designed], snippets.Snippet]) -> Callable[[Used], Exported]:
+    def made(used: Used) -> Exported:
+        item = write(snippets.Designed(axis=used.axis, units=used.model.units, gains=used.gains, feedback=used.feedback, shaper=used.shaper))
+        return Exported({f"{used.axis}_{item.target}_{item.file}": item.text}, item.note)
+
+    return made
+
+
+def _program(used: Used) -> tuple[Program, str, str]:
+    """The program, a name for it, and a title."""
+    effects = ", ".join(used.model.effects) or "rigid"
+    title = f"axis {used.axis} ({effects}): {used.model.units.input} to {used.model.units.output} at {used.sampling_rate:g} Hz, by xy_sysid"
+    return program(used.model.model, used.sampling_rate), plain_name(used.axis), title
+
+
+def plain_name(axis: str) -> str:
+    """A name that every language takes."""
+    kept = "".join(letter if letter.isascii() and letter.isalnum() else "_" for letter in axis)
+    return f"axis_{kept}"
+
+
+def c_source(used: Used) -> Exported:
+    """Simulation and feedforward in C."""
+    of, name, title = _program(used)
+    header, text = to_c.source(of, name, title)
+    return Exported({f"{name}.h": header, f"{name}.c": text}, f"C99, no dependencies: {name}_step simulates, {name}_feedforward is the inverse")
+
+
+def python_source(used: Used) -> Exported:
+    """Simulation and feedforward in Python."""
+    of, name, title = _program(used)
+    return Exported(
+        {f"{name}.py": to_python.source(of, title)}, "no dependencies: Axis().step(u) simulates, Feedforward().input(r, v, a) is the inverse"
+    )
+
+
+def matlab_source(used: Used) -> Exported:
+    """Simulation and feedforward as a MATLAB function, and the parameters as .mat."""
+    of, name, title = _program(used)
+    values = {key.replace(".", "_"): value for key, value in used.model.model.values().items()}
+    intervals = {item.name.replace(".", "_"): [item.low, item.high] for item in used.model.parameters}
+    known = {"parameters": values, "rate": used.sampling_rate}
+    content = {**known, "ci95": intervals} if intervals else known
+    gains = {item.name.replace(" ", "_"): item.value for item in used.gains.items}
+    note = f"load {name}.mat for the numbers; {name}.m is one function for scripts and MATLAB Function blocks"
+    return Exported({f"{name}.m": to_matlab.source(of, name, title)}, note, mat={f"{name}.mat": {**content, "gains": gains}})
+
+
+def mujoco(used: Used) -> Exported:
+    """MJCF."""
+    made = mjcf(used.model.model, used.sampling_rate)
+    note = f"hold the input for {made.steps} steps of the simulation; {_losses(made.lost)}"
+    return Exported({f"{plain_name(used.axis)}.xml": made.text}, note)
+
+
+def robot(used: Used) -> Exported:
+    """URDF."""
+    text, lost = urdf(used.model.model, used.travel, used.limit, used.model.units.output == "rad")
+    return Exported({f"{plain_name(used.axis)}.urdf": text}, _losses(lost))
+
+
+def mock_up(used: Used) -> Exported:
+    """FMU."""
+    of, name, title = _program(used)
+    note = f"FMI 2 co-simulation, one communication step is a whole number of samples of {1e3 / of.rate:g} ms"
+    return Exported(fmu.files(of, name, title, used.model.units), note, archive=f"{name}.fmu")
+
+
+def _losses(lost: tuple[tuple[str, str], ...]) -> str:
+    return "lost: " + "; ".join(f"{name} ({why})" for name, why in lost) if lost else "nothing is lost"
+
+
+TARGETS: dict[str, Callable[[Used], Exported]] = {
+    "tables": tables,
+    "c": c_source,
+    "python": python_source,
+    "matlab": matlab_source,
+    "fmu": mock_up,
+    "mujoco": mujoco,
+    "urdf": robot,
+    **{name: _snippet(write) for name, write in snippets.TARGETS.items()},
+}
+
+
+def export(used: Used, target: str) -> Exported:
+    """The files of a target. Raises BadInput for an unknown target, or an axis for which it has nothing."""
+    if target not in TARGETS:
+        raise unknown_name(target, list(TARGETS), "target")
+    return TARGETS[target](used)

@@ -1,0 +1,218 @@
+"""PID and cascaded P-PI for a refined model: the largest bandwidth whose margins hold for every sample of its parameters.
+
+The controller is kd (s + w / POSITION) (s + w / INTEGRAL) / s with a low-pass on the derivative, w the crossover in rad/s. That is a velocity loop
+with gain kd and integral time INTEGRAL / w inside a position loop with gain w / POSITION and the path's speed fed forward: the ordinary servo
+drive; and it is a PID. Margins and stability are those of the sampled loop, with hold and delay.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from xy_sysid.axis.model import AxisModel
+from xy_sysid.comparison.physical_model import PhysicalModel
+from xy_sysid.control_design.closed_loop import NO_LIMIT, Controller, Encoder
+from xy_sysid.control_design.sampled import Sampled, closed_poles, controller_response, noise_to_voltage, sampled
+from xy_sysid.control_design.uncertain import samples, undetermined
+from xy_sysid.errors import BadInput
+from xy_sysid.samples.block import FloatArray
+
+POSITION, INTEGRAL = 4.0, 10.0  # times below the crossover where position loop and integral begin: they cost 14 and 6 degrees there
+DERIVATIVE = 8.0  # times above it where the derivative is cut: 7 degrees
+PHASE_MARGIN, GAIN_MARGIN = 45.0, 2.0  # degrees, and times: Astrom & Murray, Feedback Systems, 2nd ed., sec. 10.3 ask for 30 to 60 and 2 to 5
+COUNT = 24  # samples of the parameters
+STEPS = 60  # crossovers that are tried
+LINES = 600  # frequencies of a response
+HIGHEST = 0.25  # of the sampling rate, for a crossover
+ADVICE = "Ask for less bandwidth or smaller margins, or sample faster."
+
+
+@dataclass(frozen=True, slots=True)
+class Margins:
+    """phase: degrees; gain: times, upwards; sensitivity: largest of 1 / |1 + L|; crossover: Hz, the highest; stable: whether the loop is."""
+
+    phase: float
+    gain: float
+    sensitivity: float
+    crossover: float
+    stable: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Feedback:
+    """A controller with what it is worth.
+
+    controller: as ``closed_loop`` runs it; sampling_rate: Hz; crossover: rad/s asked for
+    nominal, worst: margins of the model, and the least of each over the samples; count: of these
+    bandwidth: Hz, where the closed loop falls below -3 dB; disturbance: m per V of a constant load's step, largest deviation over the samples
+    noise: V rms that encoder noise and counting make; allowed: what limits the bandwidth, in words
+    """
+
+    controller: Controller
+    sampling_rate: float
+    crossover: float
+    nominal: Margins
+    worst: Margins
+    count: int
+    bandwidth: float
+    noise: float
+    allowed: str
+
+    @property
+    def position_gain(self) -> float:
+        """Of the position loop of a servo drive, 1/s."""
+        return self.crossover / POSITION
+
+    @property
+    def velocity_gain(self) -> float:
+        """Of its velocity loop, V/(m/s)."""
+        return self.controller.kd
+
+    @property
+    def velocity_integral(self) -> float:
+        """Of its velocity loop's integral, V/m."""
+        return self.controller.kd * self.crossover / INTEGRAL
+
+    @property
+    def integral_time(self) -> float:
+        """Of its velocity loop, s."""
+        return INTEGRAL / self.crossover
+
+
+def shaped(system: Sampled, crossover: float, sections: FloatArray, limit: float = NO_LIMIT) -> Controller:
+    """The controller whose loop with this system is 1 at the crossover, rad/s."""
+    kp, ki = crossover / POSITION, crossover / INTEGRAL
+    one = Controller(kp=kp + ki, ki=kp * ki, kd=1.0, derivative_time=1.0 / (DERIVATIVE * crossover), sections=sections, limit=limit)
+    at = np.array([crossover / (2.0 * math.pi)])
+    plant = system.response(at)[0]
+    size = 1.0 / abs(plant * controller_response(one, at, system.sampling_rate)[0])
+    size = math.copysign(float(size), _sign(system))
+    return Controller(kp=size * one.kp, ki=size * one.ki, kd=size, derivative_time=one.derivative_time, sections=sections, limit=limit)
+
+
+def _sign(system: Sampled) -> float:
+    """Of the motion that a positive voltage makes in the end."""
+    slow = np.array([1e-5 * system.sampling_rate])
+    return -1.0 if float(np.imag(system.response(slow)[0])) > 0.0 else 1.0
+
+
+def margins(system: Sampled, controller: Controller) -> Margins:
+    """Of the sampled loop. Source: Astrom & Murray, Feedback Systems, 2nd ed., sec. 10.3."""
+    rate = system.sampling_rate
+    frequency = np.geomspace(2e-4 * rate, 0.499 * rate, LINES)
+    loop = system.response(frequency) * controller_response(controller, frequency, rate)
+    size, turn = np.abs(loop), np.unwrap(np.angle(loop))
+    crossing = np.flatnonzero((size[:-1] - 1.0) * (size[1:] - 1.0) <= 0.0)
+    phases = [float(np.angle(-loop[k] if abs(size[k] - 1.0) < abs(size[k + 1] - 1.0) else -loop[k + 1], deg=True)) for k in crossing]
+    odd = np.floor((turn + math.pi) / (2.0 * math.pi))
+    passing = np.flatnonzero((odd[:-1] != odd[1:]) & (size[:-1] < 1.0))
+    gains = [1.0 / float(size[k]) for k in passing]
+    return Margins(
+        phase=min((abs(item) for item in phases), default=180.0),
+        gain=min(gains, default=math.inf),
+        sensitivity=float(np.max(1.0 / np.abs(1.0 + loop))),
+        crossover=float(frequency[crossing[-1]]) if crossing.size else 0.0,
+        stable=bool(np.max(np.abs(closed_poles(system, controller))) < 1.0),
+    )
+
+
+def _least(found: Sequence[Margins]) -> Margins:
+    return Margins(
+        phase=min(item.phase for item in found),
+        gain=min(item.gain for item in found),
+        sensitivity=max(item.sensitivity for item in found),
+        crossover=min(item.crossover for item in found),
+        stable=all(item.stable for item in found),
+    )
+
+
+def feedback(
+    model: PhysicalModel,
+    sampling_rate: float,
+    bandwidth: float | None = None,
+    sections: FloatArray | None = None,
+    encoder: Encoder | None = None,
+    limit: float = NO_LIMIT,
+) -> Feedback:
+    """The controller of the largest crossover, or of ``bandwidth`` Hz, whose margins hold for every sample of the parameters.
+
+    sections: filters that the feedback passes, (k, 5); encoder: whose noise is counted; limit: of the drive, V
+    Raises BadInput where gain or pole are not determined by the data, or where no bandwidth has the margins.
+    """
+    doubtful = undetermined(model, ("gain", "pole"))
+    if model.parameters and doubtful:
+        raise BadInput(
+            " and ".join(doubtful), "known to worse than a factor of two", "numbers that the data determine", "Record a livelier motion first."
+        )
+    filters = np.zeros((0, 5)) if sections is None else sections
+    own = samples(model, COUNT)
+    systems = [sampled(item, sampling_rate) for item in (*own, *_within_a_gap(own[0]))]
+    if bandwidth is not None:
+        if not 0.0 < bandwidth <= HIGHEST * sampling_rate:
+            raise BadInput("bandwidth", f"{bandwidth:g} Hz", f"above 0, up to {HIGHEST * sampling_rate:g} Hz", "Give another.")
+        tries = np.array([2.0 * math.pi * bandwidth])
+    else:
+        tries = 2.0 * math.pi * np.geomspace(HIGHEST * sampling_rate, 1e-4 * sampling_rate, STEPS)
+    worst = Margins(phase=0.0, gain=0.0, sensitivity=math.inf, crossover=0.0, stable=False)
+    for crossover in tries.tolist():
+        controller = shaped(systems[0], crossover, filters, limit)
+        nominal = margins(systems[0], controller)
+        if not _holds(nominal):
+            worst = nominal
+            continue
+        worst = _least([margins(system, controller) for system in systems])
+        if _holds(worst):
+            return _made(systems, controller, crossover, (nominal, worst), encoder or Encoder())
+    said = f"phase margin {worst.phase:.3g} degrees and gain margin {worst.gain:.3g}" if worst.stable else "unstable"
+    what = f"{bandwidth:g} Hz" if bandwidth is not None else "any"
+    raise BadInput("bandwidth", f"{what}: {said}", f"at least {PHASE_MARGIN:g} degrees and {GAIN_MARGIN:g}", ADVICE)
+
+
+def _within_a_gap(model: AxisModel) -> tuple[AxisModel, ...]:
+    """The motor alone, where an effect says what share of the mass it has: across an open gap the loop meets less mass, and must hold there, too."""
+    found = []
+    for name, values in model.effects:
+        share = dict(zip(model.library[name].names, values, strict=True)).get("share")
+        if share is not None:
+            found.append(replace(model, pole=model.pole / share))
+    return tuple(found)
+
+
+def _holds(found: Margins) -> bool:
+    return found.stable and found.phase >= PHASE_MARGIN and found.gain >= GAIN_MARGIN
+
+
+def _made(systems: list[Sampled], controller: Controller, crossover: float, found: tuple[Margins, Margins], encoder: Encoder) -> Feedback:
+    rate = systems[0].sampling_rate
+    frequency = np.geomspace(1e-4 * rate, 0.499 * rate, LINES)
+    loop = systems[0].response(frequency) * controller_response(controller, frequency, rate)
+    low = np.flatnonzero(np.abs(loop / (1.0 + loop)) < math.sqrt(0.5))
+    seen = math.hypot(encoder.noise, encoder.count / math.sqrt(12.0))
+    worst = found[1]
+    short = "phase" if worst.phase / PHASE_MARGIN < worst.gain / GAIN_MARGIN else "gain"
+    return Feedback(
+        controller=controller,
+        sampling_rate=rate,
+        crossover=crossover,
+        nominal=found[0],
+        worst=worst,
+        count=len(systems),
+        bandwidth=float(frequency[low[0]]) if low.size else 0.5 * rate,
+        noise=seen * max(noise_to_voltage(system, controller) for system in systems[:4]),
+        allowed=f"the {short} margin is what limits it ({_cost(systems[0], crossover)})",
+    )
+
+
+def _cost(system: Sampled, crossover: float) -> str:
+    """What the delay takes from the phase at the crossover."""
+    late = (system.whole + 0.5) / system.sampling_rate
+    return f"delay and hold take {math.degrees(crossover * late):.2g} degrees at the crossover"
+
+
+def of_models(models: Sequence[AxisModel], controller: Controller, sampling_rate: float) -> Margins:
+    """The least margins of a given controller over some models."""
+    return _least([margins(sampled(item, sampling_rate), controller) for item in models])

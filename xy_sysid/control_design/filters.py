@@ -1,0 +1,194 @@
+"""For the resonances that were found: a notch in the loop, and input shapers for the path, by the names that Klipper's users know.
+
+A drive that holds the encoder's side leaves what hangs on it free to swing at the antiresonance: that is the frequency to shape. The loop meets the
+resonance: that is the frequency to notch.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.signal
+
+from xy_sysid.axis.model import AxisModel
+from xy_sysid.comparison.physical_model import PhysicalModel
+from xy_sysid.control_design.path import Motion, of_position
+from xy_sysid.control_design.sample_step import sections
+from xy_sysid.control_design.uncertain import Derived, derive
+from xy_sysid.response.frf import ComplexArray
+from xy_sysid.samples.block import FloatArray
+
+TOLERATED = 0.05  # of the unshaped vibration that an EI shaper leaves at its own frequency (Klipper: 1 / 20)
+WIDEST, NARROWEST = 0.7, 0.05  # damping ratio of a notch's poles
+UNIT = 1.0  # rad/s, the rate at which roots are asked for
+
+
+@dataclass(frozen=True, slots=True)
+class Swing:
+    """One mode: frequencies, Hz, and damping ratios of what swings while the encoder's side is held, and of the free axis."""
+
+    held: Derived
+    held_damping: float
+    free: Derived
+    free_damping: float
+
+
+@dataclass(frozen=True, slots=True)
+class Notch:
+    """A second-order section that takes a resonance out of the loop.
+
+    frequency: Hz; depth: what is left at it; width: damping ratio of its poles; section: (5,) b0, b1, b2, a1, a2 at the sampling rate
+    phase_cost: degrees at the crossover that it was asked for; covers: whether its -3 dB width holds the interval of the frequency
+    """
+
+    frequency: float
+    depth: float
+    width: float
+    section: FloatArray
+    phase_cost: float
+    covers: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Shaper:
+    """Pulses that replace one.
+
+    name: zv, mzv, zvd or ei; frequency: Hz; damping: ratio; amplitudes, times: (k,) sum 1, s
+    vibration: part of the unshaped residual vibration that is left at the frequency; worst: over the interval of the frequency
+    """
+
+    name: str
+    frequency: float
+    damping: float
+    amplitudes: tuple[float, ...]
+    times: tuple[float, ...]
+    vibration: float
+    worst: float
+
+    @property
+    def duration(self) -> float:
+        """By which a path becomes longer, s."""
+        return self.times[-1]
+
+    def shape(self, path: Motion) -> Motion:
+        """The path through the pulses."""
+        rate = path.sampling_rate
+        start = path.position[0]
+        tail = np.full(math.ceil(self.duration * rate), path.position[-1] - start)
+        wanted = np.concatenate((path.position - start, tail))
+        shaped = np.zeros_like(wanted)
+        places = np.arange(wanted.size, dtype=np.float64)
+        for size, time in zip(self.amplitudes, self.times, strict=True):
+            shaped += size * np.interp(places - time * rate, places, wanted, left=0.0)
+        return of_position(start + shaped, rate)
+
+
+def modes(model: PhysicalModel) -> tuple[Swing, ...]:
+    """The modes of the resonances in the model, lowest first."""
+    count = _roots(model.model)[0].size
+    found = []
+    for k in range(count):
+        held = derive(model, "held mode", "Hz", "swings while the encoder's side is held (antiresonance)", _frequency(0, k))
+        free = derive(model, "free mode", "Hz", "swings with the free axis (resonance)", _frequency(1, k))
+        zeros, poles = _roots(model.model)
+        found.append(Swing(held=held, held_damping=_damping(zeros[k]), free=free, free_damping=_damping(poles[k])))
+    return tuple(found)
+
+
+def _frequency(which: int, place: int) -> Callable[[AxisModel], float]:
+    def of(model: AxisModel) -> float:
+        return float(abs(_roots(model)[which][place]) / (2.0 * math.pi))
+
+    return of
+
+
+def _roots(model: AxisModel) -> tuple[ComplexArray, ComplexArray]:
+    """Upper roots of zeros and poles of the resonances, rad/s, by size."""
+    parts = []
+    for polynomial in sections(model, UNIT):
+        roots = np.roots(polynomial[::-1])
+        parts.append(np.array(sorted(roots[roots.imag > 0.0], key=abs)))
+    return parts[0], parts[1]
+
+
+def _damping(root: complex) -> float:
+    return -root.real / abs(root)
+
+
+def notch(mode: Swing, sampling_rate: float, crossover: float) -> Notch:
+    """The notch of a mode's resonance, as deep as the resonance is high and as wide as its interval; crossover: Hz, where its phase is counted.
+
+    Its zeros have the damping of the resonance. Source: Franklin, Powell & Emami-Naeini, Feedback Control of Dynamic Systems, 7th ed., sec. 6.7.
+    """
+    f = mode.free.value
+    spread = max(mode.free.high - f, f - mode.free.low) / f
+    width = min(max(NARROWEST, 2.0 * spread, 4.0 * mode.free_damping), WIDEST)
+    w = 2.0 * math.pi * f
+    top = [1.0, 2.0 * mode.free_damping * w, w * w]
+    bottom = [1.0, 2.0 * width * w, w * w]
+    warp = w / (2.0 * math.tan(0.5 * w / sampling_rate)) if w < math.pi * sampling_rate * 0.95 else sampling_rate
+    b, a = scipy.signal.bilinear(top, bottom, warp)
+    z = cmath.exp(2j * math.pi * crossover / sampling_rate)
+    own = (b[0] + b[1] / z + b[2] / z**2) / (1.0 + a[1] / z + a[2] / z**2)
+    return Notch(
+        frequency=f,
+        depth=mode.free_damping / width,
+        width=width,
+        section=np.array([b[0], b[1], b[2], a[1], a[2]]),
+        phase_cost=-math.degrees(cmath.phase(own)),
+        covers=width >= spread,
+    )
+
+
+def shapers(mode: Swing) -> tuple[Shaper, ...]:
+    """ZV, MZV, ZVD and EI for what swings while the drive holds its side.
+
+    Source: Singer & Seering, Preshaping command inputs, J. Dyn. Sys. Meas. Control 112 (1990); Singhose, Seering & Singer, Residual vibration
+    reduction using vector diagrams, ASME J. Mech. Des. 116 (1994); MZV and all names as in Klipper's shaper_defs.
+    """
+    f, damping = mode.held.value, min(mode.held_damping, 0.99)
+    damped = math.sqrt(1.0 - damping * damping)
+    k = math.exp(-damping * math.pi / damped)
+    period = 1.0 / (f * damped)
+    third = math.exp(-0.75 * damping * math.pi / damped)
+    kinds = {
+        "zv": ((1.0, k), (0.0, 0.5)),
+        "mzv": ((1.0 - 1.0 / math.sqrt(2.0), (math.sqrt(2.0) - 1.0) * third, (1.0 - 1.0 / math.sqrt(2.0)) * third * third), (0.0, 0.375, 0.75)),
+        "zvd": ((1.0, 2.0 * k, k * k), (0.0, 0.5, 1.0)),
+        "ei": ((0.25 * (1.0 + TOLERATED), 0.5 * (1.0 - TOLERATED) * k, 0.25 * (1.0 + TOLERATED) * k * k), (0.0, 0.5, 1.0)),
+    }
+    found = []
+    for name, (sizes, places) in kinds.items():
+        amplitudes = tuple(size / sum(sizes) for size in sizes)
+        times = tuple(place * period for place in places)
+        ends = [f, *(end for end in (mode.held.low, mode.held.high) if math.isfinite(end) and end > 0.0)]
+        left = [vibration(amplitudes, times, end, damping) for end in ends]
+        found.append(Shaper(name=name, frequency=f, damping=damping, amplitudes=amplitudes, times=times, vibration=left[0], worst=max(left)))
+    return tuple(found)
+
+
+def vibration(amplitudes: tuple[float, ...], times: tuple[float, ...], frequency: float, damping: float) -> float:
+    """Residual vibration at a frequency, Hz, over that of one pulse (Singer & Seering 1990, eq. 5)."""
+    w = 2.0 * math.pi * frequency
+    swing = w * math.sqrt(1.0 - damping * damping)
+    last = times[-1]
+    total = sum(size * cmath.exp(-damping * w * (last - time)) * cmath.exp(-1j * swing * time) for size, time in zip(amplitudes, times, strict=True))
+    return abs(total)
+
+
+def best_shaper(found: tuple[Shaper, ...], tolerated: float = TOLERATED) -> Shaper:
+    """The shortest that leaves no more than ``tolerated`` over the interval of the frequency; else the one that leaves least."""
+    good = [item for item in found if item.worst <= tolerated]
+    return min(good, key=lambda item: item.duration) if good else min(found, key=lambda item: item.worst)
+
+
+def low_pass(frequency: float, sampling_rate: float, crossover: float) -> tuple[FloatArray, float]:
+    """(5,) second-order Butterworth section, and the phase that it costs at the crossover, Hz, in degrees."""
+    b, a = scipy.signal.butter(2, min(frequency, 0.49 * sampling_rate), fs=sampling_rate)
+    z = cmath.exp(2j * math.pi * crossover / sampling_rate)
+    own = (b[0] + b[1] / z + b[2] / z**2) / (1.0 + a[1] / z + a[2] / z**2)
+    return np.array([b[0], b[1], b[2], a[1], a[2]]), -math.degrees(cmath.phase(own))

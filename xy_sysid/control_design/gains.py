@@ -1,0 +1,88 @@
+"""kS, kV, kA, kG, kCos: the feedforward that drives and libraries ask for, with intervals.
+
+    voltage = kS sign(v) + kV v + kA a + kG + kCos cos(angle - zero)
+
+Names as in WPILib's feedforward classes (SimpleMotorFeedforward, ElevatorFeedforward, ArmFeedforward).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from xy_sysid.axis.model import AxisModel
+from xy_sysid.comparison.physical_model import PhysicalModel
+from xy_sysid.control_design.laws import ask, asks, force, friction, of_category
+from xy_sysid.control_design.path import Motion
+from xy_sysid.control_design.uncertain import Derived, derive
+from xy_sysid.samples.block import FloatArray
+
+USUAL_SPEED = 1.0  # V of the steady state whose speed is usual, where nobody says another
+
+
+@dataclass(frozen=True, slots=True)
+class Gains:
+    """The gains by name, in the order in which they are shown."""
+
+    items: tuple[Derived, ...]
+
+    def __getitem__(self, name: str) -> Derived:
+        return next(item for item in self.items if item.name == name)
+
+    def value(self, name: str) -> float:
+        """Of a gain; 0 of one that this axis does not have."""
+        return next((item.value for item in self.items if item.name == name), 0.0)
+
+
+def gains(model: PhysicalModel, speed: float | None = None) -> Gains:
+    """kS, kV and kA, and what else is constant or turns with an angle; speed: m/s, at which kS is taken (the usual one by default)."""
+    usual = abs(speed if speed is not None else USUAL_SPEED * model.model.gain)
+    way = math.copysign(1.0, model.model.gain)
+
+    def rubs(of: AxisModel, direction: float) -> float:
+        return friction(of, direction * usual, direction)
+
+    found = [
+        derive(model, "kS", "V", "dry friction while sliding, mean of both directions", lambda of: way * 0.5 * (rubs(of, 1.0) + rubs(of, -1.0))),
+        derive(model, "kV", "V/(m/s)", "holds a speed", lambda of: 1.0 / of.gain),
+        derive(model, "kA", "V/(m/s2)", "accelerates the mass", lambda of: 1.0 / (of.gain * of.pole)),
+    ]
+    centre = model.model
+    if abs(rubs(centre, 1.0) - rubs(centre, -1.0)) > 1e-9 * (rubs(centre, 1.0) + 1e-12):
+        found.append(derive(model, "kS forth", "V", "dry friction while sliding forth", lambda of: way * rubs(of, 1.0)))
+        found.append(derive(model, "kS back", "V", "dry friction while sliding back", lambda of: way * rubs(of, -1.0)))
+    if abs(friction(centre, 0.0, 1.0) - rubs(centre, 1.0)) > 1e-6 * (rubs(centre, 1.0) + 1e-12):
+        found.append(derive(model, "breakaway", "V", "dry friction that is overcome from rest", lambda of: way * friction(of, 0.0, 1.0)))
+    drags = [force(centre, side, 0.0, of_speed=True) for side in (1.0, -1.0)]
+    if abs(drags[0] + drags[1]) > 1e-12:
+        found.append(derive(model, "kV forth", "V/(m/s)", "holds a speed forth", lambda of: 1.0 / of.gain + force(of, 1.0, 0.0, of_speed=True)))
+        found.append(derive(model, "kV back", "V/(m/s)", "holds a speed back", lambda of: 1.0 / of.gain - force(of, -1.0, 0.0, of_speed=True)))
+    if any(not asks(effect) - {"gain", "pole"} for effect, _ in of_category(centre, "force")):
+        found.append(derive(model, "kG", "V", "holds the constant load", lambda of: force(of, 0.0, 0.0, of_speed=False, by_place=False)))
+    if any(effect.angular for effect, _ in of_category(centre, "force")):
+        found.append(derive(model, "kCos", "V", "holds the arm level", lambda of: math.hypot(*_turning(of))))
+        found.append(derive(model, "zero", "rad", "angle at which the arm is level", lambda of: math.atan2(_turning(of)[0], _turning(of)[1])))
+    return Gains(tuple(found))
+
+
+def _turning(model: AxisModel) -> tuple[float, float]:
+    """Force of the laws of an angle at a quarter turn and at 0, V: those of sine and cosine."""
+
+    def at(x: float) -> float:
+        turned = [item for item in of_category(model, "force") if item[0].angular]
+        return sum(ask(effect, values, "force", {"x": x, "gain": model.gain}) for effect, values in turned)
+
+    return at(0.5 * math.pi), at(0.0)
+
+
+def simple_feedforward(found: Gains, path: Motion, friction_too: bool = True) -> FloatArray:
+    """(n,) voltage along a path, V: kS sign(v) + kV v + kA a (and kG), as drives calculate it, without looking ahead."""
+    return np.asarray(
+        (found.value("kS") * np.sign(path.speed) if friction_too else 0.0)
+        + found.value("kV") * path.speed
+        + found.value("kA") * path.acceleration
+        + found.value("kG")
+        + found.value("kCos") * np.cos(path.position - found.value("zero"))
+    )

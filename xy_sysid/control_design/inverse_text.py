@@ -1,0 +1,154 @@
+"""The text of one sample of the feedforward: the voltage that moves an axis model as a path asks, law by law against the direction of the signal.
+
+Encoder, resonances, base, forces, friction, lag and amplifier are undone in this order. What hangs on the encoder's side follows the path's own
+speed, so that a resonance is undone without differentiating anything. As ``step_text``: one text, compiled here and printed elsewhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from string import Template
+
+from xy_sysid.axis.model import AxisModel
+from xy_sysid.control_design.step_text import LawText, StateLayout, given_numbers
+from xy_sysid.effects import Effect
+from xy_sysid.effects._contract import arguments
+
+NUDGE = 1e-6  # m: by which the encoder's error is differentiated
+PASSES = 4  # of a force that asks for the voltage which is sought
+TRIES = 40  # of an amplifier's law: a zone of any width is left after that many of its own voltage
+
+TEMPLATE = Template("""\
+def $name($signature):
+    x = r
+$encoder
+    s[0] = x
+    s[1] = v
+    effort = acc
+    for j in range(1, $n - 1):
+        effort -= moving[$n + j] * s[j]
+    effort = effort / moving[$n + $n - 1]
+    for _ in range($cuts):
+        unfold(guided, $n, s, acc, w)
+        follow($n, w, h / $cuts, s)
+    s[0] = x
+    s[1] = v
+    direction = 0.0
+    if v > 0.0 or (v == 0.0 and acc > 0.0):
+        direction = 1.0
+    if v < 0.0 or (v == 0.0 and acc < 0.0):
+        direction = -1.0
+$friction
+    total = effort
+$forces
+$lag
+$inputs
+    return total
+""")
+
+
+class InverseText(LawText):
+    """Writes the feedforward of some effects: behind flags, or of one model with its numbers."""
+
+    def __init__(self, effects: Sequence[Effect], hanging: int, model: AxisModel | None = None, numbers: Mapping[str, str] | None = None) -> None:
+        kept = tuple(effect for effect in effects if effect.category != "base")
+        super().__init__(StateLayout(kept, hanging), model, numbers or given_numbers())
+
+    def text(self, name: str) -> str:
+        """Source of ``name(r, v, acc, h, cuts, p, on, z, moving, guided, s, w)``, V; of one model without ``p, on, z``.
+
+        r, v, acc: position, speed and acceleration wanted; h: a sample, s; cuts: parts of it, so short that the series holds;
+        guided: the generator of what hangs on an axis that is moved; s: a state of the same layout as the simulation's, but without a ring
+        """
+        n = self.numbers["n"]
+        return TEMPLATE.substitute(
+            name=name,
+            signature="r, v, acc, h, cuts, p, on, z, moving, guided, s, w" if self.guarded else "r, v, acc, h, cuts, moving, guided, s, w",
+            n=n,
+            cuts="cuts",
+            encoder=_lines(1, self._encoder()),
+            friction=_lines(1, self._friction()),
+            forces=_lines(1, self._forces()),
+            lag=_lines(1, self._lag()),
+            inputs=_lines(1, self._inputs()),
+        )
+
+    def _asks_voltage(self) -> bool:
+        return any("u" in arguments(effect.functions["force"]) for effect in self.of("force"))
+
+    def _encoder(self) -> list[str]:
+        effects = self.of("encoder")
+        if not effects:
+            return []
+
+        def error(place: str) -> list[str]:
+            lines = ["wrong = 0.0"]
+            for effect in effects:
+                at, zero = (self.call(effect, "error", {"x": where}) for where in (place, "0.0"))
+                lines += self.guard(effect, [f"wrong += {at} - {zero}"])
+            return lines
+
+        lines: list[str] = []
+        for _ in range(3):
+            lines += [*error("x"), "x = r - wrong"]
+        for place, kept in ((f"x + {NUDGE}", "ahead"), (f"x - {NUDGE}", "behind"), ("x", "here")):
+            lines += [*error(place), f"{kept} = wrong"]
+        lines.append(f"slope = 1.0 + (ahead - behind) / {2.0 * NUDGE}")
+        lines.append("v = v / slope")
+        lines.append(f"acc = (acc - (ahead - 2.0 * here + behind) / {NUDGE * NUDGE} * v * v) / slope")
+        return lines
+
+    def _friction(self) -> list[str]:
+        """Levels; where there are bristles, they take these over, and remember."""
+        turn = self.numbers["turn"]
+        lines = ["level = 0.0"]
+        for effect in self.of("friction"):
+            lines += self.guard(effect, [f"level += {self.call(effect, 'level', {'v': 'v', 'direction': 'direction'})}"])
+        rubbing = f"effort += {turn} * direction * level"
+        bristled: list[str] = []
+        for effect in self.of("bristle"):
+            state = f"s[{self.layout.state(effect, effect.states[0])}]"
+            words = {"v": "v", "h": "h", "level": "level"}
+            bristled += self.guard(
+                effect, [f"{state} = {self.call(effect, 'bend', words)}", f"effort += {turn} * {self.call(effect, 'force', words)}"]
+            )
+        if not self.of("bristle"):
+            return [*lines, rubbing]
+        return [*lines, f"if not ({self.acts(self.of('bristle'))}):", f"    {rubbing}", *bristled] if self.guarded else [*lines, *bristled]
+
+    def _forces(self) -> list[str]:
+        """Added once; as often as needed where one asks for the voltage itself."""
+        if not self.of("force"):
+            return []
+        lines: list[str] = ["pull = 0.0"]
+        for effect in self.of("force"):
+            words = {"u": "total", "v": "v", "x": "x", "t": "0.0"}
+            lines += self.guard(effect, [f"pull += {self.call(effect, 'force', words)}"])
+        lines.append("total = effort + pull")
+        return [f"for _ in range({PASSES}):", *("    " + line for line in lines)] if self._asks_voltage() else lines
+
+    def _lag(self) -> list[str]:
+        """A first-order lag needs more by its time constant times the rate of change; where it stands still it needs none."""
+        lines: list[str] = []
+        for effect in self.of("state"):
+            if len(effect.states) == 1:
+                old = f"s[{self.layout.state(effect, effect.states[0])}]"
+                words = {"u": "1.0", effect.states[0]: "0.0", "v": "0.0", "x": "0.0", "t": "0.0", "h": "h"}
+                given = [f"mean, gained = {self.call(effect, 'advance', words)}", f"later = total + (total - {old}) * (1.0 - gained) / gained"]
+                lines += self.guard(effect, [*given, f"{old} = total", "total = later"])
+        return lines
+
+    def _inputs(self) -> list[str]:
+        """What comes out is compared with what is wanted, and as much is added; what cannot come out is not asked for."""
+        if not self.of("input"):
+            return []
+        lines = ["held = total"]
+        for effect in self.of("input"):
+            lines += self.guard(effect, [f"held = {self.call(effect, 'output', {'u': 'held', 't': '0.0', 'x': 'x'})}"])
+        tried = [*lines, "total = total + (wanted - held)"]
+        last = [*lines, "if abs(held - wanted) > 1e-6 * abs(wanted):", "    total = held"]
+        return ["wanted = total", f"for _ in range({TRIES}):", *("    " + line for line in tried), *last]
+
+
+def _lines(depth: int, lines: Sequence[str]) -> str:
+    return "\n".join("    " * depth + line for line in lines)

@@ -1,0 +1,100 @@
+"""What a refined model pushes against the drive, by speed and place: the same laws as in its simulation, asked one by one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+
+import numpy as np
+
+from xy_sysid.axis.model import AxisModel
+from xy_sysid.effects import Effect
+from xy_sysid.effects._contract import arguments
+from xy_sysid.samples.block import FloatArray
+
+LONG = 1e3  # s: after so long at a constant speed bristles slide
+
+
+def ask(effect: Effect, values: tuple[float, ...], function: str, words: Mapping[str, float]) -> float:
+    """The value of a law; words: what it may ask for beside its parameters."""
+    known = {**words, **dict(zip(effect.names, values, strict=True))}
+    law = effect.functions[function]
+    return float(law(**{name: known[name] for name in arguments(law)}))
+
+
+def of_category(model: AxisModel, *categories: str) -> Iterator[tuple[Effect, tuple[float, ...]]]:
+    """The effects of some categories with their values."""
+    for name, values in model.effects:
+        if model.library[name].category in categories:
+            yield model.library[name], values
+
+
+def asks(effect: Effect) -> frozenset[str]:
+    """What the laws of an effect ask for beside its parameters."""
+    return frozenset(word for item in effect.functions.values() for word in arguments(item)) - set(effect.names) - set(effect.states)
+
+
+def friction(model: AxisModel, speed: float, direction: float) -> float:
+    """Size of all dry friction while the axis slides at a constant speed, V; at speed 0 that at breakaway."""
+    level = sum(ask(effect, values, "level", {"v": speed, "direction": direction}) for effect, values in of_category(model, "friction"))
+    for effect, values in of_category(model, "bristle"):
+        v = speed if speed != 0.0 else direction * 1e-6
+        state = {effect.states[0]: 0.0}
+        bent = ask(effect, values, "bend", {**state, "v": v, "h": LONG / abs(v), "level": level})
+        return abs(ask(effect, values, "force", {effect.states[0]: bent, "v": v, "level": level}))
+    return level
+
+
+def force(model: AxisModel, speed: float, place: float, *, of_speed: bool | None = None, by_place: bool | None = None) -> float:
+    """Force against the drive at a speed and a place, V, without dry friction and the base's own drag.
+
+    of_speed, by_place: only of laws that ask for speed, or for the place (True), or that do not (False)
+    """
+    total = 0.0
+    for effect, values in of_category(model, "force"):
+        words = asks(effect)
+        if of_speed is not None and ("v" in words) != of_speed:
+            continue
+        if by_place is not None and ("x" in words) != by_place:
+            continue
+        if "u" in words:
+            continue  # it changes what the voltage does, and is no force of its own
+        total += ask(effect, values, "force", {"v": speed, "x": place, "t": 0.0, "u": 0.0, "gain": model.gain, "pole": model.pole})
+    return total
+
+
+def scale_error(model: AxisModel, place: float) -> float:
+    """What the encoder shows too much at a place, m; 0 at 0."""
+    return sum(
+        ask(effect, values, "error", {"x": place}) - ask(effect, values, "error", {"x": 0.0}) for effect, values in of_category(model, "encoder")
+    )
+
+
+def gain_factor(model: AxisModel, place: float) -> float:
+    """What the voltage's effect is multiplied by at a place, with the axis at rest."""
+    lost = 0.0
+    for effect, values in of_category(model, "force"):
+        if "u" in asks(effect):
+            lost += ask(effect, values, "force", {"u": 1.0, "v": 0.0, "x": place, "t": 0.0, "gain": model.gain, "pole": model.pole})
+    return 1.0 - lost
+
+
+def largest_voltage(model: AxisModel) -> float:
+    """The largest voltage that comes out of the amplifier of the model, V; infinite if nothing limits it."""
+    top = 1e9
+    held = top
+    for effect, values in sorted(of_category(model, "input"), key=lambda item: (item[0].order, item[0].name)):
+        if "t" not in asks(effect):
+            held = ask(effect, values, "output", {"u": held, "x": 0.0})
+    return held if held < 0.5 * top else math.inf
+
+
+def along(model: AxisModel, places: FloatArray, what: str) -> FloatArray:
+    """(n,) at places, m: ``force`` at rest, V; ``scale`` error, m; ``gain`` factor; ``drag`` beyond the base's own, V s/m."""
+    kinds: dict[str, Callable[[float], float]] = {
+        "force": lambda x: force(model, 0.0, x, of_speed=False, by_place=True),
+        "scale": lambda x: scale_error(model, x),
+        "gain": lambda x: gain_factor(model, x),
+        "drag": lambda x: force(model, 1.0, x, of_speed=True, by_place=True) - force(model, 0.0, x, of_speed=True, by_place=True),
+    }
+    return np.array([kinds[what](float(x)) for x in places])

@@ -1,0 +1,115 @@
+"""Walks a program and prints its statements and expressions; a language says how each looks."""
+
+from __future__ import annotations
+
+import ast
+
+from xy_sysid.errors import BadInput
+
+OPERATORS: dict[type, str] = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
+COMPARISONS: dict[type, str] = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
+
+
+class Printer:
+    """What C and MATLAB have in common; a subclass prints calls, places in arrays, loops, powers and choices in its own way."""
+
+    AND, OR, NOT, UNEQUAL = "&&", "||", "!", "!="
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self.depth = 0
+
+    def put(self, text: str) -> None:
+        """A line at the present depth."""
+        self.lines.append("    " * self.depth + text if text else "")
+
+    def refuse(self, node: ast.AST) -> BadInput:
+        """For what this small language does not have."""
+        return BadInput(
+            "law", f"written with {type(node).__name__}", "numbers, arithmetic, if, for and functions of math", "Write it in simpler terms."
+        )
+
+    def expression(self, node: ast.expr) -> str:
+        """Its text; parts that need it stand in brackets."""
+        if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
+            return self.number(node.value)
+        if isinstance(node, ast.Name):
+            return self.name(node.id)
+        if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name):
+            return self.place(node.value.id, node.slice)
+        if isinstance(node, ast.BinOp):
+            return self.arithmetic(node)
+        if isinstance(node, ast.UnaryOp):
+            sign = "-" if isinstance(node.op, ast.USub) else self.NOT if isinstance(node.op, ast.Not) else "+"
+            return f"({sign}{self.expression(node.operand)})"
+        if isinstance(node, ast.BoolOp):
+            word = self.AND if isinstance(node.op, ast.And) else self.OR
+            return "(" + f" {word} ".join(self.expression(value) for value in node.values) + ")"
+        if isinstance(node, ast.Compare):
+            return self.comparison(node)
+        if isinstance(node, ast.IfExp):
+            return self.choice(self.expression(node.test), self.expression(node.body), self.expression(node.orelse))
+        if isinstance(node, ast.Call):
+            return self.call(node)
+        raise self.refuse(node)
+
+    def comparison(self, node: ast.Compare) -> str:
+        """Also of several in a row."""
+        parts, left = [], node.left
+        for operator, right in zip(node.ops, node.comparators, strict=True):
+            word = self.UNEQUAL if isinstance(operator, ast.NotEq) else COMPARISONS[type(operator)]
+            parts.append(f"({self.expression(left)} {word} {self.expression(right)})")
+            left = right
+        return parts[0] if len(parts) == 1 else "(" + f" {self.AND} ".join(parts) + ")"
+
+    def arithmetic(self, node: ast.BinOp) -> str:
+        """Sums, products, quotients, powers."""
+        left, right = self.expression(node.left), self.expression(node.right)
+        if isinstance(node.op, ast.Pow):
+            return self.power(left, right)
+        if type(node.op) not in OPERATORS:
+            raise self.refuse(node.op)
+        return f"({left} {OPERATORS[type(node.op)]} {right})"
+
+    def statements(self, body: list[ast.stmt]) -> None:
+        """One after another, one level deeper."""
+        self.depth += 1
+        for statement in body:
+            self.statement(statement)
+        self.depth -= 1
+
+    def name(self, name: str) -> str:
+        """Of a variable."""
+        return name
+
+    def number(self, value: float) -> str:
+        raise NotImplementedError
+
+    def place(self, array: str, index: ast.expr) -> str:
+        raise NotImplementedError
+
+    def power(self, left: str, right: str) -> str:
+        raise NotImplementedError
+
+    def choice(self, test: str, yes: str, no: str) -> str:
+        raise NotImplementedError
+
+    def call(self, node: ast.Call) -> str:
+        raise NotImplementedError
+
+    def statement(self, node: ast.stmt) -> None:
+        raise NotImplementedError
+
+
+def math_name(node: ast.Call) -> str | None:
+    """The name of a function of math that is called; None of any other."""
+    at = node.func
+    return at.attr if isinstance(at, ast.Attribute) and isinstance(at.value, ast.Name) and at.value.id == "math" else None
+
+
+def range_of(node: ast.For) -> list[ast.expr]:
+    """First and end of a loop over whole numbers."""
+    if isinstance(node.iter, ast.Call) and isinstance(node.iter.func, ast.Name) and node.iter.func.id == "range":
+        given = list(node.iter.args)
+        return given if len(given) == 2 else [ast.Constant(0), given[0]]
+    raise BadInput("law", "a loop over something else than range", "for k in range(n)", "Write it in simpler terms.")

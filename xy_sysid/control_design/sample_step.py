@@ -1,0 +1,166 @@
+"""A refined model that is moved sample by sample, as a controller needs it: its generator, its numbers, its state."""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from xy_sysid.axis import interpolation, resonant_loop
+from xy_sysid.axis.model import FINE, STANDARD, AxisModel, Library
+from xy_sysid.control_design import series
+from xy_sysid.control_design.step_text import NUMBERS, ROOM, StateLayout, StepText, heeds
+from xy_sysid.effects import Effect
+from xy_sysid.effects._binding import law_names, law_texts
+from xy_sysid.effects._contract import arguments
+from xy_sysid.errors import BadInput
+from xy_sysid.jit import compiled_text
+from xy_sysid.samples.block import FloatArray
+
+SERIES = {name: getattr(series, name) for name in ("unfold", "follow", "speed_after", "stops_after", "tug")}
+LONGEST = 4096  # samples of delay that fit into a state
+
+
+@dataclass(frozen=True, slots=True)
+class Plant:
+    """An axis model at one rate, ready to be moved.
+
+    parameters, flags: of the whole library; numbers: of ``NUMBERS``; moving, still: generators in one row; layout: of its state
+    """
+
+    model: AxisModel
+    sampling_rate: float
+    parameters: FloatArray
+    flags: Any
+    numbers: FloatArray
+    moving: FloatArray
+    still: FloatArray
+    layout: StateLayout
+
+    @property
+    def order(self) -> int:
+        """n: position, speed, hanging masses and force."""
+        return round(math.sqrt(self.moving.size))
+
+    def number(self, name: str) -> float:
+        """One of ``NUMBERS``."""
+        return float(self.numbers[NUMBERS.index(name)])
+
+    def rest(self) -> FloatArray:
+        """A state at rest at position 0."""
+        return np.zeros(self.layout.ring + int(self.number("ring")))
+
+
+def sections(model: AxisModel, sampling_rate: float) -> tuple[FloatArray, FloatArray]:
+    """Zeros and poles of all resonances as polynomials of s / rate, lowest power first, monic. Raises BadInput for one without roots in s."""
+    top, bottom = np.ones(1), np.ones(1)
+    for name, values in model.effects:
+        effect = model.library[name]
+        if effect.category != "motion":
+            continue
+        section = effect.functions["section"]
+        words = dict(zip(effect.names, values, strict=True)) | {"fs": resonant_loop.FINE}
+        b0, b1, b2, a1, a2 = section(**{word: words[word] for word in arguments(section)})
+        zeros, poles = resonant_loop.roots(b1 / b0, b2 / b0, sampling_rate), resonant_loop.roots(a1, a2, sampling_rate)
+        if not (zeros[0] > 0.0 and poles[0] > 0.0):
+            raise BadInput(f"effect {name}", "a section without roots in s", "a pole-zero pair", "Leave it out of the model that is used.")
+        top, bottom = resonant_loop.times(top, np.array([*zeros, 1.0])), resonant_loop.times(bottom, np.array([*poles, 1.0]))
+    return top, bottom
+
+
+def plant(model: AxisModel, sampling_rate: float, whole: bool = True) -> Plant:
+    """The model at this rate. whole: for the loop of the whole library, else with the layout of this model alone, for printing.
+
+    Raises BadInput for a delay beyond reason, or a resonance that has no roots in s.
+    """
+    top, bottom = sections(model, sampling_rate)
+    if top.size > 1:
+        moving = resonant_loop.generator(model.gain, model.pole, top, bottom, sampling_rate)
+    else:
+        moving = np.array([[0.0, 1.0, 0.0], [0.0, -model.pole, model.gain * model.pole], [0.0, 0.0, 0.0]])
+    fastest = resonant_loop.fastest(model.pole, bottom, sampling_rate)
+    late = model.delay * sampling_rate
+    if late > LONGEST:
+        raise BadInput("delay", f"{model.delay:g} s", f"up to {LONGEST / sampling_rate:g} s at {sampling_rate:g} Hz", "Choose a lower rate.")
+    back = int(late)
+    part = late - back
+    wanted = max(fastest / (resonant_loop.STIFF * sampling_rate), FINE / sampling_rate if heeds(model) else 1.0)
+    cuts_old, cuts_new = interpolation.pieces(part, wanted)
+    cuts_old = cuts_old if part > 0.0 else 0
+    values = {
+        "gain": model.gain,
+        "pole": model.pole,
+        "turn": math.copysign(1.0, model.gain),
+        "h_old": part / sampling_rate / max(cuts_old, 1),
+        "h_new": (1.0 - part) / sampling_rate / cuts_new,
+        "cuts_old": cuts_old,
+        "cuts_new": cuts_new,
+        "back_old": back + 1,
+        "back_new": back,
+        "n": top.size + 2,
+        "ring": back + 2,
+    }
+    library = model.library.looped([model.library[name] for name, _ in model.effects]) if whole else model.library
+    effects = library.acting if whole else tuple(model.library[name] for name, _ in model.effects)
+    names = [effect.name for effect in effects]
+    parameters, flags = np.ones(3 + sum(len(effect.names) for effect in effects)), np.zeros(len(effects), dtype=np.uint8)
+    places = StepText(effects, 0).places
+    for name, row in model.effects:
+        effect = model.library[name]
+        flags[names.index(name)] = row[0] != 0.0
+        for key, value in zip(effect.names, row, strict=True):
+            parameters[places[f"{name}.{key}"]] = value
+    return Plant(
+        model=model,
+        sampling_rate=sampling_rate,
+        parameters=parameters,
+        flags=flags,
+        numbers=np.array([float(values[name]) for name in NUMBERS]),
+        moving=moving.ravel(),
+        still=resonant_loop.resting(moving).ravel(),
+        layout=StateLayout(tuple(effects), most_hanging(effects) if whole else top.size - 1),
+    )
+
+
+def most_hanging(effects: tuple[Effect, ...]) -> int:
+    """Numbers that hang on an axis with all resonances of a library."""
+    return 2 * sum(effect.category == "motion" for effect in effects)
+
+
+_COMPILED: dict[int, Callable[..., float]] = {}
+
+
+def step_of(library: Library) -> Callable[..., float]:
+    """The compiled sample step of all effects of a library; see ``StepText.text``."""
+    if id(library) not in _COMPILED:
+        writer = StepText(library.acting, most_hanging(library.acting))
+        names = {"math": math, "np": np, **SERIES, **law_names(library.acting)}
+        parts = [*law_texts(library.acting), inspect.getsource(series)]
+        _COMPILED[id(library)] = compiled_text(lambda name: writer.text(name), names, parts)
+    return _COMPILED[id(library)]
+
+
+def simulate_alone(model: AxisModel, sampling_rate: float, voltage: FloatArray, start: float = 0.0) -> FloatArray:
+    """(n,) position shown at each sample under a voltage (n,), from the speed ``start`` at position 0, m: nothing but the input drives it."""
+    ready = plant(model, sampling_rate)
+    step, state, room = step_of(model.library.looped([model.library[name] for name, _ in model.effects])), ready.rest(), np.zeros(ROOM * ready.order)
+    begin(ready, state, start)
+    shown = np.zeros(voltage.size)
+    for k, volts in enumerate(voltage[:-1].tolist()):
+        shown[k + 1] = step(volts, ready.parameters, ready.flags, ready.numbers, ready.moving, ready.still, state, room)
+    return shown
+
+
+def begin(ready: Plant, state: FloatArray, speed: float, position: float = 0.0) -> None:
+    """The state moves at this speed, and what hangs on the axis with it."""
+    top, _ = sections(ready.model, ready.sampling_rate)
+    state[0], state[1] = position, speed
+    if top.size > 1:
+        state[2] = speed / top[0]
+
+
+__all__ = ["STANDARD", "Plant", "begin", "plant", "simulate_alone", "step_of"]

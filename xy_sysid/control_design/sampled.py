@@ -1,0 +1,131 @@
+"""The linear part of a model as a computer sees it: held input, delay of any length, one sample after another; exactly.
+
+Source: Astrom & Wittenmark, Computer-Controlled Systems, 3rd ed., Prentice Hall 1997, sec. 2.3 (sampling of systems with a time delay).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+
+from xy_sysid.axis.linear_part import lag_of
+from xy_sysid.axis.model import AxisModel
+from xy_sysid.control_design.closed_loop import Controller
+from xy_sysid.control_design.sample_step import plant
+from xy_sysid.response.frf import ComplexArray
+from xy_sysid.samples.block import FloatArray
+
+EVENLY = 2048  # frequencies of a mean over all of them
+
+
+@dataclass(frozen=True, slots=True)
+class Sampled:
+    """x+ = a x + old u[k - whole - 1] + new u[k - whole], y = x[0], in m.
+
+    whole: samples of delay
+    """
+
+    sampling_rate: float
+    a: FloatArray
+    old: FloatArray
+    new: FloatArray
+    whole: int
+
+    def response(self, frequency: FloatArray) -> ComplexArray:
+        """(n,) position over voltage at frequencies, Hz."""
+        z = np.exp(2j * np.pi * frequency / self.sampling_rate)
+        n = self.old.size
+        left = z[:, None, None] * np.eye(n) - self.a
+        right = self.new + self.old / z[:, None]
+        solved = np.linalg.solve(left, right[:, :, None])
+        return np.asarray(solved[:, 0, 0] * z ** (-self.whole))
+
+    def whole_system(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """(A, B, C) with the delay as states."""
+        n, d = self.old.size, self.whole + 1
+        a, b = np.zeros((n + d, n + d)), np.zeros(n + d)
+        a[:n, :n] = self.a
+        a[:n, n + d - 1] = self.old  # the oldest voltage is the last
+        if d > 1:
+            a[:n, n + d - 2] = self.new
+            a[n + 1 :, n : n + d - 1] = np.eye(d - 1)
+        else:
+            b[:n] = self.new
+        b[n] = 1.0
+        c = np.zeros(n + d)
+        c[0] = 1.0
+        return a, b, c
+
+
+def sampled(model: AxisModel, sampling_rate: float) -> Sampled:
+    """Base, resonances, lags and delay of a model; everything else is left out."""
+    ready = plant(model, sampling_rate)
+    n = ready.order - 1
+    whole = ready.moving.reshape(n + 1, n + 1)
+    a, b = whole[:n, :n], whole[:n, n]
+    for name, values in model.effects:
+        lag = lag_of(model.library[name], values)
+        if lag is not None:
+            size = a.shape[0]
+            a = np.block([[a, b[:, None]], [np.zeros((1, size)), np.array([[-1.0 / lag]])]])
+            b = np.concatenate((np.zeros(size), [1.0 / lag]))
+    late = model.delay * sampling_rate
+    back = int(late)
+    part = (late - back) / sampling_rate
+    rest = 1.0 / sampling_rate - part
+    (first, fed_first), (last, fed_last) = _held(a, b, part), _held(a, b, rest)
+    return Sampled(sampling_rate=sampling_rate, a=last @ first, old=last @ fed_first, new=fed_last, whole=back)
+
+
+def _held(a: FloatArray, b: FloatArray, seconds: float) -> tuple[FloatArray, FloatArray]:
+    """Transition over a time and what a held input adds."""
+    n = b.size
+    made = scipy.linalg.expm(np.block([[a, b[:, None]], [np.zeros((1, n + 1))]]) * seconds)
+    return made[:n, :n], made[:n, n]
+
+
+def controller_response(controller: Controller, frequency: FloatArray, sampling_rate: float) -> ComplexArray:
+    """(n,) voltage over error at frequencies, Hz, of the controller as ``closed_loop`` runs it."""
+    z = np.exp(2j * np.pi * frequency / sampling_rate)
+    h, keeps = 1.0 / sampling_rate, controller.keeps(sampling_rate)
+    found = controller.kp + controller.ki * h / (z - 1.0) + controller.kd * (1.0 - keeps) / h * (1.0 - 1.0 / z) / (1.0 - keeps / z)
+    for b0, b1, b2, a1, a2 in controller.sections:
+        found = found * (b0 + b1 / z + b2 / z**2) / (1.0 + a1 / z + a2 / z**2)
+    return np.asarray(found)
+
+
+def controller_system(controller: Controller, sampling_rate: float) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+    """(A, B, C, D) of the same controller from error to voltage."""
+    h, keeps = 1.0 / sampling_rate, controller.keeps(sampling_rate)
+    a = np.array([[1.0, 0.0, 0.0], [0.0, keeps, -(1.0 - keeps) / h], [0.0, 0.0, 0.0]])
+    b = np.array([controller.ki * h, (1.0 - keeps) / h, 1.0])
+    c = np.array([1.0, controller.kd * keeps, -controller.kd * (1.0 - keeps) / h])
+    d = controller.kp + controller.kd * (1.0 - keeps) / h
+    for b0, b1, b2, a1, a2 in controller.sections:  # transposed direct form II, fed by what came before
+        own = np.array([[-a1, 1.0], [-a2, 0.0]])
+        fed = np.array([b1 - a1 * b0, b2 - a2 * b0])
+        a = np.block([[a, np.zeros((a.shape[0], 2))], [fed[:, None] @ c[None, :], own]])
+        b = np.concatenate((b, fed * d))
+        c = np.concatenate((b0 * c, [1.0, 0.0]))
+        d = b0 * d
+    return a, b, c, d
+
+
+def closed_poles(system: Sampled, controller: Controller) -> ComplexArray:
+    """Poles of the closed loop in z; it is stable if all are within the unit circle."""
+    a, b, c = system.whole_system()
+    ka, kb, kc, kd = controller_system(controller, system.sampling_rate)
+    top = np.hstack((a - kd * np.outer(b, c), np.outer(b, kc)))
+    bottom = np.hstack((-np.outer(kb, c), ka))
+    return np.asarray(np.linalg.eigvals(np.vstack((top, bottom))), dtype=np.complex128)
+
+
+def noise_to_voltage(system: Sampled, controller: Controller) -> float:
+    """V rms that 1 m rms of white encoder noise makes in the closed loop: the rms of its response over all frequencies; infinite if unstable."""
+    if np.max(np.abs(closed_poles(system, controller))) >= 1.0:
+        return float("inf")
+    frequency = (np.arange(EVENLY) + 0.5) / EVENLY * 0.5 * system.sampling_rate
+    own = controller_response(controller, frequency, system.sampling_rate)
+    return float(np.sqrt(np.mean(np.abs(own / (1.0 + system.response(frequency) * own)) ** 2)))

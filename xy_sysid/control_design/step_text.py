@@ -1,0 +1,334 @@
+"""The text of one sample of an axis model, written from the laws of its effects.
+
+The same lines are compiled here with every effect of the library behind a flag (``sample_step``), and printed for one model in other
+languages with its effects and numbers alone (``to_c`` and the like). So they use numbers, loops and flat arrays only, and a printed
+simulation is this one. The axis is where its own motion brings it; in ``axis.model`` it is where the recording says.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from string import Template
+
+from xy_sysid.axis.loop_source import heeds_speed, needs_speed, slots
+from xy_sysid.axis.model import AxisModel
+from xy_sysid.control_design.series import TERMS
+from xy_sysid.effects import Effect
+from xy_sysid.effects._binding import call
+from xy_sysid.effects._contract import arguments
+
+X, V, Q = 0, 1, 2  # places in a state: position, speed, what hangs on it
+NUMBERS = ("gain", "pole", "turn", "h_old", "h_new", "cuts_old", "cuts_new", "back_old", "back_new", "n", "ring")
+
+TEMPLATE = Template("""\
+def $name($signature):
+    head = int(s[$head])
+$inputs
+    s[$first + head] = held
+    for piece in range(2):
+        cuts = $cuts_old
+        h = $h_old
+        k = head - $back_old
+        if piece == 1:
+            cuts = $cuts_new
+            h = $h_new
+            k = head - $back_new
+        if k < 0:
+            k = k + $ring
+        volts = s[$first + k]
+        for _ in range(cuts):
+            v = s[1]
+            drive = volts
+            place = s[0] + 0.5 * h * v
+            time = s[$time] + 0.5 * h
+            s[$time] = s[$time] + h
+$advance
+            pull = 0.0
+$pulls
+            push = drive - pull
+$move
+    head = head + 1
+    if head == $ring:
+        head = 0
+    s[$head] = head
+    x = s[0]
+    return $shown
+""")
+
+FREE = """\
+unfold({a}, {n}, s, push - drag, w)
+middle = 0.5 * (v + speed_after({n}, w, h))
+drag = 0.0
+{drag_middle}
+unfold({a}, {n}, s, push - drag, w)
+follow({n}, w, h, s)"""
+
+PLAIN = """\
+unfold({a}, {n}, s, push, w)
+follow({n}, w, h, s)"""
+
+BRISTLED = """\
+force = push - drag
+{first}
+unfold({a}, {n}, s, force, w)
+middle = 0.5 * (v + speed_after({n}, w, h))
+{bend_first}
+drag = 0.0
+{drag_middle}
+force = push - drag
+{forces}
+unfold({a}, {n}, s, force, w)
+follow({n}, w, h, s)
+{bend_last}"""
+
+DRY = """\
+needed = push - drag + tug({a}, {n}, s)
+direction = 1.0
+if v < 0.0 or (v == 0.0 and needed * {turn} < 0.0):
+    direction = -1.0
+level = 0.0
+{rest}
+if v == 0.0 and abs(needed) <= level:
+    unfold({still}, {n}, s, push - drag, w)
+    follow({n}, w, h, s)
+else:
+    level = 0.0
+    {level_start}
+    unfold({a}, {n}, s, push - drag - {turn} * direction * level, w)
+    middle = 0.5 * (v + speed_after({n}, w, h))
+    if middle * direction < 0.0:
+        middle = 0.0
+    drag = 0.0
+    {drag_middle}
+    level = 0.0
+    {level_middle}
+    push = push - drag
+    unfold({a}, {n}, s, push - {turn} * direction * level, w)
+    if speed_after({n}, w, h) * direction >= 0.0:
+        follow({n}, w, h, s)
+    else:
+        gone = 0.0
+        if v != 0.0:
+            gone = stops_after({n}, w, h)
+            follow({n}, w, gone, s)
+            s[1] = 0.0
+        needed = push + tug({a}, {n}, s)
+        direction = 1.0
+        if needed * {turn} < 0.0:
+            direction = -1.0
+        level = 0.0
+        {rest}
+        if abs(needed) <= level:
+            unfold({still}, {n}, s, push, w)
+        else:
+            unfold({a}, {n}, s, push - {turn} * direction * level, w)
+        follow({n}, w, h - gone, s)"""
+
+
+@dataclass(frozen=True, slots=True)
+class StateLayout:
+    """Where a state holds what: position, speed and hanging masses first, then time, the ring's head, the effects' states, the ring."""
+
+    effects: tuple[Effect, ...]
+    hanging: int
+
+    @property
+    def time(self) -> int:
+        """Place of the time, s."""
+        return Q + self.hanging
+
+    @property
+    def head(self) -> int:
+        """Place of the ring's head."""
+        return self.time + 1
+
+    def state(self, effect: Effect, name: str) -> int:
+        """Place of a state of an effect."""
+        before = [(own.name, key) for own in self.effects for key in own.states]
+        return self.head + 1 + before.index((effect.name, name))
+
+    @property
+    def ring(self) -> int:
+        """Place of the ring of voltages on their way."""
+        return self.head + 1 + sum(len(effect.states) for effect in self.effects)
+
+
+def given_numbers() -> dict[str, str]:
+    """The numbers of a loop that takes them as ``z``."""
+    whole = {"cuts_old", "cuts_new", "back_old", "back_new", "n", "ring"}
+    return {name: f"int(z[{place}])" if name in whole else f"z[{place}]" for place, name in enumerate(NUMBERS)}
+
+
+class LawText:
+    """Writes calls of laws: with the numbers of a model, or behind flags with those of ``p``."""
+
+    def __init__(self, layout: StateLayout, model: AxisModel | None, numbers: Mapping[str, str]) -> None:
+        self.effects = layout.effects
+        self.layout = layout
+        self.model = model
+        self.guarded = model is None
+        self.places = slots(self.effects)
+        self.numbers = numbers
+
+    def of(self, *categories: str) -> list[Effect]:
+        """The effects of some categories, in the direction of the signal."""
+        return sorted((effect for effect in self.effects if effect.category in categories), key=lambda effect: (effect.order, effect.name))
+
+    def call(self, effect: Effect, function: str, words: Mapping[str, str]) -> str:
+        """A call of a law; words: what stands for each argument that is no parameter and no state."""
+        own = {name: self._value(effect, name) for name in effect.names}
+        states = {name: f"s[{self.layout.state(effect, name)}]" for name in effect.states}
+        return call(effect, function, {"gain": self.numbers["gain"], "pole": self.numbers["pole"], **states, **words, **own})
+
+    def _value(self, effect: Effect, name: str) -> str:
+        if self.model is None:
+            return f"p[{self.places[f'{effect.name}.{name}']}]"
+        return repr(float(dict(self.model.effects)[effect.name][effect.names.index(name)]))
+
+    def guard(self, effect: Effect, lines: list[str]) -> list[str]:
+        """Lines that run only where the effect acts."""
+        return [f"if {self.acts([effect])}:", *("    " + line for line in lines)] if self.guarded else lines
+
+    def acts(self, effects: list[Effect]) -> str:
+        """Whether one of the effects acts."""
+        return " or ".join(f"on[{self.effects.index(effect)}] != 0" for effect in effects) or "False"
+
+
+class StepText(LawText):
+    """Writes the sample step of some effects: behind flags, or of one model with its numbers (``NUMBERS``, as text)."""
+
+    def __init__(self, effects: Sequence[Effect], hanging: int, model: AxisModel | None = None, numbers: Mapping[str, str] | None = None) -> None:
+        kept = tuple(effect for effect in effects if effect.category != "base")
+        super().__init__(StateLayout(kept, hanging), model, numbers or given_numbers())
+
+    def text(self, name: str) -> str:
+        """Source of ``name(u, p, on, z, a, still, s, w)``, or for one model of ``name(u, a, still, s, w)``: the position shown after the sample.
+
+        u: voltage to be held for the sample, V; p: the library's parameters; on: flags of effects; z: ``NUMBERS``; a, still: generators of the
+        moving and the sticking axis, in one row; s: the state, which moves on; w: room for ``TERMS`` n numbers
+        """
+        at = self.layout
+        return TEMPLATE.substitute(
+            name=name,
+            signature="u, p, on, z, a, still, s, w" if self.guarded else "u, a, still, s, w",
+            head=at.head,
+            time=at.time,
+            first=at.ring,
+            inputs=_lines(1, ["held = u", *self._inputs()]),
+            advance=_lines(3, self._advance()),
+            pulls=_lines(3, self._forces("pull", False, "v")),
+            move=_lines(3, self._move()),
+            shown=self._shown(),
+            **{key: self.numbers[key] for key in ("cuts_old", "cuts_new", "h_old", "h_new", "back_old", "back_new", "ring")},
+        )
+
+    def _shown(self) -> str:
+        terms = [
+            self._if(effect, f"({self.call(effect, 'error', {'x': 'x'})} - {self.call(effect, 'error', {'x': '0.0'})})")
+            for effect in self.of("encoder")
+        ]
+        return " + ".join(["x", *terms])
+
+    def _if(self, effect: Effect, value: str) -> str:
+        return f"({value} if {self.acts([effect])} else 0.0)" if self.guarded else value
+
+    def _inputs(self) -> list[str]:
+        lines: list[str] = []
+        for effect in self.of("input"):
+            words = {"u": "held", "t": f"s[{self.layout.time}]", "x": "s[0]"}
+            lines += self.guard(effect, [f"held = {self.call(effect, 'output', words)}"])
+        return lines
+
+    def _advance(self) -> list[str]:
+        lines: list[str] = []
+        for effect in self.of("state"):
+            targets = ", ".join(["drive", *(f"s[{self.layout.state(effect, state)}]" for state in effect.states)])
+            words = {"u": "drive", "v": "v", "x": "place", "t": "time", "h": "h"}
+            lines += self.guard(effect, [f"{targets} = {self.call(effect, 'advance', words)}"])
+        return lines
+
+    def _forces(self, total: str, of_speed: bool, speed: str) -> list[str]:
+        lines: list[str] = []
+        for effect in self.of("force"):
+            if needs_speed(effect) == of_speed:
+                words = {"u": "drive", "v": speed, "x": "place", "t": "time"}
+                lines += self.guard(effect, [f"{total} += {self.call(effect, 'force', words)}"])
+        return lines
+
+    def _levels(self, speed: str) -> list[str]:
+        lines: list[str] = []
+        for effect in self.of("friction"):
+            words = {"v": speed, "direction": "direction"}
+            lines += self.guard(effect, [f"level += {self.call(effect, 'level', words)}"])
+        return lines
+
+    def _bristles(self, function: str, speed: str) -> list[str]:
+        lines: list[str] = []
+        for effect in self.of("bristle"):
+            words = {"v": speed, "h": "0.5 * h", "level": "level"}
+            state = f"s[{self.layout.state(effect, effect.states[0])}]"
+            value = self.call(effect, function, words)
+            lines += self.guard(effect, [f"{state} = {value}" if function == "bend" else f"force -= {self.numbers['turn']} * {value}"])
+        return lines
+
+    def _move(self) -> list[str]:
+        drags = self._forces("drag", True, "v")
+        parts = {
+            "drag_middle": self._forces("drag", True, "middle"),
+            "rest": self._levels("0.0"),
+            "level_start": self._levels("v"),
+            "level_middle": self._levels("middle"),
+            "first": self._bristles("force", "v"),
+            "bend_first": self._bristles("bend", "0.5 * (v + middle)"),
+            "forces": self._bristles("force", "middle"),
+            "bend_last": self._bristles("bend", "0.5 * (middle + s[1])"),
+        }
+        words = {"a": "a", "still": "still", "n": self.numbers["n"], "turn": self.numbers["turn"]}
+        start = ["drag = 0.0", *drags]
+        bristles, dry = self.of("bristle"), self.of("friction")
+        bristled = [*self._direction(), *_filled(BRISTLED, words, parts)]
+        rubbing = _filled(DRY, words, parts)
+        if self.guarded:
+            branches = [
+                f"if {self.acts(bristles)}:",
+                *("    " + line for line in bristled),
+                f"elif {self.acts(dry)}:",
+                *("    " + line for line in rubbing),
+                "else:",
+                *("    " + line for line in _filled(FREE, words, parts)),
+            ]
+            return [*start, *branches]
+        if bristles:
+            return [*start, *bristled]
+        if dry:
+            return [*start, *rubbing]
+        return [*start, *_filled(FREE, words, parts)] if drags else _filled(PLAIN, words, parts)
+
+    def _direction(self) -> list[str]:
+        """Other dry friction beside bristles scales the level at which they slide."""
+        lines = ["direction = 1.0", f"if v < 0.0 or (v == 0.0 and (push - drag) * {self.numbers['turn']} < 0.0):", "    direction = -1.0"]
+        return [*lines, "level = 0.0", *self._levels("v")] if self.of("friction") else ["level = 0.0"]
+
+
+def heeds(model: AxisModel) -> bool:
+    """Whether a law needs sub-steps: it asks for speed, place or time, or has a state."""
+    effects = [model.library[name] for name, _ in model.effects]
+    asks = {word for effect in effects if effect.category in ("force", "state") for item in effect.functions.values() for word in arguments(item)}
+    return any(heeds_speed(effect) or effect.category in ("state", "friction", "bristle") for effect in effects) or bool({"x", "t", "v"} & asks)
+
+
+def _filled(template: str, words: dict[str, str], parts: dict[str, list[str]]) -> list[str]:
+    """The lines of a template; a part takes a line of its own, with its indentation, or leaves none."""
+    lines: list[str] = []
+    for line in template.format(**words, **{name: f"\0{name}" for name in parts}).split("\n"):
+        indent, _, name = line.partition("\0")
+        lines += [indent + part for part in parts[name]] if name else [line]
+    return lines
+
+
+def _lines(depth: int, lines: Sequence[str]) -> str:
+    return "\n".join("    " * depth + line for line in lines)
+
+
+ROOM = TERMS  # numbers of ``w`` for each of the n

@@ -1,0 +1,126 @@
+"""Tables to load into a drive: dry friction by speed, and by position the force, the drag, the scale's error; what each leaves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from xy_sysid.axis.model import AxisModel
+from xy_sysid.comparison.physical_model import PhysicalModel
+from xy_sysid.control_design.laws import along, asks, friction, of_category
+from xy_sysid.control_design.uncertain import derive_row
+from xy_sysid.samples.block import FloatArray
+
+ROWS_OF_A_PERIOD = 24  # places of a table in the shortest period that it has to follow
+MOST_ROWS = 2000
+SPEEDS = 13  # in each direction
+
+
+@dataclass(frozen=True, slots=True)
+class Correction:
+    """What is added to the command, or taken from the encoder, at places or speeds.
+
+    name: ``friction``, ``force``, ``drag``, ``gain`` or ``scale``; at: (n,) places, m, or speeds, m/s
+    value, low, high: (n,) with their 95 % intervals
+    at_unit, unit: of the axis, SI; meaning: how it is used
+    before: rms of what it takes away; after: rms of half of its interval, which is what stays
+    """
+
+    name: str
+    at: FloatArray
+    value: FloatArray
+    low: FloatArray
+    high: FloatArray
+    at_unit: str
+    unit: str
+    meaning: str
+
+    @property
+    def before(self) -> float:
+        """rms without it, in ``unit``."""
+        return float(np.sqrt(np.mean(self.value**2)))
+
+    @property
+    def after(self) -> float:
+        """rms that the parameters' uncertainty leaves with it, in ``unit``; that of 1 and not of 2 standard errors."""
+        return float(np.sqrt(np.mean((0.25 * (self.high - self.low)) ** 2)))
+
+    def csv(self) -> str:
+        """With a header that names the units; read by any program."""
+        first = "speed" if self.name == "friction" else "position"
+        rows = [f"{first}_{_plain(self.at_unit)},{self.name}_{_plain(self.unit)},low,high"]
+        rows += [f"{a:.9g},{b:.7g},{c:.7g},{d:.7g}" for a, b, c, d in zip(self.at, self.value, self.low, self.high, strict=True)]
+        return "\n".join(rows) + "\n"
+
+
+def friction_table(model: PhysicalModel, top: float) -> Correction | None:
+    """Dry friction in the sense of the motion, by speed up to ``top``, m/s, both ways; None of an axis without any."""
+    if not any(of_category(model.model, "friction", "bristle")):
+        return None
+    positive = np.concatenate(([0.0], np.geomspace(1e-3 * top, top, SPEEDS)))
+    speeds = np.concatenate((-positive[::-1], positive))
+    ways = np.concatenate((-np.ones(positive.size), np.ones(positive.size)))
+
+    def of(item: AxisModel) -> FloatArray:
+        turn = math.copysign(1.0, item.gain)
+        return np.array([turn * way * friction(item, float(v), float(way)) for v, way in zip(speeds, ways, strict=True)])
+
+    value, low, high = derive_row(model, of)
+    meaning = "add to the command while the path moves at this speed; the two rows at 0 are breakaway back and forth"
+    units = model.units
+    return Correction(name="friction", at=speeds, value=value, low=low, high=high, at_unit=units.speed, unit=units.input, meaning=meaning)
+
+
+def position_tables(model: PhysicalModel, travel: tuple[float, float]) -> tuple[Correction, ...]:
+    """By position over the travel, m: force, drag, gain and scale error, of those that the model has."""
+    places = _places(model.model, travel)
+    kinds: tuple[tuple[str, str, str, Callable[[AxisModel], bool]], ...] = (
+        ("force", "V", "add to the command at this position", _has_force),
+        ("drag", "V/(m/s)", "add to kV at this position", _has_drag),
+        ("gain", "", "divide the command by this at this position", _has_gain),
+        ("scale", "m", "the encoder shows so much too much: subtract it from what is shown, or add it to the position asked for", _has_scale),
+    )
+    found = []
+    for name, unit, meaning, has in kinds:
+        if has(model.model):
+            value, low, high = derive_row(model, _along(places, name))
+            shown = model.units.of(unit) if unit else ""
+            found.append(Correction(name=name, at=places, value=value, low=low, high=high, at_unit=model.units.output, unit=shown, meaning=meaning))
+    return tuple(found)
+
+
+def _along(places: FloatArray, what: str) -> Callable[[AxisModel], FloatArray]:
+    return lambda item: along(item, places, what)
+
+
+def _has_force(model: AxisModel) -> bool:
+    return any("x" in asks(effect) and not {"v", "u"} & asks(effect) for effect, _ in of_category(model, "force"))
+
+
+def _has_drag(model: AxisModel) -> bool:
+    return any({"x", "v"} <= asks(effect) and "u" not in asks(effect) for effect, _ in of_category(model, "force"))
+
+
+def _has_gain(model: AxisModel) -> bool:
+    return any({"x", "u"} <= asks(effect) for effect, _ in of_category(model, "force"))
+
+
+def _has_scale(model: AxisModel) -> bool:
+    return any(of_category(model, "encoder"))
+
+
+def _places(model: AxisModel, travel: tuple[float, float]) -> FloatArray:
+    """Places over the travel, so dense that the shortest period has enough of them."""
+    periods = [dict(zip(model.library[name].names, values, strict=True)).get("period", math.inf) for name, values in model.effects]
+    periods += [2.0 * math.pi for name, _ in model.effects if model.library[name].angular]
+    way = travel[1] - travel[0]
+    rows = min(max(math.ceil(way / min(periods, default=math.inf) * ROWS_OF_A_PERIOD) + 1, 2 * ROWS_OF_A_PERIOD + 1), MOST_ROWS)
+    return np.linspace(travel[0], travel[1], rows)
+
+
+def _plain(unit: str) -> str:
+    """A unit as part of a column's name."""
+    return unit.replace("/(", "/").replace(")", "").replace("/", "_per_").replace(" ", "_") or "1"

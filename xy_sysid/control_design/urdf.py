@@ -1,0 +1,44 @@
+"""A refined model as URDF: mass, damping, friction and limits of one joint; everything else is named in a comment."""
+
+from __future__ import annotations
+
+import math
+
+from xy_sysid.axis.model import AxisModel
+from xy_sysid.control_design.laws import friction, largest_voltage
+from xy_sysid.effects._contract import Effect
+
+
+def urdf(model: AxisModel, travel: tuple[float, float], limit: float, angular: bool, name: str = "axis") -> tuple[str, tuple[tuple[str, str], ...]]:
+    """(text, what is lost by effect); travel: m or rad; limit: of the drive, infinite if nobody knows it."""
+    level = 0.5 * (friction(model, abs(model.gain), 1.0) + friction(model, -abs(model.gain), -1.0))
+    lost = [(effect, _lost(model.library[effect])) for effect, _ in model.effects]
+    if model.delay > 0.0:
+        lost.append(("time_delay", "URDF knows no delay"))
+    top = min(limit, largest_voltage(model))
+    effort = top if math.isfinite(top) else 1e3 / abs(model.gain)
+    mass = 1.0 / (abs(model.gain) * model.pole)
+    kind = "revolute" if angular else "prismatic"
+    axis = "0 0 1" if angular else "1 0 0"
+    inertia = f'ixx="{mass:.9g}" ixy="0" ixz="0" iyy="{mass:.9g}" iyz="0" izz="{mass:.9g}"'
+    lines = [
+        '<?xml version="1.0"?>',
+        f'<robot name="{name}">',
+        "  <!-- forces are in the unit of the input: the mass is kA, the damping kV -->",
+        *(f"  <!-- lost: {effect}: {why} -->" for effect, why in lost),
+        '  <link name="base"/>',
+        f'  <link name="{name}">',
+        f'    <inertial><origin xyz="0 0 0"/><mass value="{mass:.9g}"/><inertia {inertia}/></inertial>',
+        "  </link>",
+        f'  <joint name="{name}" type="{kind}">',
+        f'    <parent link="base"/><child link="{name}"/><axis xyz="{axis}"/>',
+        f'    <limit lower="{travel[0]:.9g}" upper="{travel[1]:.9g}" effort="{effort:.9g}" velocity="{abs(model.gain) * effort:.9g}"/>',
+        f'    <dynamics damping="{1.0 / abs(model.gain):.9g}" friction="{level:.9g}"/>',
+        "  </joint>",
+        "</robot>",
+    ]
+    return "\n".join(lines) + "\n", tuple(lost)
+
+
+def _lost(effect: Effect) -> str:
+    return "only its mean level at speed is kept" if effect.is_dry else "URDF has no word for it"

@@ -1,0 +1,206 @@
+"""One call: everything that an engineer does next with a refined model."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+
+from xy_sysid.axis.model import AxisModel
+from xy_sysid.comparison.physical_model import PhysicalModel
+from xy_sysid.control_design.closed_loop import NO_LIMIT, Encoder
+from xy_sysid.control_design.feedback import Feedback, feedback
+from xy_sysid.control_design.filters import Notch, Shaper, Swing, best_shaper, modes, notch, shapers
+from xy_sysid.control_design.gains import Gains, gains
+from xy_sysid.control_design.inverse import not_undone
+from xy_sysid.control_design.laws import largest_voltage
+from xy_sysid.control_design.limits import Fastest, fastest
+from xy_sysid.control_design.path import Bounds, recorded, s_curve
+from xy_sysid.control_design.tables import Correction, friction_table, position_tables
+from xy_sysid.control_design.uncertain import Derived, derive, samples
+from xy_sysid.control_design.worth import Predicted, Tracking, predicted, tracked
+from xy_sysid.errors import BadInput
+from xy_sysid.greybox.floor import count_size, encoder_noise
+from xy_sysid.linear.any_model import AnyModel
+from xy_sysid.samples.recording import Recording, Run, one_run
+
+RATE = 2000.0  # Hz of the controller, where nobody says another
+WORST_OF = 6  # samples of the parameters along a path
+CALM = 0.6  # of the fastest path's speed, for the path that tracking is compared on
+FOLLOWED = 0.2  # of the bandwidth: what of a recorded motion a loop is asked to follow
+LONGEST = 10.0  # s of a recorded motion that is followed
+SWING = 0.05  # m (or the output's unit) of the path, where no recording and no travel say another
+Found = TypeVar("Found")
+
+
+@dataclass(frozen=True, slots=True)
+class Used:
+    """What to do with a model; ``axis`` and ``model.units`` say of what.
+
+    sampling_rate: Hz of the controller; limit: V of the drive, infinite if nobody knows it; limit_from: who said so
+    travel: m, that tables and paths cover; gains, friction, tables, gap: feedforward and corrections (None: the axis has none)
+    feedback, modes, notch, shaper, fastest: None where there is nothing to design, or where it was refused
+    predicted, tracking: before and after, the former only with a recording
+    refused: (what, why) of what could not be designed; not_undone: (effect, why) of what the feedforward leaves; notes: to be read first
+    """
+
+    axis: str
+    model: PhysicalModel
+    sampling_rate: float
+    limit: float
+    limit_from: str
+    travel: tuple[float, float]
+    gains: Gains
+    friction: Correction | None
+    tables: tuple[Correction, ...]
+    gap: Derived | None
+    feedback: Feedback | None
+    modes: tuple[Swing, ...]
+    notch: Notch | None
+    shaper: Shaper | None
+    fastest: Fastest | None
+    predicted: Predicted | None
+    tracking: tuple[Tracking, ...]
+    refused: tuple[tuple[str, str], ...]
+    not_undone: tuple[tuple[str, str], ...]
+    notes: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        named = ", ".join(f"{item.name} {item.value:.4g}" for item in self.gains.items[:3])
+        loop = f", bandwidth {self.feedback.bandwidth:.3g} Hz" if self.feedback is not None else ""
+        return f"<Used: axis {self.axis}, {named}{loop}>"
+
+
+def use(
+    model: AnyModel,
+    data: Run | Recording | None = None,
+    rate: float | None = None,
+    limit: float | None = None,
+    bandwidth: float | None = None,
+    travel: tuple[float, float] | None = None,
+) -> Used:
+    """Feedforward with intervals, correction tables, feedback with margins, filters, limits, and what they are worth.
+
+    model: of ``refine`` or a file; data: a recording of the same machine, for before and after on its own motion, its noise and its limit
+    rate: Hz of the controller (the recording's, or 2 kHz); limit: V of the drive (the model's saturation, or the recording's largest voltage)
+    bandwidth: Hz, asked of the loop (the largest with the margins by default); travel: m, that tables cover (the recording's)
+    Raises BadInput for a transfer function, or values out of range. What cannot be designed safely is in ``refused``.
+    """
+    if not isinstance(model, PhysicalModel):
+        raise BadInput("model", type(model).__name__, "a model with physical effects", "Make one with refine, or xy-sysid refine --model.")
+    run = None if data is None else one_run(data)
+    if run is not None and run.units != model.units:
+        raise BadInput("units of the recording", "/".join(run.units), "/".join(model.units), "Give a recording in the model's units.")
+    rate = rate or (run.sampling_rate if run is not None else RATE)
+    if not 1.0 <= rate <= 1e6:
+        raise BadInput("rate", f"{rate:g} Hz", "1 to 1e6 Hz", "Give the controller's rate.")
+    drive, drive_from = _limit(model, run, limit)
+    between = travel or _travel(run)
+    if not between[0] < between[1]:
+        raise BadInput("travel", f"{between[0]:g} to {between[1]:g}", "two places, the lower first", "Give --travel LOW HIGH.")
+    encoder = Encoder() if run is None else _encoder(run)
+    refused: list[tuple[str, str]] = []
+    found = gains(model)
+    loop = _tried("feedback", lambda: feedback(model, rate, bandwidth, encoder=encoder, limit=drive), refused)
+    swings = modes(model)
+    models = _tried("worst cases", lambda: samples(model, WORST_OF), refused) or (model.model,)
+    centre = 0.5 * (between[0] + between[1])
+    ends = [centre, between[1], between[0], centre]
+    quick = None
+    if drive < NO_LIMIT:
+        quick = _tried("fastest path", lambda: fastest(models, ends, drive, rate), refused)
+    tracking: list[Tracking] = []
+    if loop is not None:
+        paths = []
+        if quick is not None:
+            calm = Bounds(CALM * quick.bounds.speed, CALM**2 * quick.bounds.acceleration, CALM**3 * quick.bounds.jerk)
+            paths.append(("S-curve over the travel", s_curve(ends, calm, rate)))
+        if run is not None and run.sampling_rate == rate:
+            own = run.until(min(run.seconds, LONGEST))
+            paths.append(("the recorded motion", recorded(own.position, rate, FOLLOWED * loop.bandwidth)))
+        tracking = [tracked(models, found, loop.controller, path, encoder) for path in paths]
+    return Used(
+        axis=model.axis or (run.axis if run is not None else "x"),
+        model=model,
+        sampling_rate=rate,
+        limit=drive if drive < NO_LIMIT else math.inf,
+        limit_from=drive_from,
+        travel=between,
+        gains=found,
+        friction=friction_table(model, max(0.5 * min(drive, 4.0) * abs(model.model.gain), 1e-12)),
+        tables=position_tables(model, between),
+        gap=_gap(model),
+        feedback=loop,
+        modes=swings,
+        notch=notch(swings[0], rate, loop.nominal.crossover) if swings and loop is not None else None,
+        shaper=best_shaper(shapers(swings[0])) if swings else None,
+        fastest=quick,
+        predicted=None if run is None else _tried("prediction", lambda: predicted(model, found, run), refused),
+        tracking=tuple(tracking),
+        refused=tuple(refused),
+        not_undone=not_undone(model.model),
+        notes=_notes(model, run, found),
+    )
+
+
+def _tried(what: str, make: Callable[[], Found], refused: list[tuple[str, str]]) -> Found | None:
+    """The result; or None, and why among the refusals."""
+    try:
+        return make()
+    except BadInput as problem:
+        refused.append((what, str(problem)))
+        return None
+
+
+def _limit(model: PhysicalModel, run: Run | None, given: float | None) -> tuple[float, str]:
+    if given is not None:
+        if not 0.0 < given < math.inf:
+            raise BadInput("limit", f"{given:g} V", "above 0 and finite", "Give the drive's largest voltage.")
+        return given, "given"
+    own = largest_voltage(model.model)
+    if own < math.inf:
+        return own, "the model's"
+    if run is not None:
+        return float(np.max(np.abs(run.voltage))), "the largest that the recording has; the drive may have more"
+    return NO_LIMIT, "not known"
+
+
+def _travel(run: Run | None) -> tuple[float, float]:
+    if run is None:
+        return -0.5 * SWING, 0.5 * SWING
+    return float(np.min(run.position)), float(np.max(run.position))
+
+
+def _encoder(run: Run) -> Encoder:
+    count = count_size(run.position)
+    noise = encoder_noise(run.sampling_rate, run.position)
+    return Encoder(noise=math.sqrt(max(noise**2 - count**2 / 12.0, 0.0)), count=count)
+
+
+def _gap(model: PhysicalModel) -> Derived | None:
+    """The free play of an effect that has one, as a correction by direction."""
+    for name, _ in model.model.effects:
+        places = [k for k, item in enumerate(model.model.library[name].parameters) if item.name == "gap"]
+        if places:
+            meaning = "free play: add half of it to the position asked for while moving forth, and subtract half while moving back"
+            return derive(model, "gap", "m", meaning, _parameter(name, places[0]))
+    return None
+
+
+def _parameter(name: str, place: int) -> Callable[[AxisModel], float]:
+    return lambda model: dict(model.effects)[name][place]
+
+
+def _notes(model: PhysicalModel, run: Run | None, found: Gains) -> tuple[str, ...]:
+    notes = []
+    if not model.parameters:
+        notes.append("the model has no intervals, so nobody knows how sure these numbers are: write it with refine --model")
+    notes += [item.doubt for item in found.items if model.parameters and item.doubt]
+    if run is not None and run.digest in model.data:
+        notes.append("the model was fitted to this very recording: before and after say how well it explains it, not how well it predicts another")
+    if model.doubt:
+        notes.append(model.doubt)
+    return tuple(notes)

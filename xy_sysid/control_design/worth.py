@@ -1,0 +1,98 @@
+"""What a feedforward is worth: the recorded voltage predicted from the recorded motion, and tracking errors with the refined model in the loop."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.signal
+
+from xy_sysid.axis.model import AxisModel
+from xy_sysid.comparison.physical_model import PhysicalModel
+from xy_sysid.control_design.closed_loop import Controller, Encoder, follow_path
+from xy_sysid.control_design.gains import Gains, simple_feedforward
+from xy_sysid.control_design.inverse import feedforward
+from xy_sysid.control_design.path import ORDER, Motion, recorded
+from xy_sysid.greybox.floor import encoder_noise
+from xy_sysid.samples.block import FloatArray
+from xy_sysid.samples.recording import Run
+
+HEARD = 0.05  # of the voltage's rms: what encoder noise may make of a predicted voltage
+HIGHEST, LOWEST = 0.05, 0.005  # of the sampling rate: bounds of the frequency below which voltages are compared
+WIDER = 4.0  # times as high is where the motion is cut, so that its reversals stay where they are
+EDGE = 0.02  # of the recording at each end that a filter without delay spoils
+
+
+@dataclass(frozen=True, slots=True)
+class Predicted:
+    """The recorded voltage against what the recorded motion asks for.
+
+    below: Hz, the part of both that is compared; voltage: rms of what was recorded, V
+    inertia, simple, whole: rms of what is left without prediction of friction (kV, kA), with kS and kG too, and with the whole feedforward, V
+    """
+
+    below: float
+    voltage: float
+    inertia: float
+    simple: float
+    whole: float
+
+
+@dataclass(frozen=True, slots=True)
+class Tracking:
+    """Tracking errors, m rms, in the simulation of the refined model under the same feedback.
+
+    path: in words; feedback, simple, whole: alone, with kS, kV and kA, with the whole feedforward
+    worst: of the whole feedforward over samples of the axis' parameters; largest: V, its largest voltage; limit: V
+    """
+
+    path: str
+    feedback: float
+    simple: float
+    whole: float
+    worst: float
+    largest: float
+    limit: float
+
+
+def predicted(model: PhysicalModel, found: Gains, run: Run) -> Predicted:
+    """The voltage of a run from its motion. Raises BadInput where the run is too short."""
+    below = clear_below(model, run)
+    path = recorded(run.position, run.sampling_rate, WIDER * below)
+    sos = scipy.signal.butter(ORDER, below, fs=run.sampling_rate, output="sos")
+    edge = max(int(EDGE * len(run)), 1)
+
+    def heard(voltage: FloatArray) -> FloatArray:
+        return np.asarray(scipy.signal.sosfiltfilt(sos, voltage)[edge:-edge])
+
+    wanted = heard(run.voltage)
+    early = path.ahead(model.model.delay + 0.5 / run.sampling_rate)  # each is given the delay: it is their laws that are compared
+    tries = (simple_feedforward(found, early, False), simple_feedforward(found, early), feedforward(model.model, path).voltage)
+    left = [float(np.sqrt(np.mean((wanted - heard(voltage)) ** 2))) for voltage in tries]
+    return Predicted(below=below, voltage=float(np.sqrt(np.mean(wanted**2))), inertia=left[0], simple=left[1], whole=left[2])
+
+
+def clear_below(model: PhysicalModel, run: Run) -> float:
+    """Hz: below it the encoder's noise makes little of a voltage that is calculated from the measured motion."""
+    noise, size = encoder_noise(run.sampling_rate, run.position), float(np.std(run.voltage))
+    own = abs(model.model.gain * model.model.pole)
+    top = (HEARD * size * own / max(noise, 1e-300)) ** 0.5 / (2.0 * np.pi)
+    return float(np.clip(top, LOWEST * run.sampling_rate, HIGHEST * run.sampling_rate))
+
+
+def tracked(models: Sequence[AxisModel], found: Gains, controller: Controller, path: tuple[str, Motion], encoder: Encoder) -> Tracking:
+    """The path followed by the first model with each feedforward, and by the others with the whole one of the first."""
+    name, wanted = path
+    simple, whole = simple_feedforward(found, wanted), feedforward(models[0], wanted).voltage
+    runs = [follow_path(models[0], wanted, controller, extra, encoder) for extra in (None, simple, whole)]
+    others = [follow_path(model, wanted, controller, whole, encoder).rms for model in models[1:]]
+    return Tracking(
+        path=name,
+        feedback=runs[0].rms,
+        simple=runs[1].rms,
+        whole=runs[2].rms,
+        worst=max([runs[2].rms, *others]),
+        largest=float(np.max(np.abs(runs[2].voltage))),
+        limit=controller.limit,
+    )
