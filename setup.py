@@ -7,6 +7,8 @@ from setuptools import find_packages, setup
 NAME = "xy_sysid"
 HOME = "https://github.com/xy-sysid/xy_sysid"  # also in package.xml
 ROS_WHEELS = "sys_platform == 'linux' and platform_machine == 'x86_64'"
+# importlib-metadata: dask needs it on Python 3.11, and its version 10 would bring a package of no use here
+FLEET = ["dask[distributed]", "pyarrow", "bokeh", "importlib-metadata<9"]
 ISAL = "isal; platform_machine in 'x86_64 AMD64 aarch64 arm64'"  # fast checksums; elsewhere zlib's will do
 
 
@@ -53,6 +55,7 @@ setup(
         "ulog": ["pyulog"],
         "wpilog": ["robotpy-wpiutil"],
         "parquet": ["pyarrow"],
+        "fleet": FLEET,
         "bench": ["scikit-rf", "pyFRF"],
         "test": [
             "matplotlib",
@@ -74,7 +77,10 @@ setup(
             "npTDMS",
             "pyulog",
             f"robotpy-wpiutil; {ROS_WHEELS}",
-            "pyarrow",
+            *FLEET,
+            "duckdb",
+            "pandas",
+            "polars",
             "colcon-core",
             "colcon-ros",
             "colcon-bash",

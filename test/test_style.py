@@ -27,7 +27,7 @@ effects axis greybox comparison hypotheses diagnosis
 story live
 """)
 EDGE = names("""
-bags imports files processes
+bags imports files processes fleets
 nodes report page cli
 """)
 ORDER = [*CORE, *EDGE]

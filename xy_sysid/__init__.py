@@ -22,6 +22,7 @@ Packages in the order of the data; each imports only from those before it.
     hypotheses, diagnosis:     which effect is missing
     story, live:               what people are shown, and the online logic
     bags, imports, files, processes: reading, writing, other processes
+    fleets:                     many recordings of many machines, and what changes over time
     nodes, report, page, cli:  what people meet
 
 What everybody knows stands beside them: ``errors``, ``settings``, ``units``, ``jit``. The names of ``__all__`` are for everybody, each made
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
     from xy_sysid.files.effects import library
     from xy_sysid.files.models import load_model, save
     from xy_sysid.fitting.of_run import LinearModel, fit, frf
+    from xy_sysid.fleets.of_paths import fleet
     from xy_sysid.imports import load
     from xy_sysid.imports.response_file import frf_from
     from xy_sysid.linear.reduction import balanced_truncation
@@ -72,6 +74,7 @@ __all__ = [
     "compare",
     "diagnose",
     "fit",
+    "fleet",
     "frf",
     "frf_from",
     "library",
@@ -101,6 +104,7 @@ _HOMES = {
     "imports": ("load",),
     "imports.response_file": ("frf_from",),
     "files.models": ("load_model", "save"),
+    "fleets.of_paths": ("fleet",),
     "cli.simulated_recording": ("simulate",),
     "errors": ("BadInput", "BadRecording", "MissingExtra", "XySysidError"),
 }

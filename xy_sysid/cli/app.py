@@ -13,6 +13,7 @@ from xy_sysid.cli.diagnose import diagnose
 from xy_sysid.cli.effects import effects
 from xy_sysid.cli.figures import figures
 from xy_sysid.cli.fit import fit
+from xy_sysid.cli.fleet import fleet
 from xy_sysid.cli.frf import frf
 from xy_sysid.cli.page import page
 from xy_sysid.cli.record import record
@@ -49,5 +50,7 @@ def _program(
     pass
 
 
-for command in (demo, page, run, record, replay, simulate, columns, frf, fit, validate, compare, diagnose, refine, effects, study, report, figures):
+ONE = (simulate, columns, frf, fit, validate, compare, diagnose, refine, effects, study, report, figures)
+MANY = (fleet,)
+for command in (demo, page, run, record, replay, *ONE, *MANY):
     app.command(name=command.__name__)(command)
