@@ -1,6 +1,6 @@
 """python -m bench [--short] [name ...]: run the benchmarks and write docs/benchmarks.md.
 
-h1, fit, replay, bags, live and intervals run without a name. Only by name: long_bag (a day of data, gigabytes on disk), axis_model, and of the
+h1, fit, replay, bags, live and intervals run without a name. Only by name: long_bag (a day of data, gigabytes on disk), axis_model, fleet, trend, and of the
 recordings of real machines in $XY_SYSID_DATA real_fits, peers and diagnoses. The last two write their tables to docs/real-machines.md.
 --short: a little of each, as the tests run it; nothing is written.
 """
@@ -18,7 +18,7 @@ from pathlib import Path
 from bench.tables import Table
 
 TABLES = ("h1", "fit", "replay", "bags", "live", "intervals")
-SCRIPTS = ("long_bag", "axis_model", "real_fits", "peers", "diagnoses")
+SCRIPTS = ("long_bag", "axis_model", "real_fits", "peers", "diagnoses", "fleet", "trend")
 PAGE = Path(__file__).parents[1] / "docs" / "benchmarks.md"
 
 

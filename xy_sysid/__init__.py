@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from xy_sysid.files.models import load_model, save
     from xy_sysid.fitting.of_run import LinearModel, fit, frf
     from xy_sysid.fleets.of_paths import fleet
+    from xy_sysid.fleets.trends import trend
     from xy_sysid.imports import load
     from xy_sysid.imports.response_file import frf_from
     from xy_sysid.linear.reduction import balanced_truncation
@@ -86,6 +87,7 @@ __all__ = [
     "simulate",
     "to_control",
     "to_scipy",
+    "trend",
     "validate",
 ]
 
@@ -105,6 +107,7 @@ _HOMES = {
     "imports.response_file": ("frf_from",),
     "files.models": ("load_model", "save"),
     "fleets.of_paths": ("fleet",),
+    "fleets.trends": ("trend",),
     "cli.simulated_recording": ("simulate",),
     "errors": ("BadInput", "BadRecording", "MissingExtra", "XySysidError"),
 }

@@ -23,6 +23,7 @@ from xy_sysid.cli.report import report
 from xy_sysid.cli.simulate import simulate
 from xy_sysid.cli.start import run
 from xy_sysid.cli.study import study
+from xy_sysid.cli.trend import trend
 from xy_sysid.cli.validate import validate
 
 app = typer.Typer(
@@ -51,6 +52,6 @@ def _program(
 
 
 ONE = (simulate, columns, frf, fit, validate, compare, diagnose, refine, effects, study, report, figures)
-MANY = (fleet,)
+MANY = (fleet, trend)
 for command in (demo, page, run, record, replay, *ONE, *MANY):
     app.command(name=command.__name__)(command)

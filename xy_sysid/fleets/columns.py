@@ -64,7 +64,7 @@ _DIAGNOSIS = (
     Column("noise_floor", "number", "m/s", "least error that a model can be known to have, rms"),
     Column("noise", "number", "m/s", "what the encoder adds to the error, rms", trended=True),
     Column("discrepancy", "number", "m/s", "what no effect explains, rms"),
-    Column("model", "text", "", "effects of the model whose parameters follow: those named, or those that the fleet follows"),
+    Column("model", "text", "", "effects of the model whose parameters follow: those that are named, and those that the fleet follows"),
     Column("one_step", "truth", "", "the model is judged one sample ahead (backlash), and its held-out error is of that"),
 )
 _ORIGIN = (

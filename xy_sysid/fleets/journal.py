@@ -19,7 +19,7 @@ from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.fleets.row import Row
 from xy_sysid.fleets.table import merged
 
-FILE = "_journal.jsonl"  # readers of Parquet leave out names that begin with _
+FILE = ".journal.jsonl"  # readers of Parquet leave out names that begin with a dot
 MANY = 500  # rows after which they go into the table
 
 
@@ -75,7 +75,6 @@ def journal(folder: Path, library: Library = STANDARD) -> Iterator[Journal]:
             yield kept
         finally:
             kept.fold()
-    (folder / FILE).unlink(missing_ok=True)
 
 
 def _written(value: Any) -> Any:

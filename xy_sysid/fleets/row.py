@@ -30,7 +30,7 @@ Row = dict[str, Any]
 class Plan:
     """How an axis is analysed.
 
-    follow:  effects whose parameters are estimated in every recording, named or not: so that they can be compared over time
+    follow:  effects whose parameters are estimated in every recording, named or not, together with those that are named
     library: the effects that are known; clock: processor time, s
     """
 
@@ -122,11 +122,9 @@ def _diagnosis(recording: Recording, run: Run, plan: Plan) -> Row:
 
 
 def _followed(runs: tuple[Run, ...], plan: Plan, found: Diagnosis) -> Row:
-    """The parameters of the effects that are followed, of a fit with exactly these."""
-    assert found.ladder is not None
-    if set(found.effects) == set(plan.follow):
-        return {}
-    return _of_fit(refined(runs, plan.follow, plan.library, Effort(0)).ladder.final)
+    """The parameters of a fit with the effects that are named and those that are followed; nothing new where all of these are named."""
+    more = tuple(name for name in plan.follow if name not in found.effects)
+    return _of_fit(refined(runs, (*found.effects, *more), plan.library, Effort(0)).ladder.final) if more else {}
 
 
 def _of_fit(fitted: GreyboxFit) -> Row:
