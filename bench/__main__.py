@@ -1,7 +1,8 @@
 """python -m bench [--short] [name ...]: run the benchmarks and write docs/benchmarks.md.
 
-h1, fit, replay, bags, live and intervals run without a name. Only by name: long_bag (a day of data, gigabytes on disk), axis_model, fleet, trend, and of the
-recordings of real machines in $XY_SYSID_DATA real_fits, peers and diagnoses. The last two write their tables to docs/real-machines.md.
+h1, fit, replay, bags, live and intervals run without a name. Only by name: long_bag (a day of data, gigabytes on disk), axis_model, fleet (a year
+of 20 machines), trend, and of the recordings of real machines in $XY_SYSID_DATA real_fits, peers and diagnoses. The last two write their tables to
+docs/real-machines.md.
 --short: a little of each, as the tests run it; nothing is written.
 """
 

@@ -142,7 +142,7 @@ def of_axes(every: Sequence[Axis], known: Causes, axis_months: float = AXIS_MONT
     count = sum(len(one.histories) for one in every)
     for number, one in enumerate(every):
         for history in one.histories:
-            every_evidence[number, history.column] = evidence(_newest(history))
+            every_evidence[number, history.column] = evidence(_newest(history))[0]
             tell(len(every_evidence) / count)
     weights = {name: learned(item for (_, column), item in every_evidence.items() if column == name) for name in {key[1] for key in every_evidence}}
     trends: list[Trend] = []
@@ -175,7 +175,8 @@ def _trend(axis: Axis, history: History, weights: FloatArray, known: Evidence, a
         ended = int(np.searchsorted(series.time, series.time[last.after] + last.duration))
         start = min(max(ended, last.after + 1), series.value.size - 2)
     quiet = series.after(start)
-    between, _ = spread(quiet.after(max(quiet.value.size - LONGEST, 0)), weights)
+    _, quiet = evidence(quiet.after(max(quiet.value.size - LONGEST, 0)))
+    between, _ = spread(quiet, weights)
     width = Z95 * np.sqrt(series.sigma**2 + between**2)
     weight = 1.0 / (quiet.sigma**2 + between**2)
     mean = float(np.sum(weight * quiet.value) / np.sum(weight))
