@@ -130,7 +130,7 @@ def test_a_recording_that_kills_its_process_is_tried_twice_and_is_a_row(data: Pa
     deadly = tmp_path / "deadly.py"
     tries = tmp_path / "tries"
     deadly.write_text(f"import os\nopen({str(tries)!r}, 'a').write('x')\nos.kill(os.getpid(), 9)\n", encoding="utf-8")
-    paths = sorted((data / "mill-01").glob("*.npz"))
+    paths = sorted((data / "mill-01").glob("*.npz"))[:2]
     tasks = [Task(str(paths[0]), effect_files=(str(deadly),)), *(Task(str(path)) for path in paths[1:])]
     found = {done.path: done.rows[0] for done, _ in results(client, tasks)}
     assert found[str(paths[0])]["stage"] == "worker" and "died twice" in found[str(paths[0])]["problem"]
@@ -143,13 +143,13 @@ def workers(client: Any) -> list[int]:
 
 
 def test_a_killed_command_goes_on_where_it_was(tmp_path: Path, client: Any) -> None:
-    """kill -9 of the command in the middle: what it had done is not done again."""
+    """kill -9 of the command in the middle, which works on another's cluster: what it had done is not done again."""
     data, table = made(tmp_path / "data"), tmp_path / "table"
-    command = subprocess.Popen([*COMMAND, "fleet", str(data), "-o", str(table), "--workers", "1"], env=bare(), stderr=subprocess.DEVNULL)
+    arguments = [*COMMAND, "fleet", str(data), "-o", str(table), "--scheduler", client.scheduler.address]
+    command = subprocess.Popen(arguments, env=bare(), stderr=subprocess.DEVNULL)
     waited(lambda: (table / FILE).exists() and (table / FILE).stat().st_size > 0)
     command.kill()
     command.wait()
-    assert not list(table.glob("*.parquet")), "it was killed before it wrote the table"
     now = run([data], table, Analysis(), client)
     assert now.unchanged >= 1 and now.done == 7 and read(table).num_rows == 7
 

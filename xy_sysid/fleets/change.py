@@ -17,6 +17,7 @@ sample size of certain sequential tests, Ann. Statist. 3 (1975); Shin, Ramdas & 
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
@@ -30,7 +31,7 @@ from xy_sysid.samples.block import FloatArray
 SPREADS = np.geomspace(3e-4, 0.3, 14)  # tau, part of the level
 SLOW = ((0.0, 1.0), *((part, length) for part in (0.3, 0.7, 1.0) for length in (3.0, 12.0)))  # part of tau^2, and length, of what is slow
 DURATIONS = (0.0, 5.0, 20.0, 80.0)  # of a change, usual distances between recordings
-SIZES = (0.01, 0.03, 0.1, 0.3, 1.0)  # standard deviation of a change, part of the level
+SIZES = (0.01, 0.04, 0.16, 0.64)  # standard deviation of a change, part of the level
 ODD = 0.01  # probability that a recording is off; that the next one is off, too, is as probable again
 SURE = 0.99  # probability from which a recording counts as off once and for all
 UNLIMITED = 1.0  # standard error, part of the level, of what is off
@@ -102,11 +103,13 @@ class Change:
     statistic: float
 
 
-def grid() -> list[Wander]:
+@functools.cache
+def grid() -> tuple[Wander, ...]:
     """Every wander that is weighed."""
-    return [Wander(float(spread), part, length) for part, length in SLOW for spread in SPREADS]
+    return tuple(Wander(float(spread), part, length) for part, length in SLOW for spread in SPREADS)
 
 
+@functools.cache
 def usual() -> FloatArray:
     """(g,) log weights of the grid when nothing else is known: half a normal distribution of the spread, and all else alike."""
     log = np.array([-0.5 * (one.spread / USUAL) ** 2 for one in grid()])
