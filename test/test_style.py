@@ -27,7 +27,7 @@ effects axis greybox comparison hypotheses diagnosis experiment_design
 story live control_design
 """)
 EDGE = names("""
-bags imports files processes
+bags imports files processes fleets
 nodes report page cli front_door
 """)
 ORDER = [*CORE, *EDGE]

@@ -25,6 +25,7 @@ Packages in the order of the data; each imports only from those before it.
     story, live:               what people are shown, and the online logic
     control_design:            what to do with the model
     bags, imports, files, processes: reading, writing, other processes
+    fleets:                     many recordings of many machines, and what changes over time
     nodes, report, page, cli:  what people meet
     front_door:                the public functions as people call them
 
@@ -50,6 +51,8 @@ if TYPE_CHECKING:
     from xy_sysid.files.effects import library
     from xy_sysid.files.models import load_model, save
     from xy_sysid.fitting.of_run import LinearModel, fit, frf
+    from xy_sysid.fleets.of_paths import fleet
+    from xy_sysid.fleets.trends import trend
     from xy_sysid.imports import load
     from xy_sysid.imports.response_file import frf_from
     from xy_sysid.linear.reduction import balanced_truncation
@@ -80,6 +83,7 @@ __all__ = [
     "compare",
     "diagnose",
     "fit",
+    "fleet",
     "frf",
     "frf_from",
     "library",
@@ -93,6 +97,7 @@ __all__ = [
     "simulate",
     "to_control",
     "to_scipy",
+    "trend",
     "use",
     "validate",
 ]
@@ -115,6 +120,8 @@ _HOMES = {
     "imports": ("load",),
     "imports.response_file": ("frf_from",),
     "files.models": ("load_model", "save"),
+    "fleets.of_paths": ("fleet",),
+    "fleets.trends": ("trend",),
     "cli.simulated_recording": ("simulate",),
     "errors": ("BadInput", "BadRecording", "MissingExtra", "XySysidError"),
 }

@@ -21,7 +21,7 @@ FLOORS = {
     "in frequency": ("response", "linear", "fitting"),
     "in time": ("time_models", "effects", "axis", "greybox", "comparison", "hypotheses", "diagnosis", "experiment_design"),
     "told": ("story", "live", "control_design"),
-    "the edge": ("bags", "imports", "files", "processes"),
+    "the edge": ("bags", "imports", "files", "processes", "fleets"),
     "surfaces": ("nodes", "report", "page", "cli", "front_door"),
 }
 

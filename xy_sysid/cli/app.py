@@ -13,6 +13,7 @@ from xy_sysid.cli.diagnose import diagnose
 from xy_sysid.cli.effects import effects
 from xy_sysid.cli.figures import figures
 from xy_sysid.cli.fit import fit
+from xy_sysid.cli.fleet import fleet
 from xy_sysid.cli.frf import frf
 from xy_sysid.cli.next import next_
 from xy_sysid.cli.page import page
@@ -25,6 +26,7 @@ from xy_sysid.cli.simulate import simulate
 from xy_sysid.cli.start import run
 from xy_sysid.cli.steps import steps
 from xy_sysid.cli.study import study
+from xy_sysid.cli.trend import trend
 from xy_sysid.cli.use import use
 from xy_sysid.cli.validate import validate
 
@@ -55,6 +57,7 @@ def _program(
 WATCH = (demo, page, run, record, replay)
 IDENTIFY = (simulate, columns, frf, fit, steps, servo, validate)
 EXPLAIN = (compare, diagnose, refine, effects, use, study, report, figures)
-for command in (*WATCH, *IDENTIFY, *EXPLAIN):
+MANY = (fleet, trend)
+for command in (*WATCH, *IDENTIFY, *EXPLAIN, *MANY):
     app.command(name=command.__name__)(command)
 app.command(name="next")(next_)

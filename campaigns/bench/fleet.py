@@ -1,0 +1,102 @@
+"""python -m campaigns.bench fleet: a year of 20 machines, 200 recordings of 20 s; three go bad. Does the fleet's trend find the three, and no other?
+
+Also: recordings an hour and core, one and two processes side by side, reading against computing, and the memory of a process over the run.
+With a folder in $XY_SYSID_FLEET the recordings and the table stay there, and what is done is not done again.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from campaigns.bench.recordings import markdown
+from campaigns.bench.workshop import FAULTS, Workshop
+from xy_sysid.fleets.engine import Cluster, connected
+from xy_sysid.fleets.estimate import Progress
+from xy_sysid.fleets.of_paths import Analysis, run
+from xy_sysid.fleets.table import read
+from xy_sysid.fleets.trends import Trends, trend
+from xy_sysid.fleets.words import sentence
+
+SOME = 24  # recordings that one and two processes do side by side
+FEW = Workshop(machines=2, recordings=2, seconds=4.0, faults={})
+DAY = 100_000  # recordings, on paper
+
+
+def main(short: bool = False) -> None:
+    """Print what was found, and the figures."""
+    shop = FEW if short else Workshop()
+    kept = os.environ.get("XY_SYSID_FLEET", "")
+    with tempfile.TemporaryDirectory() as other:
+        folder = Path(kept or other)
+        paths = list(shop.made(folder / "recordings"))
+        lines = [] if short else speed(paths, folder)
+        memory: list[tuple[int, float]] = []
+        with connected(Cluster(workers=1 if short else 2)) as client:
+
+            def tell(now: Progress) -> None:
+                if now.done % 20 == 0:
+                    memory.append((now.done, max(client.run(resident).values())))
+                    sys.stderr.write(now.sentence() + "\n")
+
+            now = run(folder / "recordings", folder / "table", Analysis(), client, tell)
+        rows = read(folder / "table").to_pylist()
+        lines += costs(rows)
+        if len(memory) > 2 and now.analysed == now.total:
+            lines.append(("memory of a process, after 20 and after all recordings", f"{memory[1][1]:.0f} and {memory[-1][1]:.0f} MB"))
+        sys.stdout.write(markdown(("figure", "measured"), lines) + "\n\n")
+        if short:
+            return
+        found = trend(folder / "table")
+        sys.stdout.write(verdict(found))
+
+
+def resident() -> float:
+    """MB that a process holds."""
+    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def speed(paths: list[Path], folder: Path) -> list[tuple[str, str]]:
+    """One and two processes with the same recordings, each after it has done one."""
+    rates = {}
+    chosen = paths[:: len(paths) // SOME][:SOME]
+    for workers in (1, 2):
+        with connected(Cluster(workers=workers)) as client, tempfile.TemporaryDirectory(dir=folder) as place:
+            run(paths[:workers], Path(place) / "first", Analysis(), client)
+            rates[workers] = run(chosen, Path(place) / "table", Analysis(), client).rate
+    efficiency = rates[2] / (2.0 * rates[1])
+    return [(f"recordings an hour on {count} process{'es' * (count > 1)}", f"{rate:.0f}") for count, rate in rates.items()] + [
+        ("efficiency of two processes", f"{efficiency:.2f}")
+    ]
+
+
+def costs(rows: list[dict[str, Any]]) -> list[tuple[str, str]]:
+    """Processor time of a recording by its parts, and what a large fleet needs."""
+    parts = {name: float(np.mean([row[f"seconds_{name}"] or 0.0 for row in rows])) for name in ("reading", "fit", "diagnosis")}
+    each = sum(parts.values())
+    lines = [(f"processor time for {name}, mean", f"{1e3 * seconds:.0f} ms") for name, seconds in parts.items()]
+    lines.append(("recordings an hour and core, of the processor time", f"{3600.0 / each:.0f}"))
+    return [*lines, (f"cores for {DAY} such recordings a day, on paper", f"{DAY * each / 86400.0:.0f}")]
+
+
+def verdict(found: Trends) -> str:
+    """What the trend says, and whether it is right: the machines that go bad, no other, and each for its own reason."""
+    axes = {(one.machine, one.axis): one for one in found.axes}
+    said = "\n".join(f"- {sentence(event, axes[event.machine, event.axis])}" for event in found.events)
+    named: dict[str, set[str]] = {}
+    for event in found.events:
+        named.setdefault(event.machine, set()).add(event.cause.cause if event.cause is not None else "")
+    right = sum(fault.name in named.get(machine, set()) for machine, fault in FAULTS.items())
+    others = sorted(set(named) - set(FAULTS))
+    found_text = f"Machines that go bad and are found with their cause: {right} of {len(FAULTS)}."
+    return f"{said}\n\n{found_text} Others that are named: {', '.join(others) or 'none'}.\n"
+
+
+if __name__ == "__main__":
+    main()

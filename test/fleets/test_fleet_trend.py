@@ -1,0 +1,205 @@
+"""What changed, since when, by how much, how sure, and why; and nothing where nothing changed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from helpers.cli_tools import cli, refused
+from helpers.html_pages import parsed
+
+import xy_sysid as xy
+from campaigns.bench.trend import PARAMETERS, axis, cusum, delays, until
+from xy_sysid.errors import BadInput, BadRecording
+from xy_sysid.fleets.causes import causes
+from xy_sysid.fleets.change import Series, changes, evidence, learned, statistic, usual
+from xy_sysid.fleets.history import Axis
+from xy_sysid.fleets.presence import statistic as naming
+from xy_sysid.fleets.table import merged
+from xy_sysid.fleets.trends import of_axes
+from xy_sysid.fleets.words import sentence
+
+BEGIN = datetime(2026, 1, 5, tzinfo=UTC)
+LEVEL = 10.0  # log of the statistic, as for a weekly recording with seven parameters
+
+
+def series(values: Any, sigma: float = 0.001) -> Series:
+    return Series(np.arange(len(values), dtype=np.float64), np.asarray(values, dtype=np.float64), np.full(len(values), sigma))
+
+
+def scattered(count: int, spread: float = 0.01, seed: int = 3) -> Any:
+    return spread * np.random.default_rng(seed).standard_normal(count)
+
+
+def test_a_step_is_found_with_its_date_size_and_error() -> None:
+    """After three recordings at the latest: level, wander and size are all estimated from the series itself."""
+    values = scattered(23)
+    values[20:] += 0.1
+    (found,) = changes(series(values), usual(), LEVEL)
+    assert found.after == 19 and found.first == found.last == 19 and found.declared <= 22
+    assert abs(found.size - 0.1) < 3.0 * found.sigma < 0.08
+
+
+def test_a_gradual_change_has_its_beginning_and_duration() -> None:
+    """Wear grows: it is one change that takes time, and not many."""
+    values = scattered(45)
+    values[20:] += 0.3 * np.clip(np.arange(25) / 20.0, 0.0, 1.0)
+    (found,) = changes(series(values), usual(), LEVEL)
+    assert found.duration == 20.0 and abs(found.after - 20) <= 3 and found.size == pytest.approx(0.3, abs=0.05)
+
+
+def test_two_changes_are_two() -> None:
+    """What follows a change is compared with what came after it."""
+    values = scattered(50)
+    values[15:] += 0.1
+    values[35:] -= 0.15
+    first, second = changes(series(values), usual(), LEVEL)
+    assert (first.after, second.after) == (14, 34)
+    assert first.size == pytest.approx(0.1, abs=0.02) and second.size == pytest.approx(-0.15, abs=0.02)
+
+
+@pytest.mark.parametrize("off", [(20,), (20, 21), (12, 14), (5, 20, 30)])
+def test_a_recording_that_is_off_is_no_change(off: tuple[int, ...]) -> None:
+    """Another load on one day, or on two in a row, is told from a change by what follows."""
+    values = scattered(40)
+    values[list(off)] += 0.2
+    assert changes(series(values), usual(), LEVEL) == ()
+
+
+def test_the_statistic_is_what_its_principle_says() -> None:
+    """Without a change its mean after n recordings is n at most (Shiryaev and Roberts): so a threshold is a rate of false alarms."""
+    random = np.random.default_rng(11)
+    last = [np.exp(statistic(evidence(series(0.03 * random.standard_normal(8)))[0], usual())[-1]) for _ in range(40)]
+    assert np.mean(last) < 8.0
+
+
+def test_the_spread_is_learned_from_all_axes_together() -> None:
+    """Two recordings after a change of an axis with little history: its own wander is not known, that of its like is."""
+    others = [evidence(series(scattered(12, seed=k)))[0] for k in range(12)]
+    values = scattered(9, seed=40)
+    values[6:] += 0.08
+    assert changes(series(values), usual(), LEVEL) == ()
+    (found,) = changes(series(values), learned(others), LEVEL)
+    assert found.after == 5
+
+
+def test_an_effect_that_is_named_from_one_day_on_is_a_change() -> None:
+    """Yes and no have the same statistic; an effect that is named now and then is none."""
+    assert naming(np.array([False] * 12 + [True] * 5))[-1] > LEVEL
+    now_and_then = np.random.default_rng(5).uniform(size=40) < 0.3
+    assert naming(now_and_then).max() < LEVEL
+
+
+def test_unchanged_axes_raise_no_alarm_and_the_next_recording_is_inside() -> None:
+    """The short form of python -m campaigns.bench trend: wander of temperature, load and friction, recordings that are off, seven parameters."""
+    every = [axis(number, 4242, 15) for number in range(4)]
+    found = of_axes([until(one, 14) for one in every], causes())
+    assert found.events == () and found.pooled
+    last = [history.value[-1] for one in every for history in one.histories]
+    inside = [one.next[0] <= value <= one.next[1] for one, value in zip(found.trends, last, strict=True)]
+    assert np.mean(inside) > 0.85
+    friction = found.of("mill-03", "x", "coulomb_friction_coulomb")
+    assert 0.01 < friction.spread < 0.05
+    own = friction.history
+    assert np.all(friction.low < own.low) and np.all(own.high < friction.high), "the spread is part of the interval"
+
+
+def test_a_change_of_ten_per_cent_is_found_within_three_recordings() -> None:
+    """Of the gain, with two other axes and half a year behind it; a CUSUM with as few false alarms is later or blind."""
+    ours, plain = delays(PARAMETERS[0], before=26, times=2, seed=77)
+    assert max(ours) <= 3.0 and min(plain) >= 1.0
+    assert cusum(scattered(30)).max() > 0.0
+
+
+def worn(*, friction: float = 1.0, gain: float = 1.0, backlash: bool = False) -> Axis:
+    """An axis that changed with its twelfth recording."""
+    one = axis(0, 5, 18)
+    late = np.arange(18) >= 12
+    factors = {"coulomb_friction_coulomb": friction, "gain": gain}
+    histories = []
+    for history in one.histories:
+        factor = np.where(late, factors.get(history.column, 1.0), 1.0)
+        histories.append(replace(history, value=history.value * factor, low=history.low * factor, high=history.high * factor))
+    return replace(one, histories=tuple(histories), named={"backlash": late} if backlash else {})
+
+
+def test_joint_changes_point_to_a_cause() -> None:
+    """Friction and backlash up: the nut. Gain down, and with it friction in volts up: the amplifier."""
+    (nut,) = of_axes([worn(friction=1.4, backlash=True), *(axis(k, 5, 18) for k in range(1, 3))], causes()).events
+    assert nut.cause is not None and nut.cause.cause == "a worn nut"
+    text = sentence(nut, worn())
+    assert "coulomb_friction_coulomb rose from 0.1" in text and "since 31 March 2025" in text and "backlash is named in 100 %" in text, text
+    (drive,) = of_axes([worn(friction=1.0 / 0.85, gain=0.85), *(axis(k, 5, 18) for k in range(1, 3))], causes()).events
+    assert drive.cause is not None and drive.cause.cause == "the amplifier or its supply"
+
+
+def test_users_add_causes_of_their_own(tmp_path: Path) -> None:
+    """A file in the same form comes before the table of the package; what it names must be a quantity."""
+    own = tmp_path / "causes.yaml"
+    own.write_text("causes:\n  - {cause: the blue hose, when: [gain down], also: [friction up]}\n", encoding="utf-8")
+    found = causes(own).likeliest([("gain", "down"), ("coulomb_friction_coulomb", "up")])
+    assert found is not None and found.cause == "the blue hose"
+    own.write_text("causes:\n  - {cause: the blue hose, when: [hose down]}\n", encoding="utf-8")
+    with pytest.raises(BadInput, match="hose down"):
+        causes(own)
+
+
+@pytest.fixture(scope="module")
+def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Three axes, one of which loses gain in August."""
+    folder = tmp_path_factory.mktemp("trend") / "table"
+    folder.mkdir()
+    rows = []
+    for number in range(3):
+        for k in range(14):
+            gain = 0.1 * (1.0 + scattered(14, 0.004, number)[k]) * (0.9 if number == 1 and k >= 10 else 1.0)
+            row = {
+                "machine": f"mill-0{number}",
+                "axis": "x",
+                "date": BEGIN + timedelta(days=14 * k),
+                "source": f"{number}-{k}",
+                "key": f"{number}-{k}",
+            }
+            row |= {"verdict": "nothing_missing", "effects": "", "input_unit": "V", "output_unit": "m", "one_step": False}
+            rows.append(row | {"gain": gain, "gain_low": 0.999 * gain, "gain_high": 1.001 * gain})
+    rows.append({"machine": "mill-00", "axis": "x", "date": None, "source": "undated", "key": "u", "verdict": "nothing_missing"})
+    merged(folder, rows)
+    return folder
+
+
+def test_the_command_names_the_change(table: Path) -> None:
+    """Size, date, certainty and cause in one sentence, and how far recordings of the same axis differ."""
+    said = cli("trend", table)
+    assert said.code == 0, said
+    assert (
+        "mill-01 x: gain fell from 100" in said.out and "since 25 May 2026" in said.out and "Likely cause: the amplifier or its supply." in said.out
+    )
+    assert "1 rows without a date or an answer are left out" in said.out and said.out.count("\n- ") == 1
+    found = cli("trend", table, "--json").json
+    (event,) = found["events"]
+    (change,) = event["changes"]
+    assert change["parameter"] == "gain" and change["part"] == pytest.approx(-0.1, abs=0.01) and change["once_in_axis_months"] > 1000.0
+    assert len(found["parameters"]) == 3 and found["parameters"][0]["spread_between_recordings"] < 0.01
+
+
+def test_the_page_shows_every_parameter_and_opens_offline(table: Path, tmp_path: Path) -> None:
+    """One figure for each event, one for each parameter of all axes, and the spread in a table."""
+    page = tmp_path / "trend.html"
+    assert cli("trend", table, "-o", page).code == 0
+    text = page.read_text(encoding="utf-8")
+    assert "mill-01 x, 25 May 2026: the amplifier or its supply" in text and 'id="all-gain"' in text
+    assert parsed(text) is not None
+    assert "allowed: a name that is not there yet" in refused("trend", table, "-o", page)
+
+
+def test_what_is_no_table_is_refused(tmp_path: Path, table: Path) -> None:
+    """In one line that says what to do."""
+    assert "xy-sysid fleet PATH -o TABLE" in refused("trend", tmp_path)
+    with pytest.raises(BadRecording):
+        xy.trend(tmp_path / "nowhere")
+    with pytest.raises(BadInput, match="an axis with 4 of them"):
+        xy.trend(table, machines=["mill-99"])

@@ -1,0 +1,97 @@
+"""xy-sysid trend: which axis changed, since when, by how much, how sure, and why."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from xy_sysid.cli import options as o
+from xy_sysid.cli.output import emit, plain, progress, say, table
+
+if TYPE_CHECKING:
+    from xy_sysid.fleets.trends import Event, Moved, Trend, Trends
+
+SHOWN = 12  # parameters whose spread is told
+
+
+def trend(
+    folder: Annotated[Path, typer.Argument(metavar="TABLE", help="the folder that xy-sysid fleet made")],
+    machine: Annotated[list[str] | None, typer.Option("--machine", "-m", metavar="NAME", help="only this machine (may be repeated)")] = None,
+    causes: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="YAML that adds to the table of changes and their causes (docs/fleet.md)")
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", metavar="FILE.html", help="write a page with every parameter over time")] = None,
+    axis_months: Annotated[
+        float, typer.Option(metavar="N", min=1e-3, help="months of an axis that does not change, in which one false alarm is allowed")
+    ] = 1000.0,
+    force: o.Force = False,
+    json: o.Json = False,
+) -> None:
+    """Every parameter of every axis over time: what changed, since when, by how much, how sure, and the likely cause."""
+    from xy_sysid.fleets.trends import trend as logic
+    from xy_sysid.fleets.words import sentence, summary, widest
+
+    o.output_file("--out", out, force)
+    with progress() as bar:
+        task = bar.add_task("comparing recordings", total=1.0)
+        found = logic(folder, machines=machine or (), own_causes=causes, axis_months=axis_months, tell=lambda part: bar.update(task, completed=part))
+    if out is not None:
+        from xy_sysid.bags.atomic import write_text
+        from xy_sysid.report.trend_page import trend_page
+
+        write_text(out, trend_page(found, folder.name))
+    if json:
+        emit(answer(found))
+        return
+    axes = {(one.machine, one.axis): one for one in found.axes}
+    say(f"{folder}: {summary(found)}.")
+    for event in found.events:
+        say(f"- {sentence(event, axes[event.machine, event.axis])}")
+    if not found.events:
+        say("Nothing changed.")
+    rows = [(name, f"{100 * between:.2g} %", f"{100 * own:.2g} %") for name, between, own in widest(found)[:SHOWN]]
+    table("spread between recordings (it is in the intervals)", ("parameter", "between recordings", "within one"), rows)
+    if out is not None:
+        say(f"wrote {out}")
+
+
+def answer(found: Trends) -> dict[str, Any]:
+    """The JSON document."""
+    return {
+        "axes": [
+            {"machine": one.machine, "axis": one.axis, "recordings": len(one.dates), "months": one.months, "left_out": one.left_out}
+            for one in found.axes
+        ],
+        "events": [_event(one) for one in found.events],
+        "parameters": [_trend(one) for one in found.trends],
+    }
+
+
+def _event(one: Event) -> dict[str, Any]:
+    cause = None if one.cause is None else {"cause": one.cause.cause, "check": one.cause.check}
+    return {"machine": one.machine, "axis": one.axis, "since": str(one.since), "cause": cause, "changes": [_moved(each) for each in one.moved]}
+
+
+def _moved(one: Moved) -> dict[str, Any]:
+    dates = {name: str(getattr(one, name)) for name in ("since", "earliest", "latest", "declared")}
+    numbers = {"before": one.before, "after": one.after, "ci95": [one.low, one.high], "part": one.part, "sigmas": one.sigmas}
+    return {"parameter": one.column, "unit": one.unit, "direction": one.direction, **numbers, **dates, "once_in_axis_months": one.one_in}
+
+
+def _trend(one: Trend) -> dict[str, Any]:
+    history = one.history
+    return {
+        "machine": one.machine,
+        "axis": one.axis,
+        "parameter": history.column,
+        "unit": history.unit,
+        "dates": [str(date) for date in history.dates],
+        "values": history.value,
+        "ci95": plain([[low, high] for low, high in zip(one.low.tolist(), one.high.tolist(), strict=True)]),
+        "ci95_of_the_recording": plain([[low, high] for low, high in zip(history.low.tolist(), history.high.tolist(), strict=True)]),
+        "spread_between_recordings": one.spread,
+        "next_ci95": list(one.next),
+        "changed": bool(one.moved),
+    }

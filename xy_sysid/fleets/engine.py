@@ -1,0 +1,137 @@
+"""Tasks -> what came of them, on the processes of a dask cluster: this machine's cores, or a scheduler that is there already.
+
+A task whose process dies is tried once more at the end, alone, so that no other can be the reason; if its process dies again, that is its row.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from multiprocessing import resource_tracker
+from typing import TYPE_CHECKING, Any
+
+from xy_sysid.errors import BadInput, MissingExtra
+from xy_sysid.fleets.of_file import Done, Task, failed, rows_of_file
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+AHEAD = 2  # tasks for each process that the scheduler has at a time
+PATIENCE = 10.0  # s until a scheduler must answer
+DIED = "its process died twice while it was analysed (too little memory?). Analyse it alone: xy-sysid fleet --one FILE."
+HERE = {"distributed.scheduler.allowed-failures": 0, "distributed.scheduler.worker-saturation": 1.0}  # one task a process, blamed at once
+
+
+@dataclass(frozen=True, slots=True)
+class Cluster:
+    """Where tasks are worked on. workers: processes on this machine, 0 for one a core; scheduler: address of another, tcp://HOST:PORT."""
+
+    workers: int = 0
+    scheduler: str = ""
+
+
+def dask() -> Any:
+    """The module ``distributed``. Raises MissingExtra where it is not installed."""
+    try:
+        import distributed
+    except ImportError:
+        raise MissingExtra("dask.distributed, which runs a fleet's processes,", "fleet") from None
+    return distributed
+
+
+@contextmanager
+def connected(where: Cluster) -> Iterator[Client]:
+    """A client of the cluster; processes of this machine end with it. Raises BadInput where no scheduler answers."""
+    distributed = dask()
+    if where.scheduler:
+        try:
+            client = distributed.Client(where.scheduler, timeout=PATIENCE)
+        except (OSError, ValueError) as error:
+            raise BadInput("--scheduler", where.scheduler, "the address of a dask scheduler, tcp://HOST:PORT", f"Start one ({error}).") from None
+        with client:
+            yield client
+        return
+    import dask as settings
+
+    with settings.config.set(HERE), _deaf():
+        cluster = distributed.LocalCluster(
+            n_workers=where.workers or cores(), threads_per_worker=1, processes=True, host="127.0.0.1", dashboard_address="127.0.0.1:0",
+            silence_logs="CRITICAL",
+        )  # fmt: skip
+    with cluster, distributed.Client(cluster) as client:
+        yield client
+
+
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """Threads and processes that begin in it never hear Ctrl-C: it is this thread that ends, and ends them."""
+    resource_tracker.ensure_running()  # started later, it would unblock the signal
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT,))
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0))
+
+
+def processes(client: Client) -> int:
+    """Threads of all workers of a cluster: tasks that run at the same time."""
+    workers: dict[str, dict[str, int]] = client.scheduler_info(n_workers=-1)["workers"]
+    return max(sum(one["nthreads"] for one in workers.values()), 1)
+
+
+def results(client: Client, tasks: Sequence[Task]) -> Iterator[tuple[Done, float]]:
+    """What came of each task, in the order in which they end, and the s that it took; never more than a few of them wait at the scheduler."""
+    waiting, doubtful = iter(tasks), list[Task]()
+    ahead = AHEAD * processes(client)
+    yield from _window(client, waiting, ahead, doubtful)
+    blamed = list[Task]()
+    yield from _window(client, iter(doubtful), 1, blamed)
+    for task in blamed:
+        yield Done(task.path, (failed(task.path, "worker", DIED),)), 0.0
+
+
+def _window(client: Client, waiting: Iterator[Task], ahead: int, died: list[Task]) -> Iterator[tuple[Done, float]]:
+    """The results of tasks of which so many are at the scheduler; those whose process died are put aside."""
+    distributed = dask()
+    running: dict[Any, Task] = {}
+    ended = distributed.as_completed()
+
+    def more() -> None:
+        for task in waiting:
+            future = client.submit(timed, task, pure=False)
+            running[future] = task
+            ended.add(future)
+            return
+
+    for _ in range(ahead):
+        more()
+    while running:
+        future = next(ended)
+        task = running.pop(future)
+        error = future.exception()
+        if error is None:
+            yield future.result()
+        elif isinstance(error, distributed.KilledWorker):
+            died.append(task)
+        else:
+            text = f"{type(error).__name__}: {error}. This is a fault of xy_sysid; please report it."
+            yield Done(task.path, (failed(task.path, "worker", " ".join(text.split())),)), 0.0
+        future.release()
+        more()
+
+
+def timed(task: Task) -> tuple[Done, float]:
+    """The rows of a recording and the s that it took, in whatever process."""
+    from time import perf_counter
+
+    begun = perf_counter()
+    done = rows_of_file(task)
+    return done, perf_counter() - begun

@@ -1,0 +1,70 @@
+"""How fast a run goes, and how long the rest of it will take."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from xy_sysid.response.frf import Z95
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far a run is.
+
+    done, total: recordings, with ``unchanged`` ones, which the table had already, and ``failed`` ones, which are rows without an answer
+    elapsed: s since the first recording was begun; spent, square: sum of the times that the done ones took, s, and of their squares
+    workers: processes at work; place: address of the dashboard, if there is one
+    """
+
+    total: int
+    done: int = 0
+    unchanged: int = 0
+    failed: int = 0
+    elapsed: float = 0.0
+    spent: float = 0.0
+    square: float = 0.0
+    workers: int = 1
+    place: str = ""
+
+    @property
+    def analysed(self) -> int:
+        """Recordings that were not in the table already."""
+        return self.done - self.unchanged
+
+    @property
+    def rate(self) -> float:
+        """Recordings an hour that are analysed."""
+        return 3600.0 * self.analysed / self.elapsed if self.elapsed > 0.0 else 0.0
+
+    def remaining(self) -> tuple[float, float] | None:
+        """95 % interval of the time that the rest takes, s, if all of it has to be analysed and is like what is done; None for less than three."""
+        count, rest = self.analysed, self.total - self.done
+        if count < 3 or self.elapsed <= 0.0:
+            return None
+        mean = self.spent / count
+        spread = math.sqrt(max(self.square / count - mean**2, 0.0) * count / (count - 1))
+        width = Z95 * spread * math.sqrt(rest / count + 1.0) * math.sqrt(rest) if rest else 0.0
+        share = self.elapsed / max(self.spent, 1e-9)  # s of the clock for each s of work
+        return max(rest * mean - width, 0.0) * share, (rest * mean + width) * share
+
+    def sentence(self) -> str:
+        """The same in words."""
+        parts = [f"{self.done} of {self.total} recordings"]
+        if self.unchanged:
+            parts.append(f"{self.unchanged} were in the table already")
+        if self.failed:
+            parts.append(f"{self.failed} without an answer")
+        if self.analysed:
+            parts.append(f"{self.rate:.3g} an hour on {self.workers} process{'es' if self.workers != 1 else ''}")
+        rest = self.remaining()
+        if rest is not None and self.done < self.total:
+            parts.append(f"{_time(rest[0])} to {_time(rest[1])} left")
+        return ", ".join(parts)
+
+
+def _time(seconds: float) -> str:
+    for size, name in ((86400.0, "d"), (3600.0, "h"), (60.0, "min")):
+        if seconds >= 2.0 * size:
+            return f"{seconds / size:.0f} {name}"
+    return f"{seconds:.0f} s"

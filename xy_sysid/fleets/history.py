@@ -1,0 +1,146 @@
+"""The table -> the series of each parameter of each axis, as numbers that changes can be looked for in."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xy_sysid.fleets.change import Series
+from xy_sysid.response.frf import Z95
+from xy_sysid.samples.block import FloatArray
+
+DAY = 86400.0  # s
+MONTH = 30.4375  # days
+FEWEST = 4  # recordings with a value, below which nothing is said
+ONE_STEP = ("held_out_error", "noise")  # of a model that is judged one sample ahead they are not what they are of any other
+
+
+@dataclass(frozen=True, slots=True)
+class History:
+    """One parameter of one axis.
+
+    column, unit: of the table; dates: (n,); value, low, high: (n,) in this unit, NaN where there is no interval
+    logarithmic: changes are looked for in the logarithm; level: what a value is divided by otherwise
+    """
+
+    column: str
+    unit: str
+    dates: tuple[datetime, ...]
+    value: FloatArray
+    low: FloatArray
+    high: FloatArray
+    logarithmic: bool
+    level: float
+
+    @property
+    def series(self) -> Series:
+        """As parts of the level, over the usual distance between recordings."""
+        value, width = self.value, self.high - self.low
+        if self.logarithmic:
+            known = np.where(self.low > 0.0, self.low, np.nan)
+            inside = np.log(self.high) - np.log(known)
+            sigma = np.where(np.isfinite(inside), inside, width / value) / (2.0 * Z95)
+        else:
+            sigma = width / self.level / (2.0 * Z95)
+        return Series(steps(self.dates), np.log(value) if self.logarithmic else value / self.level, np.nan_to_num(sigma))
+
+    def plain(self, part: Any) -> Any:
+        """Values in the unit, of parts of the level."""
+        return np.exp(part) if self.logarithmic else part * self.level
+
+    def changed(self, value: float, part: float) -> float:
+        """A value after a change by so much of the level."""
+        return value * float(np.exp(part)) if self.logarithmic else value + part * self.level
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """All that the table tells of one axis over time.
+
+    dates: (n,) of its recordings; histories: of every parameter with enough values; named: effect -> (n,) whether it was named
+    left_out: recordings without a date, or without an answer
+    """
+
+    machine: str
+    axis: str
+    units: tuple[str, str]
+    dates: tuple[datetime, ...]
+    histories: tuple[History, ...]
+    named: Mapping[str, NDArray[np.bool_]]
+    left_out: int
+
+    @property
+    def months(self) -> float:
+        """From the first recording to the last."""
+        return (self.dates[-1] - self.dates[0]).total_seconds() / DAY / MONTH if self.dates else 0.0
+
+    @property
+    def tests(self) -> int:
+        """Series in which a change is looked for."""
+        return len(self.histories) + len(self.named)
+
+
+def axes(rows: Sequence[Mapping[str, Any]], units: Mapping[str, str]) -> tuple[Axis, ...]:
+    """Every axis of every machine in the rows of a table; units: of the columns that are followed."""
+    parts: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
+    for row in rows:
+        parts.setdefault((row["machine"], row["axis"]), []).append(row)
+    return tuple(_axis(machine, axis, own, units) for (machine, axis), own in sorted(parts.items()) if axis)
+
+
+def _axis(machine: str, axis: str, rows: Sequence[Mapping[str, Any]], units: Mapping[str, str]) -> Axis:
+    dated = sorted((row for row in rows if row["date"] is not None and row["verdict"] not in (None, "not_enough_data")), key=lambda row: row["date"])
+    histories = (_history(column, unit, dated) for column, unit in units.items())
+    effects = sorted({name for row in dated for name in _names(row)})
+    last = rows[-1]
+    return Axis(
+        machine=machine,
+        axis=axis,
+        units=(last["input_unit"] or "V", last["output_unit"] or "m"),
+        dates=tuple(row["date"] for row in dated),
+        histories=tuple(one for one in histories if one is not None),
+        named={name: np.array([name in _names(row) for row in dated]) for name in effects} if len(dated) >= FEWEST else {},
+        left_out=len(rows) - len(dated),
+    )
+
+
+def _names(row: Mapping[str, Any]) -> list[str]:
+    return [name for name in (row["effects"] or "").split(", ") if name]
+
+
+def _history(column: str, unit: str, rows: Sequence[Mapping[str, Any]]) -> History | None:
+    kept = [row for row in rows if _told(row, column)]
+    if len(kept) < FEWEST:
+        return None
+    value, low, high = (np.array([_number(row, name) for row in kept]) for name in (column, f"{column}_low", f"{column}_high"))
+    level = max(float(np.median(np.abs(value))), float(np.nanmedian(high - low)) if np.isfinite(high - low).any() else 0.0)
+    if not level > 0.0:
+        return None
+    dates = tuple(row["date"] for row in kept)
+    logarithmic = bool(np.all(value > 0.0))
+    return History(column=column, unit=unit, dates=dates, value=value, low=low, high=high, logarithmic=logarithmic, level=level)
+
+
+def _told(row: Mapping[str, Any], column: str) -> bool:
+    """There is a value, and it is not one whose interval has no end."""
+    value, low, high = row.get(column), row.get(f"{column}_low"), row.get(f"{column}_high")
+    ends = [end for end in (low, high) if end is not None]
+    return value is not None and np.isfinite(value) and bool(np.all(np.isfinite(ends))) and not (row["one_step"] and column in ONE_STEP)
+
+
+def _number(row: Mapping[str, Any], name: str) -> float:
+    value = row.get(name)
+    return np.nan if value is None else float(value)
+
+
+def steps(dates: Iterable[datetime]) -> FloatArray:
+    """(n,) times in usual distances between recordings: in the median of those that are not 0."""
+    seconds = np.array([date.timestamp() for date in dates])
+    between = np.diff(seconds)
+    usual = float(np.median(between[between > 0.0])) if np.any(between > 0.0) else 1.0
+    return np.asarray((seconds - seconds[0]) / usual)

@@ -1,0 +1,85 @@
+"""Rows that are not in the table yet: each is on the disk as soon as it is known, so that a run that is killed loses none.
+
+The journal is a file of JSON lines in the table's folder. It is locked while a run writes it: one run for a table at a time.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from datetime import datetime
+from pathlib import Path
+from typing import IO, Any
+
+from xy_sysid.axis.model import STANDARD, Library
+from xy_sysid.errors import BadInput, BadRecording
+from xy_sysid.fleets.row import Row
+from xy_sysid.fleets.table import merged
+
+FILE = ".journal.jsonl"  # readers of Parquet leave out names that begin with a dot
+MANY = 500  # rows after which they go into the table
+
+
+class Journal:
+    """The rows of a run on their way into the table."""
+
+    def __init__(self, folder: Path, file: IO[str], library: Library) -> None:
+        self._folder, self._file, self._library = folder, file, library
+        self._rows: list[Row] = []
+        file.seek(0)
+        for line in file:
+            with suppress(json.JSONDecodeError):  # the last line of a run that was killed while it wrote
+                self._rows.append({name: _read(name, value) for name, value in json.loads(line).items()})
+        self.fold()
+
+    def add(self, rows: Sequence[Row]) -> None:
+        """Keep the rows of a recording."""
+        for row in rows:
+            self._file.write(json.dumps({name: _written(value) for name, value in row.items()}) + "\n")
+        self._file.flush()
+        os.fsync(self._file.fileno())
+        self._rows += rows
+        if len(self._rows) >= MANY:
+            self.fold()
+
+    def fold(self) -> None:
+        """Put all rows into the table, and begin anew. Killed in between, it does so again: the same rows replace themselves."""
+        if self._rows:
+            merged(self._folder, self._rows, self._library)
+        self._rows = []
+        self._file.seek(0)
+        self._file.truncate()
+
+
+@contextmanager
+def journal(folder: Path, library: Library = STANDARD) -> Iterator[Journal]:
+    """The journal of a table, which is made if it is not there; at the end, however it comes, its rows are in the table.
+
+    Raises BadInput where another run is at work on the table, BadRecording where it cannot be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        file = (folder / FILE).open("a+", encoding="utf-8")
+    except OSError as error:
+        raise BadRecording(folder, f"cannot be written ({error.strerror or error})", "Choose a folder that you may write to.") from None
+    with file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            raise BadInput("table", str(folder), "one that no other run is writing", "Wait until that one ends, or choose another folder.") from None
+        kept = Journal(folder, file, library)
+        try:
+            yield kept
+        finally:
+            kept.fold()
+
+
+def _written(value: Any) -> Any:
+    return value.isoformat() if isinstance(value, datetime) else value
+
+
+def _read(name: str, value: Any) -> Any:
+    return datetime.fromisoformat(value) if name == "date" and value is not None else value

@@ -1,0 +1,107 @@
+"""One file -> its rows: the task that the fleet's processes work on. It needs nothing but the file, and writes nothing."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from time import process_time
+
+from threadpoolctl import threadpool_limits
+
+from xy_sysid.errors import BadInput, BadRecording
+from xy_sysid.files.effects import library
+from xy_sysid.fleets.digest import digest
+from xy_sysid.fleets.naming import Name, Names, date_within, name_of
+from xy_sysid.fleets.row import Plan, Row, row_of
+from xy_sysid.imports import load
+from xy_sysid.imports.reading import Reading
+
+ROWS = 1  # version of what a row means; raised whenever the same data give other numbers or columns
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """One recording to be analysed.
+
+    path: of it; names: how it is named; reading: which columns of it mean what; effect_files: with effects of the user's own
+    known: keys under which it is in the table already
+    """
+
+    path: str
+    names: Names = field(default_factory=Names)
+    reading: Reading = field(default_factory=Reading)
+    effect_files: tuple[str, ...] = ()
+    known: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """What came of a task. rows: one for each axis; empty where the table has them already (``unchanged``)."""
+
+    path: str
+    rows: tuple[Row, ...]
+    unchanged: bool = False
+
+
+def rows_of_file(task: Task) -> Done:
+    """The rows of one recording. What the user can mend (``XySysidError``) is a row with its problem; anything else is raised."""
+    path, follow = Path(task.path), tuple(task.names.follow)
+    try:
+        origin: Row = {"source": task.path, "file_sha256": digest(path)}
+    except OSError as error:
+        return Done(task.path, (failed(task.path, "reading", f"cannot be read ({error.strerror or error}). Check the path and the permissions."),))
+    try:
+        name = name_of(path, task.names)
+    except BadInput as problem:
+        return Done(task.path, (failed(task.path, "naming", str(problem)) | origin,))
+    origin |= {"machine": name.machine, "versions": versions(), "key": key_of(task, name, origin["file_sha256"])}
+    if origin["key"] in task.known:
+        return Done(task.path, (), unchanged=True)
+    with threadpool_limits(1, "blas"):
+        begun = process_time()
+        try:
+            recording = load(path, task.reading)
+            if name.axis and len(recording.axes) > 1:
+                raise BadInput("axis", name.axis, f"none, since the file has {', '.join(recording.axes)}", "Leave {axis} out of the pattern.")
+            known = library(task.effect_files)
+            for effect in follow:
+                known[effect]
+        except (BadRecording, BadInput) as problem:
+            return Done(task.path, (failed(task.path, "reading", str(problem)) | {"date": name.date} | origin,))
+        seconds = process_time() - begun
+        origin |= {"date": name.date or date_within(recording), "seconds_reading": seconds}
+        plan = Plan(follow=follow, library=known, clock=process_time)
+        rows = [row_of(recording, axis, plan) for axis in recording.axes]
+    return Done(task.path, tuple(row | ({"axis": name.axis} if name.axis else {}) | origin for row in rows))
+
+
+def failed(path: str, stage: str, problem: str) -> Row:
+    """The row of a recording of which nothing is known but why; the folder stands for the machine."""
+    text = problem.removeprefix(f"{path}: ")
+    return {"machine": Path(path).absolute().parent.name, "axis": "", "source": path, "stage": stage, "problem": text, "file_sha256": "", "key": ""}
+
+
+def key_of(task: Task, name: Name, content: str) -> str:
+    """What makes a recording the same one: its content, its name, how it is read and analysed, and by which version."""
+    own = [digest(Path(file)) for file in task.effect_files]
+    parts = [content, name.machine, name.axis, str(name.date), repr(task.reading), sorted(task.names.follow), own, package_version(), ROWS]
+    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
+
+
+def package_version() -> str:
+    """Of xy_sysid."""
+    try:
+        return version("xy_sysid")
+    except PackageNotFoundError:
+        return "from source"
+
+
+def versions(packages: Sequence[str] = ("numpy", "scipy", "numba")) -> str:
+    """Of all software that a row depends on, in one line."""
+    others = ", ".join(f"{name} {version(name)}" for name in packages)
+    return f"xy_sysid {package_version()}, rows {ROWS}, python {platform.python_version()}, {others}"

@@ -1,0 +1,108 @@
+"""Recordings -> the fleet's table: the whole of it in one call."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterable
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+from xy_sysid.errors import BadInput
+from xy_sysid.files.effects import library
+from xy_sysid.fleets.engine import Cluster, connected, dask, processes, results
+from xy_sysid.fleets.estimate import Progress
+from xy_sysid.fleets.finding import recordings
+from xy_sysid.fleets.journal import journal
+from xy_sysid.fleets.naming import Names, compiled
+from xy_sysid.fleets.of_file import Task, rows_of_file
+from xy_sysid.fleets.table import arrow, as_table, keys_in, read
+from xy_sysid.imports.reading import Reading
+
+if TYPE_CHECKING:
+    import pyarrow
+    from distributed import Client
+
+Paths = Iterable[Path | str] | Path | str
+
+
+@dataclass(frozen=True, slots=True)
+class Analysis:
+    """How the recordings are named, read and analysed: see ``naming.Names`` and ``imports.Reading``; effect_files: with effects of your own."""
+
+    names: Names = field(default_factory=Names)
+    reading: Reading = field(default_factory=Reading)
+    effect_files: tuple[str, ...] = ()
+
+    def task(self, path: Path) -> Task:
+        """One recording to be analysed."""
+        return Task(path=str(path), names=self.names, reading=self.reading, effect_files=self.effect_files)
+
+    def check(self) -> None:
+        """Raises BadInput, before any work is done, for names of effects or a pattern that mean nothing."""
+        known = library(self.effect_files)
+        for name in self.names.follow:
+            if known[name].category == "base":
+                raise BadInput("follow", name, "an effect that is not in every model already", "Leave it out.")
+        if self.names.pattern:
+            compiled(self.names.pattern)
+
+
+def fleet(
+    paths: Paths,
+    table: Path | str,
+    client: Client | None = None,
+    *,
+    pattern: str = "",
+    follow: Iterable[str] = (),
+    workers: int = 0,
+) -> pyarrow.Table:
+    """Fit and diagnose every recording, and give the table of all results: one row for each axis of each recording.
+
+    paths:   recordings, folders or patterns; table: a folder. What it has already is not done again
+    client:  of a dask cluster; without one, processes of this machine: ``workers``, or one for each core
+    pattern: of the end of a path, which tells machine, axis and date: "{machine}/{date}*.csv"
+    follow:  effects whose parameters are estimated in every recording
+    Raises BadInput or BadRecording for what cannot be done at all; a recording that cannot be read is a row with its problem.
+    """
+    names = Names(pattern=pattern, follow=[follow] if isinstance(follow, str) else list(follow))
+    run(paths, Path(table), Analysis(names=names), client or Cluster(workers=workers))
+    return read(Path(table))
+
+
+def run(paths: Paths, folder: Path, how: Analysis, where: Cluster | Client, tell: Callable[[Progress], None] = lambda _: None) -> Progress:
+    """Bring the table up to date; ``tell`` hears of every recording. What is done is in the table, however the run ends."""
+    arrow()
+    dask()
+    how.check()
+    found = recordings([paths] if isinstance(paths, (str, Path)) else paths, folder)
+    with journal(folder, library(how.effect_files)) as kept, ExitStack() as stack:
+        known = keys_in(folder)
+        tasks = [dataclasses.replace(how.task(path), known=known.get(str(path), frozenset())) for path in found]
+        client = stack.enter_context(connected(where)) if isinstance(where, Cluster) else where
+        now = Progress(total=len(tasks), workers=processes(client), place=client.dashboard_link)
+        tell(now)
+        begun = perf_counter()
+        for done, seconds in results(client, tasks):
+            kept.add(done.rows)
+            worked = 0.0 if done.unchanged else seconds
+            now = dataclasses.replace(
+                now,
+                done=now.done + 1,
+                unchanged=now.unchanged + done.unchanged,
+                failed=now.failed + any(row.get("problem") for row in done.rows),
+                elapsed=perf_counter() - begun,
+                spent=now.spent + worked,
+                square=now.square + worked**2,
+            )
+            tell(now)
+    return now
+
+
+def one(path: Path, how: Analysis) -> pyarrow.Table:
+    """The rows of one recording, worked out in this process."""
+    arrow()
+    how.check()
+    return as_table(rows_of_file(how.task(path)).rows, library(how.effect_files))

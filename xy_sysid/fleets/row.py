@@ -1,0 +1,155 @@
+"""One axis of a recording -> its row of the fleet's table."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from xy_sysid.axis.model import STANDARD, Library
+from xy_sysid.diagnosis.diagnose import Diagnosis
+from xy_sysid.diagnosis.of_run import diagnose, refined, runs_together
+from xy_sysid.diagnosis.refine import Effort, never
+from xy_sysid.errors import BadInput
+from xy_sysid.fitting import Fit
+from xy_sysid.fitting.of_run import fit_response, frf
+from xy_sysid.fleets.columns import ROOTS, column_of
+from xy_sysid.greybox.free_run import GreyboxFit
+from xy_sysid.response.frf import FrequencyResponse
+from xy_sysid.samples.moves import several_moves
+from xy_sysid.samples.recording import Recording, Run
+from xy_sysid.settings import IdentifierSettings
+
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """How an axis is analysed.
+
+    follow:  effects whose parameters are estimated in every recording, named or not, together with those that are named
+    library: the effects that are known; clock: processor time, s
+    """
+
+    follow: tuple[str, ...] = ()
+    library: Library = STANDARD
+    clock: Callable[[], float] = never
+
+
+def row_of(recording: Recording, axis: str, plan: Plan) -> Row:
+    """What a fit and a diagnosis find, by column name; ``problem`` says why something is missing.
+
+    The search ends after a counted amount of work, so that the same samples give the same numbers on a busy machine. Columns that have no
+    value are left out. Raises BadInput for an axis that the recording does not have.
+    """
+    row: Row = {"axis": axis, "input_unit": recording.input_unit, "output_unit": recording.output_unit}
+    row |= {"samples": len(recording), "gaps": max(len(recording.runs()) - 1, 0), "sampling_rate": recording.sampling_rate}
+    row |= {"notes": " ".join(recording.notes) or None}
+    run = recording.run(axis)
+    row["data_sha256"] = run.digest
+    problems: list[tuple[str, str]] = []
+    for stage, work in (("fit", _linear), ("diagnosis", _diagnosis)):
+        begun = plan.clock()
+        try:
+            row |= work(recording, run, plan)
+        except BadInput as refusal:
+            problems.append((stage, str(refusal)))
+        row[f"seconds_{stage}"] = plan.clock() - begun
+    if problems:
+        row["stage"] = ", ".join(stage for stage, _ in problems)
+        row["problem"] = " ".join(dict.fromkeys(text for _, text in problems))
+    return row
+
+
+def _linear(recording: Recording, run: Run, plan: Plan) -> Row:
+    response = frf(run)
+    found, checks = fit_response(response, IdentifierSettings())
+    return _of_response(response) | _of_transfer_function(found) | {"tf_trustworthy": checks.trustworthy}
+
+
+def _of_response(response: FrequencyResponse) -> Row:
+    lines = response.frequency[response.trusted]
+    return {
+        "frf_averages": response.averages,
+        "frf_low": float(lines[0]) if lines.size else None,
+        "frf_high": float(lines[-1]) if lines.size else None,
+        "frf_trusted": float(np.mean(response.trusted)),
+        "frf_coherence": float(np.median(response.coherence)),
+    }
+
+
+def _of_transfer_function(found: Fit) -> Row:
+    row: Row = {
+        "tf_numerator": _polynomial(found.tf.numerator.tolist()),
+        "tf_denominator": _polynomial(found.tf.denominator.tolist()),
+        "tf_relative_error": found.relative_error,
+        "tf_misfit": _number(found.misfit),
+    }
+    real = [item for item in found.intervals_with_misfit if item.name.startswith("pole_") and "." not in item.name]
+    slowest = min(real, key=lambda item: abs(item.value), default=None)
+    wanted = {
+        f"{kind}_{number}.{what}" for kind in ("resonance", "antiresonance") for number in range(1, ROOTS + 1) for what in ("frequency", "damping")
+    }
+    for item in found.intervals_with_misfit:
+        if item.name in wanted | {"gain", "delay"}:
+            row |= _interval(f"tf_{column_of(item.name)}", item.value, item.low, item.high)
+        elif item is slowest:
+            row |= _interval("tf_pole", item.value, item.low, item.high)
+    return row
+
+
+def _diagnosis(recording: Recording, run: Run, plan: Plan) -> Row:
+    runs = runs_together(recording.stretches(run.axis))
+    several_moves(runs)
+    found = diagnose(runs, plan.library)
+    row: Row = {
+        "verdict": found.verdict,
+        "effects": _listed(found.effects),
+        "confidence": found.confidence,
+        "sentence": found.sentence,
+        "explained": found.explained,
+        "noise": found.noise,
+        "discrepancy": found.discrepancy,
+    }
+    if found.ladder is None:  # not enough data
+        return row | {"noise": None, "discrepancy": None, "explained": None}
+    named = found.ladder.final if found.effects else found.ladder.base
+    row |= _of_fit(named) | {"rigid_error": found.ladder.base.held_out_error}
+    return row | _followed(runs, plan, found) if plan.follow else row
+
+
+def _followed(runs: tuple[Run, ...], plan: Plan, found: Diagnosis) -> Row:
+    """The parameters of a fit with the effects that are named and those that are followed; nothing new where all of these are named."""
+    more = tuple(name for name in plan.follow if name not in found.effects)
+    return _of_fit(refined(runs, (*found.effects, *more), plan.library, Effort(0)).ladder.final) if more else {}
+
+
+def _of_fit(fitted: GreyboxFit) -> Row:
+    row: Row = {
+        "model": _listed(name for name, _ in fitted.model.effects),
+        "held_out_error": fitted.held_out_error,
+        "noise_floor": fitted.noise_floor,
+        "one_step": fitted.one_step,
+    }
+    for item in fitted.parameters:
+        row |= _interval(column_of(item.name), item.value, item.low, item.high)
+    return row
+
+
+def _interval(name: str, value: float, low: float, high: float) -> Row:
+    return {name: float(value), f"{name}_low": _number(low), f"{name}_high": _number(high)}
+
+
+def _number(value: float) -> float | None:
+    return None if math.isnan(value) else float(value)
+
+
+def _listed(names: Iterable[str]) -> str:
+    return ", ".join(names)
+
+
+def _polynomial(coefficients: list[float]) -> str:
+    return " ".join(map(repr, coefficients))

@@ -1,0 +1,278 @@
+"""The fleet's table -> what changed, when, by how much, how sure, and what may be the cause."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+import numpy as np
+
+from xy_sysid.errors import BadInput
+from xy_sysid.fleets import presence
+from xy_sysid.fleets.causes import Cause, Causes, Direction, causes
+from xy_sysid.fleets.change import LONGEST, Change, Evidence, Series, changes, evidence, learned, spread
+from xy_sysid.fleets.columns import column_of, columns
+from xy_sysid.fleets.history import DAY, FEWEST, Axis, History, axes
+from xy_sysid.fleets.table import read
+from xy_sysid.response.frf import Z95
+from xy_sysid.samples.block import FloatArray
+
+AXIS_MONTHS = 1000.0  # in which an axis that does not change raises one false alarm, at most
+
+
+@dataclass(frozen=True, slots=True)
+class Moved:
+    """One parameter of one axis changed.
+
+    column, unit: of the table; before, after: its value, and the 95 % interval ``low`` to ``high`` of the value after; of an effect that is
+        named or no longer named the part of the recordings that name it
+    part:  after over before, minus 1; sigmas: size over its standard error; NaN for an effect
+    since: date of the first recording with it; earliest, latest: 95 % interval of that; declared: date from which it was certain enough
+    one_in: axis-months in which chance alone gives such evidence once
+    duration: days that the change took
+    """
+
+    column: str
+    unit: str
+    direction: Direction
+    before: float
+    after: float
+    low: float
+    high: float
+    part: float
+    sigmas: float
+    since: datetime
+    earliest: datetime
+    latest: datetime
+    declared: datetime
+    one_in: float
+    duration: float
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """What changed on one axis at one time. moved: the most certain first; cause: None where the table of causes has none."""
+
+    machine: str
+    axis: str
+    moved: tuple[Moved, ...]
+    cause: Cause | None
+
+    @property
+    def since(self) -> datetime:
+        """Of the most certain change."""
+        return self.moved[0].since
+
+
+@dataclass(frozen=True, slots=True)
+class Trend:
+    """One parameter of one axis over time.
+
+    spread: standard deviation between recordings of an unchanged axis, part of the value; low, high: (n,) 95 % intervals with it
+    next:   95 % interval of the next recording's value, if nothing changes
+    moved:  its changes
+    """
+
+    machine: str
+    axis: str
+    history: History
+    spread: float
+    low: FloatArray
+    high: FloatArray
+    next: tuple[float, float]
+    moved: tuple[Moved, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Trends:
+    """All of a table. axes: with their dates; trends: of every parameter; events: changes, the latest last; pooled: the spread was learned from
+    several axes together"""
+
+    axes: tuple[Axis, ...]
+    trends: tuple[Trend, ...]
+    events: tuple[Event, ...]
+    pooled: bool
+
+    def of(self, machine: str, axis: str, column: str) -> Trend:
+        """One trend; raises BadInput if there is none."""
+        for one in self.trends:
+            if (one.machine, one.axis, one.history.column) == (machine, axis, column):
+                return one
+        known = ", ".join(f"{one.machine} {one.axis} {one.history.column}" for one in self.trends[:20])
+        raise BadInput("trend", f"{machine} {axis} {column}", f"one of {known}", "Choose one of these.")
+
+
+def trend(
+    table: Path | str,
+    *,
+    machines: Iterable[str] = (),
+    own_causes: Path | None = None,
+    axis_months: float = AXIS_MONTHS,
+    tell: Callable[[float], None] = lambda _: None,
+) -> Trends:
+    """What changed in the recordings of a fleet's table.
+
+    table:  the folder that ``fleet`` made; machines: only these; own_causes: a YAML file that adds to the table of causes
+    axis_months: of an axis that does not change, in which one false alarm is allowed; tell: hears the part that is done
+    The spread between recordings is learned for each parameter from all axes of the table together, and is in every interval.
+    Raises BadRecording for what is no table, BadInput where no axis has four recordings with a date and an answer.
+    """
+    if not axis_months > 0.0:
+        raise BadInput("axis_months", axis_months, "above 0", "Usual is 1000.")
+    followed = {item.name: item.unit for item in columns() if item.trended}
+    known = causes(own_causes)
+    wanted = set(machines)
+    found = read(Path(table))
+    others = {name.removesuffix("_low"): "" for name in found.column_names if name.endswith("_low")}  # of effects of a user's own
+    followed |= {name: "" for name in others if name not in {item.name for item in columns()}}
+    rows = [row for row in found.to_pylist() if not wanted or row["machine"] in wanted]
+    every = axes(rows, followed)
+    if not any(one.histories for one in every):
+        allowed = f"an axis with {FEWEST} of them that have a date and an answer"
+        raise BadInput("recordings in the table", f"{len(rows)} rows", allowed, "Record more often, or name their dates (xy-sysid fleet --names).")
+    return of_axes(every, known, axis_months, tell)
+
+
+def of_axes(every: Sequence[Axis], known: Causes, axis_months: float = AXIS_MONTHS, tell: Callable[[float], None] = lambda _: None) -> Trends:
+    """The same of axes whose histories are known."""
+    every_evidence: dict[tuple[int, str], Evidence] = {}
+    count = sum(len(one.histories) for one in every)
+    for number, one in enumerate(every):
+        for history in one.histories:
+            every_evidence[number, history.column] = evidence(_newest(history))[0]
+            tell(len(every_evidence) / count)
+    weights = {name: learned(item for (_, column), item in every_evidence.items() if column == name) for name in {key[1] for key in every_evidence}}
+    trends: list[Trend] = []
+    events: list[Event] = []
+    for number, one in enumerate(every):
+        own = [_trend(one, history, weights[history.column], every_evidence[number, history.column], axis_months) for history in one.histories]
+        trends += own
+        events += _events(one, [*(moved for item in own for moved in item.moved), *_named(one, axis_months)], known)
+    pooled = sum(bool(one.histories) for one in every) > 1
+    return Trends(axes=tuple(every), trends=tuple(trends), events=tuple(sorted(events, key=lambda item: item.since)), pooled=pooled)
+
+
+def _newest(history: History) -> Series:
+    return history.series.after(max(history.value.size - LONGEST, 0))
+
+
+def threshold(axis: Axis, axis_months: float) -> float:
+    """Log of the statistic from which a change is declared: each test passes it once in so many recordings, or more seldom."""
+    a_month = max(len(axis.dates) - 1, 1) / max(axis.months, 1e-9)
+    return math.log(axis_months * a_month * max(axis.tests, 1))
+
+
+def _trend(axis: Axis, history: History, weights: FloatArray, known: Evidence, axis_months: float) -> Trend:
+    series, level = history.series, threshold(axis, axis_months)
+    whole = known if series.value.size == known.none.shape[1] else None
+    found = changes(series, weights, level, whole)
+    start = 0
+    if found:
+        last = found[-1]
+        ended = int(np.searchsorted(series.time, series.time[last.after] + last.duration))
+        start = min(max(ended, last.after + 1), series.value.size - 2)
+    quiet = series.after(start)
+    _, quiet = evidence(quiet.after(max(quiet.value.size - LONGEST, 0)))
+    between, _ = spread(quiet, weights)
+    width = Z95 * np.sqrt(series.sigma**2 + between**2)
+    weight = 1.0 / (quiet.sigma**2 + between**2)
+    mean = float(np.sum(weight * quiet.value) / np.sum(weight))
+    ahead = Z95 * math.sqrt(between**2 + float(np.median(quiet.sigma)) ** 2 + 1.0 / float(np.sum(weight)))
+    moved = tuple(_moved(history, item, level, axis_months, mean_before(series, found, k)) for k, item in enumerate(found))
+    return Trend(
+        machine=axis.machine,
+        axis=axis.axis,
+        history=history,
+        spread=between,
+        low=history.plain(series.value - width),
+        high=history.plain(series.value + width),
+        next=(float(history.plain(mean - ahead)), float(history.plain(mean + ahead))),
+        moved=moved,
+    )
+
+
+def mean_before(series: Series, found: Sequence[Change], number: int) -> float:
+    """Level before a change: the mean of what lies between the change before it and itself."""
+    first = 0
+    if number:
+        earlier = found[number - 1]
+        first = min(int(np.searchsorted(series.time, series.time[earlier.after] + earlier.duration)), found[number].after)
+    return float(np.mean(series.value[first : found[number].after + 1]))
+
+
+def _moved(history: History, item: Change, level: float, axis_months: float, mean: float) -> Moved:
+    before = float(history.plain(mean))
+    ends = sorted(history.changed(before, item.size + side * Z95 * item.sigma) for side in (-1.0, 1.0))
+    after, dates = history.changed(before, item.size), history.dates
+    usual = np.median(np.diff([date.timestamp() for date in dates])) / DAY
+    return Moved(
+        column=history.column,
+        unit=history.unit,
+        direction="up" if abs(after) > abs(before) else "down",
+        before=before,
+        after=after,
+        low=ends[0],
+        high=ends[1],
+        part=after / before - 1.0 if before else math.nan,
+        sigmas=abs(item.size) / max(item.sigma, 1e-12),
+        since=dates[item.after + 1],
+        earliest=dates[item.first + 1],
+        latest=dates[item.last + 1],
+        declared=dates[item.declared],
+        one_in=axis_months * math.exp(min(item.statistic - level, 300.0)),
+        duration=float(item.duration * usual),
+    )
+
+
+def _named(axis: Axis, axis_months: float) -> list[Moved]:
+    """Effects that are named more often, or less, than before."""
+    level, found = threshold(axis, axis_months), []
+    for effect, named in axis.named.items():
+        log = presence.statistic(named)
+        passed = np.flatnonzero(log >= level)
+        if not passed.size:
+            continue
+        place, first, last = presence.after(named)
+        before, after = float(np.mean(named[: place + 1])), float(np.mean(named[place + 1 :]))
+        found.append(
+            Moved(
+                column=column_of(effect),
+                unit="of recordings",
+                direction="up" if after > before else "down",
+                before=before,
+                after=after,
+                low=math.nan,
+                high=math.nan,
+                part=math.nan,
+                sigmas=math.nan,
+                since=axis.dates[place + 1],
+                earliest=axis.dates[first + 1],
+                latest=axis.dates[last + 1],
+                declared=axis.dates[int(passed[0])],
+                one_in=axis_months * math.exp(min(float(log[-1]) - level, 300.0)),
+                duration=0.0,
+            )
+        )
+    return found
+
+
+def _events(axis: Axis, moved: Sequence[Moved], known: Causes) -> list[Event]:
+    """Changes whose dates may be the same are one event."""
+    groups: list[list[Moved]] = []
+    for one in sorted(moved, key=lambda item: (item.earliest, item.latest)):
+        if groups and one.earliest <= max(item.latest for item in groups[-1]):
+            groups[-1].append(one)
+        else:
+            groups.append([one])
+    return [
+        Event(
+            machine=axis.machine,
+            axis=axis.axis,
+            moved=tuple(sorted(group, key=lambda item: (-item.one_in, item.column))),
+            cause=known.likeliest([(item.column, item.direction) for item in group]),
+        )
+        for group in groups
+    ]

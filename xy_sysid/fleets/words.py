@@ -1,0 +1,73 @@
+"""Trends in words."""
+
+from __future__ import annotations
+
+import math
+from datetime import datetime
+
+from xy_sysid.fleets.history import Axis
+from xy_sysid.fleets.trends import Event, Moved, Trend, Trends
+from xy_sysid.units import Units, readable
+
+MOST = 6  # changes of an event that are told one by one
+
+
+def sentence(event: Event, axis: Axis) -> str:
+    """What changed, since when, by how much, how sure, and why."""
+    first, *others = event.moved
+    text = f"{event.machine} {event.axis}: {told(first, axis)}."
+    if others:
+        text += f" At the same time: {'; '.join(told(one, axis) for one in others[:MOST])}{_more(len(others) - MOST)}."
+    if event.cause is None:
+        return f"{text} No cause in the table explains it."
+    return f"{text} Likely cause: {event.cause.cause}. {event.cause.check}".rstrip()
+
+
+def _more(count: int) -> str:
+    return f"; and {count} more" if count > 0 else ""
+
+
+def told(one: Moved, axis: Axis) -> str:
+    """One change."""
+    if math.isnan(one.sigmas):
+        often = f"in {100 * one.after:.0f} % of the recordings, before in {100 * one.before:.0f} %"
+        return f"{one.column} is named {often}, since {day(one.since)}"
+    scale, unit = readable(Units(*axis.units).of(one.unit))
+    verb = "rose" if one.direction == "up" else "fell"
+    gradually = f", over {one.duration:.0f} days" if one.duration >= 1.0 else ""
+    size = f"{100 * one.part:+.3g} %, {min(one.sigmas, 99.0):.2g} sigma" if math.isfinite(one.part) else f"{min(one.sigmas, 99.0):.2g} sigma"
+    values = f"from {one.before * scale:.4g} to {one.after * scale:.4g} {unit}".rstrip()
+    return f"{one.column} {verb} {values} since {day(one.since)}{gradually} ({size})"
+
+
+def day(date: datetime) -> str:
+    """3 March 2026, with the time of day where there is one."""
+    text = f"{date.day} {date:%B %Y}"
+    return text if (date.hour, date.minute, date.second) == (0, 0, 0) else f"{text} {date:%H:%M}"
+
+
+def chance(one: Moved) -> str:
+    """How seldom such evidence comes by chance."""
+    return f"once in {one.one_in:.1e} axis-months" if one.one_in < 1e9 else "less than once in 1e9 axis-months"
+
+
+def summary(trends: Trends) -> str:
+    """How much was looked at."""
+    dated = [axis for axis in trends.axes if axis.histories]
+    months = sum(axis.months for axis in dated)
+    out = sum(axis.left_out for axis in trends.axes)
+    text = f"{len(dated)} axes, {sum(len(axis.dates) for axis in dated)} recordings, {months:.3g} axis-months"
+    return text + (f"; {out} rows without a date or an answer are left out" if out else "")
+
+
+def widest(trends: Trends) -> list[tuple[str, float, float]]:
+    """By parameter: median spread between recordings and median half width of a recording's own interval, parts of the value."""
+    found: dict[str, list[Trend]] = {}
+    for one in trends.trends:
+        found.setdefault(one.history.column, []).append(one)
+    rows = []
+    for column, parts in found.items():
+        spreads = sorted(one.spread for one in parts)
+        own = sorted(float(sigma) for one in parts for sigma in one.history.series.sigma)
+        rows.append((column, spreads[len(spreads) // 2], own[len(own) // 2]))
+    return sorted(rows, key=lambda row: -row[1])
