@@ -12,7 +12,7 @@ class Drive(Settings):
 
     velocity_gain: float = knob(0.097, "steady speed per volt, without any part", "m/s/V", gt=0.0, le=100.0)
     pole: float = knob(236.0, "drag (with back-EMF) over moving mass, on a fixed base", "rad/s", gt=0.0, le=1e5)
-    table_mass: float = knob(18.0, "what slides", "kg", gt=0.0, le=1e5)
+    table_mass: float = knob(18.0, "moving mass of the table", "kg", gt=0.0, le=1e5)
     rotor_mass: float = knob(7.0, "motor and screw, as seen at the table: inertia (2 pi / lead)^2", "kg", gt=0.0, le=1e5)
     guide_share: float = knob(0.05, "part of the drag that acts on the table instead of the motor", "", ge=0.0, le=1.0)
     lead: float = knob(0.005, "travel in one turn of the screw", "m", gt=0.0, le=1.0)
@@ -21,7 +21,7 @@ class Drive(Settings):
     encoder_on: Literal["motor", "table"] = knob("motor", "which side of screw and backlash the encoder sees")
     travel: float = knob(0.15, "distance from the middle to each end stop", "m", gt=0.0, le=100.0)
     stop_stiffness: float = knob(1e7, "stiffness of an end stop", "N/m", gt=0.0, le=1e9)
-    stop_damping: float = knob(2.0, "loss of an end stop, per approach speed (about 1.5 (1 - restitution) / speed)", "s/m", ge=0.0, le=1e3)
+    stop_damping: float = knob(2.0, "loss of an end stop per approach speed (about 1.5 (1 - restitution) / speed)", "s/m", ge=0.0, le=1e3)
 
     @property
     def moving_mass(self) -> float:

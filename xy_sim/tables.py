@@ -12,11 +12,11 @@ from xy_sim.parts.contract import Group, Parameter
 from xy_sysid.settings import knobs
 
 _GROUPS: dict[Group, str] = {
-    "base": "of every hypothesis",
-    "effect": "hidden effects that a diagnosis should name",
-    "outside": "what no hypothesis knows",
-    "event": "what happens meanwhile",
-    "imperfection": "dirt, of which every real machine has a little",
+    "base": "part of every model",
+    "effect": "effects that a diagnosis should name",
+    "outside": "effects that are not in the library",
+    "event": "changes during a run",
+    "imperfection": "imperfections of every real machine",
 }
 
 

@@ -54,115 +54,116 @@ EXAMPLES = (
     Example(
         "",
         (FREQUENCY, SPEED, PLACE),
-        "The reference. The error lies on the noise floor at high frequencies and below it at low ones (the floor allows 0.1 % of the signal); "
-        "its mean is zero at every velocity and every position.",
+        "The reference. At high frequencies the error is at the noise floor, at low ones below it (the floor allows 0.1 % of the signal). "
+        "The mean error is zero at every velocity and position.",
     ),
     Example(
         "coulomb_friction",
         (FREQUENCY, SPEED, ZOOM),
-        "Look at the mean error against velocity: it jumps from plus to minus at standstill. Just beside zero the axis lags behind the model in "
-        "both directions; at the ends it leads, because the fit made the rigid model too weak to make up for the friction. By frequency the "
-        "error is the same up to the axis' pole: a sign has all frequencies in it.",
+        "The mean error against velocity jumps at standstill. At low speed the axis is slower than the model in both directions. At high "
+        "speed it is faster, because the fit made the rigid model too weak to compensate for the friction. By frequency the error is flat "
+        "up to the pole of the axis, because the sign of the velocity contains all frequencies.",
     ),
     Example(
         "stribeck_friction",
         (FREQUENCY, SPEED, ZOOM),
-        "The jump of Coulomb friction, but steeper and higher right beside standstill, and the size of the error has a top there: friction is "
-        "largest when the axis breaks away.",
+        "A jump as with Coulomb friction, but steeper and higher near standstill. The size of the error has a peak there, because friction "
+        "is largest at breakaway.",
     ),
     Example(
         "presliding_hysteresis",
         (FREQUENCY, SPEED, ZOOM),
-        "As large by frequency as Coulomb friction, yet the mean against velocity has no jump, only a gentle S: the force follows the way since "
-        "the last reversal and not the sign of velocity.",
+        "By frequency the error is as large as with Coulomb friction. But the mean error against velocity has no jump, only a smooth S, "
+        "because the force follows the distance since the last reversal and not the sign of the velocity.",
     ),
     Example(
         "asymmetric_friction",
         (FREQUENCY, SPEED, TIME),
-        "The jump of Coulomb friction on a mean that is not zero: friction is larger one way than the other, which pushes like a load "
-        "whenever the axis moves to and fro.",
+        "A jump as with Coulomb friction, around a mean that is not zero: friction is larger in one direction, which acts like a load while "
+        "the axis moves to and fro.",
     ),
     Example(
         "asymmetric_viscous_friction",
         (FREQUENCY, SPEED, TIME),
-        "The mean error against velocity is a V upside down: of one sign at both ends, and larger the faster. A load is of one sign too, but flat.",
+        "The mean error against velocity is an inverted V: the same sign at both ends, and larger at higher speed. The error of a load also "
+        "has one sign, but it is flat.",
     ),
     Example(
         "constant_load",
         (FREQUENCY, SPEED, TIME),
-        "The same mean error at every velocity and every time, and nothing by frequency (a constant has none): weight, a spring at the end of its "
-        "way, an offset of the amplifier.",
+        "The mean error is the same at every velocity and time, and there is no error by frequency, because a constant has none: weight, a "
+        "preloaded spring, an offset of the amplifier.",
     ),
     Example(
         "dead_zone",
         (FREQUENCY, SPEED, ZOOM),
-        "An S as with friction but without the jump: what is lost depends on the voltage and not on the direction of motion, and at standstill "
-        "the voltage may be anything.",
+        "An S as with friction, but without the jump. The loss depends on the voltage and not on the direction of motion, and at standstill "
+        "the voltage can have any value.",
     ),
     Example(
         "saturation",
         (FREQUENCY, SPEED, ZOOM),
-        "The S the other way round, bending back at the fastest: only the peaks are cut, and the fit made the model weaker everywhere to make up "
-        "for them. In time: single large errors where the voltage peaks.",
+        "An inverted S that bends back at the highest speeds. Only the peaks are cut, and the fit made the model weaker everywhere to "
+        "compensate. In time: single large errors at the voltage peaks.",
     ),
     Example(
         "amplifier_lag",
         (FREQUENCY, BODE, ZOOM),
-        "No error at the lowest frequencies, and more and more above; the dip is where the fitted delay happens to turn the phase as the lag does. "
-        "The measured magnitude bends down above 100 Hz, which no delay can do.",
+        "No error at the lowest frequencies, and an increasing error above. At the dip, the fitted delay has the same phase as the lag. The "
+        "measured magnitude bends down above 100 Hz, which a delay cannot do.",
     ),
     Example(
         "backlash",
         (FREQUENCY, BODE, ZOOM),
-        "Small fast motions stay inside the gap and meet the motor alone: above some frequency the axis moves more than the model. Slow, large "
-        "motions see both masses and fit.",
+        "Small fast motions stay inside the gap, so the motor moves without the table: above some frequency the axis moves more than the "
+        "model. Slow, large motions move both masses and fit.",
     ),
     Example(
         "cogging",
         (FREQUENCY, PLACE, SPEED),
-        "Waves in the mean error against position, with a period of the motor or the screw. Against velocity there is no more than a slope.",
+        "The mean error against position is a wave with a period of the motor or the screw. Against velocity there is only a slope.",
     ),
     Example(
         "lead_error",
         (FREQUENCY, PLACE, SPEED),
-        "The size of the error waves along the travel while its mean stays zero, and it grows with speed: the scale of the encoder is wrong by "
-        "place, and no force is missing.",
+        "The size of the error is a wave along the travel, with zero mean, and it grows with speed. The scale of the encoder depends on the "
+        "position; no force is missing.",
     ),
     Example(
         "position_dependent_gain",
         (FREQUENCY, PLACE, SPEED),
-        "The size of the error depends on the place and not on the speed: the fit is right where the gain is the mean one, and errs to both sides. "
-        "The mean is nearly zero because the error has the sign of the voltage.",
+        "The size of the error depends on the position and not on the speed: the fit is right where the gain has its mean value. The mean "
+        "error is nearly zero because the error has the sign of the voltage.",
     ),
     Example(
         "screw_compliance",
         (FREQUENCY, BODE, ZOOM),
-        "A deep notch and a peak in the response, and the error has its top there. The model goes straight through.",
+        "The response has a deep notch and a peak, and the error is largest there. The model has neither.",
     ),
     Example(
         "base_resonance",
         (FREQUENCY, BODE, ZOOM),
-        "A small notch with a peak right beside it, near 47 Hz; the error rings at that frequency in time. The same transfer function as a "
-        "compliant screw: the name is the likelier by what is usual of both, which is a prior and not a measurement.",
+        "A small notch with a peak next to it, near 47 Hz; in time the error oscillates at that frequency. The transfer function is the "
+        "same as that of a compliant screw. The name comes from typical parameter values, which are a prior and not a measurement.",
     ),
     Example(
         "hardening_stiffness",
         (FREQUENCY, PLACE, TIME),
-        "The mean error bends at both ends of the travel, against the motion: a spring that stiffens. Over a short travel it hides in a "
+        "The mean error bends at both ends of the travel, against the motion: a stiffening spring. Over a short travel it looks like a "
         "straight line; here it is large (`cubic` 1e6 V/m3).",
         "1e6",
     ),
     Example(
         "return_spring",
         (FREQUENCY, PLACE, SPEED),
-        "The mean error is a straight line against position, as of a force towards one place, and grows towards low frequencies, where the motion is "
-        "wide. Against velocity its mean stays near zero.",
+        "The mean error against position is a straight line, as for a force towards one position. It grows towards low frequencies, where "
+        "the motion is wide. Against velocity the mean error stays near zero.",
     ),
     Example(
         "gravity",
         (FREQUENCY, PLACE, SPEED),
-        "A joint that turns; 1000 mm stand for 1 rad. The mean error is a piece of a sine: steep where the arm hangs, flat where it is level. "
-        "Over a tenth of a turn a spring with a load looks the same.",
+        "A rotary joint; 1000 mm stand for 1 rad. The mean error is part of a sine: steep where the arm hangs, flat where it is level. Over "
+        "a tenth of a turn a spring with a load looks the same.",
         machine="joint.yaml",
         excite=(
             ("rms", 6.0),
@@ -178,14 +179,14 @@ EXAMPLES = (
     Example(
         "position_dependent_drag",
         (FREQUENCY, PLACE, SPEED),
-        "The size of the error depends on the place: the model is right in the middle, too fast at the end that drags more, too slow at the other. "
-        "The mean is nearly zero because the error has the sign of the motion.",
+        "The size of the error depends on the position: the model is right in the middle, too fast at the end with more drag, too slow at "
+        "the other end. The mean error is nearly zero because the error has the sign of the motion.",
         "6",
     ),
     Example(
         "gain_drift",
         (FREQUENCY, SPEED, TIME),
-        "A V against time: the fit is right in the middle of the data that it saw, and errs to both sides, most in the part that was held out.",
+        "A V against time: the fit is right in the middle of its data. The error grows to both sides.",
     ),
 )
 

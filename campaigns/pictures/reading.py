@@ -7,47 +7,50 @@ from xy_sysid.effects import EFFECTS
 
 HEAD = """# How to read the pictures
 
-The page, the report and this text show the same pictures. Everything here is of the simulated machine, and `python -m campaigns.pictures`
-(`make pictures`) makes it anew: pictures and text.
+The page and the report show these pictures. All examples come from the simulated machine. `python -m campaigns.pictures`
+(`make pictures`) makes the pictures and this page.
 
-**Blue** is measured, **orange** is the model, **green** is the noise floor, **red** marks where the model fails, **grey** is not trusted.
-Where two models lie over each other, blue is before and orange after.
-Errors are those of velocity: the model is driven with the measured voltage alone, from the speed of the first sample on, so small errors
-cannot hide in a correction. *Held out* are parts of the recording, spread over it, that no fit has seen (its last third for backlash,
-whose filter must run through). The *noise floor* is what a perfect model would still be off by: the encoder's noise.
+- **Colours**: blue is measured, orange is the model, green is the noise floor. Red marks where the model fails. Grey is not trusted.
+  Where two models are compared, blue is before and orange after.
+- **Errors** are errors of velocity. The model is driven with the measured voltage alone, from the speed of the first sample on, so no feedback
+  hides an error.
+- **Held-out** data are parts of the recording, spread over it, that no fit has seen. For backlash it is the last third, because its filter must run
+  without interruption.
+- The **noise floor** is the error that a perfect model would still have: the encoder noise.
 
 ## The ladder
 
 ![A staircase that falls over two steps to the noise floor](pictures/ladder.png)
 
-Each step is one more effect in the model, and everything is fitted again. Look at the solid line: the error on data that no fit has seen.
-Good: it ends on the dotted green floor, with a tick. The dashed line is the error on the data of the fit; where it keeps falling while the solid line
-rises, the last effect explains noise and should go. Where both stop above the floor, something is left that is not in the library.
+Each step adds one effect and fits all parameters again. Look at the solid line: the held-out error.
+Good: it ends on the dotted green floor, with a tick. The dashed line is the error on the fitted data. If it falls while the solid line
+rises, the last effect only fits noise; remove it. If both stop above the floor, the library lacks an effect.
 
 ## Before and after
 
 ![Error by frequency and in time, of the rigid model and of the last one](pictures/before_after.png)
 
-Two steps over each other. By frequency: where the blue line is above 1 the rigid model fails; where the orange one is at or below 1 nothing is left.
+Two steps overlaid, by frequency and in time. Above 1 a model fails. At or below 1 its error is noise.
 
 ## Candidates
 
 ![Bars: what each candidate leaves of the error](pictures/candidates.png)
 
-What each effect leaves of the held-out error when it alone is added to the rigid model. Shorter is better. A runner-up far behind means a sure
-name; bars of the same length mean that these data cannot tell the effects apart, and the diagnosis then names the experiment that can.
+The held-out error that remains when only this effect is added to the rigid model. Shorter is better. If the runner-up is far behind,
+the name is certain. If bars have the same length, these data cannot distinguish the effects, and the diagnosis proposes an experiment that can.
 
 ## Bode and coherence
 
 ![Magnitude and phase with the model over it; coherence](pictures/response.png)
 
-Measured with its 95 % band (often thinner than the line), the model dashed over it. Grey crosses are not excited or not coherent; nothing is
-fitted there. The coherence is 1 where the input explains all of the output. Here it falls to 0.85 below 10 Hz:
-friction and cogging make motion that a linear response cannot explain. An axis without them has 0.99 and more down to the lowest line.
+The measurement with its 95 % band (often thinner than the line), and the model dashed. Grey crosses are lines without excitation or
+coherence; they are not fitted. The coherence is 1 where the input explains all of the output. Here it falls to 0.85 below 10 Hz, because
+friction and cogging cause motion that a linear response cannot explain. Without them it is 0.99 or more down to the lowest line.
 
 ## Where the model fails: one picture per effect
 
-First a machine without any missing effect, then each effect added to the same machine, always with the *rigid* model: gain, delay and one pole.
+The first picture shows a machine without a missing effect. Then each effect is added to the same machine. The model is always
+the *rigid* one: gain, delay and one pole.
 """
 
 
@@ -68,10 +71,10 @@ def _section(example: Example) -> str:
     if example.effect:
         effect = EFFECTS[example.effect]
         lines.append(f"- What it is: {effect.meaning}. Law: `{effect.law}`")
-        lines.append(f"- Taken for: {', '.join(effect.look_alikes)}. Told apart by: {effect.experiment}.")
+        lines.append(f"- Looks like: {', '.join(effect.look_alikes)}. Distinguished by: {effect.experiment}.")
         driven = "".join(f" --excite {name}={value:g}" for name, value in example.excite)
         made = f"xy-sysid simulate rec --machine {example.machine} --effect x:{example.typed}{driven}"
-        lines.append(f"- See it: `{made}`, `xy-sysid report rec -o report.html`\n")
+        lines.append(f"- Try it: `{made}`, `xy-sysid report rec -o report.html`\n")
     return "\n".join(lines)
 
 

@@ -41,7 +41,7 @@ def test_columns_of_what_does_not_read_says_how_to_read_it(tmp_path: Path) -> No
     """The names to be used with --map, among them the likely clock; that command then works."""
     scipy.io.savemat(tmp_path / "a.mat", {"log": np.column_stack((T, Y, U)), "gain": 3.0})
     said = cli("columns", tmp_path / "a.mat")
-    assert said.code == 0 and "Does not read by itself" in said.out and "--map time=log:1,input=COLUMN,output=COLUMN" in said.out
+    assert said.code == 0 and "Needs options to be read" in said.out and "--map time=log:1,input=COLUMN,output=COLUMN" in said.out
     answer = cli("fit", tmp_path / "a.mat", *RIGID, "--set", "length=512", "--map", "time=log:1,input=log:3,output=log:2", "--json").json
     assert answer["axes"]["x"]["converged"]
 

@@ -95,7 +95,7 @@ def test_a_wrong_option_is_one_line(command: str, options: str, words: str, good
         ("--held-out nan", "0 to 0.9"),
         ("--held-out x", "valid number"),
         ("--model /no/such/folder/m.yaml", "Make /no/such/folder first"),
-        ("--model /", "this is a folder"),
+        ("--model /", "not a folder"),
         ("--mat /no/such/folder/m.mat", "Make /no/such/folder first"),
     ],
 )
@@ -269,7 +269,7 @@ def test_a_wrong_replay_is_one_line_and_leaves_nothing(bag: Path, tmp_path: Path
     out = tmp_path / "out"
     assert "'q'; allowed: x" in refused("replay", bag, "--axis", "q", "--out", out)
     assert "--topic voltage=NAME" in refused("replay", bag, "--topic", "voltage=/nope", "--out", out)
-    assert "no window was filled (15000 paired samples, 16385 needed" in refused("replay", bag, "--set", "length=16384", "--out", out)
+    assert "not enough samples for one window (15000 paired samples, 16385 needed" in refused("replay", bag, "--set", "length=16384", "--out", out)
     assert "Did you mean 'length'?" in refused("replay", bag, "--set", "lenght=3", "--out", out)
     assert not out.exists()
     assert "exists already" in refused("replay", bag, "--out", tmp_path)

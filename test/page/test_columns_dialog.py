@@ -41,8 +41,8 @@ def test_names_that_tell_are_chosen_already(tmp_path: Path) -> None:
     [
         ("", None, [AxisColumns("x", "p", "q")], "a column, or a rate"),
         ("t", None, [AxisColumns("x", "p", "")], "output of x is not chosen"),
-        ("t", None, [AxisColumns("x", "p", "q"), AxisColumns("x", "r", "s")], "none twice"),
-        ("t", None, [], "a name for each"),
+        ("t", None, [AxisColumns("x", "p", "q"), AxisColumns("x", "r", "s")], "a different name"),
+        ("t", None, [], "a different name for each axis"),
         ("t", -5.0, [AxisColumns("x", "p", "q")], "> 0 Hz"),
     ],
 )

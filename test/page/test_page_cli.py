@@ -22,7 +22,7 @@ from xy_sysid.page.server import listen, url
     ("arguments", "words"),
     [
         (("nowhere.npz",), "is not there"),
-        (("REC", "--folder", "nowhere"), "a folder that is there"),
+        (("REC", "--folder", "nowhere"), "an existing folder"),
         (("REC", "--port", "99999"), "65535"),
         (("REC", "--namespace", "9bad", "--live"), "names after slashes"),
         (("REC", "--topic", "what=/x"), "voltage=NAME"),

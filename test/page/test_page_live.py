@@ -258,7 +258,7 @@ def test_the_stop_of_another_is_overridden_with_its_name_seen(scene: Scene) -> N
     tab.until(stop.get_subscription_count, 20)
     stop.publish(Bool(data=True))
     activate = tab.page.locator("[data-act=activate]")
-    scene.lifecycle("STOP is on from test: it is released there, or overridden here")
+    scene.lifecycle("STOP is on from test. Release it there, or override it here")
     tab.until(lambda: activate.text_content() == "Override STOP" and activate.is_enabled(), 15)
     assert "STOP is on from test" in scene.nodes()
     override = tab.page.locator("[data-act=override]")

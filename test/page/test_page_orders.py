@@ -90,7 +90,7 @@ def test_live_says_what_is_waited_for_and_which_seconds_were_used() -> None:
     heard = TopicsState()
     link: Any = Deaf()
     page = Live(heard, link, lambda words, done: None)
-    assert "not heard yet" in page.words("x") and not page.ready("x")
+    assert "does not answer" in page.words("x") and not page.ready("x")
     heard.graph({"diagnoser"}, 0.0)
     assert page.words("x").startswith("Waiting for the first samples.") and "press Diagnose" not in page.words("x")
 
@@ -99,7 +99,7 @@ def test_live_says_what_is_waited_for_and_which_seconds_were_used() -> None:
         heard.status(StatusMessage("diagnoser", 0, "", told), 0.0)
 
     said(seconds_kept="6.2")
-    assert page.words("x") == "6 of 10 s of data are here; then the rigid model is fitted by itself." and not page.ready("x")
+    assert page.words("x") == "6 of 10 s of data have arrived; then the rigid model is fitted automatically." and not page.ready("x")
     said(seconds_kept="12", seconds_heard="12")
     assert "is being fitted" in page.words("x") and page.ready("x") and page.used("x") == ""
     heard.stories["x"] = {"seconds": 10.4, "ladder": []}
@@ -133,7 +133,7 @@ def test_effects_that_the_diagnoser_does_not_begin_with_are_set_again(monkeypatc
         page.job("x")
     assert deaf.asked == 3 * ["diagnoser effects.x: coulomb_friction"]
     assert page.job("x") is None
-    assert said == ["the diagnoser has the effects that are wanted, and does nothing; press Diagnose"]
+    assert said == ["the model has these effects already; press Diagnose"]
     page.ask("add", "x", "coulomb_friction")
     deaf.told(True, "")
     heard.doing({"axis x": "adding coulomb_friction"}, now[0])

@@ -112,7 +112,7 @@ def test_a_dead_link_is_said_and_begun_anew_and_stop_works(driven: Driven) -> No
     driven.link._orders.put(lambda line: sys.exit())
     assert driven.world.until(lambda: driven.link._line is not first and driven.link.problem == "", 3.0)
     said = [message.words for message in driven.session.messages]
-    assert any("link to the nodes was lost" in words for words in said) and any("there again" in words for words in said)
+    assert any("link to the nodes was lost" in words for words in said) and any("restored" in words for words in said)
     assert driven.blocks[-1].values.any()
     sent, answer = len(driven.blocks), list[tuple[bool, str]]()
     asking = threading.Thread(target=lambda: answer.append(driven.session.stop(8.0)))

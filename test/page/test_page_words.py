@@ -163,7 +163,7 @@ def test_failing_stretches_are_found_and_told_in_words() -> None:
     assert 18 < low < 22 and 37 < high < 42 and worst == 50.0
     assert "fails at" in failing_words(comparison) and "50 standard errors" in failing_words(comparison)
     quiet = columns(comparison)
-    assert "within what noise" in failing_words(ArrayMessage(comparison.topic, comparison.labels, (2, 4), np.ones(8))) and len(quiet) == 4
+    assert "within noise at every line" in failing_words(ArrayMessage(comparison.topic, comparison.labels, (2, 4), np.ones(8))) and len(quiet) == 4
     tf = TransferFunction(np.array([1.0]), np.array([1.0, 0.0]), 0.001)
     figure = response_figure(frf, comparison, tf, 2000.0)
     assert {"95 % band", "measured", "model", "not trusted", "residual"} <= {trace.name for trace in figure.data}
@@ -216,7 +216,7 @@ def test_the_diagnosis_says_what_how_sure_and_what_came_second() -> None:
     """In one line each, for people and screen readers."""
     assert verdict_words(story()) == "Missing: coulomb friction. Confidence in coulomb friction: 98 %."
     lines = look_alike_lines(story())
-    assert lines[0] == "Runner-up: saturation: it leaves more." and "not told apart" in lines[1] and lines[2] == "Next experiment: Go slowly."
+    assert lines[0] == "Runner-up: saturation: it leaves more." and "not distinguished" in lines[1] and lines[2] == "Next experiment: Go slowly."
     assert model_effects(story(ladder=[{"held_out_error": 4e-3}])) == [] and model_effects(story()) == ["coulomb_friction"]
 
 
@@ -286,6 +286,6 @@ def test_the_button_to_activate_says_what_it_does_with_stop() -> None:
     """The page releases its own STOP by itself; that of somebody else it can only override, and both texts say so."""
     assert on_activate(False, "") == ("Activate", "")
     button, told = on_activate(True, "")
-    assert button == "Release STOP and activate" and "released before anything moves" in told
+    assert button == "Release STOP and activate" and "releases it first" in told
     button, told = on_activate(True, "guard")
-    assert button == "Override STOP" and "from guard" in told and "overridden" in told
+    assert button == "Override STOP" and "from guard" in told and "override it here" in told

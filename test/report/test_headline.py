@@ -39,7 +39,7 @@ def test_the_headline_goes_from_missing_over_adding_to_explained() -> None:
     assert all(("missing" in line) != ("Explained" in line) for line in words)
     assert "missing" not in detail(grown).lower() and "at the noise floor" in detail(grown)
     assert "Missing: coulomb_friction" in detail(found) and "Confidence in coulomb friction" in detail(found)
-    assert "fails most here" in detail(base)
+    assert "largest error of the rigid model" in detail(base)
 
 
 def test_taking_the_effect_out_makes_the_headline_fall_back() -> None:

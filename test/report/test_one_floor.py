@@ -59,4 +59,4 @@ def test_what_is_held_out_is_shaded_where_it_lies(story: dict[str, Any]) -> None
 def test_the_coherence_of_the_recording_is_no_fault_of_the_model(story: dict[str, Any]) -> None:
     """It belongs to a linear response: never red, and it says so."""
     (tile,) = [fact for fact in story_facts(story) if fact.label == "linear part"]
-    assert tile.good is None and "belongs to the recording and not to this model" in tile.meaning
+    assert tile.good is None and "property of the recording, not of this model" in tile.meaning

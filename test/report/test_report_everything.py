@@ -56,8 +56,8 @@ def test_a_manager_reads_the_summary_first(page: str) -> None:
     """Each axis has a verdict in words, the size of the error against the motion and the noise, and the falling ladder beside it."""
     text = words_of(page).partition("Provenance")[2]  # behind the links at the top
     assert text.index("Summary") < text.index("A rigid axis with delay and coulomb friction") < text.index("Remarks")
-    assert "is enough: nothing that the data show is missing" in text
-    assert "which no fit has seen" in text and "% of the speed itself" in text
+    assert "is sufficient: the data show no missing effect" in text
+    assert "on the held-out part" in text and "% of the speed" in text
     assert "The linear fit alone, without coulomb friction: relative error" in text and "checks of the linear fit passed" in text
     assert "coulomb_friction" not in text.partition("Provenance")[0]
 

@@ -109,7 +109,7 @@ def test_the_delay_in_the_model_makes_the_difference_and_the_page_says_so(study:
     text = "".join(parsed(page).text)
     assert text.count("with the delay absorbed in the polynomials the relative error is") == 2
     assert "it is not a confidence interval" in text
-    assert "Read literally they are unstable" in text
+    assert "Taken literally they are unstable" in text
 
 
 def test_unstable_poles_and_poles_outside_the_band_are_named_only_where_they_are(study: dict[str, AxisStudy], page: str) -> None:

@@ -10,10 +10,10 @@ PART = Part(
     kind="friction",
     group="effect",
     law="f = coulomb (1 + asymmetry sign(v)) sign(v)",
-    meaning="worn or tilted nut, one-sided wiper: forth costs more than back",
+    meaning="worn or tilted nut, one-sided wiper: more friction forth than back",
     source="Armstrong-Helouvry, Control of Machines with Friction, Kluwer 1991, ch. 3",
     parameters=(
-        Parameter("asymmetry", "", 0.5, 0.3, 0.9, "part by which forth is above and back below the mean", -1.0, 1.0, True),
+        Parameter("asymmetry", "", 0.5, 0.3, 0.9, "relative difference of each direction from the mean; positive: larger forth", -1.0, 1.0, True),
         Parameter("coulomb", "V", 0.2, 0.1, 0.3, "mean level", 0.0, 100.0),
     ),
     family="dry_friction",

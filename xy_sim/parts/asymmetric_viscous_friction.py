@@ -10,9 +10,11 @@ PART = Part(
     kind="friction",
     group="effect",
     law="f = drag (1 + asymmetry sign(v)) v",
-    meaning="seals and wipers whose lip drags more one way than the other",
+    meaning="seals and wipers with more drag in one direction than in the other",
     source="Janot, Gautier & Brunot, Data set and reference models of EMPS, Nonlinear System Identification Benchmarks 2019",
-    parameters=(Parameter("asymmetry", "", 0.2, 0.1, 0.4, "part by which the drag forth is above and back below the mean", -1.0, 1.0, True),),
+    parameters=(
+        Parameter("asymmetry", "", 0.2, 0.1, 0.4, "relative difference of each direction from the mean; positive: larger forth", -1.0, 1.0, True),
+    ),
     drawn=False,
 )
 

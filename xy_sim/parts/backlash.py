@@ -12,8 +12,8 @@ PART = Part(
     meaning="a nut without preload, a worn coupling",
     source="Nordin & Gutman, Controlling mechanical systems with backlash, Automatica 38 (2002), sec. 2.2; contact after Hunt & Crossley 1975",
     parameters=(
-        Parameter("gap", "m", 20e-6, 8e-6, 60e-6, "free play, flank to flank", 1e-9, 0.1),
-        Parameter("stiffness", "N/m", 2e7, 2e7, 2e7, "stiffness of the flanks; screw_compliance replaces it if it is there", 1e3, 1e9),
-        Parameter("damping", "s/m", 20.0, 20.0, 20.0, "loss of the contact, per approach speed"),
+        Parameter("gap", "m", 20e-6, 8e-6, 60e-6, "free travel between the flanks", 1e-9, 0.1),
+        Parameter("stiffness", "N/m", 2e7, 2e7, 2e7, "stiffness of the flanks; screw_compliance, if present, replaces it", 1e3, 1e9),
+        Parameter("damping", "s/m", 20.0, 20.0, 20.0, "loss of the contact per approach speed"),
     ),
 )

@@ -10,12 +10,12 @@ PART = Part(
     kind="structure",
     group="event",
     law="frequency of base_resonance -> frequency - clip(rate (t - start), 0, drop)",
-    meaning="stiffness of the feet falls; the damage that the alarm must see",
+    meaning="the stiffness of the feet falls; the alarm must detect this damage",
     source="Junker, New criteria for self-loosening of fasteners under vibration, SAE 690055 (1969)",
     parameters=(
-        Parameter("drop", "Hz", 2.0, 1.0, 3.0, "fall of the frequency in all", 0.0, 1000.0),
+        Parameter("drop", "Hz", 2.0, 1.0, 3.0, "total fall of the frequency", 0.0, 1000.0),
         Parameter("start", "s", 30.0, 20.0, 60.0, "when it begins", 0.0, 1e9),
-        Parameter("rate", "Hz/s", 1.0, 0.2, 1.0, "how fast it falls", 1e-9, 1e6),
+        Parameter("rate", "Hz/s", 1.0, 0.2, 1.0, "rate of the fall", 1e-9, 1e6),
     ),
 )
 

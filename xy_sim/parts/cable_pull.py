@@ -12,13 +12,15 @@ PART = Part(
     kind="force",
     group="imperfection",
     law="f = -pull (curve(q / length) + z / reach); z' = v - |v| z / reach",
-    meaning="cables and hoses bend, rub and are laid anew behind each reversal",
+    meaning="cables and hoses bend and rub, and settle again after each reversal",
     source="hysteresis: P. Dahl, A solid friction model, 1968; smooth random curve",
     parameters=(
-        Parameter("pull", "V", 0.02, 0.01, 0.05, "drive voltage that holds it, rms of the place, most of the hysteresis", 0.0, 100.0),
-        Parameter("reach", "m", 1e-3, 0.3e-3, 3e-3, "way back after which it pulls the other way", 1e-5, 10.0),
-        Parameter("length", "m", 5e-3, 2e-3, 10e-3, "way over which the place's part changes", 1e-5, 10.0),
-        Parameter("seed", "", 5.0, 1.0, 1e6, "of the curve", 0.0, 1e9, whole=True),
+        Parameter(
+            "pull", "V", 0.02, 0.01, 0.05, "drive voltage that holds it: rms of the position-dependent part, maximum of the hysteresis", 0.0, 100.0
+        ),
+        Parameter("reach", "m", 1e-3, 0.3e-3, 3e-3, "distance after a reversal in which the pull changes sides", 1e-5, 10.0),
+        Parameter("length", "m", 5e-3, 2e-3, 10e-3, "distance over which the position-dependent part changes", 1e-5, 10.0),
+        Parameter("seed", "", 5.0, 1.0, 1e6, "seed of the curve", 0.0, 1e9, whole=True),
     ),
     drawn=False,
 )

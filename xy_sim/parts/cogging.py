@@ -12,7 +12,7 @@ PART = Part(
     kind="force",
     group="effect",
     law="f = amplitude sin(2 pi per_revolution q / lead + phase)",
-    meaning="magnets against slots, and the current sensor's ripple",
+    meaning="magnets against slots, ripple of the current sensor",
     source="Hanselman, Brushless Permanent Magnet Motor Design, 2003, ch. 5",
     parameters=(
         Parameter("amplitude", "V", 0.15, 0.05, 0.4, "drive voltage that overcomes it", 0.0, 100.0),

@@ -10,9 +10,9 @@ PART = Part(
     kind="friction",
     group="effect",
     law="f = coulomb sign(v); at rest it holds up to coulomb",
-    meaning="preloaded nut, guide seals and bearings",
+    meaning="preloaded nut, guide seals, bearings",
     source="C. A. Coulomb 1785; switching after Olsson et al. 1998, sec. 2; here each zero of v is located in time",
-    parameters=(Parameter("coulomb", "V", 0.2, 0.05, 0.4, "drive voltage that it eats, moving or not", 0.0, 100.0),),
+    parameters=(Parameter("coulomb", "V", 0.2, 0.05, 0.4, "drive voltage that overcomes it, moving or at rest", 0.0, 100.0),),
     family="dry_friction",
 )
 

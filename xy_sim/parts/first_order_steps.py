@@ -9,7 +9,7 @@ PART = Part(
     kind="integrator",
     group="imperfection",
     law="v(t + step) = v(t) + step v'(t), q(t + step) = q(t) + step v(t + step); a motor whose speed changes its sign stands at the step's end",
-    meaning="not a machine but another maker's plant: nothing inside a step is resolved, neither a stop nor a contact",
+    meaning="the integration method of a simple simulator: events inside a step, such as a stop or a contact, are not resolved",
     source="semi-implicit Euler: Hairer, Lubich & Wanner, Geometric Numerical Integration, 2nd ed. 2006, sec. I.1.2",
     parameters=(Parameter("step", "s", 25e-6, 25e-6, 25e-6, "longest step", 1e-7, 1e-3),),
     drawn=False,

@@ -12,12 +12,12 @@ PART = Part(
     kind="drive",
     group="imperfection",
     law="v -> v max(1 + depth curve(t / time), 0.1)",
-    meaning="supply voltage, temperature of the amplifier, field weakening: not a trend but a walk",
+    meaning="random changes: supply voltage, temperature of the amplifier, field weakening",
     source="Krishnan 2010, sec. 1.3 (temperature); smooth random curve",
     parameters=(
         Parameter("depth", "", 0.02, 0.01, 0.05, "rms of the relative change", 0.0, 0.9),
-        Parameter("time", "s", 5.0, 2.0, 10.0, "time in which it changes", 0.01, 1e6),
-        Parameter("seed", "", 3.0, 1.0, 1e6, "of the curve", 0.0, 1e9, whole=True),
+        Parameter("time", "s", 5.0, 2.0, 10.0, "time over which it changes", 0.01, 1e6),
+        Parameter("seed", "", 3.0, 1.0, 1e6, "seed of the curve", 0.0, 1e9, whole=True),
     ),
     drawn=False,
 )

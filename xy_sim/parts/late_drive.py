@@ -11,11 +11,11 @@ PART = Part(
     kind="input",
     group="imperfection",
     law="v(t) = u(t - delay - e); e uniform in -largest..largest, new for each sample, never before the command",
-    meaning="the drive's cycle is not locked to the controller's, or its task waits",
+    meaning="the cycle of the drive is not synchronised to the controller, or its task is late",
     source="Wittenmark, Nilsson & Torngren, Timing problems in real-time control systems, ACC 1995",
     parameters=(
-        Parameter("largest", "s", 50e-6, 5e-6, 100e-6, "largest error of the instant; half a sample at most", 0.0, 1.0),
-        Parameter("seed", "", 7.0, 1.0, 1e6, "of the errors", 0.0, 1e9, whole=True),
+        Parameter("largest", "s", 50e-6, 5e-6, 100e-6, "largest timing error; half a sample at most", 0.0, 1.0),
+        Parameter("seed", "", 7.0, 1.0, 1e6, "seed of the errors", 0.0, 1e9, whole=True),
     ),
     drawn=False,
 )

@@ -12,7 +12,7 @@ PART = Part(
     kind="drive",
     group="outside",
     law="f = factor(q) v, back-EMF drag times factor(q)^2; factor = 1 + depth sin(2 pi q / period)",
-    meaning="a linear motor's uneven magnets, a belt that is not evenly tight",
+    meaning="uneven magnets of a linear motor, uneven tension of a belt",
     source="Hanselman 2003, ch. 4: torque and back-EMF share one constant",
     parameters=(
         Parameter("depth", "", 0.1, 0.05, 0.2, "largest relative change", 0.0, 0.9),

@@ -10,7 +10,7 @@ PART = Part(
     kind="friction",
     group="effect",
     law="z' = v - |v| z / (length level(v) / coulomb); f = coulomb z / length + damping z'",
-    meaning="asperities bend before they break: micrometre hysteresis loops around each reversal; all dry friction goes through them",
+    meaning="asperities bend before they break away: micrometre hysteresis loops around each reversal. All dry friction goes through them",
     source="C. Canudas de Wit et al., A new model for control of systems with friction (LuGre), IEEE TAC 40 (1995), eq. 1-3",
     parameters=(
         Parameter("coulomb", "V", 0.25, 0.1, 0.4, "level when sliding", 1e-6, 100.0),

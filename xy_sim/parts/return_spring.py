@@ -14,8 +14,8 @@ PART = Part(
     source="Kovacic & Brennan, The Duffing Equation, 2011, sec. 1.2",
     parameters=(
         Parameter("stiffness", "V/m", 10.0, 5.0, 40.0, "drive voltage that holds it, per distance", 0.0, 1e7),
-        Parameter("rest", "m", 0.0, -0.02, 0.02, "where it neither pulls nor pushes", -1e4, 1e4),
-        Parameter("softening", "1/m2", 0.0, 0.0, 10.0, "part of the stiffness that it loses per square of the distance", -1e6, 1e6),
+        Parameter("rest", "m", 0.0, -0.02, 0.02, "rest position of the spring", -1e4, 1e4),
+        Parameter("softening", "1/m2", 0.0, 0.0, 10.0, "relative loss of stiffness per square of the distance", -1e6, 1e6),
     ),
     family="spring",
     drawn=False,

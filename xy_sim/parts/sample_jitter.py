@@ -11,11 +11,11 @@ PART = Part(
     kind="encoder",
     group="imperfection",
     law="reading = q + v e; e uniform in -largest..largest, new for each sample",
-    meaning="an interrupt that waits, a bus that is busy",
+    meaning="a delayed interrupt, a busy bus",
     source="Wittenmark, Nilsson & Torngren, Timing problems in real-time control systems, ACC 1995; first order in e",
     parameters=(
-        Parameter("largest", "s", 20e-6, 2e-6, 20e-6, "largest error of the instant", 0.0, 1e-3),
-        Parameter("seed", "", 6.0, 1.0, 1e6, "of the errors", 0.0, 1e9, whole=True),
+        Parameter("largest", "s", 20e-6, 2e-6, 20e-6, "largest timing error", 0.0, 1e-3),
+        Parameter("seed", "", 6.0, 1.0, 1e6, "seed of the errors", 0.0, 1e9, whole=True),
     ),
     drawn=False,
 )

@@ -13,7 +13,7 @@ PART = Part(
     law="v = clip(u, -limit, limit)",
     meaning="supply or current limit of the drive",
     source="Khalil, Nonlinear Systems, sec. 1.2",
-    parameters=(Parameter("limit", "V", 1.5, 1.0, 2.2, "largest voltage that comes out", 1e-9, 1e6, power=-0.25),),
+    parameters=(Parameter("limit", "V", 1.5, 1.0, 2.2, "largest output voltage", 1e-9, 1e6, power=-0.25),),
 )
 
 

@@ -11,7 +11,7 @@ PART = Part(
     kind="structure",
     group="effect",
     law="f = k (x_motor - x_table) + c (x_motor' - x_table'); k = table_mass (2 pi frequency)^2",
-    meaning="axial and torsional give of screw, nut and bearing",
+    meaning="axial and torsional compliance of screw, nut and bearing",
     source="Varanasi & Nayfeh, The dynamics of lead-screw drives, J. Dyn. Sys. Meas. Control 126 (2004)",
     parameters=(
         Parameter("frequency", "Hz", 110.0, 95.0, 150.0, "table on the screw, motor locked: the antiresonance", 1.0, 2000.0, power=-0.5),

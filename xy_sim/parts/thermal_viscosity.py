@@ -10,12 +10,12 @@ PART = Part(
     kind="friction",
     group="outside",
     law="drag -> drag (1 - depth h / (1 + h)); time h' = (v / speed)^2 - h",
-    meaning="cold start: minutes of running-in, faster the more it moves",
+    meaning="cold start: the drag falls as the machine warms up, faster with more motion",
     source="Seeton, Viscosity-temperature correlation for liquids, Tribol. Lett. 22 (2006); first-order warming",
     parameters=(
-        Parameter("depth", "", 0.3, 0.15, 0.5, "part of the drag that warmth can take away", 0.0, 0.95),
+        Parameter("depth", "", 0.3, 0.15, 0.5, "largest relative loss of drag by warming", 0.0, 0.95),
         Parameter("time", "s", 15.0, 8.0, 30.0, "time constant of warming", 0.01, 1e5),
-        Parameter("speed", "m/s", 0.04, 0.03, 0.06, "rms speed that takes half of it away", 1e-6, 10.0),
+        Parameter("speed", "m/s", 0.04, 0.03, 0.06, "rms speed at which half of this is lost", 1e-6, 10.0),
     ),
 )
 

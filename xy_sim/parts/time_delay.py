@@ -10,7 +10,7 @@ PART = Part(
     kind="input",
     group="base",
     law="v(t) = u(t - delay)",
-    meaning="the whole chain from command to current acts a fixed time late; fractions of a sample count",
+    meaning="fixed delay of the whole chain from command to current, including fractions of a sample",
     source="measured on the paper's table: 1.29 ms (x), 1.38 ms (y)",
     parameters=(Parameter("delay", "s", 1.29e-3, 0.5e-3, 3e-3, "time from a voltage sample to its effect", 0.0, 1.0),),
 )

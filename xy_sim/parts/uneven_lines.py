@@ -14,14 +14,14 @@ PART = Part(
     kind="encoder",
     group="imperfection",
     law="reading = q + fine (sin(a) + sin(2 a + 1) / 2) + wave curve(q / length), less that at 0; a = 2 pi q / period",
-    meaning="interpolation within a line, and a scale that is stretched here and there",
+    meaning="interpolation error within a line, and a scale with local stretch",
     source="R. C. Kavanagh, Probabilistic learning technique for improved accuracy of sinusoidal encoders, IEEE TIE 48 (2001); ISO 3408-3: 2006",
     parameters=(
         Parameter("fine", "m", 0.2e-6, 0.05e-6, 0.5e-6, "error of the interpolation", 0.0, 1e-2),
         Parameter("wave", "m", 5e-6, 1e-6, 10e-6, "rms of the long waves", 0.0, 1e-2, power=1.0),
-        Parameter("period", "m", 20e-6, 20e-6, 100e-6, "from line to line", 1e-7, 1.0),
-        Parameter("length", "m", 3e-3, 1e-3, 8e-3, "way over which the long waves change", 1e-5, 10.0),
-        Parameter("seed", "", 8.0, 1.0, 1e6, "of the long waves", 0.0, 1e9, whole=True),
+        Parameter("period", "m", 20e-6, 20e-6, 100e-6, "distance between lines", 1e-7, 1.0),
+        Parameter("length", "m", 3e-3, 1e-3, 8e-3, "distance over which the long waves change", 1e-5, 10.0),
+        Parameter("seed", "", 8.0, 1.0, 1e6, "seed of the long waves", 0.0, 1e9, whole=True),
     ),
     drawn=False,
 )

@@ -10,9 +10,9 @@ PART = Part(
     kind="friction",
     group="base",
     law="f = coefficient v",
-    meaning="drag beyond the drive's own (which velocity_gain and pole describe)",
+    meaning="drag in addition to that of the drive (velocity_gain and pole)",
     source="Olsson et al., Friction models and friction compensation, Eur. J. Control 4 (1998), eq. 2",
-    parameters=(Parameter("coefficient", "V/(m/s)", 2.0, 0.5, 4.0, "drive voltage that the drag eats, per speed"),),
+    parameters=(Parameter("coefficient", "V/(m/s)", 2.0, 0.5, 4.0, "drive voltage that overcomes the drag, per speed"),),
 )
 
 

@@ -36,9 +36,9 @@ def run(arguments: Sequence[str]) -> int:
         return _nobody_reads()
     except OSError as problem:
         place = f"{problem.filename}: " if problem.filename else ""
-        return _refuse(f"{place}{problem.strerror or problem}. Check the path, the permissions and the space that is left.")
+        return _refuse(f"{place}{problem.strerror or problem}. Check the path, the permissions and the free disk space.")
     except MemoryError:
-        return _refuse("There is not enough memory for this. Give a shorter part with --span, or a shorter window with --set length=.")
+        return _refuse("Not enough memory. Give a shorter part with --span, or a shorter window with --set length=.")
     except Exception:
         if _interrupts.came:  # imports of compiled modules, and of classes with descriptors, make errors of their own of an interrupt
             return _stopped()
@@ -119,7 +119,7 @@ def _ended(code: int) -> int:
     except OSError as problem:
         _discard(sys.stdout)
         if code == 0:
-            code = _refuse(f"The answer cannot be written: {problem.strerror}. Make room, or send it elsewhere.")
+            code = _refuse(f"The answer cannot be written: {problem.strerror}. Free some disk space, or write it elsewhere.")
     _say("")
     return code
 

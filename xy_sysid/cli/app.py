@@ -32,7 +32,7 @@ from xy_sysid.cli.validate import validate
 
 app = typer.Typer(
     name="xy-sysid",
-    help="Identify the axes of a machine: frequency response, transfer function with delay, and how far both can be trusted.",
+    help="Identify the axes of a machine: frequency response, transfer function with delay, and missing physical effects, all with uncertainty.",
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -49,7 +49,7 @@ def _version(asked: bool) -> None:
 
 @app.callback()
 def _program(
-    version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and leave.")] = False,
+    version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")] = False,
 ) -> None:
     pass
 

@@ -17,7 +17,7 @@ MOST = 60  # rows shown
 
 
 def columns(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="any file that may hold a recording, a table or a rosbag2 (docs/files.md lists them)")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="a recording, a table or a rosbag2 (docs/files.md lists the formats)")],
     json: o.Json = False,
 ) -> None:
     """What is in a file: its columns, arrays or topics, what each is taken for, and how to say it otherwise."""
@@ -62,7 +62,7 @@ def _words(file: Path, found: Listing) -> None:
     if found.reads:
         say(f"Reads as: {found.reads}.")
         return
-    say(f"Does not read by itself: {found.problem}")
+    say(f"Needs options to be read: {found.problem}")
     if found.kind != "bag":
         clock = next((one.name for one in found.columns if one.looks.startswith("a clock")), "COLUMN")
-        people.print(f"Say what is what, by name or number: xy-sysid diagnose {file} --map time={clock},input=COLUMN,output=COLUMN --unit output=mm")
+        people.print(f"Assign the columns by name or number: xy-sysid diagnose {file} --map time={clock},input=COLUMN,output=COLUMN --unit output=mm")

@@ -23,12 +23,10 @@ Inputs = Annotated[
     list[Path],
     typer.Argument(
         metavar="REC [MODEL]",
-        help="recordings; then a file of fit --model or refine --model (.yaml): without one, a linear model is fitted to the first two thirds",
+        help="recordings, then a model file (.yaml) of fit or refine; without one, a linear model is fitted to the first two thirds",
     ),
 ]
-Other = Annotated[
-    Path | None, typer.Option(metavar="MODEL", help="compare two models in pairs on the same unseen data: the one before, and the one after")
-]
+Other = Annotated[Path | None, typer.Option(metavar="MODEL", help="compare two models on the same held-out data, before and after; give both")]
 
 
 @reads

@@ -20,12 +20,12 @@ DELAY_WITHIN, RESONANCE_WITHIN, ERROR_WITHIN = 20e-6, 0.2, 0.015  # s, Hz, 1: wh
 
 def demo(
     machine: Annotated[str, typer.Option(help="machine file or a name in config/machines; default paper.yaml, with the page surprise.yaml")] = "",
-    seconds: Annotated[float | None, typer.Option(help="seconds of data; default 60, with the page until Ctrl-C", min=5.0, max=86_400.0)] = None,
-    speed: Annotated[float, typer.Option(help="times faster than real time; 0 is as fast as it goes", min=0.0, max=1000.0)] = 4.0,
+    seconds: Annotated[float | None, typer.Option(help="seconds of data; default 60, or until Ctrl-C with the page", min=5.0, max=86_400.0)] = None,
+    speed: Annotated[float, typer.Option(help="times faster than real time; 0: full speed", min=0.0, max=1000.0)] = 4.0,
     seed: Annotated[int, typer.Option(help="of the excitation", min=1, max=2**31 - 100)] = 1,
-    page: Annotated[bool | None, typer.Option("--page/--no-page", help="with the page in a browser; default is yes in a terminal")] = None,
-    port: Annotated[int, typer.Option(help="port of the page, or the next one that is free; 0 is any", min=0, max=65535)] = 8080,
-    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="open a browser where there is a display")] = True,
+    page: Annotated[bool | None, typer.Option("--page/--no-page", help="open the page in a browser; default in a terminal")] = None,
+    port: Annotated[int, typer.Option(help="port of the page, or the next free one; 0: any", min=0, max=65535)] = 8080,
+    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="open a browser if there is a display")] = True,
     json: o.Json = False,
 ) -> None:
     """Watch two axes being identified live: all nodes run on this machine, and nothing else is needed."""

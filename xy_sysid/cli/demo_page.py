@@ -28,7 +28,7 @@ def wished(page: bool | None, json: bool) -> bool:
 def watch_page(specs: list[Any], axes: tuple[str, ...], speed: float, port: int, browse: bool) -> int:
     """Run the nodes and the page until Ctrl-C or until the page ends; the exit code.
 
-    speed: times real time, 0 as fast as it goes; port: of the page, or the next one that is free; browse: open a browser where there is a display
+    speed: times real time, 0 at full speed; port: of the page, or the next one that is free; browse: open a browser if there is a display
     """
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     from xy_sysid.cli.monitor import Monitor, refuse_others
@@ -37,7 +37,7 @@ def watch_page(specs: list[Any], axes: tuple[str, ...], speed: float, port: int,
     from xy_sysid.processes.run_plan import ProcessSpec
     from xy_sysid.processes.starter import run
 
-    aside.print("starting the nodes and the page: a simulated table with something hidden in each axis, over ROS 2 ...")
+    aside.print("starting the nodes and the page: a simulated table with a hidden effect in each axis, over ROS 2 ...")
     monitor = Monitor(axes)
     refuse_others(monitor)
     command = (sys.executable, "-m", "xy_sysid", "page", "--no-browse", "--port", str(port))
@@ -47,7 +47,7 @@ def watch_page(specs: list[Any], axes: tuple[str, ...], speed: float, port: int,
     def heard(name: str, line: str) -> None:
         if name == "page" and line.startswith("http"):
             people.print(f"the page is at {line}")
-            pace = f"{speed:g} times faster than real time" if speed else "as fast as it goes"
+            pace = f"{speed:g} times faster than real time" if speed else "at full speed"
             say(f"The table is simulated, {pace}. See where the rigid model fails, press Diagnose, then Add. Ctrl-C ends everything.")
             if browse and display():
                 webbrowser.open(line)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def effects(
-    name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="only this effect, in full")] = None,
+    name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="show only this effect, with all details")] = None,
     effect_file: Annotated[list[Path] | None, typer.Option("--effect-file", metavar="FILE", help="a Python file with an effect of your own")] = None,
     json: o.Json = False,
 ) -> None:

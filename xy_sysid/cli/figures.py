@@ -24,10 +24,10 @@ KINDS = ("svg", "pdf", "csv")
 def figures(
     recs: o.Recs,
     reading: Reading,
-    out: Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="the folder to write into, made if it is not there")] = Path("figures"),
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="output folder, created if needed")] = Path("figures"),
     kind: Annotated[list[str] | None, typer.Option("--kind", metavar="KIND", help="svg, pdf or csv (may be repeated; default all three)")] = None,
     effect_file: Own = None,
-    force: Annotated[bool, typer.Option("--force", help="replace the pictures of these axes that are there already")] = False,
+    force: Annotated[bool, typer.Option("--force", help="replace existing pictures of these axes")] = False,
     json: o.Json = False,
 ) -> None:
     """Write every picture of the story of each axis, from where the rigid model fails to the falling error, as SVG, PDF and CSV."""

@@ -29,10 +29,10 @@ def fit(
     set_: o.Set = None,
     params: o.Params = None,
     period: o.Period = "auto",
-    method: Annotated[str, typer.Option(help="best (maximum likelihood), lls, iwls, nlls, ml, or nllsfdi (the paper's own path)")] = "best",
-    weighting: Annotated[str, typer.Option(help="of a line's error: sigma, relative (1/|FRF|, the paper's) or uniform")] = "sigma",
+    method: Annotated[str, typer.Option(help="best (maximum likelihood), lls, iwls, nlls, ml, or nllsfdi (the paper's method)")] = "best",
+    weighting: Annotated[str, typer.Option(help="weight of each line: sigma, relative (1/|FRF|, as in the paper) or uniform")] = "sigma",
     domain: Annotated[str, typer.Option(help="s (continuous) or z (discrete)")] = "s",
-    held_out: Annotated[float, typer.Option(help="last part of the recording that no fit sees, for the check in time")] = 0.2,
+    held_out: Annotated[float, typer.Option(help="last part of the recording, held out for the check in time")] = 0.2,
     model: Annotated[Path | None, typer.Option("--model", metavar="FILE", help="write the model as YAML")] = None,
     mat: Annotated[Path | None, typer.Option("--mat", metavar="FILE", help="write the model for MATLAB's tf()")] = None,
     force: o.Force = False,
@@ -58,7 +58,7 @@ def fit(
         recording = read(recs, reading, json)
         if len(recording) and few_periods(recording, held_out):
             held_out = 0.0
-            aside.print("note: the input is there hardly more than twice, so nothing is held out for the check in time")
+            aside.print("note: the recording has hardly more than two periods of the input, so nothing is held out for the check in time")
         training, unseen = split(recording, held_out)
 
         def work(name: str) -> tuple[AxisEstimate, Fit, Validation]:
@@ -134,7 +134,7 @@ def answer(found: AxisEstimate, result: Fit, verdicts: Validation) -> dict[str, 
 
 def _error(result: Fit) -> str:
     if not result.error_cost < 1e6:
-        return "it describes nothing of the response"
+        return "the model explains nothing of the response"
     return f"relative error {result.error_cost:.2g} % (paper: error cost {result.error_cost:.2f}, confidence {result.confidence:.2f})"
 
 

@@ -15,12 +15,12 @@ if TYPE_CHECKING:
     from xy_sysid.processes.run_plan import Told
 
 Rec = Annotated[
-    Path, typer.Argument(metavar="REC", help="recording: a rosbag2 folder or file (.db3, .mcap), .csv, .mat, .npz or another of docs/files.md")
+    Path, typer.Argument(metavar="REC", help="recording: a rosbag2 folder or file (.db3, .mcap), .csv, .mat, .npz or another format of docs/files.md")
 ]
 Recs = Annotated[
     list[Path],
     typer.Argument(
-        metavar="REC", help="recordings of one machine: each a rosbag2 folder or file (.db3, .mcap), .csv, .mat, .npz or another of docs/files.md"
+        metavar="REC", help="recordings of one machine: rosbag2 folders or files (.db3, .mcap), .csv, .mat, .npz or another format of docs/files.md"
     ),
 ]
 Axes = Annotated[list[str] | None, typer.Option("--axis", "-a", help="only this axis (may be repeated)")]
@@ -32,21 +32,23 @@ Topics = Annotated[
     list[str] | None,
     typer.Option("--topic", metavar="WHAT=NAME", help="topic names in a bag: voltage=..., position=... or joints=... (may be repeated)"),
 ]
-Effort = Annotated[bool, typer.Option("--effort", help="take the input from the effort of a JointState; its unit is V, or as --unit says")]
+Effort = Annotated[bool, typer.Option("--effort", help="use the effort of a JointState as input, in V or the unit of --unit")]
 Velocity = Annotated[
-    bool, typer.Option("--velocity", help="take the output from the velocity of a JointState; without it only where there are no positions")
+    bool, typer.Option("--velocity", help="use the velocity of a JointState as output; without this option only if there are no positions")
 ]
 Joints = Annotated[
     list[str] | None,
-    typer.Option("--joint", metavar="AXIS=JOINT", help="the joint of an axis in a bag's joint states, as x=shoulder_pan_joint (may be repeated)"),
+    typer.Option(
+        "--joint", metavar="AXIS=JOINT", help="joint of an axis in the joint states of a bag, for example x=shoulder_pan_joint (may be repeated)"
+    ),
 ]
 EffortLag = Annotated[
-    int, typer.Option(metavar="N", min=0, max=100, help="samples by which effort in joint states is older than its stamp; 1 under ros2_control")
+    int, typer.Option(metavar="N", min=0, max=100, help="number of samples by which the effort is older than its stamp; 1 with ros2_control")
 ]
-Period = Annotated[str, typer.Option(help="samples of the input's period: auto, none or a number")]
+Period = Annotated[str, typer.Option(help="period of the input in samples: auto, none or a number")]
 Span = Annotated[str, typer.Option("--span", metavar="FROM:TO", help="only this part, in seconds from the start, for example 10:70")]
 LARGEST_DOMAIN = 232
-Force = Annotated[bool, typer.Option("--force", help="replace a file that is there already")]
+Force = Annotated[bool, typer.Option("--force", help="replace an existing file")]
 Json = Annotated[bool, typer.Option("--json", help="one JSON document on stdout")]
 
 
@@ -104,12 +106,12 @@ def output_file(option: str, path: Path | None, force: bool) -> None:
     folder = path.absolute().parent
     try:
         if path.is_dir():
-            raise BadInput(option, str(path), "a file, and this is a folder", "Give the file a name.")
+            raise BadInput(option, str(path), "a file, not a folder", "Give the file a name.")
         if not folder.is_dir():
-            raise BadInput(option, str(path), "a file in a folder that is there", f"Make {folder} first.")
+            raise BadInput(option, str(path), "a file in an existing folder", f"Make {folder} first.")
         free(option, path, force, "add --force")
     except OSError as problem:
-        raise BadInput(option, str(path), "a name that the file system takes", f"{problem.strerror}.") from None
+        raise BadInput(option, str(path), "a name that the file system accepts", f"{problem.strerror}.") from None
     if not os.access(path if path.exists() else folder, os.W_OK):
         raise BadInput(option, str(path), "a file that you may write", "Choose another place.")
 
@@ -176,6 +178,6 @@ Budget = Annotated[
         "--budget",
         metavar="S",
         min=0.1,
-        help="seconds of processor time for each axis, after which the best so far is said; without it a fixed amount of work",
+        help="seconds of processor time for each axis, after which the best result so far is given; without it a fixed amount of work",
     ),
 ]

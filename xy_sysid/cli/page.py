@@ -17,18 +17,16 @@ if TYPE_CHECKING:
     from xy_sysid.page.orders import Reading
 
 Recs = Annotated[
-    list[Path] | None, typer.Argument(metavar="[REC]...", help="recordings to open side by side; without one the page is live, over ROS 2")
+    list[Path] | None, typer.Argument(metavar="[REC]...", help="recordings to open side by side; without one the page is live over ROS 2")
 ]
 
 
 def page(
     rec: Recs = None,
-    host: Annotated[str, typer.Option(help="address to listen on; anything but this machine needs the token that is printed")] = "127.0.0.1",
-    port: Annotated[int, typer.Option(help="port, or the next one that is free; 0 is any", min=0, max=65535)] = 8080,
-    folder: Annotated[Path, typer.Option(help="folder whose recordings may be opened, and into which bags are recorded")] = Path(),
-    live: Annotated[
-        bool | None, typer.Option("--live/--no-live", help="with recordings: the machine too; default is live without recordings")
-    ] = None,
+    host: Annotated[str, typer.Option(help="address to listen on; other machines need the printed token")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(help="port, or the next free one; 0: any", min=0, max=65535)] = 8080,
+    folder: Annotated[Path, typer.Option(help="folder of the recordings that can be opened and of new bags")] = Path(),
+    live: Annotated[bool | None, typer.Option("--live/--no-live", help="show the machine as well as recordings; default without recordings")] = None,
     topic: o.Topics = None,
     effort: o.Effort = False,
     map_: Map = None,
@@ -37,7 +35,7 @@ def page(
     rate: Rate = None,
     effect_file: Own = None,
     namespace: Annotated[str, typer.Option(help="ROS namespace of the machine")] = "/xy",
-    browse: Annotated[bool, typer.Option("--browse/--no-browse", help="open a browser where there is a display")] = True,
+    browse: Annotated[bool, typer.Option("--browse/--no-browse", help="open a browser if there is a display")] = True,
     json: o.Json = False,
 ) -> None:
     """See measurement and model in a browser, where they part and what is missing; add it and watch the error fall. Ctrl-C ends it."""
@@ -54,7 +52,7 @@ def page(
         if not path.exists():
             raise BadRecording(path, "is not there", "Check the path.")
     if not folder.is_dir():
-        raise BadInput("--folder", str(folder), "a folder that is there", "Make it first.")
+        raise BadInput("--folder", str(folder), "an existing folder", "Make it first.")
     if not re.fullmatch(r"(/[A-Za-z_][A-Za-z0-9_]*)+", namespace):
         raise BadInput("--namespace", repr(namespace), "names after slashes, like /xy or /cell/xy", "Change it.")
     with_machine = not rec if live is None else live

@@ -23,15 +23,16 @@ Found = TypeVar("Found")
 Command = Callable[..., None]
 Map = Annotated[
     list[str] | None,
-    typer.Option("--map", metavar="WHAT=COLUMN", help='which column is what: time=Zeit,x.input="Motor Voltage",x.output=Pos (see xy-sysid columns)'),
+    typer.Option("--map", metavar="WHAT=COLUMN", help='assign columns: time=Zeit,x.input="Motor Voltage",x.output=Pos (see xy-sysid columns)'),
 ]
 Units = Annotated[
     list[str] | None, typer.Option("--unit", metavar="WHAT=UNIT", help="unit of a column: x.output=mm, output=rad/s (a velocity), time=ms")
 ]
 Scales = Annotated[
-    list[str] | None, typer.Option("--scale", metavar="WHAT=FACTOR", help="factor to SI, or to the unit given: x.output=0.5e-6 for counts of 0.5 um")
+    list[str] | None,
+    typer.Option("--scale", metavar="WHAT=FACTOR", help="factor to SI, or to the unit of --unit: x.output=0.5e-6 for counts of 0.5 um"),
 ]
-Rate = Annotated[float | None, typer.Option(metavar="HZ", help="sampling rate of a table without a time, or whose time is wrong")]
+Rate = Annotated[float | None, typer.Option(metavar="HZ", help="sampling rate of a table without a time column or with a wrong one")]
 
 
 def reading_from(
@@ -95,7 +96,7 @@ def read_each(paths: Sequence[Path], reading: Reading, quiet: bool) -> tuple[Rec
     from xy_sysid.jit import tell_compiling
 
     if aside.is_terminal:
-        tell_compiling(lambda: aside.print("compiling the effect laws, once on this machine: half a minute or so"))
+        tell_compiling(lambda: aside.print("compiling the effect laws, once on this machine: about half a minute"))
     with progress() as bar:
         task = bar.add_task(f"reading {', '.join(path.name for path in paths)}", total=1.0)
         found = read_all(paths, reading, lambda part: bar.update(task, completed=part))

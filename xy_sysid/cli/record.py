@@ -15,7 +15,7 @@ from xy_sysid.cli import options as o
 def record(
     out: Annotated[Path, typer.Argument(metavar="OUT", help="folder of the new bag")],
     storage: Annotated[str, typer.Option(help="sqlite3 or mcap")] = "sqlite3",
-    seconds: Annotated[float, typer.Option(help="stop so long after the first message; 0 is until Ctrl-C", min=0.0)] = 0.0,
+    seconds: Annotated[float, typer.Option(help="stop this many seconds after the first message; 0: until Ctrl-C", min=0.0)] = 0.0,
     topic: Annotated[list[str] | None, typer.Option("--topic", help="topic below the namespace, a regular expression (may be repeated)")] = None,
     namespace: Annotated[str, typer.Option(help="ROS namespace")] = "/xy",
     json: o.Json = False,

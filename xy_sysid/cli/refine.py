@@ -29,15 +29,15 @@ def refine(
     recs: o.Recs,
     reading: Reading,
     add: Annotated[list[str] | None, typer.Option("--add", metavar="NAME", help="add this effect (may be repeated, in this order)")] = None,
-    auto: Annotated[bool, typer.Option("--auto", help="go on by itself until the noise floor is reached or nothing helps")] = False,
+    auto: Annotated[bool, typer.Option("--auto", help="add effects until the noise floor is reached or no effect helps")] = False,
     effect_file: Own = None,
     tolerance: Annotated[
-        float, typer.Option(help="part of the signal that the model may leave; real machines need 0.01 or more", min=1e-6, max=0.5)
+        float, typer.Option(help="part of the signal that counts as noise; real machines need 0.01 or more", min=1e-6, max=0.5)
     ] = 1e-3,
     simulate_alone: Annotated[
         bool,
         typer.Option(
-            "--open-loop", help="fit the named effects once more, to the whole record, for the best simulation of the position from the input alone"
+            "--open-loop", help="fit the named effects again to the position of the whole record, for the best simulation from the input alone"
         ),
     ] = False,
     model: Annotated[Path | None, typer.Option("--model", metavar="FILE", help="write the model with its physical parameters as YAML")] = None,
@@ -64,7 +64,7 @@ def refine(
     known = library(effect_file or [])
     for name in add or []:
         if known[name].category == "base":
-            raise BadInput("--add", name, "an effect that is not in every model already", "See xy-sysid effects.")
+            raise BadInput("--add", name, "an effect that is not part of every model", "See xy-sysid effects.")
     o.output_file("--model", model, force)
     o.output_file("--mat", mat, force)
     recordings = read_each(recs, reading, json)
@@ -135,18 +135,18 @@ def verdict(ladder: Ladder) -> str:
 
 def _words(ladder: Ladder) -> str:
     names = ", ".join(ladder.effects) or "nothing"
-    left = f"what is left beyond the noise is {moved(ladder.discrepancy, ladder.final.units.judged)}"
+    left = f"the residual error beyond the noise is {moved(ladder.discrepancy, ladder.final.units.judged)}"
     said = {
-        "explained": f"Explained by the base and {names}: the held-out error is at the noise floor.",
+        "explained": f"Explained by the rigid model and {names}: the held-out error is at the noise floor.",
         "partly": f"{names} explain {100 * ladder.explained:.3g} % of the error's power; {left}.",
-        "not_in_library": "No effect of the library brings the error down.",
+        "not_in_library": "No effect of the library reduces the error.",
     }[verdict(ladder)]
-    return f"{said} The search was stopped when its time was up." if ladder.stopped else said
+    return f"{said} The search was stopped at its time limit." if ladder.stopped else said
 
 
 def _alone_in_words(found: OpenLoop, unit: str) -> str:
     where = f"{moved(found.rms, unit)} rms, {bare(found.worst, unit)} at worst ({100 * found.share:.2g} % of the measured spread)"
-    return f"Open loop, the position of the whole record simulated from the input alone: off by {where}."
+    return f"Open loop (position of the whole record, simulated from the input alone): error {where}."
 
 
 def _alone(found: OpenLoop | None, unit: str) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""xy-sysid replay: the identifier's logic on a bag, as fast as it goes."""
+"""xy-sysid replay: the identifier's logic on a bag, at full speed."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ def replay(
     joint: o.Joints = None,
     effort_lag: o.EffortLag = 0,
     velocity: o.Velocity = False,
-    diagnose: Annotated[bool, typer.Option("--diagnose", help="then name what is missing and add it, as the node diagnoser does")] = False,
+    diagnose: Annotated[bool, typer.Option("--diagnose", help="then diagnose and add missing effects, as the node diagnoser does")] = False,
     effect_file: Own = None,
-    out: Annotated[Path | None, typer.Option("--out", metavar="BAG", help="write what the node would have published")] = None,
+    out: Annotated[Path | None, typer.Option("--out", metavar="BAG", help="write the messages that the node would have published")] = None,
     json: o.Json = False,
 ) -> None:
     """Replay a bag through the identifier: the same numbers, bit for bit, as the live node."""
@@ -118,7 +118,7 @@ def replay(
     if last is None:
         windows = f"{identifier.samples} paired samples, {settings.length + 1} needed in one piece"
         faults = ", ".join(f"{name} {count}" for name, count in identifier.faults.items()) or "no faults"
-        raise BadRecording(bag, f"no window was filled ({windows}; {faults})", "Give a longer bag or a shorter --set length=.")
+        raise BadRecording(bag, f"not enough samples for one window ({windows}; {faults})", "Give a longer bag or a shorter --set length=.")
     seconds_heard = identifier.samples / last.request.sampling_rate
     if json:
         emit(

@@ -21,16 +21,16 @@ def simulate(
         typer.Option("--effect", metavar="NAME[=SIZE]", help="add an effect, [axis:]name[=size][,parameter=value] (may be repeated)"),
     ] = None,
     hidden: Annotated[
-        int | None, typer.Option(metavar="SEED", help="draw effects and sizes from this seed, and do not tell", min=0, max=2**31 - 1)
+        int | None, typer.Option(metavar="SEED", help="draw hidden effects and their sizes from this seed", min=0, max=2**31 - 1)
     ] = None,
     duration: Annotated[float, typer.Option(help="seconds of data", min=0.01, max=1e6)] = 60.0,
     clean: Annotated[bool, typer.Option("--clean", help="without encoder noise and quantization")] = False,
-    seed: Annotated[int, typer.Option(help="of encoder noise; the excitation's seeds are added to it", min=0, max=2**31 - 100)] = 0,
+    seed: Annotated[int, typer.Option(help="seed of encoder noise; the seeds of the excitation are added to it", min=0, max=2**31 - 100)] = 0,
     excite: Annotated[
         list[str] | None, typer.Option("--excite", "-e", metavar="NAME=VALUE", help="excitation setting for every axis, for example kind=multisine")
     ] = None,
-    truth: Annotated[Path | None, typer.Option(metavar="FILE", help="write what was really simulated as JSON")] = None,
-    force: Annotated[bool, typer.Option("--force", help="replace the file of --truth that is there already; OUT never replaces anything")] = False,
+    truth: Annotated[Path | None, typer.Option(metavar="FILE", help="write the true parameters as JSON")] = None,
+    force: Annotated[bool, typer.Option("--force", help="replace an existing file of --truth; OUT is never replaced")] = False,
     json: o.Json = False,
 ) -> None:
     """Simulate the XY table and write a recording."""

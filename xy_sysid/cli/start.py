@@ -11,7 +11,7 @@ from xy_sysid.cli import options as o
 
 def run(
     params: Annotated[str, typer.Option("--params", metavar="FILE", help="run file: a path, or a name in config/")] = "demo.yaml",
-    first: Annotated[bool, typer.Option("--first", help="an unknown machine's first motion: small pushes of each axis, each looked at")] = False,
+    first: Annotated[bool, typer.Option("--first", help="first motion of an unknown machine, in small steps that are checked one by one")] = False,
     json: o.Json = False,
 ) -> None:
     """Start the nodes that the file names, as processes, and watch them until Ctrl-C."""

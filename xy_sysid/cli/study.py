@@ -25,7 +25,7 @@ def study(
     reading: Reading,
     out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="the page to write")] = Path("study.html"),
     loose: Annotated[
-        Path | None, typer.Option("--loose", metavar="REC2", help="the same machine afterwards (bolts loosened): how far did the resonance move?")
+        Path | None, typer.Option("--loose", metavar="REC2", help="second recording of the same machine (bolts loosened): the shift of the resonance")
     ] = None,
     loose_span: Annotated[str, typer.Option("--loose-span", metavar="FROM:TO", help="only this part of REC2, in seconds from its start")] = "",
     set_: o.Set = None,
@@ -121,4 +121,4 @@ def _any(studies: dict[str, AxisStudy]) -> None:
 
     if all(one.frf is None for one in studies.values()):
         first = next(iter(studies.values()))
-        raise BadInput("recording", "without a response on any axis", "one that moves and is excited", first.problem)
+        raise BadInput("recording", "without a response on any axis", "one with an excited axis that moves", first.problem)

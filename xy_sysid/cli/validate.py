@@ -84,7 +84,7 @@ def validate(
         for note in notes:
             say(f"axis {name}: {note}", aside)
     for name in same:
-        say(f"axis {name}: the model was fitted to this very recording, so this is no validation", aside)
+        say(f"axis {name}: the model was fitted to this recording, so this is not a validation", aside)
     for name, found in answers.items():
         say(f"axis {name}: {found.sentence}")
         if found.simulation is not None:
@@ -92,8 +92,8 @@ def validate(
         if alone[name]:
             off = moved(alone[name]["position_rmse"], recording.output_unit)
             say(
-                f"axis {name}: from the input alone the position of the whole record is off by {off} rms; "
-                f"{100 * alone[name]['explained']:.3g} % of the motion's power is explained."
+                f"axis {name}: simulated from the input alone, the position of the whole record has an error of {off} rms; "
+                f"{100 * alone[name]['explained']:.3g} % of the power of the motion is explained."
             )
     for name, text in problems.items():
         say(f"axis {name}: not checked. {text}")

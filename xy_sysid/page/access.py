@@ -82,10 +82,10 @@ def judge(access: Access, headers: Mapping[str, str], query: str) -> Answer:
     """
     host = headers.get("host", "")
     if access.hosts and name_of(host) not in access.hosts:
-        return Answer(403, f"This page does not answer to the name {name_of(host)!r}. Open it as http://127.0.0.1 with its port.")
+        return Answer(403, f"This page is not served under the name {name_of(host)!r}. Open it as http://127.0.0.1 with its port.")
     origin = headers.get("origin", "")
     if origin and not same_origin(origin, host):
-        return Answer(403, f"Requests from {origin} are refused: this page takes orders from itself only.")
+        return Answer(403, f"Requests from {origin} are refused: this page accepts requests from itself only.")
     if headers.get("sec-fetch-site", "none") == "cross-site" and headers.get("sec-fetch-mode") != "navigate":
         return Answer(403, "Requests from other sites are refused.")
     length = headers.get("content-length", "0")
@@ -96,7 +96,7 @@ def judge(access: Access, headers: Mapping[str, str], query: str) -> Answer:
     given = parse_qs(query).get("token", [""])[0]
     if given:
         if not _equal(given, access.token):
-            return Answer(401, "That token is not the one of this page.")
+            return Answer(401, "Wrong token for this page.")
         return Answer(303, "", access.token, "/")
     if _equal(cookie_of(headers.get("cookie", "")), access.token):
         return Answer()

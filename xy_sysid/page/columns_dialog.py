@@ -38,7 +38,7 @@ def reading_of(time: str, rate: float | None, axes: Sequence[AxisColumns], usual
         raise BadInput("time", "no column and no rate", "a column, or a rate in Hz", "Choose the column that holds the time, or give the rate.")
     names = [one.axis for one in axes]
     if not names or not all(names) or len(set(names)) < len(names):
-        raise BadInput("axes", ", ".join(names) or "none", "a name for each, none twice", "Name the axes, for example x and y.")
+        raise BadInput("axes", ", ".join(names) or "none", "a different name for each axis", "Name the axes, for example x and y.")
     columns = {"time": time} if time else {}
     units: dict[str, str] = {}
     for one in axes:
@@ -94,7 +94,7 @@ class ColumnsDialog:
         time, axes = guesses(found)
         with ui.dialog() as self._dialog, ui.element("div").classes("card wide").props('data-part="columns"'):
             ui.html("<h2>Which column is what?</h2>", sanitize=False)
-            told = f"reads as {found.reads}. Change what is wrong." if found.reads else "its names do not tell. Choose what is what, and the units."
+            told = f"reads as {found.reads}. Change what is wrong." if found.reads else "the names are unknown. Choose the columns and their units."
             ui.label(f"{name}: {told}").classes("soft small")
             heads = [{"name": head, "label": head, "field": head, "align": "left"} for head in HEADS]
             ui.table(columns=heads, rows=[dict(zip(HEADS, _cells(one), strict=True)) for one in found.columns]).props("dense flat").classes("columns")

@@ -25,8 +25,8 @@ STATES = {
 def on_activate(held: bool, others: str) -> tuple[str, str]:
     """What the button to activate says, and what STOP asks for; the second is empty while STOP is off. others: who holds it but the page."""
     if held and others:
-        return "Override STOP", f"STOP is on from {others}: it is released there, or overridden here"
-    return ("Release STOP and activate", "STOP is on: it is released before anything moves") if held else ("Activate", "")
+        return "Override STOP", f"STOP is on from {others}. Release it there, or override it here"
+    return ("Release STOP and activate", "STOP is on. Activate releases it first") if held else ("Activate", "")
 
 
 class Control:
@@ -65,7 +65,7 @@ class Control:
             self._nodes.clear()
             with self._nodes:
                 if not nodes:
-                    ui.label("No node is heard yet. Start them with xy-sysid run, or see the demo: xy-sysid demo.").classes("warn")
+                    ui.label("No node is running. Start the nodes with xy-sysid run, or try xy-sysid demo.").classes("warn")
                 with ui.element("div").classes("buttons"):
                     for name, _, words in [node for node in nodes if not node[1]]:
                         with ui.element("div").classes("buttons well").props(f'tabindex=0 role=group aria-label="{name}: {words}"'):
@@ -104,7 +104,7 @@ class Control:
         """How much faster than a real machine the simulated one runs, in words; empty where it does not."""
         if self._speed == 1.0 or not self._speed or "ballscrew" not in self._session.heard.present:
             return ""
-        return f" · simulated, {self._speed:g} times faster than real time" if self._speed > 0 else " · simulated, as fast as it goes"
+        return f" · simulated, {self._speed:g} times faster than real time" if self._speed > 0 else " · simulated, at full speed"
 
     def _paced(self, values: dict[str, object]) -> None:
         """Called in the link's thread; what is shown reads it later."""
@@ -156,7 +156,7 @@ class Control:
 
         with ui.dialog() as dialog, ui.element("div").classes("card"):
             ui.html("<h2>The machine will move</h2>", sanitize=False)
-            ui.label("Keep the machine's own emergency stop in your hand. STOP in the bar, or Escape, brings the voltage to zero.")
+            ui.label("Keep your hand at the emergency stop of the machine. STOP in the bar, or Escape, brings the voltage to zero.")
             with ui.element("div").classes("buttons"):
                 ui.button("Activate", on_click=sure).props("unelevated no-caps data-act=sure")
                 ui.button("Cancel", on_click=dialog.close).props("flat no-caps")
@@ -177,8 +177,8 @@ class Control:
 
         release()
         with ui.dialog() as dialog, ui.element("div").classes("card"):
-            ui.html("<h2>Somebody else holds STOP</h2>", sanitize=False)
-            ui.label(f"STOP is on from: {held}. Look at the machine and ask there, before you override it. Then press Activate.")
+            ui.html("<h2>Another user holds STOP</h2>", sanitize=False)
+            ui.label(f"STOP is on from: {held}. Look at the machine and ask the holder before you override it. Then press Activate.")
             with ui.element("div").classes("buttons"):
                 ui.button("Override STOP", on_click=sure).props("unelevated no-caps data-act=override")
                 ui.button("Cancel", on_click=dialog.close).props("flat no-caps")
@@ -207,7 +207,7 @@ class Control:
         self._begin.set_enabled(not recorder.running)
         self._end.set_enabled(recorder.running)
         self._open.set_enabled(recorder.last is not None and not recorder.running)
-        self._told.set_text(recorder.words() or f"Bags go to the folder {self._session.shelf.folder.name}.")
+        self._told.set_text(recorder.words() or f"Bags are saved in the folder {self._session.shelf.folder.name}.")
 
     def _record(self) -> None:
         session = self._session

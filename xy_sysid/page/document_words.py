@@ -44,7 +44,7 @@ def look_alike_lines(document: Document) -> list[str]:
     if runner:
         lines.append(f"Runner-up: {spaced(_named(str(runner['effect']), str(runner['sentence'])))}")
     for item in document.get("look_alikes") or []:
-        state = "told apart" if item["told_apart"] else "not told apart by these data"
+        state = "distinguished by these data" if item["told_apart"] else "not distinguished by these data"
         lines.append(spaced(f"Look-alike {item['effect']}, {state}: {item['sentence']}.".replace("..", ".")))
     if document.get("next_experiment"):
         lines.append(spaced(f"Next experiment: {document['next_experiment']}"))

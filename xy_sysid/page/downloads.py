@@ -26,7 +26,7 @@ class Downloads:
             ui.button("Story (JSON)", on_click=lambda: self.take("story")).props("outline dense no-caps data-take=story")
             if not source.live:
                 ui.button("Report (HTML)", on_click=self._report).props("outline dense no-caps data-take=report")
-        ui.label("Figures and their numbers: the buttons SVG, PNG and CSV under each.").classes("soft small")
+        ui.label("To save a figure or its numbers, use the SVG, PNG and CSV buttons below it.").classes("soft small")
 
     def take(self, kind: str) -> None:
         """The newest models of all axes, or the story of the axis that is shown."""
@@ -43,7 +43,7 @@ class Downloads:
     async def _report(self) -> None:
         path = getattr(self._source, "path", None)
         if path is None:
-            self._session.say("Record a bag and open it: the report is made from a recording.")
+            self._session.say("A report needs a recording. Record a bag and open it.")
             return
         waiting = ui.notification("The report is being written ...", spinner=True, timeout=None)
         try:

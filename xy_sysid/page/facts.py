@@ -38,23 +38,23 @@ class Fact:
 
 
 MEANINGS = {
-    "delay": "Time from an input to the motion it causes. One or two milliseconds are usual; it limits how fast a loop can be.",
-    "gain": "Speed for each unit of the input at low frequency: the rigid machine's gain.",
-    "pole": "How fast the axis reaches its speed: 1/pole is the time constant of motor, mass and viscous friction.",
-    "antiresonance": "Where the motor hardly moves because something else swings in its place. Comes in a pair with a resonance.",
-    "resonance": "Where the machine swings most. Good is high and well damped; when it moves, something has become loose or heavier.",
-    "relative error": "Distance between measured and modelled response, relative. Below 2 % is good; above 5 % something is missing.",
-    "worst coherence": "Part of the motion that a linear response to the input explains, 0 to 1, where it is lowest. Low: too little input there, "
-    "noise, or something not linear. Above 0.9 is good.",
-    "linear part": "Lowest coherence: the part of the measured motion, 0 to 1, that a linear response explains. It belongs to the recording and not "
-    "to this model: friction and backlash lower it, and a model that has them may be complete all the same.",
-    "worst place": "Where the error is largest, in multiples of the noise floor. Below 2 is good.",
-    "windows": "Stretches of signal in the estimate. More make the bands narrower; a dozen is the least for a trend.",
-    "windows dropped": "Windows that were not used because samples were missing or broken. Good is none.",
-    "held-out error": "rms error of the simulated velocity on data held out, which no fit has seen. Good is at the noise floor.",
-    "noise floor": "The least error that encoder noise and the tolerance of the laws (0.1 % of the motion) allow. A complete model is there.",
+    "delay": "Time from an input to its motion. One or two milliseconds are typical. It limits the bandwidth of a control loop.",
+    "gain": "Speed per unit of input at low frequency: the gain of the rigid model.",
+    "pole": "1/pole is the time constant with which the axis reaches its speed, from motor, mass and viscous friction.",
+    "antiresonance": "The frequency at which the motor hardly moves because another part oscillates. It comes in a pair with a resonance.",
+    "resonance": "The frequency of the largest oscillation. High and well damped is good. If it changes, something has become loose or heavier.",
+    "relative error": "Relative difference between measured and modelled response. Below 2 % is good; above 5 % something is missing.",
+    "worst coherence": "Lowest part of the motion, 0 to 1, that a linear response to the input explains. Low: too little input, noise, or a "
+    "nonlinearity. Above 0.9 is good.",
+    "linear part": "Lowest coherence: the part of the measured motion, 0 to 1, that a linear response explains. It is a property of the "
+    "recording, not of this model. Friction and backlash lower it, even if the model includes them.",
+    "worst place": "The largest error, in multiples of the noise floor. Below 2 is good.",
+    "windows": "Parts of the signal in the estimate. More windows give narrower bands; use at least a dozen.",
+    "windows dropped": "Windows that were not used because samples were missing or invalid. None is good.",
+    "held-out error": "rms error of the simulated velocity on held-out data, which no fit has seen. At the noise floor is good.",
+    "noise floor": "The error of a perfect model: encoder noise and a tolerance of 0.1 % of the motion.",
 }
-UNSURE = " The model fails: the interval counts noise only and is too narrow."
+UNSURE = " The model fails: the interval includes noise only and is too narrow."
 NEIGHBOURS = 5  # lines of which the middle one counts, so that one line alone is not the worst
 WORTH = 2.0  # times the noise floor from which a model fails
 ESTIMATES = ("delay", "gain", "antiresonance_1.frequency", "resonance_1.frequency")
@@ -112,7 +112,7 @@ def story_facts(document: Mapping[str, Any], step: int | None = None) -> list[Fa
     for name, text in parameter_rows(last["parameters"]):
         effect, _, own = name.partition(".")
         label = name if not own else f"{effect.replace('_', ' ')}: {own.replace('_', ' ')}"
-        meaning = MEANINGS.get(name, "A parameter of the effect, with its 95 % interval. An interval that holds 0 says: not needed.")
+        meaning = MEANINGS.get(name, "A parameter of the effect, with its 95 % interval. If the interval contains 0, the effect is not needed.")
         found.append(Fact(label, text, meaning + (UNSURE if fails else ""), sure=not fails))
     for kind, label in (("zeros", "antiresonance"), ("poles", "resonance")):
         for root in pictures["linear"][kind] if pictures is not None else ():

@@ -29,7 +29,7 @@ class FailureCard:
         self._session, self._source = session, source
         self.plots: dict[By, Plot] = {}
         with ui.element("section").classes("card first").props('aria-label="where the model fails"') as self._card:
-            ui.html("<h2>Where the model fails: error on unseen data, in multiples of the noise floor</h2>", sanitize=False)
+            ui.html("<h2>Where the model fails: error on held-out data, in multiples of the noise floor</h2>", sanitize=False)
             with ui.element("div").classes("four"):
                 for by in get_args(By):
                     self.plots[by] = Plot(READING[by], f"fails_by_{by}", HEIGHT)

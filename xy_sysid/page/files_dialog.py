@@ -19,7 +19,7 @@ async def open_dialog(session: Session) -> None:
         if names:
             choice = ui.select(names, value=names[0], label="recording", with_input=len(names) > 8).props("outlined dense")
         else:
-            ui.label("There is none in this folder yet. Record a bag, or start the page in another folder.")
+            ui.label("This folder has no recordings. Record a bag, or start the page in another folder.")
         with ui.element("div").classes("buttons"):
             if names:
                 ui.button("Open", on_click=lambda: _open(session, str(choice.value), dialog)).props("unelevated")

@@ -60,7 +60,7 @@ class Guard:
             if not told and scope["type"] == "websocket":
                 await send({"type": "websocket.close", "code": NONSENSE})
             elif not told:
-                await _answer(Answer(400, "This session has ended: load the page again."), send)
+                await _answer(Answer(400, "This session has ended. Reload the page."), send)
 
 
 def _from(first: Message, receive: Receive) -> Receive:

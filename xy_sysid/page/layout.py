@@ -38,7 +38,7 @@ class Page:
             self._empty = ui.element("div").classes("card")
             self._empty.set_visibility(False)  # until it is known that there is nothing
             with self._empty:
-                ui.label("No recording is open. Open one of the folder in which the page was started.")
+                ui.label("No recording is open. Open one from the folder in which the page was started.")
                 with ui.element("div").classes("buttons"):
                     ui.button("Open a recording", on_click=lambda: open_dialog(session)).props("unelevated dense no-caps")
             self._grid = ui.element("div").classes("panels")

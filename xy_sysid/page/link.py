@@ -164,7 +164,7 @@ class Link:
         self._line.abandon()
         self._line = _Line(self.heard, self._namespace, self._orders, self._say)
         self.problem = ""
-        self._say("the link to the nodes is there again")
+        self._say("the link to the nodes is restored")
 
 
 class _StopWire:

@@ -91,7 +91,7 @@ class Live:
             asked.settled = math.inf, 0
             self.link.set_parameters(NODE, asked.wanted, lambda done, words: self._set(axis, done, words))
         else:
-            self._told(axis, False, "the diagnoser has the effects that are wanted, and does nothing; press Diagnose")
+            self._told(axis, False, "the model has these effects already; press Diagnose")
 
     def _look_for_losses(self, axis: str, asked: _Asked) -> None:
         """The diagnoser is idle and has not answered: either the answer was lost, or the question, as on a computer under load."""
@@ -115,14 +115,14 @@ class Live:
     def words(self, axis: str) -> str:
         """What is waited for before there is a story, and how long."""
         if NODE not in self.heard.present:
-            return "The diagnoser is not heard yet. If it does not run, start it with xy-sysid run, or record a bag and open it here."
+            return "The diagnoser does not answer. Start it with xy-sysid run, or record a bag and open it here."
         kept = self._kept()
         if kept <= 0.0:
-            moves = "" if self.heard.driving() else " Nothing is driven yet: Configure, then Activate."
-            return f"Waiting for the first samples. With {ENOUGH:.0f} s of data the rigid model is fitted by itself.{moves}"
+            moves = "" if self.heard.driving() else " No axis is driven. Press Configure, then Activate."
+            return f"Waiting for the first samples. After {ENOUGH:.0f} s of data the rigid model is fitted automatically.{moves}"
         if kept < ENOUGH:
-            return f"{kept:.0f} of {ENOUGH:.0f} s of data are here; then the rigid model is fitted by itself."
-        return f"{ENOUGH:.0f} s of data are here; the rigid model is being fitted, which takes a few seconds."
+            return f"{kept:.0f} of {ENOUGH:.0f} s of data have arrived; then the rigid model is fitted automatically."
+        return f"{ENOUGH:.0f} s of data have arrived. The rigid model is being fitted, which takes a few seconds."
 
     def used(self, axis: str) -> str:
         """The seconds that the story is about, since the samples began to be heard, and how many are newer."""
@@ -170,7 +170,7 @@ class Live:
             self._jobs[axis] = asked
             self._trigger(asked.state.order)
         else:
-            raise BadInput("order", act, ", ".join(("add", "remove", *SERVICES)), "Record a bag and open it for that.")
+            raise BadInput("order", act, ", ".join(("add", "remove", *SERVICES)), "Record a bag and open it.")
         self._asked += 1
 
     def cancel(self, axis: str) -> None:

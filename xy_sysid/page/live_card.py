@@ -19,11 +19,11 @@ class LiveCards:
             ui.html("<h2>Linear fit, live</h2>", sanitize=False)
             self._words = ui.label("").classes("soft")
             self._plot = Plot(
-                "The band narrows as windows come in. Residual: distance of measurement and model in standard errors; above 2 is more than chance."
+                "The band narrows with more windows. Residual: measurement minus model in standard errors; above 2 is more than chance."
             )
         with ui.element("section").classes("card").props('aria-label="resonance over time"') as self._track_card:
             ui.html("<h2>Resonance over time</h2>", sanitize=False)
-            self._track = Plot("Fitted from the newest windows alone. Two fits in a row away from the reference raise the alarm.", "resonance")
+            self._track = Plot("Fitted to the newest windows only. Two fits in a row that differ from the reference raise the alarm.", "resonance")
 
     async def refresh(self, axis: str, shown: bool) -> None:
         """Draw again what has changed; shown: the linear fit is what is looked at."""

@@ -107,7 +107,7 @@ def failing_words(comparison: ArrayMessage | None) -> str:
     if comparison is None:
         return "No model yet."
     if not found:
-        return "No stretch of the band stands out: the linear fit is within what noise explains, line by line."
+        return "The linear fit agrees with the measurement within noise at every line."
     worst = "; ".join(f"{low:.3g} to {high:.3g} Hz, up to {size:.2g} standard errors" for low, high, size in found[:3])
     return f"The linear fit fails at {worst}."
 

@@ -10,14 +10,14 @@ from typing import Any, Literal, Protocol
 OrderKind = Literal["begin", "diagnose", "renew", "add", "remove", "next", "auto", "reset"]
 
 DOING = {
-    "begin": "fitting the rigid base",
-    "diagnose": "looking for what is missing",
+    "begin": "fitting the rigid model",
+    "diagnose": "diagnosing the missing effect",
     "renew": "fitting the model to the newest data",
     "add": "adding {}",
     "remove": "taking out {}",
     "next": "finding the next effect",
     "auto": "adding effects until the floor is reached",
-    "reset": "going back to the rigid base",
+    "reset": "returning to the rigid model",
 }
 
 

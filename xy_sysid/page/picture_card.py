@@ -52,7 +52,7 @@ PICTURES = (
         card=FREQUENCY,
         tab="",
         figure=aligned(draw.bode),
-        reading="Where the dashed model leaves the band of the measurement, something is missing. Grey crosses are noise.",
+        reading="Where the dashed model leaves the band of the measurement, an effect is missing. Grey crosses are noise.",
         height=420,
     ),
     Picture(
@@ -60,7 +60,7 @@ PICTURES = (
         card=FREQUENCY,
         tab="",
         figure=aligned(draw.coherence),
-        reading="Near 1: the input explains the motion. Low: too little excitation, noise, or something not linear.",
+        reading="Near 1: the input explains the motion. Low: too little excitation, noise, or a nonlinearity.",
         height=220,
     ),
     Picture(
@@ -68,7 +68,7 @@ PICTURES = (
         card=WHERE,
         tab="speed",
         figure=draw.residual_speed,
-        reading="A mean error that jumps where the velocity changes its sign: Coulomb friction. A mean that bends with speed: drag or saturation.",
+        reading="A mean error that jumps at zero velocity: Coulomb friction. A mean that bends with speed: drag or saturation.",
         height=340,
     ),
     Picture(
@@ -84,7 +84,7 @@ PICTURES = (
         card=WHERE,
         tab="time",
         figure=draw.residual_time,
-        reading="Growing with time: something warms up, drifts or comes loose.",
+        reading="Growing with time: warming, drift, or a loose part.",
         height=340,
     ),
     Picture(
@@ -92,7 +92,7 @@ PICTURES = (
         card=WHERE,
         tab="correlation",
         figure=draw.residual_correlation,
-        reading="Beyond the grey with the input: the model misses something linear, or its delay. With itself alone: noise with a colour.",
+        reading="Correlation with the input beyond the grey bounds: the model misses a linear effect or delay. Autocorrelation only: coloured noise.",
         height=380,
     ),
     Picture(
@@ -100,7 +100,7 @@ PICTURES = (
         card=TIME,
         tab="worst moment",
         figure=draw.zoom,
-        reading="Measured and simulated around the largest error of the rigid model. Drag to zoom, double click to go back.",
+        reading="Measured and simulated around the largest error of the rigid model. Drag to zoom, double-click to go back.",
         height=360,
     ),
     Picture(
@@ -108,7 +108,7 @@ PICTURES = (
         card=TIME,
         tab="speed, all",
         figure=draw.velocity,
-        reading="The whole record, least and most of each stretch. Grey stretches were held out of every fit.",
+        reading="The whole record, as minimum and maximum of short intervals. Grey parts were held out of every fit.",
         height=220,
     ),
     Picture(
@@ -116,7 +116,7 @@ PICTURES = (
         card=TIME,
         tab="position, all",
         figure=draw.position,
-        reading="Position, measured and summed up from the simulated speed: a slow drift apart is usual.",
+        reading="Position, measured and integrated from the simulated speed. A slow drift is normal.",
         height=220,
     ),
     Picture(
@@ -124,7 +124,7 @@ PICTURES = (
         card=ROOTS,
         tab="",
         figure=draw.poles_zeros,
-        reading="Of the linear part: crosses left of 0 are stable; close to the vertical axis they ring.",
+        reading="Poles and zeros of the linear part. Crosses left of 0 are stable; close to the vertical axis they are lightly damped.",
         height=260,
     ),
 )

@@ -67,7 +67,7 @@ class OpenRecording:
 
     def words(self, axis: str) -> str:
         """While there is no story."""
-        return "" if self._problem else "The rigid base is being fitted ..."
+        return "" if self._problem else "The rigid model is being fitted ..."
 
     def effects(self) -> tuple[str, ...]:
         """Of the library that the worker has, files of one's own included."""
@@ -80,7 +80,7 @@ class OpenRecording:
     def ask(self, act: OrderKind, axis: str, argument: str = "") -> None:
         """Order something for an axis, one thing at a time."""
         if axis not in self.axes():
-            raise BadInput("axis", repr(axis), ", ".join(self.axes()) or "none yet", "Wait until the recording is read.")
+            raise BadInput("axis", repr(axis), ", ".join(self.axes()) or "none yet", "Wait until the recording has been read.")
         if axis in self._jobs:
             raise BadInput(f"axis {axis}", f"busy {self._jobs[axis].order.words}", "one thing at a time", "Wait, or cancel it.")
         order = Order(next(self._numbers), act, axis, argument)

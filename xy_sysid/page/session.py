@@ -91,7 +91,7 @@ class Session:
     def stop(self, patience: float = 0.0) -> tuple[bool, str]:
         """Zero volts, now; whether the machine has confirmed it after so many seconds at most, and what there is to say."""
         if self.link is None:
-            return False, "no machine is driven from here"
+            return False, "this page drives no machine"
         self.stopping = True
         answered = threading.Event()
         answer = [(False, "not confirmed yet: look at the machine, and use its emergency stop")]
@@ -114,7 +114,7 @@ class Session:
             done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
             if done.returncode != 0 or not out.is_file():
                 lines = [line for line in done.stderr.splitlines() if line.strip()]
-                raise BadInput("report", "not written", "a recording that can be reported on", lines[-1] if lines else "")
+                raise BadInput("report", "not written", "a recording with a usable axis", lines[-1] if lines else "")
             return out.read_text(encoding="utf-8")
 
     def figure(self, key: tuple[object, ...], make: Callable[[], dict[str, Any]]) -> dict[str, Any]:

@@ -73,7 +73,7 @@ class SettingsForm:
                     self._field(item)
             with ui.element("div").classes("buttons"):
                 on_press(ui.button("Apply").props(f"outline dense no-caps data-apply={axis}"), self._fields.values, self._apply)
-                ui.button("As the node has it", on_click=self.read).props("flat dense no-caps")
+                ui.button("Read from the node", on_click=self.read).props("flat dense no-caps")
                 self._told = ui.label("").classes("small").props(f"role=status aria-live=polite data-told={axis}")
         self._said = ("", True)
         ui.timer(0.3, self._show)

@@ -56,5 +56,5 @@ class Shelf:
             raise BadInput("name of the bag", repr(name[:80]), "1 to 64 letters, digits, - _ and . (no folders)", "Give another name.")
         path = self.folder / name
         if path.exists() or path.is_symlink():
-            raise BadInput("name of the bag", repr(name), "one that is not there yet", "Give another name.")
+            raise BadInput("name of the bag", repr(name), "a name that does not exist", "Give another name.")
         return path

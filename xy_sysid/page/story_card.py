@@ -21,10 +21,10 @@ from xy_sysid.report import story_figures as draw
 from xy_sysid.report.headline import detail, headline, next_act
 
 BUTTONS: tuple[tuple[OrderKind, str, str], ...] = (
-    ("diagnose", "Diagnose", "Which effect is missing in the rigid base? Tries them all."),
-    ("next", "Find the next", "Add the effect that helps most now."),
-    ("auto", "Auto", "Add effects until the noise floor is reached or nothing helps, then take out what is not needed."),
-    ("reset", "Start over", "Back to the rigid base with delay."),
+    ("diagnose", "Diagnose", "Find the effect that the rigid model misses."),
+    ("next", "Find the next", "Add the effect that reduces the error most."),
+    ("auto", "Auto", "Add effects until the noise floor is reached or no effect helps, then remove those that are not needed."),
+    ("reset", "Start over", "Return to the rigid model with delay."),
 )
 
 
@@ -48,7 +48,7 @@ class StoryCard:
                 self._used = ui.label("").classes("soft small grow").props("data-part=used")
                 self._button("renew", "Use the newest", "Fit the model with its effects to the newest data.", partial(self._ask, "renew"))
             with ui.element("div").classes("buttons acts"):
-                self._button("named", "Add", "What the diagnosis names: fit it together with all that is in the model.", self._add_named)
+                self._button("named", "Add", "Add the named effect and fit all parameters again.", self._add_named)
                 self._button("keep", "Download the model", "The newest models of all axes as YAML.", lambda: self._downloads.take("model"))
                 for act, text, meaning in BUTTONS:
                     self._button(act, text, meaning, partial(self._ask, act))
@@ -58,25 +58,28 @@ class StoryCard:
                 ui.button("Cancel", on_click=self._cancel).props("outline dense data-act=cancel")
         between()
         with ui.element("section").classes("card evidence").props('aria-label="steps and evidence"') as self.body:
-            self._ladder = Plot("Each step adds one effect. Held-out error counts; a complete model ends at the dotted noise floor.", "ladder", 320)
+            self._ladder = Plot(
+                "Each step adds one effect. The held-out error counts; a complete model reaches the dotted noise floor.", "ladder", 320
+            )
             self._model = ui.element("div").classes("stack").style("gap:.3rem")
             with ui.element("div").classes("stack").style("gap:.4rem") as self._evidence:
                 ui.html("<h3>What the rigid model misses</h3>", sanitize=False)
                 self._told = ui.label("").classes("small").props("data-part=diagnosis")
-                self._candidates = Plot("What each effect would leave of the error; shortest is best.", "candidates")
+                self._candidates = Plot("The error that remains with each effect; shortest is best.", "candidates")
                 self._ranked = ui.element("div").classes("ranked")
             with ui.element("div").classes("buttons"):
                 self._choice = (
                     ui.select({}, label="add any effect", with_input=True).props("outlined dense options-dense").style("flex:1;min-width:12rem")
                 )
-                self._button("add", "Add", "Fit it together with all that is in the model.", lambda: self._ask("add", str(self._choice.value or "")))
+                self._button("add", "Add", "Add this effect and fit all parameters again.", lambda: self._ask("add", str(self._choice.value or "")))
             self._more = ui.element("div").classes("stack").style("gap:.4rem")
             with ui.expansion("Before and after").classes("w-full").props("dense") as self._overlay:
                 with ui.element("div").classes("buttons"):
                     self._first = ui.select({}, label="before", on_change=lambda: self._compare()).props("outlined dense").style("flex:1")
                     self._last = ui.select({}, label="after", on_change=lambda: self._compare()).props("outlined dense").style("flex:1")
                 self._before_after = Plot(
-                    "Two models over each other: error over the floor, and the error in time where the rigid base was worst.", "before_after"
+                    "Two models overlaid: error over the noise floor, and the error in time around the largest error of the rigid model.",
+                    "before_after",
                 )
             self._pair: tuple[int, int] = (0, 0)
             with ui.expansion("Download").classes("w-full").props("dense"):
@@ -176,13 +179,13 @@ class StoryCard:
         self._rows.clear()
         if document is None:
             with self._model:
-                ui.label("In the model: rigid base with delay, nothing else")
+                ui.label("Model: rigid with delay, no effects")
             return
         there = model_effects(document)
         self._told.set_text(verdict_words(document) if there else "")
         self._told.set_visibility(bool(there))
         with self._model:
-            ui.label("In the model: rigid base with delay" + ("" if there else ", nothing else"))
+            ui.label("Model: rigid with delay" + ("" if there else ", nothing else"))
             for name in there:
                 with ui.element("div").classes("buttons"):
                     ui.label(_words(name)).classes("chip")

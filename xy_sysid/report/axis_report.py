@@ -66,7 +66,7 @@ def axis_report(
     note = ""
     run = recording.run(axis) if len(recording) else None
     if run is not None and len(run) > round(LONGEST * run.sampling_rate):
-        note = f"What is missing is judged on the first {LONGEST:g} s of the longest stretch, of {run.seconds:.4g} s."
+        note = f"The diagnosis uses the first {LONGEST:g} s of the longest stretch, of {run.seconds:.4g} s."
     try:
         story = told(recording, axis, library, tell)
     except BadInput as problem:
@@ -87,7 +87,7 @@ def _studied(recording: Recording, axis: str, settings: IdentifierSettings, peri
     except BadInput as refusal:
         return replace(studied, fits={}, pair=None, problem=str(refusal)), None
     except (np.linalg.LinAlgError, ZeroDivisionError):
-        problem = "The transfer function is beyond what numbers can hold: lower the orders or widen the band."
+        problem = "The coefficients of the transfer function are too large for the computer. Lower the orders or widen the band."
         return AxisStudy(axis=axis, excitation=drive, motion=moved, estimate=None, fits={}, pair=None, change=None, problem=problem), None
 
 

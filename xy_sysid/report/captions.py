@@ -14,18 +14,18 @@ from xy_sysid.report.words import estimate_text, interval_text, number, quantity
 from xy_sysid.response.frf import FrequencyResponse
 
 INTRODUCTION = (
-    "Figures 2 to 7 and tables 1 and 2 of the frequency-domain study of a ball-screw XY table, redrawn for this recording: what it was "
-    "driven with, what it did, its frequency response, the fits of a transfer function, and how far each of them can be trusted."
+    "Figures 2 to 7 and tables 1 and 2 of the frequency-domain study of a ball-screw XY table, for this recording: excitation, "
+    "motion, frequency response, and transfer functions with their uncertainty."
 )
 FITS = (
-    "LLS and NLLS have the delay absorbed in their polynomials (the paper's path), ML has delay and hold in its model. Top and middle: "
-    "magnitude and phase. Bottom: relative error of each fit at each line; a fit is as good as it can be where it lies on "
-    "the grey noise of the measurement, and misses something where it lies far above."
+    "LLS and NLLS absorb the delay in their polynomials (the paper's method); ML models delay and hold. Top and middle: magnitude "
+    "and phase. Bottom: relative error of each fit at each line. An error at the grey noise of the measurement cannot be reduced; "
+    "far above it, the model misses something."
 )
 NO_FIT = "No axis of this recording could be fitted; the remarks say why."
 COEFFICIENTS = (
-    "LLS and NLLS are the paper's path (nllsfdi: all poles free, delay absorbed, errors weighted by 1/|FRF|); ML has delay, hold and window "
-    "in its model and weighs by the measured scatter. Its last coefficient is fixed at 0 by the integrator of the axis."
+    "LLS and NLLS are the paper's method (nllsfdi: all poles free, delay absorbed, errors weighted by 1/|FRF|). ML models delay, "
+    "hold and window and weights each line by its measured variance. Its last coefficient is 0 because the axis integrates."
 )
 
 
@@ -43,7 +43,7 @@ def summary(one: AxisStudy) -> str:
         if one.pair.antiresonance is not None:
             text += f", antiresonance {estimate_text(one.pair.antiresonance)}"
         text += f", resonance {estimate_text(one.pair.resonance)}"
-    return f"{text}." if ml.consistent is not False else f"{text}. The model misses something that the data show; the intervals do not cover that."
+    return f"{text}." if ml.consistent is not False else f"{text}. The model misses something in the data; the intervals do not include this error."
 
 
 def excitation(inputs: Mapping[str, Excitation], unit: str) -> str:
@@ -67,7 +67,7 @@ def position(outputs: Mapping[str, Motion], unit: str) -> str:
         f"drift {quantity(one.drift * 60, f'{unit}', 3)} a minute (dashed)"
         for axis, one in outputs.items()
     )
-    return f"The measured position; each point of the line is the smallest or largest sample of its instant, so that no peak is lost. {each}."
+    return f"The measured position, drawn as minimum and maximum of short intervals, so no peak is lost. {each}."
 
 
 def response(responses: Mapping[str, FrequencyResponse]) -> str:
@@ -76,15 +76,15 @@ def response(responses: Mapping[str, FrequencyResponse]) -> str:
     for axis, frf in responses.items():
         used = frf.trusted
         if not bool(np.any(used)):
-            each.append(f"Axis {axis}: no line can be trusted, all are drawn, without a band")
+            each.append(f"Axis {axis}: no line can be trusted; all are drawn without a band")
             continue
         typical = float(np.median(frf.sigma[used] / np.abs(frf.response[used])))
         each.append(
             f"Axis {axis}: {int(np.sum(used))} lines, {number(frf.averages, 3)} averages, typical standard deviation {number(100 * typical, 2)} %"
         )
     return (
-        "Magnitude and phase of the measured response (H1) with the 95 % band of each line; where no band shows it is thinner than the "
-        f"line. {'. '.join(each)}."
+        "Magnitude and phase of the measured response (H1) with the 95 % band of each line. A band that is not visible is "
+        f"thinner than the line. {'. '.join(each)}."
     )
 
 
@@ -96,7 +96,7 @@ def coherence(responses: Mapping[str, FrequencyResponse], least: float) -> str:
         lowest = f"median {number(float(np.median(used)), 4)}, lowest used {number(float(np.min(used)), 3)}" if used.size else "no line used"
         each.append(f"Axis {axis}: {lowest}")
     return (
-        "1 means that the input explains all of the output. Crosses are lines that no fit uses: not excited, or below the limit of "
+        "At 1 the input explains all of the output. Crosses are lines that no fit uses: not excited, or below the limit of "
         f"{number(least, 2)} (dotted). {'. '.join(each)}."
     )
 
@@ -104,7 +104,7 @@ def coherence(responses: Mapping[str, FrequencyResponse], least: float) -> str:
 def fit(axis: str, fits: Mapping[str, Fit]) -> str:
     """What figure 6 shows of one axis."""
     each = ", ".join(f"{name} {number(one.error_cost, 3)} %" for name, one in fits.items())
-    banded = "; shaded is the 95 % band of the ML fit, widened by what it leaves beyond noise" if math.isfinite(fits["ML"].misfit) else ""
+    banded = "; shaded: 95 % band of the ML fit, widened by its error beyond noise" if math.isfinite(fits["ML"].misfit) else ""
     return f"Axis {axis}: fits over the measured response{banded}; relative error {each}."
 
 
@@ -126,9 +126,9 @@ def pair(studies: Mapping[str, AxisStudy]) -> str:
     if not changes:
         return "No lightly damped resonance was found in the band of this recording."
     names = f"{changes[0].before_name} and {changes[0].after_name}"
-    second = " of this recording, as no second one was given" if changes[0].before_name == "first half" else ", two recordings"
+    second = " of this recording" if changes[0].before_name == "first half" else ", two recordings"
     return (
-        "Zoom on antiresonance and resonance (the response is multiplied by jω where the axis integrates: it is that of the speed). "
-        f"Dots with 95 % bars are measured, lines fitted, vertical lines and bands the two frequencies with their intervals; {names}{second}. "
-        "Loose bolts of the base make both move left. Bottom: the shift with its 95 % interval; no shift is proven where the bar crosses 0."
+        "Antiresonance and resonance in detail, as velocity response (for an integrating axis, the response times jω). "
+        f"Dots with 95 % bars are measured, lines are fitted. Vertical lines and bands: both frequencies with intervals; {names}{second}. "
+        "Loose bolts of the base lower both frequencies. Bottom: the shift with its 95 % interval. If the bar crosses 0, no shift is proven."
     )

@@ -79,8 +79,8 @@ def worst(document: Document, step: int = -1) -> dict[str, Any] | None:
 def _fails(document: Document) -> str:
     place = worst(document)
     if document["ladder"][-1]["explained"] or place is None:
-        return "The rigid model with delay leaves no more than the encoder's noise."
-    return f"The rigid model with delay fails most here: {place['sentence']}."
+        return "The error of the rigid model with delay is encoder noise."
+    return f"The largest error of the rigid model with delay: {place['sentence']}."
 
 
 def _fall(document: Document) -> str:

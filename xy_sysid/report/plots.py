@@ -71,7 +71,7 @@ def residual(data: Run | Recording | Comparison, *models: AnyModel) -> go.Figure
     else:
         run = one_run(data)
         if not models:
-            raise BadInput("models", "none", "one or more", "Give what fit, refine or load_model gives.")
+            raise BadInput("models", "none", "one or more", "Give a model from fit, refine or load_model.")
         shown = []
         for model in models:
             first = held(run) if run.digest in model.data else 0

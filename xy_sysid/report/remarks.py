@@ -12,13 +12,13 @@ from xy_sysid.response.frf import ComplexArray
 
 MUCH_BETTER = 3.0  # times smaller error at which the delay in the model is called the reason
 NOT_A_CONFIDENCE = (
-    "What the paper calls “parameter confidence” is 100 minus the error cost. It is kept under that name for comparison, but it is "
-    "not a confidence interval: it says nothing about how sure any one parameter is. The brackets in the tables are 95 % confidence "
-    "intervals, from the scatter of the measurement."
+    "The “parameter confidence” of the paper is 100 minus the error cost. It is shown for comparison, but it is not a confidence "
+    "interval and gives no uncertainty of a parameter. The brackets in the tables are 95 % confidence intervals from the variance "
+    "of the measurement."
 )
 PRINTED = (
-    "The NLLS denominators printed in the paper have negative coefficients. Read literally they are unstable, with a pole far above "
-    "the measured band: numbers that describe the band, not a machine."
+    "The NLLS denominators printed in the paper have negative coefficients. Taken literally they are unstable, with a pole far "
+    "above the measured band. They describe the response in the band, not the machine."
 )
 PAPER_VALUES = "For comparison, the paper reports errors of 39 % (LLS) and 11 % (NLLS), and delays of 1.29 ms (x) and 1.38 ms (y)."
 
@@ -51,7 +51,7 @@ def _fit(axis: str, name: str, fit: Fit) -> list[str]:
     made = []
     label = f"Axis {axis}, {name}"
     if not fit.converged:
-        made.append(f"{label}: {fit.reason} Its numbers are where it stopped, not a result.")
+        made.append(f"{label}: {fit.reason} Its numbers are the last iterate, not a result.")
     unstable = fit.poles[fit.poles.real > 1e-9 * np.maximum(np.abs(fit.poles), 1e-300)]
     if unstable.size:
         made.append(f"{label}: unstable, pole at {roots_text(unstable)} rad/s.")
@@ -60,7 +60,7 @@ def _fit(axis: str, name: str, fit: Fit) -> list[str]:
         low, high = float(fit.frequency[0]), float(fit.frequency[-1])
         made.append(
             f"{label}: poles outside the measured band ({number(low, 3)} to {number(high, 4)} Hz): {roots_text(outside)} rad/s. "
-            "They shape the curve inside the band; as properties of the machine they are extrapolated."
+            "They shape the curve inside the band, but as properties of the machine they are extrapolated."
         )
     if name == "ML":
         made += [f"{label}: {text}" for text in fit.warnings if not text.startswith("Unstable")]
@@ -82,7 +82,7 @@ def _change(one: AxisStudy) -> list[str]:
     for pair, name in ((change.before, change.before_name), (change.after, change.after_name)):
         if pair is not None and pair.fit.consistent is False and one.fits["ML"].consistent is not False:
             made.append(
-                f"Axis {one.axis}, {name}: the model misses something in this stretch; the machine may have changed while it was recorded, "
+                f"Axis {one.axis}, {name}: the model misses something in this part. The machine may have changed during the recording, "
                 f"so that {estimate_text(pair.resonance)} is a mean."
             )
     for shift in change.shifts:
@@ -93,8 +93,8 @@ def _change(one: AxisStudy) -> list[str]:
         text = f"Axis {one.axis}: the {shift.name} moved {direction} from {change.before_name} to {change.after_name}: {size}."
         if _misses(change):
             text += (
-                " The model misses more than noise in these data, and the interval knows of noise only: "
-                "a shift that is small against the spacing of the lines need not be one of the machine."
+                " The model error exceeds the noise, and the interval includes noise only. A shift that is small compared with the spacing of "
+                "the lines may not be a change of the machine."
             )
         made.append(text)
     if change.shifts and not any(shift.certain for shift in change.shifts):

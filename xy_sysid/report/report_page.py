@@ -20,11 +20,11 @@ from xy_sysid.report.tables import Table, coefficient_table, order_table, result
 from xy_sysid.report.words import quantity
 
 ABOUT = (
-    "What was recorded, how each axis answers, which model describes it, where that model fails, what was missing, and how far each number "
-    "can be trusted. The summary is for everybody; the rest is what it stands on. Every fit saw two thirds of the recording, and the rest "
-    "was kept to test it: the last third for transfer functions, parts spread over the recording for what is missing."
+    "Recording, response and model of each axis, the places where the model fails, the missing effects, and the uncertainty of "
+    "each number. Every fit used two thirds of the recording. The rest tests it: the last third for transfer functions, parts "
+    "spread over the recording for the diagnosis."
 )
-FAILS = "Left: error over the noise floor by frequency on data that no fit has seen, grey the rigid model, solid the last one. Right:"
+FAILS = "Left: error over the noise floor by frequency on held-out data; grey: rigid model, solid: last model. Right:"
 SUMMARY_HEIGHT = 270  # px of the two pictures of an axis in the summary
 MARKS = {"explained": "good", "partly explained": "fair", "not explained": "bad", "nothing can be said": "none"}
 
@@ -217,7 +217,7 @@ def _axis(page: _Page, place: int, one: AxisReport, story: Mapping[str, Any], li
         parts.append("<h3>With what was added</h3>")
         parts.append(pictures([draw("overlay", story_figures.before_after(story, 0, last), story_words.BEFORE_AFTER)], story_words.BEFORE_AFTER))
         parts.append(_against(draw, story, last, "left", story_words.LEFT))
-    left = draw("correlation", story_figures.residual_correlation(story), story_words.CORRELATION, "Correlation of what is left")
+    left = draw("correlation", story_figures.residual_correlation(story), story_words.CORRELATION, "Correlation of the residual error")
     parts.append("<h3>The model</h3>")
     shown = [
         draw("zoom", story_figures.zoom(story), story_words.SIGNALS, "Velocity, zoomed"),
@@ -228,7 +228,7 @@ def _axis(page: _Page, place: int, one: AxisReport, story: Mapping[str, Any], li
     parts.append(pictures([left], story_words.CORRELATION))
     parts.append(table_html(story_words.parameter_table(story, axis, library)))
     parts.append(table_html(story_words.ladder_table(story, axis)))
-    title = f"Axis {axis}: what is missing, and what is left"
+    title = f"Axis {axis}: missing effects and residual error"
     page.add(f"axis-{place}", f"Axis {axis}", f'<section id="axis-{place}"><h2>{escape(title)}</h2>{"".join(parts)}</section>')
 
 

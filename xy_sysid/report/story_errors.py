@@ -69,7 +69,7 @@ def residual_correlation(document: Document, step: int | None = None, mode: str 
         return nothing(document["sentence"], mode)
     picture = shown["pictures"]["residual"].get("correlation")
     if picture is None:
-        return nothing("Too few samples to tell whether the error goes with the input.", mode)
+        return nothing("Too few samples to correlate the error with the input.", mode)
     figure = drawing([0.5, 0.5], 380, mode, gap=0.2, shared=False)
     curves = (
         (1, "lag", "autocorrelation", "white", "autocorrelation"),

@@ -15,31 +15,31 @@ from xy_sysid.story.standing import nearer
 STANDARD_TOLERANCE = 1e-3
 
 LADDER = (
-    "How the error falls as effects are added and everything is fitted again. Solid: the error on the data held out, which no fit has seen; "
-    "dashed: the error on the data of the fit; dotted: the noise floor (encoder noise and the tolerance of the laws). A step at the floor has a tick."
+    "The error after each added effect, with all parameters fitted again. Solid: error on held-out data, which no fit has seen. "
+    "Dashed: error on the fitted data. Dotted: noise floor (encoder noise and a tolerance of the laws). A step at the floor has a "
+    "tick."
 )
-CANDIDATES = "What each effect leaves of the held-out error when it alone is added to the rigid model. Shorter is better."
+CANDIDATES = "The held-out error that remains when only this effect is added to the rigid model. Shorter is better."
 BEFORE_AFTER = (
-    "The rigid model and the last one over each other: error over the noise floor by frequency, and the error in time where the rigid one was worst."
+    "The rigid model and the last model: error over the noise floor by frequency, and the error in time around the largest error of the rigid model."
 )
-BASE_FAILS = (
-    "Error of the rigid model by frequency, over the noise floor; on data that no fit has seen. Shaded: where it is more than twice the floor."
-)
+BASE_FAILS = "Error of the rigid model by frequency, over the noise floor, on held-out data. Shaded: more than twice the floor."
 AGAINST = (
-    "The error of the rigid model against velocity, position and time: above its size over the noise floor, below its mean. "
-    "A mean that jumps at zero velocity is dry friction, one that repeats along the travel is cogging or a lead error, one that grows in "
-    "time is drift."
+    "The error of the rigid model against velocity, position and time. Top: its size over the noise floor. Bottom: its mean. A "
+    "jump of the mean at zero velocity is dry friction, a wave along the travel is cogging or a lead error, growth in time is "
+    "drift."
 )
-LEFT = "What the last model leaves, over the noise floor, in the same pictures."
+LEFT = "The same pictures for the last model: its residual error over the noise floor."
 SIGNALS = (
-    "Measured, and simulated from the input alone: velocity around the rigid model's worst moment, and the position over the whole "
-    "recording. The simulated position is integrated freely from the first sample, so small errors of speed add up to a drift."
+    "Measured, and simulated from the input alone: velocity around the largest error of the rigid model, and position over the "
+    "whole recording. The simulated position is integrated from the first sample, so small errors of speed add up to a drift."
 )
 CORRELATION = (
-    "What is left, correlated with itself (top) and with the input (bottom), with the 95 % bounds of unrelated signals in grey. A stem beyond them "
-    "with the input after 0 s is motion that the model could still explain; before 0 s only feedback or a wrong delay brings it about."
+    "Autocorrelation of the residual error (top) and its correlation with the input (bottom), with the 95 % bounds of unrelated "
+    "signals in grey. A stem beyond the bounds of the input after 0 s is motion that the model could still explain. Before 0 s it "
+    "comes from feedback or a wrong delay."
 )
-ROOTS = "Poles and zeros of the linear part, without the effects that bend."
+ROOTS = "Poles and zeros of the linear part, without the nonlinear effects."
 
 
 def status(story: Document | None) -> str:
@@ -77,26 +77,26 @@ def verdict(story: Document, library: Library) -> str:
     down_to = "" if tolerance <= STANDARD_TOLERANCE else f", down to {number(100 * tolerance, 2)} % of the signal"
     kind = status(story)
     if kind == "explained":
-        rest = "is enough: nothing that the data show is missing" if len(parts) == 1 else "explain the motion: what is left is noise"
+        rest = "is sufficient: the data show no missing effect" if len(parts) == 1 else "explain the motion: the residual error is noise"
         return f"{_capital(model)} {rest}{down_to}."
     if kind == "partly explained":
-        return f"{_capital(model)} explain a part of the motion; a rest is not in the library of effects."
-    return "Something is missing in the model, and no effect of the library explains it."
+        return f"{_capital(model)} explain part of the motion; the residual error is not in the library of effects."
+    return "The model misses something that no effect of the library explains."
 
 
 def size(story: Document, speed: float) -> str:
     """How large the error is, against the motion, against the rigid model and against noise."""
     unit = story["error"]["unit"]
     first, last = story["ladder"][0], story["ladder"][-1]
-    how = "Predicted one sample ahead, as a contact allows no free simulation," if AHEAD in last["label"] else "Simulated from the input alone"
+    how = "Predicted one sample ahead (contact allows no free simulation)" if AHEAD in last["label"] else "Simulated from the input alone"
     off = quantity(float(last["held_out_error"]), unit, 3)
-    text = f"{how} on the part of the recording held out, which no fit has seen, the model is off by {off} rms"
+    text = f"{how} on the held-out part of the recording, the model has an error of {off} rms"
     if math.isfinite(speed) and speed > 0:
-        text += f", {number(100 * float(last['held_out_error']) / speed, 2)} % of the speed itself"
+        text += f", {number(100 * float(last['held_out_error']) / speed, 2)} % of the speed"
     text += f"; the noise floor is {quantity(float(last['noise_floor']), unit, 3)}."
     if last["effects"]:
         times = float(first["held_out_error"]) / max(float(last["held_out_error"]), 1e-300)
-        text += f" Without {' and '.join(words(name) for name in last['effects'])} it was off by {quantity(float(first['held_out_error']), unit, 3)}"
+        text += f" Without {' and '.join(words(name) for name in last['effects'])} its error was {quantity(float(first['held_out_error']), unit, 3)}"
         text += f", {number(times, 2)} times as much." if times >= 1.1 else "."
     return text
 
@@ -153,7 +153,7 @@ def look_alike_table(story: Document, axis: str, library: Library) -> Table | No
     rows = tuple(
         (words(item["effect"]), "yes" if item["told_apart"] else "no", spoken(str(item["sentence"]), library)) for item in story["look_alikes"]
     )
-    return Table(f"Axis {axis}: what {words(story['effects'][0])} can be taken for", ("effect", "told apart by these data", "why"), rows)
+    return Table(f"Axis {axis}: what {words(story['effects'][0])} can be taken for", ("effect", "distinguished by these data", "why"), rows)
 
 
 def _interval(item: Mapping[str, Any], name: str) -> str:
@@ -162,7 +162,7 @@ def _interval(item: Mapping[str, Any], name: str) -> str:
     return text or f"{quantity(float(item['value']), str(item['unit']), 4)}, not determined"
 
 
-_BASE = {"gain": "steady speed per unit of input", "delay": "from command to motion", "pole": "rate at which speed follows: drag over mass"}
+_BASE = {"gain": "steady speed per unit of input", "delay": "from command to motion", "pole": "drag over mass: rate at which the speed settles"}
 
 
 def _meaning(name: str, library: Library) -> str:
