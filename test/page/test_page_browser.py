@@ -80,7 +80,7 @@ def turn(one: Tab, axis: str) -> None:
 LEAVE_AT_ONCE = """async () => {
     document.querySelector("[data-act=diagnose]").click();
     const leave = document.querySelector("[data-act=cancel]");
-    for (let k = 0; k < 400 && !leave.offsetParent; k++) await new Promise(done => setTimeout(done, 10));
+    for (let k = 0; k < 400 && getComputedStyle(leave).visibility !== "visible"; k++) await new Promise(done => setTimeout(done, 10));
     leave.click();
 }"""
 
