@@ -28,7 +28,7 @@ class Candidate:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One rung: the effect added (None for the base alone), and the fit with it."""
+    """One rung: the effect added, or several with " and " (None for the base alone), and the fit with it."""
 
     added: str | None
     fit: GreyboxFit

@@ -88,9 +88,9 @@ def ladder_of_search(pool: Pool, given: Given, filtered: Filtered | None) -> Lad
         if not item.refused or is_taken_for(library, item.effects, node.effects)  # it is no spring, but is it a wave?
     ]
     others.sort(key=lambda item: (-_doubt(node, item), item.brief.excess))
-    for item in others[:1]:
-        pool.finished(item)  # its error is shown
     rivals = [Rival(tuple(sorted(item.effects)), item.fit, _doubt(node, item), item.refused) for item in others]
+    if rivals:  # its error is shown
+        rivals[0] = replace(rivals[0], fit=pool.whole_fit(others[0]))
     whole = [item for item in pool.nodes.values() if item.whole and not item.refused]
     ladder = Ladder(
         steps=(*given.steps, *_rungs(pool, given, ordered, final)),
@@ -166,18 +166,32 @@ def _parts(library: Library, name: str) -> tuple[str, ...]:
 
 
 def _rungs(pool: Pool, given: Given, names: tuple[str, ...], final: GreyboxFit) -> list[Step]:
-    """One rung for each effect, in this order, the fits that are known already taken from memory; none that does not lower the held-out error."""
+    """One rung for each effect, the largest first; of two orders that are known, one in which each rung lowers the held-out error.
+
+    An effect that lowers it in no order comes with the next one, in one rung.
+    """
     steps: list[Step] = []
     now = shown = given.steps[-1].fit
-    for name in names[len(given.names) :]:
-        so_far = frozenset(own for own, _ in now.model.effects) | {name}
-        if so_far == frozenset(own for own, _ in final.model.effects):
-            now = final
-        else:
-            known = pool.nodes.get(so_far)
-            usable = known is not None and not known.refused
-            now = pool.finished(known).fit if known is not None and usable else with_one_more(pool.data, pool.library, now, name)
-        if now is final or now.held_out_error < shown.held_out_error:
-            steps.append(Step(name, now))
-            shown = now
+    left, together = [name for name in names if name not in given.names], []
+    while left:
+        fits = {name: found for name in left if (found := _with(pool, now, name, final, name == left[0])) is not None}
+        lower = [name for name, found in fits.items() if found.held_out_error < shown.held_out_error or found is final]
+        name = lower[0] if lower else left[0]
+        now = fits[name]
+        left.remove(name)
+        together.append(name)
+        if name in lower:
+            steps.append(Step(" and ".join(together), now))
+            shown, together = now, []
     return steps
+
+
+def _with(pool: Pool, now: GreyboxFit, name: str, final: GreyboxFit, asked: bool) -> GreyboxFit | None:
+    """The fit with one more effect, from memory if it is known; None if it is not, and is not asked for."""
+    effects = frozenset(own for own, _ in now.model.effects) | {name}
+    if effects == frozenset(own for own, _ in final.model.effects):
+        return final
+    known = pool.nodes.get(effects)
+    if known is not None and not known.refused and (known.whole or asked):
+        return pool.whole_fit(known)
+    return with_one_more(pool.data, pool.library, now, name) if asked else None

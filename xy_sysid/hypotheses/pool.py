@@ -261,6 +261,10 @@ class Pool:
             node.refused = self._refusal(node.effects, node.fit)
         return node
 
+    def whole_fit(self, node: Node) -> GreyboxFit:
+        """The fit to all data, worked out though the time is up: it is shown beside others that are."""
+        return node.fit if node.whole else finish(self.data, node.brief.model, node.brief.runs)
+
     def size_without(self, node: Node, name: str) -> float:
         """What an effect explains over what is left with it: against the best of the sets that have the same effects but for this one."""
         fewer = (item for item in self.nodes.values() if item.effects <= node.effects - {name})
