@@ -50,7 +50,8 @@ friction and cogging cause motion that a linear response cannot explain. Without
 ## Where the model fails: one picture per effect
 
 The first picture shows a machine without a missing effect. Then each effect is added to the same machine. The model is always
-the *rigid* one: gain, delay and one pole.
+the *rigid* one: gain, delay and one pole. *Try it* gives the command that makes the recording `rec`;
+`xy-sysid report rec -o report.html` then draws its pictures.
 """
 
 
@@ -74,7 +75,7 @@ def _section(example: Example) -> str:
         lines.append(f"- Looks like: {', '.join(effect.look_alikes)}. Distinguished by: {effect.experiment}.")
         driven = "".join(f" --excite {name}={value:g}" for name, value in example.excite)
         made = f"xy-sysid simulate rec --machine {example.machine} --effect x:{example.typed}{driven}"
-        lines.append(f"- Try it: `{made}`, `xy-sysid report rec -o report.html`\n")
+        lines.append(f"- Try it: `{made}`\n")
     return "\n".join(lines)
 
 

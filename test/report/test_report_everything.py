@@ -221,4 +221,4 @@ def test_a_long_recording_is_judged_on_its_first_part(monkeypatch: pytest.Monkey
     path = npz(tmp_path / "long.npz", rows=12_000)
     said = cli("report", path, "-o", tmp_path / "long.html", "--json")
     assert said.json["axes"]["x"]["story"]["seconds"] == pytest.approx(8.0)
-    assert "on the first 8 s of the longest stretch, of 12 s" in words_of((tmp_path / "long.html").read_text(encoding="utf-8"))
+    assert "uses the first 8 s of the longest stretch, of 12 s" in words_of((tmp_path / "long.html").read_text(encoding="utf-8"))

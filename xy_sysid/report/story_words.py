@@ -153,7 +153,7 @@ def look_alike_table(story: Document, axis: str, library: Library) -> Table | No
     rows = tuple(
         (words(item["effect"]), "yes" if item["told_apart"] else "no", spoken(str(item["sentence"]), library)) for item in story["look_alikes"]
     )
-    return Table(f"Axis {axis}: what {words(story['effects'][0])} can be taken for", ("effect", "distinguished by these data", "why"), rows)
+    return Table(f"Axis {axis}: what {words(story['effects'][0])} can be taken for", ("effect", "distinguished", "why"), rows)
 
 
 def _interval(item: Mapping[str, Any], name: str) -> str:

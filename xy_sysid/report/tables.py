@@ -83,8 +83,8 @@ def order_table(axis: str, tried: Sequence[OrderTrial], fit: Fit) -> Table | Non
         used = fit.structure.parameters + sum(orders) - sum(at)
         rows.append((f"{orders[0]} / {orders[1]}{', taken' if orders == at else ''}", str(used), cost, number(item.length - least, 4)))
     judged = "cost over noise" if fit.expected_cost > 0 else "cost"
-    caption = f"Axis {axis}: orders tried; the minimum description length (MDL) is the best trade-off between error and parameters"
-    return Table(caption, ("zeros / poles", "parameters", judged, "MDL above the minimum (nats)"), tuple(rows))
+    caption = f"Axis {axis}: orders tried; the minimum description length (MDL) is best"
+    return Table(caption, ("zeros / poles", "parameters", judged, "MDL above minimum (nats)"), tuple(rows))
 
 
 def change_table(studies: Mapping[str, AxisStudy]) -> Table | None:
