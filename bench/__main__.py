@@ -2,7 +2,7 @@
 
 h1, fit, replay, bags, live and intervals run without a name. Only by name: long_bag (a day of data, gigabytes on disk), axis_model, and of the
 recordings of real machines in $XY_SYSID_DATA real_fits, peers, diagnoses and emps_force. peers and diagnoses write their tables to
-docs/real-machines.md, emps_force and use (a path after a minute of identification, half an hour) to docs/use.md.
+docs/real-machines.md, emps_force and use (a path after a minute of identification, a quarter of an hour) to docs/use.md.
 --short: a little of each, as the tests run it; nothing is written.
 """
 

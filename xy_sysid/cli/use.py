@@ -184,7 +184,7 @@ def _show(name: str, used: Used) -> None:
         left = f"leaves {100 * used.shaper.worst:.2g} % of the vibration over its interval"
         say(f"  Input shaper: {said}; {1e3 * used.shaper.duration:.3g} ms longer, {left}.")
     if used.notch is not None:
-        say(f"  Notch at {used.notch.frequency:.4g} Hz would cost {used.notch.phase_cost:.2g} degrees at the crossover.")
+        say(f"  A notch at {used.notch.frequency:.4g} Hz changes the phase at the crossover by {-used.notch.phase_cost:+.2g} degrees.")
     for item in (*used.tables, *([used.friction] if used.friction is not None else [])):
         say(f"  Table {item.name}: {item.before:.3g} {item.unit} rms, known to {item.after:.2g}; {item.meaning}.")
     if used.gap is not None:

@@ -20,7 +20,7 @@ FLOORS = {
     "what arrives": ("samples", "excitation"),
     "in frequency": ("response", "linear", "fitting"),
     "in time": ("effects", "axis", "greybox", "comparison", "hypotheses", "diagnosis"),
-    "told": ("story", "live"),
+    "told": ("story", "live", "control_design"),
     "the edge": ("bags", "imports", "files", "processes"),
     "surfaces": ("nodes", "report", "page", "cli"),
 }
