@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bench.recordings import between
 from bench.tables import Check, Table, at_most
@@ -67,7 +68,7 @@ def identified(machine: Machine, seed: int, seconds: float) -> dict[str, Physica
 
 def followed(
     machine: Machine, paths: Sequence[Motion], extras: Sequence[FloatArray], controllers: Sequence[Controller]
-) -> tuple[FloatArray, FloatArray]:
+) -> tuple[FloatArray, NDArray[np.bool_]]:
     """(n, axes) where the axes are, m, and whether (n, axes) the drive was at its limit, each axis under its PID along its path."""
     machine.reset()
     count, axes = len(paths[0].position), len(machine.axes)

@@ -175,7 +175,7 @@ def speeds_apart(model: AxisModel, voltage: FloatArray) -> float:
 
 def test_mujoco_says_each_effect_or_names_it_as_lost() -> None:
     """What is not named as lost moves in MuJoCo as here, within 1 % of the motion, most within 0.3 %."""
-    voltage = noise(1500)
+    voltage = noise(1000)
     for names in [(), *((name,) for name in ALL)]:
         model = axis(*names)
         lost = {name for name, _ in mjcf(model, RATE).lost}
