@@ -9,7 +9,8 @@ BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 PYTEST = $(BIN)/python -m pytest -n $(JOBS) --dist loadfile
 PIP := $(BIN)/python -m pip --disable-pip-version-check -qq install --no-compile -c constraints.txt
-LAWS = OPENBLAS_NUM_THREADS=1 $(BIN)/python -c "import xy_sysid as xy; xy.diagnose(xy.simulate(10, hidden=7, seed=1).run('x'))"
+LAWS = OPENBLAS_NUM_THREADS=1 $(BIN)/python -c "import xy_sysid as xy; xy.diagnose(xy.simulate(10, hidden=7, seed=1).run('x')); \
+  xy.use(xy.PhysicalModel(xy.AxisModel(0.1, 1e-3, 200.0)), limit=5.0)"
 FITS := import ensurepip, sys, venv; sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 14))
 
 .DEFAULT_GOAL := help

@@ -1,6 +1,6 @@
 """Is a machine better for it? Hidden machines, a minute of identification, then a path with three kinds of feedforward.
 
-    python -m campaigns.bench use            60 axes; writes the table into docs/use.md
+    python -m campaigns.bench use            30 axes; writes the table into docs/use.md
     python -m campaigns.bench use --short    two of them, as the tests run it
 
 Each axis of the simulated table has one to three hidden effects. It is driven with noise for a minute, its model is searched, and it follows a
@@ -31,7 +31,7 @@ from xy_sysid.control_design.feedback import feedback
 from xy_sysid.control_design.gains import gains, simple_feedforward
 from xy_sysid.control_design.inverse import feedforward
 from xy_sysid.control_design.laws import along
-from xy_sysid.control_design.path import Bounds, Motion, of_position, s_curve
+from xy_sysid.control_design.path import Bounds, Trajectory, of_position, s_curve
 from xy_sysid.control_design.use import use
 from xy_sysid.diagnosis.of_run import refine
 from xy_sysid.errors import BadInput
@@ -41,7 +41,7 @@ from xy_sysid.settings import AxisExcitation, ExcitationSettings
 
 RATE, LIMIT = 2000.0, 10.0  # Hz, V
 SECONDS, SHORT_SECONDS = 60.0, 8.0  # of identification
-REPORT, SHORT = range(7000, 7030), range(12, 13)  # seeds
+REPORT, SHORT = range(7000, 7015), range(12, 13)  # seeds
 PLACES, BOUNDS = (0.0, 0.03, -0.02, 0.0), Bounds(0.06, 1.0, 50.0)
 RELAY = 1.0  # V
 PAGE = Path(__file__).parents[2] / "docs" / "use.md"
@@ -67,7 +67,7 @@ def identified(machine: Machine, seed: int, seconds: float) -> dict[str, Physica
 
 
 def followed(
-    machine: Machine, paths: Sequence[Motion], extras: Sequence[FloatArray], controllers: Sequence[Controller]
+    machine: Machine, paths: Sequence[Trajectory], extras: Sequence[FloatArray], controllers: Sequence[Controller]
 ) -> tuple[FloatArray, NDArray[np.bool_]]:
     """(n, axes) where the axes are, m, and whether (n, axes) the drive was at its limit, each axis under its PID along its path."""
     machine.reset()
@@ -119,7 +119,7 @@ def ziegler_nichols(machine: Machine) -> list[Controller]:
     return made
 
 
-def corrected(model: PhysicalModel, path: Motion) -> Motion:
+def corrected(model: PhysicalModel, path: Trajectory) -> Trajectory:
     """What the encoder has to show so that the table is on the path: the scale's error, and half of the gap in the direction of motion."""
     position = path.position + along(model.model, path.position, "scale")
     gap = use(model, limit=LIMIT).gap

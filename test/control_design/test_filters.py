@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from helpers.known_models import known
@@ -22,6 +24,9 @@ def test_a_mode_is_the_models_resonance_with_its_interval() -> None:
     assert mode.free.value == pytest.approx(frequency * (1 + split), rel=1e-4)
     assert (mode.held_damping, mode.free_damping) == pytest.approx((damping, pole_damping), rel=1e-3)
     assert modes(known("coulomb_friction")) == ()
+    heavy = known("base_resonance")
+    damped = replace(heavy, model=heavy.model.with_effect("base_resonance", (0.06, 46.0, 1.0, 1.0)))
+    assert modes(damped) == (), "what is damped so much does not swing"
 
 
 def test_shapers_leave_what_their_names_promise() -> None:

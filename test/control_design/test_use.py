@@ -152,3 +152,9 @@ def test_an_unknown_target_or_a_linear_model_is_refused_in_one_line(tmp_path: Pa
     xy.save(xy.LinearModel(known().tf), linear)
     assert "xy-sysid refine --model" in refused("use", linear)
     assert "axis" in refused("use", file, "--axis", "z")
+    second = tmp_path / "second.yaml"
+    xy.save(model, second)
+    assert "one folder for two models" in refused("use", file, second, "--to", "urdf", "-o", tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+    assert "a folder" in refused("use", file, "--to", "urdf", "-o", file)
+    assert "fmu without a folder" in refused("use", file, "--to", "fmu")

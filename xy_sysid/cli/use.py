@@ -57,6 +57,8 @@ def use(
     from xy_sysid.errors import BadInput
     from xy_sysid.settings import unknown_name
 
+    if out is not None and out.exists() and not out.is_dir():
+        raise BadInput("--out", str(out), "a folder", "Choose another name.")
     asked = list(TARGETS) if to and "all" in to else list(to or [])
     for name in asked:
         if name not in TARGETS:
@@ -72,7 +74,10 @@ def use(
             except BadInput as problem:
                 if to and target in to:
                     refused[f"{name} to {target}"] = str(problem)
-    written = _write(out, files, force) if out is not None else []
+    binary = sorted({target for axis in files.values() for target, item in axis.items() if item.archive or item.mat})
+    if binary and out is None:
+        raise BadInput("--to", f"{', '.join(binary)} without a folder", "--out DIR", "These files are no text.")
+    written = _write(out, files, force) if out is not None and asked else []
     if json:
         emit({"axes": {name: plain(_answer(used)) for name, used in done.items()}, "files": written, "refused": refused})
         return
@@ -80,8 +85,6 @@ def use(
         _show(name, used)
         for target, item in files[name].items():
             if out is None:
-                if item.archive or item.mat:
-                    raise BadInput(f"--to {target}", "without a folder", "--out DIR", "Its files are no text.")
                 for file, text in item.files.items():
                     say(f"--- {file}")
                     typer.echo(text, nl=False)
@@ -126,15 +129,17 @@ def _write(folder: Path, files: dict[str, dict[str, Exported]], force: bool) -> 
     from xy_sysid.files.fmu import write_fmu
     from xy_sysid.files.unasked import free
 
-    if folder.exists() and not folder.is_dir():
-        raise BadInput("--out", str(folder), "a folder", "Choose another name.")
-    folder.mkdir(parents=True, exist_ok=True)
     exported = [item for axis in files.values() for item in axis.values()]
     texts = {folder / name: text for item in exported if not item.archive for name, text in item.files.items()}
     mats = {folder / name: content for item in exported for name, content in item.mat.items()}
     archives = {folder / item.archive: item for item in exported if item.archive}
+    names = [name for item in exported for name in ([item.archive] if item.archive else [*item.files, *item.mat])]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise BadInput("--out", f"one folder for two models with {twice[0]}", "a folder for each", "Use them one by one, or choose with --axis.")
     for path in (*texts, *mats, *archives):
         free("--out", path, force, "add --force")
+    folder.mkdir(parents=True, exist_ok=True)
     for path, text in texts.items():
         write_text(path, text)
     for path, content in mats.items():
@@ -184,7 +189,7 @@ def _show(name: str, used: Used) -> None:
         left = f"leaves {100 * used.shaper.worst:.2g} % of the vibration over its interval"
         say(f"  Input shaper: {said}; {1e3 * used.shaper.duration:.3g} ms longer, {left}.")
     if used.notch is not None:
-        say(f"  Notch at {used.notch.frequency:.4g} Hz would cost {used.notch.phase_cost:.2g} degrees at the crossover.")
+        say(f"  A notch at {used.notch.frequency:.4g} Hz changes the phase at the crossover by {-used.notch.phase_cost:+.2g} degrees.")
     for item in (*used.tables, *([used.friction] if used.friction is not None else [])):
         say(f"  Table {item.name}: {item.before:.3g} {item.unit} rms, known to {item.after:.2g}; {item.meaning}.")
     if used.gap is not None:

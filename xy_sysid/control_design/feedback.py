@@ -48,7 +48,8 @@ class Feedback:
 
     controller: as ``closed_loop`` runs it; sampling_rate: Hz; crossover: rad/s asked for
     nominal, worst: margins of the model, and the least of each over the samples; count: of these
-    bandwidth: Hz, where the closed loop falls below -3 dB; disturbance: m per V of a constant load's step, largest deviation over the samples
+    bare: the least margins without the filter on the derivative, which some controllers lack
+    bandwidth: Hz, where the closed loop falls below -3 dB
     noise: V rms that encoder noise and counting make; allowed: what limits the bandwidth, in words
     """
 
@@ -57,6 +58,7 @@ class Feedback:
     crossover: float
     nominal: Margins
     worst: Margins
+    bare: Margins
     count: int
     bandwidth: float
     noise: float
@@ -200,6 +202,7 @@ def _made(systems: list[Sampled], controller: Controller, crossover: float, foun
         crossover=crossover,
         nominal=found[0],
         worst=worst,
+        bare=_least([margins(system, replace(controller, derivative_time=0.0)) for system in systems]),
         count=len(systems),
         bandwidth=float(frequency[low[0]]) if low.size else 0.5 * rate,
         noise=seen * max(noise_to_voltage(system, controller) for system in systems[:4]),

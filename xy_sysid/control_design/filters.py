@@ -16,10 +16,9 @@ import scipy.signal
 
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.comparison.physical_model import PhysicalModel
-from xy_sysid.control_design.path import Motion, of_position
+from xy_sysid.control_design.path import Trajectory, of_position
 from xy_sysid.control_design.sample_step import sections
 from xy_sysid.control_design.uncertain import Derived, derive
-from xy_sysid.response.frf import ComplexArray
 from xy_sysid.samples.block import FloatArray
 
 TOLERATED = 0.05  # of the unshaped vibration that an EI shaper leaves at its own frequency (Klipper: 1 / 20)
@@ -74,7 +73,7 @@ class Shaper:
         """By which a path becomes longer, s."""
         return self.times[-1]
 
-    def shape(self, path: Motion) -> Motion:
+    def shape(self, path: Trajectory) -> Trajectory:
         """The path through the pulses."""
         rate = path.sampling_rate
         start = path.position[0]
@@ -88,35 +87,32 @@ class Shaper:
 
 
 def modes(model: PhysicalModel) -> tuple[Swing, ...]:
-    """The modes of the resonances in the model, lowest first."""
-    count = _roots(model.model)[0].size
+    """The modes of the resonances in the model that swing (damping below 1), lowest first."""
+    zeros, poles = _pairs(model.model)
     found = []
-    for k in range(count):
-        held = derive(model, "held mode", "Hz", "swings while the encoder's side is held (antiresonance)", _frequency(0, k))
-        free = derive(model, "free mode", "Hz", "swings with the free axis (resonance)", _frequency(1, k))
-        zeros, poles = _roots(model.model)
-        found.append(Swing(held=held, held_damping=_damping(zeros[k]), free=free, free_damping=_damping(poles[k])))
+    for k, (zero, pole) in enumerate(zip(zeros, poles, strict=True)):
+        if zero[1] < 1.0 and pole[1] < 1.0:
+            held = derive(model, "held mode", "Hz", "swings while the encoder's side is held (antiresonance)", _frequency(0, k))
+            free = derive(model, "free mode", "Hz", "swings with the free axis (resonance)", _frequency(1, k))
+            found.append(Swing(held=held, held_damping=zero[1], free=free, free_damping=pole[1]))
     return tuple(found)
 
 
 def _frequency(which: int, place: int) -> Callable[[AxisModel], float]:
     def of(model: AxisModel) -> float:
-        return float(abs(_roots(model)[which][place]) / (2.0 * math.pi))
+        return _pairs(model)[which][place][0]
 
     return of
 
 
-def _roots(model: AxisModel) -> tuple[ComplexArray, ComplexArray]:
-    """Upper roots of zeros and poles of the resonances, rad/s, by size."""
+def _pairs(model: AxisModel) -> tuple[list[tuple[float, float]], list[tuple[float, float]]]:
+    """(natural frequency, Hz; damping ratio) of each pair of zeros, and of poles, by frequency; also of pairs that do not swing."""
     parts = []
     for polynomial in sections(model, UNIT):
-        roots = np.roots(polynomial[::-1])
-        parts.append(np.array(sorted(roots[roots.imag > 0.0], key=abs)))
+        roots = sorted(np.roots(polynomial[::-1]).tolist(), key=abs)
+        pairs = [(math.sqrt(abs(one) * abs(two)), -complex(one + two).real) for one, two in zip(roots[::2], roots[1::2], strict=True)]
+        parts.append([(size / (2.0 * math.pi), total / (2.0 * size)) for size, total in pairs])
     return parts[0], parts[1]
-
-
-def _damping(root: complex) -> float:
-    return -root.real / abs(root)
 
 
 def notch(mode: Swing, sampling_rate: float, crossover: float) -> Notch:

@@ -33,7 +33,7 @@ class Bounds:
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
+class Trajectory:
     """sampling_rate: Hz; position, speed, acceleration: (n,) at each sample, m, m/s, m/s2."""
 
     sampling_rate: float
@@ -46,17 +46,17 @@ class Motion:
         """Length in time."""
         return self.position.size / self.sampling_rate
 
-    def ahead(self, seconds: float) -> Motion:
+    def ahead(self, seconds: float) -> Trajectory:
         """The same path as it will be so much later; it stands at its end."""
         times = np.arange(self.position.size) + seconds * self.sampling_rate
         last = self.position.size - 1
         whole = np.minimum(times.astype(np.int64), last)
         part, after = np.minimum(times - whole, 1.0), np.minimum(whole + 1, last)
         mixed = [(1.0 - part) * signal[whole] + part * signal[after] for signal in (self.position, self.speed, self.acceleration)]
-        return Motion(self.sampling_rate, *mixed)
+        return Trajectory(self.sampling_rate, *mixed)
 
 
-def s_curve(places: Sequence[float], bounds: Bounds, sampling_rate: float, settle: float = SETTLE) -> Motion:
+def s_curve(places: Sequence[float], bounds: Bounds, sampling_rate: float, settle: float = SETTLE) -> Trajectory:
     """From place to place, m, each move as fast as the bounds allow, with rests of ``settle`` s between.
 
     A move is a step of position through three moving averages whose lengths are distance / speed, speed / acceleration and acceleration / jerk,
@@ -88,15 +88,15 @@ def _move(way: float, bounds: Bounds, rate: float) -> FloatArray:
     return np.asarray(step)
 
 
-def of_position(position: FloatArray, sampling_rate: float) -> Motion:
+def of_position(position: FloatArray, sampling_rate: float) -> Trajectory:
     """A path through positions (n,), m, with central differences."""
     speed = np.gradient(position) * sampling_rate
     acceleration = np.zeros_like(position)
     acceleration[1:-1] = (position[2:] - 2.0 * position[1:-1] + position[:-2]) * sampling_rate**2
-    return Motion(sampling_rate, position, speed, acceleration)
+    return Trajectory(sampling_rate, position, speed, acceleration)
 
 
-def recorded(position: FloatArray, sampling_rate: float, below: float) -> Motion:
+def recorded(position: FloatArray, sampling_rate: float, below: float) -> Trajectory:
     """What a measured position (n,), m, does below a frequency, Hz, without delay. Raises BadInput where the recording is too short."""
     top = 0.45 * sampling_rate
     if position.size < 64:

@@ -14,6 +14,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.units import Units
 
 TURN = 2.0 * math.pi  # rad
+LEAST_GAIN = 1.7  # margin without a filter on the derivative: less is near the end for a machine that warms up
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +40,7 @@ class Snippet:
 
 def ros2_control(of: Designed) -> Snippet:
     """Parameters of pid_controller/PidController, with the names of control_toolbox."""
-    loop = _loop(of, "ros2_control")
+    loop = _unfiltered_loop(of, "ros2_control")
     limit = loop.controller.limit
     bound = f"{limit:.6g}" if limit < NO_LIMIT else ".inf"
     low = f"-{limit:.6g}" if limit < NO_LIMIT else "-.inf"
@@ -60,10 +61,7 @@ def ros2_control(of: Designed) -> Snippet:
         "        antiwindup_strategy: conditional_integration",
         "    feedforward_gain: 0.0",
     ]
-    note = (
-        "kS, kV and kA have no place in this controller: add them to the effort in a controller of your own. Its derivative is not filtered: "
-        "the margins hold, and the encoder's noise comes through more"
-    )
+    note = f"kS, kV and kA have no place in this controller: add them to the effort in a controller of your own. {_unfiltered(loop)}"
     return Snippet("ros2_control", "controllers.yaml", "\n".join(lines) + "\n", note)
 
 
@@ -84,7 +82,7 @@ def klipper(of: Designed) -> Snippet:
 
 def linuxcnc(of: Designed) -> Snippet:
     """HAL commands for a pid component; lengths in mm, as a metric configuration counts."""
-    loop = _loop(of, "linuxcnc")
+    loop = _unfiltered_loop(of, "linuxcnc")
     per, length = (1e-3, "mm") if of.units.output == "m" else (1.0, of.units.output)
     at = of.axis
     values = {
@@ -98,7 +96,7 @@ def linuxcnc(of: Designed) -> Snippet:
     }
     lines = [f"# command in {of.units.input}, position in {length}; run the thread at {loop.sampling_rate:g} Hz"]
     lines += [f"setp pid.{at}.{name} {value:.6g}" for name, value in values.items()]
-    note = f"pid has no kS: add {of.gains.value('kS'):.4g} {of.units.input} with the sign of the commanded velocity (components sign and sum2)"
+    note = f"pid has no kS: add {of.gains.value('kS'):.4g} {of.units.input} with the sign of the commanded velocity. {_unfiltered(loop)}"
     return Snippet("linuxcnc", "axis.hal", "\n".join(lines) + "\n", note)
 
 
@@ -130,3 +128,17 @@ def _loop(of: Designed, target: str) -> Feedback:
     if of.feedback is None:
         raise BadInput(target, "an axis without a controller", "one for which a feedback was designed", "See why it was refused.")
     return of.feedback
+
+
+def _unfiltered_loop(of: Designed, target: str) -> Feedback:
+    """The feedback for a target without a filter on the derivative; refused where it takes too much of the margins."""
+    loop = _loop(of, target)
+    if not (loop.bare.stable and loop.bare.gain >= LEAST_GAIN):
+        given = f"gain margin {loop.bare.gain:.3g} without a filter on the derivative, which {target} lacks"
+        raise BadInput(target, given, f"at least {LEAST_GAIN:g}", f"Ask for less than {loop.nominal.crossover:.3g} Hz with --bandwidth.")
+    return loop
+
+
+def _unfiltered(loop: Feedback) -> str:
+    margins = f"a phase margin of {loop.bare.phase:.3g} degrees and a gain margin of {loop.bare.gain:.3g} are left"
+    return f"Its derivative is not filtered: {margins}, and more of the encoder's noise comes through"

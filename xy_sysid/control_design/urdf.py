@@ -14,7 +14,7 @@ def urdf(model: AxisModel, travel: tuple[float, float], limit: float, angular: b
     level = 0.5 * (friction(model, abs(model.gain), 1.0) + friction(model, -abs(model.gain), -1.0))
     lost = [(effect, _lost(model.library[effect])) for effect, _ in model.effects]
     if model.delay > 0.0:
-        lost.append(("time_delay", "URDF knows no delay"))
+        lost.append(("delay", "URDF knows none"))
     top = min(limit, largest_voltage(model))
     effort = top if math.isfinite(top) else 1e3 / abs(model.gain)
     mass = 1.0 / (abs(model.gain) * model.pole)

@@ -185,7 +185,10 @@ def _gap(model: PhysicalModel) -> Derived | None:
     for name, _ in model.model.effects:
         places = [k for k, item in enumerate(model.model.library[name].parameters) if item.name == "gap"]
         if places:
-            meaning = "free play: add half of it to the position asked for while moving forth, and subtract half while moving back"
+            meaning = (
+                "free play: add half of it to the position asked for while moving forth, and subtract half while moving back, "
+                "unless a load presses the table to one side"
+            )
             return derive(model, "gap", "m", meaning, _parameter(name, places[0]))
     return None
 
