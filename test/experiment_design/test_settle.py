@@ -13,7 +13,7 @@ from xy_sysid.experiment_design.beliefs import Evidence, believed
 from xy_sysid.experiment_design.evidence import ODDS, Power, nats, seconds_needed, settled
 from xy_sysid.experiment_design.experiment import Experiment
 from xy_sysid.experiment_design.loop import Budget, Question, Signals, settle
-from xy_sysid.experiment_design.precision import Wanted, sharpest
+from xy_sysid.experiment_design.precision import Precision, sharpest
 from xy_sysid.experiment_design.prediction import Setting, recorded
 from xy_sysid.experiment_design.rivals import standing
 from xy_sysid.greybox.axis_data import AxisData, prepare_all
@@ -95,7 +95,7 @@ def test_an_interval_is_as_narrow_as_was_predicted(data: AxisData) -> None:
     made = machine(LAG, 0, 3)
     first = prepare_all(2000.0, [first_recording(LAG, made, 3)])
     belief = believed(Evidence(first), standing(first, STANDARD, [()]).fits[0], 1)
-    best = sharpest(first, belief, limits(LAG), Wanted("pole", 0.005))
+    best = sharpest(first, belief, limits(LAG), Precision("pole", 0.005))
     assert best.possible and best.experiment is not None and best.width < best.before
     both = prepare_all(2000.0, [first_recording(LAG, made, 3), carry_out(made, best.experiment)])
     pole = fit(both, belief.model).parameter("pole")

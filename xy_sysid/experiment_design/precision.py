@@ -58,7 +58,7 @@ def information(belief: Belief, model: AxisModel, item: Recorded) -> Information
 
 @dataclass(frozen=True)
 class Sharpest:
-    """experiment: the best, or None where none is within the limits; width: half of the 95 % interval that is expected, as ``Wanted`` says
+    """experiment: the best, or None where none is within the limits; width: half of the 95 % interval that is expected, as ``Precision`` says
     possible: whether that is as narrow as asked for; before: half of the interval by the data at hand
     """
 
@@ -69,7 +69,7 @@ class Sharpest:
 
 
 @dataclass(frozen=True)
-class Wanted:
+class Precision:
     """parameter: as ``gain`` or ``effect.parameter``; width: half of the 95 % interval, as a part of the value."""
 
     parameter: str
@@ -97,7 +97,7 @@ class Wanted:
         return spread * float(belief.scale.unit[place]) / value if value else math.inf
 
 
-def sharpest(data: AxisData, belief: Belief, limits: MachineLimits, target: Wanted, seed: int = 1) -> Sharpest:
+def sharpest(data: AxisData, belief: Belief, limits: MachineLimits, target: Precision, seed: int = 1) -> Sharpest:
     """The experiment after which a parameter is known as well as asked for in the least time, or best where none gets there.
 
     The experiment is chosen by its information. How long it has to last is found by a rehearsal: the fit of a simulated recording with noise.
@@ -121,7 +121,7 @@ def sharpest(data: AxisData, belief: Belief, limits: MachineLimits, target: Want
         lasts = min(math.ceil(LONGER * lasts), limits.seconds)
 
 
-def rehearsed(data: AxisData, belief: Belief, experiment: Experiment, limits: MachineLimits, target: Wanted) -> float:
+def rehearsed(data: AxisData, belief: Belief, experiment: Experiment, limits: MachineLimits, target: Precision) -> float:
     """Half of the interval that a fit reports of the data at hand and of a recording that the experiment would make, with the encoder's noise."""
     rate = data.sampling_rate
     motion = move(belief.model, rate, experiment.drive(rate, experiment.seconds, limits.start), COARSE)
@@ -131,7 +131,7 @@ def rehearsed(data: AxisData, belief: Belief, experiment: Experiment, limits: Ma
     return target.of_interval(finish(both, belief.model).parameter(target.parameter))
 
 
-def _rounds(setting: Setting, belief: Belief, limits: MachineLimits, target: Wanted, seed: int) -> Sequence[Experiment]:
+def _rounds(setting: Setting, belief: Belief, limits: MachineLimits, target: Precision, seed: int) -> Sequence[Experiment]:
     """Proposals, and neighbours of the best of them."""
     rate, most = setting.layout.sampling_rate, limits.seconds - RAMP
     first = proposals(limits, rate, seed)
@@ -155,7 +155,7 @@ def informations(setting: Setting, belief: Belief, limits: MachineLimits, experi
     return found
 
 
-def _needed(belief: Belief, found: Sequence[Information], target: Wanted, most: float) -> tuple[float, float]:
+def _needed(belief: Belief, found: Sequence[Information], target: Precision, most: float) -> tuple[float, float]:
     """s until the mean interval over draws is as narrow as asked for, infinite if ``most`` do not suffice; and half its width there."""
 
     if _width(belief, found, target, most) > target.width:
@@ -167,7 +167,7 @@ def _needed(belief: Belief, found: Sequence[Information], target: Wanted, most: 
     return high, _width(belief, found, target, high)
 
 
-def _width(belief: Belief, found: Sequence[Information], target: Wanted, seconds: float) -> float:
+def _width(belief: Belief, found: Sequence[Information], target: Precision, seconds: float) -> float:
     """Half of the 95 % interval after some seconds, in the mean over draws."""
     return float(np.mean([target.half_width(belief, item.covariance(belief.precision, seconds)) for item in found]))
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from xy_sysid.axis.model import AxisModel, Library
+from xy_sysid.diagnosis.equal_laws import equals
 from xy_sysid.diagnosis.ladder import Ladder, contains
 from xy_sysid.diagnosis.rungs import Given
 from xy_sysid.effects._contract import BEGUN
@@ -41,7 +42,7 @@ def standing(data: AxisData, library: Library, sets: Sequence[Sequence[str]], kn
     check(library, sets)
     names = tuple(tuple(each) for each in sets)
     before = tuple(known) or (None,) * len(names)
-    fits = tuple(_fitted(data, library, each, model) for each, model in zip(names, before, strict=True))
+    fits = _of_one_law(library, names, [_fitted(data, library, each, model) for each, model in zip(names, before, strict=True)])
     prices = [PRICE * sum(len(library[name].parameters) for name in each) for each in names]
     scores = [float(np.sum(found.scores)) + price for found, price in zip(fits, prices, strict=True)]
     chosen = int(np.argmin(scores))
@@ -55,6 +56,18 @@ def check(library: Library, sets: Iterable[Sequence[str]]) -> None:
         if not library[name].simulable or library[name].category == "base":
             act = "It is judged one sample ahead; see its experiment in xy-sysid effects." if not library[name].simulable else "Leave it out."
             raise BadInput("effect", name, "effects that free simulation can predict", act)
+
+
+def _of_one_law(library: Library, names: Sequence[tuple[str, ...]], fits: Sequence[GreyboxFit]) -> tuple[GreyboxFit, ...]:
+    """Sets whose equations are the same have the same fit, the best of theirs, under their own names."""
+    laws = [sorted(equals(library, name)[0].name for name in each) for each in names]
+    found = []
+    for own, law, fitted in zip(names, laws, fits, strict=True):
+        best = min((fits[k] for k, other in enumerate(laws) if other == law), key=lambda item: float(np.sum(item.scores)))
+        called = {one.name: name for name in own for one in equals(library, name)}
+        effects = tuple((called.get(name, name), values) for name, values in best.model.effects)
+        found.append(fitted if best is fitted else replace(best, model=replace(best.model, effects=effects)))
+    return tuple(found)
 
 
 def _doubt(one: GreyboxFit, other: GreyboxFit, price: float) -> float:
