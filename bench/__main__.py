@@ -1,8 +1,8 @@
 """python -m bench [--short] [name ...]: run the benchmarks and write docs/benchmarks.md.
 
-h1, fit, replay, bags, live and intervals run without a name. Only by name: long_bag (a day of data, gigabytes on disk), axis_model,
-settle, settle_limits, and of the recordings of real machines in $XY_SYSID_DATA real_fits, peers and diagnoses. The last two write their tables
-to docs/real-machines.md.
+h1, fit, replay, bags, live and intervals run without a name. Only by name: long_bag (a day of data, gigabytes on disk), axis_model, settle,
+settle_limits, settle_precision, and of the recordings of real machines in $XY_SYSID_DATA real_fits, peers and diagnoses. The last two write
+their tables to docs/real-machines.md.
 --short: a little of each, as the tests run it; nothing is written.
 """
 
@@ -19,7 +19,7 @@ from pathlib import Path
 from bench.tables import Table
 
 TABLES = ("h1", "fit", "replay", "bags", "live", "intervals")
-SCRIPTS = ("long_bag", "axis_model", "real_fits", "peers", "diagnoses", "settle", "settle_limits")
+SCRIPTS = ("long_bag", "axis_model", "real_fits", "peers", "diagnoses", "settle", "settle_limits", "settle_precision")
 PAGE = Path(__file__).parents[1] / "docs" / "benchmarks.md"
 
 

@@ -98,10 +98,13 @@ def sharpen(found: Diagnosed, parameter: str, width: float, limits: MachineLimit
     data = _data(found, tolerance)
     limits = limits or as_recorded(found.runs)
     with threadpool_limits(1, "blas"):
-        belief = believed(Evidence(data), _ladder(found).final, DRAWS)
-        best = sharpest(data, belief, limits, Precision(parameter, width))
+        final = _ladder(found).final
+        best = sharpest(data, final, limits, Precision(parameter, width))
+        beliefs = [believed(Evidence(data), final, DRAWS)] if best.experiment is not None else []
     to = f"{100.0 * best.width:.2g} %"
-    if best.experiment is None:
+    if best.experiment is None and best.possible:
+        sentence = f"No experiment is needed: {parameter} is known to {to} (95 %)."
+    elif best.experiment is None:
         sentence = f"No experiment is within the limits; {parameter} is known to {100.0 * best.before:.2g} %."
     elif best.possible:
         sentence = f"After {best.experiment.seconds:.0f} s, {parameter} is known to {to} (95 %), now {100.0 * best.before:.2g} %."
@@ -116,7 +119,7 @@ def sharpen(found: Diagnosed, parameter: str, width: float, limits: MachineLimit
             experiment=best.experiment,
             settles=best.possible,
         ),
-        [belief],
+        beliefs,
     )
 
 

@@ -15,8 +15,7 @@ from xy_sysid.effects._contract import BEGUN
 from xy_sysid.errors import BadInput
 from xy_sysid.experiment_design.beliefs import ALLOWED, Belief, Evidence, believed, hidden
 from xy_sysid.greybox.axis_data import AxisData
-from xy_sysid.greybox.free_run import GreyboxFit, best_start, fit
-from xy_sysid.hypotheses import starts
+from xy_sysid.greybox.free_run import GreyboxFit, fit
 from xy_sysid.hypotheses.compare import gain
 from xy_sysid.hypotheses.criteria import CHANCE, DOUBTFUL, PRICE
 
@@ -131,7 +130,10 @@ def _gives_way(library: Library, name: str, other: str) -> bool:
 
 
 def possible(data: AxisData, library: Library, ladder: Ladder, most: int = 4) -> list[tuple[str, ...]]:
-    """The set that was named, then those that may be true instead, the likeliest first: rivals that predict nearly as well, and look-alikes."""
+    """The set that was named, then those that may be true instead: rivals that predict nearly as well, and look-alikes.
+
+    Where nothing was named: the simplest laws that may hide in the noise.
+    """
     named = ladder.effects
     rivals = [item.effects for item in ladder.rivals if item.doubt >= DOUBTFUL and not item.refused]
     alike = [
@@ -140,9 +142,10 @@ def possible(data: AxisData, library: Library, ladder: Ladder, most: int = 4) ->
         for other in look_alikes(library, name)
         if other not in named and _may_be(data, library, other)
     ]
-    hiding = [(other.name,) for other in library.acting if not named and _may_be(data, library, other.name)]
+    simplest = sorted(library.acting, key=lambda other: len(other.parameters))
+    hiding = [(other.name,) for other in simplest if not named and _may_be(data, library, other.name)]
     found = dict.fromkeys(tuple(each) for each in (named, *rivals, *alike, *hiding) if all(library[name].simulable for name in each))
-    return list(found)[: 1 + most] if named else list(found)
+    return list(found)[: 1 + most]
 
 
 def look_alikes(library: Library, name: str) -> list[str]:
@@ -159,12 +162,6 @@ def look_alikes(library: Library, name: str) -> list[str]:
 def _may_be(data: AxisData, library: Library, name: str) -> bool:
     effect = library[name]
     return effect.simulable and (data.units.output == "rad" or not effect.angular)
-
-
-def begun(data: AxisData, now: GreyboxFit, name: str, other: str) -> GreyboxFit:
-    """A fit with another effect in the place of one."""
-    library = now.model.library
-    return fit(data, best_start(data, starts.swapped(data, now, name, library[other], None)))
 
 
 def names_of(sets: Iterable[Sequence[str]]) -> str:
