@@ -28,7 +28,7 @@ from xy_sysid.experiment_design.prediction import Setting
 from xy_sysid.experiment_design.proposals import proposals
 
 PLACE = Path(os.environ.get("SETTLE_FILE", "build/settle.jsonl"))
-SEEDS = range(101, 103)  # never used while this was developed
+SEEDS = range(101, 102)  # never used to choose a number
 MOST = 60.0  # s of motion
 DRAWS = 4  # of the parameters of each set
 COLUMNS = (
