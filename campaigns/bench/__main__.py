@@ -1,8 +1,8 @@
 """python -m campaigns.bench [--short] [name ...]: run the benchmarks and write docs/benchmarks.md.
 
 h1, frf, fit, replay, bags, live and intervals run without a name. Only by name:
-    long_bag (a day of data, gigabytes on disk), axis_model, settle, settle_limits, use (a path after a minute of identification: half an hour),
-    fleet (a year of 20 machines), trend
+    long_bag (a day of data, gigabytes on disk), axis_model, settle, settle_limits, settle_precision,
+    use (a path after a minute of identification: half an hour), fleet (a year of 20 machines), trend
     real_fits, peers, diagnoses, emps_force: of the recordings of real machines in $XY_SYSID_DATA
 peers and diagnoses write their tables to docs/real-machines.md, use and emps_force to docs/use.md.
 --short: a little of each, as the tests run it; nothing is written.
@@ -21,7 +21,7 @@ from pathlib import Path
 from campaigns.bench.tables import Table
 
 TABLES = ("h1", "frf", "fit", "replay", "bags", "live", "intervals")
-SCRIPTS = ("long_bag", "axis_model", "real_fits", "peers", "diagnoses", "settle", "settle_limits", "use", "emps_force", "fleet", "trend")
+SCRIPTS = ("long_bag", "axis_model", "real_fits", "peers", "diagnoses", "settle", "settle_limits", "settle_precision", "use", "emps_force", "fleet", "trend")
 PAGE = Path(__file__).parents[2] / "docs" / "benchmarks.md"
 
 

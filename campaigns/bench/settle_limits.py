@@ -26,8 +26,9 @@ SECONDS = 8.0
 def main(short: bool = False) -> None:
     """Print how many were run, and how many left a limit."""
     ran = left = near = 0
-    for pair in PAIRS[: 1 if short else None]:
-        for seed, truth in ((seed, truth) for seed in SEEDS for truth in (0, 1)):
+    sys.stdout.write("Experiments that keep within the limits by every model that a short recording allows:\n\n")
+    for pair in PAIRS[5:6] if short else PAIRS:
+        for seed, truth in [(seed, truth) for seed in SEEDS for truth in (0, 1)][: 1 if short else None]:
             made, asked = machine(pair, truth, seed), limits(pair)
             data = prepare_all(made.rate, [first_recording(pair, made, seed)])
             models = [model for belief in beliefs_of(data, STANDARD, standing(data, STANDARD, pair.sets), 4) for model in belief.draws]
@@ -42,8 +43,8 @@ def main(short: bool = False) -> None:
                 found = carry_out(made, item.lasting(SECONDS))
                 ran, left = ran + 1, left + left_limits(pair, [found])
                 near += int(np.max(np.abs(found[1])) > (1.0 - asked.margin) * pair.reach)
-        sys.stderr.write(f"{pair.name}: {ran} run, {left} left a limit\n")
-    sys.stdout.write(f"{ran} experiments were run; {left} left a limit, and {near} came into its margin.\n")
+        sys.stdout.write(f"- {pair.name}: {ran} run in all, {left} left a limit\n")
+    sys.stdout.write(f"\n{ran} experiments were run; {left} left a limit, and {near} came into its margin.\n")
 
 
 if __name__ == "__main__":

@@ -60,7 +60,10 @@ def powers(beliefs: Sequence[Belief], truth: int, model: AxisModel, item: Record
 
 
 def nats(sets: tuple[Belief, Belief], model: AxisModel, item: Recorded, rounds: int = ROUNDS) -> float:
-    """Expected ratio of likelihoods of the windows of a recording that a model of the first set makes, against the second that suits itself to it."""
+    """Expected ratio of likelihoods of the windows of a recording that a model of the first set makes, against the second that suits itself to it.
+
+    What each set has to leave of the data at hand counts for both.
+    """
     own, rival = sets
     least, response = expected_error(item, own, model)
     lines = item.objective.lines > 0.0
@@ -84,7 +87,8 @@ def nats(sets: tuple[Belief, Belief], model: AxisModel, item: Recorded, rounds: 
         left = (error * weight).ravel().view(np.float64)
         inner = inner + np.linalg.solve(columns @ columns.T + rival.precision, columns @ left - rival.precision @ off)
         inner = rival.scale.inner(rival.scale.outer(inner))
-    truth = _all(item, item.objective.of_power(least, response))
+    drawn = own.inner(model) - own.inner(own.model)
+    truth = _all(item, item.objective.of_power(least, response)) + 0.5 * float(drawn @ own.precision @ drawn)
     return max(best - truth, 0.0) if math.isfinite(best) else 1e6
 
 

@@ -31,7 +31,7 @@ DELAY = (0.5e-3, 5e-3)  # s
 FRICTION = (0.01, 0.2)  # of the full voltage
 COUNTS = 1e5  # of the encoder within the travel, at least
 WIDTH = 0.05  # half of the 95 % interval of gain and pole that is asked for
-DRAWS = 12
+DRAWS = 8
 SHORTEST = 30.0  # s: a diagnosis needs windows that judge, whatever gain and pole need
 
 

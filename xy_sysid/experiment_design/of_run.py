@@ -19,7 +19,7 @@ from xy_sysid.experiment_design.beliefs import Belief, Evidence, believed
 from xy_sysid.experiment_design.design import Design, design, expects
 from xy_sysid.experiment_design.experiment import Experiment
 from xy_sysid.experiment_design.limits import MachineLimits, as_recorded
-from xy_sysid.experiment_design.precision import DRAWS, Wanted, sharpest
+from xy_sysid.experiment_design.precision import DRAWS, Precision, sharpest
 from xy_sysid.experiment_design.prediction import COARSE, Setting
 from xy_sysid.experiment_design.rivals import beliefs_of, names_of, possible, standing
 from xy_sysid.greybox.axis_data import EPSILON, AxisData, prepare_all
@@ -98,10 +98,13 @@ def sharpen(found: Diagnosed, parameter: str, width: float, limits: MachineLimit
     data = _data(found, tolerance)
     limits = limits or as_recorded(found.runs)
     with threadpool_limits(1, "blas"):
-        belief = believed(Evidence(data), _ladder(found).final, DRAWS)
-        best = sharpest(data, belief, limits, Wanted(parameter, width))
+        final = _ladder(found).final
+        best = sharpest(data, final, limits, Precision(parameter, width))
+        beliefs = [believed(Evidence(data), final, DRAWS)] if best.experiment is not None else []
     to = f"{100.0 * best.width:.2g} %"
-    if best.experiment is None:
+    if best.experiment is None and best.possible:
+        sentence = f"No experiment is needed: {parameter} is known to {to} (95 %)."
+    elif best.experiment is None:
         sentence = f"No experiment is within the limits; {parameter} is known to {100.0 * best.before:.2g} %."
     elif best.possible:
         sentence = f"After {best.experiment.seconds:.0f} s, {parameter} is known to {to} (95 %), now {100.0 * best.before:.2g} %."
@@ -116,7 +119,7 @@ def sharpen(found: Diagnosed, parameter: str, width: float, limits: MachineLimit
             experiment=best.experiment,
             settles=best.possible,
         ),
-        [belief],
+        beliefs,
     )
 
 

@@ -15,14 +15,14 @@ import numpy as np
 from xy_sysid.axis.forward import move
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.errors import BadInput
-from xy_sysid.experiment_design.beliefs import Belief
+from xy_sysid.experiment_design.beliefs import Belief, Evidence, believed
 from xy_sysid.experiment_design.design import FINAL, SHORTEST
 from xy_sysid.experiment_design.experiment import RAMP, Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
 from xy_sysid.experiment_design.prediction import COARSE, Recorded, Setting, expected_error, predicted, recorded, slopes
 from xy_sysid.experiment_design.proposals import neighbours, proposals
 from xy_sysid.greybox.axis_data import HELD, SEEN, AxisData, prepare_all
-from xy_sysid.greybox.free_run import finish
+from xy_sysid.greybox.free_run import GreyboxFit, finish
 from xy_sysid.greybox.least_squares import of_the_law
 from xy_sysid.greybox.parameters import Z95, Estimate
 from xy_sysid.samples.block import FloatArray
@@ -52,13 +52,13 @@ def information(belief: Belief, model: AxisModel, item: Recorded) -> Information
     change = slopes(item, belief, model, predicted(item, model)) * weight
     columns = change.reshape(change.shape[0], -1).view(np.float64)
     normal = columns @ columns.T
-    law = of_the_law(change, item.trusted * item.velocity * weight, layout, _inverse(normal))
+    law = of_the_law(change, item.trusted * item.velocity * weight, layout, _inverse(normal + belief.precision))
     return Information(normal / item.seconds, law)
 
 
 @dataclass(frozen=True)
 class Sharpest:
-    """experiment: the best, or None where none is within the limits; width: half of the 95 % interval that is expected, as ``Wanted`` says
+    """experiment: the best; None where none is needed, or within the limits; width: half of the 95 % interval that is expected, as ``Precision`` says
     possible: whether that is as narrow as asked for; before: half of the interval by the data at hand
     """
 
@@ -69,7 +69,7 @@ class Sharpest:
 
 
 @dataclass(frozen=True)
-class Wanted:
+class Precision:
     """parameter: as ``gain`` or ``effect.parameter``; width: half of the 95 % interval, as a part of the value."""
 
     parameter: str
@@ -97,22 +97,24 @@ class Wanted:
         return spread * float(belief.scale.unit[place]) / value if value else math.inf
 
 
-def sharpest(data: AxisData, belief: Belief, limits: MachineLimits, target: Wanted, seed: int = 1) -> Sharpest:
-    """The experiment after which a parameter is known as well as asked for in the least time, or best where none gets there.
+def sharpest(data: AxisData, found: GreyboxFit, limits: MachineLimits, target: Precision, seed: int = 1) -> Sharpest:
+    """The experiment after which a parameter of a fit is known as well as asked for in the least time, or best where none gets there.
 
     The experiment is chosen by its information. How long it has to last is found by a rehearsal: the fit of a simulated recording with noise.
     """
-    setting = Setting.of(data)
-    before = target.half_width(belief, _inverse(belief.precision))
+    before = target.of_interval(found.parameter(target.parameter))
+    if before <= target.width:
+        return Sharpest(None, before, True, before)
+    setting, belief = Setting.of(data), believed(Evidence(data), found, DRAWS)
     most = limits.seconds - RAMP
-    judged: list[tuple[float, float, int, Experiment, list[Information]]] = []
+    judged: list[tuple[float, float, int, Experiment]] = []
     for experiment in _rounds(setting, belief, limits, target, seed):
-        found = informations(setting, belief, limits, experiment)
-        if found:
-            judged.append((*_needed(belief, found, target, most), len(judged), experiment, found))
+        told = informations(setting, belief, limits, experiment)
+        if told:
+            judged.append((*_needed(belief, told, target, most), len(judged), experiment))
     if not judged:
-        return Sharpest(None, before, before <= target.width, before)
-    seconds, _, _, best, _ = min(judged, key=lambda item: item[:3])
+        return Sharpest(None, before, False, before)
+    seconds, _, _, best = min(judged, key=lambda item: item[:3])
     lasts = min(max(math.ceil((seconds if math.isfinite(seconds) else most) + RAMP), SHORTEST), limits.seconds)
     while True:
         width = rehearsed(data, belief, best.lasting(float(lasts)), limits, target)
@@ -121,7 +123,7 @@ def sharpest(data: AxisData, belief: Belief, limits: MachineLimits, target: Want
         lasts = min(math.ceil(LONGER * lasts), limits.seconds)
 
 
-def rehearsed(data: AxisData, belief: Belief, experiment: Experiment, limits: MachineLimits, target: Wanted) -> float:
+def rehearsed(data: AxisData, belief: Belief, experiment: Experiment, limits: MachineLimits, target: Precision) -> float:
     """Half of the interval that a fit reports of the data at hand and of a recording that the experiment would make, with the encoder's noise."""
     rate = data.sampling_rate
     motion = move(belief.model, rate, experiment.drive(rate, experiment.seconds, limits.start), COARSE)
@@ -131,7 +133,7 @@ def rehearsed(data: AxisData, belief: Belief, experiment: Experiment, limits: Ma
     return target.of_interval(finish(both, belief.model).parameter(target.parameter))
 
 
-def _rounds(setting: Setting, belief: Belief, limits: MachineLimits, target: Wanted, seed: int) -> Sequence[Experiment]:
+def _rounds(setting: Setting, belief: Belief, limits: MachineLimits, target: Precision, seed: int) -> Sequence[Experiment]:
     """Proposals, and neighbours of the best of them."""
     rate, most = setting.layout.sampling_rate, limits.seconds - RAMP
     first = proposals(limits, rate, seed)
@@ -145,17 +147,17 @@ def _rounds(setting: Setting, belief: Belief, limits: MachineLimits, target: Wan
 
 
 def informations(setting: Setting, belief: Belief, limits: MachineLimits, experiment: Experiment, draws: int = DRAWS) -> list[Information]:
-    """Of one experiment, for some draws; none where a draw would break a limit."""
+    """Of one experiment, for some draws; none where a draw would break a limit, or would not move."""
     found = []
     for model in belief.draws[:draws]:
         item = recorded(setting, experiment, model, limits.start)
-        if limits.broken(item.motion):
+        if not item.moves or limits.broken(item.motion):
             return []
         found.append(information(belief, model, item))
     return found
 
 
-def _needed(belief: Belief, found: Sequence[Information], target: Wanted, most: float) -> tuple[float, float]:
+def _needed(belief: Belief, found: Sequence[Information], target: Precision, most: float) -> tuple[float, float]:
     """s until the mean interval over draws is as narrow as asked for, infinite if ``most`` do not suffice; and half its width there."""
 
     if _width(belief, found, target, most) > target.width:
@@ -167,7 +169,7 @@ def _needed(belief: Belief, found: Sequence[Information], target: Wanted, most: 
     return high, _width(belief, found, target, high)
 
 
-def _width(belief: Belief, found: Sequence[Information], target: Wanted, seconds: float) -> float:
+def _width(belief: Belief, found: Sequence[Information], target: Precision, seconds: float) -> float:
     """Half of the 95 % interval after some seconds, in the mean over draws."""
     return float(np.mean([target.half_width(belief, item.covariance(belief.precision, seconds)) for item in found]))
 

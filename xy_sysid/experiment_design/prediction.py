@@ -41,7 +41,7 @@ class Recorded:
     """What would be recorded without noise.
 
     windows: of the steady part; seconds: of it; velocity: (windows, lines) spectrum; objective: scores an error of it
-    trusted: part of the motion to which laws are trusted
+    trusted: part of the motion to which laws are trusted; moves: whether the encoder sees more than its noise
     """
 
     motion: Motion
@@ -50,6 +50,7 @@ class Recorded:
     velocity: NDArray[np.complex128]
     objective: Objective
     trusted: float
+    moves: bool
 
 
 def recorded(setting: Setting, experiment: Experiment, model: AxisModel, start: float, seconds: float = LOOKED) -> Recorded:
@@ -73,6 +74,7 @@ def seen(setting: Setting, motion: Motion) -> Recorded:
         velocity=windows.spectrum(velocity),
         objective=Objective.of(least),
         trusted=setting.epsilon,
+        moves=bool(np.any(least.excited)),
     )
 
 

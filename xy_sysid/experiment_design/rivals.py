@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from xy_sysid.axis.model import AxisModel, Library
+from xy_sysid.diagnosis.equal_laws import equals
 from xy_sysid.diagnosis.ladder import Ladder, contains
 from xy_sysid.diagnosis.rungs import Given
 from xy_sysid.effects._contract import BEGUN
 from xy_sysid.errors import BadInput
 from xy_sysid.experiment_design.beliefs import ALLOWED, Belief, Evidence, believed, hidden
 from xy_sysid.greybox.axis_data import AxisData
-from xy_sysid.greybox.free_run import GreyboxFit, best_start, fit
-from xy_sysid.hypotheses import starts
+from xy_sysid.greybox.free_run import GreyboxFit, fit
 from xy_sysid.hypotheses.compare import gain
 from xy_sysid.hypotheses.criteria import CHANCE, DOUBTFUL, PRICE
 
@@ -41,7 +41,7 @@ def standing(data: AxisData, library: Library, sets: Sequence[Sequence[str]], kn
     check(library, sets)
     names = tuple(tuple(each) for each in sets)
     before = tuple(known) or (None,) * len(names)
-    fits = tuple(_fitted(data, library, each, model) for each, model in zip(names, before, strict=True))
+    fits = _of_one_law(library, names, [_fitted(data, library, each, model) for each, model in zip(names, before, strict=True)])
     prices = [PRICE * sum(len(library[name].parameters) for name in each) for each in names]
     scores = [float(np.sum(found.scores)) + price for found, price in zip(fits, prices, strict=True)]
     chosen = int(np.argmin(scores))
@@ -55,6 +55,18 @@ def check(library: Library, sets: Iterable[Sequence[str]]) -> None:
         if not library[name].simulable or library[name].category == "base":
             act = "It is judged one sample ahead; see its experiment in xy-sysid effects." if not library[name].simulable else "Leave it out."
             raise BadInput("effect", name, "effects that free simulation can predict", act)
+
+
+def _of_one_law(library: Library, names: Sequence[tuple[str, ...]], fits: Sequence[GreyboxFit]) -> tuple[GreyboxFit, ...]:
+    """Sets whose equations are the same have the same fit, the best of theirs, under their own names."""
+    laws = [sorted(equals(library, name)[0].name for name in each) for each in names]
+    found = []
+    for own, law, fitted in zip(names, laws, fits, strict=True):
+        best = min((fits[k] for k, other in enumerate(laws) if other == law), key=lambda item: float(np.sum(item.scores)))
+        called = {one.name: name for name in own for one in equals(library, name)}
+        effects = tuple((called.get(name, name), values) for name, values in best.model.effects)
+        found.append(fitted if best is fitted else replace(best, model=replace(best.model, effects=effects)))
+    return tuple(found)
 
 
 def _doubt(one: GreyboxFit, other: GreyboxFit, price: float) -> float:
@@ -118,7 +130,10 @@ def _gives_way(library: Library, name: str, other: str) -> bool:
 
 
 def possible(data: AxisData, library: Library, ladder: Ladder, most: int = 4) -> list[tuple[str, ...]]:
-    """The set that was named, then those that may be true instead, the likeliest first: rivals that predict nearly as well, and look-alikes."""
+    """The set that was named, then those that may be true instead: rivals that predict nearly as well, and look-alikes.
+
+    Where nothing was named: the simplest laws that may hide in the noise.
+    """
     named = ladder.effects
     rivals = [item.effects for item in ladder.rivals if item.doubt >= DOUBTFUL and not item.refused]
     alike = [
@@ -127,9 +142,10 @@ def possible(data: AxisData, library: Library, ladder: Ladder, most: int = 4) ->
         for other in look_alikes(library, name)
         if other not in named and _may_be(data, library, other)
     ]
-    hiding = [(other.name,) for other in library.acting if not named and _may_be(data, library, other.name)]
+    simplest = sorted(library.acting, key=lambda other: len(other.parameters))
+    hiding = [(other.name,) for other in simplest if not named and _may_be(data, library, other.name)]
     found = dict.fromkeys(tuple(each) for each in (named, *rivals, *alike, *hiding) if all(library[name].simulable for name in each))
-    return list(found)[: 1 + most] if named else list(found)
+    return list(found)[: 1 + most]
 
 
 def look_alikes(library: Library, name: str) -> list[str]:
@@ -146,12 +162,6 @@ def look_alikes(library: Library, name: str) -> list[str]:
 def _may_be(data: AxisData, library: Library, name: str) -> bool:
     effect = library[name]
     return effect.simulable and (data.units.output == "rad" or not effect.angular)
-
-
-def begun(data: AxisData, now: GreyboxFit, name: str, other: str) -> GreyboxFit:
-    """A fit with another effect in the place of one."""
-    library = now.model.library
-    return fit(data, best_start(data, starts.swapped(data, now, name, library[other], None)))
 
 
 def names_of(sets: Iterable[Sequence[str]]) -> str:
