@@ -8,6 +8,7 @@ import typer
 
 from xy_sysid.cli.columns import columns
 from xy_sysid.cli.compare import compare
+from xy_sysid.cli.coupling import coupling
 from xy_sysid.cli.demo import demo
 from xy_sysid.cli.diagnose import diagnose
 from xy_sysid.cli.effects import effects
@@ -52,6 +53,7 @@ def _program(
 
 
 for command in (
-    demo, page, run, record, replay, simulate, columns, frf, fit, steps, servo, validate, compare, diagnose, refine, effects, study, report, figures
+    demo, page, run, record, replay, simulate, columns, frf, fit, steps, servo, coupling, validate, compare, diagnose, refine, effects,
+    study, report, figures,
 ):  # fmt: skip
     app.command(name=command.__name__)(command)
