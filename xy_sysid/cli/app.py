@@ -25,6 +25,7 @@ from xy_sysid.cli.simulate import simulate
 from xy_sysid.cli.start import run
 from xy_sysid.cli.steps import steps
 from xy_sysid.cli.study import study
+from xy_sysid.cli.trajectory import trajectory
 from xy_sysid.cli.validate import validate
 
 app = typer.Typer(
@@ -54,6 +55,6 @@ def _program(
 
 for command in (
     demo, page, run, record, replay, simulate, columns, frf, fit, steps, servo, coupling, validate, compare, diagnose, refine, effects,
-    study, report, figures,
+    study, report, figures, trajectory,
 ):  # fmt: skip
     app.command(name=command.__name__)(command)
