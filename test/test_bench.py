@@ -101,7 +101,14 @@ def test_a_table_takes_the_place_of_the_one_before() -> None:
 
 def test_every_benchmark_is_among_these() -> None:
     """A new file of campaigns/bench/ has a short form, too."""
-    files = {path.stem for path in (ROOT / "campaigns" / "bench").glob("*.py")} - {"__init__", "__main__", "mujoco_machine", "recordings", "settle_pairs", "tables"}
+    files = {path.stem for path in (ROOT / "campaigns" / "bench").glob("*.py")} - {
+        "__init__",
+        "__main__",
+        "mujoco_machine",
+        "recordings",
+        "settle_pairs",
+        "tables",
+    }
     assert files == {*TABLES, *SCRIPTS}
 
 

@@ -21,7 +21,20 @@ from pathlib import Path
 from campaigns.bench.tables import Table
 
 TABLES = ("h1", "frf", "fit", "replay", "bags", "live", "intervals")
-SCRIPTS = ("long_bag", "axis_model", "real_fits", "peers", "diagnoses", "settle", "settle_limits", "settle_precision", "use", "emps_force", "fleet", "trend")
+SCRIPTS = (
+    "long_bag",
+    "axis_model",
+    "real_fits",
+    "peers",
+    "diagnoses",
+    "settle",
+    "settle_limits",
+    "settle_precision",
+    "use",
+    "emps_force",
+    "fleet",
+    "trend",
+)
 PAGE = Path(__file__).parents[2] / "docs" / "benchmarks.md"
 
 

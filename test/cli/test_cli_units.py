@@ -48,7 +48,7 @@ COMMANDS: dict[str, tuple[Any, ...]] = {
 
 def wrong(text: str) -> list[str]:
     """Each place where a unit of the table stands, with what is around it."""
-    rest = re.sub(r"\bN[ \u00a0]m\b", "torque", text)
+    rest = re.sub(r"\bkg m\^2", "inertia", re.sub(r"\bN[ \u00a0]m\b", "torque", text))
     return [rest[max(found.start() - 40, 0) : found.end() + 20] for found in LENGTHS.finditer(rest)]
 
 

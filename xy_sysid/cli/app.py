@@ -8,6 +8,7 @@ import typer
 
 from xy_sysid.cli.columns import columns
 from xy_sysid.cli.compare import compare
+from xy_sysid.cli.coupling import coupling
 from xy_sysid.cli.demo import demo
 from xy_sysid.cli.diagnose import diagnose
 from xy_sysid.cli.effects import effects
@@ -26,6 +27,7 @@ from xy_sysid.cli.simulate import simulate
 from xy_sysid.cli.start import run
 from xy_sysid.cli.steps import steps
 from xy_sysid.cli.study import study
+from xy_sysid.cli.trajectory import trajectory
 from xy_sysid.cli.trend import trend
 from xy_sysid.cli.use import use
 from xy_sysid.cli.validate import validate
@@ -54,8 +56,8 @@ def _program(
     pass
 
 
-WATCH = (demo, page, run, record, replay)
-IDENTIFY = (simulate, columns, frf, fit, steps, servo, validate)
+WATCH = (demo, page, run, trajectory, record, replay)
+IDENTIFY = (simulate, columns, frf, fit, steps, servo, coupling, validate)
 EXPLAIN = (compare, diagnose, refine, effects, use, study, report, figures)
 MANY = (fleet, trend)
 for command in (*WATCH, *IDENTIFY, *EXPLAIN, *MANY):

@@ -11,6 +11,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.fitting import Fit, identify
 from xy_sysid.fitting.choose_orders import Choice, choose, choose_among
 from xy_sysid.fitting.structure import structure_from
+from xy_sysid.response.best_linear import Realisation, best_linear
 from xy_sysid.response.frf import FrequencyResponse
 from xy_sysid.response.friction_hint import friction_hint, friction_note
 from xy_sysid.response.h1 import H1Options
@@ -35,6 +36,8 @@ LONGEST = 16_384  # samples of a window of which one will do
 MOST_ON_GRID = 0.5  # of the windows that fit; where the grid holds fewer, each stretch has windows from its own beginning on
 COVERED = 0.5  # of the samples that such windows take in at least
 MANY = 6  # periods that must be there where feedback or friction shape the input
+MOST_TRANSIENT = 2  # periods of a stretch of which none can be left out
+BEST = "Several realisations of a periodic input: noise and nonlinear distortion are told apart, and sigma is of the larger one."
 TRANSIENT = 1  # periods left out at the start of a periodic recording
 USUAL = IdentifierSettings()
 ROUNDING = 1e-12  # of the response: no line of a made-up signal without noise is more exact than its numbers
@@ -120,12 +123,28 @@ def estimate(recording: Recording, axis: str, settings: IdentifierSettings, peri
     sums = method.whole(cut, shape, settings.differenced)
     frf = method.estimate(sums, shape, recording.sampling_rate, options)
     notes += [method.note] if method.note else []
+    if period and r is None and not half and settings.response == "h1":
+        frf = best_linear(frf, _realisations([(u, y) for _, u, y in pieces], period, settings.differenced))
+        notes += [BEST] if frf.noise.size else []
     frf = replace(frf, sigma=np.maximum(frf.sigma, ROUNDING * np.abs(frf.response)))
     notes += _coherence(frf, settings, bool(period))
     longest = max(runs, key=_samples)
     friction = friction_note(friction_hint(u[longest], y[longest], recording.sampling_rate))
     notes += [*(_closed_loop(recording, axis) if r is None else []), *([friction] if friction else [])]
     return AxisEstimate(axis=axis, frf=frf, period=period or None, windows=int(method.windows(sums)), notes=tuple(notes))
+
+
+def _realisations(pieces: list[tuple[FloatArray, FloatArray]], period: int, differenced: bool) -> list[Realisation]:
+    """Input and output of each stretch, period by period, the first left out where three remain with it."""
+    found = []
+    for u, y in pieces:
+        output = np.diff(y) if differenced else y
+        count = output.size // period
+        first = int(count > MOST_TRANSIENT)
+        rows = slice(first * period, count * period)
+        if count > first:
+            found.append((u[rows].reshape(-1, period), output[rows].reshape(-1, period)))
+    return found
 
 
 def _sensed(recording: Recording, y: FloatArray, period: int, sign: float = 1.0) -> FloatArray:

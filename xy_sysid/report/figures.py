@@ -104,6 +104,13 @@ def response_figure(responses: Mapping[str, FrequencyResponse]) -> go.Figure:
                 line={"color": colour, "width": 1.6}, marker={"color": colour, "size": 3}, name=f"axis {plain(axis)}", legendgroup=axis,
                 showlegend=row == 1, row=row, col=1,
             )  # fmt: skip
+        for name, own, dash in (("noise", lines.noise, "dot"), ("nonlinear distortion", lines.distortion, "dash")):
+            if own.size:
+                level = np.where(own > 0.0, decibel(np.asarray(own, dtype=np.complex128), frf.output_unit), np.nan)
+                figure.add_scatter(
+                    x=lines.frequency, y=level, mode="lines", line={"color": colour, "width": 1.2, "dash": dash},
+                    name=f"{name}, axis {plain(axis)}", legendgroup=axis, row=1, col=1,
+                )  # fmt: skip
     first = next(iter(responses.values()))
     figure.update_yaxes(title_text=f"magnitude (dB re {_ratio(first)})", row=1, col=1)
     figure.update_yaxes(title_text="phase (°)", dtick=turns(phases), row=2, col=1)

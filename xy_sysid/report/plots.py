@@ -32,12 +32,18 @@ COLOURS = ("#d1495b", "#2e8b57", "#7b5ea7", "#c77d0a", "#00798c")
 DASHES = ("dash", "solid", "dot", "dashdot", "longdash")
 
 
-def bode(frf: FrequencyResponse, *models: AnyModel) -> go.Figure:
+def bode(frf: FrequencyResponse, *others: FrequencyResponse | AnyModel) -> go.Figure:
     """Magnitude and phase of a measured response with its 95 % band, and of models over it (of physical ones the linear part).
 
-    Each model is drawn as a measurement like this one is expected to see it: held, sampled, blurred by the window.
+    Each model is drawn as a measurement like this one is expected to see it: held, sampled, blurred by the window. Other responses are drawn
+    beside the first, and noise and nonlinear distortion where they are known.
     """
-    figure = response_figure({frf.origin.axis or "measured": frf})
+    measured = {frf.origin.axis or "measured": frf}
+    for number, other in enumerate((item for item in others if isinstance(item, FrequencyResponse)), 2):
+        name = other.origin.axis or "measured"
+        measured[f"{name} ({number})" if name in measured else name] = other
+    models = [item for item in others if not isinstance(item, FrequencyResponse)]
+    figure = response_figure(measured)
     lines = frf.select(frf.trusted) if bool(np.any(frf.trusted)) else frf
     reference = phase_of(lines.response)
     for number, model in enumerate(models):

@@ -5,7 +5,10 @@ H1 estimator: Bendat & Piersol, Random Data, 4th ed., eq. 6.37 (H = Gyx / Gxx) a
 
 from __future__ import annotations
 
+import importlib
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +19,12 @@ from xy_sysid.units import over
 
 ComplexArray = NDArray[np.complex128]
 Z95 = 1.959963984540054  # sigmas to each side of a 95 % interval: 97.5 % of the normal distribution
+
+
+def _algebra(name: str) -> Callable[..., FrequencyResponse]:
+    """One of its functions; it makes responses itself, so it is imported when it is used."""
+    found: Callable[..., FrequencyResponse] = getattr(importlib.import_module("xy_sysid.response.algebra"), name)
+    return found
 
 
 def _one() -> FloatArray:
@@ -52,6 +61,8 @@ class FrequencyResponse:
     smoothing:        lines over which the noise power was averaged for sigma
     differenced:      True if the window was put on the output's difference y[n+1] - y[n] and the estimate divided by
                       exp(j w T) - 1, so that blurring acts on the response times (exp(j w T) - 1)
+    noise, distortion: (m,) standard deviations of one realisation's response by noise, and by what is not linear, where several realisations of a
+                      periodic input tell them apart; else (0,)
     origin:           axis, samples and notes, where they are known
     """
 
@@ -74,6 +85,8 @@ class FrequencyResponse:
     hop: float = 1.0
     smoothing: int = 1
     differenced: bool = False
+    noise: FloatArray = field(default_factory=_none)
+    distortion: FloatArray = field(default_factory=_none)
     origin: Origin = field(default_factory=Origin)
 
     def __len__(self) -> int:
@@ -95,7 +108,31 @@ class FrequencyResponse:
             coherence=self.coherence[lines],
             sigma=self.sigma[lines],
             trusted=self.trusted[lines],
+            noise=self.noise[lines] if self.noise.size else self.noise,
+            distortion=self.distortion[lines] if self.distortion.size else self.distortion,
         )
+
+    def __add__(self, other: Any) -> FrequencyResponse:
+        """Sum with a response, a transfer function or a number; errors are taken to be independent. Raises BadInput for other units."""
+        return _algebra("added")(self, other)
+
+    def __sub__(self, other: Any) -> FrequencyResponse:
+        """Difference, as the sum."""
+        return _algebra("added")(self, other, -1.0)
+
+    def __mul__(self, other: Any) -> FrequencyResponse:
+        """This one after the other: ``plant * controller``. Raises BadInput where the other's output is not this one's input."""
+        return _algebra("multiplied")(self, other)
+
+    __rmul__ = __mul__
+
+    def inverse(self) -> FrequencyResponse:
+        """Input over output."""
+        return _algebra("inverted")(self)
+
+    def closed_loop(self, controller: Any) -> FrequencyResponse:
+        """From reference to output, P C / (1 + P C); controller: a response, a transfer function or a number, from output to input."""
+        return _algebra("closed")(self, controller)
 
     def band(self, low: float, high: float) -> FrequencyResponse:
         """The lines from low to high, both included, Hz."""

@@ -1,0 +1,89 @@
+"""Two axes at once: the 2 x 2 response and its verdict."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers.cli_tools import cli, refused
+from helpers.table_making import csv_of
+from scipy import signal
+
+from xy_sysid.errors import BadInput
+from xy_sysid.response.coupling import Coupling, coupling
+from xy_sysid.response.windows import WindowShape
+from xy_sysid.samples.block import FloatArray
+from xy_sysid.samples.recording import Recording
+
+RATE, SHAPE, BAND = 500.0, WindowShape.of("hann", 512, 0.5), (2.0, 100.0)
+
+
+def machine(cross: float, mix: FloatArray | None = None, seconds: float = 120.0, alike: bool = False) -> Recording:
+    """Two axes with lags of their own, each moved a little by the other's drive; mix: drives and encoders are sums and differences."""
+    random = np.random.default_rng(6)
+    u = random.normal(size=(int(seconds * RATE), 2))
+    if alike:
+        u[:, 1] = u[:, 0]
+    own = np.column_stack([signal.lfilter([0.1], [1.0, -1.0 + p, 0.0], u[:, k]) for k, p in enumerate((0.1, 0.2))])
+    moved = own + cross * own[:, ::-1]
+    position = np.cumsum(moved, axis=0) / RATE + 1e-7 * random.normal(size=moved.shape)
+    if mix is not None:
+        u, position = u @ np.linalg.inv(mix).T, position @ mix.T
+    return Recording.from_arrays(RATE, u, position, axes=("x", "y") if mix is None else ("a", "b"))
+
+
+def of(recording: Recording, combine: str = "") -> Coupling:
+    """With the windows of this test."""
+    return coupling(recording, SHAPE, BAND, combine)
+
+
+def test_axes_that_are_not_coupled_get_a_limit() -> None:
+    """In per cent and decibels, with the band, and the verdict that two single-axis models suffice."""
+    found = of(machine(0.0))
+    assert found.suffice
+    assert "two single-axis models suffice" in found.sentence and "dB" in found.sentence
+
+
+@pytest.mark.parametrize("cross", [0.03, 0.2])
+def test_axes_that_are_coupled_are_said_to_be(cross: float) -> None:
+    """With the size of the coupling and where it is; the cross responses are right within their sigma."""
+    found = of(machine(cross))
+    assert not found.suffice and "do not suffice" in found.sentence
+    assert float(np.median(found.coupling)) == pytest.approx(cross, rel=0.5)
+    across = found.response[:, 0, 1] / found.response[:, 1, 1]
+    assert float(np.median(np.abs(across - cross))) < 0.2 * cross
+
+
+def test_too_little_data_rules_nothing_out() -> None:
+    """Neither suffice nor coupled: how much cannot be ruled out, and what to do."""
+    noisy = machine(0.0, seconds=6.0)
+    found = of(Recording.from_arrays(RATE, noisy.voltage, noisy.position + 2e-4 * np.random.default_rng(1).normal(size=noisy.position.shape)))
+    assert not found.suffice and "cannot be ruled out" in found.sentence
+
+
+def test_the_two_motors_of_a_corexy_are_taken_apart() -> None:
+    """Motor by motor all is coupled; as x and y nothing is."""
+    recording = machine(0.0, mix=np.array([[1.0, 1.0], [1.0, -1.0]]))
+    assert not of(recording).suffice
+    found = of(recording, "corexy")
+    assert found.axes == ("x", "y") and found.suffice, found.sentence
+
+
+def test_inputs_that_are_alike_are_refused() -> None:
+    """One signal on both axes tells no cross response."""
+    with pytest.raises(BadInput, match="alike"):
+        of(machine(0.0, alike=True))
+
+
+def test_the_command_answers(tmp_path: Path) -> None:
+    """Sentence and table; a recording of one axis is refused in one line."""
+    recording = machine(0.0)
+    columns = {"time": recording.time}
+    for k, axis in enumerate("xy"):
+        columns |= {f"{axis}_voltage": recording.voltage[:, k], f"{axis}_position": recording.position[:, k]}
+    path = csv_of(tmp_path, columns)
+    options = ("--set", "length=512", "--set", "band_low=2", "--set", "band_high=100")
+    assert "suffice" in cli("coupling", path, *options).out
+    assert cli("coupling", path, *options, "--json").json["suffice"] is True
+    assert "two" in refused("coupling", path, "--axis", "x")

@@ -1,0 +1,170 @@
+"""Two axes at once: the 2 x 2 response, its uncertainty, and whether two single-axis models suffice.
+
+G = Syu Suu^-1 of two inputs that are not one and the same (two independent noises, orthogonal multisines); the covariance of what the inputs do
+not explain gives sigma of each of the four. (Bendat & Piersol, Random Data, 4th ed., sec. 7.4; Pintelon & Schoukens, System Identification,
+2nd ed., sec. 2.7)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from xy_sysid.errors import BadInput
+from xy_sysid.response.frf import ComplexArray, FrequencyResponse
+from xy_sysid.response.h1 import divisor
+from xy_sysid.response.windows import WindowShape, error_correlation
+from xy_sysid.samples.block import FloatArray
+from xy_sysid.samples.recording import Recording, as_sensed
+
+SUFFICES = 0.01  # of the own motion: less is below what models of machines reach
+BANDS = 24  # over which coupling is averaged
+ALIKE = 0.95  # coherence of the two inputs from which they cannot be told apart
+FEWEST = 4.0  # independent windows
+COMBINED = {
+    "corexy": (np.array([[1.0, 1.0], [1.0, -1.0]]), np.array([[0.5, 0.5], [0.5, -0.5]])),
+    "gantry": (np.array([[1.0, 1.0], [1.0, -1.0]]), np.array([[0.5, 0.5], [0.5, -0.5]])),
+}  # (inputs, outputs) -> of the mean and of the difference: x and y of a CoreXY's two motors, travel and yaw of a gantry's two sides
+
+
+@dataclass(frozen=True, slots=True)
+class Coupling:
+    """What two axes do to each other.
+
+    axes: their names; response: (lines, 2, 2) complex, output i over input j; sigma: (lines, 2, 2); frequency: (lines,) Hz, those used
+    band_edges: (bands + 1,) Hz; coupling, at_most: (bands,) |G_ij| / sqrt(|G_ii G_jj|), rms in the band, the larger way: what is sure, and 95 % limit
+    """
+
+    axes: tuple[str, str]
+    frequency: FloatArray
+    response: ComplexArray
+    sigma: FloatArray
+    band_edges: FloatArray
+    coupling: FloatArray
+    at_most: FloatArray
+
+    @property
+    def largest(self) -> float:
+        """Of the 95 % limits over all bands."""
+        return float(np.max(self.at_most))
+
+    @property
+    def suffice(self) -> bool:
+        """Two single-axis models suffice."""
+        return self.largest < SUFFICES
+
+    @property
+    def sentence(self) -> str:
+        """For people."""
+        one, other = self.axes
+        span = f"{self.frequency[0]:.3g} to {self.frequency[-1]:.4g} Hz"
+        if self.suffice:
+            level = 20 * np.log10(self.largest)
+            return f"{one} and {other} are coupled by at most {100 * self.largest:.2g} % ({level:.0f} dB) in {span}: two single-axis models suffice."
+        sure = self.coupling > SUFFICES
+        if not bool(np.any(sure)):
+            return (
+                f"No coupling of {one} and {other} above {100 * SUFFICES:g} % is distinguished from noise in {span}, and up to "
+                f"{100 * self.largest:.2g} % cannot be ruled out: record longer, or excite both axes more."
+            )
+        worst = int(np.argmax(self.coupling))
+        low, high = self.band_edges[worst], self.band_edges[worst + 1]
+        level = 20 * np.log10(self.coupling[worst])
+        return (
+            f"{one} and {other} are coupled by {100 * self.coupling[worst]:.2g} % ({level:.0f} dB) in {low:.3g} to {high:.3g} Hz: "
+            "two single-axis models do not suffice there."
+        )
+
+
+def coupling(recording: Recording, shape: WindowShape, band: tuple[float, float], combine: str = "") -> Coupling:
+    """Of the first two axes of a recording. combine: corexy or gantry, of a machine whose two drives move both.
+
+    Raises BadInput for a recording without two axes, too short a one, or two inputs that are alike.
+    """
+    if len(recording.axes) < 2:
+        raise BadInput("axes of the recording", ", ".join(recording.axes), "two", "Record both axes at once, each with a signal of its own.")
+    if combine and combine not in COMBINED:
+        raise BadInput("combine", repr(combine), ", ".join(COMBINED), "Choose one of these.")
+    drives, moves = COMBINED.get(combine, (np.eye(2), np.eye(2)))
+    names = {"corexy": ("x", "y"), "gantry": ("travel", "yaw")}.get(combine, recording.axes[:2])
+    u, y = recording.voltage[:, :2] @ drives.T, recording.position[:, :2] @ moves.T
+    suu, syu, syy, averages = _spectra(recording, u, y, shape)
+    every = np.arange(suu.shape[0]) * recording.sampling_rate / shape.length
+    used = np.flatnonzero((every > 2 * recording.sampling_rate / shape.length) & (every >= band[0]) & (every <= band[1]))
+    power = np.real(np.einsum("kii->ki", suu))
+    used = used[np.all(power[used] > 1e-3 * np.quantile(power[used], 0.9, axis=0), axis=1)]
+    if averages < FEWEST or used.size < 2 * BANDS // 3:
+        raise BadInput("recording", f"{averages:.1f} independent windows, {used.size} excited lines", f"{FEWEST:g} and more", "Record longer.")
+    alike = float(np.median(np.abs(suu[used, 0, 1]) ** 2 / (power[used, 0] * power[used, 1])))
+    if alike > ALIKE:
+        raise BadInput("inputs of the two axes", f"alike (coherence {alike:.2f})", f"less than {ALIKE}", "Give each axis a signal of its own (seed).")
+    inverse = np.linalg.inv(suu[used])
+    response = np.einsum("kij,kjl->kil", syu[used], inverse)
+    left = np.real(np.einsum("kii->ki", syy[used] - np.einsum("kij,klj->kil", response, syu[used].conj())))
+    sigma = np.sqrt(np.maximum(left[:, :, None] * np.real(np.einsum("kii->ki", inverse))[:, None, :], 0.0) / max(averages - 2.0, 1.0))
+    if recording.measured == "position":
+        step = divisor(every[used], recording.sampling_rate)[:, None, None]
+        response, sigma = response / step, sigma / np.abs(step)
+    edges, size, most = _by_band(every[used], response, sigma)
+    return Coupling(axes=(names[0], names[1]), frequency=every[used], response=response, sigma=sigma, band_edges=edges, coupling=size, at_most=most)
+
+
+def single(found: Coupling, output: int, driven: int, recording: Recording) -> FrequencyResponse:
+    """One of the four responses, as any other."""
+    return FrequencyResponse(
+        frequency=found.frequency,
+        response=found.response[:, output, driven],
+        coherence=np.ones(found.frequency.size),
+        sigma=found.sigma[:, output, driven],
+        trusted=np.isfinite(found.sigma[:, output, driven]),
+        sampling_rate=recording.sampling_rate,
+        averages=FEWEST,
+        resolution=float(found.frequency[1] - found.frequency[0]),
+        input_unit=recording.units.input,
+        output_unit=recording.units.measured,
+    )
+
+
+def _spectra(recording: Recording, u: FloatArray, y: FloatArray, shape: WindowShape) -> tuple[ComplexArray, ComplexArray, ComplexArray, float]:
+    """Sums over windows of U U*, Y U*, Y Y* (lines, 2, 2), the output differenced, and how many independent windows they are worth."""
+    lines, taper, count = shape.length // 2 + 1, shape.taper()[:, None], 0
+    suu, syu, syy = np.zeros((3, lines, 2, 2), dtype=np.complex128)
+    for run in recording.runs():
+        own = u[run]
+        moved = (
+            np.diff(y[run], axis=0)
+            if recording.measured == "position"
+            else np.column_stack([as_sensed(column, recording.sampling_rate, recording.measured) for column in y[run].T])
+        )
+        for begin in range(0, len(moved) - shape.length + 1, shape.hop):
+            part = slice(begin, begin + shape.length)
+            one, other = (np.fft.rfft((signal[part] - signal[part].mean(axis=0)) * taper, axis=0) for signal in (own, moved))
+            suu += one[:, :, None] * one[:, None, :].conj()
+            syu += other[:, :, None] * one[:, None, :].conj()
+            syy += other[:, :, None] * other[:, None, :].conj()
+            count += 1
+    if not count:
+        raise BadInput("longest gap-free run", f"{len(u)} samples", f"more than {shape.length}", "Record longer, or shorten the window.")
+    overlap = error_correlation(shape)[:, 0]
+    worth = count / (1.0 + 2.0 * float(np.sum(overlap[1:])))
+    return suu, syu, syy, worth
+
+
+def _by_band(frequency: FloatArray, response: ComplexArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Edges (b + 1,) Hz, and coupling and its 95 % limit (b,): rms over the lines of each band, less what noise adds."""
+    edges = np.geomspace(frequency[0], frequency[-1] * (1 + 1e-9), BANDS + 1)
+    place = np.clip(np.searchsorted(edges, frequency, side="right") - 1, 0, BANDS - 1)
+    there = np.unique(place)
+    size, most = np.zeros(there.size), np.zeros(there.size)
+    for k, band in enumerate(there):
+        inside = place == band
+        own = np.sqrt(np.prod([np.mean(np.abs(response[inside, i, i]) ** 2) for i in (0, 1)]))  # an antiresonance is no coupling
+        for i, j in ((0, 1), (1, 0)):
+            power = float(np.mean(np.abs(response[inside, i, j]) ** 2) / own)
+            noise = float(np.mean(sigma[inside, i, j] ** 2) / own)
+            real = max(power - noise, 0.0)
+            spread = np.sqrt((noise**2 + 2.0 * noise * real) / max(inside.sum() / 2.0, 1.0))  # neighbouring lines share half
+            size[k] = max(size[k], np.sqrt(max(power - noise - 2.0 * spread, 0.0)))
+            most[k] = max(most[k], np.sqrt(real + 2.0 * spread))
+    return np.append(edges[there], edges[there[-1] + 1]), size, most
