@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bench.recordings import markdown
 from xy_sysid.fleets.causes import causes
@@ -127,7 +128,7 @@ def _series(what: Wander, random: np.random.Generator, weeks: int) -> Series:
     return Series(np.arange(weeks, dtype=np.float64), np.log1p(wandering(what, random, weeks)), np.full(weeks, what.own))
 
 
-def _first(alarm: FloatArray, before: int) -> float:
+def _first(alarm: NDArray[np.bool_], before: int) -> float:
     """Recordings with the change until the first alarm."""
     passed = np.flatnonzero(alarm[before:])
     return float(passed[0] + 1) if passed.size else np.inf

@@ -9,19 +9,24 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers import ROOT
 from helpers.cli_tools import cli, refused
 from helpers.html_pages import parsed
+from helpers.simulated import recorded
 
 import xy_sysid as xy
 from bench.trend import PARAMETERS, axis, cusum, delays, until
 from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.fleets.causes import causes
 from xy_sysid.fleets.change import Series, changes, evidence, learned, statistic, usual
+from xy_sysid.fleets.columns_doc import document
 from xy_sysid.fleets.history import Axis
 from xy_sysid.fleets.presence import statistic as naming
 from xy_sysid.fleets.table import merged
 from xy_sysid.fleets.trends import of_axes
 from xy_sysid.fleets.words import sentence
+from xy_sysid.imports import save
+from xy_sysid.samples.recording import Recording
 
 BEGIN = datetime(2026, 1, 5, tzinfo=UTC)
 LEVEL = 10.0  # log of the statistic, as for a weekly recording with seven parameters
@@ -137,6 +142,11 @@ def test_joint_changes_point_to_a_cause() -> None:
     assert drive.cause is not None and drive.cause.cause == "the amplifier or its supply"
 
 
+def test_the_page_of_the_fleet_lists_every_column() -> None:
+    """python -m xy_sysid.fleets.columns_doc --write"""
+    assert document() in (ROOT / "docs" / "fleet.md").read_text(encoding="utf-8")
+
+
 def test_users_add_causes_of_their_own(tmp_path: Path) -> None:
     """A file in the same form comes before the table of the package; what it names must be a quantity."""
     own = tmp_path / "causes.yaml"
@@ -194,6 +204,18 @@ def test_the_page_shows_every_parameter_and_opens_offline(table: Path, tmp_path:
     assert "mill-01 x, 25 May 2026: the amplifier or its supply" in text and 'id="all-gain"' in text
     assert parsed(text) is not None
     assert "allowed: a name that is not there yet" in refused("trend", table, "-o", page)
+
+
+def test_one_long_recording_is_a_trend_of_its_parts(tmp_path: Path) -> None:
+    """--every: the friction of a recording of 45 s rises after half of it; no clock tells the date, so times are from the start."""
+    before, after = (recorded(f"x:coulomb_friction={size}", seconds) for size, seconds in ((0.15, 24.0), (0.195, 21.0)))
+    both = [one.run("x") for one in (before, after)]
+    voltage, position = (np.concatenate([getattr(one, name) for one in both]) for name in ("voltage", "position"))
+    position[len(both[0]) :] += both[0].position[-1] - both[1].position[0]
+    save(Recording.from_arrays(2000.0, voltage, position), tmp_path / "long.npz")
+    said = cli("trend", tmp_path / "long.npz", "--every", "3s")
+    assert said.code == 0 and "coulomb_friction_coulomb rose from 0.15" in said.out and "since 0.4 min after the start" in said.out, said
+    assert "a time of 1 s or more" in refused("trend", tmp_path / "long.npz", "--every", "soon")
 
 
 def test_what_is_no_table_is_refused(tmp_path: Path, table: Path) -> None:

@@ -21,7 +21,7 @@ FLOORS = {
     "in frequency": ("response", "linear", "fitting"),
     "in time": ("effects", "axis", "greybox", "comparison", "hypotheses", "diagnosis"),
     "told": ("story", "live"),
-    "the edge": ("bags", "imports", "files", "processes"),
+    "the edge": ("bags", "imports", "files", "processes", "fleets"),
     "surfaces": ("nodes", "report", "page", "cli"),
 }
 

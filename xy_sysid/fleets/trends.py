@@ -16,6 +16,7 @@ from xy_sysid.fleets.causes import Cause, Causes, Direction, causes
 from xy_sysid.fleets.change import LONGEST, Change, Evidence, Series, changes, evidence, learned, spread
 from xy_sysid.fleets.columns import column_of, columns
 from xy_sysid.fleets.history import DAY, FEWEST, Axis, History, axes
+from xy_sysid.fleets.row import Row
 from xy_sysid.fleets.table import read
 from xy_sysid.response.frf import Z95
 from xy_sysid.samples.block import FloatArray
@@ -120,20 +121,30 @@ def trend(
     The spread between recordings is learned for each parameter from all axes of the table together, and is in every interval.
     Raises BadRecording for what is no table, BadInput where no axis has four recordings with a date and an answer.
     """
-    if not axis_months > 0.0:
-        raise BadInput("axis_months", axis_months, "above 0", "Usual is 1000.")
-    followed = {item.name: item.unit for item in columns() if item.trended}
-    known = causes(own_causes)
     wanted = set(machines)
     found = read(Path(table))
-    others = {name.removesuffix("_low"): "" for name in found.column_names if name.endswith("_low")}  # of effects of a user's own
-    followed |= {name: "" for name in others if name not in {item.name for item in columns()}}
     rows = [row for row in found.to_pylist() if not wanted or row["machine"] in wanted]
+    return of_rows(rows, found.column_names, own_causes, axis_months, tell)
+
+
+def of_rows(
+    rows: Sequence[Row],
+    names: Iterable[str] = (),
+    own_causes: Path | None = None,
+    axis_months: float = AXIS_MONTHS,
+    tell: Callable[[float], None] = lambda _: None,
+) -> Trends:
+    """The same of rows that are in no table. names: of columns, where there are parameters of effects of a user's own."""
+    if not axis_months > 0.0:
+        raise BadInput("axis_months", axis_months, "above 0", "Usual is 1000.")
+    known = {item.name: item for item in columns()}
+    followed = {name: item.unit for name, item in known.items() if item.trended}
+    followed |= {name: "" for end in names if (name := end.removesuffix("_low")) != end and name not in known}
     every = axes(rows, followed)
     if not any(one.histories for one in every):
         allowed = f"an axis with {FEWEST} of them that have a date and an answer"
         raise BadInput("recordings in the table", f"{len(rows)} rows", allowed, "Record more often, or name their dates (xy-sysid fleet --names).")
-    return of_axes(every, known, axis_months, tell)
+    return of_axes(every, causes(own_causes), axis_months, tell)
 
 
 def of_axes(every: Sequence[Axis], known: Causes, axis_months: float = AXIS_MONTHS, tell: Callable[[float], None] = lambda _: None) -> Trends:
