@@ -156,12 +156,15 @@ def of_axes(every: Sequence[Axis], known: Causes, axis_months: float = AXIS_MONT
             every_evidence[number, history.column] = evidence(_newest(history))[0]
             tell(len(every_evidence) / count)
     weights = {name: learned(item for (_, column), item in every_evidence.items() if column == name) for name in {key[1] for key in every_evidence}}
+    effects = {effect for one in every for effect in one.named}
+    seen = [one.named.get(effect, np.zeros(len(one.dates), dtype=np.bool_)) for one in every for effect in effects]
+    often = presence.learned(seen)
     trends: list[Trend] = []
     events: list[Event] = []
     for number, one in enumerate(every):
         own = [_trend(one, history, weights[history.column], every_evidence[number, history.column], axis_months) for history in one.histories]
         trends += own
-        events += _events(one, [*(moved for item in own for moved in item.moved), *_named(one, axis_months)], known)
+        events += _events(one, [*(moved for item in own for moved in item.moved), *_named(one, often, axis_months)], known)
     pooled = sum(bool(one.histories) for one in every) > 1
     return Trends(axes=tuple(every), trends=tuple(trends), events=tuple(sorted(events, key=lambda item: item.since)), pooled=pooled)
 
@@ -238,15 +241,15 @@ def _moved(history: History, item: Change, level: float, axis_months: float, mea
     )
 
 
-def _named(axis: Axis, axis_months: float) -> list[Moved]:
+def _named(axis: Axis, often: FloatArray, axis_months: float) -> list[Moved]:
     """Effects that are named more often, or less, than before."""
     level, found = threshold(axis, axis_months), []
     for effect, named in axis.named.items():
-        log = presence.statistic(named)
+        log = presence.statistic(named, often)
         passed = np.flatnonzero(log >= level)
         if not passed.size:
             continue
-        place, first, last = presence.after(named)
+        place, first, last = presence.after(named, often)
         before, after = float(np.mean(named[: place + 1])), float(np.mean(named[place + 1 :]))
         found.append(
             Moved(
