@@ -6,6 +6,7 @@ With a folder in $XY_SYSID_FLEET the recordings and the table stay there, and wh
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 import tempfile
@@ -16,15 +17,19 @@ import numpy as np
 
 from campaigns.bench.recordings import markdown
 from campaigns.bench.workshop import FAULTS, Workshop
+from campaigns.pictures.shots import shoot
 from xy_sysid.fleets.engine import Cluster, connected
 from xy_sysid.fleets.estimate import Progress
 from xy_sysid.fleets.of_paths import Analysis, run
 from xy_sysid.fleets.table import read
 from xy_sysid.fleets.trends import Trends, trend
 from xy_sysid.fleets.words import sentence
+from xy_sysid.report.trend_page import overview_figure
 
 SOME = 24  # recordings that one and two processes do side by side
 FEW = Workshop(machines=2, recordings=2, seconds=4.0, faults={})
+DRAWN = ("coulomb_friction_coulomb", "base_resonance_frequency", "gain")
+PICTURE = Path(__file__).parents[2] / "docs" / "pictures" / "fleet.png"
 DAY = 100_000  # recordings, on paper
 
 
@@ -54,6 +59,7 @@ def main(short: bool = False) -> None:
             return
         found = trend(folder / "table")
         sys.stdout.write(verdict(found))
+        picture(found)
 
 
 def resident() -> float:
@@ -82,7 +88,17 @@ def costs(rows: list[dict[str, Any]]) -> list[tuple[str, str]]:
     each = sum(parts.values())
     lines = [(f"processor time for {name}, mean", f"{1e3 * seconds:.0f} ms") for name, seconds in parts.items()]
     lines.append(("recordings an hour and core, of the processor time", f"{3600.0 / each:.0f}"))
-    return [*lines, (f"cores for {DAY} such recordings a day, on paper", f"{DAY * each / 86400.0:.0f}")]
+    return [*lines, (f"cores for {DAY} such recordings a day, on paper", f"{math.ceil(DAY * each / 86400.0)}")]
+
+
+def picture(found: Trends) -> None:
+    """docs/pictures/fleet.png: the parameters that the three machines change, of all machines."""
+    figures = []
+    for column in DRAWN:
+        figure = overview_figure([one for one in found.trends if one.history.column == column])
+        figure.update_yaxes(title_text=f"{column} (%)")
+        figures.append(figure)
+    shoot(figures, PICTURE, 380, 300)
 
 
 def verdict(found: Trends) -> str:

@@ -103,12 +103,13 @@ def test_what_is_in_the_table_is_not_done_again(data: Path, table: Path, client:
 
 
 def test_a_moved_recording_is_no_second_one(data: Path, client: Any, tmp_path: Path) -> None:
-    """The same content under the same machine and date has one row, wherever it lies."""
+    """The same content under the same machine and date has one row, wherever it lies, and is not done again."""
     for folder in ("a", "b"):
         (tmp_path / folder / "mill").mkdir(parents=True)
         npz(tmp_path / folder / "mill" / "2026-03-01.npz", rows=SAMPLES)
-    found = xy.fleet([tmp_path / "a", tmp_path / "b"], tmp_path / "table", client)
-    assert found.num_rows == 1
+    assert run([tmp_path / "a"], tmp_path / "table", Analysis(), client).analysed == 1
+    assert run([tmp_path / "b"], tmp_path / "table", Analysis(), client).unchanged == 1
+    assert read(tmp_path / "table").num_rows == 1
 
 
 def test_a_killed_process_loses_nothing(data: Path, tmp_path: Path, client: Any) -> None:

@@ -9,16 +9,18 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers.cli_tools import cli, refused
+from helpers import ROOT
+from helpers.cli_tools import cli, npz, refused
 from helpers.html_pages import parsed
 
 import xy_sysid as xy
 from campaigns.bench.trend import PARAMETERS, axis, cusum, delays, until
 from xy_sysid.errors import BadInput, BadRecording
+from xy_sysid.fleets import presence
 from xy_sysid.fleets.causes import causes
 from xy_sysid.fleets.change import Series, changes, evidence, learned, statistic, usual
+from xy_sysid.fleets.columns_doc import document
 from xy_sysid.fleets.history import Axis
-from xy_sysid.fleets.presence import statistic as naming
 from xy_sysid.fleets.table import merged
 from xy_sysid.fleets.trends import of_axes
 from xy_sysid.fleets.words import sentence
@@ -88,10 +90,15 @@ def test_the_spread_is_learned_from_all_axes_together() -> None:
 
 
 def test_an_effect_that_is_named_from_one_day_on_is_a_change() -> None:
-    """Yes and no have the same statistic; an effect that is named now and then is none."""
-    assert naming(np.array([False] * 12 + [True] * 5))[-1] > LEVEL
-    now_and_then = np.random.default_rng(5).uniform(size=40) < 0.3
-    assert naming(now_and_then).max() < LEVEL
+    """Yes and no have the same statistic. How seldom an unchanged axis is told this and that is learned from all axes."""
+    always, never = np.ones(12, dtype=np.bool_), np.zeros(12, dtype=np.bool_)
+    steady = presence.learned([always, never] * 10)
+    appeared = np.arange(12) >= 9
+    assert presence.statistic(appeared, steady)[-1] > LEVEL and presence.after(appeared, steady)[0] == 8
+    random = np.random.default_rng(5)
+    fickle = presence.learned([random.uniform(size=12) < 0.3 for _ in range(20)])
+    assert presence.statistic(appeared, fickle)[-1] < LEVEL
+    assert presence.statistic(random.uniform(size=40) < 0.3, fickle).max() < LEVEL
 
 
 def test_unchanged_axes_raise_no_alarm_and_the_next_recording_is_inside() -> None:
@@ -135,6 +142,11 @@ def test_joint_changes_point_to_a_cause() -> None:
     assert "coulomb_friction_coulomb rose from 0.1" in text and "since 31 March 2025" in text and "backlash is named in 100 %" in text, text
     (drive,) = of_axes([worn(friction=1.0 / 0.85, gain=0.85), *(axis(k, 5, 18) for k in range(1, 3))], causes()).events
     assert drive.cause is not None and drive.cause.cause == "the amplifier or its supply"
+
+
+def test_the_page_of_the_fleet_lists_every_column() -> None:
+    """python -m xy_sysid.fleets.columns_doc --write"""
+    assert document() in (ROOT / "docs" / "fleet.md").read_text(encoding="utf-8")
 
 
 def test_users_add_causes_of_their_own(tmp_path: Path) -> None:
@@ -194,6 +206,20 @@ def test_the_page_shows_every_parameter_and_opens_offline(table: Path, tmp_path:
     assert "mill-01 x, 25 May 2026: the amplifier or its supply" in text and 'id="all-gain"' in text
     assert parsed(text) is not None
     assert "allowed: a name that is not there yet" in refused("trend", table, "-o", page)
+
+
+def test_one_long_recording_is_a_trend_of_its_parts(tmp_path: Path) -> None:
+    """--every: the gain of a recording of 4 s rises after 2 s; no clock tells the date, so times are from the start."""
+
+    def risen(content: Any) -> Any:
+        steps = np.diff(content["y"], prepend=0.0)
+        return np.cumsum(np.where(content["t"] < 2.0, steps, 1.3 * steps))
+
+    path = npz(tmp_path / "long.npz", rows=4_000, y=risen)
+    (gain,) = (one for one in cli("trend", path, "--every", "1s", "--json").json["parameters"] if one["parameter"] == "gain")
+    assert gain["values"] == pytest.approx([1e-3, 1e-3, 1.3e-3, 1.3e-3], rel=0.05)
+    assert [date[14:19] for date in gain["dates"]] == ["00:00", "00:01", "00:02", "00:03"]
+    assert "a time of 1 s or more" in refused("trend", path, "--every", "soon")
 
 
 def test_what_is_no_table_is_refused(tmp_path: Path, table: Path) -> None:

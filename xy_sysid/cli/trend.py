@@ -9,15 +9,20 @@ import typer
 
 from xy_sysid.cli import options as o
 from xy_sysid.cli.output import emit, plain, progress, say, table
+from xy_sysid.cli.reading import reads
 
 if TYPE_CHECKING:
     from xy_sysid.fleets.trends import Event, Moved, Trend, Trends
+    from xy_sysid.imports.reading import Reading
 
 SHOWN = 12  # parameters whose spread is told
 
 
+@reads
 def trend(
-    folder: Annotated[Path, typer.Argument(metavar="TABLE", help="the folder that xy-sysid fleet made")],
+    folder: Annotated[Path, typer.Argument(metavar="TABLE", help="the folder that xy-sysid fleet made; with --every a recording")],
+    reading: Reading,
+    every: Annotated[str, typer.Option(metavar="TIME", help="compare parts of one long recording, each of so long: 10min, 90s, 1h")] = "",
     machine: Annotated[list[str] | None, typer.Option("--machine", "-m", metavar="NAME", help="only this machine (may be repeated)")] = None,
     causes: Annotated[
         Path | None, typer.Option(metavar="FILE", help="YAML that adds to the table of changes and their causes (docs/fleet.md)")
@@ -30,13 +35,22 @@ def trend(
     json: o.Json = False,
 ) -> None:
     """Every parameter of every axis over time: what changed, since when, by how much, how sure, and the likely cause."""
+    from xy_sysid.fleets.of_paths import Analysis
+    from xy_sysid.fleets.parts import rows_of_parts, seconds
+    from xy_sysid.fleets.trends import of_rows
     from xy_sysid.fleets.trends import trend as logic
     from xy_sysid.fleets.words import sentence, summary, widest
 
     o.output_file("--out", out, force)
     with progress() as bar:
         task = bar.add_task("comparing recordings", total=1.0)
-        found = logic(folder, machines=machine or (), own_causes=causes, axis_months=axis_months, tell=lambda part: bar.update(task, completed=part))
+        if every:
+            parts = rows_of_parts(folder, seconds(every), Analysis(reading=reading), lambda number: bar.update(task, description=f"part {number}"))
+            found = of_rows(parts, (), causes, axis_months)
+        else:
+            found = logic(
+                folder, machines=machine or (), own_causes=causes, axis_months=axis_months, tell=lambda part: bar.update(task, completed=part)
+            )
     if out is not None:
         from xy_sysid.bags.atomic import write_text
         from xy_sysid.report.trend_page import trend_page

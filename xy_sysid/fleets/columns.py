@@ -50,7 +50,7 @@ _RESPONSE = (
     Column("tf_numerator", "text", "", "coefficients of the transfer function's numerator in s, highest power first"),
     Column("tf_denominator", "text", "", "the same of the denominator"),
     Column("tf_trustworthy", "truth", "", "the data determine it, and noise nearly explains what it leaves"),
-    Column("tf_relative_error", "number", "", "rms of |measured - fitted| / |measured|"),
+    Column("tf_relative_error", "number", "", "rms of the error over the magnitude, line by line"),
     Column("tf_misfit", "number", "", "factor by which the intervals of noise alone are too narrow; it is in the intervals below"),
 )
 _DIAGNOSIS = (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from xy_sysid.response.frf import Z95
 from xy_sysid.samples.block import FloatArray
 
 DAY = 86400.0  # s
+BEGIN = datetime(1970, 1, 1, tzinfo=UTC)  # where no clock tells the date: of a recording that is looked at in parts
 MONTH = 30.4375  # days
 FEWEST = 4  # recordings with a value, below which nothing is said
 ONE_STEP = ("held_out_error", "noise")  # of a model that is judged one sample ahead they are not what they are of any other
@@ -94,14 +95,15 @@ def axes(rows: Sequence[Mapping[str, Any]], units: Mapping[str, str]) -> tuple[A
 
 
 def _axis(machine: str, axis: str, rows: Sequence[Mapping[str, Any]], units: Mapping[str, str]) -> Axis:
-    dated = sorted((row for row in rows if row["date"] is not None and row["verdict"] not in (None, "not_enough_data")), key=lambda row: row["date"])
+    answered = (row for row in rows if row.get("date") is not None and row.get("verdict") not in (None, "not_enough_data"))
+    dated = sorted(answered, key=lambda row: row["date"])
     histories = (_history(column, unit, dated) for column, unit in units.items())
     effects = sorted({name for row in dated for name in _names(row)})
     last = rows[-1]
     return Axis(
         machine=machine,
         axis=axis,
-        units=(last["input_unit"] or "V", last["output_unit"] or "m"),
+        units=(last.get("input_unit") or "V", last.get("output_unit") or "m"),
         dates=tuple(row["date"] for row in dated),
         histories=tuple(one for one in histories if one is not None),
         named={name: np.array([name in _names(row) for row in dated]) for name in effects} if len(dated) >= FEWEST else {},
@@ -110,7 +112,7 @@ def _axis(machine: str, axis: str, rows: Sequence[Mapping[str, Any]], units: Map
 
 
 def _names(row: Mapping[str, Any]) -> list[str]:
-    return [name for name in (row["effects"] or "").split(", ") if name]
+    return [name for name in (row.get("effects") or "").split(", ") if name]
 
 
 def _history(column: str, unit: str, rows: Sequence[Mapping[str, Any]]) -> History | None:
@@ -130,7 +132,7 @@ def _told(row: Mapping[str, Any], column: str) -> bool:
     """There is a value, and it is not one whose interval has no end."""
     value, low, high = row.get(column), row.get(f"{column}_low"), row.get(f"{column}_high")
     ends = [end for end in (low, high) if end is not None]
-    return value is not None and np.isfinite(value) and bool(np.all(np.isfinite(ends))) and not (row["one_step"] and column in ONE_STEP)
+    return value is not None and np.isfinite(value) and bool(np.all(np.isfinite(ends))) and not (row.get("one_step") and column in ONE_STEP)
 
 
 def _number(row: Mapping[str, Any], name: str) -> float:

@@ -80,7 +80,7 @@ def run(paths: Paths, folder: Path, how: Analysis, where: Cluster | Client, tell
     found = recordings([paths] if isinstance(paths, (str, Path)) else paths, folder)
     with journal(folder, library(how.effect_files)) as kept, ExitStack() as stack:
         known = keys_in(folder)
-        tasks = [dataclasses.replace(how.task(path), known=known.get(str(path), frozenset())) for path in found]
+        tasks = [dataclasses.replace(how.task(path), known=known.get(path.name, frozenset())) for path in found]
         client = stack.enter_context(connected(where)) if isinstance(where, Cluster) else where
         now = Progress(total=len(tasks), workers=processes(client), place=client.dashboard_link)
         tell(now)

@@ -1,10 +1,13 @@
 """Is an effect named more often, or less, than before? The same detection as of a change, for yes and no.
 
-An axis that does not change has its effect named with one probability in every recording, which is mostly near 0 or near 1; a change takes it to
-another. Both are integrated over a beta distribution, so that the likelihood ratio of each change has a closed form.
+An axis that does not change has its effect named with one probability in every recording; a change takes it to another. Both come from a
+symmetric beta distribution, so that the likelihood ratio of each change has a closed form. The distribution's parameter says how seldom an
+unchanged axis is told now this and now that. It is not known: a few are weighed by how well they explain all axes of the table.
 """
 
 from __future__ import annotations
+
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,30 +15,51 @@ from scipy.special import betaln, logsumexp
 
 from xy_sysid.samples.block import FloatArray
 
-NEARLY_ALWAYS = 0.05  # both parameters of the beta distribution: an unchanged axis is nearly always told the same
+Named = NDArray[np.bool_]
+OFTEN = np.array([0.001, 0.01, 0.1, 1.0])  # parameter of the beta distribution: from nearly never this and that, to any probability alike
 
 
-def statistic(named: NDArray[np.bool_]) -> FloatArray:
+def learned(every: Iterable[Named]) -> FloatArray:
+    """Log weights of ``OFTEN`` from whether effects were named (n,) on all axes, each with a change or without."""
+    total = np.zeros(OFTEN.size)
+    for named in every:
+        if named.size > 1:
+            total += np.logaddexp(_log(_yes(named), named.size), logsumexp(_changed(named), axis=1) - np.log(named.size - 1))
+    return np.asarray(total - logsumexp(total))
+
+
+def statistic(named: Named, weights: FloatArray) -> FloatArray:
     """(n,) log of Shiryaev and Roberts' statistic after each recording; named: (n,)."""
-    return np.array([float(logsumexp(_ratios(named[: n + 1]))) if n else -np.inf for n in range(named.size)])
+    found = np.full(named.size, -np.inf)
+    for count in range(2, named.size + 1):
+        part = named[:count]
+        changed = weights + logsumexp(_changed(part), axis=1)
+        found[count - 1] = logsumexp(changed) - logsumexp(weights + _log(_yes(part), count))
+    return found
 
 
-def after(named: NDArray[np.bool_]) -> tuple[int, int, int]:
+def after(named: Named, weights: FloatArray) -> tuple[int, int, int]:
     """Number of the last recording before the likeliest change of (n,), and the 95 % interval of that number."""
-    log = _ratios(named)
+    log = logsumexp(weights[:, None] + _changed(named), axis=0)
     total = np.cumsum(np.exp(log - logsumexp(log)))
     return int(np.argmax(log)), int(np.searchsorted(total, 0.025)), min(int(np.searchsorted(total, 0.975)), named.size - 2)
 
 
-def _ratios(named: NDArray[np.bool_]) -> FloatArray:
-    """(n - 1,) log likelihood ratio of a change after each recording but the last."""
-    yes = np.cumsum(named, dtype=np.int64)[:-1]
-    count = np.arange(1, named.size)
-    every, rest = int(named.sum()), named.size - count
-    parts = _log(yes, count - yes) + _log(every - yes, rest - (every - yes)) - _log(np.array(every), np.array(named.size - every))
-    return np.asarray(parts)
+def _yes(named: Named) -> NDArray[np.int64]:
+    return np.array([np.count_nonzero(named)])
 
 
-def _log(yes: NDArray[np.int64], no: NDArray[np.int64]) -> FloatArray:
-    """Log probability of so many yes and no, in the order in which they came."""
-    return np.asarray(betaln(NEARLY_ALWAYS + yes, NEARLY_ALWAYS + no) - betaln(NEARLY_ALWAYS, NEARLY_ALWAYS))
+def _changed(named: Named) -> FloatArray:
+    """(parameters, n - 1) log probability with a change after each recording but the last."""
+    yes, count = np.cumsum(named, dtype=np.int64)[:-1], np.arange(1, named.size)
+    return _of_each(yes, count) + _of_each(np.count_nonzero(named) - yes, named.size - count)
+
+
+def _log(yes: NDArray[np.int64], count: int) -> FloatArray:
+    return np.asarray(_of_each(yes, np.array([count]))[:, 0])
+
+
+def _of_each(yes: NDArray[np.int64], count: NDArray[np.int64]) -> FloatArray:
+    """(parameters, k) log probability of so many yes among so many recordings, in the order in which they came."""
+    a = OFTEN[:, None]
+    return np.asarray(betaln(a + yes, a + count - yes) - betaln(a, a))

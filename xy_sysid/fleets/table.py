@@ -117,10 +117,10 @@ def file_name(machine: str) -> str:
 
 
 def keys_in(folder: Path) -> dict[str, frozenset[str]]:
-    """By source: the keys of the rows that are in the table."""
+    """By the last part of their paths, which stays when a folder moves: the keys of the recordings that are in the table."""
     if not folder.is_dir() or not any(folder.glob(f"*{ENDING}")):
         return {}
     found: dict[str, set[str]] = {}
     for row in read(folder, ("source", "key")).to_pylist():
-        found.setdefault(row["source"], set()).add(row["key"])
-    return {source: frozenset(keys) - {""} for source, keys in found.items()}
+        found.setdefault(Path(row["source"]).name, set()).add(row["key"])
+    return {name: frozenset(keys) - {""} for name, keys in found.items()}

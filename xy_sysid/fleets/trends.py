@@ -16,6 +16,7 @@ from xy_sysid.fleets.causes import Cause, Causes, Direction, causes
 from xy_sysid.fleets.change import LONGEST, Change, Evidence, Series, changes, evidence, learned, spread
 from xy_sysid.fleets.columns import column_of, columns
 from xy_sysid.fleets.history import DAY, FEWEST, Axis, History, axes
+from xy_sysid.fleets.row import Row
 from xy_sysid.fleets.table import read
 from xy_sysid.response.frf import Z95
 from xy_sysid.samples.block import FloatArray
@@ -120,20 +121,30 @@ def trend(
     The spread between recordings is learned for each parameter from all axes of the table together, and is in every interval.
     Raises BadRecording for what is no table, BadInput where no axis has four recordings with a date and an answer.
     """
-    if not axis_months > 0.0:
-        raise BadInput("axis_months", axis_months, "above 0", "Usual is 1000.")
-    followed = {item.name: item.unit for item in columns() if item.trended}
-    known = causes(own_causes)
     wanted = set(machines)
     found = read(Path(table))
-    others = {name.removesuffix("_low"): "" for name in found.column_names if name.endswith("_low")}  # of effects of a user's own
-    followed |= {name: "" for name in others if name not in {item.name for item in columns()}}
     rows = [row for row in found.to_pylist() if not wanted or row["machine"] in wanted]
+    return of_rows(rows, found.column_names, own_causes, axis_months, tell)
+
+
+def of_rows(
+    rows: Sequence[Row],
+    names: Iterable[str] = (),
+    own_causes: Path | None = None,
+    axis_months: float = AXIS_MONTHS,
+    tell: Callable[[float], None] = lambda _: None,
+) -> Trends:
+    """The same of rows that are in no table. names: of columns, where there are parameters of effects of a user's own."""
+    if not axis_months > 0.0:
+        raise BadInput("axis_months", axis_months, "above 0", "Usual is 1000.")
+    known = {item.name: item for item in columns()}
+    followed = {name: item.unit for name, item in known.items() if item.trended}
+    followed |= {name: "" for end in names if (name := end.removesuffix("_low")) != end and name not in known}
     every = axes(rows, followed)
     if not any(one.histories for one in every):
         allowed = f"an axis with {FEWEST} of them that have a date and an answer"
         raise BadInput("recordings in the table", f"{len(rows)} rows", allowed, "Record more often, or name their dates (xy-sysid fleet --names).")
-    return of_axes(every, known, axis_months, tell)
+    return of_axes(every, causes(own_causes), axis_months, tell)
 
 
 def of_axes(every: Sequence[Axis], known: Causes, axis_months: float = AXIS_MONTHS, tell: Callable[[float], None] = lambda _: None) -> Trends:
@@ -145,12 +156,15 @@ def of_axes(every: Sequence[Axis], known: Causes, axis_months: float = AXIS_MONT
             every_evidence[number, history.column] = evidence(_newest(history))[0]
             tell(len(every_evidence) / count)
     weights = {name: learned(item for (_, column), item in every_evidence.items() if column == name) for name in {key[1] for key in every_evidence}}
+    effects = {effect for one in every for effect in one.named}
+    seen = [one.named.get(effect, np.zeros(len(one.dates), dtype=np.bool_)) for one in every for effect in effects]
+    often = presence.learned(seen)
     trends: list[Trend] = []
     events: list[Event] = []
     for number, one in enumerate(every):
         own = [_trend(one, history, weights[history.column], every_evidence[number, history.column], axis_months) for history in one.histories]
         trends += own
-        events += _events(one, [*(moved for item in own for moved in item.moved), *_named(one, axis_months)], known)
+        events += _events(one, [*(moved for item in own for moved in item.moved), *_named(one, often, axis_months)], known)
     pooled = sum(bool(one.histories) for one in every) > 1
     return Trends(axes=tuple(every), trends=tuple(trends), events=tuple(sorted(events, key=lambda item: item.since)), pooled=pooled)
 
@@ -227,15 +241,15 @@ def _moved(history: History, item: Change, level: float, axis_months: float, mea
     )
 
 
-def _named(axis: Axis, axis_months: float) -> list[Moved]:
+def _named(axis: Axis, often: FloatArray, axis_months: float) -> list[Moved]:
     """Effects that are named more often, or less, than before."""
     level, found = threshold(axis, axis_months), []
     for effect, named in axis.named.items():
-        log = presence.statistic(named)
+        log = presence.statistic(named, often)
         passed = np.flatnonzero(log >= level)
         if not passed.size:
             continue
-        place, first, last = presence.after(named)
+        place, first, last = presence.after(named, often)
         before, after = float(np.mean(named[: place + 1])), float(np.mean(named[place + 1 :]))
         found.append(
             Moved(

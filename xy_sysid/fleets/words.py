@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from datetime import datetime
 
-from xy_sysid.fleets.history import Axis
+from xy_sysid.fleets.history import BEGIN, Axis
 from xy_sysid.fleets.trends import Event, Moved, Trend, Trends
 from xy_sysid.units import Units, readable
 
@@ -41,7 +41,9 @@ def told(one: Moved, axis: Axis) -> str:
 
 
 def day(date: datetime) -> str:
-    """3 March 2026, with the time of day where there is one."""
+    """3 March 2026, with the time of day where there is one; the time since the start where no clock tells the date."""
+    if date.year == BEGIN.year:
+        return f"{(date - BEGIN).total_seconds() / 60.0:.4g} min after the start"
     text = f"{date.day} {date:%B %Y}"
     return text if (date.hour, date.minute, date.second) == (0, 0, 0) else f"{text} {date:%H:%M}"
 

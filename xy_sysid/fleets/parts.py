@@ -1,0 +1,58 @@
+"""One long recording -> rows of its parts, one after another: a recording of a day as a trend, with no more than one part in memory."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections.abc import Callable
+from datetime import timedelta
+from pathlib import Path
+
+from xy_sysid.errors import BadInput
+from xy_sysid.files.effects import library
+from xy_sysid.fleets.history import BEGIN
+from xy_sysid.fleets.naming import date_within, name_of
+from xy_sysid.fleets.of_paths import Analysis
+from xy_sysid.fleets.row import Plan, Row, row_of
+from xy_sysid.imports import load
+
+UNITS = {"": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
+SHORTEST = 1.0  # s of a part
+
+
+def seconds(text: str) -> float:
+    """A time like 10min, 90s or 1h. Raises BadInput."""
+    found = re.fullmatch(r"(\d+(?:\.\d*)?)\s*(s|min|h|d|)", text.strip())
+    if found is None or float(found.group(1)) * UNITS[found.group(2)] < SHORTEST:
+        raise BadInput("--every", repr(text), f"a time of {SHORTEST:g} s or more", "Write for example 10min, 90s or 1h.")
+    return float(found.group(1)) * UNITS[found.group(2)]
+
+
+def rows_of_parts(path: Path, every: float, how: Analysis, tell: Callable[[int], None] = lambda _: None) -> list[Row]:
+    """The rows of each part of a recording.
+
+    every: s of a part; tell: hears how many parts are done. A part's date is when it began; where no clock tells the date, 1970 and the time since
+    the start. Raises BadRecording or BadInput for a recording that cannot be read.
+    """
+    how.check()
+    name, known = name_of(path, how.names), library(how.effect_files)
+    plan = Plan(follow=tuple(how.names.follow), library=known)
+    rows: list[Row] = []
+    begin, number = None, 0
+    while True:
+        start = how.reading.start + number * every
+        stop = start + every if how.reading.stop is None else min(start + every, how.reading.stop)
+        if stop <= start:
+            return rows
+        try:
+            part = load(path, dataclasses.replace(how.reading, start=start, stop=stop))
+        except BadInput as problem:
+            if number and problem.what in ("start", "start and stop"):  # the end
+                return rows
+            raise
+        begin = begin or name.date or date_within(part) or BEGIN
+        for axis in part.axes:
+            own = {"machine": name.machine, "source": f"{path}#{number}", "date": begin + timedelta(seconds=number * every)}
+            rows.append(row_of(part, axis, plan) | ({"axis": name.axis} if name.axis and len(part.axes) == 1 else {}) | own)
+        number += 1
+        tell(number)
