@@ -31,7 +31,7 @@ from xy_sysid.control_design.feedback import feedback
 from xy_sysid.control_design.gains import gains, simple_feedforward
 from xy_sysid.control_design.inverse import feedforward
 from xy_sysid.control_design.laws import along
-from xy_sysid.control_design.path import Bounds, Trajectory, of_position, s_curve
+from xy_sysid.control_design.path import Bounds, SampledPath, of_position, s_curve
 from xy_sysid.control_design.use import use
 from xy_sysid.diagnosis.of_run import refine
 from xy_sysid.errors import BadInput
@@ -67,7 +67,7 @@ def identified(machine: Machine, seed: int, seconds: float) -> dict[str, Physica
 
 
 def followed(
-    machine: Machine, paths: Sequence[Trajectory], extras: Sequence[FloatArray], controllers: Sequence[Controller]
+    machine: Machine, paths: Sequence[SampledPath], extras: Sequence[FloatArray], controllers: Sequence[Controller]
 ) -> tuple[FloatArray, NDArray[np.bool_]]:
     """(n, axes) where the axes are, m, and whether (n, axes) the drive was at its limit, each axis under its PID along its path."""
     machine.reset()
@@ -119,7 +119,7 @@ def ziegler_nichols(machine: Machine) -> list[Controller]:
     return made
 
 
-def corrected(model: PhysicalModel, path: Trajectory) -> Trajectory:
+def corrected(model: PhysicalModel, path: SampledPath) -> SampledPath:
     """What the encoder has to show so that the table is on the path: the scale's error, and half of the gap in the direction of motion."""
     position = path.position + along(model.model, path.position, "scale")
     gap = use(model, limit=LIMIT).gap

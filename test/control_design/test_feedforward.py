@@ -15,7 +15,7 @@ from xy_sysid.axis.model import STANDARD, simulate
 from xy_sysid.control_design.gains import gains, simple_feedforward
 from xy_sysid.control_design.inverse import feedforward, not_undone
 from xy_sysid.control_design.limits import fastest
-from xy_sysid.control_design.path import Bounds, Trajectory, recorded, s_curve
+from xy_sysid.control_design.path import Bounds, SampledPath, recorded, s_curve
 from xy_sysid.control_design.sample_step import simulate_alone
 from xy_sysid.control_design.tables import friction_table, position_tables
 from xy_sysid.control_design.uncertain import samples, undetermined
@@ -34,7 +34,7 @@ def noise(count: int = 6000, rms: float = 1.0) -> FloatArray:
     return np.asarray(rms * shaped / np.std(shaped))
 
 
-def path() -> Trajectory:
+def path() -> SampledPath:
     return s_curve([0.0, 0.03, -0.02, 0.0], Bounds(0.1, 2.0, 100.0), RATE)
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from xy_sysid.axis.model import AxisModel, Library
-from xy_sysid.control_design.path import Trajectory
+from xy_sysid.control_design.path import SampledPath
 from xy_sysid.control_design.sample_step import begin, plant, step_of
 from xy_sysid.control_design.step_text import ROOM
 from xy_sysid.jit import compiled_text
@@ -109,7 +109,7 @@ def _loop_of(library: Library) -> Callable[..., None]:
 
 
 def follow_path(
-    model: AxisModel, path: Trajectory, controller: Controller, extra: FloatArray | None = None, encoder: Encoder | None = None, seed: int = 0
+    model: AxisModel, path: SampledPath, controller: Controller, extra: FloatArray | None = None, encoder: Encoder | None = None, seed: int = 0
 ) -> Tracked:
     """The axis along a path, from its begin and speed; extra: (n,) V of feedforward; seed: of the encoder's noise."""
     ready, encoder = plant(model, path.sampling_rate), encoder or Encoder()

@@ -16,7 +16,7 @@ import scipy.signal
 
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.comparison.physical_model import PhysicalModel
-from xy_sysid.control_design.path import Trajectory, of_position
+from xy_sysid.control_design.path import SampledPath, of_position
 from xy_sysid.control_design.sample_step import sections
 from xy_sysid.control_design.uncertain import Derived, derive
 from xy_sysid.samples.block import FloatArray
@@ -73,7 +73,7 @@ class Shaper:
         """By which a path becomes longer, s."""
         return self.times[-1]
 
-    def shape(self, path: Trajectory) -> Trajectory:
+    def shape(self, path: SampledPath) -> SampledPath:
         """The path through the pulses."""
         rate = path.sampling_rate
         start = path.position[0]

@@ -15,7 +15,7 @@ import numpy as np
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.comparison.physical_model import PhysicalModel
 from xy_sysid.control_design.laws import ask, asks, force, friction, of_category
-from xy_sysid.control_design.path import Trajectory
+from xy_sysid.control_design.path import SampledPath
 from xy_sysid.control_design.uncertain import Derived, derive
 from xy_sysid.samples.block import FloatArray
 
@@ -77,7 +77,7 @@ def _turning(model: AxisModel) -> tuple[float, float]:
     return at(0.5 * math.pi), at(0.0)
 
 
-def simple_feedforward(found: Gains, path: Trajectory, friction_too: bool = True) -> FloatArray:
+def simple_feedforward(found: Gains, path: SampledPath, friction_too: bool = True) -> FloatArray:
     """(n,) voltage along a path, V: kS sign(v) + kV v + kA a (and kG), as drives calculate it, without looking ahead."""
     return np.asarray(
         (found.value("kS") * np.sign(path.speed) if friction_too else 0.0)

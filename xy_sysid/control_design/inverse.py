@@ -14,7 +14,7 @@ from xy_sysid.axis.linear_part import lag_of
 from xy_sysid.axis.model import AxisModel, Library
 from xy_sysid.control_design import series
 from xy_sysid.control_design.inverse_text import InverseText
-from xy_sysid.control_design.path import Trajectory
+from xy_sysid.control_design.path import SampledPath
 from xy_sysid.control_design.sample_step import SERIES, Plant, most_hanging, plant
 from xy_sysid.control_design.step_text import ROOM
 from xy_sysid.effects._binding import law_names, law_texts
@@ -50,7 +50,7 @@ def parts_of_sample(ready: Plant) -> int:
     return max(math.ceil(float(fastest) / (resonant_loop.STIFF * ready.sampling_rate)), 1)
 
 
-def feedforward(model: AxisModel, path: Trajectory) -> Feedforward:
+def feedforward(model: AxisModel, path: SampledPath) -> Feedforward:
     """The voltage along a path, with delay, hold, lag, resonances and amplifier undone; see ``not_undone`` for the rest."""
     ready = plant(model, path.sampling_rate)
     ahead = ahead_of(model, path.sampling_rate)

@@ -11,7 +11,7 @@ import numpy as np
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.control_design.inverse import feedforward
 from xy_sysid.control_design.laws import force, friction
-from xy_sysid.control_design.path import Bounds, Trajectory, s_curve
+from xy_sysid.control_design.path import Bounds, SampledPath, s_curve
 from xy_sysid.control_design.sample_step import sections
 from xy_sysid.errors import BadInput
 
@@ -27,7 +27,7 @@ class Fastest:
     """bounds: of the fastest S-curve; path: of the move; voltage: largest of the whole feedforward, V; limit, reserve: V, and the part kept free."""
 
     bounds: Bounds
-    path: Trajectory
+    path: SampledPath
     voltage: float
     limit: float
     reserve: float
@@ -47,12 +47,12 @@ def fastest(models: Sequence[AxisModel], places: Sequence[float], limit: float, 
         raise BadInput(
             "limit", f"{limit:g} V", f"more than {held / (1.0 - reserve):.3g} V, which friction and load need", "Check the limit, or the model."
         )
-    best: tuple[float, Bounds, Trajectory, float] | None = None
+    best: tuple[float, Bounds, SampledPath, float] | None = None
     rise = max(JERK_TIME, _ringing(centre, sampling_rate), 4.0 * centre.delay)
     for share in SHARES.tolist():
         speed, acceleration = share * usable * abs(centre.gain), (1.0 - share) * usable * abs(centre.gain) * centre.pole
 
-        def at(scale: float, speed: float = speed, acceleration: float = acceleration) -> tuple[Bounds, Trajectory, float]:
+        def at(scale: float, speed: float = speed, acceleration: float = acceleration) -> tuple[Bounds, SampledPath, float]:
             bounds = Bounds(scale * speed, scale * acceleration, scale * acceleration / rise)
             path = s_curve(places, bounds, sampling_rate)
             return bounds, path, max(float(np.max(np.abs(feedforward(model, path).voltage))) for model in models)

@@ -33,7 +33,7 @@ class Bounds:
 
 
 @dataclass(frozen=True, slots=True)
-class Trajectory:
+class SampledPath:
     """sampling_rate: Hz; position, speed, acceleration: (n,) at each sample, m, m/s, m/s2."""
 
     sampling_rate: float
@@ -46,21 +46,21 @@ class Trajectory:
         """Length in time."""
         return self.position.size / self.sampling_rate
 
-    def ahead(self, seconds: float) -> Trajectory:
+    def ahead(self, seconds: float) -> SampledPath:
         """The same path as it will be so much later; it stands at its end."""
         times = np.arange(self.position.size) + seconds * self.sampling_rate
         last = self.position.size - 1
         whole = np.minimum(times.astype(np.int64), last)
         part, after = np.minimum(times - whole, 1.0), np.minimum(whole + 1, last)
         mixed = [(1.0 - part) * signal[whole] + part * signal[after] for signal in (self.position, self.speed, self.acceleration)]
-        return Trajectory(self.sampling_rate, *mixed)
+        return SampledPath(self.sampling_rate, *mixed)
 
 
-def s_curve(places: Sequence[float], bounds: Bounds, sampling_rate: float, settle: float = SETTLE) -> Trajectory:
+def s_curve(places: Sequence[float], bounds: Bounds, sampling_rate: float, settle: float = SETTLE) -> SampledPath:
     """From place to place, m, each move as fast as the bounds allow, with rests of ``settle`` s between.
 
     A move is a step of position through three moving averages whose lengths are distance / speed, speed / acceleration and acceleration / jerk,
-    so that speed, acceleration and jerk stay within their bounds. Source: Biagiotti & Melchiorri, Trajectory Planning for Automatic Machines and
+    so that speed, acceleration and jerk stay within their bounds. Source: Biagiotti & Melchiorri, SampledPath Planning for Automatic Machines and
     Robots, Springer 2008, sec. 4.5. Raises BadInput for fewer than two places.
     """
     if len(places) < 2:
@@ -88,15 +88,15 @@ def _move(way: float, bounds: Bounds, rate: float) -> FloatArray:
     return np.asarray(step)
 
 
-def of_position(position: FloatArray, sampling_rate: float) -> Trajectory:
+def of_position(position: FloatArray, sampling_rate: float) -> SampledPath:
     """A path through positions (n,), m, with central differences."""
     speed = np.gradient(position) * sampling_rate
     acceleration = np.zeros_like(position)
     acceleration[1:-1] = (position[2:] - 2.0 * position[1:-1] + position[:-2]) * sampling_rate**2
-    return Trajectory(sampling_rate, position, speed, acceleration)
+    return SampledPath(sampling_rate, position, speed, acceleration)
 
 
-def recorded(position: FloatArray, sampling_rate: float, below: float) -> Trajectory:
+def recorded(position: FloatArray, sampling_rate: float, below: float) -> SampledPath:
     """What a measured position (n,), m, does below a frequency, Hz, without delay. Raises BadInput where the recording is too short."""
     top = 0.45 * sampling_rate
     if position.size < 64:

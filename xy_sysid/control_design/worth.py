@@ -13,7 +13,7 @@ from xy_sysid.comparison.physical_model import PhysicalModel
 from xy_sysid.control_design.closed_loop import Controller, Encoder, follow_path
 from xy_sysid.control_design.gains import Gains, simple_feedforward
 from xy_sysid.control_design.inverse import feedforward
-from xy_sysid.control_design.path import ORDER, Trajectory, recorded
+from xy_sysid.control_design.path import ORDER, SampledPath, recorded
 from xy_sysid.greybox.floor import encoder_noise
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import Run
@@ -81,7 +81,7 @@ def clear_below(model: PhysicalModel, run: Run) -> float:
     return float(np.clip(top, LOWEST * run.sampling_rate, HIGHEST * run.sampling_rate))
 
 
-def tracked(models: Sequence[AxisModel], found: Gains, controller: Controller, path: tuple[str, Trajectory], encoder: Encoder) -> Tracking:
+def tracked(models: Sequence[AxisModel], found: Gains, controller: Controller, path: tuple[str, SampledPath], encoder: Encoder) -> Tracking:
     """The path followed by the first model with each feedforward, and by the others with the whole one of the first."""
     name, wanted = path
     simple, whole = simple_feedforward(found, wanted), feedforward(models[0], wanted).voltage
