@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -203,8 +204,10 @@ def test_the_page_shows_every_parameter_and_opens_offline(table: Path, tmp_path:
     page = tmp_path / "trend.html"
     assert cli("trend", table, "-o", page).code == 0
     text = page.read_text(encoding="utf-8")
-    assert "mill-01 x, 25 May 2026: the amplifier or its supply" in text and 'id="all-gain"' in text
+    assert "mill-01 x, 25 May 2026: the amplifier or its supply" in text and 'id="plot-gain"' in text
     assert parsed(text) is not None
+    ids = re.findall(r'\bid="([^"]+)"', text.split('<script type="application/json"')[0])
+    assert len(ids) == len(set(ids)), "a figure has a place of its own"
     assert "allowed: a name that is not there yet" in refused("trend", table, "-o", page)
 
 

@@ -33,7 +33,7 @@ def trend_page(found: Trends, title: str) -> str:
     for number, event in enumerate(found.events):
         axis = axes[event.machine, event.axis]
         name = f"{event.machine} {event.axis}"
-        made = [Drawing(f"event-{number}", event_figure(event, _drawn(found, event), axis), f"The parameters of {name} over time")]
+        made = [Drawing(f"plot-event-{number}", event_figure(event, _drawn(found, event), axis), f"The parameters of {name} over time")]
         drawings += made
         extra = listing(f"{told(one, axis)}; such evidence comes by chance {chance(one)}" for one in event.moved)
         heading = f"{name}, {day(event.since)}: {event.cause.cause if event.cause is not None else 'cause unknown'}"
@@ -42,7 +42,7 @@ def trend_page(found: Trends, title: str) -> str:
     made = []
     for column in columns:
         own = [one for one in found.trends if one.history.column == column]
-        made.append(Drawing(f"all-{column}", overview_figure(own), f"{column} of all axes over time", column))
+        made.append(Drawing(f"plot-{column}", overview_figure(own), f"{column} of all axes over time", column))
     drawings += made
     parts.append(section("all", "All axes", made, OVER))
     spreads = [(name, f"{100 * between:.2g}", f"{100 * own:.2g}") for name, between, own in widest(found)]
