@@ -88,9 +88,9 @@ def ladder_of_search(pool: Pool, given: Given, filtered: Filtered | None) -> Lad
         if not item.refused or is_taken_for(library, item.effects, node.effects)  # it is no spring, but is it a wave?
     ]
     others.sort(key=lambda item: (-_doubt(node, item), item.brief.excess))
+    for item in others[:1]:
+        pool.finished(item, shown=True)
     rivals = [Rival(tuple(sorted(item.effects)), item.fit, _doubt(node, item), item.refused) for item in others]
-    if rivals:  # its error is shown
-        rivals[0] = replace(rivals[0], fit=pool.whole_fit(others[0]))
     whole = [item for item in pool.nodes.values() if item.whole and not item.refused]
     ladder = Ladder(
         steps=(*given.steps, *_rungs(pool, given, ordered, final)),
@@ -193,5 +193,5 @@ def _with(pool: Pool, now: GreyboxFit, name: str, final: GreyboxFit, asked: bool
         return final
     known = pool.nodes.get(effects)
     if known is not None and not known.refused and (known.whole or asked):
-        return pool.whole_fit(known)
+        return pool.finished(known, shown=True).fit
     return with_one_more(pool.data, pool.library, now, name) if asked else None

@@ -254,16 +254,12 @@ class Pool:
         brief = fit(self.data, start, brief=True, late=self.late)
         return self.remember(effects, brief, brief, leads=False) if np.isfinite(brief.excess) else known
 
-    def finished(self, node: Node) -> Node:
-        """The same node, fitted on all data."""
-        if not node.whole and not self.late():
-            node.fit = finish(self.data, node.brief.model, node.brief.runs, self.late)
+    def finished(self, node: Node, shown: bool = False) -> Node:
+        """The same node, fitted on all data, unless the time is up; one that is shown beside others is fitted even so."""
+        if not node.whole and (shown or not self.late()):
+            node.fit = finish(self.data, node.brief.model, node.brief.runs, in_time if shown else self.late)
             node.refused = self._refusal(node.effects, node.fit)
         return node
-
-    def whole_fit(self, node: Node) -> GreyboxFit:
-        """The fit to all data, worked out though the time is up: it is shown beside others that are."""
-        return node.fit if node.whole else finish(self.data, node.brief.model, node.brief.runs)
 
     def size_without(self, node: Node, name: str) -> float:
         """What an effect explains over what is left with it: against the best of the sets that have the same effects but for this one."""
