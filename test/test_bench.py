@@ -108,6 +108,7 @@ def test_every_benchmark_is_among_these() -> None:
         "recordings",
         "settle_pairs",
         "tables",
+        "workshop",
     }
     assert files == {*TABLES, *SCRIPTS}
 

@@ -12,11 +12,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Protocol
 
+from xy_sysid.effects import SIMPLEST_FRICTION
 from xy_sysid.errors import BadInput
 from xy_sysid.units import SCALES, Units
 
 TURN = 2.0 * math.pi
-ROBOTS = {"inertia": "armature", "damping": "damping", "coulomb_friction.coulomb": "frictionloss", "friction": "frictionloss"}  # MuJoCo, URDF
+FRICTION = f"{SIMPLEST_FRICTION.name}.{SIMPLEST_FRICTION.names[0]}"
+ROBOTS = {"inertia": "armature", "damping": "damping", FRICTION: "frictionloss", "friction": "frictionloss"}  # MuJoCo, URDF
 
 
 class Figure(Protocol):

@@ -21,5 +21,6 @@ def _found() -> dict[str, Effect]:
 
 
 EFFECTS: dict[str, Effect] = _found()
+SIMPLEST_FRICTION = min((effect for effect in EFFECTS.values() if effect.is_dry), key=lambda effect: len(effect.parameters))
 
-__all__ = ["EFFECTS", "Effect", "Guess", "Parameter", "Scene", "columns", "law"]
+__all__ = ["EFFECTS", "SIMPLEST_FRICTION", "Effect", "Guess", "Parameter", "Scene", "columns", "law"]

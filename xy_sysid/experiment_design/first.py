@@ -13,6 +13,7 @@ from threadpoolctl import threadpool_limits
 
 from xy_sysid.axis.forward import move
 from xy_sysid.axis.model import AxisModel
+from xy_sysid.effects import SIMPLEST_FRICTION
 from xy_sysid.experiment_design.beliefs import Belief
 from xy_sysid.experiment_design.experiment import RAMP, Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
@@ -78,7 +79,7 @@ def _draws(limits: MachineLimits, seed: int) -> list[AxisModel]:
         crosses, pole, delay, friction = (low * (high / low) ** random.uniform() for low, high in (CROSSES, POLE, DELAY, FRICTION))
         gain = (limits.travel[1] - limits.travel[0]) / (limits.voltage * (crosses if number else CROSSES[0]))
         rubs = friction if number else FRICTION[0]
-        found.append(AxisModel(gain, delay, pole).with_effect("coulomb_friction", (rubs * limits.voltage,)))
+        found.append(AxisModel(gain, delay, pole).with_effect(SIMPLEST_FRICTION.name, (rubs * limits.voltage,)))
     return found
 
 
@@ -98,7 +99,7 @@ def _believed(model: AxisModel) -> Belief:
     """A draw as if it were known, so that its sensitivities can be asked for."""
     low, high = np.array([-np.inf, 0.0, 1e-2, 1e-9]), np.array([np.inf, 1.0, 1e5, 1e3])
     scale = Scale(low, high, np.array([False, False, True, True]), np.array([model.gain, model.delay, 1.0, 1.0]))
-    return Belief(effects=("coulomb_friction",), model=model, draws=(model,), scale=scale, precision=np.eye(4), free=1, force=0.0, motion=0.0)
+    return Belief(effects=(SIMPLEST_FRICTION.name,), model=model, draws=(model,), scale=scale, precision=np.eye(4), free=1, force=0.0, motion=0.0)
 
 
 def _width(item: Information, seconds: float) -> float:

@@ -23,7 +23,7 @@ def for_people(function: Callable[..., Any], name: str) -> Callable[..., Any]:
 
     name: as people write it, for example xy.fit. The result raises BadInput for arguments of a wrong type, too many, or too few.
     """
-    signature, hints = inspect.signature(function), get_type_hints(function)
+    signature, hints = inspect.signature(function), _hints(function)
     usage = _usage(name, signature)
 
     @functools.wraps(function)
@@ -42,6 +42,17 @@ def for_people(function: Callable[..., Any], name: str) -> Callable[..., Any]:
         return function(*bound.args, **bound.kwargs)
 
     return call
+
+
+def _hints(function: Callable[..., Any]) -> dict[str, Any]:
+    """The annotated types of the arguments; one of a library that only a type checker imports counts as any."""
+    found: dict[str, Any] = {}
+    for name, text in function.__annotations__.items():
+        try:
+            found |= get_type_hints(types.SimpleNamespace(__annotations__={name: text}), globalns=function.__globals__)
+        except (NameError, AttributeError):
+            found[name] = Any
+    return found
 
 
 def pictures(module: types.ModuleType) -> types.ModuleType:
