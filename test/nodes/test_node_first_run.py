@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 from helpers import ROOT
@@ -36,6 +37,17 @@ sys.exit(run(["run", "--first", "--params", sys.argv[1]]))
 def test_an_error_of_the_conductor_stops_the_drive_and_is_one_line(tmp_path: Path, place: str) -> None:
     """While it pushes, in a callback, and after the last push: one line, exit code 1, zero volts last, no traceback."""
     (tmp_path / "run.yaml").write_text(RUN)
+    for _ in range(3):
+        said, code, blocks = _run_with_an_error(tmp_path, place)
+        if "without all its messages" not in said:  # on a busy computer the run gives up before it comes to that place
+            break
+    assert code == 1 and "Traceback" not in said, said
+    assert len([line for line in said.splitlines() if "ZeroDivisionError: float division by zero" in line]) == 1, said
+    assert not blocks or not blocks[-1].values.any()
+
+
+def _run_with_an_error(tmp_path: Path, place: str) -> tuple[str, int | None, list[Any]]:
+    """What the program says, its exit code, and the voltage that it sent."""
     with world_in(tmp_path) as world:
         blocks = world.blocks()
         environment = bare(ROS_DOMAIN_ID=str(world.domain), ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST")
@@ -47,6 +59,4 @@ def test_an_error_of_the_conductor_stops_the_drive_and_is_one_line(tmp_path: Pat
         finally:
             process.kill()
         world.spin(0.3)
-        assert process.returncode == 1 and "Traceback" not in said, said
-        assert len([line for line in said.splitlines() if "ZeroDivisionError: float division by zero" in line]) == 1, said
-        assert not blocks or not blocks[-1].values.any()
+    return said, process.returncode, list(blocks)

@@ -99,7 +99,7 @@ def test_the_demo_begins_without_a_jump_and_says_what_is_awaited(address: str, c
         frames.look()
     assert frames.over == [] and frames.moved == []
     awaited = [sentence for _, headline, sentence in frames.said if not headline.startswith("Something is missing")]
-    assert awaited and all(re.search("not heard yet|Waiting|of data have arrived", sentence) for sentence in awaited), awaited
+    assert awaited and all(re.search("does not answer|Waiting|of data have arrived", sentence) for sentence in awaited), awaited
     last = max(at for at, _, sentence in frames.said if re.search("of 10 s of data have arrived", sentence))
     assert frames.since("Something is missing") - last < allowed(SOON)
     used = tab.page.locator("[data-part=used]")
