@@ -48,7 +48,17 @@ OVER_EACH_OTHER = """() => {
     };
     const leaves = [...document.querySelectorAll("main *")].filter(e => !e.closest("svg") && e.textContent.trim() && !e.children.length);
     const drawn = [...document.querySelectorAll("main .js-plotly-plot svg text")].filter(e => e.textContent.trim());
-    const words = [...leaves, ...drawn].map(e => ({box: e.getBoundingClientRect(), said: e.textContent.trim().slice(0, 60), e}))
+    const seen = e => {  // without what a scrolled box around it cuts off
+        const {left, right, top, bottom} = e.getBoundingClientRect();
+        const box = {left, right, top, bottom};
+        for (let one = e.parentElement; one; one = one.parentElement) if (/auto|scroll/.test(getComputedStyle(one).overflowY)) {
+            const around = one.getBoundingClientRect();
+            box.top = Math.max(box.top, around.top);
+            box.bottom = Math.min(box.bottom, around.bottom);
+        }
+        return {...box, width: right - left, height: box.bottom - box.top};
+    };
+    const words = [...leaves, ...drawn].map(e => ({box: seen(e), said: e.textContent.trim().slice(0, 60), e}))
         .filter(word => word.box.width > 1 && word.box.height > 1 && shown(word.e));
     const found = [];
     for (let i = 0; i < words.length; i++) for (let k = i + 1; k < words.length; k++) {

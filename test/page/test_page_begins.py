@@ -21,7 +21,7 @@ from helpers.ros_tools import needs_ros, new_domain
 pytestmark = [needs_browser, needs_ros]
 
 EVERY = 250  # ms between two frames
-STILL = 24.0  # px that a card may move: a line of text
+STILL = 6.0  # px that a card may move
 SLOW = 0.5  # times real time, so that the page is there long before the verdict on a busy machine, too
 SOON = 5.5  # s from 10 s of data to the verdict on the rigid model, on a quiet machine: 8 s from the first sample of the demo, which runs 4 times
 # faster than real time

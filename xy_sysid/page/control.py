@@ -41,7 +41,7 @@ class Control:
         with ui.element("section").classes("card machine").props('aria-label="machine"'):
             ui.html("<h2>The machine</h2>", sanitize=False)
             self._nodes = ui.element("div").classes("stack").classes("nodes").props("role=status aria-live=polite data-part=nodes")
-            self._state = ui.label("").props("data-part=lifecycle")
+            self._state = ui.label("").classes("lifecycle").props("data-part=lifecycle")
             with ui.element("div").classes("buttons"):
                 self._configure = heeded(
                     ui.button("Configure", on_click=lambda: self._go("configure")).props("outline dense no-caps data-act=configure")
