@@ -7,7 +7,7 @@ from setuptools import find_packages, setup
 NAME = "xy_sysid"
 HOME = "https://github.com/xy-sysid/xy_sysid"  # also in package.xml
 ROS_WHEELS = "sys_platform == 'linux' and platform_machine == 'x86_64'"
-# importlib-metadata: dask needs it on Python 3.11, and its version 10 would bring a package of no use here
+# importlib-metadata: dask needs it on Python 3.11; version 10 needs one more package
 FLEET = ["dask[distributed]", "pyarrow", "bokeh", "importlib-metadata<9"]
 ISAL = "isal; platform_machine in 'x86_64 AMD64 aarch64 arm64'"  # fast checksums; elsewhere zlib's will do
 

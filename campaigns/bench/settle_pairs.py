@@ -43,6 +43,19 @@ class Pair:
     sized: tuple[str, ...] = field(default=())
 
 
+HANGING = Pair(
+    "gravity or a spring, near hanging",
+    (("gravity",), ("return_spring",)),
+    ({"gravity": {"amplitude": 0.5}}, {"return_spring": {"stiffness": 0.5}}),
+    {"low": 0.5, "high": 20.0, "rms": 0.08, "centring": 0.0},
+    seconds=12.0,
+    voltage=1.2,
+    reach=2.5,
+    machine="joint.yaml",
+    noise=2e-4,
+    sized=("amplitude", "stiffness"),
+)
+
 PAIRS = (
     Pair(
         "Coulomb or Stribeck friction, seen only at speed",
@@ -68,18 +81,7 @@ PAIRS = (
         {"low": 5.0, "high": 200.0, "offset": 0.45, "rms": 0.05, "centring": 0.0},
         sized=("load", "coulomb"),
     ),
-    Pair(
-        "gravity or a spring, near hanging",
-        (("gravity",), ("return_spring",)),
-        ({"gravity": {"amplitude": 0.5}}, {"return_spring": {"stiffness": 0.5}}),
-        {"low": 0.5, "high": 20.0, "rms": 0.08, "centring": 0.0},
-        seconds=12.0,
-        voltage=1.2,
-        reach=2.5,
-        machine="joint.yaml",
-        noise=2e-4,
-        sized=("amplitude", "stiffness"),
-    ),
+    HANGING,
     Pair(
         "a saturation that is never reached",
         ((), ("saturation",)),
@@ -119,18 +121,7 @@ PAIRS = (
         {"low": 0.5, "high": 100.0, "rms": 0.5},
         sized=("cubic",),
     ),
-    Pair(
-        "gravity or a spring, near hanging (MuJoCo)",
-        (("gravity",), ("return_spring",)),
-        ({"gravity": {"amplitude": 0.5}}, {"return_spring": {"stiffness": 0.5}}),
-        {"low": 0.5, "high": 20.0, "rms": 0.08, "centring": 0.0},
-        seconds=12.0,
-        voltage=1.2,
-        reach=2.5,
-        machine="mujoco hinge",
-        noise=2e-4,
-        sized=("amplitude", "stiffness"),
-    ),
+    replace(HANGING, name=f"{HANGING.name} (MuJoCo)", machine="mujoco hinge"),
     Pair(
         "load or Coulomb friction, seen in one direction (MuJoCo)",
         (("constant_load",), ("coulomb_friction",)),

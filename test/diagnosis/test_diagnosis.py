@@ -242,7 +242,7 @@ def test_what_two_sets_share_is_named_and_what_they_differ_in_is_not() -> None:
     tie = Rival(("coulomb_friction", "cogging"), both, 0.5)
     ladder = replace(
         alone,
-        steps=(*alone.steps, Step("constant_load", both)),
+        steps=(*alone.steps, Step(("constant_load",), both)),
         final=both,
         effects=("coulomb_friction", "constant_load"),
         rivals=(tie, *alone.rivals),

@@ -36,7 +36,7 @@ class Controller:
     limit: float = NO_LIMIT
 
     def keeps(self, sampling_rate: float) -> float:
-        """What is left of the filtered derivative after a sample."""
+        """Factor by which the filtered derivative decays in a sample."""
         return float(np.exp(-1.0 / (sampling_rate * self.derivative_time))) if self.derivative_time > 0.0 else 0.0
 
 

@@ -40,7 +40,7 @@ class Swing:
 class Notch:
     """A second-order section that takes a resonance out of the loop.
 
-    frequency: Hz; depth: what is left at it; width: damping ratio of its poles; section: (5,) b0, b1, b2, a1, a2 at the sampling rate
+    frequency: Hz; depth: gain at it, 0 to 1; width: damping ratio of its poles; section: (5,) b0, b1, b2, a1, a2 at the sampling rate
     phase_cost: degrees at the crossover that it was asked for; covers: whether its -3 dB width holds the interval of the frequency
     """
 

@@ -104,7 +104,7 @@ def mjcf(model: AxisModel, sampling_rate: float, name: str = "axis") -> Mjcf:
 
 
 def _steps(model: AxisModel, sampling_rate: float, fine: float) -> int:
-    """Steps in a sample, at least ``fine`` a second: the number, up to half as many more, of which the delay is nearest to a whole one."""
+    """Steps in a sample, at least ``fine`` a second: of up to 1.5 times the least, the number that makes the delay nearest to whole steps."""
     least = max(math.ceil(fine / sampling_rate), 1)
     late = model.delay * sampling_rate
     return min(range(least, least + max(least // 2, 1) + 1), key=lambda count: (round(abs(late * count - round(late * count)) / count, 6), count))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from abc import ABC, abstractmethod
 
 from xy_sysid.errors import BadInput
 
@@ -10,7 +11,7 @@ OPERATORS: dict[type, str] = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div
 COMPARISONS: dict[type, str] = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
 
 
-class Printer:
+class Printer(ABC):
     """What C and MATLAB have in common; a subclass prints calls, places in arrays, loops, powers and choices in its own way."""
 
     AND, OR, NOT, UNEQUAL = "&&", "||", "!", "!="
@@ -82,23 +83,29 @@ class Printer:
         """Of a variable."""
         return name
 
+    @abstractmethod
     def number(self, value: float) -> str:
-        raise NotImplementedError
+        """A number as the language writes it."""
 
+    @abstractmethod
     def place(self, array: str, index: ast.expr) -> str:
-        raise NotImplementedError
+        """An element of an array."""
 
+    @abstractmethod
     def power(self, left: str, right: str) -> str:
-        raise NotImplementedError
+        """A power."""
 
+    @abstractmethod
     def choice(self, test: str, yes: str, no: str) -> str:
-        raise NotImplementedError
+        """One of two values, by a test."""
 
+    @abstractmethod
     def call(self, node: ast.Call) -> str:
-        raise NotImplementedError
+        """A call of a function."""
 
+    @abstractmethod
     def statement(self, node: ast.stmt) -> None:
-        raise NotImplementedError
+        """One statement."""
 
 
 def math_name(node: ast.Call) -> str | None:

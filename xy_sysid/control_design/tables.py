@@ -26,7 +26,7 @@ class Correction:
     name: ``friction``, ``force``, ``drag``, ``gain`` or ``scale``; at: (n,) places, m, or speeds, m/s
     value, low, high: (n,) with their 95 % intervals
     at_unit, unit: of the axis, SI; meaning: how it is used
-    before: rms of what it takes away; after: rms of half of its interval, which is what stays
+    before: rms of the correction; after: rms of half of its 95 % interval, the error that remains
     """
 
     name: str

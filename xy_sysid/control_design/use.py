@@ -43,7 +43,7 @@ class Used:
     sampling_rate: Hz of the controller; limit: V of the drive, infinite if nobody knows it; limit_from: who said so
     travel: m, that tables and paths cover; gains, friction, tables, gap: feedforward and corrections (None: the axis has none)
     feedback, modes, notch, shaper, fastest: None where there is nothing to design, or where it was refused
-    predicted, tracking: before and after, the former only with a recording
+    predicted: input of the recording before and after, if there is one; tracking: simulated tracking errors
     refused: (what, why) of what could not be designed; not_undone: (effect, why) of what the feedforward leaves; notes: to be read first
     """
 

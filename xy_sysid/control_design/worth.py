@@ -29,7 +29,7 @@ class Predicted:
     """The recorded voltage against what the recorded motion asks for.
 
     below: Hz, the part of both that is compared; voltage: rms of what was recorded, V
-    inertia, simple, whole: rms of what is left without prediction of friction (kV, kA), with kS and kG too, and with the whole feedforward, V
+    rms of the input, V, that a feedforward does not predict. inertia: with kV and kA; simple: with kS and kG too; whole: with every law
     """
 
     below: float

@@ -75,7 +75,7 @@ def _renamed(ladder: Ladder, names: Mapping[str, str]) -> Ladder:
 
     return replace(
         ladder,
-        steps=tuple(Step(step.added and " and ".join(map(word, step.added.split(" and "))), fit(step.fit)) for step in ladder.steps),
+        steps=tuple(Step(tuple(map(word, step.names)), fit(step.fit)) for step in ladder.steps),
         final=fit(ladder.final),
         effects=tuple(map(word, ladder.effects)),
         tried=tuple(replace(item, effect=word(item.effect), fit=item.fit and fit(item.fit)) for item in ladder.tried),

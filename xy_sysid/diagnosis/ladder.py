@@ -28,10 +28,15 @@ class Candidate:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One rung: the effect added, or several with " and " (None for the base alone), and the fit with it."""
+    """One rung: the names of the effects that came with it, none for the base alone, and the fit with them."""
 
-    added: str | None
+    names: tuple[str, ...]
     fit: GreyboxFit
+
+    @property
+    def added(self) -> str | None:
+        """The names in words; None for the base alone."""
+        return " and ".join(self.names) or None
 
 
 @dataclass(frozen=True, slots=True)

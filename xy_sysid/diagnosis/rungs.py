@@ -30,9 +30,9 @@ class Given:
     @staticmethod
     def of(data: AxisData, library: Library, names: tuple[str, ...]) -> Given:
         """Each fitted after those before it."""
-        steps = [Step(None, fit_base(data, library))]
+        steps = [Step((), fit_base(data, library))]
         for name in names:
-            steps.append(Step(name, with_one_more(data, library, steps[-1].fit, name)))
+            steps.append(Step((name,), with_one_more(data, library, steps[-1].fit, name)))
         return Given(names, tuple(steps))
 
 
@@ -131,7 +131,7 @@ def _of_one_step(
     left, before = (error**2 - noise**2 for error in (last.held_out_error, bar))
     doubt = 0.5 * (last.held_out_error / bar) ** (2.0 / TELLS)
     return Ladder(
-        steps=(Step(None, base), *(Step(name, fit) for name, fit in rungs)),
+        steps=(Step((), base), *(Step((name,), fit) for name, fit in rungs)),
         final=last,
         effects=names,
         tried=(next(Candidate(name, 0.0, fit) for name, fit in rungs if fit.one_step), *tried),
@@ -181,7 +181,7 @@ def _rungs(pool: Pool, given: Given, names: tuple[str, ...], final: GreyboxFit) 
         left.remove(name)
         together.append(name)
         if name in lower:
-            steps.append(Step(" and ".join(together), now))
+            steps.append(Step(tuple(together), now))
             shown, together = now, []
     return steps
 

@@ -2,7 +2,7 @@
 
 Parameters are Gaussian in the coordinates of the fit (``greybox.least_squares.Scale``: the logarithm of what is positive). Their precision is
 the information of the data, and a little more: a positive number is known to a factor of two before anything is measured. Draws that the
-data contradict are left out. An effect of which the data show nothing keeps its usual size, as far as they allow it.
+data contradict are left out. An effect that does not show in the data keeps its usual size, if the data allow it.
 """
 
 from __future__ import annotations
@@ -137,7 +137,7 @@ def believed(evidence: Evidence, found: GreyboxFit, count: int, seed: int = 0) -
 
 
 def hidden(evidence: Evidence, rest: AxisModel, name: str, best: float, draws: tuple[int, int]) -> Belief | None:
-    """An effect of which the data show nothing, beside a model that explains them: its usual sizes, as far as they allow these.
+    """An effect that does not show in the data, beside a model that explains them: the usual sizes that the data allow.
 
     A relative in the model gives way, and what it calls by the same name is taken over. None where the data allow no such size.
     best: nats of what explains the data best; draws: how many are wanted, and their seed

@@ -119,7 +119,7 @@ def _belief(
 
 
 def _is_gone(data: AxisData, found: GreyboxFit, name: str) -> bool:
-    """A fit has made an effect so small that no fit would begin there: what is left is the model without it."""
+    """The fit made an effect so small that the model is as good as without it."""
     effect = found.model.library[name]
     pairs = zip(effect.on(data.similar), dict(found.model.effects)[name], strict=True)
     return any(item.positive and (k == 0 or "V" in item.unit) and value < BEGUN * abs(item.typical) for k, (item, value) in enumerate(pairs))

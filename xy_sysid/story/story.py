@@ -149,7 +149,7 @@ def next_best(story: Story, run: Run, library: Library = STANDARD) -> Story:
     if story.now.explained:
         return replace(story, note="Nothing is left to explain: the held-out error is at the noise floor.")
     found = refine(data, library, story.effects, Effort(most=MOST_EFFECTS - len(story.effects)))
-    new = [step for step in found.steps if step.added is not None and step.added not in story.effects]
+    new = [step for step in found.steps if not set(step.names) <= {*story.effects}]
     if not new:
         return replace(story, note="No effect of the library helps any further.")
     return _grown(story, data, new[0].fit, new[0].added, None)
