@@ -28,6 +28,7 @@ from xy_sysid.samples.block import FloatArray
 ALLOWED = 3.0  # nats by which a draw may explain the data at hand worse than the best: a factor of twenty in likelihood
 TRIES = 12  # draws for each one that is wanted, at most
 STEPS = 3  # of Gauss and Newton
+LEAST_SEEN = 3e-5  # of the best seen direction in the parameters: one that the data show less is left as it is
 FACTOR = math.log(USUAL_WITHIN)  # standard deviation of the logarithm of a positive number before anything is measured
 
 
@@ -196,10 +197,10 @@ def _settled(evidence: Evidence, model: AxisModel, fixed: set[str]) -> AxisModel
     now = evidence.nats(model)
     for _ in range(STEPS):
         slopes, error = evidence.whitened(model, scale)
-        normal = slopes[free] @ slopes[free].T
-        normal += 1e-9 * np.trace(normal) / normal.shape[0] * np.eye(normal.shape[0])
-        inner = scale.inner(model.row)
-        inner[free] -= np.clip(np.linalg.solve(normal, slopes[free] @ error), -0.5, 0.5)
+        if not (np.all(np.isfinite(slopes)) and np.all(np.isfinite(error))):
+            break
+        inner = scale.inner(model.row)  # what the data do not show, or show together with others, takes the smallest step
+        inner[free] -= np.clip(np.linalg.lstsq(slopes[free].T, error, rcond=LEAST_SEEN)[0], -0.5, 0.5)
         moved = with_row(model, scale.outer(inner))
         then = evidence.nats(moved)
         if not then < now - 0.1:

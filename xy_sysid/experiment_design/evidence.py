@@ -85,7 +85,9 @@ def nats(sets: tuple[Belief, Belief], model: AxisModel, item: Recorded, rounds: 
             break
         columns = (slopes(item, rival, other, now) * weight).reshape(inner.size, -1).view(np.float64)
         left = (error * weight).ravel().view(np.float64)
-        inner = inner + np.linalg.solve(columns @ columns.T + rival.precision, columns @ left - rival.precision @ off)
+        if not np.all(np.isfinite(columns)):
+            break
+        inner = inner + np.linalg.lstsq(columns @ columns.T + rival.precision, columns @ left - rival.precision @ off)[0]
         inner = rival.scale.inner(rival.scale.outer(inner))
     drawn = own.inner(model) - own.inner(own.model)
     truth = _all(item, item.objective.of_power(least, response)) + 0.5 * float(drawn @ own.precision @ drawn)
