@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 from helpers.simulated import recorded
 
 from xy_sysid.diagnosis.diagnose import diagnose, diagnose_all
-from xy_sysid.greybox.axis_data import AxisData, prepare, prepare_all
+from xy_sysid.greybox.axis_data import SHIFTS, AxisData, _blocks, prepare, prepare_all
+from xy_sysid.greybox.floor import Bands, Windows
+from xy_sysid.samples.block import FloatArray
 
 
 def noise(samples: int, seed: int = 1) -> np.ndarray:
@@ -84,3 +88,16 @@ def test_two_recordings_of_one_machine_are_one_question() -> None:
     widths = [(found.high - found.low) for found in (item.ladder.final.parameter("coulomb_friction.coulomb") for item in (both, one) if item.ladder)]
     assert widths[0] < widths[1]
     assert both.ladder.final.parameter("coulomb_friction.coulomb").value == pytest.approx(0.2, rel=0.01)
+
+
+def test_the_first_stage_is_short_where_windows_are_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the first block that a fit sees is cut short by the beginning, the stage grows until it has two windows, not to the whole record."""
+
+    def half_shifted(layout: Bands, spans: Sequence[tuple[int, int]], velocity: FloatArray) -> tuple[Windows, Windows]:
+        fitted, held = _blocks(layout.length, *spans[0], SHIFTS // 2)
+        return Windows(layout, fitted), Windows(layout, held)
+
+    monkeypatch.setattr("xy_sysid.greybox.axis_data._split", half_shifted)
+    data = prepare(4000.0, *moved(200_000))
+    assert data.brief.begins.size >= 2
+    assert data.first < 100_000

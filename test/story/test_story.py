@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from xy_sysid.axis.model import STANDARD, AxisModel
 from xy_sysid.errors import BadInput
 from xy_sysid.samples.recording import Run
 from xy_sysid.story.document import document
-from xy_sysid.story.story import added, auto, begin, diagnosed, next_best, removed, tell, with_effects
+from xy_sysid.story.story import HELPS_NO_MORE, added, auto, begin, diagnosed, next_best, removed, tell, with_effects
 
 
 def test_the_error_falls_from_the_base_to_the_floor() -> None:
@@ -94,6 +95,16 @@ def test_effects_come_and_go_by_name() -> None:
     assert done.effects == ("coulomb_friction",)
     assert "Nothing is left to explain" in next_best(done, run).note
     assert removed(done, run, "coulomb_friction").effects == ()
+
+
+def test_what_the_diagnosis_has_searched_is_not_searched_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At the last rung of the diagnosis nothing helps any more, and the answer comes without a fit."""
+    run = Run("x", RATE, *data())
+    story = diagnosed(begin(run), run)
+    assert story.diagnosis is not None
+    story = replace(story, diagnosis=replace(story.diagnosis, ladder=story.diagnosis.ladder[:1]))
+    monkeypatch.setattr("xy_sysid.story.story.refine", None)
+    assert next_best(story, run).note == HELPS_NO_MORE
 
 
 def test_a_relative_replaces_its_own() -> None:

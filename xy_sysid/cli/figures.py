@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import json as _json
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,7 +11,7 @@ import typer
 
 from xy_sysid.cli import options as o
 from xy_sysid.cli.diagnose import Own
-from xy_sysid.cli.output import emit, progress, say
+from xy_sysid.cli.output import emit, say
 from xy_sysid.cli.reading import chosen, each, read, reads
 
 if TYPE_CHECKING:
@@ -33,11 +33,10 @@ def figures(
     """Write every picture of the story of each axis, from where the rigid model fails to the falling error, as SVG, PDF and CSV."""
     from xy_sysid.errors import BadInput
     from xy_sysid.files.effects import library
+    from xy_sysid.jit import cores
     from xy_sysid.report.axis_report import told
-    from xy_sysid.report.figure_data import table
-    from xy_sysid.report.gallery import gallery
+    from xy_sysid.report.drawers import Drawers
     from xy_sysid.report.headline import headline
-    from xy_sysid.report.vector import vectors
 
     kinds = tuple(dict.fromkeys(kind or KINDS))
     for one in kinds:
@@ -50,25 +49,16 @@ def figures(
     names = chosen(recording, reading.axes)
     if not force:
         _free(out, names, kinds)
-    written: dict[str, list[str]] = {}
-    with progress() as bar:
-        task = bar.add_task("telling the story", total=len(names))
+    drawers = Drawers(kinds, cores())
+    with drawers:
 
         def work(name: str) -> dict[str, Any]:
-            bar.update(task, description=f"axis {name}")
             story = dict(told(recording, name, known))
-            made = []
-            for title, figure in gallery(story).items():
-                content = vectors(figure, [one for one in kinds if one != "csv"])
-                if "csv" in kinds:
-                    content["csv"] = table(_json.loads(figure.to_json())).encode()
-                made += [(out / f"{_plain(name)}_{title}.{one}", content[one]) for one in kinds]
-            _write(out, made)
-            written[name] = [path.name for path, _ in made]
-            bar.advance(task)
+            drawers.ask(name, story)
             return story
 
         found, refused = each(names, work)
+        written = {name: _write(out, name, kinds, drawers.drawn(name)) for name in found}
     if json:
         emit({"folder": str(out), "files": written, "refused": refused})
         return
@@ -96,10 +86,13 @@ def _free(out: Path, names: tuple[str, ...], kinds: tuple[str, ...]) -> None:
                 free("--out", path, force=False, act="add --force")
 
 
-def _write(out: Path, made: list[tuple[Path, bytes]]) -> None:
+def _write(out: Path, name: str, kinds: tuple[str, ...], drawn: Mapping[str, Mapping[str, bytes]]) -> list[str]:
+    """Write the pictures of an axis; names of the files."""
     from xy_sysid.bags.atomic import whole
 
     out.mkdir(parents=True, exist_ok=True)
-    for path, content in made:
-        with whole(path) as part:
+    made = {f"{_plain(name)}_{title}.{kind}": content[kind] for title, content in drawn.items() for kind in kinds}
+    for file, content in made.items():
+        with whole(out / file) as part:
             part.write_bytes(content)
+    return list(made)

@@ -35,7 +35,7 @@ def report(
     """Everything in one self-contained page: summary, experiment, response, fits, checks, what is missing, the falling error."""
     from xy_sysid.bags.atomic import write_text
     from xy_sysid.files.effects import library
-    from xy_sysid.report.axis_report import STAGES, axis_report
+    from xy_sysid.report.axis_report import STAGES, axis_reports
     from xy_sysid.report.report_page import Recorded, report_page
     from xy_sysid.report.story_words import status
 
@@ -45,15 +45,13 @@ def report(
     known = library(effect_file or [])
     recording = read(recs, reading, json)
     names = chosen(recording, reading.axes)
-    made: dict[str, AxisReport] = {}
     with progress() as bar:
-        task = bar.add_task("", total=len(names) * len(STAGES))
-        for place, name in enumerate(names):
+        tasks = {name: bar.add_task(f"axis {name}", total=len(STAGES)) for name in names}
 
-            def tell(stage: str, name: str = name, place: int = place) -> None:
-                bar.update(task, description=f"axis {name}: {stage}", completed=place * len(STAGES) + STAGES.index(stage))
+        def tell(name: str, stage: str) -> None:
+            bar.update(tasks[name], description=f"axis {name}: {stage}", completed=STAGES.index(stage))
 
-            made[name] = axis_report(recording, name, settings, samples, known, tell)
+        made = axis_reports(recording, names, settings, samples, known, tell)
     origin = provenance(named(recs), recording)
     units = recording.units
     title = ", ".join(rec.name for rec in recs)

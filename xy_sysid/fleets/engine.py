@@ -6,15 +6,14 @@ A task whose process dies is tried once more at the end, alone, so that no other
 from __future__ import annotations
 
 import os
-import signal
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from multiprocessing import resource_tracker
 from typing import TYPE_CHECKING, Any
 
 from xy_sysid.errors import BadInput, MissingExtra
 from xy_sysid.fleets.of_file import Done, Task, failed, rows_of_file
+from xy_sysid.processes.deaf import deaf
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -56,24 +55,13 @@ def connected(where: Cluster) -> Iterator[Client]:
         return
     import dask as settings
 
-    with settings.config.set(HERE), _deaf():
+    with settings.config.set(HERE), deaf():
         cluster = distributed.LocalCluster(
             n_workers=where.workers or cores(), threads_per_worker=1, processes=True, host="127.0.0.1", dashboard_address="127.0.0.1:0",
             silence_logs="CRITICAL",
         )  # fmt: skip
     with cluster, distributed.Client(cluster) as client:
         yield client
-
-
-@contextmanager
-def _deaf() -> Iterator[None]:
-    """Threads and processes that begin in it never hear Ctrl-C: it is this thread that ends, and ends them."""
-    resource_tracker.ensure_running()  # started later, it would unblock the signal
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT,))
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def cores() -> int:

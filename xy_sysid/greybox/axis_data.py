@@ -27,6 +27,7 @@ from xy_sysid.units import USUAL, Units
 FIRST = 28_000  # samples of the first stage of a fit, of all recordings together
 TRAINING = 2.0 / 3.0  # of the record, for what must run through from the start (one-step prediction)
 EPSILON = 1e-3  # part of the motion to which laws and their integration are trusted
+FEWEST_BRIEF = 2  # windows that a fit sees in the first stage
 LIKE = 0.1  # of the whole power in each excited band that the first stage must hold
 FEWEST = 256  # samples of all recordings
 SHORTEST = 16  # samples of each
@@ -211,11 +212,7 @@ def prepare_all(
     fitted, held = _split(layout, spans, velocity)
     least = floor(whole, velocity, encoder, epsilon)
     steps = [slice(*span) for span in spans]
-    early = _early(whole, velocity, least, steps)
-    brief = _within(fitted, steps, early)
-    if brief.begins.size < 2:
-        early = tuple(step.stop - step.start for step in steps)
-        brief = fitted
+    early = _early(whole, fitted, velocity, least, steps)
     return AxisData(
         sampling_rate=sampling_rate,
         voltage=np.concatenate([voltage for voltage, _ in recordings]),
@@ -225,7 +222,7 @@ def prepare_all(
         layout=layout,
         fitted=fitted,
         held=held,
-        brief=brief,
+        brief=_within(fitted, steps, early),
         training=int(TRAINING * velocities[0].size),
         early=early,
         floor=least,
@@ -233,21 +230,23 @@ def prepare_all(
     )
 
 
-def _early(whole: Windows, velocity: FloatArray, least: Floor, steps: Sequence[slice]) -> tuple[int, ...]:
-    """Samples of each recording in the first stage: as many as it takes that what the whole excites is excited there (a sweep takes its time)."""
+def _early(whole: Windows, fitted: Windows, velocity: FloatArray, least: Floor, steps: Sequence[slice]) -> tuple[int, ...]:
+    """Samples of each recording in the first stage: as many as it takes that what the whole excites is excited there (a sweep takes its time),
+    and that a fit sees two windows."""
     sizes = np.array([step.stop - step.start for step in steps])
     each = FIRST if len(steps) == 1 else max(FIRST // len(steps), int(SEEN * whole.layout.length))
     powers = whole.layout.powers(whole.spectrum(velocity))[:, least.excited]
     ends = whole.begins + whole.layout.length
     while each < sizes.max():
         seen = powers[np.any([(step.start <= whole.begins) & (ends <= step.start + each) for step in steps], axis=0)]
-        if seen.shape[0] and np.all(seen.mean(axis=0) > LIKE * powers.mean(axis=0)):
+        enough = _within(fitted, steps, np.minimum(sizes, each)).begins.size >= FEWEST_BRIEF
+        if enough and seen.shape[0] and np.all(seen.mean(axis=0) > LIKE * powers.mean(axis=0)):
             break
         each *= 2
     return tuple(int(size) for size in np.minimum(sizes, each))
 
 
-def _within(windows: Windows, steps: Sequence[slice], early: Sequence[int]) -> Windows:
+def _within(windows: Windows, steps: Sequence[slice], early: Sequence[int] | NDArray[np.int64]) -> Windows:
     """The windows that end within the beginnings of the recordings, by their place in these alone."""
     offsets = np.cumsum([0, *early[:-1]])
     found = []

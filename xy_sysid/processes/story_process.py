@@ -15,12 +15,12 @@ import sys
 import threading
 import time
 from dataclasses import dataclass
-from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 from xy_sysid.files.effects import library
+from xy_sysid.processes.deaf import deaf
 from xy_sysid.story.acts import Job, perform
 from xy_sysid.story.attempt import Attempt
 from xy_sysid.story.document import document
@@ -115,12 +115,8 @@ class StoryWorker:
 def _begin(effect_files: tuple[str, ...]) -> tuple[BaseProcess, Connection]:
     here, there = multiprocessing.Pipe()
     process = multiprocessing.get_context("spawn").Process(target=work, args=(there, effect_files), name="story", daemon=True)
-    resource_tracker.ensure_running()  # its own start would let SIGINT through again
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # the child inherits it: Ctrl-C is for its parent
-    try:
+    with deaf():
         process.start()
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
     there.close()
     return process, here
 

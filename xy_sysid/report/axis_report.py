@@ -6,7 +6,9 @@ the story's models see two thirds that are spread over it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import functools
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,6 +18,7 @@ from xy_sysid.axis.model import STANDARD, Library
 from xy_sysid.errors import BadInput
 from xy_sysid.fitting.of_recording import judged, split
 from xy_sysid.fitting.verdicts import Validation, validate
+from xy_sysid.jit import cores
 from xy_sysid.report.signals import excitation, motion
 from xy_sysid.report.study import AxisStudy, study_axis
 from xy_sysid.samples.recording import Recording
@@ -50,6 +53,26 @@ class AxisReport:
     def axis(self) -> str:
         """Its name."""
         return self.study.axis
+
+
+def axis_reports(
+    recording: Recording,
+    axes: Sequence[str],
+    settings: IdentifierSettings,
+    period: int | None = 0,
+    library: Library = STANDARD,
+    tell: Callable[[str, str], None] = lambda axis, stage: None,
+) -> dict[str, AxisReport]:
+    """All that can be said about each of these axes, by name; several at a time, as simulations leave the interpreter to others.
+
+    tell: called with an axis and each of STAGES as it begins, from other threads
+    """
+    pool = ThreadPoolExecutor(min(len(axes), cores()))
+    try:
+        made = pool.map(lambda axis: axis_report(recording, axis, settings, period, library, functools.partial(tell, axis)), axes)
+        return dict(zip(axes, made, strict=True))
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
 
 
 def axis_report(

@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 import plotly.graph_objects as go
 
-from xy_sysid.report.parts import frequency_axis, plain, positive
+from xy_sysid.report.parts import frequency_axis, plain, positive, stretches
 from xy_sysid.report.story_parts import Document, drawing, floor_line, nothing, pictured, row, shade, words
 from xy_sysid.report.theme import FAILS, MODEL, UNTRUSTED, fade
 from xy_sysid.report.words import number
@@ -83,10 +83,8 @@ def _places(figure: go.Figure, step: Document, by: By, ends: tuple[float, float]
             b for a, b in zip(places, mirrored, strict=True) if a["from"] > 0
         ]
     shade(figure, places[:1], ends, log=by == "frequency", scale=scale)
-    for item in places[1:]:
-        low, high = max(float(item["from"]), ends[0]), min(float(item["to"]), ends[1])
-        if high > low:
-            figure.add_vrect(x0=low * scale, x1=high * scale, fillcolor=fade(FAILS, 0.13), line_width=0, row=1, col=1)
+    others = ((max(float(item["from"]), ends[0]), min(float(item["to"]), ends[1])) for item in places[1:])
+    stretches(figure, [(low * scale, high * scale) for low, high in others if high > low], fade(FAILS, 0.13))
 
 
 def failure_words(document: Document, by: By, step: int | None = None) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from xy_sysid.report.parts import rows
+from xy_sysid.report.parts import rows, stretches
 from xy_sysid.report.theme import FAILS, FLOOR, UNTRUSTED, fade
 from xy_sysid.report.words import number
 from xy_sysid.samples.block import FloatArray
@@ -75,7 +75,7 @@ def shade(figure: go.Figure, places: list[Mapping[str, Any]], ends: tuple[float,
         first, last = max(float(item["from"]), low), min(float(item["to"]), high)
         if not last >= first:
             continue
-        figure.add_vrect(x0=first * scale, x1=last * scale, fillcolor=fade(FAILS, 0.13), line={"color": fade(FAILS, 0.5), "width": 1}, row=at, col=1)
+        stretches(figure, [(first * scale, last * scale)], fade(FAILS, 0.13), row=at, line={"color": fade(FAILS, 0.5), "width": 1})
         if level >= NAMED:
             continue
         middle = np.log10(np.sqrt(first * last) * scale) if log else 0.5 * (first + last) * scale
@@ -112,8 +112,7 @@ def shade_held_out(figure: go.Figure, document: Document, shown: Document, at: t
     ahead = AHEAD in str(shown["label"])
     spans = [(float(time["held_out_from"]), float(document["seconds"]))] if ahead else [(float(a), float(b)) for a, b in time["held_out"]]
     for row_ in at:
-        for first, last in spans:
-            figure.add_vrect(x0=first, x1=last, fillcolor=fade(UNTRUSTED, 0.14), line_width=0, layer="below", row=row_, col=1)
+        stretches(figure, spans, fade(UNTRUSTED, 0.14), row=row_, layer="below")
     if spans:
         figure.add_annotation(
             text="grey: held out", x=0, xref="x domain", y=0, yref="y domain", xanchor="left", yanchor="bottom", showarrow=False, font={"size": 11}

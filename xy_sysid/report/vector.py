@@ -11,6 +11,7 @@ import re
 import tempfile
 from collections.abc import Mapping, Sequence
 from html import unescape
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -40,10 +41,7 @@ DECADES = 1.6  # of a logarithmic axis below which 2 and 5 are named, too
 
 def vectors(figure: go.Figure, kinds: Sequence[str]) -> dict[str, bytes]:
     """The figure as svg, pdf or both, by kind: drawn once, written in each. Raises MissingExtra without Matplotlib."""
-    try:
-        import matplotlib as mpl
-    except ModuleNotFoundError:
-        raise MissingExtra("Matplotlib, which draws vectors,", "figures") from None
+    mpl = installed()
     look: Any = {
         "font.family": [_font()[0], "DejaVu Sans"],
         "svg.fonttype": "path",
@@ -56,6 +54,15 @@ def vectors(figure: go.Figure, kinds: Sequence[str]) -> dict[str, bytes]:
     with mpl.rc_context(look):
         drawn = _drawn(figure)
         return {kind: _written(drawn, kind) for kind in kinds}
+
+
+def installed() -> ModuleType:
+    """Matplotlib, or MissingExtra."""
+    try:
+        import matplotlib as mpl
+    except ModuleNotFoundError:
+        raise MissingExtra("Matplotlib, which draws vectors,", "figures") from None
+    return mpl
 
 
 @functools.cache

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-from xy_sysid.axis.model import STANDARD
 from xy_sysid.fitting import Interval
 from xy_sysid.units import motion, readable
 
@@ -55,6 +54,8 @@ def _not_negative(name: str) -> bool:
     effect, _, own = name.partition(".")
     if not own:
         return effect == "delay"
+    from xy_sysid.axis.model import STANDARD  # a second: who only draws does without
+
     known = STANDARD.effects.get(effect)
     return known is not None and any(item.name == own and item.low >= 0.0 for item in known.parameters)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -26,6 +27,8 @@ from xy_sysid.samples.recording import Run
 from xy_sysid.settings import unknown_name
 from xy_sysid.story.pictures import Measured, Pictures, measured, pictures
 from xy_sysid.units import Units
+
+HELPS_NO_MORE = "No effect of the library helps any further."
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,15 +146,17 @@ def next_best(story: Story, run: Run, library: Library = STANDARD) -> Story:
     if story.now is None:
         return story
     planned = _planned(story)
+    if planned is None and story.now.explained:
+        return replace(story, note="Nothing is left to explain: the held-out error is at the noise floor.")
+    if planned is None and _searched(story):
+        return replace(story, note=HELPS_NO_MORE)
     data = prepare(run.sampling_rate, run.voltage, run.position, story.tolerance, run.units)
     if planned is not None:
         return _shown(story, data, planned, library)
-    if story.now.explained:
-        return replace(story, note="Nothing is left to explain: the held-out error is at the noise floor.")
     found = refine(data, library, story.effects, Effort(most=MOST_EFFECTS - len(story.effects)))
     new = [step for step in found.steps if not set(step.names) <= {*story.effects}]
     if not new:
-        return replace(story, note="No effect of the library helps any further.")
+        return replace(story, note=HELPS_NO_MORE)
     return _grown(story, data, new[0].fit, new[0].added, None)
 
 
@@ -194,13 +199,18 @@ def allowed(name: str, library: Library = STANDARD) -> None:
 
 def _planned(story: Story) -> Rung | None:
     """What the diagnosis has fitted already as the next step from here."""
-    found = story.diagnosis
-    if found is None:
-        return None
-    for here, following in zip(found.ladder, found.ladder[1:], strict=False):
-        if following.added is not None and here.effects == story.effects and here.values == story.steps[-1].rung.values:
-            return following
-    return None
+    rungs = story.diagnosis.ladder if story.diagnosis is not None else ()
+    return next((after for here, after in pairwise(rungs) if after.added is not None and _stands_on(story, here)), None)
+
+
+def _searched(story: Story) -> bool:
+    """The diagnosis has tried everything from here, and no more helped: to search once more would say the same."""
+    rungs = story.diagnosis.ladder if story.diagnosis is not None else ()
+    return bool(rungs) and _stands_on(story, rungs[-1])
+
+
+def _stands_on(story: Story, here: Rung) -> bool:
+    return here.effects == story.effects and here.values == story.steps[-1].rung.values
 
 
 def _shown(story: Story, data: AxisData, step: Rung, library: Library) -> Story:

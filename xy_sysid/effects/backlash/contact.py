@@ -49,7 +49,10 @@ class Contact:
             if fit.scale(innovation[task.stages[1] :]) * task.noise > (1.0 if idle else BEHIND) * task.limits.bar:
                 return self._told(fit, task, best, (looseness, innovation))
         best = fit.solved(best, np.arange(best.size), whole, 20, 1e-3)
-        calm = replace(whole, looseness=self._seen(fit, best, task)[0])
+        looseness, innovation = self._seen(fit, best, task)
+        if task.limits.bar is not None and fit.scale(innovation[task.stages[1] :]) * task.noise > task.limits.bar:
+            return self._told(fit, task, best, (looseness, innovation))
+        calm = replace(whole, looseness=looseness)
         best = fit.solved(best, np.arange(best.size), calm, 10, 1e-3)
         rigid = self._rigid(fit, self._closed(fit, rigid, best, near), whole, 1e-3)
         without = self._seen(fit.softened(SOFT), rigid, task)[1]
@@ -57,10 +60,11 @@ class Contact:
 
     @staticmethod
     def _seen(fit: Innovations, inner: FloatArray, task: OneStepTask) -> tuple[float, FloatArray]:
-        """The process noise with which the filter predicts the training best, over the usual, and all innovations with it."""
-        _, training, n = task.stages
-        found = ((looseness, fit.seen(inner, View(n, looseness))) for looseness in FORGIVING)
-        return min(found, key=lambda item: _rms(item[1][:training]))
+        """The process noise with which the filter predicts the first stage best, over the usual, and all innovations with it."""
+        first, training, n = task.stages
+        sizes = {looseness: _rms(fit.seen(inner, View(min(first, training), looseness))) for looseness in FORGIVING}
+        looseness = min(FORGIVING, key=lambda item: sizes[item])
+        return looseness, fit.seen(inner, View(n, looseness))
 
     @staticmethod
     def _told(
