@@ -138,6 +138,12 @@ def _classes(path: Path) -> list[str]:
     return [name for name in found if name[0].isupper() and not name.isupper() and "_" not in name]
 
 
+def test_slow_parts_of_scipy_are_loaded_when_they_are_first_used() -> None:
+    """``import scipy`` is enough: scipy.signal and scipy.stats take a second, which most commands and nodes need not wait for."""
+    slow = re.compile(r"^(import|from) scipy\.(signal|stats|optimize)\b|^from scipy import", re.MULTILINE)
+    assert [str(path) for path in sources("xy_sysid") if slow.search(path.read_text(encoding="utf-8"))] == []
+
+
 def test_no_public_class_name_stands_for_two_things_in_the_core() -> None:
     """One name, one thing: who reads ``Quantity`` need not ask whose."""
     where: dict[str, list[str]] = {}

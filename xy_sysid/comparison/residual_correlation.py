@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.fft
+import scipy
 
 from xy_sysid.errors import BadInput
 from xy_sysid.response.frf import Z95

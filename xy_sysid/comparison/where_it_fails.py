@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import signal
 
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.floor import Floor, Windows, bands, encoder_noise, floor
@@ -167,7 +167,7 @@ def compare_motion(model: FloatArray, unseen: Unseen) -> Comparison:
         places.append(_place("frequency", (0.0, float(edges[1])), "Hz", abs(offset) / allowed, text))
     if noise > 0.0 and np.isfinite(noise):
         width = max(int(ENVELOPE * sampling_rate), 1)
-        power_in = np.asarray(signal.oaconvolve(unseen.voltage[first:-1] ** 2, np.full(width, 1.0 / width), mode="same"), dtype=np.float64)
+        power_in = np.asarray(scipy.signal.oaconvolve(unseen.voltage[first:-1] ** 2, np.full(width, 1.0 / width), mode="same"), dtype=np.float64)
         envelope, here = np.sqrt(np.maximum(power_in, 0.0))[counts], y[first:-1][counts]
         off, speed = low_error[counts], low_speed[counts]
         places += _binned("speed", (np.abs(speed), unseen.units.speed), SPEED_BINS, off, noise)
@@ -208,8 +208,8 @@ def _place(kind: PlaceKind, span: tuple[float, float], unit: str, ratio: float, 
 def _low_pass(values: FloatArray, end: float, sampling_rate: float) -> FloatArray:
     if end >= 0.45 * sampling_rate:
         return values
-    taps = signal.firwin(257, end, fs=sampling_rate)
-    return np.asarray(signal.oaconvolve(values, taps, mode="same"), dtype=np.float64)
+    taps = scipy.signal.firwin(257, end, fs=sampling_rate)
+    return np.asarray(scipy.signal.oaconvolve(values, taps, mode="same"), dtype=np.float64)
 
 
 def _frequency_places(edges: FloatArray, ratio: FloatArray, end: float) -> list[Place]:

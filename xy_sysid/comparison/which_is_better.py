@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import stats
 
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.floor import Windows, bands, encoder_noise, floor
@@ -112,7 +112,7 @@ def paired(before: FloatArray, after: FloatArray, position: FloatArray, sampling
     whole = [float(np.sqrt(np.sum(lines * layout.power(error)) * 2.0 / layout.length)) for error in errors]
     total = _log_ratio(power[0].sum(axis=1), power[1].sum(axis=1))
     mean, spread, t, p = _test(total)
-    reach = float(stats.t.ppf(0.975, windows - 1)) * spread
+    reach = float(scipy.stats.t.ppf(0.975, windows - 1)) * spread
     edges = layout.edges()
     found = []
     for k in range(layout.count):
@@ -153,7 +153,7 @@ def _test(values: FloatArray) -> tuple[float, float, float, float]:
     if spread == 0.0:
         return mean, 0.0, 0.0 if mean == 0.0 else float(np.copysign(np.inf, mean)), 1.0 if mean == 0.0 else 0.0
     t = mean / spread
-    return mean, spread, t, float(2.0 * stats.t.sf(abs(t), values.size - 1))
+    return mean, spread, t, float(2.0 * scipy.stats.t.sf(abs(t), values.size - 1))
 
 
 def _holm(chances: FloatArray) -> NDArray[np.bool_]:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.signal
+import scipy
 
 from xy_sysid.errors import BadInput
 from xy_sysid.samples.block import FloatArray

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
+import scipy
 
 from xy_sysid.axis.linear_part import lag_of
 from xy_sysid.axis.model import AxisModel

@@ -11,8 +11,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.special
-from scipy.stats import qmc
+import scipy
 
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.comparison.physical_model import PhysicalModel
@@ -109,7 +108,7 @@ def samples(model: PhysicalModel, count: int) -> tuple[AxisModel, ...]:
             raise BadInput(f"interval of {item.name}", "not finite", "one that the data determine", "Record a longer or livelier motion.")
     if not known:
         return (model.model,)
-    points = qmc.Halton(len(known), scramble=False).random(count + SKIPPED)[SKIPPED:]
+    points = scipy.stats.qmc.Halton(len(known), scramble=False).random(count + SKIPPED)[SKIPPED:]
     return (model.model, *(with_values(model.model, dict(_drawn(known, row))) for row in points))
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from functools import cache, lru_cache
 
 import numpy as np
-import scipy.signal
+import scipy
 
 from xy_sysid.effects._similarity import Similarity
 from xy_sysid.samples.block import FloatArray

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.signal import ellip, sosfilt, sosfreqz
+import scipy
 
 from xy_sysid.errors import BadInput
 from xy_sysid.excitation.contract import Parts, below_nyquist
@@ -28,10 +28,10 @@ PIECE = 512  # samples filtered at a time: a call costs as much as 500 samples
 
 def sections(low: float, high: float, rate: float) -> FloatArray:
     """(sections, 6) second-order sections of the band-pass with unit gain in the band; low = 0 keeps DC."""
-    lowpass = np.asarray(ellip(ORDER, RIPPLE_DB, STOP_DB, high, "lowpass", output="sos", fs=rate), dtype=np.float64)
+    lowpass = np.asarray(scipy.signal.ellip(ORDER, RIPPLE_DB, STOP_DB, high, "lowpass", output="sos", fs=rate), dtype=np.float64)
     if low == 0:
         return lowpass
-    return np.vstack((lowpass, np.asarray(ellip(ORDER, RIPPLE_DB, STOP_DB, low, "highpass", output="sos", fs=rate), dtype=np.float64)))
+    return np.vstack((lowpass, np.asarray(scipy.signal.ellip(ORDER, RIPPLE_DB, STOP_DB, low, "highpass", output="sos", fs=rate), dtype=np.float64)))
 
 
 def power_gain(sos: FloatArray, low: float, high: float, rate: float) -> float:
@@ -39,14 +39,14 @@ def power_gain(sos: FloatArray, low: float, high: float, rate: float) -> float:
     top = min(1.5 * high, rate / 2)  # beyond it is less than 1e-6 of the power
     near_low = low * np.geomspace(0.5, 100, 20_001)
     frequency = np.union1d(np.linspace(0, top, 40_001), near_low[near_low < top])
-    gain = np.abs(np.asarray(sosfreqz(sos, frequency, fs=rate)[1])) ** 2
+    gain = np.abs(np.asarray(scipy.signal.sosfreqz(sos, frequency, fs=rate)[1])) ** 2
     return float(np.trapezoid(gain, frequency) / (rate / 2))
 
 
 def _filtered(sos: FloatArray, scale: float, seed: int) -> Iterator[FloatArray]:
     white, state = np.random.Generator(np.random.Philox(seed)), np.zeros((sos.shape[0], 2))
     while True:
-        piece, state = sosfilt(sos, white.standard_normal(PIECE), zi=state)
+        piece, state = scipy.signal.sosfilt(sos, white.standard_normal(PIECE), zi=state)
         yield np.asarray(piece, dtype=np.float64) * scale
 
 

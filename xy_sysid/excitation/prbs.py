@@ -10,7 +10,7 @@ Source: S. W. Golomb, "Shift Register Sequences", 1967; clock rule: L. Ljung, "S
 from __future__ import annotations
 
 import numpy as np
-from scipy.signal import max_len_seq
+import scipy
 
 from xy_sysid.errors import BadInput
 from xy_sysid.excitation.contract import Periodic, below_nyquist, samples
@@ -37,5 +37,5 @@ def prbs(settings: AxisExcitation, rate: float) -> Periodic:
     bits, chip = layout(settings, rate)
     register = settings.seed % (2**bits - 1) + 1
     state = np.array([register >> k & 1 for k in range(bits)], dtype=np.int8)
-    sequence = np.asarray(max_len_seq(bits, state=state)[0], dtype=np.float64)
+    sequence = np.asarray(scipy.signal.max_len_seq(bits, state=state)[0], dtype=np.float64)
     return Periodic(np.repeat(settings.rms * (2 * sequence - 1), chip))

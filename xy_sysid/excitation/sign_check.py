@@ -19,7 +19,7 @@ Source: generalized likelihood ratio test, S. M. Kay, Fundamentals of Statistica
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import nnls
+import scipy
 
 from xy_sysid.excitation.encoder_noise import BENT, EncoderNoise
 from xy_sysid.samples.block import FloatArray
@@ -122,7 +122,7 @@ def _against(steps: FloatArray, responses: FloatArray, unsure: FloatArray, span:
         return False
     both = both / scale
     step, told = both[:, 0], both[:, 1:]
-    fits = [nnls(sign * told, step) for sign in (1.0, -1.0)]
+    fits = [scipy.optimize.nnls(sign * told, step) for sign in (1.0, -1.0)]
     plus, minus = (float(residual) ** 2 for _, residual in fits)
     if plus < len(step) / BETTER or plus < BETTER * minus:
         return False

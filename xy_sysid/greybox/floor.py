@@ -12,9 +12,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-import scipy.fft
-import scipy.ndimage
-import scipy.signal
+import scipy
 from numpy.typing import NDArray
 
 from xy_sysid.response.frf import ComplexArray

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 import numpy as np
-import scipy.signal
+import scipy
 
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.effects import Effect, Scene

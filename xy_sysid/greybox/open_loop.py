@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import least_squares
+import scipy
 
 from xy_sysid.axis.model import AxisModel, simulator, start_of
 from xy_sysid.effects import Effect
@@ -97,7 +97,7 @@ def settled(data: AxisData, fitted: GreyboxFit) -> GreyboxFit:
         return np.concatenate((drift / far, (data.velocity - velocity) / fast))
 
     inside = np.clip(start / size, low + EDGE, high - EDGE)
-    found = least_squares(left, inside, bounds=(low, high), diff_step=[STEP] * size.size, max_nfev=ROUNDS)
+    found = scipy.optimize.least_squares(left, inside, bounds=(low, high), diff_step=[STEP] * size.size, max_nfev=ROUNDS)
     values = found.x * size
     best = _moved(model, free, values)
     return _with(data, fitted, best, run(best.row, begins))

@@ -12,7 +12,7 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-import scipy.signal
+import scipy
 
 from xy_sysid.effects import Effect, Scene
 from xy_sysid.effects._scene import Guess

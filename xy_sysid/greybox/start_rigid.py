@@ -7,7 +7,7 @@ least is taken. The response is that of the mean velocity per sample behind a ze
 from __future__ import annotations
 
 import numpy as np
-import scipy.signal
+import scipy
 
 from xy_sysid.samples.block import FloatArray
 

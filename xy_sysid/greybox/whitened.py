@@ -7,7 +7,7 @@ A fair rival of every one-step prediction: it, too, follows whatever the physics
 from __future__ import annotations
 
 import numpy as np
-import scipy.signal
+import scipy
 from numpy.typing import NDArray
 
 from xy_sysid.errors import BadInput

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t as student
+import scipy
 
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.hypotheses.criteria import CHANCE, OVERLAP
@@ -27,7 +27,7 @@ class Gain:
             return float(self.nats > 0.0)
         if self.error == 0.0:
             return 0.5 if self.nats == 0.0 else float(self.nats > 0.0)
-        return float(student.cdf(self.nats / self.error, max(self.windows - 1.0, 1.0)))
+        return float(scipy.stats.t.cdf(self.nats / self.error, max(self.windows - 1.0, 1.0)))
 
     @property
     def is_sure(self) -> bool:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.linalg
+import scipy
 
 from xy_sysid.errors import BadInput
 from xy_sysid.linear.any_model import AnyModel

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import welch
 
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import Recording
@@ -119,7 +119,7 @@ def excitation(recording: Recording, axis: str) -> Excitation:
 def density(signal: FloatArray, sampling_rate: float) -> Density:
     """One-sided power spectral density (Welch, Hann), averaged in bins of equal width on a log axis."""
     segment = max(min(LONGEST_SEGMENT, signal.shape[0] // 4), min(16, signal.shape[0]))
-    frequency, power = welch(signal, sampling_rate, nperseg=segment)
+    frequency, power = scipy.signal.welch(signal, sampling_rate, nperseg=segment)
     frequency, power = _log_bins(np.asarray(frequency)[1:], np.asarray(power)[1:])
     level = float(np.sum(power**2 * np.gradient(frequency)) / max(float(np.sum(power * np.gradient(frequency))), np.finfo(float).tiny))
     inside = np.flatnonzero((power >= EDGE * level) & (power > 0.0))

@@ -7,7 +7,7 @@ One complex transform serves both signals, u + j y: the spectrum of a real signa
 from __future__ import annotations
 
 import numpy as np
-from scipy import fft
+import scipy
 
 from xy_sysid.errors import BadInput
 from xy_sysid.jit import compiled
@@ -78,7 +78,7 @@ def batch_spectra(runs: list[tuple[int, FloatArray, FloatArray]], shape: WindowS
         for start in range(0, number, CHUNK):
             part = joined[: min(CHUNK, number - start)]
             scale = _join(inputs, outputs, offset + start * shape.hop, shape.hop, taper, part)
-            _accumulate(fft.fft(part, overwrite_x=True), scale, gxx, gyy, real, imag)
+            _accumulate(scipy.fft.fft(part, overwrite_x=True), scale, gxx, gyy, real, imag)
         indices += range(first, first + number)
     if not indices:
         longest = max((len(u) for _, u, _ in runs), default=0)

@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from xy_sysid.samples.block import FloatArray
 
@@ -79,7 +79,7 @@ def distortion(sampling_rate: float, u: FloatArray, y: FloatArray, period: int) 
     rows = slice(period, (periods + 1) * period)
     inputs, outputs = (np.fft.rfft(values[rows].reshape(periods, period), axis=1)[:, 1:] * 2.0 / period for values in (u, velocity))
     size = np.abs(inputs.mean(axis=0))
-    strongest = ndimage.maximum_filter1d(size, 2 * NEAR + 1)
+    strongest = scipy.ndimage.maximum_filter1d(size, 2 * NEAR + 1)
     used = strongest > WEAK * float(size.max())
     excited = used & (size > EXCITED * strongest)
     number = np.arange(1, size.size + 1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import fft
+import scipy
 
 from xy_sysid.errors import BadInput
 from xy_sysid.samples.block import FloatArray
@@ -24,8 +24,8 @@ def find_period(u: FloatArray, shortest: int = 16) -> int | None:
     power = float(np.dot(signal, signal))
     if number < FEWEST * shortest or power == 0.0:
         return None
-    size = fft.next_fast_len(2 * number, real=True)
-    correlation = fft.irfft(np.abs(fft.rfft(signal, size)) ** 2, size)[: number // FEWEST + 1]
+    size = scipy.fft.next_fast_len(2 * number, real=True)
+    correlation = scipy.fft.irfft(np.abs(scipy.fft.rfft(signal, size)) ** 2, size)[: number // FEWEST + 1]
     overlap = 1.0 - np.arange(correlation.shape[0]) / number
     alike = correlation / (power * overlap)
     below = np.flatnonzero(alike < 0.5)
@@ -50,8 +50,8 @@ def find_half_period(u: FloatArray, shortest: int = 16) -> int | None:
     number, power = signal.shape[0], float(np.dot(signal, signal))
     if number < FEWEST * shortest or power == 0.0:
         return None
-    size = fft.next_fast_len(2 * number, real=True)
-    correlation = fft.irfft(np.abs(fft.rfft(signal, size)) ** 2, size)[: number // FEWEST + 1]
+    size = scipy.fft.next_fast_len(2 * number, real=True)
+    correlation = scipy.fft.irfft(np.abs(scipy.fft.rfft(signal, size)) ** 2, size)[: number // FEWEST + 1]
     alike = correlation / (power * (1.0 - np.arange(correlation.shape[0]) / number))
     half = int(np.argmin(alike[shortest:])) + shortest
     tones = _odd_lines(signal[:half])
@@ -90,7 +90,7 @@ def half_periods(u: FloatArray, y: FloatArray, half: int, differenced: bool = Tr
 
 def _odd_lines(part: FloatArray) -> FloatArray:
     """Sizes of the odd lines of a period that is this part (n,) and its negative."""
-    return np.asarray(np.abs(fft.rfft(np.concatenate((part, -part))))[1::2])
+    return np.asarray(np.abs(scipy.fft.rfft(np.concatenate((part, -part))))[1::2])
 
 
 def _whole(signal: FloatArray, period: int) -> bool:

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import fft
 
 from xy_sysid.jit import compiled
 from xy_sysid.response.frf import ComplexArray
@@ -98,7 +98,7 @@ class Transformer:
 
     def lines(self, values: FloatArray) -> ComplexArray:
         """(axes, lines) of (length, axes) samples of one signal."""
-        return np.asarray(fft.rfft(_tapered(values, self._taper)), dtype=np.complex128)
+        return np.asarray(scipy.fft.rfft(_tapered(values, self._taper)), dtype=np.complex128)
 
 
 def of_pair(index: int, x: ComplexArray, y: ComplexArray) -> WindowSpectrum:

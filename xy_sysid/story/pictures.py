@@ -10,8 +10,8 @@ import contextlib
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import signal
 
 from xy_sysid.axis.linear_part import linear_part
 from xy_sysid.comparison.residual_correlation import ResidualCorrelation, residual_correlation
@@ -230,7 +230,7 @@ def _below(values: FloatArray, end: float, sampling_rate: float) -> FloatArray:
     """The part below ``end`` Hz."""
     if end >= TOP * sampling_rate:
         return values
-    return np.asarray(signal.oaconvolve(values, signal.firwin(257, end, fs=sampling_rate), mode="same"), dtype=np.float64)
+    return np.asarray(scipy.signal.oaconvolve(values, scipy.signal.firwin(257, end, fs=sampling_rate), mode="same"), dtype=np.float64)
 
 
 def _response(data: AxisData, position: FloatArray) -> FrequencyResponse:
@@ -304,7 +304,7 @@ def _zoom(data: AxisData, base: GreyboxFit) -> tuple[int, int]:
     """The samples around the largest error that is not encoder noise."""
     width = min(int(ZOOM * data.sampling_rate), ZOOM_MOST, base.error.size)
     smooth = max(int(0.002 * data.sampling_rate), 1)
-    power = signal.oaconvolve(base.error, np.full(smooth, 1.0 / smooth), mode="same") ** 2
+    power = scipy.signal.oaconvolve(base.error, np.full(smooth, 1.0 / smooth), mode="same") ** 2
     skip = min(int(0.5 * data.sampling_rate), power.size // 4)  # the simulation starts from rest
     start = skip + int(np.argmax(power[skip:])) - width // 2
     start = min(max(start, 0), base.error.size - width)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy import signal
+import scipy
 
 from xy_sysid.errors import BadInput
 from xy_sysid.jit import compiled
@@ -157,7 +157,7 @@ def _starts(rate: float, inputs: Sequence[FloatArray], speeds: Sequence[FloatArr
 
 def _lagged(values: FloatArray, keep: float) -> FloatArray:
     """(n,) first-order answer to held values, from rest at the first."""
-    return np.asarray(signal.lfilter([0.0, 1.0 - keep], [1.0, -keep], values), dtype=np.float64)
+    return np.asarray(scipy.signal.lfilter([0.0, 1.0 - keep], [1.0, -keep], values), dtype=np.float64)
 
 
 def _answer(

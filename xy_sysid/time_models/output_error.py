@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy import optimize, stats
+import scipy
 
 from xy_sysid.samples.block import FloatArray
 
@@ -73,7 +73,7 @@ class Minimized:
         variance = float(slope @ self.covariance @ slope) if np.all(np.isfinite(self.covariance)) else np.inf
         if not np.isfinite(variance):
             return Told(name=name, value=value, low=0.0 if positive else -np.inf, high=np.inf, unit=unit)
-        width = float(stats.t.ppf(0.975, max(self.independent - self.values.size, 1.0))) * np.sqrt(max(variance, 0.0))
+        width = float(scipy.stats.t.ppf(0.975, max(self.independent - self.values.size, 1.0))) * np.sqrt(max(variance, 0.0))
         if positive and value > 0.0:
             factor = float(np.exp(min(width / value, 700.0)))
             return Told(name=name, value=value, low=value / factor, high=value * factor, unit=unit)
@@ -102,7 +102,9 @@ def solved(
         return np.nan_to_num(found, nan=1e6, posinf=1e6, neginf=-1e6)
 
     found = [
-        optimize.least_squares(error, np.clip(start, low, high), bounds=(low, high), x_scale=scale, diff_step=np.full(scale.size, 1e-5), max_nfev=60)
+        scipy.optimize.least_squares(
+            error, np.clip(start, low, high), bounds=(low, high), x_scale=scale, diff_step=np.full(scale.size, 1e-5), max_nfev=60
+        )
         for start in starts
     ]
     best = min(found, key=lambda item: float(item.cost))

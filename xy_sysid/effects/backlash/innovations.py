@@ -7,7 +7,7 @@ from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.optimize
+import scipy
 from numpy.typing import NDArray
 
 from xy_sysid.effects._contract import Beside, Effect, Parameter, in_time
