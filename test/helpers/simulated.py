@@ -11,14 +11,11 @@ from xy_sysid.samples.recording import Recording
 from xy_sysid.settings import AxisExcitation, ExcitationSettings
 
 
-def recorded(effect: str, seconds: float = 30.0, seed: int = 21, counts: float = 0.0) -> Recording:
-    """counts: of the encoder, per revolution of 5 mm; 0 as the machine has it."""
+def recorded(effect: str, seconds: float = 30.0, seed: int = 21, counts: float = 0.0, encoder_on: str = "motor") -> Recording:
+    """counts: of the encoder, per revolution of 5 mm; 0 as the machine has it; encoder_on: motor or table."""
     machine = Machine.from_file("rigid.yaml", seed)
-    if counts:
-        spec = machine.spec
-        machine = Machine(
-            replace(spec, axes=tuple(replace(a, drive=a.drive.model_copy(update={"counts_per_revolution": counts})) for a in spec.axes))
-        )
+    own: dict[str, object] = {"encoder_on": encoder_on, **({"counts_per_revolution": counts} if counts else {})}
+    machine = Machine(replace(machine.spec, axes=tuple(replace(a, drive=a.drive.model_copy(update=own)) for a in machine.spec.axes)))
     machine = with_effects(machine, effect.split("+")) if effect else machine
     axes = {axis: AxisExcitation(seed=seed + k) for k, axis in enumerate(machine.axes)}
     return drive(machine, ExcitationSettings(lockstep=True, speed=0.0, axes=axes), seconds, lambda _: None)

@@ -103,7 +103,9 @@ def undoing(name: str, effects: Sequence[Effect]) -> str:
 
 def undoable(effect: Effect) -> bool:
     """True if what the effect does follows from voltage, position and time alone."""
-    return effect.category in ("input", "encoder", "motion") or (effect.category in ("force", "state") and not heeds_speed(effect))
+    if effect.category == "motion":
+        return effect.can_be_undone
+    return effect.category in ("input", "encoder") or (effect.category in ("force", "state") and not heeds_speed(effect))
 
 
 def bends(effect: Effect) -> bool:

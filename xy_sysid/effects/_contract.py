@@ -356,6 +356,14 @@ class Effect:
         return self.category in ("motion", "encoder")
 
     @property
+    def can_be_undone(self) -> bool:
+        """True for a section of the motion whose zeros are damped, so that what goes in follows from what comes out."""
+        section = self.functions["section"]
+        words = {"fs": 2000.0, **dict(zip(self.names, self.typical, strict=True))}
+        zeros = np.roots(section(**{name: words[name] for name in arguments(section)})[:3])
+        return bool(np.all(np.abs(zeros) < 1.0 - 1e-6))
+
+    @property
     def is_by_place(self) -> bool:
         """True for a law that asks where the axis is."""
         return any("x" in arguments(item) for item in self.functions.values())

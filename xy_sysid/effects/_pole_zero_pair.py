@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -43,7 +44,13 @@ def pair(zero: float, zero_damping: float, pole: float, pole_damping: float, fs:
 
 
 def guesses(scene: Scene, low: float, high: float) -> Iterator[Guess]:
-    """Traces of the likeliest pairs with poles between ``low`` and ``high`` (Hz); none where the sampling is too slow to see one."""
+    """The likeliest pairs with poles between ``low`` and ``high`` (Hz)."""
+    for trace, frequency in traces(scene, low, high):
+        yield Guess(trace, _Reader(frequency))
+
+
+def traces(scene: Scene, low: float, high: float) -> Iterator[tuple[FloatArray, float]]:
+    """(2, n) traces of the likeliest poles between ``low`` and ``high`` (Hz), and their frequencies; none where sampling is too slow to see one."""
     top = min(high, 0.35 * scene.sampling_rate)
     if top <= low:
         return
@@ -54,7 +61,7 @@ def guesses(scene: Scene, low: float, high: float) -> Iterator[Guess]:
         a = np.array([c * c + 2.0 * _DAMPING * w * c + w * w, 2.0 * (w * w - c * c), c * c - 2.0 * _DAMPING * w * c + w * w])
         poles = scipy.signal.lfilter([1.0], a, model)  # and both numerators of what they make
         once, twice = np.append(0.0, poles[:-1]), np.concatenate(((0.0, 0.0), poles[:-2]))
-        yield Guess(columns(c * c * (poles - 2.0 * once + twice), c * w * (poles - twice)), _Reader(float(frequency)))
+        yield columns(c * c * (poles - 2.0 * once + twice), c * w * (poles - twice)), float(frequency)
 
 
 def _likely(scene: Scene, frequencies: FloatArray) -> FloatArray:
@@ -98,22 +105,32 @@ class _Reader:
 
 
 def joint(scene: Scene, low: float, high: float) -> Iterator[tuple[float, float, float, tuple[float, ...]]]:
-    """Gain, delay beyond the scene's, pole, and the pair's parameters, all from the frequency response.
-
-    Three poles and two zeros, by linear least squares with weights worked out again (Sanathanan & Koerner 1963), for delays
-    on a grid; the pair must lie between ``low`` and ``high`` (Hz).
-    """
-    found = _of_response(scene)
-    if found is None:
+    """Gain, delay beyond the scene's, pole, and the pair's parameters, all from the frequency response; the pair must lie between
+    ``low`` and ``high`` (Hz)."""
+    found = of_response(scene, zeros=2)
+    if found is None or found.zero is None:
         return
-    gain, delay, pole, (split, bottom, *dampings) = found
-    if low <= bottom <= high:
-        yield gain, delay, pole, (split, bottom, *dampings)
+    bottom, top = found.zero[0], found.pair[0]
+    if low <= bottom <= high and top > bottom:
+        yield found.gain, found.delay, found.pole, (top / bottom - 1.0, bottom, found.zero[1], found.pair[1])
 
 
-@lru_cache(maxsize=1)
-def _of_response(scene: Scene) -> tuple[float, float, float, tuple[float, ...]] | None:
-    """What ``joint`` gives, for a pair anywhere: once for all effects that are one."""
+@dataclass(frozen=True, slots=True)
+class OfResponse:
+    """A base with a pair of poles, as a frequency response shows it: gain, m/s/V; delay beyond the scene's, s; pole, rad/s;
+    frequency (Hz) and damping ratio of the pair, and of the zeros if there are two that swing."""
+
+    gain: float
+    delay: float
+    pole: float
+    pair: tuple[float, float]
+    zero: tuple[float, float] | None
+
+
+@lru_cache(maxsize=2)
+def of_response(scene: Scene, zeros: int) -> OfResponse | None:
+    """Three poles and so many zeros, by linear least squares with weights worked out again (Sanathanan & Koerner 1963), for delays on a
+    grid: once for all effects that ask. None where that is no base with a pair of poles."""
     f, response, weight = _response(scene)
     if f.size < 4:  # three lines hold the six numbers, more judge them
         return None
@@ -121,19 +138,20 @@ def _of_response(scene: Scene) -> tuple[float, float, float, tuple[float, ...]] 
     s = 2j * math.pi * f / scale
     box = np.sinc(f / scene.sampling_rate) ** 2  # held input, mean output
     powers = np.stack([s**2, s, s**0], axis=1)
+    above = powers[:, 2 - zeros :]
 
     def fitted(delays: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """(delays, 6) numerator and denominator, and (delays,) misfit, for each, s; all at once."""
+        """(delays, zeros + 4) numerator and denominator, and (delays,) misfit, for each, s; all at once."""
         target = response * np.exp(np.outer(delays, s * scale)) / box
-        matrix = np.concatenate((np.broadcast_to(powers, (delays.size, *powers.shape)), -target[:, :, None] * powers), axis=2)
-        right, denominator, found = target * s**3, np.ones_like(target), np.zeros((delays.size, 6))
+        matrix = np.concatenate((np.broadcast_to(above, (delays.size, *above.shape)), -target[:, :, None] * powers), axis=2)
+        right, denominator, found = target * s**3, np.ones_like(target), np.zeros((delays.size, zeros + 4))
         for _ in range(6):
             row = (weight / (np.abs(target) * np.abs(denominator)))[:, :, None]
             both, wanted = matrix * row, right[:, :, None] * row
             q, r = np.linalg.qr(np.concatenate((both.real, both.imag), axis=1))
             found = (np.linalg.pinv(r) @ (q.transpose(0, 2, 1) @ np.concatenate((wanted.real, wanted.imag), axis=1)))[:, :, 0]
-            denominator = s**3 + found[:, 3:] @ powers.T
-        misfit = np.sum((weight * np.abs(1.0 - found[:, :3] @ powers.T / denominator / target)) ** 2, axis=1)
+            denominator = s**3 + found[:, -3:] @ powers.T
+        misfit = np.sum((weight * np.abs(1.0 - found[:, :-3] @ above.T / denominator / target)) ** 2, axis=1)
         return found, np.where(np.isfinite(misfit), misfit, np.inf)
 
     delays = np.arange(-12.0, 4.01) / scene.sampling_rate  # a rigid base takes a large pair for more delay
@@ -143,18 +161,24 @@ def _of_response(scene: Scene) -> tuple[float, float, float, tuple[float, ...]] 
     best = int(np.argmin(misfit))
     if not np.isfinite(misfit[best]):
         return None
-    delay, c = float(delays[best]), found[best]
-    zeros, poles = np.roots(c[:3]) * scale, np.roots([1.0, *c[3:]]) * scale
+    c = found[best]
+    poles = np.asarray(np.roots([1.0, *c[-3:]]) * scale, dtype=np.complex128)
     real = poles[np.abs(poles.imag) < 1e-9 * np.abs(poles)]
-    pair_of = poles[poles.imag > 1e-9 * np.abs(poles)]
-    zero_of = zeros[zeros.imag > 0.0]
-    if real.size != 1 or pair_of.size != 1 or zero_of.size != 1 or real[0].real >= 0.0:
+    pair_of = _swinging(poles)
+    if real.size != 1 or pair_of is None or real[0].real >= 0.0:
         return None
-    bottom, top = float(abs(zero_of[0])) / (2.0 * math.pi), float(abs(pair_of[0])) / (2.0 * math.pi)
-    if top <= bottom:
+    return OfResponse(
+        float(c[-4] / c[-1]), float(delays[best]), -float(real[0].real), pair_of, _swinging(np.asarray(np.roots(c[:-3]) * scale, dtype=np.complex128))
+    )
+
+
+def _swinging(roots: NDArray[np.complex128]) -> tuple[float, float] | None:
+    """Frequency, Hz, and damping ratio of the one pair among the roots that swings; None if there is none."""
+    pair_of = roots[roots.imag > 1e-9 * np.abs(roots)]
+    if pair_of.size != 1:
         return None
-    dampings = [max(-float(root.real) / float(abs(root)), 1e-3) for root in (zero_of[0], pair_of[0])]
-    return float(c[2] / c[5]), delay, -float(real[0].real), (top / bottom - 1.0, bottom, dampings[0], dampings[1])
+    size = float(abs(pair_of[0]))
+    return size / (2.0 * math.pi), max(-float(pair_of[0].real) / size, 1e-3)
 
 
 @lru_cache(maxsize=1)

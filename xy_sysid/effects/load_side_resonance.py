@@ -1,0 +1,65 @@
+"""A spring between the motor and the load, on which the encoder sits."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from xy_sysid.effects import _pole_zero_pair
+from xy_sysid.effects._contract import Effect, Parameter, law
+from xy_sysid.effects._scene import Guess, Scene
+from xy_sysid.samples.block import FloatArray
+
+LOWEST, HIGHEST = 1.0, 600.0  # Hz, where it is looked for
+
+
+@law
+def section(frequency: float, damping: float, fs: float) -> tuple[float, float, float, float, float]:
+    """Two poles, and zeros at half the sampling rate, which delay nothing (bilinear)."""
+    a1, a2 = _pole_zero_pair.polynomial(frequency, damping, fs)
+    b0 = 0.25 * (1.0 + a1 + a2)
+    return b0, 2.0 * b0, b0, a1, a2
+
+
+def guesses(scene: Scene) -> Iterator[Guess]:
+    """The traces of poles, as of a pole-zero pair: only what their two coefficients say is another thing."""
+    for trace, frequency in _pole_zero_pair.traces(scene, LOWEST, HIGHEST):
+        yield Guess(trace, _Reader(frequency))
+
+
+class _Reader:
+    """(frequency, damping) from the two coefficients of poles at ``frequency``."""
+
+    def __init__(self, frequency: float) -> None:
+        self.frequency = frequency
+
+    def __call__(self, c: FloatArray) -> tuple[float, ...]:
+        return (self.frequency, min(max(-0.5 * float(c[1]), 0.005), 0.5))
+
+
+def joint(scene: Scene) -> Iterable[tuple[float, float, float, tuple[float, ...]]]:
+    """Base and poles from the frequency response."""
+    found = _pole_zero_pair.of_response(scene, zeros=0)
+    if found is not None and LOWEST <= found.pair[0] <= HIGHEST:
+        yield found.gain, found.delay, found.pole, found.pair
+
+
+EFFECT = Effect(
+    name="load_side_resonance",
+    law="v = v_rigid w^2 / (s^2 + 2 d w s + w^2); w = 2 pi frequency",
+    meaning="shaft, belt or gear between motor and load gives; the encoder sits on the load (link side, glass scale)",
+    validity="one mode, small amplitude; friction sits at the motor, whose motion the encoder does not see",
+    source="Spong, Modeling and control of elastic joint robots, J. Dyn. Sys. Meas. Control 109 (1987), eq. 10",
+    category="motion",
+    parameters=(
+        Parameter("frequency", "Hz", 1.0, 2000.0, 60.0, "resonance: motor and load swing against each other"),
+        Parameter("damping", "", 1e-4, 1.0, 0.03, "its damping ratio"),
+    ),
+    shows="a resonance without an antiresonance before it, above which the motion falls and lags by 180 degrees more",
+    look_alikes=("screw_compliance", "base_resonance", "amplifier_lag"),
+    experiment="a second encoder on the motor: it sees an antiresonance before the same resonance",
+    functions={"section": section},
+    guesses=guesses,
+    joint=joint,
+    family="resonance",
+    mode_frequency="frequency",
+)
