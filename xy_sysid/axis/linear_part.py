@@ -48,7 +48,7 @@ def _polynomial(discrete: list[float]) -> Any:
     """In s, 1 at 0 Hz, with the roots s = ln(z) fs; those at z = -1 are no roots in s, they end the band."""
     roots = np.roots(discrete)
     kept = np.log(roots[(np.abs(roots) > 1e-9) & (np.abs(roots + 1.0) > 1e-6)].astype(np.complex128)) * FINE
-    found = np.real(np.poly(kept))
+    found = np.real(np.atleast_1d(np.poly(kept)))
     return found / found[-1]
 
 

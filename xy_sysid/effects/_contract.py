@@ -259,7 +259,7 @@ class Effect:
     validity:    where the law holds, and where it does not
     source:      paper or book, with the equation
     category:    where it acts (table above)
-    parameters:  the first one is its size: at zero the effect is absent
+    parameters:  the first one is its size, or its limit or frequency: at zero the effect is absent
     shows:       how it looks in data
     look_alikes: names of effects that it can be taken for; words for people, which steer nothing
     experiment:  what separates it from them

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 
 from xy_sysid.effects import _pole_zero_pair
@@ -14,10 +15,13 @@ LOWEST, HIGHEST = 1.0, 600.0  # Hz, where it is looked for
 
 @law
 def section(frequency: float, damping: float, fs: float) -> tuple[float, float, float, float, float]:
-    """Two poles, and zeros at half the sampling rate, which delay nothing (bilinear)."""
-    a1, a2 = _pole_zero_pair.polynomial(frequency, damping, fs)
-    b0 = 0.25 * (1.0 + a1 + a2)
-    return b0, 2.0 * b0, b0, a1, a2
+    """Two poles by the bilinear transform, exact at the resonance (Franklin, Powell & Workman, 3rd ed., sec. 6.1): nothing is folded back."""
+    w = 2.0 * math.pi * frequency
+    turn = min(0.5 * w / fs, 1.4)
+    c = 2.0 * fs * turn / math.tan(turn)
+    whole = c * c + 2.0 * damping * w * c + w * w
+    b0 = w * w / whole
+    return b0, 2.0 * b0, b0, 2.0 * (w * w - c * c) / whole, (c * c - 2.0 * damping * w * c + w * w) / whole
 
 
 def guesses(scene: Scene) -> Iterator[Guess]:
