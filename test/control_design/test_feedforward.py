@@ -23,7 +23,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.samples.block import FloatArray
 
 RATE = 2000.0
-EFFECTS = [effect.name for effect in STANDARD.acting]
+EFFECTS = [effect.name for effect in STANDARD.acting if effect.name != "load_side_resonance"]
 LEFT = {"gain_drift", "backlash"}  # effects that no feedforward along a path undoes
 
 
@@ -161,3 +161,9 @@ def test_a_recorded_motion_becomes_a_path_without_delay() -> None:
     assert wanted.speed[inside] == pytest.approx(0.01 * 6 * np.pi * np.cos(2 * np.pi * 3.0 * t[inside]), abs=1e-3)
     with pytest.raises(BadInput, match="64 or more"):
         recorded(np.zeros(10), RATE, 50.0)
+
+
+def test_a_resonance_that_only_the_load_shows_is_refused_in_one_line() -> None:
+    """Nothing of it is undone by a feedforward that ends at the motor."""
+    with pytest.raises(BadInput, match="load_side_resonance is a section without roots in s.*Leave it out"):
+        feedforward(axis().with_effect("load_side_resonance", (60.0, 0.05)), path())

@@ -15,7 +15,8 @@ def recorded(effect: str, seconds: float = 30.0, seed: int = 21, counts: float =
     """counts: of the encoder, per revolution of 5 mm; 0 as the machine has it; encoder_on: motor or table."""
     machine = Machine.from_file("rigid.yaml", seed)
     own: dict[str, object] = {"encoder_on": encoder_on, **({"counts_per_revolution": counts} if counts else {})}
-    machine = Machine(replace(machine.spec, axes=tuple(replace(a, drive=a.drive.model_copy(update=own)) for a in machine.spec.axes)))
+    if own != {"encoder_on": "motor"}:
+        machine = Machine(replace(machine.spec, axes=tuple(replace(a, drive=a.drive.model_copy(update=own)) for a in machine.spec.axes)))
     machine = with_effects(machine, effect.split("+")) if effect else machine
     axes = {axis: AxisExcitation(seed=seed + k) for k, axis in enumerate(machine.axes)}
     return drive(machine, ExcitationSettings(lockstep=True, speed=0.0, axes=axes), seconds, lambda _: None)

@@ -114,9 +114,10 @@ class Pool:
             best = self.best
             if best.fit.excess < AT_FLOOR:
                 return
-            if best.moves is None and len(best.effects - self.kept) < self.most:
-                best.moves = self._moves(best)
-                yield from self._ways_back(best)
+            for node in dict.fromkeys((best, self.answer)):  # what would be said if the search ended here is another place to go on from
+                if node.moves is None and len(node.effects - self.kept) < self.most:
+                    node.moves = self._moves(node)
+                    yield from self._ways_back(node)
             move = self._next()
             if move is None:
                 return

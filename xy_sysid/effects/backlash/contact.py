@@ -49,10 +49,7 @@ class Contact:
             if fit.scale(innovation[task.stages[1] :]) * task.noise > (1.0 if idle else BEHIND) * task.limits.bar:
                 return self._told(fit, task, best, (looseness, innovation))
         best = fit.solved(best, np.arange(best.size), whole, 20, 1e-3)
-        looseness, innovation = self._seen(fit, best, task)
-        if task.limits.bar is not None and fit.scale(innovation[task.stages[1] :]) * task.noise > task.limits.bar:
-            return self._told(fit, task, best, (looseness, innovation))
-        calm = replace(whole, looseness=looseness)
+        calm = replace(whole, looseness=self._seen(fit, best, task)[0])
         best = fit.solved(best, np.arange(best.size), calm, 10, 1e-3)
         rigid = self._rigid(fit, self._closed(fit, rigid, best, near), whole, 1e-3)
         without = self._seen(fit.softened(SOFT), rigid, task)[1]
