@@ -165,5 +165,5 @@ def test_a_recorded_motion_becomes_a_path_without_delay() -> None:
 
 def test_a_resonance_that_only_the_load_shows_is_refused_in_one_line() -> None:
     """Nothing of it is undone by a feedforward that ends at the motor."""
-    with pytest.raises(BadInput, match="load_side_resonance is a section without roots in s.*Leave it out"):
+    with pytest.raises(BadInput, match=r"load_side_resonance is a section without roots in s.*Leave it out"):
         feedforward(axis().with_effect("load_side_resonance", (60.0, 0.05)), path())
