@@ -177,7 +177,7 @@ def real_disk(tries: int, folder: Path) -> Iterator[Found]:
 
 
 def full_stdout(tries: int, folder: Path) -> Iterator[Found]:
-    """What is said cannot be written: code 2, and one line on stderr if that can."""
+    """What is said cannot be written: code 2, and one line on stderr if that can, after the notes on the recording."""
     rigid(folder / "rec.npz")
     rec = str(folder / "rec.npz")
     for words in (("frf", rec), ("fit", rec, *RIGID, "--json"), ("effects", "--json"), ("columns", rec), ("--help",))[:tries]:
@@ -185,7 +185,8 @@ def full_stdout(tries: int, folder: Path) -> Iterator[Found]:
             done = subprocess.run(
                 [sys.executable, "-m", "xy_sysid", *words], stdout=full, stderr=subprocess.PIPE, env=environment(), check=False, timeout=120
             )
-        good = done.returncode == 2 and done.stderr.count(b"\n") == 1 and b"No space left" in done.stderr
+        last = done.stderr.splitlines()[-1:]
+        good = done.returncode == 2 and b"Traceback" not in done.stderr and b"No space left" in b"".join(last)
         yield Found("one line" if good else "not told", note="" if good else f"{words}: {done.returncode}, {done.stderr[-200:]!r}")
 
 

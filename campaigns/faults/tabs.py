@@ -62,7 +62,7 @@ class Scene:
         """The page; its address is the first line that it says."""
         begun = len(self.said("page"))
         self.start("page", "-m", "xy_sysid", "page", "--port", str(port), "--no-browse", "--folder", str(self.folder))
-        self.until(lambda: "http://" in self.said("page")[begun:], 60.0)
+        assert self.until(lambda: "http://" in self.said("page")[begun:], 180.0), self.said("page")
         self.address = self.said("page")[begun:].partition("http://")[2].partition("\n")[0].strip()
         self.address = f"http://{self.address}"
 

@@ -341,3 +341,14 @@ def test_an_output_that_is_the_input_is_answered_without_noise_on_the_terminal(t
                 said = cli("fit", path, *settings, "--method", method, *extra, "--json")
                 assert said.code in (0, 2) and "Warning" not in said.err
                 assert said.json if said.code == 0 else said.err.count("\n") == 1
+
+
+@pytest.mark.parametrize("strange", ["in random order", "against time"])
+def test_compare_says_that_input_and_output_do_not_belong_together(strange: str, tmp_path: Path) -> None:
+    """A model that leaves most of the motion is no model; text and JSON say so before any figure."""
+    position = rigid(30_000)["y"]
+    own = np.random.default_rng(2).permutation(position) if strange == "in random order" else position[::-1]
+    file = npz(tmp_path / "rec.npz", y=own)
+    assert "hardly describes this axis" in cli("compare", file).err
+    assert "hardly describes this axis" in cli("compare", file, "--json").json["notes"][-1]
+    assert "hardly describes this axis" not in cli("compare", npz(tmp_path / "right.npz")).err

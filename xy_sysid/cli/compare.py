@@ -83,7 +83,7 @@ def compare(
         emit(
             {
                 "model": None if model is None else str(model),
-                "notes": recording.notes,
+                "notes": [*recording.notes, *(f"axis {name}: {note}" for name, item in found.items() for note in item.notes)],
                 "axes": {name: _answer(item, splits[name]) for name, item in found.items()},
             }
         )

@@ -24,6 +24,9 @@ from xy_sysid.units import told
 HELD_OUT = 1.0 / 3.0  # of the recording, when a model was fitted to it
 SEEN = "the model was fitted to this very recording; only its last third is looked at"
 
+MOST_LEFT = 0.7  # of the motion: half of its power
+HARDLY = "The model leaves most of the motion: it hardly describes this axis, or input and output do not belong together."
+
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
@@ -86,7 +89,8 @@ def judge(recording: Recording, axis: str, model: AnyModel | None, settings: Ide
         encoder = encoder_noise(run.sampling_rate, recording.run(axis).position, run.measured, recording.run(axis).voltage)
     unseen = Unseen(run.voltage[first:], run.position[first:], run.sampling_rate, run.units, encoder=encoder)
     where = compare_motion(velocity, unseen)
-    notes = tuple(text for text in (model.doubt, SEEN if seen else "") if text)
+    hardly = HARDLY if where.error > MOST_LEFT * where.motion else ""
+    notes = tuple(text for text in (model.doubt, SEEN if seen else "", hardly) if text)
     try:
         return Judgement(where, in_frequency(data, axis, model, settings)[0], notes)
     except BadInput:  # too short for a window, or nothing coherent: time alone must do

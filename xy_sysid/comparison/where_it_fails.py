@@ -57,7 +57,7 @@ class Comparison:
     """A model against unseen samples, in velocity, or in acceleration where that was measured.
 
     time: (n,) s; measured, predicted: (n,) in ``unit``; position: (n,) m
-    error, noise_floor: rms, m/s, up to the top band
+    motion, error, noise_floor: rms, m/s, up to the top band
     band_end: Hz, where motion and noise meet; error_below_end, floor_below_end: rms up to there, m/s
     frequency: (bands,) Hz centres; error_over_floor: (bands,) amplitude ratio; places: worst first
     """
@@ -66,6 +66,7 @@ class Comparison:
     measured: FloatArray
     predicted: FloatArray
     position: FloatArray
+    motion: float
     error: float
     noise_floor: float
     error_below_end: float
@@ -181,6 +182,7 @@ def compare_motion(model: FloatArray, unseen: Unseen) -> Comparison:
         measured=measured,
         predicted=predicted,
         position=y[first:-1],
+        motion=layout.rms(least.motion),
         error=whole,
         noise_floor=allowed,
         error_below_end=total,

@@ -197,6 +197,7 @@ def _compared(data: AxisData, fitted: GreyboxFit) -> Comparison:
         measured=nothing,
         predicted=nothing,
         position=nothing,
+        motion=data.layout.rms(data.floor.motion),
         error=fitted.held_out_error,
         noise_floor=data.noise_floor,
         error_below_end=fitted.held_out_error,
