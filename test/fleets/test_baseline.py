@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -98,7 +99,7 @@ def test_files_of_other_kinds_are_refused_in_one_line(tmp_path: Path) -> None:
     """The identifier takes a file of fit, the diagnoser one of refine; each says which."""
     linear, physical = tmp_path / "linear.yaml", tmp_path / "physical.yaml"
     run = Recording.from_arrays(2000.0, *moving(20_000)).run("x")
-    xy.save(xy.fit(run), linear)
+    xy.save(xy.fit(xy.frf(run)), linear)
     xy.save(xy.refine(run).model, physical)
     tf, known = of_transfer_functions(linear)["x"]
     assert {"gain", "delay"} <= {item.name for item in known} and tf.denominator.size > 1
@@ -122,6 +123,11 @@ def moving(count: int, gain: float = 0.1) -> tuple[Any, Any]:
     return u, np.round(path / 5e-7) * 5e-7
 
 
+def all_heard(statuses: list[Any], seconds: float) -> bool:
+    """The diagnoser has heard so much, but for the newest block or two."""
+    return float(newest(statuses, "diagnoser").get("seconds heard (s)", "0")) >= seconds - 0.2
+
+
 @pytest.fixture
 def world(tmp_path: Path) -> Iterator[World]:
     with world_in(tmp_path) as made:
@@ -132,7 +138,7 @@ def world(tmp_path: Path) -> Iterator[World]:
 def test_the_identifier_says_that_the_gain_fell(world: World, tmp_path: Path) -> None:
     """At commissioning the axis had another gain: diagnostics name it, and the axis that has the same gain as ever is quiet."""
     runs = {name: Recording.from_arrays(2000.0, *moving(20_000, gain)).run("x") for name, gain in (("x", 0.16), ("y", 0.1))}
-    xy.save({name: xy.fit(run) for name, run in runs.items()}, tmp_path / "baseline.yaml")
+    xy.save({name: xy.fit(xy.frf(run)) for name, run in runs.items()}, tmp_path / "baseline.yaml")
     statuses = world.statuses("/diagnostics")
     source = Source(world)
     node = world.start(IDENTIFIER, {"length": 1024, "refit": 0.5, "baseline": str(tmp_path / "baseline.yaml")})
@@ -157,7 +163,7 @@ def test_the_diagnoser_compares_each_diagnosis_with_commissioning(world: World, 
     assert world.until(source.found, 30.0), node.output()
     for number in range(AGREEING):
         source.send(8_000 * number, 8_000 * (number + 1))
-        assert world.until(lambda last=4.0 * (number + 1) - 0.2: float(newest(statuses, "diagnoser").get("seconds heard (s)", "0")) >= last, 20.0)
+        assert world.until(partial(all_heard, statuses, 4.0 * (number + 1)), 20.0)
         assert world.call(Trigger, "/xy/diagnoser/renew", Trigger.Request(), 60.0).success
     assert world.until(lambda: newest(statuses, "baseline x").get("level") == str(WARN), 20.0), node.output()
     assert "gain fell from 160 to 100 mm/s/V" in newest(statuses, "baseline x")["message"]
