@@ -85,6 +85,7 @@ def speed(paths: list[Path], folder: Path) -> list[tuple[str, str]]:
             before = spent(client)
             rates[workers] = run(chosen, Path(place) / "table", Analysis(), client).rate
             costs[workers] = (spent(client) - before) / len(chosen)
+        sys.stderr.write(f"{workers}: {rates[workers]:.0f} recordings an hour, {costs[workers]:.2f} s of processor time each\n")
     lines = [(f"recordings an hour on {count} process{'es' * (count > 1)}, by the clock", f"{rate:.0f}") for count, rate in rates.items()]
     lines += [(f"processor time of a recording on {count}, engine included", f"{1e3 * cost:.0f} ms") for count, cost in costs.items()]
     lines.append(("efficiency of two processes by the clock", f"{rates[2] / (2.0 * rates[1]):.2f}"))
@@ -107,11 +108,7 @@ def costs(rows: list[dict[str, Any]]) -> list[tuple[str, str]]:
 
 def picture(found: Trends) -> None:
     """docs/pictures/fleet.png: the parameters that the three machines change, of all machines."""
-    figures = []
-    for column in DRAWN:
-        figure = overview_figure([one for one in found.trends if one.history.column == column])
-        figure.update_yaxes(title_text=f"{column} (%)")
-        figures.append(figure)
+    figures = [overview_figure([one for one in found.trends if one.history.column == column], column) for column in DRAWN]
     shoot(figures, PICTURE, 380, 300)
 
 
