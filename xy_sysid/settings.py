@@ -190,6 +190,8 @@ class IdentifierSettings(Settings):
     output_unit: str = knob("m", "unit of the position, m or rad, also where the output is a velocity")
     state_file: str = knob("", "file that keeps the spectra over a restart; empty is none")
     save_every: float = knob(10.0, "seconds between two savings of the state", "s", gt=0.0, le=3600.0)
+    baseline: str = knob("", "model file of fit --model from commissioning, with which the newest estimates are compared; empty is none")
+    baseline_table: str = knob("", "fleet's table that tells how much estimates differ between recordings; empty: 3 % for every parameter")
 
     @model_validator(mode="after")
     def _ordered(self) -> IdentifierSettings:
@@ -240,6 +242,8 @@ class DiagnoserSettings(Settings):
     input_unit: str = knob("V", "unit of the input, as N m of an effort; it stands in every answer")
     output_unit: str = knob("m", "unit of the position, m or rad, also where the output is a velocity")
     effect_files: Names = knob([""], "Python files with effects of your own; they are run")
+    baseline: str = knob("", "model file of refine --model from commissioning, with which each diagnosis is compared; empty is none")
+    baseline_table: str = knob("", "fleet's table that tells how much estimates differ between recordings; empty: 3 % for every parameter")
     effects: dict[str, Names] = Field(
         default_factory=lambda: {"x": [""], "y": [""]},
         description="effects in the model of this axis: setting them adds or removes them and fits again; an empty name is none",

@@ -33,6 +33,7 @@ SCRIPTS = (
     "use",
     "emps_force",
     "fleet",
+    "fleet_scale",
     "trend",
 )
 PAGE = Path(__file__).parents[2] / "docs" / "benchmarks.md"

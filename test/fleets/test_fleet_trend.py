@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ import numpy as np
 import pytest
 from helpers import ROOT
 from helpers.cli_tools import cli, npz, refused
+from helpers.fleet_tables import gain_falls
 from helpers.html_pages import parsed
 
 import xy_sysid as xy
@@ -22,11 +22,9 @@ from xy_sysid.fleets.causes import causes
 from xy_sysid.fleets.change import Series, changes, evidence, learned, statistic, usual
 from xy_sysid.fleets.columns_doc import document
 from xy_sysid.fleets.history import Axis
-from xy_sysid.fleets.table import merged
 from xy_sysid.fleets.trends import of_axes
 from xy_sysid.fleets.words import sentence
 
-BEGIN = datetime(2026, 1, 5, tzinfo=UTC)
 LEVEL = 10.0  # log of the statistic, as for a weekly recording with seven parameters
 
 
@@ -163,25 +161,8 @@ def test_users_add_causes_of_their_own(tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Three axes, one of which loses gain in August."""
-    folder = tmp_path_factory.mktemp("trend") / "table"
-    folder.mkdir()
-    rows = []
-    for number in range(3):
-        for k in range(14):
-            gain = 0.1 * (1.0 + scattered(14, 0.004, number)[k]) * (0.9 if number == 1 and k >= 10 else 1.0)
-            row = {
-                "machine": f"mill-0{number}",
-                "axis": "x",
-                "date": BEGIN + timedelta(days=14 * k),
-                "source": f"{number}-{k}",
-                "key": f"{number}-{k}",
-            }
-            row |= {"verdict": "nothing_missing", "effects": "", "input_unit": "V", "output_unit": "m", "one_step": False}
-            rows.append(row | {"gain": gain, "gain_low": 0.999 * gain, "gain_high": 1.001 * gain})
-    rows.append({"machine": "mill-00", "axis": "x", "date": None, "source": "undated", "key": "u", "verdict": "nothing_missing"})
-    merged(folder, rows)
-    return folder
+    """Three axes, one of which loses gain in May."""
+    return gain_falls(tmp_path_factory.mktemp("trend") / "table")
 
 
 def test_the_command_names_the_change(table: Path) -> None:

@@ -21,7 +21,11 @@ if TYPE_CHECKING:
 AHEAD = 2  # tasks for each process that the scheduler has at a time
 PATIENCE = 10.0  # s until a scheduler must answer
 DIED = "its process died twice while it was analysed (too little memory?). Analyse it alone: xy-sysid fleet --one FILE."
-HERE = {"distributed.scheduler.allowed-failures": 0, "distributed.scheduler.worker-saturation": 1.0}  # one task a process, blamed at once
+HERE = {
+    "distributed.scheduler.allowed-failures": 0,  # a task whose process died is blamed at once
+    "distributed.scheduler.worker-saturation": 1.0,  # one task a process
+    "distributed.nanny.pre-spawn-environ.NUMBA_NUM_THREADS": 1,  # dask itself says so to BLAS
+}
 
 
 @dataclass(frozen=True, slots=True)

@@ -149,13 +149,15 @@ def of_rows(
 
 def of_axes(every: Sequence[Axis], known: Causes, axis_months: float = AXIS_MONTHS, tell: Callable[[float], None] = lambda _: None) -> Trends:
     """The same of axes whose histories are known."""
-    every_evidence: dict[tuple[int, str], Evidence] = {}
+    every_evidence: dict[tuple[int, str], tuple[Evidence, Series]] = {}
     count = sum(len(one.histories) for one in every)
     for number, one in enumerate(every):
         for history in one.histories:
-            every_evidence[number, history.column] = evidence(_newest(history))[0]
+            every_evidence[number, history.column] = evidence(_newest(history))
             tell(len(every_evidence) / count)
-    weights = {name: learned(item for (_, column), item in every_evidence.items() if column == name) for name in {key[1] for key in every_evidence}}
+    weights = {
+        name: learned(item for (_, column), (item, _) in every_evidence.items() if column == name) for name in {key[1] for key in every_evidence}
+    }
     effects = {effect for one in every for effect in one.named}
     seen = [one.named.get(effect, np.zeros(len(one.dates), dtype=np.bool_)) for one in every for effect in effects]
     often = presence.learned(seen)
@@ -179,17 +181,15 @@ def threshold(axis: Axis, axis_months: float) -> float:
     return math.log(axis_months * a_month * max(axis.tests, 1))
 
 
-def _trend(axis: Axis, history: History, weights: FloatArray, known: Evidence, axis_months: float) -> Trend:
+def _trend(axis: Axis, history: History, weights: FloatArray, known: tuple[Evidence, Series], axis_months: float) -> Trend:
     series, level = history.series, threshold(axis, axis_months)
-    whole = known if series.value.size == known.none.shape[1] else None
-    found = changes(series, weights, level, whole)
-    start = 0
+    found = changes(series, weights, level, known[0] if series.value.size == known[1].value.size else None)
+    quiet = known[1]
     if found:
         last = found[-1]
         ended = int(np.searchsorted(series.time, series.time[last.after] + last.duration))
         start = min(max(ended, last.after + 1), series.value.size - 2)
-    quiet = series.after(start)
-    _, quiet = evidence(quiet.after(max(quiet.value.size - LONGEST, 0)))
+        _, quiet = evidence(series.after(max(start, series.value.size - LONGEST)))
     between, _ = spread(quiet, weights)
     width = Z95 * np.sqrt(series.sigma**2 + between**2)
     weight = 1.0 / (quiet.sigma**2 + between**2)

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,10 +17,12 @@ from xy_sysid.fitting.choose_orders import choose
 from xy_sysid.fitting.modes import pole_estimates
 from xy_sysid.fitting.result import Fit, Interval
 from xy_sysid.fitting.structure import FitOptions, Structure, structure_from
+from xy_sysid.linear.transfer_function import TransferFunction
 from xy_sysid.live.identifier import AxisRequest, FitRequest
 from xy_sysid.live.messages import comparison_message, frf_message, transfer_function_message
 from xy_sysid.live.plain_messages import ERROR, OK, WARN, ArrayMessage, StatusMessage
 from xy_sysid.live.resonance_watch import Resonance, Track, alarm_sentence, follow
+from xy_sysid.live.stretch_fits import Stretch, StretchFits
 from xy_sysid.response.frf import FrequencyResponse
 from xy_sysid.response.h1 import H1Options, frequency_response
 from xy_sysid.response.spectra import RunningSpectra, State, Transformer
@@ -38,7 +41,10 @@ GOOD_ERROR = 0.05  # relative error above which the sentence of an axis says tha
 
 @dataclass(frozen=True, slots=True)
 class AxisUpdate:
-    """One axis after a fit; ``fit`` is None and ``problem`` says why when it could not be tried."""
+    """One axis after a fit; ``fit`` is None and ``problem`` says why when it could not be tried.
+
+    stretch: fit of the newest windows with the structure of the baseline, where they share no sample with those of the stretch before
+    """
 
     frf: FrequencyResponse
     fit: Fit | None
@@ -46,6 +52,7 @@ class AxisUpdate:
     windows: int
     dropped: dict[str, int]
     problem: str = ""
+    stretch: Stretch | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,10 +78,14 @@ class Update:
 
 
 class LiveFitter:
-    """Keeps the last model of each axis as the next start, and its resonance's history."""
+    """Keeps the last model of each axis as the next start, and its resonance's history.
 
-    def __init__(self, settings: IdentifierSettings) -> None:
+    baseline: by axis, the model of commissioning, with which stretches of new data are fitted, too
+    """
+
+    def __init__(self, settings: IdentifierSettings, baseline: Mapping[str, TransferFunction] | None = None) -> None:
         self._settings = settings
+        self._stretches = StretchFits(settings, baseline or {}, OPTIONS)
         self._structures: dict[str, Structure] = {}
         self._last: dict[str, Fit] = {}
         self._tracks: dict[str, Track] = {}
@@ -124,7 +135,8 @@ class LiveFitter:
         overall = watched(fit)
         track = follow(track, overall, self._recent(asked, fit, track), asked.windows, self._settings.alarm_sigma)
         self._tracks[axis] = track
-        return AxisUpdate(frf=asked.frf, fit=fit, track=track, windows=asked.windows, dropped=asked.dropped)
+        stretch = self._stretches.fit(axis, asked)
+        return AxisUpdate(frf=asked.frf, fit=fit, track=track, windows=asked.windows, dropped=asked.dropped, stretch=stretch)
 
     def _recent(self, asked: AxisRequest, fit: Fit, track: Track) -> Resonance | None:
         if asked.recent is None or not fit.converged:

@@ -26,6 +26,7 @@ from xy_sysid.nodes.common import LATCHED_QOS, WalledNode, declare
 from xy_sysid.nodes.convert import array_to_ros, status_to_ros, statuses_to_ros
 from xy_sysid.nodes.diagnostics import Diagnostics
 from xy_sysid.nodes.later import LaterTrigger
+from xy_sysid.nodes.since_commissioning import SinceCommissioning
 from xy_sysid.nodes.streams import AXES, HEARING, Streams, answered, declare_axes
 from xy_sysid.processes.story_process import StoryWorker
 from xy_sysid.settings import DiagnoserSettings, given
@@ -37,7 +38,7 @@ LOOK = 0.1  # s between two looks for news
 HEARTBEAT = 1.0  # s between two statuses in metrics
 ACTS: tuple[Act, ...] = ("begin", "diagnose", "renew", "add_next", "auto")  # services, of all axes and of each
 IDLE = "idle"
-FIXED = (*HEARING, "effect_files")
+FIXED = (*HEARING, "effect_files", "baseline", "baseline_table")
 
 
 class DiagnoserNode(WalledNode):
@@ -53,6 +54,7 @@ class DiagnoserNode(WalledNode):
         files = given(settings.effect_files)
         self._library = library([Path(file).expanduser() for file in files])
         self._check(settings)
+        self._since = SinceCommissioning.of_diagnoser(settings, self._axes, self._library)
         self._diagnoser = Diagnoser(settings, self._axes)
         self._worker = StoryWorker(files)
         self._told: tuple[str, ...] = ()
@@ -86,6 +88,7 @@ class DiagnoserNode(WalledNode):
         """Give the worker what is to be done, and tell what it has done."""
         for item in self._worker.news():
             if item.ended:
+                self._compare(self._diagnoser.under_way)
                 self._diagnoser.finish(item.problem)
                 if item.problem:
                     self.get_logger().error(item.problem)
@@ -105,6 +108,12 @@ class DiagnoserNode(WalledNode):
             self.get_logger().info(answer.text)
         if answers or job is not None:
             self._tell()
+
+    def _compare(self, axis: str) -> None:
+        """The newest model of an axis with the one of commissioning."""
+        story, used = self._diagnoser.stories.get(axis), self._diagnoser.used(axis)
+        if story is not None and story.now is not None and used is not None:
+            self._since.hear(axis, story.now.parameters, *used)
 
     def _show(self, story: Story, text: str) -> None:
         self._ladders[story.axis].publish(array_to_ros(ladder_message(story)))
@@ -146,7 +155,7 @@ class DiagnoserNode(WalledNode):
             values |= {f"axis {axis} used {end} (s)": f"{at:.6g}" for end, at in zip(("from", "to"), used, strict=True)} if used is not None else {}
         values |= {f"stream: {reason}": str(number) for reason, number in hearing.faults.items()}
         status = StatusMessage("diagnoser", level, text, tuple(values.items()))
-        self._metrics.publish([status_to_ros(status, "diagnoser")])
+        self._metrics.publish(status_to_ros(item, "diagnoser") for item in (status, *self._since.statuses()))
 
     # parameters and services
 
@@ -189,6 +198,7 @@ class DiagnoserNode(WalledNode):
     def _forget(self) -> str:
         self._diagnoser.reset()
         self._streams.forget()
+        self._since.forget()
         return "everything heard is forgotten"
 
     def _cancel(self, axes: tuple[str, ...]) -> str:

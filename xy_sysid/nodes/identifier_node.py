@@ -23,6 +23,7 @@ from xy_sysid.live.plain_messages import WARN, StatusMessage, topic_of
 from xy_sysid.nodes.common import LATCHED_QOS, WalledNode, declare
 from xy_sysid.nodes.convert import array_to_ros, status_to_ros
 from xy_sysid.nodes.diagnostics import Diagnostics
+from xy_sysid.nodes.since_commissioning import SinceCommissioning
 from xy_sysid.nodes.streams import AXES, HEARING, Streams, answered, declare_axes
 from xy_sysid.processes.fit_thread import FitWorker
 from xy_sysid.samples.block import Block, StreamName
@@ -32,7 +33,7 @@ PUBLISH_PERIOD = 0.05  # s between two looks for finished fits
 HEARTBEAT = 1.0  # s between two statuses of the streams
 # Changing one of these starts the spectra anew; the topics' names and types are fixed when the node starts.
 SHAPES_SPECTRA = ("window", "length", "overlap", "differenced", "memory", "sliding", "alarm_windows", "reorder")
-FIXED = ("response", *HEARING, "state_file", "save_every")
+FIXED = ("response", *HEARING, "state_file", "save_every", "baseline", "baseline_table")
 
 
 class IdentifierNode(WalledNode):
@@ -46,7 +47,8 @@ class IdentifierNode(WalledNode):
         settings = self._own.settings
         self._axes = axes
         self._identifier = Identifier(settings, self._axes, settings.units)
-        self._worker = FitWorker(LiveFitter(settings))
+        self._since = SinceCommissioning.of_identifier(settings, axes)
+        self._worker = FitWorker(self._fitter(settings))
         self._state_path = Path(settings.state_file).expanduser() if settings.state_file else None
         self._metrics = Diagnostics(self)
         self._arrays: dict[str, Any] = {}
@@ -86,6 +88,10 @@ class IdentifierNode(WalledNode):
         for message in update.arrays():
             self._publisher(message.topic).publish(array_to_ros(message))
         self._metrics.publish(status_to_ros(item, "identifier") for item in update.statuses())
+        for axis, part in update.axes.items():
+            if part.stretch is not None:
+                self._since.hear(axis, part.stretch.fit.intervals_with_misfit, part.stretch.begin, part.stretch.end)
+        self._metrics.publish(status_to_ros(item, "identifier") for item in self._since.statuses())
 
     def _beat(self) -> None:
         """What is heard of the streams, once a second, whether or not there is anything to fit."""
@@ -120,19 +126,24 @@ class IdentifierNode(WalledNode):
                 raise BadInput(name, "not to be changed while the node runs", str(getattr(before, name)), "Start the node again with it.")
         if any(getattr(before, name) != getattr(settings, name) for name in SHAPES_SPECTRA):
             self._identifier = Identifier(settings, self._axes, settings.units)
-            self._worker.change(LiveFitter(settings))
+            self._worker.change(self._fitter(settings))
             self.get_logger().info("the spectra start anew with the new settings")
         else:
             self._identifier.change(settings)
             references = self._worker.fitter.references()
-            fitter = LiveFitter(settings)
+            fitter = self._fitter(settings)
             fitter.restore(references)
             self._worker.change(fitter)
+
+    def _fitter(self, settings: IdentifierSettings) -> LiveFitter:
+        """A fitter that knows nothing yet, and what is compared with the baseline begins anew."""
+        self._since.forget()
+        return LiveFitter(settings, self._since.models)
 
     def _reset(self) -> str:
         self._identifier.reset()
         self._streams.forget()
-        self._worker.change(LiveFitter(self._own.settings))
+        self._worker.change(self._fitter(self._own.settings))
         return "everything heard is forgotten"
 
     def _save(self) -> str:
@@ -144,7 +155,7 @@ class IdentifierNode(WalledNode):
         path = self._path()
         state = load_state(path)
         self._identifier.restore(state)
-        fitter = LiveFitter(self._own.settings)
+        fitter = self._fitter(self._own.settings)
         fitter.recall(state)
         self._worker.change(fitter)
         return f"loaded {sum(self._identifier.windows.values())} windows from {path}"

@@ -11,6 +11,7 @@ from xy_sysid.page.orders import Source
 from xy_sysid.page.panel import Panel
 from xy_sysid.page.session import Session
 from xy_sysid.page.together_card import TogetherCard
+from xy_sysid.page.trend_card import TrendCard
 
 EVERY = 0.4  # s between two looks for what is new
 SHOWN = 4  # messages on the page at a time
@@ -43,6 +44,7 @@ class Page:
                     ui.button("Open a recording", on_click=lambda: open_dialog(session)).props("unelevated dense no-caps")
             self._grid = ui.element("div").classes("panels")
             self._together = TogetherCard(session)
+            TrendCard(session)
         ui.skip_link("to the pictures", target=main)
 
     async def refresh(self) -> None:

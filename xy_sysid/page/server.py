@@ -12,7 +12,7 @@ from importlib.resources import files
 import uvicorn
 from fastapi import FastAPI
 from fastapi.responses import JSONResponse
-from nicegui import ui
+from nicegui import run, ui
 
 from xy_sysid.errors import BadInput
 from xy_sysid.page.access import Access, rules
@@ -50,6 +50,7 @@ def serve(session: Session, host: str, port: int, token: str, browse: bool, say:
 
 def application(session: Session, access: Access) -> FastAPI:
     """The application with its guard before everything."""
+    run.process_pool_start_method = "spawn"  # a copy of this process, with the threads of ROS in it, may stand still for ever
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
 
     @app.post("/stop")

@@ -33,7 +33,7 @@ def trend_page(found: Trends, title: str) -> str:
     for number, event in enumerate(found.events):
         axis = axes[event.machine, event.axis]
         name = f"{event.machine} {event.axis}"
-        made = [Drawing(f"plot-event-{number}", event_figure(event, _drawn(found, event), axis), f"The parameters of {name} over time")]
+        made = [Drawing(f"plot-event-{number}", axis_figure(_drawn(found, event), axis), f"The parameters of {name} over time")]
         drawings += made
         extra = listing(f"{told(one, axis)}; such evidence comes by chance {chance(one)}" for one in event.moved)
         heading = f"{name}, {day(event.since)}: {event.cause.cause if event.cause is not None else 'cause unknown'}"
@@ -59,8 +59,8 @@ def _drawn(found: Trends, event: Event) -> list[Trend]:
     return sorted(own, key=lambda one: wanted.index(one.history.column))[:MOST]
 
 
-def event_figure(event: Event, trends: Sequence[Trend], axis: Axis) -> go.Figure:
-    """The parameters that changed, one above the other, with both intervals and the date."""
+def axis_figure(trends: Sequence[Trend], axis: Axis) -> go.Figure:
+    """Parameters of an axis over time, one above the other, with their intervals and the dates of their changes."""
     figure = rows(max(len(trends), 1), shared=True, gap=0.06)
     for row, one in enumerate(trends, 1):
         history = one.history
@@ -80,8 +80,8 @@ def event_figure(event: Event, trends: Sequence[Trend], axis: Axis) -> go.Figure
     return figure
 
 
-def overview_figure(trends: Sequence[Trend]) -> go.Figure:
-    """One parameter of all axes, in per cent of its median before any change."""
+def overview_figure(trends: Sequence[Trend], column: str = "") -> go.Figure:
+    """One parameter of all axes, in per cent of its median before any change. column: its name, for the figure's axis."""
     figure = rows(1, shared=False, gap=0.1)
     coloured = 0
     for one in sorted(trends, key=lambda item: bool(item.moved)):
@@ -95,5 +95,5 @@ def overview_figure(trends: Sequence[Trend]) -> go.Figure:
             x=list(history.dates), y=part, mode="lines+markers" if one.moved else "lines", name=name, showlegend=bool(one.moved),
             line={"color": colour if one.moved else fade(colour, 0.5), "width": 2.0 if one.moved else 1.0},
         )  # fmt: skip
-    figure.update_yaxes(title_text="change (%)")
+    figure.update_yaxes(title_text=plain(f"{column} (%)" if column else "change (%)"))
     return figure

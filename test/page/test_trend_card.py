@@ -1,0 +1,64 @@
+"""The trend of a table on the page: the sentences of the command, and the parameters over time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from helpers.browser_tools import Server, Tab, browser, needs_browser
+from helpers.cli_tools import cli
+from helpers.fleet_tables import gain_falls
+
+from xy_sysid.errors import BadInput
+from xy_sysid.page.shelf import Shelf
+from xy_sysid.page.trend_card import find, tables
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    made = tmp_path_factory.mktemp("shelf")
+    gain_falls(made / "table")
+    (made / "empty").mkdir()
+    return made
+
+
+@pytest.fixture(scope="module")
+def server(folder: Path) -> Iterator[Server]:
+    made = Server(folder, "--no-live")
+    yield made
+    made.end()
+    assert "Traceback" not in made.said(), made.said()
+
+
+@needs_browser
+@pytest.mark.parametrize("width", [1400, 400])
+def test_a_table_is_opened_and_its_change_is_told_as_by_the_command(server: Server, folder: Path, width: int) -> None:
+    """One button: the sentences of ``xy-sysid trend``, the changed parameter of the changed axis, and that of all axes; nothing is too wide."""
+    with browser() as chromium:
+        tab = Tab(chromium, server.address, width)
+        tab.until(lambda: tab.page.locator("[data-act=trend]:visible").count() == 1)
+        events = tab.page.locator("#trend .events li")
+        tab.press("trend")
+        tab.until(lambda: events.count() == 1, 60.0)
+        said = str(events.first.text_content())
+        assert f"- {said}" in cli("trend", folder / "table").out
+        tab.until(lambda: drawn(tab, "gain of mill-01 x over time") and drawn(tab, "gain of all axes over time"), 30.0)
+        assert tab.wide() <= width
+        assert tab.errors == []
+
+
+def drawn(tab: Tab, label: str) -> bool:
+    """The figure of that description has data."""
+    plot: Any = tab.page.locator(f"#trend .js-plotly-plot[aria-label^='{label}'] .scatterlayer .trace")
+    return bool(plot.count())
+
+
+def test_only_folders_of_the_shelf_that_are_tables_can_be_opened(folder: Path) -> None:
+    """The browser sends a name of the list, never a path."""
+    shelf = Shelf(folder)
+    assert tables(shelf) == ["table"]
+    assert find(shelf, "table") == folder.resolve() / "table"
+    with pytest.raises(BadInput, match="one of the list"):
+        find(shelf, "../elsewhere")

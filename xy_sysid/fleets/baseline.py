@@ -1,0 +1,140 @@
+"""Which parameter of an axis has left its interval since commissioning? The estimates of a running machine against those of a model file.
+
+The baseline is one recording, and what is heard since the node began is another: temperature, load and lubrication differ between the two and not
+within them. So the estimates of the running machine are not a series of independent recordings. Each of them is compared with the baseline by the
+test of ``change``: its statistic for two recordings whose wander is known. The wander is the spread between recordings, of the fleet's table or
+the usual one. The threshold is that of a trend with one recording a day.
+
+As in a trend, one or two estimates that are off are no change: a parameter has left its interval when that many estimates of stretches without a
+common sample say so one after another.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from datetime import timedelta
+from functools import cache
+
+import numpy as np
+from scipy.special import logsumexp
+
+from xy_sysid.fleets.causes import Cause, Causes
+from xy_sysid.fleets.change import SPREADS, USUAL, Series, evidence, grid
+from xy_sysid.fleets.columns import column_of
+from xy_sysid.fleets.history import BEGIN, MONTH, History
+from xy_sysid.greybox.parameters import Estimate
+from xy_sysid.response.frf import Z95
+from xy_sysid.samples.block import FloatArray
+
+AGREEING = 3  # estimates in a row; a trend, too, declares a change with its third recording
+A_MONTH = MONTH  # recordings: one a day
+
+
+@dataclass(frozen=True, slots=True)
+class Compared:
+    """One parameter then and now.
+
+    before, now: its value at commissioning and in the newest stretch; low, high: 95 % interval of an unchanged axis, with the spread between
+        recordings; part: now over before, minus 1
+    statistic: least log of the test's statistic of the newest ``AGREEING`` estimates; -inf before there are so many
+    left: it has left its interval; one_in: axis-months in which chance alone gives such evidence once
+    """
+
+    name: str
+    unit: str
+    before: float
+    now: float
+    low: float
+    high: float
+    part: float
+    statistic: float
+    left: bool
+    one_in: float
+
+
+class Baseline:
+    """The estimates of an axis at commissioning, and what is heard of it since.
+
+    known: estimates at commissioning; spreads: between recordings, by column of the fleet's table, part of the value; column: of a parameter's name
+    """
+
+    def __init__(self, known: Iterable[Estimate], spreads: Mapping[str, float], column: Callable[[str], str] = column_of) -> None:
+        self._known = {item.name: item for item in known if finite(item)}
+        self._spreads, self._column = spreads, column
+        self._heard: list[dict[str, tuple[Estimate, float]]] = []
+        self._newest = (-math.inf, -math.inf)
+
+    def hear(self, estimates: Iterable[Estimate], begin: float, end: float) -> None:
+        """The estimates of a stretch of data. begin, end: of it, in s or in samples.
+
+        They take the place of other estimates of the same stretch; a stretch that overlaps the one before it is left out.
+        """
+        again = (begin, end) == self._newest
+        if begin < self._newest[1] and not again:
+            return
+        found = {item.name: (item, self._statistic(item)) for item in estimates if item.name in self._known and finite(item)}
+        self._heard = [*(self._heard[:-1] if again else self._heard[1 - AGREEING :]), found]
+        self._newest = (begin, end)
+
+    def compared(self, axis_months: float) -> tuple[Compared, ...]:
+        """Every parameter that the baseline and the newest stretch have."""
+        newest = self._heard[-1] if self._heard else {}
+        level = math.log(axis_months * A_MONTH * max(len(newest), 1))
+        return tuple(self._compared(item, level, axis_months) for item, _ in newest.values())
+
+    @property
+    def stretches(self) -> int:
+        """That were heard, up to ``AGREEING``."""
+        return len(self._heard)
+
+    def cause(self, items: Iterable[Compared], known: Causes) -> Cause | None:
+        """The likeliest cause of what has left its interval; None where the table has none."""
+        return known.likeliest([(self._column(item.name), "up" if abs(item.now) > abs(item.before) else "down") for item in items if item.left])
+
+    def _history(self, *items: Estimate) -> History:
+        value, low, high = (np.array([getattr(item, name) for item in items]) for name in ("value", "low", "high"))
+        level = max(float(np.median(np.abs(value))), float(np.nan_to_num(high - low).max()), np.finfo(np.float64).tiny)
+        dates = tuple(BEGIN + timedelta(days=k) for k in range(len(items)))
+        return History(
+            column=self._column(items[0].name), unit=items[0].unit, dates=dates, value=value, low=low, high=high,
+            logarithmic=bool(np.all(value > 0.0)), level=level,
+        )  # fmt: skip
+
+    def _spread(self, name: str) -> float:
+        return self._spreads.get(self._column(name), USUAL)
+
+    def _statistic(self, item: Estimate) -> float:
+        return compare(self._history(self._known[item.name], item).series, self._spread(item.name))
+
+    def _compared(self, item: Estimate, level: float, axis_months: float) -> Compared:
+        before = self._known[item.name]
+        history = self._history(before, item)
+        width = Z95 * math.sqrt(2.0 * self._spread(item.name) ** 2 + float(np.sum(history.series.sigma**2)))
+        low, high = sorted(history.changed(before.value, side * width) for side in (-1.0, 1.0))
+        every = [heard[item.name][1] if item.name in heard else -math.inf for heard in self._heard]
+        least = min(every) if len(every) == AGREEING else -math.inf
+        return Compared(
+            name=item.name, unit=item.unit, before=before.value, now=item.value, low=low, high=high,
+            part=item.value / before.value - 1.0 if before.value else math.nan,
+            statistic=least, left=least >= level, one_in=axis_months * math.exp(min(least - level, 300.0)),
+        )  # fmt: skip
+
+
+def compare(series: Series, spread: float) -> float:
+    """Log of the statistic of Shiryaev and Roberts after the second of two recordings whose wander is known. spread: its standard deviation."""
+    told = Series(series.time, series.value, np.hypot(series.sigma, spread))
+    found = evidence(told)[0]
+    return float(logsumexp(_still() + found.none[:, -1] + found.change[:, -1]) - logsumexp(_still() + found.none[:, -1]))
+
+
+@cache
+def _still() -> FloatArray:
+    """(g,) log weights of a grid of wanders of which only the least is possible."""
+    return np.array([0.0 if one.spread == SPREADS[0] and not one.slow else -np.inf for one in grid()])
+
+
+def finite(item: Estimate) -> bool:
+    """It has a value, and no interval without an end."""
+    return math.isfinite(item.value) and not any(math.isinf(end) for end in (item.low, item.high))

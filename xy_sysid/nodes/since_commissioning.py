@@ -1,0 +1,72 @@
+"""What a node says of its axes compared with commissioning: the settings ``baseline`` and ``baseline_table`` -> statuses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+
+from xy_sysid.axis.model import Library
+from xy_sysid.errors import BadInput
+from xy_sysid.fitting.result import Interval
+from xy_sysid.fleets.baseline import Baseline
+from xy_sysid.fleets.baseline_words import status
+from xy_sysid.fleets.causes import causes
+from xy_sysid.fleets.columns import column_of
+from xy_sysid.fleets.commissioned import of_axis_models, of_transfer_functions, spreads
+from xy_sysid.fleets.trends import AXIS_MONTHS
+from xy_sysid.greybox.parameters import Estimate
+from xy_sysid.linear.transfer_function import TransferFunction
+from xy_sysid.live.plain_messages import StatusMessage
+from xy_sysid.settings import DiagnoserSettings, IdentifierSettings
+
+Column = Callable[[str], str]
+
+
+class SinceCommissioning:
+    """The baselines of the axes that a model file has; nothing at all without a file. models: its transfer functions, by axis."""
+
+    def __init__(self, known: Mapping[str, tuple[Estimate, ...]], table: str, column: Column, models: Mapping[str, TransferFunction]) -> None:
+        self.models = models
+        self._known, self._column, self._causes = known, column, causes()
+        self._spreads = spreads(Path(table).expanduser()) if table else {}
+        self.forget()
+
+    @classmethod
+    def of_identifier(cls, settings: IdentifierSettings, axes: tuple[str, ...]) -> SinceCommissioning:
+        """From a file of ``fit --model``. Raises BadRecording or BadInput for another one, or one of other axes."""
+        found = of_transfer_functions(Path(settings.baseline).expanduser()) if settings.baseline else {}
+        _same(settings.baseline, found, axes)
+        known = {axis: estimates for axis, (_, estimates) in found.items()}
+        return cls(known, settings.baseline_table, column_of_fit, {axis: tf for axis, (tf, _) in found.items()})
+
+    @classmethod
+    def of_diagnoser(cls, settings: DiagnoserSettings, axes: tuple[str, ...], library: Library) -> SinceCommissioning:
+        """From a file of ``refine --model``. Raises BadRecording or BadInput for another one, or one of other axes."""
+        known = of_axis_models(Path(settings.baseline).expanduser(), library) if settings.baseline else {}
+        _same(settings.baseline, known, axes)
+        return cls(known, settings.baseline_table, column_of, {})
+
+    def forget(self) -> None:
+        """Nothing was heard yet."""
+        self._baselines = {axis: Baseline(known, self._spreads, self._column) for axis, known in self._known.items()}
+
+    def hear(self, axis: str, estimates: Iterable[Estimate | Interval], begin: float, end: float) -> None:
+        """The estimates of a stretch of data of an axis; see ``Baseline.hear``."""
+        if axis in self._baselines:
+            self._baselines[axis].hear([Estimate(one.name, one.value, one.unit, one.low, one.high) for one in estimates], begin, end)
+
+    def statuses(self) -> list[StatusMessage]:
+        """One for each axis that has a baseline."""
+        return [status(axis, baseline, self._causes, AXIS_MONTHS) for axis, baseline in self._baselines.items()]
+
+
+def column_of_fit(name: str) -> str:
+    """The column of the fleet's table of an estimate of a transfer function."""
+    return f"tf_{column_of(name)}"
+
+
+def _same(path: str, known: Mapping[str, object], axes: tuple[str, ...]) -> None:
+    if path and not set(known) & set(axes):
+        raise BadInput(
+            "parameter baseline", f"a model of axis {', '.join(known)}", f"one of axis {' or '.join(axes)}", "Give the file of this machine."
+        )
