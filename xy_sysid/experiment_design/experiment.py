@@ -10,6 +10,7 @@ from xy_sysid.axis.forward import DriveInput
 from xy_sysid.excitation import signal
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.settings import AxisExcitation, ExcitationSettings
+from xy_sysid.units import USUAL, Units
 
 RAMP = float(ExcitationSettings.model_fields["ramp"].default)  # s in which the excitation fades in
 AGE = 0.04  # s: age of the position by which the excitation pulls back to the start
@@ -45,14 +46,18 @@ class Experiment:
 
     @property
     def words(self) -> str:
-        """What it is, as people say it."""
-        told, parts = self.excitation, []
+        """What it is, as people say it, for an axis that is driven in V."""
+        return self.said(USUAL)
+
+    def said(self, units: Units) -> str:
+        """What it is, as people say it, in the units of an axis."""
+        told, volt, parts = self.excitation, units.input, []
         if told.rms > 0.0 and told.kind in BANDED:
-            parts.append(f"{told.kind} of {told.rms:.3g} V rms from {told.low:.3g} to {told.high:.3g} Hz")
+            parts.append(f"{told.kind} of {told.rms:.3g} {volt} rms from {told.low:.3g} to {told.high:.3g} Hz")
         elif told.rms > 0.0 and told.kind != "off":
-            parts.append(f"{told.kind} of {told.rms:.3g} V, each for {told.period:.3g} s")
+            parts.append(f"{told.kind} of {told.rms:.3g} {volt}, each for {told.period:.3g} s")
         if told.slow > 0.0:
-            parts.append(f"a slow sine of {told.slow:.3g} V with a period of {told.slow_period:.3g} s")
+            parts.append(f"a slow sine of {told.slow:.3g} {volt} with a period of {told.slow_period:.3g} s")
         if told.offset != 0.0:
-            parts.append(f"an offset of {told.offset:.3g} V")
+            parts.append(f"an offset of {told.offset:.3g} {volt}")
         return " and ".join(parts) or "nothing"

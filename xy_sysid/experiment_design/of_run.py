@@ -33,7 +33,7 @@ class NextExperiment:
 
     experiment: None where none helps; sentence: what it is expected to bring; sets: of effects that it is to distinguish
     probability: that it tells; settles: whether that is 95 % or more; ask: what a person would have to change, or nothing
-    voltage, travel: the largest voltage, V, and the places, m, that it needs; limits: within which it was chosen
+    voltage, travel: the largest input and the places that it needs; limits: within which it was chosen, with the units of the axis
     """
 
     axis: str
@@ -54,7 +54,7 @@ class NextExperiment:
         return self.experiment.seconds if self.experiment is not None else 0.0
 
     def __repr__(self) -> str:
-        what = self.experiment.words if self.experiment is not None else "none"
+        what = self.experiment.said(self.limits.units) if self.experiment is not None else "none"
         return f"<Next experiment of axis {self.axis}: {what}. {self.sentence}>"
 
 
@@ -73,7 +73,7 @@ def next_experiment(
     Raises BadInput for a diagnosis without enough data, and for effects that free simulation cannot predict.
     """
     data = _data(found, tolerance)
-    limits = limits or as_recorded(found.runs)
+    limits = _limits(found, limits)
     axis, rate = found.runs[0].axis, data.sampling_rate
     sets = [tuple(each) for each in between] or possible(data, library, _ladder(found))
     with threadpool_limits(1, "blas"):
@@ -96,7 +96,7 @@ def sharpen(found: Diagnosed, parameter: str, width: float, limits: MachineLimit
     if not 0.0 < width < math.inf:
         raise BadInput("width", width, "above 0", "Give half of the interval, for example 0.02 for 2 %.")
     data = _data(found, tolerance)
-    limits = limits or as_recorded(found.runs)
+    limits = _limits(found, limits)
     with threadpool_limits(1, "blas"):
         final = _ladder(found).final
         best = sharpest(data, final, limits, Precision(parameter, width))
@@ -127,6 +127,11 @@ def _data(found: Diagnosed, tolerance: float) -> AxisData:
     _ladder(found)
     runs = found.runs
     return prepare_all(runs[0].sampling_rate, [(run.voltage, run.position) for run in runs], tolerance, runs[0].units)
+
+
+def _limits(found: Diagnosed, limits: MachineLimits | None) -> MachineLimits:
+    """Those that were given, in the units of the recordings; without, what the recordings show."""
+    return as_recorded(found.runs) if limits is None else replace(limits, units=found.runs[-1].units)
 
 
 def _ladder(found: Diagnosed) -> Ladder:
