@@ -22,7 +22,7 @@ from xy_sysid.experiment_design.beliefs import Belief
 from xy_sysid.experiment_design.design import judge
 from xy_sysid.experiment_design.experiment import Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
-from xy_sysid.experiment_design.loop import Budget, Choose, Question, Signals, best_design, settle
+from xy_sysid.experiment_design.loop import Budget, Choice, Choose, Question, Signals, best_design, settle
 from xy_sysid.experiment_design.precision import informations, volume
 from xy_sysid.experiment_design.prediction import Setting
 from xy_sysid.experiment_design.proposals import proposals
@@ -45,17 +45,17 @@ COLUMNS = (
 )
 
 
-def noise(setting: Setting, beliefs: Sequence[Belief], asked: MachineLimits) -> Experiment | None:
+def noise(setting: Setting, beliefs: Sequence[Belief], asked: MachineLimits) -> Choice:
     """Broadband noise, as loud as the limits allow for what is believed."""
     for item in proposals(asked, setting.layout.sampling_rate):
         told = item.excitation
         broadband = told.kind == "noise" and told.slow == 0.0 and told.low == 0.1 and told.high > 50.0
         if broadband and not judge(setting, beliefs, asked, item).broken:
-            return item
-    return None
+            return Choice(item)
+    return Choice(None)
 
 
-def d_optimal(setting: Setting, beliefs: Sequence[Belief], asked: MachineLimits) -> Experiment | None:
+def d_optimal(setting: Setting, beliefs: Sequence[Belief], asked: MachineLimits) -> Choice:
     """The experiment that makes the parameters of all sets known best, together."""
     best: tuple[float, Experiment] | None = None
     for item in proposals(asked, setting.layout.sampling_rate):
@@ -65,7 +65,7 @@ def d_optimal(setting: Setting, beliefs: Sequence[Belief], asked: MachineLimits)
             total += volume(belief, found, 10.0) if found else math.inf
         if math.isfinite(total) and (best is None or total < best[0]):
             best = (total, item)
-    return None if best is None else best[1]
+    return Choice(None if best is None else best[1])
 
 
 QUICK = 5  # place of the pair that takes least time
@@ -119,9 +119,9 @@ def _other(pair: Pair, draw: tuple[int, int], choose: Choose, seconds: float) ->
     made, asked = machine(pair, *draw), limits(pair)
     question = Question(made.rate, [first_recording(pair, made, draw[1])], pair.sets, STANDARD)
 
-    def chosen(setting: Setting, beliefs: Sequence[Belief], among: MachineLimits) -> Experiment | None:
-        item = choose(setting, beliefs, among)
-        return None if item is None else item.lasting(seconds)
+    def chosen(setting: Setting, beliefs: Sequence[Belief], among: MachineLimits) -> Choice:
+        item = choose(setting, beliefs, among).experiment
+        return Choice(None if item is None else item.lasting(seconds))
 
     found = settle(question, asked, lambda item: carry_out(made, item), Budget(experiments=1, seconds=seconds, draws=DRAWS), chosen)
     right = found.effects == pair.sets[draw[0]]

@@ -13,18 +13,13 @@ from dataclasses import dataclass
 
 from xy_sysid.axis.forward import move
 from xy_sysid.experiment_design.beliefs import Belief
-from xy_sysid.experiment_design.evidence import ROUNDS, SURE, Power, powers, seconds_needed, settled
+from xy_sysid.experiment_design.criteria import ALIKE, BLOCK, COARSE, ENOUGH, FINAL, JUDGED, LOOKED, NO_EVIDENCE, ROUNDS, SHORTEST, SURE
+from xy_sysid.experiment_design.evidence import Power, powers, seconds_needed, settled
 from xy_sysid.experiment_design.experiment import RAMP, Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
-from xy_sysid.experiment_design.prediction import COARSE, LOOKED, Setting, seen
+from xy_sysid.experiment_design.prediction import Setting, seen
 from xy_sysid.experiment_design.proposals import neighbours, proposals
 from xy_sysid.hypotheses.criteria import DOUBTFUL
-
-FINAL = 6  # proposals that are judged by draws
-ALIKE = 0.1  # probabilities that differ by less are alike: they are means over few draws
-ENOUGH = 0.95  # part of what an experiment can reach at all, after which more of it is a waste
-SHORTEST = 4.0  # s of motion at least: a few windows that judge
-BLOCK = 2.0  # s: experiments last whole multiples
 
 
 @dataclass(frozen=True)
@@ -63,6 +58,13 @@ class Design:
     def possible(self) -> bool:
         """Whether an experiment within the limits distinguishes the sets with 95 %."""
         return self.best is not None and math.isfinite(self.best.seconds)
+
+    @property
+    def alike(self) -> bool:
+        """Whether the sets are the same as far as this machine may go: no experiment within the limits has evidence for any of their draws."""
+        looked = [item for item in self.tried if item.each]
+        most = max((one.rate for item in looked for draw in item.each for one in draw), default=math.inf)
+        return most * JUDGED * self.limits.seconds < NO_EVIDENCE
 
     @property
     def helps(self) -> bool:
@@ -141,6 +143,8 @@ def expects(found: Design) -> str:
     chance = f"{100.0 * found.best.probability:.0f} %"
     if found.possible:
         return f"After {found.best.experiment.seconds:.0f} s, {names} are distinguished with {100.0 * SURE:.0f} % probability."
+    if found.alike:
+        return f"Within the limits of this machine {names} are the same: no experiment has evidence for one of them."
     if found.helps:
         return f"No experiment within the limits is sure to distinguish {names}: the best does with {chance} probability."
     return f"No experiment within the limits can distinguish {names}: the best would with {chance} probability."

@@ -10,7 +10,7 @@ from xy_sysid.axis.forward import DriveInput
 from xy_sysid.excitation import signal
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.settings import AxisExcitation, ExcitationSettings
-from xy_sysid.units import USUAL, Units
+from xy_sysid.units import USUAL, Units, readable
 
 RAMP = float(ExcitationSettings.model_fields["ramp"].default)  # s in which the excitation fades in
 AGE = 0.04  # s: age of the position by which the excitation pulls back to the start
@@ -59,5 +59,6 @@ class Experiment:
         if told.slow > 0.0:
             parts.append(f"a slow sine of {told.slow:.3g} {volt} with a period of {told.slow_period:.3g} s")
         if told.offset != 0.0:
-            parts.append(f"an offset of {told.offset:.3g} {volt}")
+            held, place = told.offset / told.centring if told.centring else 0.0, readable(units.output)
+            parts.append(f"held {place[0] * held:+.3g} {place[1]} from the start" if held else f"an offset of {told.offset:.3g} {volt}")
         return " and ".join(parts) or "nothing"

@@ -10,10 +10,10 @@ import numpy as np
 
 from xy_sysid.axis.forward import Motion
 from xy_sysid.errors import BadInput
+from xy_sysid.experiment_design.criteria import MARGIN
 from xy_sysid.samples.recording import Run
 from xy_sysid.units import USUAL, Units, readable
 
-MARGIN = 0.15  # part of each limit that is kept free for what the models do not know
 SECONDS = 60.0  # s of motion for one experiment at most
 
 

@@ -16,11 +16,12 @@ from xy_sysid.diagnosis.ladder import Ladder
 from xy_sysid.diagnosis.of_run import Diagnosed
 from xy_sysid.errors import BadInput
 from xy_sysid.experiment_design.beliefs import Belief, Evidence, believed
+from xy_sysid.experiment_design.criteria import COARSE, DRAWN
 from xy_sysid.experiment_design.design import Design, design, expects
 from xy_sysid.experiment_design.experiment import Experiment
 from xy_sysid.experiment_design.limits import MachineLimits, as_recorded
-from xy_sysid.experiment_design.precision import DRAWS, Precision, sharpest
-from xy_sysid.experiment_design.prediction import COARSE, Setting
+from xy_sysid.experiment_design.precision import Precision, sharpest
+from xy_sysid.experiment_design.prediction import Setting
 from xy_sysid.experiment_design.rivals import beliefs_of, names_of, possible, standing
 from xy_sysid.greybox.axis_data import EPSILON, AxisData, prepare_all
 
@@ -78,7 +79,7 @@ def next_experiment(
     sets = [tuple(each) for each in between] or possible(data, library, _ladder(found))
     with threadpool_limits(1, "blas"):
         now = standing(data, library, sets)
-        beliefs = beliefs_of(data, library, now)
+        beliefs = beliefs_of(data, library, now, limits.travel)
         if len(beliefs) < 2:
             chosen = names_of([now.names[now.chosen]])
             sentence = f"Nothing is left to settle: of {names_of(sets)} these data leave only {chosen}."
@@ -100,7 +101,7 @@ def sharpen(found: Diagnosed, parameter: str, width: float, limits: MachineLimit
     with threadpool_limits(1, "blas"):
         final = _ladder(found).final
         best = sharpest(data, final, limits, Precision(parameter, width))
-        beliefs = [believed(Evidence(data), final, DRAWS)] if best.experiment is not None else []
+        beliefs = [believed(Evidence(data, limits.travel), final, DRAWN)] if best.experiment is not None else []
     to = f"{100.0 * best.width:.2g} %"
     if best.experiment is None and best.possible:
         sentence = f"No experiment is needed: {parameter} is known to {to} (95 %)."

@@ -10,15 +10,13 @@ from numpy.typing import NDArray
 from xy_sysid.axis.forward import Motion, move
 from xy_sysid.axis.model import AxisModel, simulator
 from xy_sysid.experiment_design.beliefs import Belief, with_row
+from xy_sysid.experiment_design.criteria import COARSE, LOOKED
 from xy_sysid.experiment_design.experiment import RAMP, Experiment
 from xy_sysid.greybox.axis_data import WINDOWS, AxisData
 from xy_sysid.greybox.floor import Bands, Windows, bands, floor
 from xy_sysid.greybox.least_squares import STEP
 from xy_sysid.greybox.objective import Objective, responder
 from xy_sysid.samples.block import FloatArray
-
-LOOKED = 8.0  # s of each experiment that are simulated: longer ones go on as they began
-COARSE = 4000.0  # Hz: sub-steps
 
 
 @dataclass(frozen=True)

@@ -13,13 +13,12 @@ from xy_sysid.diagnosis.ladder import Ladder, contains
 from xy_sysid.diagnosis.rungs import Given
 from xy_sysid.effects._contract import BEGUN
 from xy_sysid.errors import BadInput
-from xy_sysid.experiment_design.beliefs import ALLOWED, Belief, Evidence, believed, hidden
+from xy_sysid.experiment_design.beliefs import Belief, Evidence, believed, hidden
+from xy_sysid.experiment_design.criteria import ALLOWED, DRAWS
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit, fit
 from xy_sysid.hypotheses.compare import gain
 from xy_sysid.hypotheses.criteria import CHANCE, DOUBTFUL, PRICE
-
-DRAWS = 6  # of the parameters of each set
 
 
 @dataclass(frozen=True)
@@ -82,9 +81,11 @@ def _fitted(data: AxisData, library: Library, names: Sequence[str], known: AxisM
     return other if float(np.sum(other.scores)) < float(np.sum(found.scores)) else found
 
 
-def beliefs_of(data: AxisData, library: Library, found: Standing, draws: int = DRAWS, seed: int = 0) -> list[Belief]:
-    """What each set says, that which was chosen first; sets that the data rule out are left out."""
-    evidence = Evidence(data)
+def beliefs_of(
+    data: AxisData, library: Library, found: Standing, travel: tuple[float, float] | None = None, draws: int = DRAWS, seed: int = 0
+) -> list[Belief]:
+    """What each set says of the motion within a travel, m; that which was chosen first, and sets that the data rule out left out."""
+    evidence = Evidence(data, travel)
     order = sorted(range(len(found.names)), key=lambda k: k != found.chosen)
     best = found.fits[found.chosen]
     beliefs = []
