@@ -13,4 +13,5 @@ precision:   the experiment that makes parameters known best
 first:       a first experiment for an axis of which nothing is known
 loop:        design, run, compare, and again until nothing is left to settle
 of_run:      one call for a diagnosis
+walk:        the loop for recordings of a machine: diagnosed together after each experiment, told in sentences
 """

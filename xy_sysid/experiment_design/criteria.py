@@ -57,10 +57,13 @@ ROUNDS = _number(
 FINAL = _number("final", 6, "experiments", "judged by all draws, after all were judged by the likeliest")
 ALIKE = _number("alike", 0.1, "1", "probabilities that differ by less are alike: they are means over few draws")
 ENOUGH = _number("enough", 0.95, "1", "part of what an experiment can reach at all, after which more of it is a waste")
-SHORTEST = _number("shortest", 4.0, "s", "of motion at least: three windows that judge")
-BLOCK = _number("block", 2.0, "s", "experiments last whole multiples of this")
+CYCLES = _number(
+    "cycles", 2, "1", "blocks to fit and to judge that an experiment holds at least: with fewer than four windows of its own it settles nothing"
+)
+BLOCK = _number("block", 1.0, "s", "experiments last whole multiples of this")
 MARGIN = _number("margin", 0.15, "1", "part of speed, acceleration and travel that is kept free for what the models do not know")
 
 # for precision
 DRAWN = _number("drawn", 2, "draws", "parameters of the one set whose interval is to become narrow: it depends on them little")
+SHORTEST = _number("shortest", 4.0, "s", "of motion at least: a few windows")
 LONGER = _number("longer", 1.4, "1", "times as long, where a rehearsal does not reach what was asked for")

@@ -113,8 +113,8 @@ def decide(
 ) -> Decision:
     """What the recordings say, and what to measure next."""
     data = prepare_all(question.sampling_rate, [*question.recordings, *more], question.tolerance, question.units)
-    known = tuple(found.model for found in before.fits) if before is not None else ()
-    now = standing(data, question.library, question.sets, known)
+    models = {names: found.model for names, found in zip(before.names, before.fits, strict=True)} if before is not None else {}
+    now = standing(data, question.library, question.sets, [models.get(tuple(each)) for each in question.sets])
     beliefs = beliefs_of(data, question.library, now, limits.travel, draws)
     choice = choose(Setting.of(data), beliefs, limits) if len(beliefs) > 1 else None
     return Decision(now, tuple(item.effects for item in beliefs), choice)

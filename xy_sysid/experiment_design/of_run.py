@@ -76,7 +76,7 @@ def next_experiment(
     data = _data(found, tolerance)
     limits = _limits(found, limits)
     axis, rate = found.runs[0].axis, data.sampling_rate
-    sets = [tuple(each) for each in between] or possible(data, library, _ladder(found))
+    sets = [tuple(each) for each in between] or possible(data, library, ladder_of(found))
     with threadpool_limits(1, "blas"):
         now = standing(data, library, sets)
         beliefs = beliefs_of(data, library, now, limits.travel)
@@ -85,7 +85,7 @@ def next_experiment(
             sentence = f"Nothing is left to settle: of {names_of(sets)} these data leave only {chosen}."
             return NextExperiment(axis=axis, sampling_rate=rate, sentence=sentence, limits=limits, sets=tuple(sets))
         made = design(Setting.of(data), beliefs, limits, tell=tell)
-    return _answer(axis, rate, made, _ask(library, made))
+    return answered(axis, rate, made, library)
 
 
 def sharpen(found: Diagnosed, parameter: str, width: float, limits: MachineLimits | None = None, tolerance: float = EPSILON) -> NextExperiment:
@@ -99,7 +99,7 @@ def sharpen(found: Diagnosed, parameter: str, width: float, limits: MachineLimit
     data = _data(found, tolerance)
     limits = _limits(found, limits)
     with threadpool_limits(1, "blas"):
-        final = _ladder(found).final
+        final = ladder_of(found).final
         best = sharpest(data, final, limits, Precision(parameter, width))
         beliefs = [believed(Evidence(data, limits.travel), final, DRAWN)] if best.experiment is not None else []
     to = f"{100.0 * best.width:.2g} %"
@@ -125,7 +125,7 @@ def sharpen(found: Diagnosed, parameter: str, width: float, limits: MachineLimit
 
 
 def _data(found: Diagnosed, tolerance: float) -> AxisData:
-    _ladder(found)
+    ladder_of(found)
     runs = found.runs
     return prepare_all(runs[0].sampling_rate, [(run.voltage, run.position) for run in runs], tolerance, runs[0].units)
 
@@ -135,13 +135,15 @@ def _limits(found: Diagnosed, limits: MachineLimits | None) -> MachineLimits:
     return as_recorded(found.runs) if limits is None else replace(limits, units=found.runs[-1].units)
 
 
-def _ladder(found: Diagnosed) -> Ladder:
+def ladder_of(found: Diagnosed) -> Ladder:
+    """The ladder of a diagnosis; raises BadInput for one of too little data."""
     if found.ladder is None or not found.runs:
         raise BadInput("diagnosis", found.verdict, "one of data that suffice", "Record for longer, or ask for a first experiment (--for nothing).")
     return found.ladder
 
 
-def _answer(axis: str, rate: float, made: Design, ask: str) -> NextExperiment:
+def answered(axis: str, rate: float, made: Design, library: Library) -> NextExperiment:
+    """A design as an answer: the experiment with what it needs, what it is expected to bring, and what a person would have to change."""
     best = made.best if made.helps else None
     found = NextExperiment(
         axis=axis,
@@ -152,7 +154,7 @@ def _answer(axis: str, rate: float, made: Design, ask: str) -> NextExperiment:
         sets=tuple(item.effects for item in made.beliefs),
         probability=made.best.probability if made.best is not None else 0.0,
         settles=made.possible,
-        ask=ask,
+        ask=_ask(library, made),
     )
     return _needs(found, made.beliefs)
 
