@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers.cli_tools import cli
 
 from campaigns.bench.settle_pairs import PAIRS, carry_out, first_recording, limits, machine
 from xy_sysid.axis.model import STANDARD
@@ -48,8 +49,8 @@ def test_a_walk_settles_and_its_bags_decide_the_same_again(tmp_path: Path) -> No
     assert [one["chosen"] for one in done] == [[], ["amplifier_lag"]]
     assert done[0]["words"] and done[0]["file"]["experiment"]["needs"]["voltage"] <= LAG.voltage
     assert done[1]["ending"] == "settled" and done[1]["sentence"].startswith("Settled: amplifier_lag. The recordings rule out the rigid model.")
-    pairs = replayed(tmp_path)
-    assert len(pairs) == 2 and all(kept == again for kept, again in pairs)
+    said = cli("next", "--replay", tmp_path)
+    assert said.code == 0 and "step 1: Settled: amplifier_lag." in said.out and "It was" not in said.out, said
 
 
 def test_a_plan_is_read_as_it_was_written() -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 TRAVEL, VOLTAGE = 2.5, 1.2  # rad to each side, V
+RATE = 500.0  # Hz: a robot's
 QUIET = {"low": 0.5, "high": 20.0, "rms": 0.08, "centring": 0.0, "brake": 0.2}  # the arm stays near hanging
 JOIN = 15.0  # s that the walk may take to end
 WORDS = (
@@ -40,7 +41,7 @@ def specs(machine: str, speed: float, seed: int, watched: bool) -> list[Any]:
 
     one: dict[str, Any] = {"axes": ["x"]}
     axis = {**QUIET, "limit": VOLTAGE, "travel_min": -TRAVEL, "travel_max": TRAVEL, "seed": seed}
-    excite = {**one, "lockstep": True, "speed": float(speed), "unit": "rad", "x": axis}
+    excite = {**one, "rate": RATE, "lockstep": True, "speed": float(speed), "unit": "rad", "x": axis}
     unit = {**one, "output_unit": "rad"}
     listeners = [
         {"executable": "identifier", "parameters": {**unit, "numerator_order": 0, "denominator_order": 2}},

@@ -38,6 +38,7 @@ def next_(
         list[Path] | None, typer.Argument(metavar="[REC]", help="recordings of one machine, as of diagnose; none with --for nothing")
     ] = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", metavar="FILE", help="write the experiment for the excitation node")] = None,
+    replay: Annotated[Path | None, typer.Option("--replay", metavar="FOLDER", help="decide every step of a walk again from its bags")] = None,
     between: Between = None,
     precision: Annotated[
         str | None,
@@ -73,6 +74,8 @@ def next_(
     from xy_sysid.experiment_design.rivals import check
     from xy_sysid.files.effects import library
 
+    if replay is not None:
+        raise typer.Exit(_replayed(replay, effect_file, json))
     o.output_file("--output", output, force)
     asked = partial(_asked, voltage=voltage, travel=travel, speed=speed, acceleration=acceleration)
     if precision == NOTHING:
@@ -84,7 +87,7 @@ def next_(
     known = library(effect_file or [])
     if precision is not None and between:
         raise BadInput("--for", f"{precision} together with --between", "one of them", "Leave one out.")
-    sets = _sets(between)
+    sets = sets_of(between)
     check(known, sets)
     recordings = read_each(recs, reading, json)
     names = chosen(recordings[0], reading.axes)
@@ -103,6 +106,20 @@ def next_(
     if not json:
         say(f"axis {names[0]}: {found.sentence.rstrip()}")
     _answered(answer, output, json)
+
+
+def _replayed(folder: Path, effect_file: list[Path] | None, json: bool) -> int:
+    """Print every step as its bags decide it; 1 where one differs from what was decided then."""
+    from xy_sysid.files.effects import library
+    from xy_sysid.files.walk import replayed
+
+    pairs = replayed(folder, library(effect_file or []))
+    same = [kept == again for kept, again in pairs]
+    if json:
+        emit({"steps": [again for _, again in pairs], "same": same})
+    for number, (kept, again) in enumerate(() if json else pairs):
+        say(f"step {number}: {again['sentence']}" + ("" if same[number] else f" It was: {kept['sentence']}"))
+    return 0 if all(same) else 1
 
 
 def _answered(answer: NextExperiment, output: Path | None, json: bool) -> None:
@@ -160,7 +177,8 @@ def _show(answer: NextExperiment, output: Path | None) -> None:
         say(f"  {output}: run it with parameter experiment of the excitation node, then diagnose all recordings together.")
 
 
-def _sets(between: list[str] | None) -> list[tuple[str, ...]]:
+def sets_of(between: list[str] | None) -> list[tuple[str, ...]]:
+    """The sets of --between; raises BadInput for one alone."""
     if between is None:
         return []
     if len(between) < 2:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -14,7 +15,16 @@ from xy_sysid.units import USUAL, Units, readable
 
 RAMP = float(ExcitationSettings.model_fields["ramp"].default)  # s in which the excitation fades in
 AGE = 0.04  # s: age of the position by which the excitation pulls back to the start
+KEPT = 64  # signals, as many as differ in more than their amplitude
 BANDED = ("noise", "multisine", "multisine_odd", "multisine_detect", "sweep", "stepped_sine", "prbs")  # kinds that have a band
+
+
+@lru_cache(maxsize=KEPT)
+def unit_signal(told: AxisExcitation, sampling_rate: float, n: int) -> FloatArray:
+    """(n,) of rms 1, read-only: many experiments differ in their amplitude alone, and each is simulated with many models."""
+    made = signal(told, sampling_rate).next(n)
+    made.setflags(write=False)
+    return made
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,9 +50,11 @@ class Experiment:
 
     def _signal(self, sampling_rate: float, n: int) -> FloatArray:
         """(n,) of rms 1."""
-        if self.excitation.kind == "off" or self.excitation.rms == 0.0:
+        told = self.excitation
+        if told.kind == "off" or told.rms == 0.0:
             return np.zeros(n)
-        return signal(self.excitation.model_copy(update={"rms": 1.0}), sampling_rate).next(n)
+        shape = {name: getattr(told, name) for name in ("kind", "low", "high", "period", "steps", "seed")}
+        return unit_signal(AxisExcitation(**shape, rms=1.0), sampling_rate, n)
 
     @property
     def words(self) -> str:

@@ -27,6 +27,7 @@ class Settling:
         self._settler: Settler | None = None
         self._ended, self._go = threading.Event(), threading.Event()
         self.axis, self.folder, self.wished = "", folder, ""  # wished: axis that is settled without being told
+        self.sets: tuple[tuple[str, ...], ...] = ()  # of effects that are to be distinguished; empty: those that the diagnosis leaves possible
 
     @property
     def running(self) -> bool:
@@ -76,7 +77,7 @@ class Settling:
         if alone:
             self._go.set()
         self.axis, self.folder = axis, self._folder / f"settle_{axis}_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
-        wishes = Wishes(axis, self.folder, alone=alone)
+        wishes = Wishes(axis, self.folder, sets=self.sets, alone=alone)
         settler = Settler(wishes, lambda words: None, self._ended.is_set, self._go.is_set, self._namespace)
 
         def walk() -> None:
