@@ -23,7 +23,7 @@ from xy_sysid.experiment_design.beliefs import Belief
 from xy_sysid.experiment_design.design import judge
 from xy_sysid.experiment_design.experiment import Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
-from xy_sysid.experiment_design.loop import Budget, Choice, Choose, Question, Signals, best_design, decide, settle
+from xy_sysid.experiment_design.loop import Budget, Choose, NextChoice, Question, Signals, best_design, decide, settle
 from xy_sysid.experiment_design.precision import informations, volume
 from xy_sysid.experiment_design.prediction import Setting
 from xy_sysid.experiment_design.proposals import neighbours, proposals
@@ -46,17 +46,17 @@ COLUMNS = (
 )
 
 
-def noise(setting: Setting, beliefs: Sequence[Belief], asked: MachineLimits) -> Choice:
+def noise(setting: Setting, beliefs: Sequence[Belief], asked: MachineLimits) -> NextChoice:
     """Broadband noise, as loud as the limits allow for what is believed."""
     for item in proposals(asked, setting.layout.sampling_rate):
         told = item.excitation
         broadband = told.kind == "noise" and told.slow == 0.0 and told.low == 0.1 and told.high > 50.0
         if broadband and not judge(setting, beliefs, asked, item).broken:
-            return Choice(item)
-    return Choice(None)
+            return NextChoice(item)
+    return NextChoice(None)
 
 
-def d_optimal(setting: Setting, beliefs: Sequence[Belief], asked: MachineLimits) -> Choice:
+def d_optimal(setting: Setting, beliefs: Sequence[Belief], asked: MachineLimits) -> NextChoice:
     """The experiment that makes the parameters of all sets known best, together; of the same candidates as ``design`` has."""
     rate = setting.layout.sampling_rate
 
@@ -67,9 +67,9 @@ def d_optimal(setting: Setting, beliefs: Sequence[Belief], asked: MachineLimits)
     judged = [(total(item), number, item) for number, item in enumerate(proposals(asked, rate))]
     best = min(judged)
     if not math.isfinite(best[0]):
-        return Choice(None)
+        return NextChoice(None)
     near = [(total(item), -1 - number, item) for number, item in enumerate(neighbours(best[2], asked, rate))]
-    return Choice(min([best, *near])[2])
+    return NextChoice(min([best, *near])[2])
 
 
 QUICK = 5  # place of the pair that takes least time
@@ -108,11 +108,11 @@ def compared(pair: Pair, truth: int, seed: int) -> dict[str, Any]:
     """The seconds needed by one experiment that is chosen in each way, infinite ones as None, with what it was."""
     made, asked = machine(pair, truth, seed), limits(pair)
     question = _question(pair, made, seed)
-    chosen: dict[str, Choice] = {}
+    chosen: dict[str, NextChoice] = {}
 
-    def all_ways(setting: Setting, beliefs: Sequence[Belief], among: MachineLimits) -> Choice:
+    def all_ways(setting: Setting, beliefs: Sequence[Belief], among: MachineLimits) -> NextChoice:
         chosen.update({name: choose(setting, beliefs, among) for name, choose in WAYS.items()})
-        return Choice(None)
+        return NextChoice(None)
 
     first = decide(question, (), asked, all_ways, draws=DRAWS)
     line: dict[str, Any] = {}
@@ -124,7 +124,7 @@ def compared(pair: Pair, truth: int, seed: int) -> dict[str, Any]:
         needed = None
         for part in PARTS:
             count = round(part * made.rate)
-            then = decide(question, [(voltage[:count], position[:count])], asked, lambda *_: Choice(None), first.standing, DRAWS)
+            then = decide(question, [(voltage[:count], position[:count])], asked, lambda *_: NextChoice(None), first.standing, DRAWS)
             if then.left == (pair.sets[truth],):
                 needed = part
                 break

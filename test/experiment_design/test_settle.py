@@ -13,7 +13,7 @@ from xy_sysid.experiment_design.beliefs import Evidence, believed
 from xy_sysid.experiment_design.criteria import ODDS
 from xy_sysid.experiment_design.evidence import Power, nats, seconds_needed, settled
 from xy_sysid.experiment_design.experiment import Experiment
-from xy_sysid.experiment_design.loop import Budget, Choice, Question, Signals, settle
+from xy_sysid.experiment_design.loop import Budget, NextChoice, Question, Signals, settle
 from xy_sysid.experiment_design.precision import Precision, sharpest
 from xy_sysid.experiment_design.prediction import Setting, recorded
 from xy_sysid.experiment_design.rivals import standing
@@ -61,7 +61,7 @@ def test_what_one_recording_leaves_open_is_settled_by_an_experiment_within_the_l
 
 def test_it_ends_when_somebody_stops_it(short: Signals) -> None:
     """STOP is an ordinary end: nothing is claimed."""
-    found = settle(Question(2000.0, [short], LAG.sets, STANDARD), limits(LAG), lambda experiment: None, FEW, lambda *_: Choice(LOUD))
+    found = settle(Question(2000.0, [short], LAG.sets, STANDARD), limits(LAG), lambda experiment: None, FEW, lambda *_: NextChoice(LOUD))
     assert found.ended == "stopped"
     assert found.seconds == 0.0
 

@@ -15,9 +15,9 @@ from campaigns.bench.settle_pairs import PAIRS, carry_out, first_recording, limi
 from xy_sysid.axis.model import STANDARD
 from xy_sysid.errors import BadInput
 from xy_sysid.experiment_design.experiment import Experiment
-from xy_sysid.experiment_design.loop import Budget, Choice, Decision, after
+from xy_sysid.experiment_design.loop import Budget, Decision, NextChoice, after
 from xy_sysid.experiment_design.rivals import Standing, gained
-from xy_sysid.experiment_design.walk import Plan, step, told
+from xy_sysid.experiment_design.walk import WalkPlan, step, told
 from xy_sysid.files.walk import plan_document, plan_of, replayed, step_document, write_walk
 from xy_sysid.imports import save
 from xy_sysid.samples.recording import Recording
@@ -30,12 +30,12 @@ LOUD = Experiment(AxisExcitation(kind="noise", rms=1.0), 8.0)
 def decision(left: tuple[tuple[str, ...], ...], then: Experiment | None) -> Decision:
     """As if these sets were left of three."""
     every = (("coulomb_friction",), ("stribeck_friction",), ("dead_zone",))
-    return Decision(Standing(names=every, fits=(), chosen=0, doubt=0.0), left, Choice(then))
+    return Decision(Standing(names=every, fits=(), chosen=0, doubt=0.0), left, NextChoice(then))
 
 
 def test_a_walk_settles_and_its_bags_decide_the_same_again(tmp_path: Path) -> None:
     """Two steps on the simulated machine: the wrong set first, then the right one alone. Replayed from the bags, each step is the same."""
-    made, plan = machine(LAG, 1, 1), Plan("x", limits(LAG), Budget(experiments=2, seconds=30.0, draws=1), LAG.sets)
+    made, plan = machine(LAG, 1, 1), WalkPlan("x", limits(LAG), Budget(experiments=2, seconds=30.0, draws=1), LAG.sets)
     signals, before, done, runs = first_recording(LAG, made, 1), None, [], []
     for number in range(2):
         recording = Recording.from_arrays(made.rate, *signals, axes=("x",))
@@ -55,7 +55,7 @@ def test_a_walk_settles_and_its_bags_decide_the_same_again(tmp_path: Path) -> No
 
 def test_a_plan_is_read_as_it_was_written() -> None:
     """Limits, budget and sets; what has no limit stays without one."""
-    plan = Plan("x", limits(LAG), Budget(experiments=3), LAG.sets)
+    plan = WalkPlan("x", limits(LAG), Budget(experiments=3), LAG.sets)
     assert plan_of(json.loads(json.dumps(plan_document(plan))), STANDARD) == plan
 
 
@@ -73,6 +73,8 @@ def test_nothing_follows_what_is_settled_or_a_budget_that_is_spent() -> None:
     assert after(decision(two, LOUD), budget, 2, 10.0) == "experiments"
     assert after(decision(two, LOUD), budget, 1, 19.5) == "seconds"
     assert after(decision(two, LOUD), budget, 1, 15.0) == LOUD.lasting(5.0)
+    assert after(decision(two, LOUD), budget, 0, 0.0) == LOUD
+    assert after(decision(two, LOUD), budget, 1, 8.0) == LOUD.lasting(12.0)  # the last one takes what is left
 
 
 def test_the_end_is_told_in_a_sentence() -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 TRAVEL, VOLTAGE = 2.5, 1.2  # rad to each side, V
-RATE = 500.0  # Hz: a robot's
+RATE = 1000.0  # Hz: that of the machine
 QUIET = {"low": 0.5, "high": 20.0, "rms": 0.08, "centring": 0.0, "brake": 0.2}  # the arm stays near hanging
 JOIN = 15.0  # s that the walk may take to end
 WORDS = (

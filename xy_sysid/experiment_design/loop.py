@@ -27,14 +27,14 @@ CarryOut = Callable[[Experiment], Signals | None]  # carries an experiment out; 
 
 
 @dataclass(frozen=True)
-class Choice:
+class NextChoice:
     """experiment: what comes next, None where none helps; found: what it was chosen from, if by ``design``."""
 
     experiment: Experiment | None
     found: Design | None = None
 
 
-Choose = Callable[[Setting, Sequence[Belief], MachineLimits], Choice]
+Choose = Callable[[Setting, Sequence[Belief], MachineLimits], NextChoice]
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,7 @@ class Decision:
 
     standing: Standing
     left: tuple[tuple[str, ...], ...]
-    choice: Choice | None = None
+    choice: NextChoice | None = None
 
     @property
     def then(self) -> Experiment | None:
@@ -102,10 +102,10 @@ class Question:
     units: Units = USUAL
 
 
-def best_design(setting: Setting, beliefs: Sequence[Belief], limits: MachineLimits) -> Choice:
+def best_design(setting: Setting, beliefs: Sequence[Belief], limits: MachineLimits) -> NextChoice:
     """The experiment of ``design``; none where none may tell."""
     found: Design = design(setting, beliefs, limits)
-    return Choice(found.best.experiment if found.best is not None and found.helps else None, found)
+    return NextChoice(found.best.experiment if found.best is not None and found.helps else None, found)
 
 
 def decide(
@@ -149,6 +149,8 @@ def after(last: Decision, budget: Budget, experiments: int, seconds: float) -> E
     room = budget.seconds - seconds
     if room < MINIMUM:
         return "seconds"
+    if experiments and experiments + 1 == budget.experiments:  # those before did not keep what they promised, and none comes after
+        return last.then.lasting(room)
     unsure = last.choice is not None and last.choice.found is not None and not last.choice.found.possible
     if unsure and experiments + 1 < budget.experiments:  # what it teaches is for a better one, which needs its time too
         room = max(0.5 * room, MINIMUM)

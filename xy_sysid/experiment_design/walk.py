@@ -5,7 +5,7 @@ Each step is a pure function of the recordings so far and the step before, so th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 from threadpoolctl import threadpool_limits
@@ -16,18 +16,16 @@ from xy_sysid.experiment_design.beliefs import Belief
 from xy_sysid.experiment_design.design import design
 from xy_sysid.experiment_design.experiment import Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
-from xy_sysid.experiment_design.loop import Budget, Choice, Decision, Ending, Question, after, decide
-from xy_sysid.experiment_design.of_run import NextExperiment, answered, ladder_of
+from xy_sysid.experiment_design.loop import Budget, Decision, Ending, NextChoice, Question, after, decide
+from xy_sysid.experiment_design.of_run import NextExperiment, Tell, answered, ladder_of
 from xy_sysid.experiment_design.prediction import Setting
 from xy_sysid.experiment_design.rivals import names_of, possible
 from xy_sysid.greybox.axis_data import EPSILON, prepare_all
 from xy_sysid.samples.recording import Run
 
-Tell = Callable[[float], None]
-
 
 @dataclass(frozen=True)
-class Plan:
+class WalkPlan:
     """axis: its name; limits: what experiments may ask of it; budget: of the whole walk
     sets: of effects that are to be distinguished; empty: those that the diagnosis leaves possible
     tolerance: part of the motion that a model may leave
@@ -42,7 +40,7 @@ class Plan:
 
 
 @dataclass(frozen=True)
-class Step:
+class WalkStep:
     """What is known after some recordings, and what follows.
 
     diagnosis: of all recordings, in a sentence; decision: which sets are left; following: the next experiment, None at the end; ending: why
@@ -65,7 +63,7 @@ class Step:
         return told(self.decision, self.ending, self.answer)
 
 
-def step(plan: Plan, runs: Sequence[Run], before: Step | None = None, tell: Tell = lambda part: None) -> Step:
+def step(plan: WalkPlan, runs: Sequence[Run], before: WalkStep | None = None, tell: Tell = lambda part: None) -> WalkStep:
     """What all recordings so far say together, and what to measure next. tell: called with the part of a design that is done.
 
     runs: the first recording, and one of each experiment so far; before: the step before the last experiment, None at the first
@@ -76,13 +74,13 @@ def step(plan: Plan, runs: Sequence[Run], before: Step | None = None, tell: Tell
     rate, signals, units = runs[0].sampling_rate, [(run.voltage, run.position) for run in runs], runs[0].units
     limits = replace(plan.limits, start=float(runs[-1].position[-1]), units=units)
 
-    def choose(setting: Setting, beliefs: Sequence[Belief], among: MachineLimits) -> Choice:
+    def choose(setting: Setting, beliefs: Sequence[Belief], among: MachineLimits) -> NextChoice:
         made = design(setting, beliefs, among, tell=tell)
-        return Choice(made.best.experiment if made.best is not None and made.helps else None, made)
+        return NextChoice(made.best.experiment if made.best is not None and made.helps else None, made)
 
     with threadpool_limits(1, "blas"):
         sets = plan.sets or possible(prepare_all(rate, signals, plan.tolerance, units), plan.library, ladder)
-        question = Question(rate, signals, sets, plan.library, plan.tolerance, units)
+        question = Question(sampling_rate=rate, recordings=signals, sets=sets, library=plan.library, tolerance=plan.tolerance, units=units)
         decision = decide(question, (), limits, choose, before.decision.standing if before is not None else None, plan.budget.draws)
         experiments = before.experiments + 1 if before is not None else 0
         seconds = before.seconds + before.following.seconds if before is not None and before.following is not None else 0.0
@@ -92,7 +90,7 @@ def step(plan: Plan, runs: Sequence[Run], before: Step | None = None, tell: Tell
     following = None if isinstance(follows, str) else follows
     if answer is not None and following is not None:
         answer = replace(answer, experiment=following)
-    return Step(
+    return WalkStep(
         diagnosis=found.sentence.rstrip(),
         decision=decision,
         following=following,
@@ -103,9 +101,9 @@ def step(plan: Plan, runs: Sequence[Run], before: Step | None = None, tell: Tell
     )
 
 
-def steps(plan: Plan, recordings: Sequence[Run]) -> Iterator[Step]:
+def steps(plan: WalkPlan, recordings: Sequence[Run]) -> Iterator[WalkStep]:
     """Every step of a walk that has these recordings, the first one first. It ends with them, or where nothing follows."""
-    before: Step | None = None
+    before: WalkStep | None = None
     for count in range(1, len(recordings) + 1):
         before = step(plan, recordings[:count], before)
         yield before

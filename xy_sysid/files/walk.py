@@ -16,7 +16,7 @@ from xy_sysid.bags.atomic import write_text
 from xy_sysid.errors import BadInput
 from xy_sysid.experiment_design.limits import MachineLimits
 from xy_sysid.experiment_design.loop import Budget
-from xy_sysid.experiment_design.walk import Plan, Step, steps
+from xy_sysid.experiment_design.walk import WalkPlan, WalkStep, steps
 from xy_sysid.files.experiment import document
 from xy_sysid.imports import load
 from xy_sysid.samples.recording import Run
@@ -26,7 +26,7 @@ NAME = "walk.json"
 UNKNOWN = "Give the folder of a walk: xy-sysid demo --settle and the page make them."
 
 
-def step_document(step: Step) -> dict[str, Any]:
+def step_document(step: WalkStep) -> dict[str, Any]:
     """A step as JSON: what was found, what is left, and what follows."""
     answer = step.answer if step.following is not None else None
     return {
@@ -44,7 +44,7 @@ def step_document(step: Step) -> dict[str, Any]:
     }
 
 
-def plan_document(plan: Plan) -> dict[str, Any]:
+def plan_document(plan: WalkPlan) -> dict[str, Any]:
     """A plan as JSON."""
     limits = {name: None if value in (float("inf"),) else value for name, value in asdict(plan.limits).items() if name != "units"}
     return {
@@ -56,10 +56,10 @@ def plan_document(plan: Plan) -> dict[str, Any]:
     }
 
 
-def plan_of(told: dict[str, Any], library: Library = STANDARD) -> Plan:
+def plan_of(told: dict[str, Any], library: Library = STANDARD) -> WalkPlan:
     """The plan of a document."""
     limits = {name: float("inf") if value is None else value for name, value in told["limits"].items() if name not in ("units", "travel")}
-    return Plan(
+    return WalkPlan(
         axis=told["axis"],
         limits=MachineLimits(travel=(told["limits"]["travel"][0], told["limits"]["travel"][1]), units=Units(*told["limits"]["units"]), **limits),
         budget=Budget(**told["budget"]),
@@ -69,7 +69,7 @@ def plan_of(told: dict[str, Any], library: Library = STANDARD) -> Plan:
     )
 
 
-def write_walk(folder: Path, plan: Plan, done: Iterable[dict[str, Any]]) -> None:
+def write_walk(folder: Path, plan: WalkPlan, done: Iterable[dict[str, Any]]) -> None:
     """The plan and the steps so far. done: their documents."""
     write_text(folder / NAME, json.dumps({"plan": plan_document(plan), "steps": list(done)}, indent=1))
 

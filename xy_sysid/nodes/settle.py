@@ -27,7 +27,7 @@ from xy_sysid.bags.atomic import write_text
 from xy_sysid.errors import BadInput, XySysidError
 from xy_sysid.experiment_design.limits import MachineLimits
 from xy_sysid.experiment_design.loop import Budget
-from xy_sysid.experiment_design.walk import Plan
+from xy_sysid.experiment_design.walk import WalkPlan
 from xy_sysid.files.walk import plan_document, write_walk
 from xy_sysid.nodes.common import NAMESPACE
 from xy_sysid.nodes.convert import from_message
@@ -123,7 +123,7 @@ class Settler(ExcitationClient):
         finally:
             decider.close()
 
-    def _plan(self, settings: ExcitationSettings) -> Plan:
+    def _plan(self, settings: ExcitationSettings) -> WalkPlan:
         axis = self.wishes.axis
         if axis not in settings.axes:
             raise BadInput("axis", repr(axis), ", ".join(settings.axes), "Choose an axis that the excitation drives.")
@@ -131,7 +131,7 @@ class Settler(ExcitationClient):
         middle = 0.5 * (own.travel_min + own.travel_max)
         travel = own.travel_min, own.travel_max
         limits = MachineLimits(voltage=own.limit, travel=travel, start=middle, units=settings.units, seconds=self.wishes.budget.seconds)
-        return Plan(axis, limits, self.wishes.budget, self.wishes.sets)
+        return WalkPlan(axis, limits, self.wishes.budget, self.wishes.sets)
 
     # the machine
 
