@@ -1,8 +1,9 @@
 """python -m campaigns.bench settle: pairs of effects that one recording does not distinguish, and the experiments that do.
 
 Each pair is drawn with either effect true. A short recording comes first. Then at most two designed experiments with 60 s of motion in all
-are run on the machine; for comparison the same seconds of broadband noise, and of a D-optimal experiment. Every case is a line of
-build/settle.jsonl, and the table is made from all lines there: a campaign that was stopped goes on.
+are run on the machine. For comparison one experiment of each way to choose is run for 60 s: the designed one, the D-optimal one and broadband
+noise, all chosen from the same beliefs. The seconds needed are those of its beginning that settle the case together with the first recording.
+Every case is a line of build/settle.jsonl, and the table is made from all lines there: a campaign that was stopped goes on.
 """
 
 from __future__ import annotations
@@ -16,21 +17,22 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from campaigns.bench.settle_pairs import PAIRS, Pair, carry_out, first_recording, left_limits, limits, machine
+from campaigns.bench.settle_pairs import PAIRS, Pair, Rig, carry_out, first_recording, left_limits, limits, machine
 from xy_sysid.axis.model import STANDARD
 from xy_sysid.experiment_design.beliefs import Belief
 from xy_sysid.experiment_design.design import judge
 from xy_sysid.experiment_design.experiment import Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
-from xy_sysid.experiment_design.loop import Budget, Choose, Question, Signals, best_design, settle
+from xy_sysid.experiment_design.loop import Budget, Choose, NextChoice, Question, Signals, best_design, decide, settle
 from xy_sysid.experiment_design.precision import informations, volume
 from xy_sysid.experiment_design.prediction import Setting
-from xy_sysid.experiment_design.proposals import proposals
+from xy_sysid.experiment_design.proposals import neighbours, proposals
 
 PLACE = Path(os.environ.get("SETTLE_FILE", "build/settle.jsonl"))
 SEEDS = range(101, 102)  # never used to choose a number
 MOST = 60.0  # s of motion
 DRAWS = 4  # of the parameters of each set
+PARTS = (2.0, 4.0, 8.0, 16.0, 32.0, MOST)  # s of an experiment, from its beginning
 COLUMNS = (
     "pair",
     "one recording settles",
@@ -38,45 +40,45 @@ COLUMNS = (
     "settled",
     "right after",
     "seconds",
-    "noise",
-    "D-optimal",
-    "noise, 60 s",
-    "D-optimal, 60 s",
+    "needed: designed",
+    "needed: D-optimal",
+    "needed: noise",
 )
 
 
-def noise(setting: Setting, beliefs: Sequence[Belief], asked: MachineLimits) -> Experiment | None:
+def noise(setting: Setting, beliefs: Sequence[Belief], asked: MachineLimits) -> NextChoice:
     """Broadband noise, as loud as the limits allow for what is believed."""
     for item in proposals(asked, setting.layout.sampling_rate):
         told = item.excitation
         broadband = told.kind == "noise" and told.slow == 0.0 and told.low == 0.1 and told.high > 50.0
         if broadband and not judge(setting, beliefs, asked, item).broken:
-            return item
-    return None
+            return NextChoice(item)
+    return NextChoice(None)
 
 
-def d_optimal(setting: Setting, beliefs: Sequence[Belief], asked: MachineLimits) -> Experiment | None:
-    """The experiment that makes the parameters of all sets known best, together."""
-    best: tuple[float, Experiment] | None = None
-    for item in proposals(asked, setting.layout.sampling_rate):
-        total = 0.0
-        for belief in beliefs:
-            found = informations(setting, belief, asked, item, draws=1)
-            total += volume(belief, found, 10.0) if found else math.inf
-        if math.isfinite(total) and (best is None or total < best[0]):
-            best = (total, item)
-    return None if best is None else best[1]
+def d_optimal(setting: Setting, beliefs: Sequence[Belief], asked: MachineLimits) -> NextChoice:
+    """The experiment that makes the parameters of all sets known best, together; of the same candidates as ``design`` has."""
+    rate = setting.layout.sampling_rate
+
+    def total(item: Experiment) -> float:
+        found = [(belief, informations(setting, belief, asked, item, draws=1)) for belief in beliefs]
+        return sum(volume(belief, told, 10.0) if told else math.inf for belief, told in found)
+
+    judged = [(total(item), number, item) for number, item in enumerate(proposals(asked, rate))]
+    best = min(judged)
+    if not math.isfinite(best[0]):
+        return NextChoice(None)
+    near = [(total(item), -1 - number, item) for number, item in enumerate(neighbours(best[2], asked, rate))]
+    return NextChoice(min([best, *near])[2])
 
 
 QUICK = 5  # place of the pair that takes least time
-WAYS = {"noise": noise, "d_optimal": d_optimal}
+WAYS: dict[str, Choose] = {"designed": best_design, "d_optimal": d_optimal, "noise": noise}
 
 
-def case(pair: Pair, truth: int, seed: int, short: bool = False) -> dict[str, Any]:
-    """One draw of one pair, with all three ways to choose experiments."""
+def case(pair: Pair, truth: int, seed: int) -> dict[str, Any]:
+    """One draw of one pair with designed experiments."""
     made, asked = machine(pair, truth, seed), limits(pair)
-    first = first_recording(pair, made, seed)
-    question = Question(made.rate, [first], pair.sets, STANDARD)
     told: list[str] = []
 
     def run(experiment: Experiment) -> Signals:
@@ -84,14 +86,14 @@ def case(pair: Pair, truth: int, seed: int, short: bool = False) -> dict[str, An
         return carry_out(made, experiment)
 
     begun = time.process_time()
-    found = settle(question, asked, run, Budget(experiments=2, seconds=MOST, draws=DRAWS), best_design)
-    line: dict[str, Any] = {
+    found = settle(_question(pair, made, seed), asked, run, Budget(experiments=2, seconds=MOST, draws=DRAWS), best_design)
+    return {
         "pair": pair.name,
         "truth": truth,
         "seed": seed,
-        "first_right": found.steps[0].standing.chosen == truth,
+        "first_right": found.steps[0].chosen == pair.sets[truth],
         "first_left": len(found.steps[0].left),
-        "first_settled": len(found.steps[0].left) == 1 and found.steps[0].standing.chosen == truth,
+        "first_settled": len(found.steps[0].left) == 1 and found.steps[0].chosen == pair.sets[truth],
         "right": found.effects == pair.sets[truth],
         "ended": found.ended,
         "seconds": found.seconds,
@@ -100,32 +102,38 @@ def case(pair: Pair, truth: int, seed: int, short: bool = False) -> dict[str, An
         "outside": left_limits(pair, found.recordings),
         "processor": time.process_time() - begun,
     }
-    for name, choose in () if short or not found.recordings else WAYS.items():
-        line[name] = _other(pair, (truth, seed), choose, found.seconds)
+
+
+def compared(pair: Pair, truth: int, seed: int) -> dict[str, Any]:
+    """The seconds needed by one experiment that is chosen in each way, infinite ones as None, with what it was."""
+    made, asked = machine(pair, truth, seed), limits(pair)
+    question = _question(pair, made, seed)
+    chosen: dict[str, NextChoice] = {}
+
+    def all_ways(setting: Setting, beliefs: Sequence[Belief], among: MachineLimits) -> NextChoice:
+        chosen.update({name: choose(setting, beliefs, among) for name, choose in WAYS.items()})
+        return NextChoice(None)
+
+    first = decide(question, (), asked, all_ways, draws=DRAWS)
+    line: dict[str, Any] = {}
+    for name, choice in chosen.items():
+        if choice.experiment is None:
+            line[name] = {"needed": None, "experiment": "", "outside": 0}
+            continue
+        voltage, position = carry_out(made, choice.experiment.lasting(MOST))
+        needed = None
+        for part in PARTS:
+            count = round(part * made.rate)
+            then = decide(question, [(voltage[:count], position[:count])], asked, lambda *_: NextChoice(None), first.standing, DRAWS)
+            if then.left == (pair.sets[truth],):
+                needed = part
+                break
+        line[name] = {"needed": needed, "experiment": choice.experiment.words, "outside": left_limits(pair, [(voltage, position)])}
     return line
 
 
-def longer(line: dict[str, Any]) -> bool:
-    """Give the other ways all the seconds where they did not settle a case that the designed experiments settled; whether there was one."""
-    pair = next(pair for pair in PAIRS if pair.name == line["pair"])
-    ways = [way for way in WAYS if line["ended"] == "settled" and way in line and not line[way]["settled"] and "longer" not in line[way]]
-    for way in ways:
-        line[way]["longer"] = _other(pair, (line["truth"], line["seed"]), WAYS[way], MOST)
-    return bool(ways)
-
-
-def _other(pair: Pair, draw: tuple[int, int], choose: Choose, seconds: float) -> dict[str, Any]:
-    """Whether one experiment that is chosen in another way settles a case in some seconds."""
-    made, asked = machine(pair, *draw), limits(pair)
-    question = Question(made.rate, [first_recording(pair, made, draw[1])], pair.sets, STANDARD)
-
-    def chosen(setting: Setting, beliefs: Sequence[Belief], among: MachineLimits) -> Experiment | None:
-        item = choose(setting, beliefs, among)
-        return None if item is None else item.lasting(seconds)
-
-    found = settle(question, asked, lambda item: carry_out(made, item), Budget(experiments=1, seconds=seconds, draws=DRAWS), chosen)
-    right = found.effects == pair.sets[draw[0]]
-    return {"settled": right and found.ended == "settled", "right": right, "outside": left_limits(pair, found.recordings)}
+def _question(pair: Pair, made: Rig, seed: int) -> Question:
+    return Question(made.rate, [first_recording(pair, made, seed)], pair.sets, STANDARD)
 
 
 def table(lines: Sequence[dict[str, Any]]) -> str:
@@ -135,24 +143,28 @@ def table(lines: Sequence[dict[str, Any]]) -> str:
     for name in [*names, "all"]:
         own = [line for line in lines if name in ("all", line["pair"])]
         count = len(own)
-
-        def part(key: str, own: Sequence[dict[str, Any]] = own) -> str:
-            return f"{sum(bool(line[key]) for line in own)} of {len(own)}"
-
-        good = [line for line in own if line["ended"] == "settled" and line["right"]]
-        compared = [line for line in own if "noise" in line]
+        good = [line for line in own if line["ended"] in ("settled", "alike") and line["right"]]
         seconds = sorted(line["seconds"] for line in own if line["seconds"] > 0.0)
+        parts = [f"{sum(bool(line[key]) for line in own)} of {count}" for key in ("first_settled", "first_right", "right")]
         middle = f"{seconds[len(seconds) // 2]:.0f}" if seconds else "-"
-        cells = [name, part("first_settled"), part("first_right"), f"{len(good)} of {count}", part("right"), middle]
-        cells += [f"{sum(line[way]['settled'] for line in compared)} of {len(compared)}" for way in ("noise", "d_optimal")]
-        for way in ("noise", "d_optimal"):
-            late = [line for line in compared if line[way]["settled"] or line[way].get("longer", {}).get("settled")]
-            cells.append(f"{len(late)} of {len(compared)}")
+        cells = [name, parts[0], parts[1], f"{len(good)} of {count}", parts[2], middle, *(_needed(own, way, name == "all") for way in WAYS)]
         rows.append(f"| {' | '.join(cells)} |")
-    runs = sum(line["runs"] for line in lines)
+    ways = [line["ways"] for line in lines if "ways" in line]
+    runs = sum(line["runs"] for line in lines) + sum(bool(way["experiment"]) for each in ways for way in each.values())
+    left = sum(line["outside"] for line in lines) + sum(way["outside"] for each in ways for way in each.values())
     rows.append("")
-    rows.append(f"Designed experiments that were run: {runs}; that left a limit: {sum(line['outside'] for line in lines)}.")
+    rows.append(f"Experiments that were run: {runs}; that left a limit: {left}.")
     return "\n".join(rows)
+
+
+def _needed(lines: Sequence[dict[str, Any]], way: str, together: bool) -> str:
+    """Seconds of each case, or of all together: their sum, those that were not settled counted as 60 s."""
+    own = [line["ways"][way]["needed"] for line in lines if "ways" in line]
+    if not own:
+        return "-"
+    if together:
+        return f"{sum(MOST if item is None else item for item in own):.0f} s in all, {sum(item is None for item in own)} of {len(own)} open"
+    return ", ".join(f"> {MOST:.0f}" if item is None else f"{item:.0f}" for item in own)
 
 
 def main(short: bool = False) -> None:
@@ -164,19 +176,21 @@ def main(short: bool = False) -> None:
     for seed in seeds[: 1 if short else None]:
         for pair in PAIRS[QUICK : QUICK + 1] if short else PAIRS:
             for truth in (1,) if short else (0, 1):
-                if (pair.name, truth, seed) in known:
-                    continue
-                line = case(pair, truth, seed, short)
-                done.append(line)
-                sys.stderr.write(json.dumps(line) + "\n")
-                if not short:
-                    with PLACE.open("a", encoding="utf-8") as file:
-                        file.write(json.dumps(line) + "\n")
+                if (pair.name, truth, seed) not in known:
+                    done.append(case(pair, truth, seed))
+                    sys.stderr.write(json.dumps(done[-1]) + "\n")
+                    _keep(done, short)
     for line in () if short else done:
-        if longer(line):
+        if "ways" not in line and line["first_left"] > 1:
+            line["ways"] = compared(next(pair for pair in PAIRS if pair.name == line["pair"]), line["truth"], line["seed"])
             sys.stderr.write(json.dumps(line) + "\n")
-            PLACE.write_text("".join(json.dumps(one) + "\n" for one in done), encoding="utf-8")
+            _keep(done, short)
     sys.stdout.write(table(done) + "\n")
+
+
+def _keep(done: Sequence[dict[str, Any]], short: bool) -> None:
+    if not short:
+        PLACE.write_text("".join(json.dumps(one) + "\n" for one in done), encoding="utf-8")
 
 
 if __name__ == "__main__":

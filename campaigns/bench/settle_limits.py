@@ -13,7 +13,7 @@ import numpy as np
 from campaigns.bench.settle_pairs import PAIRS, carry_out, first_recording, left_limits, limits, machine
 from xy_sysid.axis.forward import move
 from xy_sysid.axis.model import STANDARD
-from xy_sysid.experiment_design.prediction import COARSE
+from xy_sysid.experiment_design.criteria import COARSE
 from xy_sysid.experiment_design.proposals import proposals
 from xy_sysid.experiment_design.rivals import beliefs_of, standing
 from xy_sysid.greybox.axis_data import prepare_all
@@ -31,7 +31,7 @@ def main(short: bool = False) -> None:
         for seed, truth in [(seed, truth) for seed in SEEDS for truth in (0, 1)][: 1 if short else None]:
             made, asked = machine(pair, truth, seed), limits(pair)
             data = prepare_all(made.rate, [first_recording(pair, made, seed)])
-            models = [model for belief in beliefs_of(data, STANDARD, standing(data, STANDARD, pair.sets), 4) for model in belief.draws]
+            models = [model for belief in beliefs_of(data, STANDARD, standing(data, STANDARD, pair.sets), asked.travel, 4) for model in belief.draws]
             every = proposals(asked, made.rate)
             chosen = 0
             for place in np.random.default_rng([seed, truth]).permutation(len(every)):

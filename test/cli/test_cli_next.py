@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -56,3 +57,16 @@ def test_without_a_recording_it_asks_for_one() -> None:
     """Or for --for nothing, with the limits of the machine."""
     assert "--for nothing" in refused("next")
     assert "travel" in refused("next", "--for", "nothing", "--voltage", "3")
+
+
+def test_every_sentence_is_in_the_units_of_the_recording(recording: Path, tmp_path: Path) -> None:
+    """An axis that is driven in A and turns: its own units stand in the answer, in the file and in a refusal, and those of a table nowhere."""
+    out = tmp_path / "next.yaml"
+    read = (recording, "--unit", "input=A", "--unit", "output=rad")
+    said = cli("next", *read, "--between", "rigid", "--between", "amplifier_lag", "--voltage", 5, "--travel=-0.14:0.14", "-o", out)
+    assert said.code == 0, said
+    assert re.search(r"\d A rms|\d A, each|\d A with", said.out) and re.search(r"up to [\d.]+ A and the travel from \S+ to \S+ rad,", said.out)
+    assert not re.search(r"\d m?(V|m)\b", said.out), said.out
+    text = out.read_text()
+    assert "are in A, needs.travel is in rad" in text and yaml.safe_load(text)["experiment"]["units"] == ["A", "rad"]
+    assert "to -100 rad; allowed: where the axis stands" in refused("next", *read, "--voltage", 5, "--travel=-140:-100")

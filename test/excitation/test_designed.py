@@ -21,7 +21,7 @@ SLOW = AxisExcitation(kind="off", rms=0.0, slow=2.0, slow_period=3.0, limit=5.0)
 
 
 def document(**changes: Any) -> dict[str, Any]:
-    made = document_of("x", 2000.0, 12.0, SLOW, (2.0, (-0.05, 0.05)))
+    made = document_of("x", 2000.0, Experiment(SLOW, 12.0), (2.0, (-0.05, 0.05)))
     made["experiment"] |= changes
     return made
 
@@ -46,6 +46,8 @@ def test_an_experiment_takes_the_place_of_the_signal_and_not_of_the_limits() -> 
         ({"excitation": {"kind": "noise", "rms": -1.0}}, "rms"),
         ({"needs": {"voltage": True, "travel": [-0.05, 0.05]}}, "needs"),
         ({"seconds": 0.0}, "seconds is 0"),
+        ({"units": ["A", "rad"]}, "units is A and rad; allowed: V and m"),
+        ({"units": "V"}, "units is 'V'"),
         ({"colour": "red"}, "'colour'"),
     ],
 )

@@ -10,9 +10,10 @@ from campaigns.bench.settle_pairs import PAIRS, carry_out, first_recording, left
 from xy_sysid.axis.model import STANDARD
 from xy_sysid.errors import BadInput
 from xy_sysid.experiment_design.beliefs import Evidence, believed
-from xy_sysid.experiment_design.evidence import ODDS, Power, nats, seconds_needed, settled
+from xy_sysid.experiment_design.criteria import ODDS
+from xy_sysid.experiment_design.evidence import Power, nats, seconds_needed, settled
 from xy_sysid.experiment_design.experiment import Experiment
-from xy_sysid.experiment_design.loop import Budget, Question, Signals, settle
+from xy_sysid.experiment_design.loop import Budget, NextChoice, Question, Signals, settle
 from xy_sysid.experiment_design.precision import Precision, sharpest
 from xy_sysid.experiment_design.prediction import Setting, recorded
 from xy_sysid.experiment_design.rivals import standing
@@ -60,7 +61,7 @@ def test_what_one_recording_leaves_open_is_settled_by_an_experiment_within_the_l
 
 def test_it_ends_when_somebody_stops_it(short: Signals) -> None:
     """STOP is an ordinary end: nothing is claimed."""
-    found = settle(Question(2000.0, [short], LAG.sets, STANDARD), limits(LAG), lambda experiment: None, FEW, lambda *_: LOUD)
+    found = settle(Question(2000.0, [short], LAG.sets, STANDARD), limits(LAG), lambda experiment: None, FEW, lambda *_: NextChoice(LOUD))
     assert found.ended == "stopped"
     assert found.seconds == 0.0
 

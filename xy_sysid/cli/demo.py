@@ -26,6 +26,7 @@ def demo(
     page: Annotated[bool | None, typer.Option("--page/--no-page", help="open the page in a browser; default in a terminal")] = None,
     port: Annotated[int, typer.Option(help="port of the page, or the next free one; 0: any", min=0, max=65535)] = 8080,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="open a browser if there is a display")] = True,
+    settle: Annotated[bool, typer.Option("--settle", help="an ambiguous machine: experiments are designed and run until it is settled")] = False,
     json: o.Json = False,
 ) -> None:
     """Watch two axes being identified live: all nodes run on this machine, and nothing else is needed."""
@@ -40,6 +41,10 @@ def demo(
         raise MissingExtra("ROS 2 (rclpy)", "ros") from None
     o.ros_domain()
     with_page = wished(page, json)
+    if settle:
+        from xy_sysid.cli.demo_settle import settle_demo
+
+        raise typer.Exit(settle_demo(machine or "hanging.yaml", speed, seed, (port, browser) if with_page else None, json))
     machine = machine or ("surprise.yaml" if with_page else "paper.yaml")
     table = Machine.from_file(machine)
     if with_page:

@@ -25,10 +25,17 @@ def wished(page: bool | None, json: bool) -> bool:
     return page
 
 
-def watch_page(specs: list[Any], axes: tuple[str, ...], speed: float, port: int, browse: bool) -> int:
+TABLE = "a simulated table with a hidden effect in each axis"
+TOLD = "See where the rigid model fails, press Diagnose, then Add. Ctrl-C ends everything."
+
+
+def watch_page(
+    specs: list[Any], axes: tuple[str, ...], speed: float, port: int, browse: bool, more: tuple[str, ...] = (), words: tuple[str, str] = (TABLE, TOLD)
+) -> int:
     """Run the nodes and the page until Ctrl-C or until the page ends; the exit code.
 
     speed: times real time, 0 at full speed; port: of the page, or the next one that is free; browse: open a browser if there is a display
+    more: options of the page; words: what is simulated, and what to do on the page
     """
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     from xy_sysid.cli.monitor import Monitor, refuse_others
@@ -37,10 +44,10 @@ def watch_page(specs: list[Any], axes: tuple[str, ...], speed: float, port: int,
     from xy_sysid.processes.run_plan import ProcessSpec
     from xy_sysid.processes.starter import run
 
-    aside.print("starting the nodes and the page: a simulated table with a hidden effect in each axis, over ROS 2 ...")
+    aside.print(f"starting the nodes and the page: {words[0]}, over ROS 2 ...")
     monitor = Monitor(axes)
     refuse_others(monitor)
-    command = (sys.executable, "-m", "xy_sysid", "page", "--no-browse", "--port", str(port))
+    command = (sys.executable, "-m", "xy_sysid", "page", "--no-browse", "--port", str(port), *more)
     page = ProcessSpec("page", command, (("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST"),), stop_rank=max(spec.stop_rank for spec in specs))
     lines: list[str] = []
 
@@ -48,7 +55,7 @@ def watch_page(specs: list[Any], axes: tuple[str, ...], speed: float, port: int,
         if name == "page" and line.startswith("http"):
             people.print(f"the page is at {line}")
             pace = f"{speed:g} times faster than real time" if speed else "at full speed"
-            say(f"The table is simulated, {pace}. See where the rigid model fails, press Diagnose, then Add. Ctrl-C ends everything.")
+            say(f"The machine is simulated, {pace}. {words[1]}")
             if browse and display():
                 webbrowser.open(line)
 

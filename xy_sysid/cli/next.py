@@ -16,7 +16,7 @@ from xy_sysid.cli.diagnose import Own
 from xy_sysid.cli.output import emit, progress, say
 from xy_sysid.cli.reading import chosen, read_each, reads, runs_of
 from xy_sysid.errors import BadInput
-from xy_sysid.units import readable
+from xy_sysid.units import Units, readable
 
 if TYPE_CHECKING:
     from xy_sysid.experiment_design.limits import MachineLimits
@@ -38,6 +38,7 @@ def next_(
         list[Path] | None, typer.Argument(metavar="[REC]", help="recordings of one machine, as of diagnose; none with --for nothing")
     ] = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", metavar="FILE", help="write the experiment for the excitation node")] = None,
+    replay: Annotated[Path | None, typer.Option("--replay", metavar="FOLDER", help="decide every step of a walk again from its bags")] = None,
     between: Between = None,
     precision: Annotated[
         str | None,
@@ -52,11 +53,15 @@ def next_(
         Path | None,
         typer.Option("--params", metavar="FILE", help="ROS parameter file or run file; limit and travel of the excitation are the limits"),
     ] = None,
-    voltage: Annotated[float | None, typer.Option(help="largest voltage, V; without limits: what the recordings show")] = None,
-    travel: Annotated[str, typer.Option(metavar="LOW:HIGH", help="ends of the travel, mm (degrees of a joint)")] = "",
-    speed: Annotated[float | None, typer.Option(help="largest speed, mm/s (degrees/s)")] = None,
+    voltage: Annotated[
+        float | None, typer.Option(help="largest voltage, V (input in its own unit, as A); without limits: what the recordings show")
+    ] = None,
+    travel: Annotated[str, typer.Option(metavar="LOW:HIGH", help="ends of the travel, mm (rad of a joint)")] = "",
+    speed: Annotated[float | None, typer.Option(help="largest speed, mm/s (rad/s)")] = None,
     acceleration: Annotated[float | None, typer.Option(help="largest acceleration, m/s^2 (rad/s^2)")] = None,
-    rms: Annotated[float | None, typer.Option(help="largest rms of the voltage, which the drive's current allows for long, V")] = None,
+    rms: Annotated[
+        float | None, typer.Option(help="largest rms of the voltage, V (input in its own unit), which the drive's current allows for long")
+    ] = None,
     seconds: Annotated[float, typer.Option(help="seconds of motion at most", min=2.0, max=3600.0)] = 60.0,
     effect_file: Own = None,
     budget: o.Budget = None,
@@ -69,6 +74,8 @@ def next_(
     from xy_sysid.experiment_design.rivals import check
     from xy_sysid.files.effects import library
 
+    if replay is not None:
+        raise typer.Exit(_replayed(replay, effect_file, json))
     o.output_file("--output", output, force)
     asked = partial(_asked, voltage=voltage, travel=travel, speed=speed, acceleration=acceleration)
     if precision == NOTHING:
@@ -80,7 +87,7 @@ def next_(
     known = library(effect_file or [])
     if precision is not None and between:
         raise BadInput("--for", f"{precision} together with --between", "one of them", "Leave one out.")
-    sets = _sets(between)
+    sets = sets_of(between)
     check(known, sets)
     recordings = read_each(recs, reading, json)
     names = chosen(recordings[0], reading.axes)
@@ -99,6 +106,20 @@ def next_(
     if not json:
         say(f"axis {names[0]}: {found.sentence.rstrip()}")
     _answered(answer, output, json)
+
+
+def _replayed(folder: Path, effect_file: list[Path] | None, json: bool) -> int:
+    """Print every step as its bags decide it; 1 where one differs from what was decided then."""
+    from xy_sysid.files.effects import library
+    from xy_sysid.files.walk import replayed
+
+    pairs = replayed(folder, library(effect_file or []))
+    same = [kept == again for kept, again in pairs]
+    if json:
+        emit({"steps": [again for _, again in pairs], "same": same})
+    for number, (kept, again) in enumerate(() if json else pairs):
+        say(f"step {number}: {again['sentence']}" + ("" if same[number] else f" It was: {kept['sentence']}"))
+    return 0 if all(same) else 1
 
 
 def _answered(answer: NextExperiment, output: Path | None, json: bool) -> None:
@@ -121,13 +142,15 @@ def _first(reading: Reading, run_file: Path | None, asked: Callable[[str], dict[
 
     axis = (reading.axes or ("x",))[0]
     told = o.told_to("excitation", run_file).parameters if run_file is not None else {}
-    values = {**_own_limits(run_file, axis), **asked(str(told.get("unit", "m"))), **({} if rms is None else {"rms": rms})}
+    of = {name: reading.units.get(f"{axis}.{name}", reading.units.get(name)) for name in ("input", "output")}
+    units = Units(of["input"] or "V", of["output"] or str(told.get("unit", "m")))
+    values = {**_own_limits(run_file, axis), **asked(units.output), **({} if rms is None else {"rms": rms})}
     for name in ("voltage", "travel"):
         if name not in values:
             raise BadInput("--for nothing", f"without the limit of {name}", f"--{name}, or --params with a run file", "Say what the machine may do.")
     rate = float(told.get("rate", reading.rate or ExcitationSettings().rate))
     middle = 0.5 * (values["travel"][0] + values["travel"][1])
-    return first_experiment(axis, rate, MachineLimits(start=middle, seconds=seconds, **values))
+    return first_experiment(axis, rate, MachineLimits(start=middle, seconds=seconds, units=units, **values))
 
 
 def _plain(answer: NextExperiment) -> dict[str, Any]:
@@ -138,23 +161,24 @@ def _plain(answer: NextExperiment) -> dict[str, Any]:
         "seconds": answer.seconds,
         "ask": answer.ask or None,
         "needs": {"voltage": answer.voltage, "travel": answer.travel},
+        "units": {"input": answer.limits.units.input, "output": answer.limits.units.output},
     }
 
 
 def _show(answer: NextExperiment, output: Path | None) -> None:
     say(f"  {answer.sentence}")
     if answer.experiment is not None:
-        scale, unit = readable("m")
-        low, high = (f"{scale * end:.4g}" for end in answer.travel)
-        say(f"  Experiment: {answer.experiment.words}, for {answer.seconds:.0f} s.")
-        say(f"  It needs up to {answer.voltage:.3g} V and the travel from {low} to {high} {unit}, with margin.")
+        limits = answer.limits
+        say(f"  Experiment: {answer.experiment.said(limits.units)}, for {answer.seconds:.0f} s.")
+        say(f"  It needs up to {answer.voltage:.3g} {limits.units.input} and the travel from {limits.span(answer.travel)}, with margin.")
     if answer.ask:
         say(f"  Somebody has to help: {answer.ask}")
     if output is not None and answer.experiment is not None:
         say(f"  {output}: run it with parameter experiment of the excitation node, then diagnose all recordings together.")
 
 
-def _sets(between: list[str] | None) -> list[tuple[str, ...]]:
+def sets_of(between: list[str] | None) -> list[tuple[str, ...]]:
+    """The sets of --between; raises BadInput for one alone."""
     if between is None:
         return []
     if len(between) < 2:

@@ -11,6 +11,7 @@ import typer
 
 from xy_sysid.cli import options as o
 from xy_sysid.cli.diagnose import Own
+from xy_sysid.cli.next import Between, sets_of
 from xy_sysid.cli.reading import Map, Rate, Scales, Units
 
 if TYPE_CHECKING:
@@ -36,6 +37,8 @@ def page(
     effect_file: Own = None,
     namespace: Annotated[str, typer.Option(help="ROS namespace of the machine")] = "/xy",
     browse: Annotated[bool, typer.Option("--browse/--no-browse", help="open a browser if there is a display")] = True,
+    between: Between = None,
+    settle: Annotated[str, typer.Option(hidden=True, help="axis that is settled without being told, for the demo")] = "",
     json: o.Json = False,
 ) -> None:
     """See measurement and model in a browser, where they part and what is missing; add it and watch the error fall. Ctrl-C ends it."""
@@ -75,6 +78,8 @@ def page(
     said = {"--map": map_ or [], "--unit": unit or [], "--scale": scale or [], "--rate": [] if rate is None else [f"{rate:g}"]}
     how = reading(topic, effort, effect_file, said)
     session = Session(Shelf(folder), with_machine, namespace, how)
+    if session.settling is not None:
+        session.settling.wished, session.settling.sets = settle, tuple(sets_of(between))
     try:
         for path in rec or []:
             session.open(path)

@@ -6,12 +6,13 @@ The document is that of ``xy-sysid next``: which axis, for how long, what drives
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Protocol
 
 from xy_sysid.errors import BadInput
 from xy_sysid.settings import AxisExcitation, ExcitationSettings, changed, unknown_name
+from xy_sysid.units import USUAL, Units
 
-KEYS = ("axis", "rate", "seconds", "excitation", "needs", "expects", "sets", "made_by")
+KEYS = ("axis", "rate", "seconds", "excitation", "needs", "units", "expects", "sets", "made_by")
 DRIVES = ("kind", "rms", "low", "high", "period", "steps", "offset", "seed", "centring", "slow", "slow_period")  # settings that it may have
 NEEDS = ("voltage", "travel")
 AGAIN = "Design it again within these limits: xy-sysid next with --params."
@@ -30,12 +31,15 @@ def with_experiment(settings: ExcitationSettings, document: object, where: str) 
         raise BadInput(
             f"{where}: rate", f"{told['rate']:g} Hz", f"{settings.rate:g} Hz, that of the excitation", "Design it from recordings of this rate."
         )
-    own, unit = settings.axes[axis], settings.unit
+    own, units = settings.axes[axis], settings.units
+    if told["units"] != list(units):
+        asked, allowed = (f"{drive} and {place}" for drive, place in (told["units"], units))
+        raise BadInput(f"{where}: units", asked, f"{allowed}, those of the excitation", "Design it from recordings of what the excitation sends.")
     voltage, (low, high) = told["needs"]["voltage"], told["needs"]["travel"]
     if not 0.0 <= voltage <= own.limit * (1.0 + 1e-9):
-        raise BadInput(f"{where}: voltage of axis {axis}", f"{voltage:.4g} V", f"up to its limit of {own.limit:g} V", AGAIN)
+        raise BadInput(f"{where}: voltage of axis {axis}", f"{voltage:.4g} {units.input}", f"up to its limit of {own.limit:g} {units.input}", AGAIN)
     if not own.travel_min <= low < high <= own.travel_max:
-        asked, allowed = f"{low:.4g} to {high:.4g} {unit}", f"{own.travel_min:g} to {own.travel_max:g} {unit}"
+        asked, allowed = f"{low:.4g} to {high:.4g} {units.output}", f"{own.travel_min:g} to {own.travel_max:g} {units.output}"
         raise BadInput(f"{where}: travel of axis {axis}", asked, f"within {allowed}", AGAIN)
     values: dict[str, Any] = {f"{axis}.{name}": value for name, value in told["excitation"].items()}
     values |= {
@@ -62,21 +66,37 @@ def _checked(document: object, where: str) -> Mapping[str, Any]:
     numbers = [told.get("rate"), told.get("seconds"), told["needs"].get("voltage"), *(travel if isinstance(travel, list | tuple) else ())]
     if len(numbers) != 5 or not all(isinstance(value, int | float) and not isinstance(value, bool) for value in numbers):
         raise BadInput(f"{where}: rate, seconds, needs", repr(numbers), "numbers", "Make the file again.")
+    units = told.setdefault("units", list(USUAL))
+    if not isinstance(units, list | tuple) or len(units) != 2 or not all(isinstance(unit, str) for unit in units):
+        raise BadInput(f"{where}: units", repr(units), "two, as [V, m]", "Make the file again.")
     if not 0.0 < told["seconds"] <= 3600.0:
         raise BadInput(f"{where}: seconds", told["seconds"], "above 0, up to 3600", "Make the file again.")
     return told
 
 
-def document_of(axis: str, rate: float, seconds: float, excitation: AxisExcitation, needs: tuple[float, tuple[float, float]]) -> dict[str, Any]:
-    """The document of an experiment. needs: the voltage, V, and the travel, m."""
-    values = excitation.model_dump()
+class Lasting(Protocol):
+    """What drives an axis, and for how many s."""
+
+    @property
+    def excitation(self) -> AxisExcitation:
+        """Of the axis."""
+
+    @property
+    def seconds(self) -> float:
+        """Of motion."""
+
+
+def document_of(axis: str, rate: float, experiment: Lasting, needs: tuple[float, tuple[float, float]], units: Units = USUAL) -> dict[str, Any]:
+    """The document of an experiment. rate: Hz; needs: the largest input, and the travel; units: in which they are."""
+    values = experiment.excitation.model_dump()
     drives = {name: values[name] for name in DRIVES}
     return {
         "experiment": {
             "axis": axis,
             "rate": rate,
-            "seconds": seconds,
+            "seconds": experiment.seconds,
             "excitation": drives,
             "needs": {"voltage": needs[0], "travel": list(needs[1])},
+            "units": list(units),
         }
     }

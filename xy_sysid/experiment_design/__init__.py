@@ -1,5 +1,6 @@
 """What to measure next: the experiment that distinguishes what the data at hand do not.
 
+criteria:    every number that decides, with its reason
 limits:      what an experiment may ask of the machine
 experiment:  one experiment: what drives the axis, and for how long
 proposals:   the experiments that are compared
@@ -12,4 +13,5 @@ precision:   the experiment that makes parameters known best
 first:       a first experiment for an axis of which nothing is known
 loop:        design, run, compare, and again until nothing is left to settle
 of_run:      one call for a diagnosis
+walk:        the loop for recordings of a machine: diagnosed together after each experiment, told in sentences
 """

@@ -1,8 +1,10 @@
 """A set of effects with its parameters, and how well the data at hand know them.
 
 Parameters are Gaussian in the coordinates of the fit (``greybox.least_squares.Scale``: the logarithm of what is positive). Their precision is
-the information of the data, and a little more: a positive number is known to a factor of two before anything is measured. Draws that the
-data contradict are left out. An effect that does not show in the data keeps its usual size, if the data allow it.
+the information of the data, and a little more: a positive number is known to a factor of two before anything is measured, and the shape of a
+law (what may be zero or negative) to what is usual over the travel of the machine. Draws that the data contradict are left out, and so are laws
+that are not valid over the travel (``Effect.refusal``): a short motion shows little of a shape, and a fit of it may be absurd farther out.
+An effect that does not show in the data keeps its usual size, if the data allow it.
 """
 
 from __future__ import annotations
@@ -15,21 +17,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xy_sysid.axis.model import AxisModel
-from xy_sysid.effects._contract import USUAL_WITHIN
+from xy_sysid.effects import Effect, Parameter
 from xy_sysid.effects._similarity import Similarity
+from xy_sysid.experiment_design.criteria import ALLOWED, FACTOR, LEAST_SEEN, REACH, STEPS, TRIES
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.floor import Windows
 from xy_sysid.greybox.free_run import MIDDLING, GreyboxFit
 from xy_sysid.greybox.least_squares import STEP, Scale
 from xy_sysid.greybox.objective import Objective, responder
-from xy_sysid.greybox.parameters import problem
+from xy_sysid.greybox.parameters import problem, unit_of
 from xy_sysid.samples.block import FloatArray
-
-ALLOWED = 3.0  # nats by which a draw may explain the data at hand worse than the best: a factor of twenty in likelihood
-TRIES = 12  # draws for each one that is wanted, at most
-STEPS = 3  # of Gauss and Newton
-LEAST_SEEN = 3e-5  # of the best seen direction in the parameters: one that the data show less is left as it is
-FACTOR = math.log(USUAL_WITHIN)  # standard deviation of the logarithm of a positive number before anything is measured
 
 
 @dataclass(frozen=True)
@@ -65,10 +62,23 @@ class Belief:
 class Evidence:
     """How well models explain the data at hand: in nats over every window, fitted or held out."""
 
-    def __init__(self, data: AxisData) -> None:
+    def __init__(self, data: AxisData, travel: tuple[float, float] | None = None) -> None:
+        """travel: of the machine, m; None: as far as the data went."""
+        self.travel = travel
+        self.machine = data.similar if travel is None else replace(data.similar, length=0.5 * (travel[1] - travel[0]) / REACH)
         self.data, self.windows = data, Windows(data.layout, np.sort(np.concatenate((data.fitted.begins, data.held.begins))))
         self.objective = Objective.of(data.floor)
         self.measured = self.windows.spectrum(data.velocity)
+
+    def sizes(self, effect: Effect) -> list[Parameter]:
+        """Its parameters, their usual sizes as the data show them, and of shapes as they are usual over the travel."""
+        pairs = zip(effect.on(self.data.similar), effect.on(self.machine), strict=True)
+        return [seen if seen.positive else over for seen, over in pairs]
+
+    def valid(self, model: AxisModel) -> bool:
+        """Whether its laws hold over the travel."""
+        told = [(model.library[name].refusal, values) for name, values in model.effects]
+        return self.travel is None or not any(refusal(values, self.travel) for refusal, values in told if refusal is not None)
 
     def error(self, model: AxisModel) -> NDArray[np.complex128]:
         """(windows, lines) of a model."""
@@ -111,19 +121,20 @@ def with_row(model: AxisModel, row: FloatArray) -> AxisModel:
     return replace(model, gain=float(row[0]), delay=float(row[1]), pole=float(row[2]), effects=effects, per_recording=())
 
 
-def usual_precision(model: AxisModel, scale: Scale) -> FloatArray:
-    """(k, k) before anything is measured: a factor of two of what is positive, its own size of the rest."""
-    each = np.where(scale.positive, 1.0 / FACTOR**2, 1.0)
+def usual_precision(evidence: Evidence, model: AxisModel, scale: Scale) -> FloatArray:
+    """(k, k) before anything is measured: a factor of two of what is positive, its usual size of the rest."""
+    usual = np.array([*scale.unit[:3], *(unit_of(item) for name, _ in model.effects for item in evidence.sizes(model.library[name]))])
+    each = np.where(scale.positive, 1.0 / FACTOR**2, (scale.unit / usual) ** 2)
     each[:3] = 1e-6  # the base is what the data know best
     return np.diag(each)
 
 
 def believed(evidence: Evidence, found: GreyboxFit, count: int, seed: int = 0) -> Belief:
     """What a fit says: draws about it, as wide as the data leave them."""
-    model = replace(found.model, per_recording=())
+    model = _valid(evidence, replace(found.model, per_recording=()))
     scale = _scale(evidence.data, model)
     slopes, _ = evidence.whitened(model, scale)
-    precision = slopes @ slopes.T + usual_precision(model, scale)
+    precision = slopes @ slopes.T + usual_precision(evidence, model, scale)
     spread = _root(precision)
     random, best, draws = np.random.default_rng(seed), evidence.nats(model), [model]
     inner = scale.inner(model.row)
@@ -132,7 +143,7 @@ def believed(evidence: Evidence, found: GreyboxFit, count: int, seed: int = 0) -
             break
         width = 0.5 ** (3.0 * tried / (TRIES * count))  # where the likelihood bends, nearer ones
         drawn = with_row(model, scale.outer(inner + width * spread @ random.standard_normal(inner.size)))
-        if evidence.nats(drawn) - best < ALLOWED:
+        if evidence.valid(drawn) and evidence.nats(drawn) - best < ALLOWED:
             draws.append(drawn)
     return _belief(evidence, model, draws, scale, precision)
 
@@ -147,9 +158,9 @@ def hidden(evidence: Evidence, rest: AxisModel, name: str, best: float, draws: t
     found: list[AxisModel] = []
     shared = _shared(rest, name)
     own = {key for key in rest.library[name].names if key not in shared}
-    for drawn in _usual(evidence.data, rest, name, TRIES * count, seed):
+    for drawn in _usual(evidence, rest, name, TRIES * count, seed):
         model = _settled(evidence, drawn, {f"{name}.{key}" for key in own})
-        if evidence.nats(model) - best < ALLOWED:
+        if evidence.valid(model) and evidence.nats(model) - best < ALLOWED:
             found.append(model)
         if len(found) >= count:
             break
@@ -158,7 +169,22 @@ def hidden(evidence: Evidence, rest: AxisModel, name: str, best: float, draws: t
     model = found[0]
     scale = _scale(evidence.data, model)
     slopes, _ = evidence.whitened(model, scale)
-    return _belief(evidence, model, found, scale, slopes @ slopes.T + usual_precision(model, scale))
+    return _belief(evidence, model, found, scale, slopes @ slopes.T + usual_precision(evidence, model, scale))
+
+
+def _valid(evidence: Evidence, model: AxisModel) -> AxisModel:
+    """Without the shapes of laws that are not valid over the travel, if the data do not insist on them."""
+    if evidence.valid(model):
+        return model
+    plain, fixed = [], set()
+    for name, values in model.effects:
+        items = model.library[name].parameters
+        flat = not evidence.valid(replace(model, effects=((name, values),)))
+        shapes = [flat and not item.positive for item in items]
+        fixed |= {f"{name}.{item.name}" for item, shape in zip(items, shapes, strict=True) if shape}
+        plain.append((name, tuple(0.0 if shape else value for value, shape in zip(values, shapes, strict=True))))
+    found = _settled(evidence, replace(model, effects=tuple(plain)), fixed)
+    return found if evidence.valid(found) and evidence.nats(found) - evidence.nats(model) < ALLOWED else model
 
 
 def _relative(model: AxisModel, name: str) -> str | None:
@@ -174,10 +200,11 @@ def _shared(model: AxisModel, name: str) -> dict[str, float]:
     return {key: known[key] for key in model.library[name].names if key in known}
 
 
-def _usual(data: AxisData, rest: AxisModel, name: str, count: int, seed: int) -> Iterator[AxisModel]:
-    random = np.random.default_rng([seed, 1])
+def _usual(evidence: Evidence, rest: AxisModel, name: str, count: int, seed: int) -> Iterator[AxisModel]:
+    random, data = np.random.default_rng([seed, 1]), evidence.data
     both = [np.concatenate((signal, -signal)) for signal in (data.voltage, data.velocity)]  # an offset is a part of the size
-    items, shared = rest.library[name].on(Similarity.of(data.sampling_rate, *both)), _shared(rest, name)
+    moved, shared = rest.library[name].on(Similarity.of(data.sampling_rate, *both)), _shared(rest, name)
+    items = [item if item.positive else over for item, over in zip(moved, evidence.sizes(rest.library[name]), strict=True)]
     relative = _relative(rest, name)
     less = rest if relative is None else rest.without(relative)
     for number in range(count):

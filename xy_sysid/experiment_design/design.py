@@ -9,22 +9,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from xy_sysid.axis.forward import move
 from xy_sysid.experiment_design.beliefs import Belief
-from xy_sysid.experiment_design.evidence import ROUNDS, SURE, Power, powers, seconds_needed, settled
+from xy_sysid.experiment_design.criteria import ALIKE, BLOCK, COARSE, ENOUGH, FINAL, JUDGED, LOOKED, NO_EVIDENCE, ROUNDS, SURE
+from xy_sysid.experiment_design.evidence import Power, powers, seconds_needed, settled
 from xy_sysid.experiment_design.experiment import RAMP, Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
-from xy_sysid.experiment_design.prediction import COARSE, LOOKED, Setting, seen
+from xy_sysid.experiment_design.prediction import Setting, seen
 from xy_sysid.experiment_design.proposals import neighbours, proposals
 from xy_sysid.hypotheses.criteria import DOUBTFUL
-
-FINAL = 6  # proposals that are judged by draws
-ALIKE = 0.1  # probabilities that differ by less are alike: they are means over few draws
-ENOUGH = 0.95  # part of what an experiment can reach at all, after which more of it is a waste
-SHORTEST = 4.0  # s of motion at least: a few windows that judge
-BLOCK = 2.0  # s: experiments last whole multiples
 
 
 @dataclass(frozen=True)
@@ -32,7 +27,7 @@ class Judged:
     """An experiment with what it is worth.
 
     seconds: of steady motion after which the sets are distinguished with 95 %, infinite if ``most`` do not suffice; probability: that they
-    are at the end; each: powers of each draw; broken: which limit it would come too near to, or nothing
+    are at the end; each: powers of each draw; broken: which limit it would come too near to, or nothing; shortest: s that it lasts at least
     """
 
     experiment: Experiment
@@ -40,13 +35,14 @@ class Judged:
     probability: float = 0.0
     each: tuple[tuple[Power, ...], ...] = ()
     broken: str = ""
+    shortest: float = 0.0
 
     @property
     def order(self) -> tuple[float, float, float]:
         """Least is best; where none gets anywhere the evidence a second decides."""
         rate = sum(min((one.rate for one in item), default=0.0) for item in self.each)
         if math.isfinite(self.seconds):
-            return max(self.seconds, shortest(self.experiment)), 0.0, -rate
+            return max(self.seconds + RAMP, self.shortest), 0.0, -rate
         return math.inf, -round(self.probability / ALIKE), -rate
 
 
@@ -63,6 +59,13 @@ class Design:
     def possible(self) -> bool:
         """Whether an experiment within the limits distinguishes the sets with 95 %."""
         return self.best is not None and math.isfinite(self.best.seconds)
+
+    @property
+    def alike(self) -> bool:
+        """Whether the sets are the same as far as this machine may go: no experiment within the limits has evidence for any of their draws."""
+        looked = [item for item in self.tried if item.each]
+        most = max((one.rate for item in looked for draw in item.each for one in draw), default=math.inf)
+        return most * JUDGED * self.limits.seconds < NO_EVIDENCE
 
     @property
     def helps(self) -> bool:
@@ -112,13 +115,9 @@ def judge(setting: Setting, beliefs: Sequence[Belief], limits: MachineLimits, ex
     pairs = zip(looked, motions, strict=True)
     each = [tuple(powers(beliefs, number, model, seen(setting, motion), rounds)) for (number, model), motion in pairs]
     most = limits.seconds - RAMP
-    return Judged(experiment, seconds=seconds_needed(each, most), probability=settled(each, most), each=tuple(each))
-
-
-def shortest(experiment: Experiment) -> float:
-    """s of an experiment that is what it was judged by: a few windows, and a whole period of a slow sine."""
-    told = experiment.excitation
-    return max(SHORTEST, told.slow_period + RAMP if told.slow > 0.0 else 0.0)
+    needed, chance = seconds_needed(each, most), settled(each, most)
+    least = max(setting.shortest(), told.slow_period + RAMP if told.slow > 0.0 else 0.0)
+    return Judged(experiment, seconds=needed, probability=chance, each=tuple(each), shortest=least)
 
 
 def _timed(item: Judged, limits: MachineLimits) -> Judged:
@@ -128,8 +127,8 @@ def _timed(item: Judged, limits: MachineLimits) -> Judged:
     wanted = item.seconds
     if not math.isfinite(wanted):
         wanted = next((step for step in steps if settled(item.each, step) >= ENOUGH * item.probability), most)
-    seconds = min(BLOCK * math.ceil(max(wanted + RAMP, shortest(item.experiment)) / BLOCK), limits.seconds)
-    return Judged(item.experiment.lasting(seconds), item.seconds, item.probability, item.each)
+    seconds = min(BLOCK * math.ceil(max(wanted + RAMP, item.shortest) / BLOCK), limits.seconds)
+    return replace(item, experiment=item.experiment.lasting(seconds))
 
 
 def expects(found: Design) -> str:
@@ -141,6 +140,8 @@ def expects(found: Design) -> str:
     chance = f"{100.0 * found.best.probability:.0f} %"
     if found.possible:
         return f"After {found.best.experiment.seconds:.0f} s, {names} are distinguished with {100.0 * SURE:.0f} % probability."
+    if found.alike:
+        return f"Within the limits of this machine {names} are the same: no experiment has evidence for one of them."
     if found.helps:
         return f"No experiment within the limits is sure to distinguish {names}: the best does with {chance} probability."
     return f"No experiment within the limits can distinguish {names}: the best would with {chance} probability."

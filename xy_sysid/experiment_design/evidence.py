@@ -17,15 +17,10 @@ from scipy.special import ndtr
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.diagnosis.ladder import contains
 from xy_sysid.experiment_design.beliefs import Belief
+from xy_sysid.experiment_design.criteria import JUDGED, ODDS, ROUNDS, SURE
 from xy_sysid.experiment_design.prediction import Recorded, expected_error, predicted, slopes
-from xy_sysid.greybox.axis_data import HELD, SEEN
 from xy_sysid.greybox.objective import responder
 from xy_sysid.hypotheses.criteria import PRICE
-
-SURE = 0.95  # probability that is asked for
-ODDS = math.log(SURE / (1.0 - SURE))  # nats: likelihood ratio at which one of two is that probable (Wald 1945)
-JUDGED = HELD / (SEEN + HELD)  # part of a record that judges
-ROUNDS = 2  # of Gauss and Newton for the rival
 
 
 @dataclass(frozen=True, slots=True)

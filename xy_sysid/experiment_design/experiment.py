@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -10,10 +11,20 @@ from xy_sysid.axis.forward import DriveInput
 from xy_sysid.excitation import signal
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.settings import AxisExcitation, ExcitationSettings
+from xy_sysid.units import USUAL, Units, readable
 
 RAMP = float(ExcitationSettings.model_fields["ramp"].default)  # s in which the excitation fades in
 AGE = 0.04  # s: age of the position by which the excitation pulls back to the start
+KEPT = 64  # signals, as many as differ in more than their amplitude
 BANDED = ("noise", "multisine", "multisine_odd", "multisine_detect", "sweep", "stepped_sine", "prbs")  # kinds that have a band
+
+
+@lru_cache(maxsize=KEPT)
+def unit_signal(told: AxisExcitation, sampling_rate: float, n: int) -> FloatArray:
+    """(n,) of rms 1, read-only: many experiments differ in their amplitude alone, and each is simulated with many models."""
+    made = signal(told, sampling_rate).next(n)
+    made.setflags(write=False)
+    return made
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,20 +50,27 @@ class Experiment:
 
     def _signal(self, sampling_rate: float, n: int) -> FloatArray:
         """(n,) of rms 1."""
-        if self.excitation.kind == "off" or self.excitation.rms == 0.0:
+        told = self.excitation
+        if told.kind == "off" or told.rms == 0.0:
             return np.zeros(n)
-        return signal(self.excitation.model_copy(update={"rms": 1.0}), sampling_rate).next(n)
+        shape = {name: getattr(told, name) for name in ("kind", "low", "high", "period", "steps", "seed")}
+        return unit_signal(AxisExcitation(**shape, rms=1.0), sampling_rate, n)
 
     @property
     def words(self) -> str:
-        """What it is, as people say it."""
-        told, parts = self.excitation, []
+        """What it is, as people say it, for an axis that is driven in V."""
+        return self.said(USUAL)
+
+    def said(self, units: Units) -> str:
+        """What it is, as people say it, in the units of an axis."""
+        told, volt, parts = self.excitation, units.input, []
         if told.rms > 0.0 and told.kind in BANDED:
-            parts.append(f"{told.kind} of {told.rms:.3g} V rms from {told.low:.3g} to {told.high:.3g} Hz")
+            parts.append(f"{told.kind} of {told.rms:.3g} {volt} rms from {told.low:.3g} to {told.high:.3g} Hz")
         elif told.rms > 0.0 and told.kind != "off":
-            parts.append(f"{told.kind} of {told.rms:.3g} V, each for {told.period:.3g} s")
+            parts.append(f"{told.kind} of {told.rms:.3g} {volt}, each for {told.period:.3g} s")
         if told.slow > 0.0:
-            parts.append(f"a slow sine of {told.slow:.3g} V with a period of {told.slow_period:.3g} s")
+            parts.append(f"a slow sine of {told.slow:.3g} {volt} with a period of {told.slow_period:.3g} s")
         if told.offset != 0.0:
-            parts.append(f"an offset of {told.offset:.3g} V")
+            held, place = told.offset / told.centring if told.centring else 0.0, readable(units.output)
+            parts.append(f"held {place[0] * held:+.3g} {place[1]} from the start" if held else f"an offset of {told.offset:.3g} {volt}")
         return " and ".join(parts) or "nothing"

@@ -15,11 +15,12 @@ from xy_sysid.axis.forward import move
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.effects import SIMPLEST_FRICTION
 from xy_sysid.experiment_design.beliefs import Belief
+from xy_sysid.experiment_design.criteria import COARSE, FITTED, LOOKED
 from xy_sysid.experiment_design.experiment import RAMP, Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
 from xy_sysid.experiment_design.of_run import NextExperiment
-from xy_sysid.experiment_design.precision import FITTED, Information, information
-from xy_sysid.experiment_design.prediction import COARSE, LOOKED, Setting, seen
+from xy_sysid.experiment_design.precision import Information, information
+from xy_sysid.experiment_design.prediction import Setting, seen
 from xy_sysid.experiment_design.proposals import proposals
 from xy_sysid.greybox.axis_data import EPSILON, WINDOWS
 from xy_sysid.greybox.floor import bands

@@ -10,9 +10,10 @@ import numpy as np
 
 from xy_sysid.axis.forward import Motion
 from xy_sysid.errors import BadInput
+from xy_sysid.experiment_design.criteria import MARGIN
 from xy_sysid.samples.recording import Run
+from xy_sysid.units import USUAL, Units, readable
 
-MARGIN = 0.15  # part of each limit that is kept free for what the models do not know
 SECONDS = 60.0  # s of motion for one experiment at most
 
 
@@ -23,6 +24,7 @@ class MachineLimits:
     voltage: V, of each sample; rms: V, that the drive stands for long (its current); speed: m/s; acceleration: m/s^2
     travel: (low, high) m; start: m, where the axis stands when an experiment begins
     margin: part of speed, acceleration and travel that is kept free; seconds: s of one experiment at most
+    units: of the axis, in which the limits are told; V and m stand for them above
     """
 
     voltage: float
@@ -33,6 +35,7 @@ class MachineLimits:
     acceleration: float = math.inf
     margin: float = MARGIN
     seconds: float = SECONDS
+    units: Units = USUAL
 
     def __post_init__(self) -> None:
         for name in ("voltage", "rms", "speed", "acceleration", "seconds"):
@@ -41,9 +44,18 @@ class MachineLimits:
         if not 0.0 <= self.margin < 1.0:
             raise BadInput("margin", self.margin, "0 to below 1", "Give the part of each limit that is kept free.")
         if not self.travel[0] < self.start < self.travel[1]:
-            low, high = (f"{1e3 * end:.4g}" for end in self.travel)
-            allowed = f"where the axis stands, {1e3 * self.start:.4g} mm, between its ends"
-            raise BadInput("travel", f"{low} to {high} mm", allowed, "Give the ends of the travel, or move the axis between them.")
+            allowed = f"where the axis stands, {self.place(self.start)}, between its ends"
+            raise BadInput("travel", self.span(self.travel), allowed, "Give the ends of the travel, or move the axis between them.")
+
+    def place(self, where: float) -> str:
+        """A place as people read it: 110.7 mm, 1.2 rad."""
+        scale, unit = readable(self.units.output)
+        return f"{scale * where:.4g} {unit}"
+
+    def span(self, travel: tuple[float, float]) -> str:
+        """Two places as people read them."""
+        scale, _ = readable(self.units.output)
+        return f"{scale * travel[0]:.4g} to {self.place(travel[1])}"
 
     @property
     def room(self) -> float:
@@ -77,7 +89,7 @@ def as_recorded(runs: Sequence[Run]) -> MachineLimits:
     if not (voltage > 0.0 and high > low):
         raise BadInput("recordings", "without voltage or motion", "an axis that moves", "Give the limits: voltage and travel.")
     start, least = float(runs[-1].position[-1]), 0.1 * (high - low)
-    return MachineLimits(voltage=voltage, travel=(min(low, start - least), max(high, start + least)), start=start)
+    return MachineLimits(voltage=voltage, travel=(min(low, start - least), max(high, start + least)), start=start, units=runs[-1].units)
 
 
 def _peak(values: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> float:

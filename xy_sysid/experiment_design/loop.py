@@ -11,6 +11,7 @@ from typing import Literal
 
 from xy_sysid.axis.model import Library
 from xy_sysid.experiment_design.beliefs import Belief
+from xy_sysid.experiment_design.criteria import DRAWS, MINIMUM
 from xy_sysid.experiment_design.design import Design, design
 from xy_sysid.experiment_design.experiment import Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
@@ -20,10 +21,20 @@ from xy_sysid.greybox.axis_data import EPSILON, prepare_all
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import USUAL, Units
 
-Ending = Literal["settled", "impossible", "experiments", "seconds", "stopped"]
+Ending = Literal["settled", "alike", "impossible", "experiments", "seconds", "stopped"]
 Signals = tuple[FloatArray, FloatArray]  # voltage and position, (n,) each
 CarryOut = Callable[[Experiment], Signals | None]  # carries an experiment out; None if somebody stopped it
-Choose = Callable[[Setting, Sequence[Belief], MachineLimits], Experiment | None]
+
+
+@dataclass(frozen=True)
+class NextChoice:
+    """experiment: what comes next, None where none helps; found: what it was chosen from, if by ``design``."""
+
+    experiment: Experiment | None
+    found: Design | None = None
+
+
+Choose = Callable[[Setting, Sequence[Belief], MachineLimits], NextChoice]
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,16 +43,36 @@ class Budget:
 
     experiments: int = 2
     seconds: float = 60.0
-    draws: int = 6
+    draws: int = DRAWS
 
 
 @dataclass(frozen=True)
 class Decision:
-    """standing: how the sets explain all recordings so far; left: those that are still possible, the chosen one first; then: what comes next."""
+    """standing: how the sets explain all recordings so far; left: those that are still possible, the chosen one first
+    choice: what comes next; None where one set is left
+    """
 
     standing: Standing
     left: tuple[tuple[str, ...], ...]
-    then: Experiment | None
+    choice: NextChoice | None = None
+
+    @property
+    def then(self) -> Experiment | None:
+        """The next experiment; None where none is needed, or none helps."""
+        return self.choice.experiment if self.choice is not None else None
+
+    @property
+    def chosen(self) -> tuple[str, ...]:
+        """The set that explains all recordings best."""
+        return self.standing.names[self.standing.chosen]
+
+    def over(self) -> Ending | None:
+        """Why no experiment follows, whatever the budget."""
+        if len(self.left) == 1:
+            return "settled"
+        if self.then is not None:
+            return None
+        return "alike" if self.choice is not None and self.choice.found is not None and self.choice.found.alike else "impossible"
 
 
 @dataclass(frozen=True)
@@ -56,8 +87,7 @@ class Settled:
     @property
     def effects(self) -> tuple[str, ...]:
         """The set that explains all recordings best."""
-        last = self.steps[-1].standing
-        return last.names[last.chosen]
+        return self.steps[-1].chosen
 
 
 @dataclass(frozen=True)
@@ -72,22 +102,22 @@ class Question:
     units: Units = USUAL
 
 
-def best_design(setting: Setting, beliefs: Sequence[Belief], limits: MachineLimits) -> Experiment | None:
-    """The experiment of ``design``; None where none is more likely than not to tell."""
+def best_design(setting: Setting, beliefs: Sequence[Belief], limits: MachineLimits) -> NextChoice:
+    """The experiment of ``design``; none where none may tell."""
     found: Design = design(setting, beliefs, limits)
-    return found.best.experiment if found.best is not None and found.helps else None
+    return NextChoice(found.best.experiment if found.best is not None and found.helps else None, found)
 
 
 def decide(
-    question: Question, more: Sequence[Signals], limits: MachineLimits, choose: Choose, before: Standing | None = None, draws: int = 6
+    question: Question, more: Sequence[Signals], limits: MachineLimits, choose: Choose, before: Standing | None = None, draws: int = DRAWS
 ) -> Decision:
     """What the recordings say, and what to measure next."""
     data = prepare_all(question.sampling_rate, [*question.recordings, *more], question.tolerance, question.units)
-    known = tuple(found.model for found in before.fits) if before is not None else ()
-    now = standing(data, question.library, question.sets, known)
-    beliefs = beliefs_of(data, question.library, now, draws)
-    then = choose(Setting.of(data), beliefs, limits) if len(beliefs) > 1 else None
-    return Decision(now, tuple(item.effects for item in beliefs), then)
+    models = {names: found.model for names, found in zip(before.names, before.fits, strict=True)} if before is not None else {}
+    now = standing(data, question.library, question.sets, [models.get(tuple(each)) for each in question.sets])
+    beliefs = beliefs_of(data, question.library, now, limits.travel, draws)
+    choice = choose(Setting.of(data), beliefs, limits) if len(beliefs) > 1 else None
+    return Decision(now, tuple(item.effects for item in beliefs), choice)
 
 
 def settle(question: Question, limits: MachineLimits, run: CarryOut, budget: Budget | None = None, choose: Choose = best_design) -> Settled:
@@ -98,17 +128,10 @@ def settle(question: Question, limits: MachineLimits, run: CarryOut, budget: Bud
     spent = 0.0
     while True:
         steps.append(decide(question, recordings, limits, choose, steps[-1].standing if steps else None, budget.draws))
-        last = steps[-1]
-        if len(last.left) == 1:
-            return Settled("settled", tuple(steps), tuple(recordings), spent)
-        if last.then is None:
-            return Settled("impossible", tuple(steps), tuple(recordings), spent)
-        if len(recordings) >= budget.experiments:
-            return Settled("experiments", tuple(steps), tuple(recordings), spent)
-        room = budget.seconds - spent
-        if room < MINIMUM:
-            return Settled("seconds", tuple(steps), tuple(recordings), spent)
-        experiment = last.then.lasting(min(last.then.seconds, room))
+        following = after(steps[-1], budget, len(recordings), spent)
+        if isinstance(following, str):
+            return Settled(following, tuple(steps), tuple(recordings), spent)
+        experiment = following
         found = run(experiment)
         if found is None:
             return Settled("stopped", tuple(steps), tuple(recordings), spent)
@@ -116,4 +139,19 @@ def settle(question: Question, limits: MachineLimits, run: CarryOut, budget: Bud
         spent += experiment.seconds
 
 
-MINIMUM = 2.0  # s of motion that are worth an experiment
+def after(last: Decision, budget: Budget, experiments: int, seconds: float) -> Experiment | Ending:
+    """What follows a decision: the next experiment, or why there is none. experiments, seconds: of motion, that were spent."""
+    over = last.over()
+    if over is not None or last.then is None:
+        return over or "impossible"
+    if experiments >= budget.experiments:
+        return "experiments"
+    room = budget.seconds - seconds
+    if room < MINIMUM:
+        return "seconds"
+    if experiments and experiments + 1 == budget.experiments:  # those before did not keep what they promised, and none comes after
+        return last.then.lasting(room)
+    unsure = last.choice is not None and last.choice.found is not None and not last.choice.found.possible
+    if unsure and experiments + 1 < budget.experiments:  # what it teaches is for a better one, which needs its time too
+        room = max(0.5 * room, MINIMUM)
+    return last.then.lasting(min(last.then.seconds, room))

@@ -16,11 +16,12 @@ from xy_sysid.diagnosis.ladder import Ladder
 from xy_sysid.diagnosis.of_run import Diagnosed
 from xy_sysid.errors import BadInput
 from xy_sysid.experiment_design.beliefs import Belief, Evidence, believed
+from xy_sysid.experiment_design.criteria import COARSE, DRAWN
 from xy_sysid.experiment_design.design import Design, design, expects
 from xy_sysid.experiment_design.experiment import Experiment
 from xy_sysid.experiment_design.limits import MachineLimits, as_recorded
-from xy_sysid.experiment_design.precision import DRAWS, Precision, sharpest
-from xy_sysid.experiment_design.prediction import COARSE, Setting
+from xy_sysid.experiment_design.precision import Precision, sharpest
+from xy_sysid.experiment_design.prediction import Setting
 from xy_sysid.experiment_design.rivals import beliefs_of, names_of, possible, standing
 from xy_sysid.greybox.axis_data import EPSILON, AxisData, prepare_all
 
@@ -33,7 +34,7 @@ class NextExperiment:
 
     experiment: None where none helps; sentence: what it is expected to bring; sets: of effects that it is to distinguish
     probability: that it tells; settles: whether that is 95 % or more; ask: what a person would have to change, or nothing
-    voltage, travel: the largest voltage, V, and the places, m, that it needs; limits: within which it was chosen
+    voltage, travel: the largest input and the places that it needs; limits: within which it was chosen, with the units of the axis
     """
 
     axis: str
@@ -54,7 +55,7 @@ class NextExperiment:
         return self.experiment.seconds if self.experiment is not None else 0.0
 
     def __repr__(self) -> str:
-        what = self.experiment.words if self.experiment is not None else "none"
+        what = self.experiment.said(self.limits.units) if self.experiment is not None else "none"
         return f"<Next experiment of axis {self.axis}: {what}. {self.sentence}>"
 
 
@@ -73,18 +74,18 @@ def next_experiment(
     Raises BadInput for a diagnosis without enough data, and for effects that free simulation cannot predict.
     """
     data = _data(found, tolerance)
-    limits = limits or as_recorded(found.runs)
+    limits = _limits(found, limits)
     axis, rate = found.runs[0].axis, data.sampling_rate
-    sets = [tuple(each) for each in between] or possible(data, library, _ladder(found))
+    sets = [tuple(each) for each in between] or possible(data, library, ladder_of(found))
     with threadpool_limits(1, "blas"):
         now = standing(data, library, sets)
-        beliefs = beliefs_of(data, library, now)
+        beliefs = beliefs_of(data, library, now, limits.travel)
         if len(beliefs) < 2:
             chosen = names_of([now.names[now.chosen]])
             sentence = f"Nothing is left to settle: of {names_of(sets)} these data leave only {chosen}."
             return NextExperiment(axis=axis, sampling_rate=rate, sentence=sentence, limits=limits, sets=tuple(sets))
         made = design(Setting.of(data), beliefs, limits, tell=tell)
-    return _answer(axis, rate, made, _ask(library, made))
+    return answered(axis, rate, made, library)
 
 
 def sharpen(found: Diagnosed, parameter: str, width: float, limits: MachineLimits | None = None, tolerance: float = EPSILON) -> NextExperiment:
@@ -96,11 +97,11 @@ def sharpen(found: Diagnosed, parameter: str, width: float, limits: MachineLimit
     if not 0.0 < width < math.inf:
         raise BadInput("width", width, "above 0", "Give half of the interval, for example 0.02 for 2 %.")
     data = _data(found, tolerance)
-    limits = limits or as_recorded(found.runs)
+    limits = _limits(found, limits)
     with threadpool_limits(1, "blas"):
-        final = _ladder(found).final
+        final = ladder_of(found).final
         best = sharpest(data, final, limits, Precision(parameter, width))
-        beliefs = [believed(Evidence(data), final, DRAWS)] if best.experiment is not None else []
+        beliefs = [believed(Evidence(data, limits.travel), final, DRAWN)] if best.experiment is not None else []
     to = f"{100.0 * best.width:.2g} %"
     if best.experiment is None and best.possible:
         sentence = f"No experiment is needed: {parameter} is known to {to} (95 %)."
@@ -124,18 +125,25 @@ def sharpen(found: Diagnosed, parameter: str, width: float, limits: MachineLimit
 
 
 def _data(found: Diagnosed, tolerance: float) -> AxisData:
-    _ladder(found)
+    ladder_of(found)
     runs = found.runs
     return prepare_all(runs[0].sampling_rate, [(run.voltage, run.position) for run in runs], tolerance, runs[0].units)
 
 
-def _ladder(found: Diagnosed) -> Ladder:
+def _limits(found: Diagnosed, limits: MachineLimits | None) -> MachineLimits:
+    """Those that were given, in the units of the recordings; without, what the recordings show."""
+    return as_recorded(found.runs) if limits is None else replace(limits, units=found.runs[-1].units)
+
+
+def ladder_of(found: Diagnosed) -> Ladder:
+    """The ladder of a diagnosis; raises BadInput for one of too little data."""
     if found.ladder is None or not found.runs:
         raise BadInput("diagnosis", found.verdict, "one of data that suffice", "Record for longer, or ask for a first experiment (--for nothing).")
     return found.ladder
 
 
-def _answer(axis: str, rate: float, made: Design, ask: str) -> NextExperiment:
+def answered(axis: str, rate: float, made: Design, library: Library) -> NextExperiment:
+    """A design as an answer: the experiment with what it needs, what it is expected to bring, and what a person would have to change."""
     best = made.best if made.helps else None
     found = NextExperiment(
         axis=axis,
@@ -146,7 +154,7 @@ def _answer(axis: str, rate: float, made: Design, ask: str) -> NextExperiment:
         sets=tuple(item.effects for item in made.beliefs),
         probability=made.best.probability if made.best is not None else 0.0,
         settles=made.possible,
-        ask=ask,
+        ask=_ask(library, made),
     )
     return _needs(found, made.beliefs)
 

@@ -16,20 +16,16 @@ from xy_sysid.axis.forward import move
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.errors import BadInput
 from xy_sysid.experiment_design.beliefs import Belief, Evidence, believed
-from xy_sysid.experiment_design.design import FINAL, SHORTEST
+from xy_sysid.experiment_design.criteria import COARSE, DRAWN, FINAL, FITTED, LONGER, SHORTEST
 from xy_sysid.experiment_design.experiment import RAMP, Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
-from xy_sysid.experiment_design.prediction import COARSE, Recorded, Setting, expected_error, predicted, recorded, slopes
+from xy_sysid.experiment_design.prediction import Recorded, Setting, expected_error, predicted, recorded, slopes
 from xy_sysid.experiment_design.proposals import neighbours, proposals
-from xy_sysid.greybox.axis_data import HELD, SEEN, AxisData, prepare_all
+from xy_sysid.greybox.axis_data import AxisData, prepare_all
 from xy_sysid.greybox.free_run import GreyboxFit, finish
 from xy_sysid.greybox.least_squares import of_the_law
 from xy_sysid.greybox.parameters import Z95, Estimate
 from xy_sysid.samples.block import FloatArray
-
-FITTED = SEEN / (SEEN + HELD)  # part of a record that a fit sees
-DRAWS = 2  # of the parameters that are looked at
-LONGER = 1.4  # times as long, where a rehearsal does not reach what was asked for
 
 
 @dataclass(frozen=True)
@@ -105,7 +101,7 @@ def sharpest(data: AxisData, found: GreyboxFit, limits: MachineLimits, target: P
     before = target.of_interval(found.parameter(target.parameter))
     if before <= target.width:
         return Sharpest(None, before, True, before)
-    setting, belief = Setting.of(data), believed(Evidence(data), found, DRAWS)
+    setting, belief = Setting.of(data), believed(Evidence(data, limits.travel), found, DRAWN)
     most = limits.seconds - RAMP
     judged: list[tuple[float, float, int, Experiment]] = []
     for experiment in _rounds(setting, belief, limits, target, seed):
@@ -146,7 +142,7 @@ def _rounds(setting: Setting, belief: Belief, limits: MachineLimits, target: Pre
     return [*best, *(neighbours(best[0], limits, rate) if best else ())]
 
 
-def informations(setting: Setting, belief: Belief, limits: MachineLimits, experiment: Experiment, draws: int = DRAWS) -> list[Information]:
+def informations(setting: Setting, belief: Belief, limits: MachineLimits, experiment: Experiment, draws: int = DRAWN) -> list[Information]:
     """Of one experiment, for some draws; none where a draw would break a limit, or would not move."""
     found = []
     for model in belief.draws[:draws]:

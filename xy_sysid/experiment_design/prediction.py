@@ -10,30 +10,47 @@ from numpy.typing import NDArray
 from xy_sysid.axis.forward import Motion, move
 from xy_sysid.axis.model import AxisModel, simulator
 from xy_sysid.experiment_design.beliefs import Belief, with_row
+from xy_sysid.experiment_design.criteria import BLOCK, COARSE, CYCLES, LOOKED
 from xy_sysid.experiment_design.experiment import RAMP, Experiment
-from xy_sysid.greybox.axis_data import WINDOWS, AxisData
+from xy_sysid.greybox.axis_data import HELD, ROOM, SEEN, WINDOWS, AxisData
 from xy_sysid.greybox.floor import Bands, Windows, bands, floor
 from xy_sysid.greybox.least_squares import STEP
 from xy_sysid.greybox.objective import Objective, responder
 from xy_sysid.samples.block import FloatArray
 
-LOOKED = 8.0  # s of each experiment that are simulated: longer ones go on as they began
-COARSE = 4000.0  # Hz: sub-steps
-
 
 @dataclass(frozen=True)
 class Setting:
-    """What an experiment is seen through. layout: windows and bands; encoder: m; epsilon: part of the motion to which laws are trusted."""
+    """What an experiment is seen through.
+
+    layout: windows and bands; encoder: m; epsilon: part of the motion to which laws are trusted; recorded: s of each recording at hand
+    """
 
     layout: Bands
     encoder: float
     epsilon: float
+    recorded: tuple[float, ...] = ()
 
     @staticmethod
     def of(data: AxisData) -> Setting:
         """As some data were seen, in windows for recordings as long as those that are simulated."""
-        longest = max(LOOKED, *(size / data.sampling_rate for size in data.counts(early=False)))
-        return Setting(bands(data.sampling_rate, int(longest * data.sampling_rate / WINDOWS)), data.floor.encoder, data.floor.epsilon)
+        recorded = tuple(size / data.sampling_rate for size in data.counts(early=False))
+        longest = max(LOOKED, *recorded)
+        layout = bands(data.sampling_rate, int(longest * data.sampling_rate / WINDOWS))
+        return Setting(layout, data.floor.encoder, data.floor.epsilon, recorded)
+
+    def shortest(self) -> float:
+        """s of an experiment that holds windows which judge it, when it is compared together with the recordings at hand.
+
+        The windows grow with the data (``greybox.axis_data``), so the time is found in steps.
+        """
+        rate, seconds = self.layout.sampling_rate, BLOCK
+        while True:
+            every = (*self.recorded, seconds)
+            window = bands(rate, int(min(sum(every) / WINDOWS, max(every) / ROOM) * rate)).length / rate
+            if seconds - RAMP >= CYCLES * (SEEN + HELD) * window:
+                return seconds
+            seconds += BLOCK
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,7 @@
-"""The experiments that are compared: a grid over kind, band, amplitude and period, and their neighbours."""
+"""The experiments that are compared: a grid over kind, band, amplitude, period, place in the travel and path, and their neighbours.
+
+A place is approached and held by the excitation's pull: with an offset it pulls to another place than the start. A slow sine about it is a path.
+"""
 
 from __future__ import annotations
 
@@ -6,17 +9,23 @@ from collections.abc import Iterator
 from itertools import product
 from typing import Any
 
+from xy_sysid.experiment_design.criteria import CREST, FULL, LONGEST, PLACES, QUIETER, TOP
 from xy_sysid.experiment_design.experiment import Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
 from xy_sysid.settings import AxisExcitation
 
-CREST = 4.2  # peak of Gaussian noise over its rms: one sample in 40,000 is beyond
-PART = {"noise": 1.0 / CREST, "sweep": 0.7, "step": 0.95}  # largest rms (height of a step) over the limit of the voltage
-HALVES = (1.0, 0.5, 0.25, 0.125, 0.0625)  # parts of the largest amplitude
-FINER = tuple(2.0 ** (-0.5 * k) for k in range(11))  # of a slow sine, which goes as far as its amplitude says
-TOP = 0.15  # of the sampling rate: highest frequency that is proposed
-NEAR = {"rms": (0.7, 1.4), "slow": (0.7, 1.4), "slow_period": (0.6, 1.6), "period": (0.6, 1.6), "low": (0.4, 2.5), "high": (0.5, 2.0)}
-LONGEST = 10.0  # s, of a slow sine
+PART = {"noise": 1.0 / CREST, "sweep": 0.7, "step": FULL}  # largest rms (height of a step) over the limit of the voltage
+HALVES = tuple(0.5**k for k in range(QUIETER))  # parts of the largest amplitude
+FINER = tuple(2.0 ** (-0.5 * k) for k in range(2 * QUIETER + 1))  # of a slow sine, which goes as far as its amplitude says
+NEAR = {
+    "rms": (0.7, 1.4),
+    "slow": (0.7, 1.4),
+    "slow_period": (0.6, 1.6),
+    "period": (0.6, 1.6),
+    "low": (0.4, 2.5),
+    "high": (0.5, 2.0),
+    "offset": (0.7, 1.3),
+}
 
 
 def proposals(limits: MachineLimits, sampling_rate: float, seed: int = 1) -> list[Experiment]:
@@ -32,7 +41,7 @@ def neighbours(experiment: Experiment, limits: MachineLimits, sampling_rate: flo
         banded = name in ("low", "high") and told.kind in ("noise", "sweep") and told.rms > 0.0
         if name in ("low", "high") and not banded:
             continue
-        if values[name] <= 0.0 or (name == "slow_period" and told.slow == 0.0) or (name == "period" and told.kind not in ("step", "sweep")):
+        if values[name] == 0.0 or (name == "slow_period" and told.slow == 0.0) or (name == "period" and told.kind not in ("step", "sweep")):
             continue
         for factor in factors:
             yield _experiment(limits, sampling_rate, {**values, name: values[name] * factor})
@@ -49,16 +58,34 @@ def _grid(limits: MachineLimits, sampling_rate: float) -> Iterator[dict[str, Any
     for part, period in product(HALVES, (0.1, 0.4, 1.6)):
         yield {"kind": "step", "period": period, "rms": part * PART["step"] * most}
     for part, period in product(FINER, (1.0, 3.0, LONGEST)):
-        yield {"kind": "off", "rms": 0.0, "slow": 0.95 * part * most, "slow_period": period}
+        yield {"kind": "off", "rms": 0.0, "slow": FULL * part * most, "slow_period": period}
     for part, quiet, period in product(HALVES[1:], (0.25, 0.0625), (3.0, LONGEST)):
         yield {"kind": "noise", "low": 0.1, "high": top, "rms": quiet * most / CREST, "slow": 0.7 * part * most, "slow_period": period}
+    yield from _held(limits, top)
+
+
+def _held(limits: MachineLimits, top: float) -> Iterator[dict[str, Any]]:
+    """Away from the start, or along a path, both held by the pull."""
+    pull = FULL * limits.voltage / limits.room
+    for side, part, quiet in product((-PLACES, PLACES), HALVES[:2], HALVES[1::2]):
+        offset = side * part * FULL * limits.voltage
+        yield {
+            "kind": "noise",
+            "low": 0.1,
+            "high": top,
+            "rms": quiet * (1.0 - PLACES) * limits.voltage / CREST,
+            "offset": offset,
+            "centring": part * pull,
+        }
+    for part, period in product(HALVES[:2], (3.0, LONGEST)):
+        yield {"kind": "off", "rms": 0.0, "slow": PLACES * part * FULL * limits.voltage, "slow_period": period, "centring": part * pull}
 
 
 def _experiment(limits: MachineLimits, sampling_rate: float, told: dict[str, Any]) -> Experiment:
     """With the limits of the axis, and numbers that its settings allow."""
     told = {**told, "limit": limits.voltage, "travel_min": limits.travel[0], "travel_max": limits.travel[1]}
     told["brake"] = min(AxisExcitation.model_fields["brake"].default, 0.2 * (limits.travel[1] - limits.travel[0]))
-    told["centring"] = _centring(limits)
+    told["centring"] = min(max(told.get("centring", 0.0), _centring(limits)), 1e4)
     told["rms"] = min(told["rms"], PART.get(told["kind"], 0.0) * limits.voltage)
     told["slow"] = min(told.get("slow", 0.0), max(0.95 * limits.voltage - told["rms"] / PART.get(told["kind"], 1.0), 0.0))
     if "high" in told and told.get("kind") != "off":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
@@ -13,13 +14,12 @@ from xy_sysid.diagnosis.ladder import Ladder, contains
 from xy_sysid.diagnosis.rungs import Given
 from xy_sysid.effects._contract import BEGUN
 from xy_sysid.errors import BadInput
-from xy_sysid.experiment_design.beliefs import ALLOWED, Belief, Evidence, believed, hidden
+from xy_sysid.experiment_design.beliefs import Belief, Evidence, believed, hidden
+from xy_sysid.experiment_design.criteria import ALLOWED, DRAWS
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit, fit
-from xy_sysid.hypotheses.compare import gain
-from xy_sysid.hypotheses.criteria import CHANCE, DOUBTFUL, PRICE
-
-DRAWS = 6  # of the parameters of each set
+from xy_sysid.hypotheses.compare import Gain, gain
+from xy_sysid.hypotheses.criteria import CHANCE, DOUBTFUL, OVERLAP, PRICE
 
 
 @dataclass(frozen=True)
@@ -41,11 +41,13 @@ def standing(data: AxisData, library: Library, sets: Sequence[Sequence[str]], kn
     check(library, sets)
     names = tuple(tuple(each) for each in sets)
     before = tuple(known) or (None,) * len(names)
-    fits = _of_one_law(library, names, [_fitted(data, library, each, model) for each, model in zip(names, before, strict=True)])
+    each_fit = [_fitted(data, library, each, model) for each, model in zip(names, before, strict=True)]
+    first = min(each_fit, key=lambda found: float(np.sum(found.scores)))
+    fits = _of_one_law(library, names, [_from_the_best(data, each, found, first) for each, found in zip(names, each_fit, strict=True)])
     prices = [PRICE * sum(len(library[name].parameters) for name in each) for each in names]
     scores = [float(np.sum(found.scores)) + price for found, price in zip(fits, prices, strict=True)]
     chosen = int(np.argmin(scores))
-    doubts = [_doubt(fits[chosen], other, prices[k] - prices[chosen]) for k, other in enumerate(fits) if k != chosen]
+    doubts = [_doubt(gained(data, fits[chosen], other), prices[k] - prices[chosen]) for k, other in enumerate(fits) if k != chosen]
     return Standing(names, fits, chosen, max(doubts, default=0.0))
 
 
@@ -69,9 +71,43 @@ def _of_one_law(library: Library, names: Sequence[tuple[str, ...]], fits: Sequen
     return tuple(found)
 
 
-def _doubt(one: GreyboxFit, other: GreyboxFit, price: float) -> float:
+def gained(data: AxisData, one: GreyboxFit, other: GreyboxFit) -> Gain:
+    """``gain`` over the windows of several recordings: what differs from one recording to the next is no error of either.
+
+    A stratified sample (Cochran, Sampling techniques, 1977, ch. 5): each recording has its own mean. One window alone differs from 0.
+    """
     found = gain(one, other)
-    return min(1.0 - type(found)(found.nats + price, found.error, found.windows).probability, 0.5)
+    if len(data.steps) < 2 or not math.isfinite(found.nats):
+        return found
+    each = other.scores - one.scores
+    ends = [step.start for step in data.steps]
+    parts = [each[np.searchsorted(ends, data.held.begins, side="right") == k + 1] for k in range(len(ends))]
+    parts = [part for part in parts if part.size]
+    variance = sum(part.size * (float(np.var(part, ddof=1)) if part.size > 1 else float(part[0] ** 2)) for part in parts)
+    return Gain(found.nats, math.sqrt(OVERLAP * variance), each.size / OVERLAP - len(parts) + 1)
+
+
+def _from_the_best(data: AxisData, names: Sequence[str], found: GreyboxFit, best: GreyboxFit) -> GreyboxFit:
+    """A fit that starts from what the best one knows, if that is better: an effect takes over what another calls by the same name (a period).
+
+    A wave whose period a fit has not found would be ruled out for no reason.
+    """
+    there = dict(best.model.effects)
+    new, gone = [name for name in names if name not in there], [name for name in there if name not in names]
+    known = {key: value for name in gone for key, value in zip(best.model.library[name].names, there[name], strict=True)}
+    if len(new) != 1 or not known.keys() & set(best.model.library[new[0]].names):
+        return found
+    rest = best.model
+    for name in gone:
+        rest = rest.without(name)
+    items = best.model.library[new[0]].on(data.similar)
+    starts = [[known.get(item.name, item.typical) + turned * (item.unit == "rad") for item in items] for turned in (0.0, 0.5 * math.pi)]
+    fits = [found, *(fit(data, rest.with_effect(new[0], values)) for values in starts)]
+    return min(fits, key=lambda one: float(np.sum(one.scores)))
+
+
+def _doubt(found: Gain, price: float) -> float:
+    return min(1.0 - Gain(found.nats + price, found.error, found.windows).probability, 0.5)
 
 
 def _fitted(data: AxisData, library: Library, names: Sequence[str], known: AxisModel | None) -> GreyboxFit:
@@ -82,9 +118,11 @@ def _fitted(data: AxisData, library: Library, names: Sequence[str], known: AxisM
     return other if float(np.sum(other.scores)) < float(np.sum(found.scores)) else found
 
 
-def beliefs_of(data: AxisData, library: Library, found: Standing, draws: int = DRAWS, seed: int = 0) -> list[Belief]:
-    """What each set says, that which was chosen first; sets that the data rule out are left out."""
-    evidence = Evidence(data)
+def beliefs_of(
+    data: AxisData, library: Library, found: Standing, travel: tuple[float, float] | None = None, draws: int = DRAWS, seed: int = 0
+) -> list[Belief]:
+    """What each set says of the motion within a travel, m; that which was chosen first, and sets that the data rule out left out."""
+    evidence = Evidence(data, travel)
     order = sorted(range(len(found.names)), key=lambda k: k != found.chosen)
     best = found.fits[found.chosen]
     beliefs = []
@@ -105,8 +143,8 @@ def _belief(
     rest = frozenset(name for name, _ in best.model.effects)
     new = [name for name in names if name not in rest]
     holds = contains(library, frozenset(names), rest)  # then it cannot do worse, and a fit that does has not found what there is
-    better = gain(best, own)
-    if len(new) == 1 and holds and not gain(own, best).is_sure:
+    better = gained(evidence.data, best, own)
+    if len(new) == 1 and holds and not gained(evidence.data, own, best).is_sure:
         model, least = best.model, evidence.nats(best.model)
         for name in rest - frozenset(names):
             model = model if _gives_way(library, new[0], name) else model.without(name)

@@ -19,9 +19,8 @@ def document(found: NextExperiment) -> dict[str, Any]:
     """What the file of an experiment holds. Raises BadInput where there is none."""
     if found.experiment is None:
         raise BadInput("experiment", "none", "one that helps", found.sentence)
-    made = document_of(
-        found.axis, found.sampling_rate, found.seconds, found.experiment.excitation, (found.voltage, (found.travel[0], found.travel[1]))
-    )
+    needs = found.voltage, (found.travel[0], found.travel[1])
+    made = document_of(found.axis, found.sampling_rate, found.experiment, needs, found.limits.units)
     made["experiment"] |= {"expects": found.sentence, "sets": [list(names) for names in found.sets]}
     return made
 
@@ -29,8 +28,10 @@ def document(found: NextExperiment) -> dict[str, Any]:
 def write_experiment(path: Path, found: NextExperiment) -> None:
     """The file of an experiment, for parameter ``experiment`` of the excitation node."""
     text = yaml.safe_dump(_quoted(document(found)), sort_keys=False, width=120, allow_unicode=True)
+    units = found.limits.units
     head = (
         "# Made by xy-sysid next. Run it: parameter experiment of the excitation node. It is refused where it asks for more than the node's limits.\n"
+        f"# rms, offset, slow and needs.voltage are in {units.input}, needs.travel is in {units.output}, times in s, frequencies in Hz.\n"
     )
     write_text(path, head + text)
 

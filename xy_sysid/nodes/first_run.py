@@ -10,57 +10,37 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
-from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState, GetState
-from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
-from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.parameter import Parameter, parameter_value_to_python
-from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Float64MultiArray
 
 from xy_sysid.errors import BadInput
 from xy_sysid.excitation.first_run import AxisFound, FirstRun, Push
 from xy_sysid.nodes.common import DATA_QOS, NAMESPACE
 from xy_sysid.nodes.convert import from_message
+from xy_sysid.nodes.excitation_client import ANSWER, NODE, ExcitationClient
 from xy_sysid.nodes.hearing import Ear
 from xy_sysid.nodes.wall import Wall
 from xy_sysid.samples.block import Block, FloatArray
-from xy_sysid.settings import ExcitationSettings, build, knobs
+from xy_sysid.settings import ExcitationSettings
 
 TRIES = 5  # of a push whose messages did not all come
 REST, FORTH = 0.12, 0.15  # s at 0 V before, between and after, and s of each push
-ANSWER = 10.0  # s for an answer of the excitation,
-ASKED = 3  # times, as long as a node is there
-APPEARS = 60.0  # s until the excitation is there
-NODE = "excitation"
 
 
-class Conductor:
+class Conductor(ExcitationClient):
     """``run`` does it all; it returns when the machine stands. ended: asked often, true when somebody wants to stop."""
 
     def __init__(self, say: Callable[[str], None], ended: Callable[[], bool], namespace: str = NAMESPACE) -> None:
         self.found: dict[str, AxisFound] = {}
         self.problem = ""
-        self._say, self._is_over = say, ended
-        self._context = Context()
-        rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
-        self._node: Any = rclpy.create_node("first_run", namespace=namespace, context=self._context)
-        self._executor = SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self._node)
+        super().__init__("first_run", ended, namespace)
+        self._say = say
         self._blocks: dict[str, dict[float, Block]] = {"voltage": {}, "position": {}}
         self._reason = ""
         self._wall = wall = Wall(lambda words: None, "ended by an error of its own, please report it")  # told as the problem
         for topic in self._blocks:
             Ear(self._node, Float64MultiArray, topic, wall.around(self._keeper(topic)), DATA_QOS)
         self._node.create_subscription(DiagnosticArray, "metrics", wall.around(self._on_statuses), 100)
-
-    def close(self) -> None:
-        """Leave the graph."""
-        self._node.destroy_node()
-        self._context.try_shutdown()
 
     def run(self) -> bool:
         """Whether all was well; ``problem`` says what was not, ``found`` what is known."""
@@ -75,17 +55,17 @@ class Conductor:
         return not self.problem
 
     def _conduct(self) -> None:
-        settings = self._settings()
-        if self._state() == "active":
+        settings = self.settings()
+        if self.state() == "active":
             raise BadInput("first run", "the excitation drives already", "an excitation that is not active", "Take autostart out of the run file.")
         first = FirstRun(settings)
         quiet: dict[str, Any] = {
             f"{axis}.{name}": value for axis in settings.axes for name, value in (("kind", "off"), ("centring", 0.0), ("offset", 0.0))
         }
-        self._set(quiet)
-        if self._state() == "unconfigured":
-            self._transition("configure")
-        self._transition("activate")
+        self.set(quiet)
+        if self.state() == "unconfigured":
+            self.transition("configure")
+        self.transition("activate")
         try:
             while not self._over() and (push := first.next()) is not None:
                 samples = self._push(push, settings)
@@ -103,8 +83,8 @@ class Conductor:
     def _rest(self) -> None:
         """Deactivate; what goes wrong with that is told beside what has ended the run, and the nodes are ended anyway."""
         try:
-            if self._state() == "active":
-                self._transition("deactivate")
+            if self.state() == "active":
+                self.transition("deactivate")
         except BadInput as problem:
             self.problem = self.problem or str(problem)
 
@@ -120,15 +100,15 @@ class Conductor:
 
     def _pushed(self, push: Push, settings: ExcitationSettings) -> tuple[FloatArray, FloatArray, bool]:
         """Voltage and position of rest, forth, rest, back, rest, and whether they are without a gap."""
-        self._set({f"{push.axis}.breakaway": push.volts})  # friction is what is looked for: it is no fault up to here
+        self.set({f"{push.axis}.breakaway": push.volts})  # friction is what is looked for: it is no fault up to here
         for blocks in self._blocks.values():
             blocks.clear()
-        self._wait(REST)
+        self.wait(REST)
         self._heard(REST * settings.rate)
         for volts in (push.volts, 0.0, -push.volts, 0.0):
             if not self._over():
-                self._set({f"{push.axis}.offset": volts})
-                self._wait(FORTH if volts else REST)
+                self.set({f"{push.axis}.offset": volts})
+                self.wait(FORTH if volts else REST)
         axes = tuple(settings.axes)
         both = sorted(self._blocks["voltage"].keys() & self._blocks["position"].keys())
         rows = [np.empty((0, len(axes)))]
@@ -167,57 +147,6 @@ class Conductor:
             if time.monotonic() > until or self._over():
                 return
             self._executor.spin_once(timeout_sec=0.01)
-
-    def _wait(self, seconds: float) -> None:
-        until = time.monotonic() + seconds
-        while time.monotonic() < until:
-            self._executor.spin_once(timeout_sec=0.01)
-
-    def _call(self, kind: Any, service: str, request: Any) -> Any:
-        """The answer; asked again if none came, as discovery loses answers while it is half done. A change of state is asked for once."""
-        for _ in range(1 if kind is ChangeState else ASKED):
-            answer = self._ask(kind, service, request)
-            if answer is not None or self._is_over():
-                break
-        if answer is None:
-            raise BadInput("excitation", f"no answer to {service}", "a node excitation in the run file that lives", "Look at its lines above.")
-        return answer
-
-    def _ask(self, kind: Any, service: str, request: Any) -> Any:
-        """The answer, or None if it did not come in time."""
-        client = self._node.create_client(kind, f"{NODE}/{service}")
-        until = time.monotonic() + APPEARS
-        while not client.service_is_ready() and time.monotonic() < until and not self._is_over():
-            self._wait(0.05)
-        future = client.call_async(request)
-        until = time.monotonic() + ANSWER
-        while not future.done() and time.monotonic() < until and client.service_is_ready():
-            self._executor.spin_once(timeout_sec=0.01)
-        answer = future.result() if future.done() else None
-        self._node.destroy_client(client)
-        return answer
-
-    def _settings(self) -> ExcitationSettings:
-        names = list(self._call(ListParameters, "list_parameters", ListParameters.Request()).result.names)
-        values = self._call(GetParameters, "get_parameters", GetParameters.Request(names=names)).values
-        given = {name: parameter_value_to_python(value) for name, value in zip(names, values, strict=True)}
-        axes = given["axes"]
-        known = {item.name for item in knobs(ExcitationSettings())} | {name for name in given if name.partition(".")[0] in axes}
-        return build(ExcitationSettings, {name: value for name, value in given.items() if name in known}, "excitation")
-
-    def _set(self, values: dict[str, Any]) -> None:
-        kind: Any = Parameter
-        request = SetParameters.Request(parameters=[kind(name, value=value).to_parameter_msg() for name, value in values.items()])
-        refused = [result.reason for result in self._call(SetParameters, "set_parameters", request).results if not result.successful]
-        if refused:
-            raise BadInput("excitation", f"refused: {refused[0]}", "settings as the sentence says", "Change the run file.")
-
-    def _state(self) -> str:
-        return str(self._call(GetState, "get_state", GetState.Request()).current_state.label)
-
-    def _transition(self, label: str) -> None:
-        if not self._call(ChangeState, "change_state", ChangeState.Request(transition=Transition(label=label))).success:
-            raise BadInput("excitation", f"did not {label}", "an excitation that does", "Look at its lines above.")
 
 
 def _columns(block: Block, axes: tuple[str, ...]) -> FloatArray:

@@ -15,6 +15,7 @@ from xy_sysid.page.numbers_card import Numbers
 from xy_sysid.page.orders import Source
 from xy_sysid.page.picture_card import Cards
 from xy_sysid.page.session import Session
+from xy_sysid.page.settle_card import SettleCard
 from xy_sysid.page.story_card import StoryCard
 from xy_sysid.page.views import NOW, View, view_of, views
 
@@ -51,6 +52,7 @@ class Panel:
                     self._cards = Cards(session, source, self._first.plots["frequency"])
                 with ui.element("div").classes("stack side"):
                     self._story = StoryCard(session, source, self._machine if source.live else lambda: None)
+                    self._settle = SettleCard(session) if source.live else None
 
     def _machine(self) -> None:
         self._control = Control(self._session)
@@ -74,6 +76,8 @@ class Panel:
         axis, view = self._axis, self._choose()  # without an axis every card keeps its place, and says what is waited for
         self._numbers.refresh(self._session, source, axis, view)  # first what waits for nothing: meanwhile the browser may go
         await self._story.refresh(axis, quiet=waits)
+        if self._settle is not None:
+            self._settle.refresh(axis)
         await self._first.refresh(axis, view)
         if self._live is not None:
             await self._live.refresh(axis, view.linear)

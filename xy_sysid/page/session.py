@@ -17,6 +17,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.page.orders import Reading, Source
 from xy_sysid.page.recorder import Recorder
 from xy_sysid.page.recordings import OpenRecording
+from xy_sysid.page.settling import Settling
 from xy_sysid.page.shelf import Shelf
 from xy_sysid.page.topics_state import TopicsState
 
@@ -55,6 +56,7 @@ class Session:
         self._figures: dict[tuple[object, ...], dict[str, Any]] = {}
         self.link: Link | None = None
         self.live: Live | None = None
+        self.settling: Settling | None = Settling(shelf.folder, namespace, self.say) if live else None
         if live:  # ROS 2 is needed for this alone
             from xy_sysid.page.link import Link
             from xy_sysid.page.live import Live
@@ -93,6 +95,8 @@ class Session:
         if self.link is None:
             return False, "this page drives no machine"
         self.stopping = True
+        if self.settling is not None:
+            self.settling.end()
         answered = threading.Event()
         answer = [(False, "not confirmed yet: look at the machine, and use its emergency stop")]
 
@@ -132,5 +136,7 @@ class Session:
             self.recorder.stop()
         for one in self.recordings:
             one.close()
+        if self.settling is not None:
+            self.settling.close()
         if self.link is not None:
             self.link.close()

@@ -1,0 +1,123 @@
+"""The way to a settled diagnosis, step by step: after each recording all are diagnosed together, and the next experiment is designed.
+
+Each step is a pure function of the recordings so far and the step before, so that a walk can be replayed from its recordings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+
+from threadpoolctl import threadpool_limits
+
+from xy_sysid.axis.model import STANDARD, Library
+from xy_sysid.diagnosis.of_run import diagnose
+from xy_sysid.experiment_design.beliefs import Belief
+from xy_sysid.experiment_design.design import design
+from xy_sysid.experiment_design.experiment import Experiment
+from xy_sysid.experiment_design.limits import MachineLimits
+from xy_sysid.experiment_design.loop import Budget, Decision, Ending, NextChoice, Question, after, decide
+from xy_sysid.experiment_design.of_run import NextExperiment, Tell, answered, ladder_of
+from xy_sysid.experiment_design.prediction import Setting
+from xy_sysid.experiment_design.rivals import names_of, possible
+from xy_sysid.greybox.axis_data import EPSILON, prepare_all
+from xy_sysid.samples.recording import Run
+
+
+@dataclass(frozen=True)
+class WalkPlan:
+    """axis: its name; limits: what experiments may ask of it; budget: of the whole walk
+    sets: of effects that are to be distinguished; empty: those that the diagnosis leaves possible
+    tolerance: part of the motion that a model may leave
+    """
+
+    axis: str
+    limits: MachineLimits
+    budget: Budget = field(default_factory=lambda: Budget(experiments=4))
+    sets: tuple[tuple[str, ...], ...] = ()
+    library: Library = STANDARD
+    tolerance: float = EPSILON
+
+
+@dataclass(frozen=True)
+class WalkStep:
+    """What is known after some recordings, and what follows.
+
+    diagnosis: of all recordings, in a sentence; decision: which sets are left; following: the next experiment, None at the end; ending: why
+    answer: the same experiment with what it needs; experiments, seconds: of motion, that were spent
+    """
+
+    diagnosis: str
+    decision: Decision
+    following: Experiment | None
+    ending: Ending | None
+    answer: NextExperiment | None
+    experiments: int = 0
+    seconds: float = 0.0
+
+    @property
+    def sentence(self) -> str:
+        """What is settled, or what the next experiment is expected to bring."""
+        if self.ending is None:
+            return self.answer.sentence if self.answer is not None else ""
+        return told(self.decision, self.ending, self.answer)
+
+
+def step(plan: WalkPlan, runs: Sequence[Run], before: WalkStep | None = None, tell: Tell = lambda part: None) -> WalkStep:
+    """What all recordings so far say together, and what to measure next. tell: called with the part of a design that is done.
+
+    runs: the first recording, and one of each experiment so far; before: the step before the last experiment, None at the first
+    Raises BadInput for recordings that do not suffice for a diagnosis, or of which the last ends outside the travel.
+    """
+    found = diagnose(list(runs), plan.library, tolerance=plan.tolerance)
+    ladder = ladder_of(found)
+    rate, signals, units = runs[0].sampling_rate, [(run.voltage, run.position) for run in runs], runs[0].units
+    limits = replace(plan.limits, start=float(runs[-1].position[-1]), units=units)
+
+    def choose(setting: Setting, beliefs: Sequence[Belief], among: MachineLimits) -> NextChoice:
+        made = design(setting, beliefs, among, tell=tell)
+        return NextChoice(made.best.experiment if made.best is not None and made.helps else None, made)
+
+    with threadpool_limits(1, "blas"):
+        sets = plan.sets or possible(prepare_all(rate, signals, plan.tolerance, units), plan.library, ladder)
+        question = Question(sampling_rate=rate, recordings=signals, sets=sets, library=plan.library, tolerance=plan.tolerance, units=units)
+        decision = decide(question, (), limits, choose, before.decision.standing if before is not None else None, plan.budget.draws)
+        experiments = before.experiments + 1 if before is not None else 0
+        seconds = before.seconds + before.following.seconds if before is not None and before.following is not None else 0.0
+        follows = after(decision, plan.budget, experiments, seconds)
+        made = decision.choice.found if decision.choice is not None else None
+        answer = answered(plan.axis, rate, made, plan.library) if made is not None else None
+    following = None if isinstance(follows, str) else follows
+    if answer is not None and following is not None:
+        answer = replace(answer, experiment=following)
+    return WalkStep(
+        diagnosis=found.sentence.rstrip(),
+        decision=decision,
+        following=following,
+        ending=follows if isinstance(follows, str) else None,
+        answer=answer,
+        experiments=experiments,
+        seconds=seconds,
+    )
+
+
+def steps(plan: WalkPlan, recordings: Sequence[Run]) -> Iterator[WalkStep]:
+    """Every step of a walk that has these recordings, the first one first. It ends with them, or where nothing follows."""
+    before: WalkStep | None = None
+    for count in range(1, len(recordings) + 1):
+        before = step(plan, recordings[:count], before)
+        yield before
+        if before.ending is not None:
+            return
+
+
+def told(decision: Decision, ending: Ending, answer: NextExperiment | None = None) -> str:
+    """How a walk ended, in a sentence."""
+    chosen, left = names_of([decision.chosen]), names_of(decision.left)
+    others = names_of([names for names in decision.standing.names if names not in decision.left])
+    if ending == "settled":
+        return f"Settled: {chosen}." + (f" The recordings rule out {others}." if others else "")
+    if ending in ("alike", "impossible") and answer is not None:
+        return f"{answer.sentence} {answer.ask}".rstrip()
+    why = {"experiments": "The budget of experiments is spent", "seconds": "The budget of seconds is spent", "stopped": "Stopped"}
+    return f"{why.get(ending, 'Ended')}: {left} are still possible, {chosen} is the most probable."

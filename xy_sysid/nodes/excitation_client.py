@@ -1,0 +1,92 @@
+"""Asks the excitation for what it may do: parameters and transitions, each answered or refused in a sentence."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import rclpy
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter, parameter_value_to_python
+from rclpy.signals import SignalHandlerOptions
+
+from xy_sysid.errors import BadInput
+from xy_sysid.settings import ExcitationSettings, build, knobs
+
+ANSWER = 10.0  # s for an answer of the excitation,
+ASKED = 3  # times, as long as a node is there
+APPEARS = 60.0  # s until the excitation is there
+NODE = "excitation"
+
+
+class ExcitationClient:
+    """A node of its own in the thread that calls it. ended: asked often, true when somebody wants to stop."""
+
+    def __init__(self, name: str, ended: Callable[[], bool], namespace: str) -> None:
+        self._is_over = ended
+        self._context = Context()
+        rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
+        self._node: Any = rclpy.create_node(name, namespace=namespace, context=self._context)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+
+    def close(self) -> None:
+        """Leave the graph."""
+        self._node.destroy_node()
+        self._context.try_shutdown()
+
+    def wait(self, seconds: float) -> None:
+        until = time.monotonic() + seconds
+        while time.monotonic() < until:
+            self._executor.spin_once(timeout_sec=0.01)
+
+    def call(self, kind: Any, service: str, request: Any) -> Any:
+        """The answer; asked again if none came, as discovery loses answers while it is half done. A change of state is asked for once."""
+        for _ in range(1 if kind is ChangeState else ASKED):
+            answer = self._ask(kind, service, request)
+            if answer is not None or self._is_over():
+                break
+        if answer is None:
+            raise BadInput("excitation", f"no answer to {service}", "a node excitation in the run file that lives", "Look at its lines above.")
+        return answer
+
+    def _ask(self, kind: Any, service: str, request: Any) -> Any:
+        """The answer, or None if it did not come in time."""
+        client = self._node.create_client(kind, f"{NODE}/{service}")
+        until = time.monotonic() + APPEARS
+        while not client.service_is_ready() and time.monotonic() < until and not self._is_over():
+            self.wait(0.05)
+        future = client.call_async(request)
+        until = time.monotonic() + ANSWER
+        while not future.done() and time.monotonic() < until and client.service_is_ready():
+            self._executor.spin_once(timeout_sec=0.01)
+        answer = future.result() if future.done() else None
+        self._node.destroy_client(client)
+        return answer
+
+    def settings(self) -> ExcitationSettings:
+        names = list(self.call(ListParameters, "list_parameters", ListParameters.Request()).result.names)
+        values = self.call(GetParameters, "get_parameters", GetParameters.Request(names=names)).values
+        given = {name: parameter_value_to_python(value) for name, value in zip(names, values, strict=True)}
+        axes = given["axes"]
+        known = {item.name for item in knobs(ExcitationSettings())} | {name for name in given if name.partition(".")[0] in axes}
+        return build(ExcitationSettings, {name: value for name, value in given.items() if name in known}, "excitation")
+
+    def set(self, values: dict[str, Any]) -> None:
+        kind: Any = Parameter
+        request = SetParameters.Request(parameters=[kind(name, value=value).to_parameter_msg() for name, value in values.items()])
+        refused = [result.reason for result in self.call(SetParameters, "set_parameters", request).results if not result.successful]
+        if refused:
+            raise BadInput("excitation", f"refused: {refused[0]}", "settings as the sentence says", "Change the run file.")
+
+    def state(self) -> str:
+        return str(self.call(GetState, "get_state", GetState.Request()).current_state.label)
+
+    def transition(self, label: str) -> None:
+        if not self.call(ChangeState, "change_state", ChangeState.Request(transition=Transition(label=label))).success:
+            raise BadInput("excitation", f"did not {label}", "an excitation that does", "Look at its lines above.")

@@ -1,0 +1,276 @@
+"""Carries a walk to a settled diagnosis out on the machine: records, has the next experiment designed, runs it, and so on.
+
+``experiment_design.walk`` decides, in a process of its own; here are only time, topics, services and bags. The excitation checks every experiment
+against its own limits once more. Afterwards its settings are what they were.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import yaml
+from diagnostic_msgs.msg import DiagnosticArray
+from rcl_interfaces.srv import SetParametersAtomically
+from rclpy.parameter import Parameter
+from rclpy.qos import HistoryPolicy, QoSProfile
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+
+from xy_sysid.bags import BagWriter
+from xy_sysid.bags.atomic import write_text
+from xy_sysid.errors import BadInput, XySysidError
+from xy_sysid.experiment_design.limits import MachineLimits
+from xy_sysid.experiment_design.loop import Budget
+from xy_sysid.experiment_design.walk import WalkPlan
+from xy_sysid.files.walk import plan_document, write_walk
+from xy_sysid.nodes.common import NAMESPACE
+from xy_sysid.nodes.convert import from_message
+from xy_sysid.nodes.excitation_client import NODE, ExcitationClient
+from xy_sysid.nodes.wall import Wall
+from xy_sysid.processes.settle_process import Decider
+from xy_sysid.settings import ExcitationSettings, knobs
+
+FIRST = 12.0  # s of the first recording, of what drives the machine when the walk begins
+WHOLE = 0.95  # part of its seconds with which an experiment counts as carried out; less was stopped
+LATE = 10.0  # s on the wall that a recording may take longer than its seconds, as on a busy computer
+SETTLES = 0.5  # s in which the node tells its state after a change
+QUALITY = QoSProfile(depth=1000, history=HistoryPolicy.KEEP_LAST)
+FIXED = ("output", "interface", "unit", "command_topic", "controller_joints", "joint_topic", "joints")  # of the excitation, while it runs
+
+
+@dataclass(frozen=True, slots=True)
+class Wishes:
+    """What is asked for. axis: its name; folder: of the bags and decisions, new; sets: of effects, empty: of the diagnosis
+    budget: of the walk; first: s of the first recording; alone: begin to drive and go on without being told
+    """
+
+    axis: str
+    folder: Path
+    sets: tuple[tuple[str, ...], ...] = ()
+    budget: Budget = field(default_factory=lambda: Budget(experiments=4))
+    first: float = FIRST
+    alone: bool = False
+    effect_files: tuple[str, ...] = ()
+
+
+class Settler(ExcitationClient):
+    """``run`` does it all, in a thread of its own; others read ``steps``, ``doing``, ``part``, ``ending`` and ``problem``."""
+
+    def __init__(
+        self, wishes: Wishes, say: Callable[[str], None], ended: Callable[[], bool], go: Callable[[], bool], namespace: str = NAMESPACE
+    ) -> None:
+        """say: takes each line for people; ended: asked often, true when somebody wants to end it; go: whether experiments may run."""
+        super().__init__("settle", ended, namespace)
+        self.wishes = wishes
+        self.steps: tuple[dict[str, Any], ...] = ()
+        self.doing, self.part, self.ending, self.problem = "", 0.0, "", ""
+        self._say, self._go, self._namespace = say, go, namespace.rstrip("/")
+        self._bag: BagWriter | None = None
+        self._samples: tuple[int, float] = (0, 0.0)  # positions that were recorded, and their sampling rate
+        self._status: dict[str, str] = {}
+        self._message = ""
+        self._wall = Wall(say)
+        self._node.create_subscription(DiagnosticArray, "metrics", self._wall.around(self._on_statuses), 100)
+
+    def run(self) -> bool:
+        """Whether it came to an end that is none of a fault; ``problem`` says what was wrong, ``ending`` how it ended."""
+        before: ExcitationSettings | None = None
+        with self._wall:
+            try:
+                before = self.settings()
+                self._walk(before)
+            except XySysidError as problem:
+                self.problem = str(problem)
+            finally:
+                self.doing = ""
+                self._rest(before)
+        self.problem = self._wall.told or self.problem
+        if self.problem:
+            self._say(self.problem)
+        return not self.problem
+
+    def _walk(self, settings: ExcitationSettings) -> None:
+        wishes, plan = self.wishes, self._plan(settings)
+        self._listen(settings)
+        wishes.folder.mkdir(parents=True, exist_ok=False)
+        decider = Decider(plan_document(plan), wishes.effect_files)
+        try:
+            bag = self._first(settings)
+            while not self.ending:
+                step = self._decided(decider, bag)
+                if step is None:
+                    break
+                self.steps = (*self.steps, step)
+                self._say(step["diagnosis"])
+                self._say(step["sentence"])
+                write_walk(wishes.folder, plan, self.steps)
+                if step["ending"]:
+                    self.ending = step["ending"]
+                    break
+                self._say(f"Next: {step['words']}, for {step['lasts']:.0f} s.")
+                self.doing = "waiting for Run it"
+                while not self._go() and not self._over():
+                    self.wait(0.1)
+                if self._over():
+                    break
+                bag = self._carried_out(len(self.steps), step, settings)
+        finally:
+            decider.close()
+
+    def _plan(self, settings: ExcitationSettings) -> WalkPlan:
+        axis = self.wishes.axis
+        if axis not in settings.axes:
+            raise BadInput("axis", repr(axis), ", ".join(settings.axes), "Choose an axis that the excitation drives.")
+        own = settings.axes[axis]
+        middle = 0.5 * (own.travel_min + own.travel_max)
+        travel = own.travel_min, own.travel_max
+        limits = MachineLimits(voltage=own.limit, travel=travel, start=middle, units=settings.units, seconds=self.wishes.budget.seconds)
+        return WalkPlan(axis, limits, self.wishes.budget, self.wishes.sets)
+
+    # the machine
+
+    def _first(self, settings: ExcitationSettings) -> Path:
+        """A recording of what drives the machine now, after which it stands."""
+        self.doing = f"recording {self.wishes.first:.0f} s of the present excitation"
+        state = self.state()
+        if state != "active" and not self.wishes.alone:
+            raise BadInput("excitation", state, "active", "Activate it, so that there is a first recording.")
+        with self._recording(0, settings):
+            if state == "unconfigured":
+                self._change("configure")
+            if state != "active":
+                self._change("activate")
+            self._record(self.wishes.first, settings)
+            if not self._over():
+                self._change("deactivate")
+        return self.wishes.folder / "0"
+
+    def _carried_out(self, number: int, step: dict[str, Any], settings: ExcitationSettings) -> Path:
+        """The bag of an experiment that the excitation has checked and run; ``ending`` is stopped where it did not run to its end."""
+        file, seconds = self.wishes.folder / f"next_{number}.yaml", float(step["lasts"])
+        write_text(file, f"# Experiment {number} of a walk. {step['words']}\n" + yaml.safe_dump(step["file"], sort_keys=False, width=120))
+        self.doing = f"running experiment {number}: {step['words']}, {seconds:.0f} s"
+        if self.state() == "active":
+            self._change("deactivate")
+        if self.state() == "inactive":
+            self._change("cleanup")
+        self.set({"experiment": str(file.resolve())})
+        self._change("configure")
+        with self._recording(number, settings):
+            self._change("activate")
+            self._record(seconds + settings.ramp, settings)
+        count, rate = self._samples
+        if rate <= 0.0 or count < WHOLE * seconds * rate:
+            self.ending = "stopped"
+            self._say(f"Experiment {number} was stopped after {count / rate if rate else 0.0:.1f} s: {self._message}.")
+        return self.wishes.folder / str(number)
+
+    def _record(self, seconds: float, settings: ExcitationSettings) -> None:
+        """Until so many s of positions have come, or the excitation drives no more."""
+        begun, pace, driven = time.monotonic(), settings.speed or 1.0, False
+        while time.monotonic() < begun + seconds / min(pace, 1.0) + LATE and not self._over():
+            self.wait(0.05)
+            driven = driven or self._status.get("state") in ("active", "stopping")
+            if self._samples[1] and self._samples[0] >= seconds * self._samples[1]:
+                return
+            if driven and self._status.get("state") in ("stopped", "idle"):
+                self.wait(SETTLES)  # what is on its way
+                return
+
+    def _decided(self, decider: Decider, bag: Path) -> dict[str, Any] | None:
+        """The next step, or None where somebody ended it meanwhile."""
+        if self.ending:
+            return None
+        self.doing, self.part = "diagnosing all recordings and designing the next experiment", 0.0
+        decider.ask(bag)
+        while not self._over():
+            news = decider.news()
+            if news is not None and news.problem:
+                raise BadInput("decision", news.problem, "recordings that suffice", "Record again.")
+            if news is not None:
+                self.part = news.part
+                if news.step is not None:
+                    return news.step
+            self.wait(0.1)
+        return None
+
+    def _over(self) -> bool:
+        """Somebody has ended it, or STOP is on."""
+        if not self.ending and (self._is_over() or self._status.get("stop") == "on"):
+            self.ending = "stopped"
+        return bool(self.ending or self._wall.count)
+
+    def _change(self, label: str) -> None:
+        """A transition; a refusal is told in the excitation's own words."""
+        try:
+            self.transition(label)
+        except BadInput:
+            self.wait(SETTLES)
+            raise BadInput("excitation", f"did not {label}: {self._message or 'no reason told'}", "an excitation that does", "See above.") from None
+        self.wait(0.05)
+
+    def _rest(self, before: ExcitationSettings | None) -> None:
+        """The machine stands, and the settings are as they were."""
+        if before is None:
+            return
+        try:
+            if self.state() == "active":
+                self.transition("deactivate")
+            now = {item.name: item.value for item in knobs(self.settings())}
+            changed = {item.name: item.value for item in knobs(before) if item.value != now.get(item.name) and item.name not in FIXED}
+            if changed:
+                kind: Any = Parameter
+                request = SetParametersAtomically.Request(parameters=[kind(name, value=value).to_parameter_msg() for name, value in changed.items()])
+                self.call(SetParametersAtomically, "set_parameters_atomically", request)
+        except BadInput as problem:
+            self.problem = self.problem or str(problem)
+
+    # what is heard
+
+    def _listen(self, settings: ExcitationSettings) -> None:
+        topics: dict[str, Any] = {"voltage": Float64MultiArray}
+        if settings.output == "commands":
+            topics[settings.joint_topic] = JointState
+        else:
+            topics["position"] = Float64MultiArray
+        for topic, kind in topics.items():
+            self._node.create_subscription(kind, topic, self._wall.around(self._writer(topic, kind)), QUALITY, raw=True)
+
+    def _writer(self, topic: str, kind: Any) -> Callable[[bytes], None]:
+        name = topic if topic.startswith("/") else f"{self._namespace}/{topic}"
+        text = f"{kind.__module__.split('.')[0]}/msg/{kind.__name__}"
+
+        def write(message: bytes) -> None:
+            if self._bag is None:
+                return
+            self._bag.write_raw(name, text, message, time.time_ns())
+            if topic == "voltage":
+                block = from_message(deserialize_message(message, kind))
+                if len(block) > 1:
+                    rate = (block.seq[-1] - block.seq[0]) / (block.time[-1] - block.time[0])
+                    self._samples = self._samples[0] + len(block), float(rate)
+
+        return write
+
+    @contextmanager
+    def _recording(self, number: int, settings: ExcitationSettings) -> Iterator[None]:
+        """Meanwhile everything heard goes into a bag, which is whole at the end."""
+        units = dict(zip(("input_unit", "output_unit"), settings.units, strict=True))
+        with BagWriter(self.wishes.folder / str(number), custom=units) as bag:
+            self._bag, self._samples = bag, (0, 0.0)
+            try:
+                yield
+            finally:
+                self._bag = None
+
+    def _on_statuses(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            if status.name == NODE:
+                self._status = {pair.key: pair.value for pair in status.values}
+                self._message = status.message

@@ -1,0 +1,96 @@
+"""What to measure next, in one browser: the next experiment is designed, run, and so on until nothing is left to settle."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from nicegui import ui
+
+from xy_sysid.errors import XySysidError
+from xy_sysid.page.buttons import heeded
+from xy_sysid.page.document_words import spaced
+from xy_sysid.page.session import Session
+
+ABOUT = "Designs the experiment that distinguishes what the data leave open, within the limits of the excitation. Each step is recorded."
+
+
+class SettleCard:
+    """The card beside the story of the machine."""
+
+    def __init__(self, session: Session) -> None:
+        self._session, self._axis = session, ""
+        self._shown: object = None
+        with ui.element("section").classes("card settle").props('aria-label="what to measure next" data-part=settle'):
+            ui.html("<h2>What to measure next</h2>", sanitize=False)
+            self._state = ui.label(ABOUT).classes("sentence").props("role=status aria-live=polite data-part=settle-state")
+            self._steps = ui.element("div").classes("stack").style("gap:.4rem")
+            with ui.element("div").classes("buttons"):
+                self._design = heeded(ui.button("Design the next experiment", on_click=self._begin).props("outline dense no-caps data-act=design"))
+                self._run = heeded(ui.button("Run it", on_click=self._ask_run).props("outline dense no-caps data-act=run-it"))
+                self._end = heeded(ui.button("End here", on_click=self._stop).props("outline dense no-caps data-act=end-settle"))
+
+    def refresh(self, axis: str) -> None:
+        """Show what is now."""
+        settling = self._session.settling
+        if settling is None:
+            return
+        settling.attend(self._session.live)
+        self._axis = axis
+        self._design.set_enabled(bool(axis) and not settling.running)
+        self._run.set_enabled(settling.waits)
+        self._end.set_enabled(settling.running)
+        filled = settling.waits
+        self._run.props(add="unelevated" if filled else "outline", remove="outline" if filled else "unelevated")
+        part = f" ({100.0 * settling.part:.0f} %)" if settling.doing.startswith("diagnosing") and settling.part else ""
+        self._state.set_text(f"Axis {settling.axis}: {settling.doing}{part} ..." if settling.doing else settling.problem or ABOUT)
+        shown = len(settling.steps), settling.running
+        if shown != self._shown:
+            self._shown = shown
+            self._write(settling.steps)
+
+    def _write(self, steps: tuple[dict[str, Any], ...]) -> None:
+        self._steps.clear()
+        with self._steps:
+            for number, step in enumerate(steps):
+                last = number == len(steps) - 1
+                with ui.element("div").classes("stack").style("gap:.15rem").props(f"data-step={number}"):
+                    ui.label(f"{self._named(number)}: {spaced(step['diagnosis'])}").classes("small soft")
+                    ui.label(spaced(step["sentence"])).classes("sentence" if last else "small")
+                    if step["words"]:
+                        ui.label(f"Next: {step['words']}, for {step['lasts']:.0f} s.").classes("next" if last else "small")
+
+    def _named(self, number: int) -> str:
+        return "First recording" if number == 0 else f"With experiment {number}"
+
+    def _begin(self) -> None:
+        if self._session.settling is not None:
+            try:
+                self._session.settling.start(self._axis)
+            except XySysidError as problem:
+                self._session.say(str(problem))
+
+    def _ask_run(self) -> None:
+        """A real machine moves: ask once more, as for Activate."""
+        settling = self._session.settling
+        if settling is None or not settling.waits:
+            return
+        if "ballscrew" in self._session.heard.present:
+            settling.go()
+            return
+
+        def sure() -> None:
+            dialog.close()
+            settling.go()
+
+        with ui.dialog() as dialog, ui.element("div").classes("card"):
+            ui.html("<h2>The machine will move</h2>", sanitize=False)
+            ui.label("It goes on by itself until nothing is left to settle. Keep your hand at the emergency stop. STOP, or Escape, ends it.")
+            with ui.element("div").classes("buttons"):
+                ui.button("Run it", on_click=sure).props("unelevated no-caps data-act=sure-run")
+                ui.button("Cancel", on_click=dialog.close).props("flat no-caps")
+        dialog.on("hide", dialog.delete)
+        dialog.open()
+
+    def _stop(self) -> None:
+        if self._session.settling is not None:
+            self._session.settling.end()

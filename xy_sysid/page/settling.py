@@ -1,0 +1,117 @@
+"""The walk to a settled diagnosis that the page has started, shared by all tabs: at most one at a time."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from xy_sysid.errors import BadInput
+
+if TYPE_CHECKING:
+    from xy_sysid.nodes.settle import Settler
+    from xy_sysid.page.live import Live
+
+JOIN = 3.0  # s that the walk may take to end when the page does
+
+
+class Settling:
+    """start, then go on; ``steps`` and ``doing`` say how far it is."""
+
+    def __init__(self, folder: Path, namespace: str, say: Callable[[str, bool], None]) -> None:
+        """folder: of recordings; say: takes a sentence for everybody, and whether it is good news."""
+        self._folder, self._namespace, self._say = folder, namespace, say
+        self._thread: threading.Thread | None = None
+        self._settler: Settler | None = None
+        self._ended, self._go = threading.Event(), threading.Event()
+        self.axis, self.folder, self.wished = "", folder, ""  # wished: axis that is settled without being told
+        self.sets: tuple[tuple[str, ...], ...] = ()  # of effects that are to be distinguished; empty: those that the diagnosis leaves possible
+
+    @property
+    def running(self) -> bool:
+        """Whether a walk is under way."""
+        return self._thread is not None and self._thread.is_alive()
+
+    @property
+    def going(self) -> bool:
+        """Whether it goes on by itself."""
+        return self._go.is_set()
+
+    @property
+    def waits(self) -> bool:
+        """Whether an experiment is designed and somebody has to say that it may run."""
+        return self.running and not self.going and bool(self.steps) and not self.steps[-1]["ending"]
+
+    @property
+    def steps(self) -> tuple[dict[str, Any], ...]:
+        """Documents of the steps so far."""
+        return self._settler.steps if self._settler is not None else ()
+
+    @property
+    def doing(self) -> str:
+        """What is being done."""
+        return self._settler.doing if self._settler is not None and self.running else ""
+
+    @property
+    def part(self) -> float:
+        """Part of the design that is done."""
+        return self._settler.part if self._settler is not None else 0.0
+
+    @property
+    def problem(self) -> str:
+        """What went wrong, or that it was stopped; empty while all is well."""
+        if self._settler is None or self.running:
+            return ""
+        return self._settler.problem or ("It was stopped." if self._settler.ending == "stopped" else "")
+
+    def start(self, axis: str, alone: bool = False) -> None:
+        """Record, and design the first experiment; alone: drive and go on without being told. Raises BadInput while a walk is under way."""
+        from xy_sysid.nodes.settle import Settler, Wishes
+
+        if self.running:
+            raise BadInput("experiment", f"axis {self.axis} is being settled", "one axis at a time", "Wait, or end it first.")
+        self._ended.clear()
+        self._go.clear()
+        if alone:
+            self._go.set()
+        self.axis, self.folder = axis, self._folder / f"settle_{axis}_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
+        wishes = Wishes(axis, self.folder, sets=self.sets, alone=alone)
+        settler = Settler(wishes, lambda words: None, self._ended.is_set, self._go.is_set, self._namespace)
+
+        def walk() -> None:
+            try:
+                settler.run()
+            finally:
+                settler.close()
+            last = settler.problem or (settler.steps[-1]["sentence"] if settler.steps else "")
+            self._say(f"axis {axis}: {last}", settler.ending in ("settled", "alike"))
+
+        self._settler = settler
+        self._thread = threading.Thread(target=walk, name="settle", daemon=True)
+        self._thread.start()
+
+    def attend(self, live: Live | None) -> None:
+        """Start by itself where the page was told to, once the axis is driven and its rigid model is shown; have the end explained by the story."""
+        if live is None or not self.wished:
+            return
+        if not self.steps and not self.running and live.heard.driving() and live.document(self.wished) is not None:
+            self.start(self.wished, alone=True)
+        elif self.steps and not self.running:
+            axis, self.wished = self.wished, ""
+            live.ask("auto", axis)
+
+    def go(self) -> None:
+        """Run the designed experiment, and go on until nothing is left to settle."""
+        self._go.set()
+
+    def end(self) -> None:
+        """Stop the machine and the walk."""
+        self._ended.set()
+
+    def close(self) -> None:
+        """The page ends."""
+        self.end()
+        if self._thread is not None:
+            self._thread.join(JOIN)

@@ -1,0 +1,87 @@
+"""A process that decides the steps of a walk to a settled diagnosis, so that whoever hears the machine never waits for a design."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import sys
+from dataclasses import dataclass
+from multiprocessing import resource_tracker
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+from xy_sysid.files.effects import library
+from xy_sysid.files.walk import plan_of, run_of, step_document
+from xy_sysid.story.attempt import Attempt
+
+NICE = 10  # of the process: whoever hears data goes first
+
+
+@dataclass(frozen=True, slots=True)
+class DecisionNews:
+    """part: of the design that is done; step: the document of the step that was decided; problem: why none was."""
+
+    part: float = 0.0
+    step: dict[str, Any] | None = None
+    problem: str = ""
+
+
+class Decider:
+    """ask(bag) for each recording in turn, then ``news`` until it brings a step or a problem."""
+
+    def __init__(self, plan: dict[str, Any], effect_files: tuple[str, ...] = ()) -> None:
+        """plan: its document."""
+        self._pipe, there = multiprocessing.Pipe()
+        self._process = multiprocessing.get_context("spawn").Process(target=work, args=(there, plan, effect_files), name="settle", daemon=True)
+        resource_tracker.ensure_running()  # its own start would let SIGINT through again
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # the child inherits it: Ctrl-C is for its parent
+        try:
+            self._process.start()
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        there.close()
+
+    def ask(self, bag: Path) -> None:
+        """Decide with one more recording."""
+        self._pipe.send(str(bag))
+
+    def news(self) -> DecisionNews | None:
+        """What has come since the last call, the newest of it; None if nothing has."""
+        found: DecisionNews | None = None
+        try:
+            while self._pipe.poll():
+                found = self._pipe.recv()
+        except (EOFError, OSError):
+            return DecisionNews(problem="The process that decides has ended. Start again; see the log.")
+        return found
+
+    def close(self) -> None:
+        """End the process."""
+        self._process.terminate()
+        self._process.join(2.0)
+        self._pipe.close()
+
+
+def work(pipe: Connection, told: dict[str, Any], effect_files: tuple[str, ...]) -> None:
+    """What the process does: bags in, steps out, until nobody is there any more."""
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    os.nice(NICE)
+    from xy_sysid.experiment_design.walk import step
+
+    plan = plan_of(told, library([Path(file).expanduser() for file in effect_files]))
+    runs, before = [], None
+    try:
+        while True:
+            bag = Path(pipe.recv())
+            with Attempt() as attempt:
+                runs.append(run_of(bag, plan.axis))
+                before = step(plan, runs, before, lambda part: pipe.send(DecisionNews(part)))
+                pipe.send(DecisionNews(1.0, step_document(before)))
+            if attempt.detail:
+                sys.stderr.write(f"{bag}: {attempt.detail}\n")
+            if attempt.problem:
+                pipe.send(DecisionNews(problem=attempt.problem))
+    except (EOFError, OSError):
+        return
