@@ -167,9 +167,8 @@ def of_response(scene: Scene, zeros: int) -> OfResponse | None:
     pair_of = _swinging(poles)
     if real.size != 1 or pair_of is None or real[0].real >= 0.0:
         return None
-    return OfResponse(
-        float(c[-4] / c[-1]), float(delays[best]), -float(real[0].real), pair_of, _swinging(np.asarray(np.roots(c[:-3]) * scale, dtype=np.complex128))
-    )
+    zero_of = _swinging(np.asarray(np.roots(c[:-3]) * scale, dtype=np.complex128))
+    return OfResponse(gain=float(c[-4] / c[-1]), delay=float(delays[best]), pole=-float(real[0].real), pair=pair_of, zero=zero_of)
 
 
 def _swinging(roots: NDArray[np.complex128]) -> tuple[float, float] | None:
