@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -72,19 +73,23 @@ def compare(
         for name, text in refused.items():
             say(f"axis {name}: {text}")
         return
-    found: dict[str, Judgement] = {}
     splits: dict[str, Distortion | None] = {}
-    for name in names:
-        found[name] = judge(recording, name, models[0][name] if models else None, settings)
+
+    def judged_axis(name: str) -> Judgement:
+        item = judge(recording, name, models[0][name] if models else None, settings)
         splits[name] = distorted(recording.run(name))
-        for note in () if json else found[name].notes:
+        for note in () if json else item.notes:
             say(f"axis {name}: {note}", aside)
+        return item
+
+    found, refused = each(names, judged_axis)
     if json:
         emit(
             {
                 "model": None if model is None else str(model),
                 "notes": [*recording.notes, *(f"axis {name}: {note}" for name, item in found.items() for note in item.notes)],
                 "axes": {name: _answer(item, splits[name]) for name, item in found.items()},
+                "refused": refused,
             }
         )
         return
@@ -93,6 +98,7 @@ def compare(
         size = f"{moved(item.error, item.unit, 4)}, noise floor {moved(item.noise_floor, item.unit, 4)}, up to {item.band_end:.4g} Hz"
         times = item.error / max(item.noise_floor, 1e-300)
         fails = f"the error is {told(times)} times the noise floor ({size})." if item.places else f"{item.sentence} Error {size}."
+        fails = fails if math.isfinite(item.error) else item.sentence
         say(f"axis {name}: {fails}")
         if line is not None:
             say(f"  {frequency_sentence(line, item)}")

@@ -88,8 +88,9 @@ def judge(recording: Recording, axis: str, model: AnyModel | None, settings: Ide
     with np.errstate(over="ignore"):  # positions of any size
         encoder = encoder_noise(run.sampling_rate, recording.run(axis).position, run.measured, recording.run(axis).voltage)
     unseen = Unseen(run.voltage[first:], run.position[first:], run.sampling_rate, run.units, encoder=encoder)
-    where = compare_motion(velocity, unseen)
-    hardly = HARDLY if where.error > MOST_LEFT * where.motion else ""
+    with np.errstate(over="ignore", invalid="ignore"):  # of a model that runs away
+        where = compare_motion(velocity, unseen)
+    hardly = HARDLY if np.isfinite(where.error) and where.error > MOST_LEFT * where.motion else ""
     notes = tuple(text for text in (model.doubt, SEEN if seen else "", hardly) if text)
     try:
         return Judgement(where, in_frequency(data, axis, model, settings)[0], notes)

@@ -191,8 +191,14 @@ def compare_motion(model: FloatArray, unseen: Unseen) -> Comparison:
         unit=unit,
         frequency=centres,
         error_over_floor=ratio,
-        places=tuple(sorted((place for place in places if place.error_over_floor >= TWICE), key=lambda place: -place.error_over_floor)),
+        places=tuple(
+            sorted((place for place in places if place.error_over_floor >= TWICE and np.isfinite(whole)), key=lambda place: -place.error_over_floor)
+        ),
     )
+
+
+def _worst_first(places: list[Place]) -> tuple[Place, ...]:
+    return tuple(sorted((place for place in places if place.error_over_floor >= TWICE), key=lambda place: -place.error_over_floor))
 
 
 def _inside(windows: Windows, samples: int) -> NDArray[np.bool_]:
