@@ -110,3 +110,13 @@ def test_a_short_run_can_be_compared() -> None:
     model = TransferFunction(np.array([0.1]), np.array([1.0, 0.0]))
     found = compare(model, run.voltage[:1200], run.position[:1200], run.sampling_rate)
     assert found.error > found.noise_floor > 0.0
+
+
+def test_of_a_model_that_runs_away_nothing_else_is_said() -> None:
+    """Its velocity grows beyond every number: no place, no warning, one sentence."""
+    random = np.random.default_rng(3)
+    voltage, position = random.normal(size=4000), np.cumsum(random.normal(size=4000)) * 1e-4
+    with np.errstate(over="ignore", invalid="ignore"):
+        found = compare_motion(np.exp(np.linspace(0.0, 700.0, 3999)) * 1e100, Unseen(voltage, position, 1000.0))
+    assert found.places == ()
+    assert found.sentence == "the simulated model runs away: it is not stable."
