@@ -66,6 +66,11 @@ class MujocoMachine:
         self._past: list[float] = [0.0] * LATE
         self._random = np.random.default_rng(self.seed)
 
+    @property
+    def place(self) -> float:
+        """Where the joint truly is, rad or m."""
+        return float(self._data.qpos[0])
+
     def step(self, voltage: FloatArray) -> FloatArray:
         """(n, 1) encoder positions for held voltages (n, 1), V."""
         seen = np.empty(voltage.shape[0])

@@ -12,7 +12,7 @@ from xy_sim.effect_text import with_effects
 from xy_sim.machine import Machine
 from xy_sim.parts import PARTS
 from xy_sysid.cli.simulated_recording import simulate
-from xy_sysid.comparison.where_it_fails import Comparison, compare
+from xy_sysid.comparison.where_it_fails import Comparison, Unseen, compare, compare_motion
 from xy_sysid.errors import BadInput
 from xy_sysid.excitation.lockstep import drive
 from xy_sysid.fitting import Structure, identify

@@ -7,7 +7,9 @@ import subprocess
 import sys
 import types
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from xml.etree import ElementTree
 
 import fmpy
 import fmpy.validation
@@ -29,6 +31,7 @@ from xy_sysid.control_design.mjcf import Mjcf, mjcf
 from xy_sysid.control_design.path import Bounds, s_curve
 from xy_sysid.control_design.program import program
 from xy_sysid.control_design.sample_step import simulate_alone
+from xy_sysid.control_design.sdf import sdf
 from xy_sysid.control_design.use import use
 from xy_sysid.effects import Effect, Parameter, law
 from xy_sysid.samples.block import FloatArray
@@ -208,6 +211,26 @@ def test_a_urdf_is_parsed_by_mujoco_and_names_what_it_loses() -> None:
     assert "<!-- lost: cogging" in text and "cogging" in made.note and "delay" in made.note
 
 
+def test_an_sdf_says_what_the_model_is_and_names_what_it_loses() -> None:
+    """Mass, damping, friction and spring stand where SDFormat 1.9 has them; each effect that SDF cannot say is in a comment and in the note."""
+    made = export(use(known("coulomb_friction", "return_spring", "cogging"), limit=5.0), "sdf")
+    (text,) = made.files.values()
+    root = ElementTree.fromstring(text)
+    assert root.tag == "sdf" and root.get("version") == "1.9" and root.find("model/joint[@type='prismatic']/axis/xyz") is not None
+
+    def number(path: str) -> float:
+        return float(root.findtext(f"model/{path}") or "nan")
+
+    assert number("link[@name='axis']/inertial/mass") == pytest.approx(1 / (0.097 * 236.0))
+    dynamics = "joint[@type='prismatic']/axis/dynamics"
+    assert number(f"{dynamics}/damping") == pytest.approx(1 / 0.097) and number(f"{dynamics}/friction") == pytest.approx(0.2)
+    assert root.find(f"model/{dynamics}/spring_stiffness") is None, "with cogging beside it, the force is no straight spring"
+    assert "<!-- lost: cogging" in text and "cogging" in made.note and "return_spring" in made.note and "delay" in made.note
+    straight = replace(axis(), effects=(("return_spring", (10.0, 0.002, 0.0)),))
+    spring, lost = sdf(straight, (-0.02, 0.02), 5.0, angular=False)
+    assert "<spring_reference>0.002</spring_reference><spring_stiffness>10</spring_stiffness>" in spring and [name for name, _ in lost] == ["delay"]
+
+
 def test_matlab_gets_parameters_and_a_function(tmp_path: Path) -> None:
     """The .mat file is read back by scipy; the function's ifs, fors and functions are all closed."""
     file = tmp_path / "axes.yaml"
@@ -227,4 +250,4 @@ def test_every_target_writes_for_an_axis_that_has_all_of_it(tmp_path: Path) -> N
     said = cli("use", file, "--limit", "5", "--to", "all", "-o", tmp_path / "out")
     assert said.code == 0, said
     names = {path.suffix for path in (tmp_path / "out").iterdir()}
-    assert {".c", ".h", ".py", ".m", ".mat", ".fmu", ".xml", ".urdf", ".yaml", ".cfg", ".hal", ".csv"} <= names
+    assert {".c", ".h", ".py", ".m", ".mat", ".fmu", ".xml", ".urdf", ".sdf", ".yaml", ".cfg", ".hal", ".csv"} <= names

@@ -12,11 +12,12 @@ import yaml
 from helpers import ROOT
 
 from xy_sysid.errors import BadInput
+from xy_sysid.files.story_models import model_text
 from xy_sysid.linear.transfer_function import TransferFunction
 from xy_sysid.live.plain_messages import ArrayMessage, StatusMessage
 from xy_sysid.page.control import on_activate
 from xy_sysid.page.document_words import look_alike_lines, model_effects, verdict_words
-from xy_sysid.page.downloads import model_text, plain_name
+from xy_sysid.page.downloads import plain_name
 from xy_sysid.page.facts import coherence_fact, dropped_words, facts, polynomial, seconds_text, transfer_function_html
 from xy_sysid.page.live_figures import failing, failing_words, response_figure, tracking_figure
 from xy_sysid.page.session import Session

@@ -27,6 +27,7 @@ def demo(
     port: Annotated[int, typer.Option(help="port of the page, or the next free one; 0: any", min=0, max=65535)] = 8080,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="open a browser if there is a display")] = True,
     settle: Annotated[bool, typer.Option("--settle", help="an ambiguous machine: experiments are designed and run until it is settled")] = False,
+    use: Annotated[bool, typer.Option("--use", help="then use the models: watch the tracking error of a path fall on the simulated table")] = False,
     json: o.Json = False,
 ) -> None:
     """Watch two axes being identified live: all nodes run on this machine, and nothing else is needed."""
@@ -45,10 +46,19 @@ def demo(
         from xy_sysid.cli.demo_settle import settle_demo
 
         raise typer.Exit(settle_demo(machine or "hanging.yaml", speed, seed, (port, browser) if with_page else None, json))
-    machine = machine or ("surprise.yaml" if with_page else "paper.yaml")
+    machine = machine or ("surprise.yaml" if with_page or use else "paper.yaml")
     table = Machine.from_file(machine)
+    if use and not with_page:
+        from xy_sysid.cli.demo_use import SECONDS, watch_use
+
+        raise typer.Exit(watch_use(_specs(table, machine, 0.0, speed, seed), table, seconds or SECONDS, json))
     if with_page:
-        raise typer.Exit(watch_page(_specs(table, machine, seconds or 0.0, speed, seed), table.axes, speed, port, browser))
+        specs = _specs(table, machine, seconds or 0.0, speed, seed)
+        if use:
+            from xy_sysid.cli.demo_use import excited
+
+            specs = excited(table.axes, specs)
+        raise typer.Exit(watch_page(specs, table.axes, speed, port, browser))
     seconds = seconds or 60.0
     aside.print("starting the nodes: a simulated table, an excitation and an identifier, over ROS 2 ...")
     code, monitor, lines, wall = _watch(_specs(table, machine, seconds, speed, seed), table.axes, seconds, plain=json)

@@ -80,6 +80,10 @@ class Monitor:
         while (left := until - time.monotonic()) > 0:
             self._executor.spin_once(timeout_sec=left)
 
+    def client(self, kind: Any, service: str) -> Any:
+        """A client of a service, to be called between two calls of ``spin``."""
+        return self._node.create_client(kind, service)
+
     def start_when_ready(self) -> None:
         """Configure and activate the excitation once everybody hears everybody: discovery can take seconds."""
         if not self._wanted or "streams" not in self.statuses or not self._client.service_is_ready():

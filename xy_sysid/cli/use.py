@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from xy_sysid.imports.reading import Reading
     from xy_sysid.samples.recording import Recording
 
+TURN = 6.283185307179586  # rad
 Models = Annotated[list[Path], typer.Argument(metavar="MODEL", help="model files of refine --model")]
 On = Annotated[
     list[Path] | None, typer.Option("--on", metavar="REC", help="a recording of the machine: before and after on its own motion (may be repeated)")
@@ -182,6 +183,13 @@ def _show(name: str, used: Used) -> None:
             f"phase margin {loop.worst.phase:.3g} degrees, gain margin {loop.worst.gain:.3g}, sensitivity {loop.worst.sensitivity:.3g}; "
             f"{loop.allowed}. Encoder noise makes {quantity(loop.noise, units.input, 2)} rms."
         )
+    if used.states is not None:
+        s = used.states
+        say(
+            f"  State feedback with an observer (--to state_feedback): bandwidth {s.bandwidth / TURN:.3g} Hz, {s.b.size} states. Worst of {s.count} "
+            f"samples: phase margin {s.worst.phase:.3g} degrees, gain margin {s.worst.gain:.3g}. A load of 1 {units.input} moves it by "
+            f"{moved(s.rejects, units.output)} at most, and a tenth of that is left after {1e3 * s.settles:.3g} ms."
+        )
     for mode in used.modes:
         say(f"  {_mode(mode)}")
     if used.shaper is not None:
@@ -241,6 +249,7 @@ def _answer(used: Used) -> dict[str, Any]:
     loop = used.feedback
     servo = ("position_gain", "velocity_gain", "integral_time")
     found["feedback"] = None if loop is None else {**plain(loop), **{name: getattr(loop, name) for name in servo}}
+    found["state_feedback"] = plain(used.states) if used.states is not None else None
     quick = used.fastest
     found["fastest"] = None if quick is None else {"bounds": quick.bounds, "voltage": quick.voltage, "seconds": quick.path.seconds}
     found["refused"] = [{"what": what, "reason": why} for what, why in used.refused]

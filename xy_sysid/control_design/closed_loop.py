@@ -11,12 +11,13 @@ import numpy as np
 
 from xy_sysid.axis.model import AxisModel, Library
 from xy_sysid.control_design.path import SampledPath
-from xy_sysid.control_design.sample_step import begin, plant, step_of
+from xy_sysid.control_design.sample_step import Plant, begin, plant, step_of
 from xy_sysid.control_design.step_text import ROOM
 from xy_sysid.jit import compiled_text
 from xy_sysid.samples.block import FloatArray
 
 NO_LIMIT = 1e12  # V
+APART = "apart"  # the state of an effect with a gap: motor minus load, m
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,12 +51,17 @@ class Encoder:
 
 @dataclass(frozen=True, slots=True)
 class Tracked:
-    """position: (n,) what the encoder would show without noise, m; shown: (n,) what it shows; voltage: (n,) V; error: (n,) path - position."""
+    """What a simulated axis did.
+
+    position: (n,) what the encoder would show without noise, m; shown: (n,) what it shows; voltage: (n,) V; error: (n,) path - position
+    carried: (n,) where what the axis carries truly is, m: without the scale's error, and behind the gap if there is one
+    """
 
     position: FloatArray
     shown: FloatArray
     voltage: FloatArray
     error: FloatArray
+    carried: FloatArray
 
     @property
     def rms(self) -> float:
@@ -67,13 +73,16 @@ class Tracked:
 def loop_text(name: str) -> str:
     """Source of the loop; its arguments are those of ``follow_path`` in numbers."""
     return f"""\
-def {name}(path, extra, gains, sections, noise, count, p, on, z, a, still, s, w, position, shown, voltage):
+def {name}(path, extra, gains, sections, noise, count, behind, p, on, z, a, still, s, w, position, shown, voltage, carried):
     kp, ki, kd, keeps, limit, h = gains[0], gains[1], gains[2], gains[3], gains[4], gains[5]
     inside = np.zeros((sections.shape[0], 2))
     place = s[0]
     total = rate = before = 0.0
     for i in range(path.size):
         position[i] = place
+        carried[i] = s[0]
+        if behind >= 0:
+            carried[i] -= s[behind]
         seen = place + noise[i]
         if count > 0.0:
             seen = math.floor(seen / count + 0.5) * count
@@ -120,9 +129,19 @@ def follow_path(
     noise = encoder.noise * np.random.default_rng(seed).standard_normal(count)
     h = 1.0 / path.sampling_rate
     gains = np.array([controller.kp, controller.ki, controller.kd, controller.keeps(path.sampling_rate), controller.limit, h])
-    position, shown, voltage = np.empty(count), np.empty(count), np.empty(count)
+    position, shown, voltage, carried = (np.empty(count) for _ in range(4))
     given = np.zeros(count) if extra is None else np.ascontiguousarray(extra, dtype=np.float64)
     sections = np.ascontiguousarray(controller.sections, dtype=np.float64)
     numbers = (ready.parameters, ready.flags, ready.numbers, ready.moving, ready.still, state, room)
-    _loop_of(library)(np.ascontiguousarray(path.position), given, gains, sections, noise, encoder.count, *numbers, position, shown, voltage)
-    return Tracked(position, shown, voltage, path.position - position)
+    asked = (np.ascontiguousarray(path.position), given, gains, sections, noise, encoder.count, _behind(ready))
+    _loop_of(library)(*asked, *numbers, position, shown, voltage, carried)
+    return Tracked(position=position, shown=shown, voltage=voltage, error=path.position - position, carried=carried)
+
+
+def _behind(ready: Plant) -> int:
+    """Place in the state of the distance across a gap, motor minus load; -1 of an axis without one."""
+    for name, _ in ready.model.effects:
+        effect = ready.model.library[name]
+        if APART in effect.states:
+            return ready.layout.state(effect, APART)
+    return -1

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from xy_sysid.control_design import fmu, snippets, to_c, to_matlab, to_python
+from xy_sysid.control_design import fmu, snippets, state_text, to_c, to_matlab, to_python
 from xy_sysid.control_design.mjcf import mjcf
 from xy_sysid.control_design.program import Program, program
+from xy_sysid.control_design.sdf import sdf
 from xy_sysid.control_design.urdf import urdf
 from xy_sysid.control_design.use import Used
 from xy_sysid.errors import BadInput
@@ -100,6 +102,24 @@ def robot(used: Used) -> Exported:
     return Exported({f"{plain_name(used.axis)}.urdf": text}, _losses(lost))
 
 
+def observer(used: Used) -> Exported:
+    """State feedback in C and Python."""
+    if used.states is None:
+        why = next((text for what, text in used.refused if what == "state feedback"), "none was designed")
+        raise BadInput("state feedback", why, "a design with margins", "Ask for less bandwidth.")
+    name = f"{plain_name(used.axis)}_control"
+    title = f"axis {used.axis}, {used.model.units.input} for {used.model.units.output}, {used.states.bandwidth / (2.0 * math.pi):.3g} Hz"
+    text, module = state_text.source(used.states, plain_name(used.axis), title, used.limit)
+    note = f"call it once every {1e3 / used.sampling_rate:g} ms with path minus encoder, and add the feedforward to what it gives"
+    return Exported({f"{name}.c": text, f"{name}.py": module}, note)
+
+
+def gazebo(used: Used) -> Exported:
+    """SDF."""
+    text, lost = sdf(used.model.model, used.travel, used.limit, used.model.units.output == "rad")
+    return Exported({f"{plain_name(used.axis)}.sdf": text}, _losses(lost))
+
+
 def mock_up(used: Used) -> Exported:
     """FMU."""
     of, name, title = _program(used)
@@ -119,6 +139,8 @@ TARGETS: dict[str, Callable[[Used], Exported]] = {
     "fmu": mock_up,
     "mujoco": mujoco,
     "urdf": robot,
+    "sdf": gazebo,
+    "state_feedback": observer,
     **{name: _snippet(write) for name, write in snippets.TARGETS.items()},
 }
 

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from string import Template
 
 from xy_sysid.axis.model import AxisModel
-from xy_sysid.control_design.step_text import LawText, StateLayout, given_numbers
+from xy_sysid.control_design.law_text import LawText, StateLayout, given_numbers
 from xy_sysid.effects import Effect
 from xy_sysid.effects._contract import arguments
 

@@ -17,8 +17,9 @@ from xy_sysid.axis.model import AxisModel
 from xy_sysid.control_design import series
 from xy_sysid.control_design.inverse import guided, parts_of_sample
 from xy_sysid.control_design.inverse_text import InverseText
+from xy_sysid.control_design.law_text import NUMBERS
 from xy_sysid.control_design.sample_step import SERIES, Plant, plant
-from xy_sysid.control_design.step_text import NUMBERS, ROOM, StepText
+from xy_sysid.control_design.step_text import ROOM, StepText
 from xy_sysid.effects._binding import called
 from xy_sysid.errors import BadInput
 from xy_sysid.samples.block import FloatArray

@@ -13,7 +13,8 @@ import numpy as np
 from xy_sysid.axis import interpolation, resonant_loop
 from xy_sysid.axis.model import FINE, STANDARD, AxisModel, Library
 from xy_sysid.control_design import series
-from xy_sysid.control_design.step_text import NUMBERS, ROOM, StateLayout, StepText, heeds
+from xy_sysid.control_design.law_text import NUMBERS, StateLayout
+from xy_sysid.control_design.step_text import ROOM, StepText, heeds
 from xy_sysid.effects import Effect
 from xy_sysid.effects._binding import law_names, law_texts
 from xy_sysid.effects._contract import arguments

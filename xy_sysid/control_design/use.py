@@ -19,6 +19,7 @@ from xy_sysid.control_design.inverse import not_undone
 from xy_sysid.control_design.laws import largest_voltage
 from xy_sysid.control_design.limits import Fastest, fastest
 from xy_sysid.control_design.path import Bounds, recorded, s_curve
+from xy_sysid.control_design.state_feedback import StateFeedback, state_feedback
 from xy_sysid.control_design.tables import Correction, friction_table, position_tables
 from xy_sysid.control_design.uncertain import Derived, derive, samples
 from xy_sysid.control_design.worth import Predicted, Tracking, predicted, tracked
@@ -42,7 +43,7 @@ class Used:
 
     sampling_rate: Hz of the controller; limit: V of the drive, infinite if nobody knows it; limit_from: who said so
     travel: m, that tables and paths cover; gains, friction, tables, gap: feedforward and corrections (None: the axis has none)
-    feedback, modes, notch, shaper, fastest: None where there is nothing to design, or where it was refused
+    feedback, states (state feedback with an observer), modes, notch, shaper, fastest: None where there is nothing to design, or where it was refused
     predicted: input of the recording before and after, if there is one; tracking: simulated tracking errors
     refused: (what, why) of what could not be designed; not_undone: (effect, why) of what the feedforward leaves; notes: to be read first
     """
@@ -58,6 +59,7 @@ class Used:
     tables: tuple[Correction, ...]
     gap: Derived | None
     feedback: Feedback | None
+    states: StateFeedback | None
     modes: tuple[Swing, ...]
     notch: Notch | None
     shaper: Shaper | None
@@ -134,6 +136,7 @@ def use(
         tables=position_tables(model, between),
         gap=_gap(model),
         feedback=loop,
+        states=_tried("state feedback", lambda: state_feedback(model, rate, bandwidth), refused),
         modes=swings,
         notch=notch(swings[0], rate, loop.nominal.crossover) if swings and loop is not None else None,
         shaper=best_shaper(shapers(swings[0])) if swings else None,

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable
 
-import yaml
 from nicegui import run, ui
 
 from xy_sysid.errors import XySysidError
-from xy_sysid.files.linear_models import Quoting
-from xy_sysid.files.seal import sealed
+from xy_sysid.files.story_models import model_text
 from xy_sysid.page.orders import Source
 from xy_sysid.page.session import Session
 
@@ -54,22 +51,6 @@ class Downloads:
             self._session.say(str(problem))
         finally:
             waiting.dismiss()
-
-
-def model_text(source: str, documents: Mapping[str, Mapping[str, Any]]) -> str:
-    """The newest models of all axes, in the format of ``xy-sysid refine --model``."""
-    axes = {
-        axis: {
-            "effects": list(model["effects"]),
-            "parameters": {name: dict(item) for name, item in model["parameters"].items()},
-            "held_out_error": model["held_out_error"],
-            "noise_floor": model["noise_floor"],
-        }
-        for axis, document in documents.items()
-        if (model := document.get("model"))
-    }
-    made = {"format": "xy_sysid axis model 1", "provenance": {"source": source}, "axes": axes}
-    return sealed(str(yaml.dump(made, Dumper=Quoting, sort_keys=False, width=120, allow_unicode=True)))
 
 
 def plain_name(title: str) -> str:

@@ -1,0 +1,82 @@
+"""State feedback with an observer: margins over samples of the parameters, a step of load rejected, what delay and resonance allow."""
+
+from __future__ import annotations
+
+import ctypes
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from helpers.known_models import axis, known
+
+from xy_sysid.control_design.sampled import sampled
+from xy_sysid.control_design.state_feedback import StateFeedback, closed_loop, state_feedback
+from xy_sysid.control_design.state_text import source
+from xy_sysid.control_design.uncertain import samples
+from xy_sysid.errors import BadInput
+
+RATE = 2000.0
+
+
+@pytest.fixture(scope="module")
+def rigid() -> StateFeedback:
+    return state_feedback(known(), RATE)
+
+
+def test_the_margins_hold_for_samples_that_were_not_designed_for(rigid: StateFeedback) -> None:
+    """Fresh samples of the intervals are stable, and the loop that this test closes by itself stays 0.45 away from -1 (a gain margin of 2 is 0.5)."""
+    frequency = np.geomspace(0.5, 0.499 * RATE, 2000)
+    own = rigid.response(frequency)
+    for item in samples(known(), 100)[30:]:
+        system = sampled(item, RATE)
+        assert np.max(np.abs(np.linalg.eigvals(closed_loop(system, rigid.a, rigid.b, rigid.c)))) < 1.0
+        loop = system.response(frequency) * own
+        assert np.min(np.abs(1.0 + loop)) > 0.45
+
+
+def test_a_step_of_load_is_rejected_without_a_lasting_error(rigid: StateFeedback) -> None:
+    """The controller, run sample by sample against the plant, brings the error of a load of 1 V below a tenth after the time it tells, and to 0."""
+    system = sampled(known().model, RATE)
+    z, past = np.zeros(rigid.b.size), [0.0] * (system.whole + 2)
+    x = np.zeros(system.old.size)
+    place = []
+    for _ in range(int(2.0 * RATE)):
+        place.append(x[0])
+        u = float(rigid.c @ z)
+        z = rigid.a @ z + rigid.b * (0.0 - x[0])
+        past = [u, *past[:-1]]
+        x = system.a @ x + system.old * (past[system.whole + 1] + 1.0) + system.new * (past[system.whole] + 1.0)
+    error = np.abs(np.array(place))
+    assert error.max() == pytest.approx(rigid.rejects, rel=1e-6)
+    assert error[int(rigid.settles * RATE) + 1 :].max() <= 0.1 * error.max() and error[-1] < 1e-6 * error.max()
+
+
+def test_delay_and_resonance_limit_the_bandwidth(rigid: StateFeedback) -> None:
+    """Ten times the delay costs more than a factor of three; a bandwidth beyond that is refused with the margins that it would have."""
+    slow = replace(known(), model=axis(delay=12.9e-3), known=())
+    assert state_feedback(slow, RATE).bandwidth < rigid.bandwidth / 3.0
+    with pytest.raises(BadInput, match=r"phase margin|unstable"):
+        state_feedback(slow, RATE, bandwidth=200.0)
+
+
+def test_c_and_python_run_as_the_design_does(rigid: StateFeedback, tmp_path: Path) -> None:
+    """Both sources give the voltages of the design, held at the limit, and compile without a warning."""
+    text, module = source(rigid, "axis", "a test", 2.0)
+    (tmp_path / "control.c").write_text(text)
+    strict = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-ffp-contract=off", "-shared", "-fPIC")
+    subprocess.run(["gcc", *strict, "-o", tmp_path / "control.so", tmp_path / "control.c"], check=True)
+    compiled = ctypes.CDLL(str(tmp_path / "control.so")).axis_control
+    compiled.restype = ctypes.c_double
+    space: dict[str, Any] = {}
+    exec(module, space)
+    python, state, z = space["Controller"](), (ctypes.c_double * rigid.b.size)(), np.zeros(rigid.b.size)
+    errors, held = 1e-3 * np.random.default_rng(3).standard_normal(400), []
+    for error in errors.tolist():
+        held.append(float(np.clip(rigid.c @ z, -2.0, 2.0)))
+        z = rigid.free @ z + rigid.b * error + rigid.drive * held[-1]
+        assert python.input(error) == pytest.approx(held[-1], rel=1e-9, abs=1e-12)
+        assert compiled(state, ctypes.c_double(error)) == pytest.approx(held[-1], rel=1e-9, abs=1e-12)
+    assert max(held) == 2.0 and min(np.abs(held)) < 2.0

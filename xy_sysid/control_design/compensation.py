@@ -1,0 +1,209 @@
+"""Which laws of a model are worth undoing along a path: those that help in simulation, for every sample of the model's parameters.
+
+The whole feedforward undoes every law. Where a parameter is known badly, where the feedback answers a sudden voltage worse than a slow force, or
+where a load presses one flank of a gap, undoing a law does harm. So each sample of the parameters follows the path in simulation, under the
+controller that will be used. A law is left out if the worst sample follows better without it. If kS, kV and kA do better for any sample, they are
+all that is used; as they are where a law was stretched to its bound.
+
+Samples are of the parameters' intervals, and of laws that data cannot distinguish (``Effect.sum_of``): friction that differs between the directions
+may be friction and a load.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from xy_sysid.axis.model import AxisModel
+from xy_sysid.control_design.closed_loop import Controller, Encoder, follow_path
+from xy_sysid.control_design.gains import Gains, simple_feedforward
+from xy_sysid.control_design.inverse import feedforward
+from xy_sysid.control_design.laws import along, force
+from xy_sysid.control_design.limits import RESERVE
+from xy_sysid.control_design.path import Bounds, SampledPath, of_position, s_curve
+from xy_sysid.errors import BadInput
+from xy_sysid.samples.block import FloatArray
+
+ACROSS = 0.02  # s in which the correction by direction crosses a gap: a step of the path would hammer at it
+SLOWED, SLOWINGS = 0.7, 6  # of the speed, again and again, where the drive would reach its limit
+RIGID = "base"  # what no model is without: gain, pole and delay
+SIMPLE = "kS kV kA"
+
+
+@dataclass(frozen=True, slots=True)
+class Compensation:
+    """How a path is followed.
+
+    path: what the encoder is asked to show; voltage: (n,) V, added to the feedback
+    terms: laws that are undone; left: (law, why) of those that are not
+    feedback, simple, chosen: tracking error of the worst sample of the parameters, m rms: alone, with kS kV kA, with what was chosen
+    largest: V, that any sample's drive gives
+    """
+
+    path: SampledPath
+    voltage: FloatArray
+    terms: tuple[str, ...]
+    left: tuple[tuple[str, str], ...]
+    feedback: float
+    simple: float
+    chosen: float
+    largest: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Tried:
+    """A choice of laws: what the encoder has to show, the voltage, and for each sample the error, m rms, and the largest voltage, V."""
+
+    terms: tuple[str, ...]
+    path: SampledPath
+    voltage: FloatArray
+    errors: FloatArray
+    largest: float
+
+    def against(self, other: _Tried) -> float:
+        """The error of the worst sample over that of another choice."""
+        return float(np.max(self.errors / np.maximum(other.errors, 1e-300)))
+
+
+def asked_of_encoder(model: AxisModel, path: SampledPath, terms: Sequence[str]) -> SampledPath:
+    """What the encoder has to show so that what the axis carries is on the path: with the scale's error, and half of a gap towards the flank.
+
+    terms: effects that are corrected
+    """
+    kept = replace(model, effects=tuple(item for item in model.effects if item[0] in terms))
+    position = path.position + along(kept, path.position, "scale")
+    for name, values in kept.effects:
+        own = dict(zip(model.library[name].names, values, strict=True))
+        if "gap" in own:
+            flank = _flank(model, path, own.get("rub", 0.0))
+            length = max(round(ACROSS * path.sampling_rate), 1)
+            soft = np.convolve(np.concatenate((np.zeros(length), flank)), np.full(length + 1, 1.0 / (length + 1)), mode="valid")
+            position = position + 0.5 * own["gap"] * soft
+    return of_position(position, path.sampling_rate)
+
+
+def _flank(model: AxisModel, path: SampledPath, rub: float) -> FloatArray:
+    """(n,) the flank of a gap that pushes what the axis carries: 1 forth, -1 back, 0 where that is not known.
+
+    Dry friction (``rub``, V, of what is carried) keeps it at the flank behind it. A load keeps it at one flank for good where it is larger than that
+    friction, if it acts behind the gap; no encoder at the motor says on which side it acts. So the flank is known where both agree.
+    """
+    way = np.sign(path.speed)
+    last = np.maximum.accumulate(np.where(way != 0.0, np.arange(way.size), -1))
+    way = np.where(last >= 0, way[np.maximum(last, 0)], 0.0)
+    load = along(model, path.position, "force") + force(model, 0.0, 0.0, of_speed=False, by_place=False)
+    return np.asarray(0.5 * (way + np.sign(load * math.copysign(1.0, model.gain) + rub * way)))
+
+
+def alike(model: AxisModel) -> tuple[AxisModel, ...]:
+    """The model written with other effects that are the very same law while it slides, and differ at rest: a sum's parts, and half of each way."""
+    joined = model.joined()
+    found: list[AxisModel] = [joined]
+    for name, values in joined.effects:
+        whole = joined.library[name].sum_of
+        if whole is None or any(part in dict(joined.effects) for part in whole.parts):
+            continue
+        apart = joined.apart(name)
+        first, second = whole.apart(values)
+        half = (0.5 * second[0], *second[1:])
+        added = dict(apart.effects)[whole.parts[1]]
+        rest = tuple(item for item in joined.effects if item[0] != name)
+        both = ((name, whole.joined((first, half))), (whole.parts[1], (0.5 * added[0], *added[1:])))
+        found += [apart, replace(joined, effects=(*rest, *both), per_recording=())]
+    return tuple(item for item in found if item.effects != model.effects)
+
+
+def at_its_bound(model: AxisModel) -> str:
+    """The first share or ratio that ended at the largest or smallest that its law takes, other than 0; empty if none did.
+
+    The data ask for more than the law can give. What was fitted together with it has taken up the rest, and is not to be trusted either.
+    """
+    for name, values in model.effects:
+        for item, value in zip(model.library[name].parameters, values, strict=True):
+            if not item.unit and value != 0.0 and value in (item.low, item.high):
+                return f"{name}.{item.name}"
+    return ""
+
+
+def compensate(models: Sequence[AxisModel], found: Gains, path: SampledPath, controller: Controller, encoder: Encoder | None = None) -> Compensation:
+    """The laws of the first model that are worth undoing along the path. models: the model and samples of its parameters (``uncertain.samples``)."""
+    others = alike(models[0])
+    judges = (*models, *others)
+
+    def judged(terms: tuple[str, ...], wanted: SampledPath, voltage: FloatArray) -> _Tried:
+        runs = [follow_path(model, wanted, controller, voltage, encoder) for model in judges]
+        errors = np.array([_rms(path.position - run.carried) for run in runs])
+        return _Tried(terms=terms, path=wanted, voltage=voltage, errors=errors, largest=max(float(np.max(np.abs(run.voltage))) for run in runs))
+
+    def undoing(model: AxisModel) -> Callable[[tuple[str, ...]], _Tried]:
+        def these(terms: tuple[str, ...]) -> _Tried:
+            kept = replace(model, effects=tuple(item for item in model.effects if item[0] in terms))
+            wanted = asked_of_encoder(model, path, terms)
+            return judged(terms, wanted, feedforward(kept, wanted).voltage)
+
+        return these
+
+    simple = judged((), path, simple_feedforward(found, path))
+    stretched = at_its_bound(models[0])
+    reason = f"{stretched} is at its bound, so that another law acts" if stretched else f"{SIMPLE} alone are better for a sample of the parameters"
+    best, left = simple, tuple((name, reason) for name, _ in models[0].effects)
+    for model in (models[0], *others) if not stretched else ():
+        whole, gone = _worth_undoing(model, undoing(model), simple)
+        if whole.against(simple) < best.against(simple):
+            best, left = whole, tuple((name, "undoing it makes the error of the worst sample of the parameters larger") for name in gone)
+    alone = judged((), path, np.zeros(path.position.size))
+    return Compensation(
+        path=best.path,
+        voltage=best.voltage,
+        terms=(SIMPLE,) if best is simple else (RIGID, *best.terms),
+        left=left,
+        feedback=float(np.max(alone.errors)),
+        simple=float(np.max(simple.errors)),
+        chosen=float(np.max(best.errors)),
+        largest=best.largest,
+    )
+
+
+def compensate_within(
+    models: Sequence[AxisModel],
+    found: Gains,
+    places: Sequence[float],
+    bounds: Bounds,
+    controller: Controller,
+    sampling_rate: float,
+    encoder: Encoder | None = None,
+) -> tuple[SampledPath, Compensation]:
+    """The S-curve through places, m, as fast as the bounds allow, slowed until no sample's drive comes nearer to its limit than ``RESERVE``.
+
+    Raises BadInput where it does even on a slow path, as under a controller that does not come to rest.
+    """
+    for scale in SLOWED ** np.arange(SLOWINGS):
+        slower = Bounds(scale * bounds.speed, scale**2 * bounds.acceleration, scale**3 * bounds.jerk)
+        path = s_curve(places, slower, sampling_rate)
+        made = compensate(models, found, path, controller, encoder)
+        if made.largest <= (1.0 - RESERVE) * controller.limit:
+            return path, made
+    allowed = f"up to {(1.0 - RESERVE) * controller.limit:.3g} V on a path of {slower.speed:.3g} m/s"
+    raise BadInput("voltage", f"{made.largest:.3g} V", allowed, "Lower the controller's gains, or stay away from what holds the axis.")
+
+
+def _worth_undoing(model: AxisModel, undoing: Callable[[tuple[str, ...]], _Tried], simple: _Tried) -> tuple[_Tried, tuple[str, ...]]:
+    """The best choice of a model's laws, and those that it leaves: one after another goes as long as the worst sample gains by it."""
+    best = undoing(tuple(name for name, _ in model.effects))
+    gone: tuple[str, ...] = ()
+    while best.terms:
+        fewer = [undoing(tuple(name for name in best.terms if name != one)) for one in best.terms]
+        tried = min(fewer, key=lambda item: item.against(simple))
+        if tried.against(simple) >= best.against(simple):
+            break
+        gone = (*gone, *set(best.terms).difference(tried.terms))
+        best = tried
+    return best, gone
+
+
+def _rms(values: FloatArray) -> float:
+    value = float(np.sqrt(np.mean(values**2)))
+    return value if np.isfinite(value) else float("inf")

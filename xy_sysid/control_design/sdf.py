@@ -1,0 +1,69 @@
+"""A refined model as SDF (Gazebo, Drake): mass, damping, friction, spring and limits of one joint; everything else is named in a comment.
+
+Source: SDFormat specification 1.9, ``joint/axis/dynamics``: damping, friction, spring_reference, spring_stiffness; ``joint/axis/limit``.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from xy_sysid.axis.model import AxisModel
+from xy_sysid.control_design.laws import along, asks, force, friction, largest_voltage
+from xy_sysid.effects._contract import Effect
+
+PLACES = 101  # at which a spring is asked whether it is straight
+STRAIGHT = 1e-6  # of its force at the end of the travel: a spring that bends less is one number
+
+
+def sdf(model: AxisModel, travel: tuple[float, float], limit: float, angular: bool, name: str = "axis") -> tuple[str, tuple[tuple[str, str], ...]]:
+    """(text, what is lost by effect); travel: m or rad; limit: of the drive, infinite if nobody knows it."""
+    level = 0.5 * (friction(model, abs(model.gain), 1.0) + friction(model, -abs(model.gain), -1.0))
+    places = np.linspace(*travel, PLACES)
+    pull = along(model, places, "force") * math.copysign(1.0, model.gain)
+    stiffness, offset = (float(value) for value in np.polyfit(places, pull, 1))
+    reach = float(np.max(np.abs(pull)))
+    straight = reach > 0.0 and stiffness > 0.0 and float(np.max(np.abs(stiffness * places + offset - pull))) <= STRAIGHT * reach
+    lost = [(effect, _lost(model.library[effect])) for effect, _ in model.effects if not (straight and _spring(model.library[effect]))]
+    if model.delay > 0.0:
+        lost.append(("delay", "SDF knows none"))
+    top = min(limit, largest_voltage(model))
+    effort = top if math.isfinite(top) else 1e3 / abs(model.gain)
+    mass = 1.0 / (abs(model.gain) * model.pole)
+    spring = f"<spring_reference>{-offset / stiffness:.9g}</spring_reference><spring_stiffness>{stiffness:.9g}</spring_stiffness>" if straight else ""
+    damping = 1.0 / abs(model.gain) + 0.5 * sum(side * force(model, side, 0.0, of_speed=True) for side in (1.0, -1.0))
+    lines = [
+        '<?xml version="1.0"?>',
+        '<sdf version="1.9">',
+        f'  <model name="{name}">',
+        "    <!-- forces are in the unit of the input: the mass is kA, the damping kV -->",
+        *(f"    <!-- lost: {effect}: {why} -->" for effect, why in lost),
+        '    <link name="base"/>',
+        f'    <link name="{name}">',
+        f"      <inertial><mass>{mass:.9g}</mass>",
+        f"        <inertia><ixx>{mass:.9g}</ixx><ixy>0</ixy><ixz>0</ixz><iyy>{mass:.9g}</iyy><iyz>0</iyz><izz>{mass:.9g}</izz></inertia>",
+        "      </inertial>",
+        "    </link>",
+        '    <joint name="ground" type="fixed"><parent>world</parent><child>base</child></joint>',
+        f'    <joint name="{name}_joint" type="{"revolute" if angular else "prismatic"}">',
+        f"      <parent>base</parent><child>{name}</child>",
+        f"      <axis><xyz>{'0 0 1' if angular else '1 0 0'}</xyz>",
+        f"        <limit><lower>{travel[0]:.9g}</lower><upper>{travel[1]:.9g}</upper><effort>{effort:.9g}</effort>",
+        f"          <velocity>{abs(model.gain) * effort:.9g}</velocity></limit>",
+        f"        <dynamics><damping>{damping:.9g}</damping><friction>{level:.9g}</friction>{spring}</dynamics>",
+        "      </axis>",
+        "    </joint>",
+        "  </model>",
+        "</sdf>",
+    ]
+    return "\n".join(lines) + "\n", tuple(lost)
+
+
+def _spring(effect: Effect) -> bool:
+    """Whether it is a force by position alone."""
+    return effect.category == "force" and asks(effect) - {"gain", "pole"} == {"x"}
+
+
+def _lost(effect: Effect) -> str:
+    return "only its mean level at speed is kept" if effect.is_dry else "SDF has no word for it"

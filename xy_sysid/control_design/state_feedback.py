@@ -1,0 +1,205 @@
+"""State feedback with an observer for the sampled linear part of a model: the largest bandwidth that holds for every sample of its parameters.
+
+The plant is sampled exactly, with its delay as states (``sampled``), and an integral of the error is added. Gains come from two quadratic problems:
+the controller weighs the position's error against the voltage, the observer weighs a force at the input against the encoder's noise. Both weights are
+set by one number, a bandwidth. A controller is taken where the loop, broken at the voltage, has the margins of ``feedback`` for every sample of the
+parameters. Source: Astrom & Wittenmark, Computer-Controlled Systems, 3rd ed., Prentice Hall 1997, ch. 11 (LQG); Anderson & Moore, Optimal
+Control: Linear Quadratic Methods, Prentice Hall 1990, sec. 8.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+
+from xy_sysid.comparison.physical_model import PhysicalModel
+from xy_sysid.control_design.feedback import ADVICE, COUNT, GAIN_MARGIN, HIGHEST, LINES, PHASE_MARGIN, Margins
+from xy_sysid.control_design.sampled import Sampled, sampled
+from xy_sysid.control_design.uncertain import samples, undetermined
+from xy_sysid.errors import BadInput
+from xy_sysid.response.frf import ComplexArray
+from xy_sysid.samples.block import FloatArray
+
+STEPS = 24  # bandwidths that are tried
+FASTER = 3.0  # times the controller's bandwidth: the observer's, so that what it does not know yet is gone first
+INTEGRAL = 4.0  # times below the bandwidth where the integral begins
+
+
+@dataclass(frozen=True, slots=True)
+class StateFeedback:
+    """z+ = free z + b (path - encoder) + drive held, u = c z, held = u within the drive's limit: observer and state feedback in one system.
+
+    The observer hears of the voltage that is held, so it does not wind up. Within the limit z+ = a z + b (path - encoder).
+
+    free: (n, n); b, c, drive: (n,); sampling_rate: Hz; bandwidth: rad/s that the weights were set by
+    nominal, worst: margins of the loop broken at the voltage, of the model and the least over the samples; count: of these
+    rejects: m, the largest position error after a step of load of 1 V; settles: s until a tenth of it is left
+    """
+
+    free: FloatArray
+    b: FloatArray
+    c: FloatArray
+    drive: FloatArray
+    sampling_rate: float
+    bandwidth: float
+    nominal: Margins
+    worst: Margins
+    count: int
+    rejects: float
+    settles: float
+
+    @property
+    def a(self) -> FloatArray:
+        """(n, n) transition within the limit."""
+        return np.asarray(self.free + np.outer(self.drive, self.c))
+
+    def response(self, frequency: FloatArray) -> ComplexArray:
+        """(n,) voltage over error at frequencies, Hz."""
+        z = np.exp(2j * np.pi * frequency / self.sampling_rate)
+        solved = np.linalg.solve(z[:, None, None] * np.eye(self.b.size) - self.a, np.broadcast_to(self.b[:, None], (z.size, self.b.size, 1)))
+        return np.asarray(solved[:, :, 0] @ self.c, dtype=np.complex128)
+
+
+def state_feedback(model: PhysicalModel, sampling_rate: float, bandwidth: float | None = None) -> StateFeedback:
+    """The controller of the largest bandwidth, or of ``bandwidth`` Hz, whose margins hold for every sample of the parameters.
+
+    Raises BadInput where gain or pole are not determined by the data, or where no bandwidth has the margins.
+    """
+    doubtful = undetermined(model, ("gain", "pole"))
+    if model.parameters and doubtful:
+        raise BadInput(
+            " and ".join(doubtful), "known to worse than a factor of two", "numbers that the data determine", "Record a livelier motion first."
+        )
+    if bandwidth is not None and not 0.0 < bandwidth <= HIGHEST * sampling_rate:
+        raise BadInput("bandwidth", f"{bandwidth:g} Hz", f"above 0, up to {HIGHEST * sampling_rate:g} Hz", "Give another.")
+    systems = [sampled(item, sampling_rate) for item in samples(model, COUNT)]
+    tries = [bandwidth] if bandwidth is not None else np.geomspace(HIGHEST * sampling_rate, 1e-4 * sampling_rate, STEPS).tolist()
+    worst = Margins(phase=0.0, gain=0.0, sensitivity=math.inf, crossover=0.0, stable=False)
+    for tried in tries:
+        wanted = 2.0 * math.pi * tried
+        try:
+            free, b, c, drive = _designed(systems[0], wanted)
+        except np.linalg.LinAlgError:  # so far apart from the plant that the quadratic problem has no answer in double precision
+            continue
+        parts = free + np.outer(drive, c), b, c
+        nominal = _margins(systems[0], *parts)
+        worst = nominal
+        if not _holds(nominal):
+            continue
+        found = [_margins(system, *parts) for system in systems]
+        worst = Margins(
+            phase=min(item.phase for item in found),
+            gain=min(item.gain for item in found),
+            sensitivity=max(item.sensitivity for item in found),
+            crossover=min(item.crossover for item in found),
+            stable=all(item.stable for item in found),
+        )
+        if _holds(worst):
+            rejects, settles = _load_step(systems[0], *parts)
+            return StateFeedback(
+                free=free,
+                b=b,
+                c=c,
+                drive=drive,
+                sampling_rate=sampling_rate,
+                bandwidth=wanted,
+                nominal=nominal,
+                worst=worst,
+                count=len(systems),
+                rejects=rejects,
+                settles=settles,
+            )
+    said = f"phase margin {worst.phase:.3g} degrees and gain margin {worst.gain:.3g}" if worst.stable else "unstable"
+    what = f"{bandwidth:g} Hz" if bandwidth is not None else "any"
+    raise BadInput("bandwidth of the state feedback", f"{what}: {said}", f"at least {PHASE_MARGIN:g} degrees and {GAIN_MARGIN:g}", ADVICE)
+
+
+def _holds(found: Margins) -> bool:
+    return found.stable and found.phase >= PHASE_MARGIN and found.gain >= GAIN_MARGIN
+
+
+def _designed(system: Sampled, bandwidth: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """(free, b, c, drive) of the controller: its states are the observer's, which follow the encoder's error, and the integral of that error.
+
+    The error's dynamics are those of the plant, as a constant path is an equilibrium. A force at the input is part of what is observed, and is
+    taken from the voltage: that is the integral.
+    """
+    plant, into, shown = system.whole_system()
+    n, h = into.size, 1.0 / system.sampling_rate
+    push = np.zeros(n)
+    push[: system.old.size] = system.old + system.new  # a force that acts on the axis at once, in V
+    size = _size(system, bandwidth)
+    weight = size**2  # a voltage that moves the axis by one unit at the bandwidth costs as much as one unit of error
+    feed = _regulator(plant, into, np.outer(shown, shown), weight)
+    whole = np.block([[plant, push[:, None]], [np.zeros((1, n)), np.eye(1)]])
+    seen = np.concatenate((shown, [0.0]))
+    slow = bandwidth / INTEGRAL * h
+    noise = np.outer(np.concatenate((push, [0.0])), np.concatenate((push, [0.0])))
+    noise[n, n] = slow**2
+    correct = _observer(whole, seen, noise, _size(system, FASTER * bandwidth) ** 2)
+    gains = np.concatenate((feed, [1.0]))  # the force that is seen is taken from the voltage
+    drive = np.concatenate((into, [0.0]))
+    return whole - np.outer(correct, seen), -correct, -gains, drive
+
+
+def _size(system: Sampled, at: float) -> float:
+    """Position over voltage at a frequency, rad/s."""
+    return float(np.abs(system.response(np.array([at / (2.0 * math.pi)]))[0]))
+
+
+def _regulator(a: FloatArray, b: FloatArray, states: FloatArray, voltage: float) -> FloatArray:
+    """(n,) gains that minimise the sum of x' states x + voltage u^2."""
+    p = scipy.linalg.solve_discrete_are(a, b[:, None], states, np.array([[voltage]]))
+    return np.asarray((b @ p @ a) / (voltage + b @ p @ b))
+
+
+def _observer(a: FloatArray, c: FloatArray, forces: FloatArray, noise: float) -> FloatArray:
+    """(n,) gains of the steady Kalman predictor."""
+    p = scipy.linalg.solve_discrete_are(a.T, c[:, None], forces, np.array([[noise]]))
+    return np.asarray((a @ p @ c) / (noise + c @ p @ c))
+
+
+def _margins(system: Sampled, a: FloatArray, b: FloatArray, c: FloatArray) -> Margins:
+    """Of the loop, broken at the voltage; stability from the poles of the closed loop."""
+    rate = system.sampling_rate
+    frequency = np.geomspace(2e-4 * rate, 0.499 * rate, LINES)
+    z = np.exp(2j * np.pi * frequency / rate)
+    solved = np.linalg.solve(z[:, None, None] * np.eye(b.size) - a, np.broadcast_to(b[:, None], (z.size, b.size, 1)))
+    loop = system.response(frequency) * (solved[:, :, 0] @ c)
+    size, turn = np.abs(loop), np.unwrap(np.angle(loop))
+    crossing = np.flatnonzero((size[:-1] - 1.0) * (size[1:] - 1.0) <= 0.0)
+    phases = [float(abs(np.angle(-loop[k] if abs(size[k] - 1.0) < abs(size[k + 1] - 1.0) else -loop[k + 1], deg=True))) for k in crossing]
+    odd = np.floor((turn + math.pi) / (2.0 * math.pi))
+    passing = np.flatnonzero((odd[:-1] != odd[1:]) & (size[:-1] < 1.0))
+    return Margins(
+        phase=min(phases, default=180.0),
+        gain=min((1.0 / float(size[k]) for k in passing), default=math.inf),
+        sensitivity=float(np.max(1.0 / np.abs(1.0 + loop))),
+        crossover=float(frequency[crossing[-1]]) if crossing.size else 0.0,
+        stable=bool(np.max(np.abs(np.linalg.eigvals(closed_loop(system, a, b, c)))) < 1.0),
+    )
+
+
+def closed_loop(system: Sampled, a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
+    """The closed loop's transition: plant first, then the controller."""
+    plant, into, shown = system.whole_system()
+    return np.block([[plant, np.outer(into, c)], [-np.outer(b, shown), a]])
+
+
+def _load_step(system: Sampled, a: FloatArray, b: FloatArray, c: FloatArray) -> tuple[float, float]:
+    """The largest error after a step of 1 V of load, m, and when a tenth of it is left for good, s."""
+    move = closed_loop(system, a, b, c)
+    push = np.zeros(move.shape[0])
+    push[: system.old.size] = system.old + system.new
+    slowest = float(np.max(np.abs(np.linalg.eigvals(move))))
+    count = int(min(max(-8.0 / math.log(slowest), 100.0), 1e5)) if slowest < 1.0 else 100
+    state, place = np.zeros(move.shape[0]), np.zeros(count)
+    for k in range(count):
+        place[k] = state[0]
+        state = move @ state + push
+    top = float(np.max(np.abs(place)))
+    late = np.flatnonzero(np.abs(place) > 0.1 * top)
+    return top, float(late[-1] + 1) / system.sampling_rate if late.size else 0.0

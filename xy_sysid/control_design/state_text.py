@@ -1,0 +1,77 @@
+"""State feedback as C and Python source without dependencies: one function that takes the error and gives the voltage."""
+
+from __future__ import annotations
+
+import math
+
+from xy_sysid.control_design.state_feedback import StateFeedback
+from xy_sysid.samples.block import FloatArray
+
+PYTHON = """\
+# State feedback with an observer: {title}
+FREE = [{free}]
+B = [{b}]
+C = [{c}]
+DRIVE = [{drive}]
+LIMIT = {limit}
+
+
+class Controller:
+    # error: path minus encoder, once every {period:.9g} s; the answer is the input to be held until the next call
+
+    def __init__(self):
+        self.z = [0.0] * {n}
+
+    def input(self, error):
+        z = self.z
+        u = sum(c * x for c, x in zip(C, z))
+        held = min(max(u, -LIMIT), LIMIT)
+        self.z = [
+            sum(a * x for a, x in zip(FREE[i * {n} : (i + 1) * {n}], z)) + B[i] * error + DRIVE[i] * held
+            for i in range({n})
+        ]
+        return held
+"""
+
+C_SOURCE = """\
+/* State feedback with an observer: {title}
+   error: path minus encoder, once every {period:.9g} s; z: {n} numbers, 0 at the begin; the answer is the input to be held until the next call */
+static const double FREE[] = {{{free}}};
+static const double B[] = {{{b}}};
+static const double C[] = {{{c}}};
+static const double DRIVE[] = {{{drive}}};
+
+double {name}_control(double *z, double error)
+{{
+    double next[{n}], u = 0.0, held;
+    int i, j;
+    for (i = 0; i < {n}; i++)
+        u += C[i] * z[i];
+    held = u > {limit} ? {limit} : u < -{limit} ? -{limit} : u;
+    for (i = 0; i < {n}; i++) {{
+        next[i] = B[i] * error + DRIVE[i] * held;
+        for (j = 0; j < {n}; j++)
+            next[i] += FREE[i * {n} + j] * z[j];
+    }}
+    for (i = 0; i < {n}; i++)
+        z[i] = next[i];
+    return held;
+}}
+"""
+
+
+def source(made: StateFeedback, name: str, title: str, limit: float) -> tuple[str, str]:
+    """(C, Python) source; limit: of the drive, in the unit of its input, infinite if nobody knows it."""
+    words = {
+        "name": name,
+        "title": title,
+        "n": made.b.size,
+        "period": 1.0 / made.sampling_rate,
+        "limit": repr(limit if math.isfinite(limit) else 1e12),
+        **{key: _numbers(getattr(made, key)) for key in ("free", "b", "c", "drive")},
+    }
+    return C_SOURCE.format(**words), PYTHON.format(**words)
+
+
+def _numbers(values: FloatArray) -> str:
+    return ", ".join(repr(float(value)) for value in values.ravel())

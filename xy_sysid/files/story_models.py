@@ -1,0 +1,51 @@
+"""The models of stories in the format of ``xy-sysid refine --model``, and back."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from xy_sysid.axis.model import STANDARD, Library
+from xy_sysid.comparison.physical_model import PhysicalModel
+from xy_sysid.errors import BadInput
+from xy_sysid.files.linear_models import Quoting
+from xy_sysid.files.models import read_models
+from xy_sysid.files.seal import sealed
+
+
+def model_text(source: str, documents: Mapping[str, Mapping[str, Any]]) -> str:
+    """The newest models of all axes; source: where the stories come from; documents: axis -> story."""
+    axes = {
+        axis: {
+            "effects": list(model["effects"]),
+            "parameters": {name: dict(item) for name, item in model["parameters"].items()},
+            "held_out_error": model["held_out_error"],
+            "noise_floor": model["noise_floor"],
+            **_units(document),
+        }
+        for axis, document in documents.items()
+        if (model := document.get("model"))
+    }
+    made = {"format": "xy_sysid axis model 1", "provenance": {"source": source}, "axes": axes}
+    return sealed(str(yaml.dump(made, Dumper=Quoting, sort_keys=False, width=120, allow_unicode=True)))
+
+
+def _units(document: Mapping[str, Any]) -> dict[str, str]:
+    """Units of input and output, where the story names them."""
+    named = document.get("units") or {}
+    return {f"{name}_unit": str(named[name]) for name in ("input", "output") if name in named}
+
+
+def model_of(document: Mapping[str, Any], axis: str, library: Library = STANDARD) -> PhysicalModel:
+    """The newest model of a story. Raises BadInput for a story without one."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "story.yaml"
+        path.write_text(model_text("story", {axis: document}), encoding="utf-8")
+        found = read_models(path, library).get(axis) if document.get("model") else None
+    if not isinstance(found, PhysicalModel):
+        raise BadInput(f"story of axis {axis}", "without a model", "a model with physical effects", "Diagnose the axis first.")
+    return found
