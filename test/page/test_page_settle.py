@@ -14,6 +14,7 @@ from helpers.ros_tools import World, needs_ros, world_in
 
 from xy_sysid.cli.demo_settle import QUIET, RATE, TRAVEL, VOLTAGE
 from xy_sysid.files.walk import run_of
+from xy_sysid.imports import load
 
 pytestmark = [needs_browser, needs_ros]
 
@@ -71,6 +72,7 @@ def test_run_it_goes_on_by_itself_until_nothing_is_left_to_settle(scene: Scene, 
     run = run_of(folder / "1", "x")
     assert run.output_unit == "rad" and run.seconds >= 0.95 * experiment["seconds"]
     assert float(abs(run.voltage).max()) <= VOLTAGE and float(abs(run.position).max()) < TRAVEL
+    assert load(folder / "1").seq[0] > load(folder / "0").seq[-1]  # the counter goes on, so nobody hears a restart
     tab.until(lambda: not tab.page.locator("[data-act=end-settle]").is_enabled(), 20, "the walk does not end")
     kind, rms, file = scene.parameters("x.kind", "x.rms", "experiment")
     assert (kind.string_value, rms.double_value, file.string_value) == ("noise", QUIET["rms"], "")

@@ -79,7 +79,7 @@ def page(
     how = reading(topic, effort, effect_file, said)
     session = Session(Shelf(folder), with_machine, namespace, how)
     if session.settling is not None:
-        session.settling.wished, session.settling.sets = settle, tuple(sets_of(between))
+        session.settling.wished, session.settling.sets, session.settling.first = settle, tuple(sets_of(between)), bool(settle)
     try:
         for path in rec or []:
             session.open(path)

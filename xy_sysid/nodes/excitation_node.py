@@ -114,7 +114,7 @@ class ExcitationNode(Overridable, LifecycleNode):
             return self._refuse(f"{rivals}: no configure beside it. End one of the two. {KILLED}")
         try:
             self._take_experiment()
-            self._drive = Drive(self._knobs.settings)
+            self._drive = Drive(self._knobs.settings, 0 if self._drive is None else self._drive.seq)  # the counter never goes back
         except BadInput as error:
             return self._refuse(str(error))
         return super().on_configure(state)

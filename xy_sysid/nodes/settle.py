@@ -38,7 +38,7 @@ from xy_sysid.settings import ExcitationSettings, knobs
 
 FIRST = 12.0  # s of the first recording, of what drives the machine when the walk begins
 WHOLE = 0.95  # part of its seconds with which an experiment counts as carried out; less was stopped
-LATE = 10.0  # s on the wall that a recording may take longer than its seconds, as on a busy computer
+LATE = 10.0  # s on the wall without a sample after which a recording ends, however busy the computer is
 SETTLES = 0.5  # s in which the node tells its state after a change
 QUALITY = QoSProfile(depth=1000, history=HistoryPolicy.KEEP_LAST)
 FIXED = ("output", "interface", "unit", "command_topic", "controller_joints", "joint_topic", "joints")  # of the excitation, while it runs
@@ -173,9 +173,11 @@ class Settler(ExcitationClient):
 
     def _record(self, seconds: float, settings: ExcitationSettings) -> None:
         """Until so many s of positions have come, or the excitation drives no more."""
-        begun, pace, driven = time.monotonic(), settings.speed or 1.0, False
-        while time.monotonic() < begun + seconds / min(pace, 1.0) + LATE and not self._over():
+        heard, newest, driven = 0, time.monotonic(), False
+        while time.monotonic() < newest + max(LATE, settings.patience) and not self._over():
             self.wait(0.05)
+            if self._samples[0] > heard:
+                heard, newest = self._samples[0], time.monotonic()
             driven = driven or self._status.get("state") in ("active", "stopping")
             if self._samples[1] and self._samples[0] >= seconds * self._samples[1]:
                 return

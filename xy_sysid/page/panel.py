@@ -51,8 +51,10 @@ class Panel:
                     self._numbers = Numbers()
                     self._cards = Cards(session, source, self._first.plots["frequency"])
                 with ui.element("div").classes("stack side"):
+                    settling = session.settling if source.live else None
+                    self._settle = SettleCard(session) if settling is not None and settling.first else None
                     self._story = StoryCard(session, source, self._machine if source.live else lambda: None)
-                    self._settle = SettleCard(session) if source.live else None
+                    self._settle = self._settle or (SettleCard(session) if source.live else None)
 
     def _machine(self) -> None:
         self._control = Control(self._session)
