@@ -6,14 +6,14 @@ from collections.abc import Sequence
 
 from xy_sysid.fleets.baseline import AGREEING, Baseline, Compared
 from xy_sysid.fleets.causes import Causes
-from xy_sysid.live.plain_messages import OK, STALE, WARN, StatusMessage
+from xy_sysid.live.plain_messages import OK, WARN, StatusMessage
 from xy_sysid.units import readable
 
 ONCE = 1e9  # axis-months beyond which the number itself says nothing more
 
 
 def status(axis: str, baseline: Baseline, known: Causes, axis_months: float) -> StatusMessage:
-    """``baseline <axis>``: WARN where a parameter has left its interval, STALE before enough is heard, else OK.
+    """``baseline <axis>``: WARN where a parameter has left its interval, else OK; before enough is heard it says so.
 
     axis_months: of an unchanged axis, in which one false alarm is allowed
     """
@@ -26,7 +26,7 @@ def status(axis: str, baseline: Baseline, known: Causes, axis_months: float) -> 
         return StatusMessage(f"baseline {axis}", WARN, f"axis {axis}: since commissioning {told(left)}.{likely}", values)
     if baseline.stretches < AGREEING:
         text = f"axis {axis}: {baseline.stretches} of {AGREEING} estimates that are compared with commissioning"
-        return StatusMessage(f"baseline {axis}", STALE, text, values)
+        return StatusMessage(f"baseline {axis}", OK, text, values)
     if not every:
         return StatusMessage(f"baseline {axis}", WARN, f"axis {axis}: no parameter of the baseline is estimated", values)
     return StatusMessage(f"baseline {axis}", OK, f"axis {axis}: every parameter is within its interval since commissioning", values)

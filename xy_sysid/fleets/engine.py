@@ -24,6 +24,7 @@ DIED = "its process died twice while it was analysed (too little memory?). Analy
 HERE = {
     "distributed.scheduler.allowed-failures": 0,  # a task whose process died is blamed at once
     "distributed.scheduler.worker-saturation": 1.0,  # one task a process
+    "distributed.worker.profile.enabled": False,  # it keeps the stacks of an hour, 100 MB and more
     "distributed.nanny.pre-spawn-environ.NUMBA_NUM_THREADS": 1,  # dask itself says so to BLAS
 }
 

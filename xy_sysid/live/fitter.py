@@ -22,7 +22,7 @@ from xy_sysid.live.identifier import AxisRequest, FitRequest
 from xy_sysid.live.messages import comparison_message, frf_message, transfer_function_message
 from xy_sysid.live.plain_messages import ERROR, OK, WARN, ArrayMessage, StatusMessage
 from xy_sysid.live.resonance_watch import Resonance, Track, alarm_sentence, follow
-from xy_sysid.live.stretch_fits import Stretch, StretchFits
+from xy_sysid.live.stretch_fits import FittedStretch, StretchFits
 from xy_sysid.response.frf import FrequencyResponse
 from xy_sysid.response.h1 import H1Options, frequency_response
 from xy_sysid.response.spectra import RunningSpectra, State, Transformer
@@ -52,7 +52,7 @@ class AxisUpdate:
     windows: int
     dropped: dict[str, int]
     problem: str = ""
-    stretch: Stretch | None = None
+    stretch: FittedStretch | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,7 @@ from xy_sysid.settings import IdentifierSettings
 
 
 @dataclass(frozen=True, slots=True)
-class Stretch:
+class FittedStretch:
     """The fit of the newest ``alarm_windows`` windows. begin, end: number of the first window, and of the first one that shares no sample with it."""
 
     fit: Fit
@@ -34,7 +34,7 @@ class StretchFits:
         self._shared = math.ceil(1.0 / (1.0 - settings.overlap))  # windows until one shares no sample with another
         self._ends: dict[str, int] = {}
 
-    def fit(self, axis: str, asked: AxisRequest) -> Stretch | None:
+    def fit(self, axis: str, asked: AxisRequest) -> FittedStretch | None:
         """The fit of the newest windows, where all of them lie behind those of the fit before it; None where they don't, or it fails."""
         begin, end = asked.windows - self._settings.alarm_windows, asked.windows - 1 + self._shared
         model = self._models.get(axis)
@@ -54,4 +54,4 @@ class StretchFits:
         if not found.converged:
             return None
         self._ends[axis] = end
-        return Stretch(found, begin, end)
+        return FittedStretch(found, begin, end)

@@ -53,7 +53,8 @@ class SinceCommissioning:
     def hear(self, axis: str, estimates: Iterable[Estimate | Interval], begin: float, end: float) -> None:
         """The estimates of a stretch of data of an axis; see ``Baseline.hear``."""
         if axis in self._baselines:
-            self._baselines[axis].hear([Estimate(one.name, one.value, one.unit, one.low, one.high) for one in estimates], begin, end)
+            found = [Estimate(name=one.name, value=one.value, unit=one.unit, low=one.low, high=one.high) for one in estimates]
+            self._baselines[axis].hear(found, begin, end)
 
     def statuses(self) -> list[StatusMessage]:
         """One for each axis that has a baseline."""
