@@ -12,6 +12,7 @@ from helpers.known_models import DELAY, GAIN, POLE, axis, known, unknown
 from scipy import signal
 
 from xy_sysid.axis.model import STANDARD, simulate
+from xy_sysid.comparison.physical_model import PhysicalModel
 from xy_sysid.control_design.gains import gains, simple_feedforward
 from xy_sysid.control_design.inverse import feedforward, not_undone
 from xy_sysid.control_design.limits import fastest
@@ -19,6 +20,7 @@ from xy_sysid.control_design.path import Bounds, SampledPath, recorded, s_curve
 from xy_sysid.control_design.sample_step import simulate_alone
 from xy_sysid.control_design.tables import friction_table, position_tables
 from xy_sysid.control_design.uncertain import samples, undetermined
+from xy_sysid.control_design.use import use
 from xy_sysid.errors import BadInput
 from xy_sysid.samples.block import FloatArray
 
@@ -165,5 +167,14 @@ def test_a_recorded_motion_becomes_a_path_without_delay() -> None:
 
 def test_a_resonance_that_only_the_load_shows_is_refused_in_one_line() -> None:
     """Nothing of it is undone by a feedforward that ends at the motor."""
-    with pytest.raises(BadInput, match=r"load_side_resonance is a section without roots in s.*Leave it out"):
+    with pytest.raises(BadInput, match=r"load_side_resonance is a spring between motor and encoder.*an encoder at the motor"):
         feedforward(axis().with_effect("load_side_resonance", (60.0, 0.05)), path())
+
+
+def test_with_an_encoder_on_the_load_there_are_gains_and_no_loops() -> None:
+    """kV and kA hold for both masses together; a loop around a spring that no design here knows is refused, in words."""
+    model = PhysicalModel(axis().with_effect("load_side_resonance", (60.0, 0.05)))
+    used = use(model, limit=5.0)
+    assert [gain.name for gain in used.gains.items[1:3]] == ["kV", "kA"]
+    assert used.feedback is None and used.states is None and used.modes == ()
+    assert {what for what, _ in used.refused} >= {"feedback", "state feedback", "filters"}

@@ -68,7 +68,8 @@ def sections(model: AxisModel, sampling_rate: float) -> tuple[FloatArray, FloatA
         b0, b1, b2, a1, a2 = section(**{word: words[word] for word in arguments(section)})
         zeros, poles = resonant_loop.roots(b1 / b0, b2 / b0, sampling_rate), resonant_loop.roots(a1, a2, sampling_rate)
         if not (zeros[0] > 0.0 and poles[0] > 0.0):
-            raise BadInput(f"effect {name}", "a section without roots in s", "a pole-zero pair", "Leave it out of the model that is used.")
+            act = "Close loops on an encoder at the motor, or use the gains alone at a bandwidth far below it."
+            raise BadInput(f"effect {name}", "a spring between motor and encoder", "a resonance that an encoder at the motor sees", act)
         top, bottom = resonant_loop.times(top, np.array([*zeros, 1.0])), resonant_loop.times(bottom, np.array([*poles, 1.0]))
     return top, bottom
 

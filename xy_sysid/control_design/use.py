@@ -107,7 +107,7 @@ def use(
     refused: list[tuple[str, str]] = []
     found = gains(model)
     loop = _tried("feedback", lambda: feedback(model, rate, bandwidth, encoder=encoder, limit=drive), refused)
-    swings = modes(model)
+    swings = _tried("filters", lambda: modes(model), refused) or ()
     models = _tried("worst cases", lambda: samples(model, WORST_OF), refused) or (model.model,)
     centre = 0.5 * (between[0] + between[1])
     ends = [centre, between[1], between[0], centre]
