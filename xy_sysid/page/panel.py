@@ -16,6 +16,7 @@ from xy_sysid.page.orders import Source
 from xy_sysid.page.picture_card import Cards
 from xy_sysid.page.session import Session
 from xy_sysid.page.story_card import StoryCard
+from xy_sysid.page.use_card import UseCard
 from xy_sysid.page.views import NOW, View, view_of, views
 
 SHORT = 3  # letters of an axis' name that needs the word axis before it
@@ -51,6 +52,7 @@ class Panel:
                     self._cards = Cards(session, source, self._first.plots["frequency"])
                 with ui.element("div").classes("stack side"):
                     self._story = StoryCard(session, source, self._machine if source.live else lambda: None)
+                    self._use = UseCard(session, source)
 
     def _machine(self) -> None:
         self._control = Control(self._session)
@@ -72,6 +74,7 @@ class Panel:
         begun = source.document(self._axis) is not None
         waits = self._control is not None and self._control.refresh(self._axes, begun)
         axis, view = self._axis, self._choose()  # without an axis every card keeps its place, and says what is waited for
+        self._use.refresh()
         self._numbers.refresh(self._session, source, axis, view)  # first what waits for nothing: meanwhile the browser may go
         await self._story.refresh(axis, quiet=waits)
         await self._first.refresh(axis, view)
