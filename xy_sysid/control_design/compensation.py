@@ -174,7 +174,6 @@ def compensate_within(
     bounds: Bounds,
     controller: Controller,
     sampling_rate: float,
-    encoder: Encoder | None = None,
 ) -> tuple[SampledPath, Compensation]:
     """The S-curve through places, m, as fast as the bounds allow, slowed until no sample's drive comes nearer to its limit than ``RESERVE``.
 
@@ -183,7 +182,7 @@ def compensate_within(
     for scale in SLOWED ** np.arange(SLOWINGS):
         slower = Bounds(scale * bounds.speed, scale**2 * bounds.acceleration, scale**3 * bounds.jerk)
         path = s_curve(places, slower, sampling_rate)
-        made = compensate(models, found, path, controller, encoder)
+        made = compensate(models, found, path, controller)
         if made.largest <= (1.0 - RESERVE) * controller.limit:
             return path, made
     allowed = f"up to {(1.0 - RESERVE) * controller.limit:.3g} V on a path of {slower.speed:.3g} m/s"

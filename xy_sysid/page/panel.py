@@ -17,6 +17,7 @@ from xy_sysid.page.picture_card import Cards
 from xy_sysid.page.session import Session
 from xy_sysid.page.settle_card import SettleCard
 from xy_sysid.page.story_card import StoryCard
+from xy_sysid.page.use_card import UseCard
 from xy_sysid.page.views import NOW, View, view_of, views
 
 SHORT = 3  # letters of an axis' name that needs the word axis before it
@@ -55,6 +56,7 @@ class Panel:
                     self._settle = SettleCard(session) if settling is not None and settling.first else None
                     self._story = StoryCard(session, source, self._machine if source.live else lambda: None)
                     self._settle = self._settle or (SettleCard(session) if source.live else None)
+                    self._use = UseCard(session, source)
 
     def _machine(self) -> None:
         self._control = Control(self._session)
@@ -76,6 +78,7 @@ class Panel:
         begun = source.document(self._axis) is not None
         waits = self._control is not None and self._control.refresh(self._axes, begun)
         axis, view = self._axis, self._choose()  # without an axis every card keeps its place, and says what is waited for
+        self._use.refresh()
         self._numbers.refresh(self._session, source, axis, view)  # first what waits for nothing: meanwhile the browser may go
         await self._story.refresh(axis, quiet=waits)
         if self._settle is not None:

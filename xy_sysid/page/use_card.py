@@ -1,0 +1,105 @@
+"""The card *Use the model*: numbers to paste and files, as ``xy-sysid use`` gives them; in the demo, the path that is followed with them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from nicegui import run, ui
+
+from xy_sysid.errors import XySysidError
+from xy_sysid.page.buttons import heeded
+from xy_sysid.page.downloads import plain_name
+from xy_sysid.page.orders import Source
+from xy_sysid.page.session import Session
+from xy_sysid.page.use_job import used_files, used_text
+
+FOLLOWER = "demo_follower"  # the node of ``xy-sysid demo --use``
+BUSY = ("stopping the excitation", "designing", "following")
+
+
+class UseCard:
+    """One source in one browser."""
+
+    def __init__(self, session: Session, source: Source) -> None:
+        self._session, self._source = session, source
+        self._shown: object = None
+        self._working = False
+        with ui.element("section").classes("card use").props('aria-label="use the model"') as self._card:
+            ui.html("<h2>Use the model</h2>", sanitize=False)
+            ui.label("Numbers for your controller, and files for other programs, from the newest models.").classes("soft small")
+            with ui.element("div").classes("buttons"):
+                self._limit = ui.number("limit of the drive", min=1e-9).props("outlined dense clearable data-part=use-limit").style("width:9rem")
+                self._numbers = heeded(ui.button("Numbers to paste", on_click=self._tell).props("outline dense no-caps data-act=use-numbers"))
+                self._files = heeded(ui.button("Files (ZIP)", on_click=self._pack).props("outline dense no-caps data-act=use-files"))
+            self._text = ui.element("div").classes("use-text").props('tabindex=0 role=region aria-label="numbers to paste" data-part=use-text')
+            with ui.element("div").classes("stack").style("gap:.3rem") as self._path:
+                self._go = heeded(ui.button("Use it", on_click=self._follow).props("unelevated dense no-caps data-act=use-it"))
+                self._state = ui.label("").classes("soft small").props("role=status aria-live=polite data-part=use-state")
+                self._errors = ui.element("div").classes("rows small").props("data-part=use-errors")
+        self._text.set_visibility(False)
+
+    def refresh(self) -> None:
+        """Show what is now."""
+        documents = self._documents()
+        self._card.set_visibility(bool(documents))
+        for button in (self._numbers, self._files):
+            button.set_enabled(not self._working)
+        there = self._source.live and FOLLOWER in self._session.heard.present
+        self._path.set_visibility(there)
+        if there:
+            values = self._session.heard.values(FOLLOWER)
+            status = self._session.heard.statuses.get(FOLLOWER)
+            self._go.set_enabled(len(documents) == len(self._source.axes()) and values.get("state") not in BUSY)
+            self._state.set_text(f"A path on the simulated machine: {status.message if status else 'not begun'}.")
+            self._write(values)
+
+    def _documents(self) -> dict[str, dict[str, Any]]:
+        found = {axis: self._source.document(axis) for axis in self._source.axes()}
+        return {axis: document for axis, document in found.items() if document and document.get("model")}
+
+    def _write(self, values: dict[str, str]) -> None:
+        rows = [(key.removesuffix(" (m)"), f"{1e6 * float(value):.3g} um rms") for key, value in values.items() if key.endswith(" (m)")]
+        if rows != self._shown:
+            self._shown = rows
+            self._errors.clear()
+            with self._errors:
+                for name, text in rows:
+                    ui.label(name)
+                    ui.label(text)
+
+    def _follow(self) -> None:
+        if self._session.link is not None:
+            self._session.link.trigger(
+                f"{FOLLOWER}/use", lambda done, words: self._session.say(words or "the demo's controller did not answer", done)
+            )
+
+    async def _tell(self) -> None:
+        path, how = getattr(self._source, "path", None), getattr(self._source, "how", self._session.reading)
+        text = await self._do(used_text, self._documents(), path, how.words, self._limit.value)
+        if text:
+            self._text.clear()
+            with self._text:
+                ui.html(f"<pre>{_escaped(str(text))}</pre>", sanitize=False)
+            self._text.set_visibility(True)
+
+    async def _pack(self) -> None:
+        packed = await self._do(used_files, self._documents(), self._limit.value)
+        if packed:
+            ui.download.content(packed, f"{plain_name(self._source.title)}.use.zip")
+
+    async def _do(self, act: Any, *arguments: Any) -> Any:
+        """What ``act`` gives, made beside the page's loop; None where it is refused, which is told."""
+        self._working = True
+        waiting = ui.notification("xy-sysid use is running ...", spinner=True, timeout=None)
+        try:
+            return await run.io_bound(act, *arguments)
+        except XySysidError as problem:
+            self._session.say(str(problem))
+            return None
+        finally:
+            self._working = False
+            waiting.dismiss()
+
+
+def _escaped(text: str) -> str:
+    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")

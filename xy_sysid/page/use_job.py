@@ -1,0 +1,49 @@
+"""What ``xy-sysid use`` says of a model on the page: the command itself is asked, so that the page and the command have the same words."""
+
+from __future__ import annotations
+
+import io
+import subprocess
+import sys
+import tempfile
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from xy_sysid.errors import BadInput
+from xy_sysid.files.story_models import model_text
+
+
+def used_text(documents: Mapping[str, Mapping[str, Any]], recording: Path | None, reading: tuple[str, ...], limit: float | None) -> str:
+    """The numbers to paste, as the command prints them. Raises BadInput with what it says. Takes seconds."""
+    with tempfile.TemporaryDirectory() as folder:
+        return _asked(Path(folder), documents, recording, (*reading, *_limit(limit)))
+
+
+def used_files(documents: Mapping[str, Mapping[str, Any]], limit: float | None) -> bytes:
+    """A ZIP with the exports of every axis, each in a folder of its own. Raises BadInput. Takes seconds."""
+    packed = io.BytesIO()
+    with tempfile.TemporaryDirectory() as folder, zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as pack:
+        for axis, document in documents.items():
+            out = Path(folder) / f"axis_{len(pack.namelist())}"
+            _asked(Path(folder), {axis: document}, None, (*_limit(limit), "--to", "all", "-o", str(out)))
+            for file in sorted(out.iterdir()):
+                pack.write(file, f"{axis}/{file.name}")
+    return packed.getvalue()
+
+
+def _limit(limit: float | None) -> tuple[str, ...]:
+    return () if limit is None else ("--limit", f"{limit:.9g}")
+
+
+def _asked(folder: Path, documents: Mapping[str, Mapping[str, Any]], recording: Path | None, more: tuple[str, ...]) -> str:
+    model = folder / "axes.yaml"
+    model.write_text(model_text("page", documents), encoding="utf-8")
+    on = () if recording is None else ("--on", str(recording))
+    command = [sys.executable, "-m", "xy_sysid", "use", str(model), *on, *more]
+    done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        lines = [line for line in done.stderr.splitlines() if line.strip()]
+        raise BadInput("model", "not to be used", "one that the data determine", lines[-1] if lines else "")
+    return done.stdout
