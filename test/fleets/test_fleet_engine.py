@@ -23,7 +23,7 @@ from xy_sysid.fleets.columns import TIMES
 from xy_sysid.fleets.engine import Cluster, connected, results
 from xy_sysid.fleets.estimate import Progress
 from xy_sysid.fleets.journal import FILE, journal
-from xy_sysid.fleets.of_file import Task, rows_of_file
+from xy_sysid.fleets.of_file import Task, failed, rows_of_file
 from xy_sysid.fleets.of_paths import Analysis, run
 from xy_sysid.fleets.row import Row
 from xy_sysid.fleets.table import as_table, read
@@ -208,3 +208,19 @@ def test_the_estimate_holds_what_is_left() -> None:
     assert low < 50.0 < high < 60.0 and "3.6e+03 an hour on 2 processes" in now.sentence()
     assert Progress(total=10, done=2, elapsed=3.0, spent=3.0, square=4.5).remaining() is None
     assert threading.active_count() >= 1 and cli("fleet", "--help").code == 0
+
+
+def test_a_row_whose_writing_is_interrupted_is_in_the_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ctrl-C between the journal and the disk: the row is known, so it is not lost."""
+
+    def interrupted(_: int) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("os.fsync", interrupted)
+    row = failed("data/mill-01/a.csv", "reading", "is no table")
+    with pytest.raises(KeyboardInterrupt), journal(tmp_path / "table") as kept:
+        try:
+            kept.add([row])
+        finally:
+            monkeypatch.undo()
+    assert [one["problem"] for one in read(tmp_path / "table").to_pylist()] == ["is no table"]

@@ -37,11 +37,11 @@ class Journal:
 
     def add(self, rows: Sequence[Row]) -> None:
         """Keep the rows of a recording."""
+        self._rows += rows  # first, since Ctrl-C may end the writing, and the rows that are here go into the table
         for row in rows:
             self._file.write(json.dumps({name: _written(value) for name, value in row.items()}) + "\n")
         self._file.flush()
         os.fsync(self._file.fileno())
-        self._rows += rows
         if len(self._rows) >= MANY:
             self.fold()
 
