@@ -11,6 +11,7 @@ from typing import Any
 TRAVEL, VOLTAGE = 2.5, 1.2  # rad to each side, V
 RATE = 1000.0  # Hz: that of the machine
 QUIET = {"low": 0.5, "high": 20.0, "rms": 0.08, "centring": 0.0, "brake": 0.2}  # the arm stays near hanging
+SETS = (("gravity",), ("return_spring",))  # what may pull the arm back
 JOIN = 15.0  # s that the walk may take to end
 WORDS = (
     "a simulated joint whose arm hangs, pulled back by a weight or a spring",
@@ -28,7 +29,8 @@ def settle_demo(machine: str, speed: float, seed: int, page: tuple[int, bool] | 
     if page is not None:
         from xy_sysid.cli.demo_page import watch_page
 
-        more = ("--settle", "x", "--folder", str(folder))
+        between = [word for names in SETS for word in ("--between", "+".join(names))]
+        more = ("--settle", "x", "--folder", str(folder), *between)
         return watch_page(specs(machine, speed, seed, watched=True), ("x",), speed, *page, more, WORDS)
     return _headless(machine, speed, seed, folder, json)
 
@@ -68,7 +70,7 @@ def _headless(machine: str, speed: float, seed: int, folder: Path, json: bool) -
     aside.print("starting the nodes: a simulated joint and its excitation, over ROS 2 ...")
     over = threading.Event()
     lines: list[str] = []
-    settler = Settler(Wishes("x", folder / "walk", alone=True), lambda words: None if json else say(words), over.is_set, lambda: True)
+    settler = Settler(Wishes("x", folder / "walk", sets=SETS, alone=True), lambda words: None if json else say(words), over.is_set, lambda: True)
     thread = threading.Thread(target=settler.run, name="settle", daemon=True)
     thread.start()
     try:

@@ -32,7 +32,7 @@ from xy_sysid.nodes.convert import array_from_ros
 from xy_sysid.nodes.wall import Wall
 from xy_sysid.page.topics_state import TopicsState
 
-WATCHERS = ("page", "page_stop", "demo")  # nodes that only look on
+WATCHERS = ("page", "page_stop", "demo", "settle")  # nodes of the page and of commands, which come and go
 LOOK = 0.5  # s between two looks at the graph and the lifecycle
 PATIENCE = 5.0  # s for an answer of a node
 AGAIN = 2  # times that parameters are asked for or set once more without an answer

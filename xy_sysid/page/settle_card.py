@@ -20,7 +20,10 @@ class SettleCard:
     def __init__(self, session: Session) -> None:
         self._session, self._axis = session, ""
         self._shown: object = None
-        with ui.element("section").classes("card settle").props('aria-label="what to measure next" data-part=settle'):
+        early = session.settling is not None and session.settling.first
+        with (
+            ui.element("section").classes("card settle early" if early else "card settle").props('aria-label="what to measure next" data-part=settle')
+        ):
             ui.html("<h2>What to measure next</h2>", sanitize=False)
             self._state = ui.label(ABOUT).classes("sentence").props("role=status aria-live=polite data-part=settle-state")
             self._steps = ui.element("div").classes("stack").style("gap:.4rem")
