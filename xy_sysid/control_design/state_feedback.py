@@ -140,7 +140,8 @@ def _designed(system: Sampled, bandwidth: float) -> tuple[FloatArray, FloatArray
     noise = np.outer(np.concatenate((push, [0.0])), np.concatenate((push, [0.0])))
     noise[n, n] = slow**2
     correct = _observer(whole, seen, noise, _size(system, FASTER * bandwidth) ** 2)
-    gains = np.concatenate((feed, [1.0]))  # the force that is seen is taken from the voltage
+    on_the_way = float(np.sum(feed[system.old.size :]))  # at rest the voltages that the delay holds are those that balance the force
+    gains = np.concatenate((feed, [1.0 + on_the_way]))
     drive = np.concatenate((into, [0.0]))
     return whole - np.outer(correct, seen), -correct, -gains, drive
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 from typing import Any
 
 from nicegui import run, ui
@@ -79,7 +80,7 @@ class UseCard:
         if text:
             self._text.clear()
             with self._text:
-                ui.html(f"<pre>{_escaped(str(text))}</pre>", sanitize=False)
+                ui.html(_lines(str(text)), sanitize=False)
             self._text.set_visibility(True)
 
     async def _pack(self) -> None:
@@ -88,7 +89,9 @@ class UseCard:
             ui.download.content(packed, f"{plain_name(self._source.title)}.use.zip")
 
     async def _do(self, act: Any, *arguments: Any) -> Any:
-        """What ``act`` gives, made beside the page's loop; None where it is refused, which is told."""
+        """What ``act`` gives, made beside the page's loop; None where it is refused, which is told, or while it runs."""
+        if self._working:
+            return None
         self._working = True
         waiting = ui.notification("xy-sysid use is running ...", spinner=True, timeout=None)
         try:
@@ -101,5 +104,7 @@ class UseCard:
             waiting.dismiss()
 
 
-def _escaped(text: str) -> str:
-    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+def _lines(text: str) -> str:
+    """The command's tables as they are; its sentences, which are indented, wrap."""
+    made = [html.escape(line) for line in text.splitlines()]
+    return "".join(f"<p>{line}</p>" if line.startswith("  ") and line.endswith(".") else f"<pre>{line}</pre>" for line in made)
