@@ -108,6 +108,7 @@ def test_every_benchmark_is_among_these() -> None:
         "recordings",
         "settle_pairs",
         "tables",
+        "use_machines",
         "workshop",
     }
     assert files == {*TABLES, *SCRIPTS}

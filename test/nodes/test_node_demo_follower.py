@@ -57,8 +57,12 @@ def test_the_tracking_error_falls_from_pid_to_feedforward_to_compensation(world:
     world.start("xy_sim.node", {"machine": str(file)})
     world.start("xy_sysid.nodes.demo_follower", {"distance": 0.01})
     heard, voltage, positions = world.statuses(), world.blocks(), world.blocks("position")
-    refused = world.call(Trigger, "demo_follower/use", Trigger.Request(), 20.0, 3)
-    assert not refused.success and "Press Diagnose" in refused.message, refused
+
+    def refused() -> Trigger.Response:
+        return world.call(Trigger, "demo_follower/use", Trigger.Request(), 20.0, 3)
+
+    assert world.until(lambda: "Press Diagnose" in refused().message, 30.0), refused()  # until it has heard that the machine is the simulated one
+    assert not refused().success
     for axis in TRUTH:
         world.node.create_publisher(String, f"story/{axis}", LATCHED_QOS).publish(String(data=story(axis)))
     drive, rows = world.node.create_publisher(Float64MultiArray, "voltage", DATA_QOS), np.arange(20.0)

@@ -255,10 +255,14 @@ def test_the_stop_of_another_is_overridden_with_its_name_seen(scene: Scene) -> N
     tab = scene.tab
     scene.drive()
     stop = scene.world.node.create_publisher(Bool, "stop", 1)
-    tab.until(stop.get_subscription_count, 20)
-    stop.publish(Bool(data=True))
+    said = tab.page.locator("[data-part=lifecycle]")
+
+    def held() -> bool:
+        stop.publish(Bool(data=True))  # again, as one subscriber may be found before the other
+        return "STOP is on from test. Release it there, or override it here" in str(said.text_content())
+
+    tab.until(held, 20, "the page does not say who holds STOP")
     activate = tab.page.locator("[data-act=activate]")
-    scene.lifecycle("STOP is on from test. Release it there, or override it here")
     tab.until(lambda: activate.text_content() == "Override STOP" and activate.is_enabled(), 15)
     assert "STOP is on from test" in scene.nodes()
     override = tab.page.locator("[data-act=override]")

@@ -81,7 +81,7 @@ def test_loose_bolts_lower_the_pair_by_more_than_a_hertz_while_it_runs() -> None
         (GOOD + "rate: fast\n", "rate is 'fast'"),
         (GOOD + "hidden: {sed: 1}\n", "Did you mean 'seed'"),
         (GOOD + "hidden: {effects: many}\n", "0 to 6, a range"),
-        (GOOD + "base: nowhere.yaml\n", "one of hidden.yaml"),
+        (GOOD + "base: nowhere.yaml\n", "hidden.yaml"),
         (GOOD + "base: machine.yaml\n", "its own base"),
         ("rate: 2000\n", "one group per axis"),
         ("- 1\n", "names with values"),

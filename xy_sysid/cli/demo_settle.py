@@ -11,12 +11,19 @@ from typing import Any
 TRAVEL, VOLTAGE = 2.5, 1.2  # rad to each side, V
 RATE = 1000.0  # Hz: that of the machine
 QUIET = {"low": 0.5, "high": 20.0, "rms": 0.08, "centring": 0.0, "brake": 0.2}  # the arm stays near hanging
-SETS = (("gravity",), ("return_spring",))  # what may pull the arm back
 JOIN = 15.0  # s that the walk may take to end
 WORDS = (
     "a simulated joint whose arm hangs, pulled back by a weight or a spring",
     "It hardly swings: a weight and a spring look the same. Watch the page design the experiment that distinguishes them, and run it.",
 )
+
+
+def pulls() -> tuple[tuple[str, ...], ...]:
+    """What may pull the arm back: a law of an angle, or the first that looks like it."""
+    from xy_sysid.effects import EFFECTS
+
+    law = next(effect for effect in EFFECTS.values() if effect.angular)
+    return (law.name,), (law.look_alikes[0],)
 
 
 def settle_demo(machine: str, speed: float, seed: int, page: tuple[int, bool] | None, json: bool) -> int:
@@ -29,7 +36,7 @@ def settle_demo(machine: str, speed: float, seed: int, page: tuple[int, bool] | 
     if page is not None:
         from xy_sysid.cli.demo_page import watch_page
 
-        between = [word for names in SETS for word in ("--between", "+".join(names))]
+        between = [word for names in pulls() for word in ("--between", "+".join(names))]
         more = ("--settle", "x", "--folder", str(folder), *between)
         return watch_page(specs(machine, speed, seed, watched=True), ("x",), speed, *page, more, WORDS)
     return _headless(machine, speed, seed, folder, json)
@@ -70,7 +77,7 @@ def _headless(machine: str, speed: float, seed: int, folder: Path, json: bool) -
     aside.print("starting the nodes: a simulated joint and its excitation, over ROS 2 ...")
     over = threading.Event()
     lines: list[str] = []
-    settler = Settler(Wishes("x", folder / "walk", sets=SETS, alone=True), lambda words: None if json else say(words), over.is_set, lambda: True)
+    settler = Settler(Wishes("x", folder / "walk", sets=pulls(), alone=True), lambda words: None if json else say(words), over.is_set, lambda: True)
     thread = threading.Thread(target=settler.run, name="settle", daemon=True)
     thread.start()
     try:
