@@ -74,7 +74,7 @@ def test_nothing_follows_what_is_settled_or_a_budget_that_is_spent() -> None:
     assert after(decision(two, LOUD), budget, 1, 19.5) == "seconds"
     assert after(decision(two, LOUD), budget, 1, 15.0) == LOUD.lasting(5.0)
     assert after(decision(two, LOUD), budget, 0, 0.0) == LOUD
-    assert after(decision(two, LOUD), budget, 1, 8.0) == LOUD.lasting(12.0)  # the last one takes what is left
+    assert after(decision(two, LOUD), budget, 1, 8.0) == LOUD.lasting(12.0)  # the last experiment uses all remaining seconds
 
 
 def test_the_end_is_told_in_a_sentence() -> None:

@@ -38,7 +38,7 @@ axes:
 
 
 def story(axis: str) -> str:
-    """A story of which the controller reads the model alone."""
+    """A story as JSON; the controller reads only its model."""
     parameters = {name: {"value": value, "unit": "", "ci95": [0.999 * value, 1.001 * value]} for name, value in TRUTH[axis].items()}
     model = {"effects": ["coulomb_friction"], "parameters": parameters, "held_out_error": 3e-4, "noise_floor": 3e-4}
     return json.dumps({"axis": axis, "model": model, "sampling_rate": 2000.0, "units": {"input": "V", "output": "m"}})

@@ -67,7 +67,7 @@ def step(plan: WalkPlan, runs: Sequence[Run], before: WalkStep | None = None, te
     """What all recordings so far say together, and what to measure next. tell: called with the part of a design that is done.
 
     runs: the first recording, and one of each experiment so far; before: the step before the last experiment, None at the first
-    Raises BadInput for recordings that do not suffice for a diagnosis, or of which the last ends outside the travel.
+    Raises BadInput if the recordings do not suffice for a diagnosis, or if the last one ends outside the travel.
     """
     found = diagnose(list(runs), plan.library, tolerance=plan.tolerance)
     ladder = ladder_of(found)

@@ -27,7 +27,7 @@ UNKNOWN = "Give the folder of a walk: xy-sysid demo --settle and the page make t
 
 
 def step_document(step: WalkStep) -> dict[str, Any]:
-    """A step as JSON: what was found, what is left, and what follows."""
+    """A step as JSON: the diagnosis, the remaining sets of effects, and the next experiment."""
     answer = step.answer if step.following is not None else None
     return {
         "diagnosis": step.diagnosis,

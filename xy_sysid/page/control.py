@@ -7,6 +7,7 @@ import time
 from nicegui import run, ui
 
 from xy_sysid.errors import XySysidError
+from xy_sysid.page import will_move
 from xy_sysid.page.buttons import heeded
 from xy_sysid.page.facts import dropped_words, seconds_text
 from xy_sysid.page.fields import on_press, typed
@@ -146,22 +147,8 @@ class Control:
         if held:
             self._ask_override(held)
             return
-        if "ballscrew" in self._session.heard.present:
-            self._go("activate")
-            return
-
-        def sure() -> None:
-            dialog.close()
-            self._go("activate")
-
-        with ui.dialog() as dialog, ui.element("div").classes("card"):
-            ui.html("<h2>The machine will move</h2>", sanitize=False)
-            ui.label("Keep your hand at the emergency stop of the machine. STOP in the bar, or Escape, brings the voltage to zero.")
-            with ui.element("div").classes("buttons"):
-                ui.button("Activate", on_click=sure).props("unelevated no-caps data-act=sure")
-                ui.button("Cancel", on_click=dialog.close).props("flat no-caps")
-        dialog.on("hide", dialog.delete)
-        dialog.open()
+        words = "Keep your hand at the emergency stop of the machine. STOP in the bar, or Escape, brings the voltage to zero."
+        will_move.ask(self._session, words, "Activate", "sure", lambda: self._go("activate"))
 
     def _ask_override(self, held: str) -> None:
         """The excitation is asked twice: when the dialog opens, for the names, and when the user has seen them."""

@@ -7,6 +7,7 @@ from typing import Any
 from nicegui import ui
 
 from xy_sysid.errors import XySysidError
+from xy_sysid.page import will_move
 from xy_sysid.page.buttons import heeded
 from xy_sysid.page.document_words import spaced
 from xy_sysid.page.session import Session
@@ -77,22 +78,8 @@ class SettleCard:
         settling = self._session.settling
         if settling is None or not settling.waits:
             return
-        if "ballscrew" in self._session.heard.present:
-            settling.go()
-            return
-
-        def sure() -> None:
-            dialog.close()
-            settling.go()
-
-        with ui.dialog() as dialog, ui.element("div").classes("card"):
-            ui.html("<h2>The machine will move</h2>", sanitize=False)
-            ui.label("It goes on by itself until nothing is left to settle. Keep your hand at the emergency stop. STOP, or Escape, ends it.")
-            with ui.element("div").classes("buttons"):
-                ui.button("Run it", on_click=sure).props("unelevated no-caps data-act=sure-run")
-                ui.button("Cancel", on_click=dialog.close).props("flat no-caps")
-        dialog.on("hide", dialog.delete)
-        dialog.open()
+        words = "It goes on by itself until nothing is left to settle. Keep your hand at the emergency stop. STOP, or Escape, ends it."
+        will_move.ask(self._session, words, "Run it", "sure-run", settling.go)
 
     def _stop(self) -> None:
         if self._session.settling is not None:

@@ -1,0 +1,34 @@
+"""The question before the machine moves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from nicegui import ui
+
+from xy_sysid.page.session import Session
+
+SIMULATED = "ballscrew"  # node of the simulated machine
+
+
+def ask(session: Session, words: str, button: str, part: str, go: Callable[[], object]) -> None:
+    """Call ``go`` if the user agrees that a real machine moves; a simulated one may go at once.
+
+    words: what to expect; button: label of the button that agrees; part: its data-act
+    """
+    if SIMULATED in session.heard.present:
+        go()
+        return
+
+    def sure() -> None:
+        dialog.close()
+        go()
+
+    with ui.dialog() as dialog, ui.element("div").classes("card"):
+        ui.html("<h2>The machine will move</h2>", sanitize=False)
+        ui.label(words)
+        with ui.element("div").classes("buttons"):
+            ui.button(button, on_click=sure).props(f"unelevated no-caps data-act={part}")
+            ui.button("Cancel", on_click=dialog.close).props("flat no-caps")
+    dialog.on("hide", dialog.delete)
+    dialog.open()
