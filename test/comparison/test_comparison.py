@@ -12,7 +12,7 @@ from xy_sim.effect_text import with_effects
 from xy_sim.machine import Machine
 from xy_sim.parts import PARTS
 from xy_sysid.cli.simulated_recording import simulate
-from xy_sysid.comparison.where_it_fails import Comparison, Unseen, compare, compare_motion
+from xy_sysid.comparison.where_it_fails import Comparison, Unseen, by_chance, compare, compare_motion
 from xy_sysid.errors import BadInput
 from xy_sysid.excitation.lockstep import drive
 from xy_sysid.fitting import Structure, identify
@@ -52,6 +52,15 @@ def test_the_worst_frequency_is_where_the_effect_acts(effect: str, low: float, h
     assert any(place.kind == "frequency" for place in found.places)
     worst = found.frequency[int(np.nanargmax(found.error_over_floor))]
     assert low <= worst <= high
+
+
+def test_what_chance_gives_a_band_of_few_lines_is_exceeded_once_in_a_thousand() -> None:
+    """Drawn: the mean power of 1 to 30 lines of noise."""
+    rng = np.random.default_rng(5)
+    for lines in (1, 2, 5, 30):
+        drawn = rng.standard_normal((200_000, 2 * lines)) ** 2
+        (limit,) = by_chance(np.array([float(lines)]))
+        assert np.mean(np.sqrt(drawn.mean(axis=1)) > limit) == pytest.approx(1e-3, rel=0.3)
 
 
 def test_cogging_repeats_with_its_period() -> None:

@@ -130,7 +130,7 @@ class Tab:
         self.page.on("request", lambda request: self.asked.append(request.url))
         self.page.goto(address)
 
-    def until(self, done: Callable[[], object], seconds: float = 20.0, why: str = "") -> None:
+    def until(self, done: Callable[[], object], seconds: float = 20.0, why: str | Callable[[], str] = "") -> None:
         """Let the browser work until it is done; it may take PATIENCE times the seconds."""
         from playwright.sync_api import Error
 
@@ -144,7 +144,7 @@ class Tab:
 
         end = time.monotonic() + PATIENCE * seconds
         while not seen():
-            assert time.monotonic() < end, f"{why or 'waited in vain'}: {self.headline()!r}, {self.verdict()!r}; messages: {self.notices()}"
+            assert time.monotonic() < end, f"{(why() if callable(why) else why) or 'waited in vain'}: {self.headline()!r}, {self.verdict()!r}; messages: {self.notices()}"
             self.page.wait_for_timeout(50)
 
     def verdict(self) -> str:

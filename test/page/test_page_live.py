@@ -115,6 +115,11 @@ def test_curves_converge_live(scene: Scene) -> None:
     assert "windows heard" in str(tab.page.locator("[data-part=windows]").text_content())
 
 
+def at_noise(worst: str) -> bool:
+    """The tile of the explained model: no place, or one that chance made on a few windows; the rigid model's is above 4."""
+    return worst.startswith("nowhere") or (bool(worst) and float(worst.split()[0]) < 3.0)
+
+
 def test_the_failing_picture_comes_by_itself_and_every_number_follows_the_story(scene: Scene) -> None:
     """Unasked, the rigid model's failure is drawn; Diagnose, Add: headline, picture, ladder and tiles are the explained model's.
 
@@ -134,7 +139,7 @@ def test_the_failing_picture_comes_by_itself_and_every_number_follows_the_story(
     tab.page.get_by_role("button", name="axis y").click()
     tab.until(lambda: "Missing: coulomb friction" in tab.verdict(), 40, "axis y is not shown")
     tab.press_until("named", lambda: tab.headline().startswith("Explained: ") and tab.over_floor() < 2 and len(tab.ladder()) == 2, 60)
-    tab.until(lambda: tab.fact("worst place").startswith("nowhere"), 40, "the tiles are stale")
+    tab.until(lambda: at_noise(tab.fact("worst place")), 40, lambda: f"the tiles are stale: {tab.fact('worst place')}")
     assert tab.ladder()[1] < 1.2 and "at the noise floor" in tab.verdict() and tab.fact("held-out error").startswith("0.3")
     assert tab.page.locator("[aria-label='linear fit, live']:visible").count() == 0
     tab.page.get_by_role("button", name="linear fit").click()

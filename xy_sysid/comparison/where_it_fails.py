@@ -162,7 +162,7 @@ def compare_motion(model: FloatArray, unseen: Unseen) -> Comparison:
     time = unseen.begins + (np.arange(error.shape[0]) + first) / sampling_rate
     total = float(np.sqrt(np.mean(low_error[counts] ** 2)))
     noise = total * allowed / max(whole, 1e-300)  # so that the bins have the ratio of the whole in their mean
-    places = _frequency_places(edges, ratio, end)
+    places = _frequency_places(edges, ratio, end, by_chance(layout.lines * windows.begins.size))
     if abs(offset) > TWICE * allowed:
         text = f"a constant error of {moved(offset, unit)}, {told(abs(offset) / allowed)} times the floor"
         places.append(_place("frequency", (0.0, float(edges[1])), "Hz", abs(offset) / allowed, text))
@@ -220,12 +220,21 @@ def _low_pass(values: FloatArray, end: float, sampling_rate: float) -> FloatArra
     return np.asarray(scipy.signal.oaconvolve(values, taps, mode="same"), dtype=np.float64)
 
 
-def _frequency_places(edges: FloatArray, ratio: FloatArray, end: float) -> list[Place]:
-    """Runs of neighbouring bands that are above twice the floor."""
+def by_chance(averaged: FloatArray) -> FloatArray:
+    """(bands,) error over the floor that noise alone exceeds in one band of a thousand. averaged: (bands,) lines times windows.
+
+    The power of one line of one window is distributed as chi-square with two degrees of freedom.
+    """
+    degrees = 2.0 * np.maximum(averaged, 1.0)
+    return np.asarray(np.sqrt(scipy.special.chdtri(degrees, 1e-3) / degrees))
+
+
+def _frequency_places(edges: FloatArray, ratio: FloatArray, end: float, chance: FloatArray) -> list[Place]:
+    """Runs of neighbouring bands that are above twice the floor, and above what chance gives: few lines and windows scatter widely."""
     places: list[Place] = []
     known = np.flatnonzero(np.isfinite(ratio))
     filled = np.interp(np.arange(ratio.size), known, ratio[known]) if known.size else ratio  # the lowest bands may hold no line
-    bad = (filled > TWICE) & (edges[1:] <= end * 1.05)
+    bad = (filled > np.maximum(TWICE, chance)) & (edges[1:] <= end * 1.05)
     start: int | None = None
     for k, flag in enumerate([*bad.tolist(), False]):
         if flag and start is None:
