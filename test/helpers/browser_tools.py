@@ -144,7 +144,8 @@ class Tab:
 
         end = time.monotonic() + PATIENCE * seconds
         while not seen():
-            assert time.monotonic() < end, f"{(why() if callable(why) else why) or 'waited in vain'}: {self.headline()!r}, {self.verdict()!r}; messages: {self.notices()}"
+            what = why() if callable(why) else why
+            assert time.monotonic() < end, f"{what or 'waited in vain'}: {self.headline()!r}, {self.verdict()!r}; messages: {self.notices()}"
             self.page.wait_for_timeout(50)
 
     def verdict(self) -> str:
