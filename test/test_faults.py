@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -63,6 +64,18 @@ def test_what_an_attack_finds_is_judged_by_how_it_ends(tmp_path: Path) -> None:
         assert not row.holds and "seed 3" in row.bad[0]
     assert not Row("nothing was tried").holds
     assert attacked(Attack("a", lambda count, folder: [Found("full", seconds=0.5)] * count, 9, 2), tmp_path, True).counts == {"full": 2}
+
+
+def test_an_attack_that_breaks_is_a_hole_of_its_own_and_ends_no_campaign(tmp_path: Path) -> None:
+    """What was found before stays, and the row says where it broke."""
+
+    def breaks(count: int, folder: Path) -> Iterator[Found]:
+        yield Found("full")
+        raise OSError("no browser\nanswers")
+
+    row = attacked(Attack("a", breaks, 1, 1), tmp_path, False)
+    assert not row.holds and row.counts == {"full": 1, "traceback": 1}
+    assert row.bad == [f"traceback: the attack itself: OSError: no browser answers (test_faults.py:{breaks.__code__.co_firstlineno + 2})"]
 
 
 def test_a_group_that_was_not_run_keeps_its_table() -> None:

@@ -75,8 +75,13 @@ def attacked(attack: Attack, folder: Path, short: bool) -> Row:
     """Run one attack."""
     row = Row(attack.name, attack.bound)
     folder.mkdir(parents=True, exist_ok=True)
-    for found in attack.run(attack.short if short else attack.tries, folder):
-        row.add(found)
+    try:
+        for found in attack.run(attack.short if short else attack.tries, folder):
+            row.add(found)
+    except Exception as error:  # noqa: BLE001  a hole, or a fault of the attack itself: either ends this row, and no other
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        text = f"{type(error).__name__}: {' '.join(str(error).split())[:200]} ({Path(place.filename).name}:{place.lineno})"
+        row.add(Found("traceback", note=f"the attack itself: {text}"))
     return row
 
 

@@ -166,7 +166,7 @@ def browser() -> Iterator[Any]:
 
 def _tab(made: Any, address: str) -> Any:
     tab = made.new_page()
-    tab.goto(address, wait_until="commit", timeout=60_000)
+    tab.goto(address, wait_until="commit", timeout=1000.0 * DRAWN)
     return tab
 
 
@@ -234,7 +234,7 @@ def lost_socket(count: int, folder: Path) -> Iterator[Found]:
     """The tab's WebSocket is gone, and its STOP button is pressed; a fit runs meanwhile."""
     with scene(folder) as here, browser() as made:
         tab = _tab(made, here.address)
-        tab.wait_for_selector("#stop", timeout=60_000)
+        tab.wait_for_selector("#stop", timeout=1000.0 * DRAWN)
         for number in range(count):
             if number:
                 here.drive()
@@ -247,14 +247,14 @@ def lost_socket(count: int, folder: Path) -> Iterator[Found]:
             good = zero and not here.voltage[-1].values.any()
             yield Found("zero volts" if good else "too late", seconds, note="" if good else f"try {number}: {here.said('excitation')[-300:]}")
             tab.reload()
-            tab.wait_for_selector("#stop", timeout=60_000)
+            tab.wait_for_selector("#stop", timeout=1000.0 * DRAWN)
 
 
 def restarted(count: int, folder: Path) -> Iterator[Found]:
     """kill -9 of the server while it drives, and another on the same port: an open tab is drawn again by itself or by a reload, and STOP works."""
     with scene(folder) as here, browser() as made:
         tab = _tab(made, here.address)
-        tab.wait_for_selector("#stop", timeout=60_000)
+        tab.wait_for_selector("#stop", timeout=1000.0 * DRAWN)
         port = int(here.address.rstrip("/").rpartition(":")[2])
         sent = len(here.voltage)
         here.processes["page"].send_signal(signal.SIGKILL)
@@ -264,7 +264,7 @@ def restarted(count: int, folder: Path) -> Iterator[Found]:
         here.serve(port)
         back = int(here.address.rstrip("/").rpartition(":")[2]) == port
         tab.goto(here.address)
-        tab.wait_for_selector("#stop", timeout=60_000)
+        tab.wait_for_selector("#stop", timeout=1000.0 * DRAWN)
         found = here.stop("after a restart of the server")
         good = goes_on and back and found.outcome == "zero volts"
         yield Found("zero volts" if good else "too late", found.seconds, note="" if good else f"drives on {goes_on}, same port {back}; {found.note}")
@@ -274,7 +274,7 @@ def killed_nodes(count: int, folder: Path) -> Iterator[Found]:
     """kill -9 of the identifier and of the machine while a tab is open: it says who is lost, and STOP works."""
     with scene(folder) as here, browser() as made:
         tab = _tab(made, here.address)
-        tab.wait_for_selector("#stop", timeout=60_000)
+        tab.wait_for_selector("#stop", timeout=1000.0 * DRAWN)
         here.processes["identifier"].send_signal(signal.SIGKILL)
         begun = time.monotonic()
         lost, words = False, ""
