@@ -97,7 +97,7 @@ RECORDINGS = (
 NO_RECORDINGS = ("README.md",)
 COMMANDS = ("columns", "fit", "compare", "diagnose", "refine", "report")
 LITTLE, BRIEF = ("--set", "length=512"), ("--budget", "0.3")
-SHORT = {"fit": LITTLE, "compare": LITTLE, "report": LITTLE, "diagnose": BRIEF, "refine": BRIEF}
+SHORT = {"fit": LITTLE, "compare": LITTLE, "report": (*LITTLE, *BRIEF), "diagnose": BRIEF, "refine": BRIEF}
 
 
 def unnamed(folder: Path = DATA) -> list[str]:

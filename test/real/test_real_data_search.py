@@ -5,13 +5,17 @@ from __future__ import annotations
 import time
 from functools import cache
 
+import numpy as np
 import pytest
 from helpers.real_data import data
 
 from xy_sysid.axis.model import STANDARD
 from xy_sysid.diagnosis.diagnose import Diagnosis, diagnose
+from xy_sysid.greybox.axis_data import prepare
+from xy_sysid.greybox.free_run import fit_base, fit_with, fitted_score
 from xy_sysid.greybox.parameters import Estimate
 from xy_sysid.imports import load
+from xy_sysid.units import Units
 
 
 @cache
@@ -88,3 +92,13 @@ def test_two_like_inertias_on_a_shaft_are_a_compliance_and_no_base() -> None:
         assert "base_resonance" not in item.effects
         assert "A motor encoder cannot distinguish screw_compliance from base_resonance" in item.sentence
         assert item.confidence < 0.96
+
+
+def test_one_more_effect_never_ends_worse_than_the_model_that_it_was_added_to() -> None:
+    """Where friction has no place beside a slow pole, its fit ends with next to none of it, and not somewhere worse."""
+    rate = 1000.0
+    drive, speed = (np.loadtxt(data(f"generator/{name}_cc.csv"), delimiter=",").ravel()[:60_000] for name in ("x", "y"))
+    prepared = prepare(rate, drive, np.cumsum(speed) / rate, units=Units("V", "rad"))
+    base = fit_base(prepared)
+    more = fit_with(prepared, base, ["coulomb_friction"])
+    assert fitted_score(prepared, more) < fitted_score(prepared, base) + 1e-6

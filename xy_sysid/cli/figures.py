@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -27,6 +28,7 @@ def figures(
     out: Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="output folder, created if needed")] = Path("figures"),
     kind: Annotated[list[str] | None, typer.Option("--kind", metavar="KIND", help="svg, pdf or csv (may be repeated; default all three)")] = None,
     effect_file: Own = None,
+    budget: o.Budget = None,
     force: Annotated[bool, typer.Option("--force", help="replace existing pictures of these axes")] = False,
     json: o.Json = False,
 ) -> None:
@@ -34,7 +36,7 @@ def figures(
     from xy_sysid.errors import BadInput
     from xy_sysid.files.effects import library
     from xy_sysid.jit import cores
-    from xy_sysid.report.axis_report import told
+    from xy_sysid.report.axis_report import Wanted, told
     from xy_sysid.report.drawers import Drawers
     from xy_sysid.report.headline import headline
 
@@ -44,7 +46,7 @@ def figures(
             raise BadInput("--kind", repr(one), ", ".join(KINDS), "Choose one of these.")
     if out.exists() and not out.is_dir():
         raise BadInput("--out", str(out), "a folder", "Give another name.")
-    known = library(effect_file or [])
+    wanted = Wanted(library=library(effect_file or []), budget=math.inf if budget is None else budget)
     recording = read(recs, reading, json)
     names = chosen(recording, reading.axes)
     if not force:
@@ -53,7 +55,7 @@ def figures(
     with drawers:
 
         def work(name: str) -> dict[str, Any]:
-            story = dict(told(recording, name, known))
+            story = dict(told(recording, name, wanted))
             drawers.ask(name, story)
             return story
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -29,13 +30,14 @@ def report(
     params: o.Params = None,
     period: o.Period = "auto",
     effect_file: Own = None,
+    budget: o.Budget = None,
     force: o.Force = False,
     json: o.Json = False,
 ) -> None:
     """Everything in one self-contained page: summary, experiment, response, fits, checks, what is missing, the falling error."""
     from xy_sysid.bags.atomic import write_text
     from xy_sysid.files.effects import library
-    from xy_sysid.report.axis_report import STAGES, axis_reports
+    from xy_sysid.report.axis_report import STAGES, Wanted, axis_reports
     from xy_sysid.report.report_page import Recorded, report_page
     from xy_sysid.report.story_words import status
 
@@ -51,7 +53,7 @@ def report(
         def tell(name: str, stage: str) -> None:
             bar.update(tasks[name], description=f"axis {name}: {stage}", completed=STAGES.index(stage))
 
-        made = axis_reports(recording, names, settings, samples, known, tell)
+        made = axis_reports(recording, names, Wanted(settings, samples, known, math.inf if budget is None else budget), tell)
     origin = provenance(named(recs), recording)
     units = recording.units
     title = ", ".join(rec.name for rec in recs)

@@ -122,13 +122,28 @@ def fit_with(
 ) -> GreyboxFit:
     """The model of ``base`` with more effects, all refitted together; starts: their first values, else read from the data.
 
+    A model that ends worse than ``base`` is fitted again from there, with what is new nearly absent.
     brief: on the first stage's data only, and no longer than a first round if that leaves more excess than ``hopeless``
     """
     model = base.model
     for name in names:
         values = (starts or {}).get(name)
         model = _begun(data, base, model, name) if values is None else model.with_effect(name, bounded(model.library[name], values, data.similar))
-    return fit(data, model, brief, hopeless)
+    found = fit(data, model, brief, hopeless)
+    if brief or fitted_score(data, found) <= fitted_score(data, base):
+        return found
+    absent = base.model
+    for name, values in model.effects:
+        if name not in absent:
+            least = absent.library[name].parameters[0].low if absent.library[name].parameters[0].positive else 0.0
+            absent = absent.with_effect(name, bounded(absent.library[name], (least, *values[1:]), data.similar))
+    return min((found, finish(data, absent)), key=lambda one: fitted_score(data, one))
+
+
+def fitted_score(data: AxisData, fitted: GreyboxFit) -> float:
+    """What a fit minimises, of the windows that it was fitted to: nats a line."""
+    power = data.layout.power(data.fitted.spectrum(fitted.error))
+    return Objective.of(data.floor).of_power(np.where(np.isfinite(power), power, np.inf), responder(data.layout, fitted.model)(fitted.model.row))
 
 
 def _begun(data: AxisData, base: GreyboxFit, model: AxisModel, name: str) -> AxisModel:

@@ -7,14 +7,17 @@ the story's models see two thirds that are spread over it.
 from __future__ import annotations
 
 import functools
+import math
+import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from xy_sysid.axis.model import STANDARD, Library
+from xy_sysid.diagnosis.refine import never
 from xy_sysid.errors import BadInput
 from xy_sysid.fitting.of_recording import judged, split
 from xy_sysid.fitting.verdicts import Validation, validate
@@ -55,43 +58,43 @@ class AxisReport:
         return self.study.axis
 
 
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """How a report is made. period: of the input, samples (0: none, None: found); budget: s of processor time for the diagnosis of each axis."""
+
+    settings: IdentifierSettings = field(default_factory=IdentifierSettings)
+    period: int | None = 0
+    library: Library = STANDARD
+    budget: float = math.inf
+
+
 def axis_reports(
-    recording: Recording,
-    axes: Sequence[str],
-    settings: IdentifierSettings,
-    period: int | None = 0,
-    library: Library = STANDARD,
-    tell: Callable[[str, str], None] = lambda axis, stage: None,
+    recording: Recording, axes: Sequence[str], wanted: Wanted, tell: Callable[[str, str], None] = lambda axis, stage: None
 ) -> dict[str, AxisReport]:
     """All that can be said about each of these axes, by name; several at a time, as simulations leave the interpreter to others.
 
     tell: called with an axis and each of STAGES as it begins, from other threads
     """
-    pool = ThreadPoolExecutor(min(len(axes), cores()))
+    several = min(len(axes), cores())
+    each = replace(wanted, budget=several * wanted.budget)  # the clock counts all threads
+    pool = ThreadPoolExecutor(several)
     try:
-        made = pool.map(lambda axis: axis_report(recording, axis, settings, period, library, functools.partial(tell, axis)), axes)
+        made = pool.map(lambda axis: axis_report(recording, axis, each, functools.partial(tell, axis)), axes)
         return dict(zip(axes, made, strict=True))
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
 
 
-def axis_report(
-    recording: Recording,
-    axis: str,
-    settings: IdentifierSettings,
-    period: int | None = 0,
-    library: Library = STANDARD,
-    tell: Tell = lambda stage: None,
-) -> AxisReport:
+def axis_report(recording: Recording, axis: str, wanted: Wanted, tell: Tell = lambda stage: None) -> AxisReport:
     """All that can be said about one axis; what cannot is said in words. tell: called with each of STAGES as it begins."""
     tell(STAGES[0])
-    studied, verdicts = _studied(recording, axis, settings, period)
+    studied, verdicts = _studied(recording, axis, wanted.settings, wanted.period)
     note = ""
     run = recording.run(axis) if len(recording) else None
     if run is not None and len(run) > round(LONGEST * run.sampling_rate):
         note = f"The diagnosis uses the first {LONGEST:g} s of the longest stretch, of {run.seconds:.4g} s."
     try:
-        story = told(recording, axis, library, tell)
+        story = told(recording, axis, wanted, tell)
     except BadInput as problem:
         return AxisReport(study=studied, verdicts=verdicts, story=None, speed=float("nan"), problem=str(problem), note=note)
     return AxisReport(studied, verdicts, story, _speed(recording, axis), note=note)
@@ -114,14 +117,15 @@ def _studied(recording: Recording, axis: str, settings: IdentifierSettings, peri
         return AxisStudy(axis=axis, excitation=drive, motion=moved, estimate=None, fits={}, pair=None, change=None, problem=problem), None
 
 
-def told(recording: Recording, axis: str, library: Library = STANDARD, tell: Tell = lambda stage: None) -> Mapping[str, Any]:
+def told(recording: Recording, axis: str, wanted: Wanted, tell: Tell = lambda stage: None) -> Mapping[str, Any]:
     """The document of the whole story of an axis, of at most LONGEST. Raises BadInput for samples that cannot be judged."""
+    library = wanted.library
     run = recording.run(axis).until(LONGEST)
     tell(STAGES[1])
     story = begin(run, library)
     if story.steps:
         tell(STAGES[2])
-        story = diagnosed(story, run, library)
+        story = diagnosed(story, run, library, never if wanted.budget == math.inf else time.process_time, wanted.budget)
         tell(STAGES[3])
         story = auto(story, run, library)
     return document(story)

@@ -6,6 +6,7 @@ another process, and written as a document (``document``).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -90,9 +91,9 @@ def begin(run: Run, library: Library = STANDARD, tolerance: float = EPSILON) -> 
     return replace(empty, measured=shown, steps=(StoryStep(rung(base), pictures(data, base, shown)),))
 
 
-def diagnosed(story: Story, run: Run, library: Library = STANDARD, clock: Callable[[], float] = never) -> Story:
-    """With the answer to: which effect is missing in the rigid base? The model stays what it is."""
-    return replace(story, diagnosis=findings(diagnose(run, library, clock=clock, tolerance=story.tolerance), library), note="")
+def diagnosed(story: Story, run: Run, library: Library = STANDARD, clock: Callable[[], float] = never, budget: float = math.inf) -> Story:
+    """With the answer to: which effect is missing in the rigid base? The model stays what it is. budget, clock: see ``diagnosis.of_run``."""
+    return replace(story, diagnosis=findings(diagnose(run, library, budget, clock, tolerance=story.tolerance), library), note="")
 
 
 def added(story: Story, run: Run, name: str, library: Library = STANDARD) -> Story:
