@@ -90,9 +90,9 @@ RECORDINGS = (
     Shared("ur10e/ur-20_01_22-joint_6.csv", mapped("time=1,input=19,output=7", "--unit", "input=A", "--unit", "output=rad"), part=("--span", "0:12")),
     Shared("vendor_exports/ctrlx_step.trace.csv"),
     Shared("vendor_exports/dspace_bldc.mat", mapped("input=Switch2,output=Sum3", "--unit", "output=rpm")),
-    Shared("vendor_exports/mitsubishi_mr.csv", mapped("time=ms,input=Torque,output=Servo motor speed", "--unit", "time=ms", "--unit", "output=rpm")),
-    Shared("vendor_exports/tc3_decimalcomma.csv"),
-    Shared("vendor_exports/tc3_default.csv"),
+    Shared("vendor_exports/mitsubishi_mr.csv"),
+    Shared("vendor_exports/tc3_decimalcomma.csv", mapped("input=var_INT8,output=func_OS")),
+    Shared("vendor_exports/tc3_default.csv", mapped("input=var_INT8,output=func_OS")),
 )
 NO_RECORDINGS = ("README.md",)
 COMMANDS = ("columns", "fit", "compare", "diagnose", "refine", "report")
