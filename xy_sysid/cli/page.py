@@ -41,7 +41,7 @@ def page(
     settle: Annotated[str, typer.Option(hidden=True, help="axis that is settled without being told, for the demo")] = "",
     json: o.Json = False,
 ) -> None:
-    """See measurement and model in a browser, where they part and what is missing; add it and watch the error fall. Ctrl-C ends it."""
+    """Show measurement and model in a browser, where they differ, and the missing effect; add it there and see the error fall. Ctrl-C ends it."""
     import re
 
     from xy_sysid.cli.output import aside, emit, people
