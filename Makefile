@@ -41,9 +41,10 @@ test: $(INSTALLED) ## style, types and every test
 	@$(MAKE) --no-print-directory -j 2 lint types laws
 	@$(MAKE) --no-print-directory unit
 
-lint: $(INSTALLED) ## style
+lint: $(INSTALLED) ## style of the code, and of the prose in README and docs
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .
+	@$(BIN)/proselint check --config proselint.json *.md config/*.md docs/*.md
 
 types: $(INSTALLED) ## types
 	@$(BIN)/mypy

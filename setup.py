@@ -69,6 +69,7 @@ setup(
             "pytest-xdist",
             "hypothesis",
             "ruff",
+            "proselint",
             "mypy",
             "scipy-stubs",
             "types-PyYAML",

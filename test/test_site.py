@@ -9,16 +9,19 @@ import sys
 from pathlib import Path
 
 import pytest
+from helpers.browser_tools import browser, needs_browser
 
 ROOT = Path(__file__).parents[1]
 
 
-def test_the_site_builds_without_a_warning_and_shows_the_docstrings(tmp_path: Path) -> None:
-    """make docs: strict, so that a dead link is an error; examples in full; the reference has meaning, not only names."""
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """make docs: strict, so that a dead link is an error."""
+    made = tmp_path_factory.mktemp("docs") / "site"
     pytest.importorskip("material", reason="pip install '.[docs]'")
     pytest.importorskip("mkdocstrings")
     done = subprocess.run(
-        [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(tmp_path / "site")],
+        [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(made)],
         cwd=ROOT,
         env={**os.environ, "NO_MKDOCS_2_WARNING": "1"},
         capture_output=True,
@@ -26,9 +29,28 @@ def test_the_site_builds_without_a_warning_and_shows_the_docstrings(tmp_path: Pa
         check=False,
     )
     assert done.returncode == 0, done.stdout + done.stderr
-    site = tmp_path / "site"
+    return made
+
+
+def test_the_site_shows_the_examples_and_the_docstrings(site: Path) -> None:
+    """Examples in full; the reference has meaning, not only names."""
     assert "Four commands" in (site / "index.html").read_text(encoding="utf-8")
     gallery = re.sub(r"<[^>]+>", "", (site / "gallery.html").read_text(encoding="utf-8"))
     assert "xy.simulate(60, hidden=12)" in gallery
     reference = (site / "api.html").read_text(encoding="utf-8")
     assert "H1 with coherence and sigma of every line" in reference and "Biometrika" in reference
+
+
+@needs_browser
+def test_the_site_is_searched_from_a_folder_without_a_network(site: Path) -> None:
+    """Opened as a file: the search box answers, the picture of the packages is there, and no other host is asked."""
+    asked: list[str] = []
+    with browser() as chromium:
+        page = chromium.new_page()
+        page.on("request", lambda request: asked.append(request.url))
+        page.goto((site / "architecture.html").as_uri())
+        assert page.evaluate("[...document.images].every(image => image.naturalWidth > 0)") and page.locator("img[src$='packages.svg']").count() == 1
+        page.locator("input.md-search__input").click()
+        page.keyboard.type("coherence")
+        page.locator(".md-search-result__item").first.wait_for(timeout=60_000)
+    assert asked and all(url.startswith(("file:", "data:", "blob:")) for url in asked), asked

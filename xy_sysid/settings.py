@@ -99,7 +99,7 @@ class ExcitationSettings(Settings):
     controller_joints: Names = knob([""], "with commands: all joints of the controller, in its order; empty is those of the axes")
     joint_topic: str = knob("joint_states", "with commands: topic of the joint states; that of ros2_control is /joint_states")
     joints: Names = knob([""], 'with commands: the joint of an axis, as "x=shoulder_pan_joint"; an axis without one is the name of its joint')
-    renamed: bool = knob(False, "with blocks: whoever hears them under another name than voltage expects blocks, and no commands")
+    renamed: bool = knob(False, "the topic voltage is renamed: its receiver expects blocks, not commands")
     axes: dict[str, AxisExcitation] = Field(
         default_factory=lambda: {"x": AxisExcitation(seed=1), "y": AxisExcitation(seed=2)}, description="one group per axis"
     )

@@ -1,7 +1,7 @@
-"""The picture of the packages in docs/architecture.md, made from what the files import.
+"""The picture of the packages, docs/pictures/packages.svg, made from what the files import.
 
 python -m campaigns.documents.architecture           # the picture
-python -m campaigns.documents.architecture --write   # put it into the page
+python -m campaigns.documents.architecture --write   # write it into its file
 """
 
 from __future__ import annotations
@@ -12,9 +12,10 @@ from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 
+from campaigns.documents.layers import svg
 from xy_sysid.errors import BadInput
 
-BEGIN, END = "<!-- the picture: python -m campaigns.documents.architecture --write -->", "<!-- the end of the picture -->"
+PICTURE = "docs/pictures/packages.svg"
 COMMON = ("errors", "settings", "units", "jit", "tables")  # what everybody imports, so that it tells nothing
 FLOORS = {
     "what arrives": ("samples", "excitation"),
@@ -63,31 +64,20 @@ def reduced(edges: Mapping[tuple[str, str], int]) -> list[tuple[str, str]]:
 
 
 def picture(package: Path) -> str:
-    """A Mermaid flow chart: an arrow goes from what is imported to what imports it, so that it follows the data."""
+    """An SVG: an arrow goes from what is imported to what imports it, so that it follows the data."""
     edges = imports(package)
     known = [name for names in FLOORS.values() for name in names]
     there = sorted(path.parent.name for path in package.glob("*/__init__.py"))
     if sorted(known) != there:
         odd = sorted(set(known) ^ set(there))
         raise BadInput("packages", ", ".join(odd), "those of FLOORS", "Say in campaigns/documents/architecture.py on which floor they are.")
-    lines = ["flowchart TB"]
-    for number, (floor, names) in enumerate(FLOORS.items()):
-        lines += [f'  subgraph floor{number}["{floor}"]', "    direction LR", *(f"    {name}" for name in names), "  end"]
-    lines += [f"  {start} --> {end}" for start, end in reduced(edges)]
-    return "\n".join(["```mermaid", *lines, "```"])
-
-
-def placed(page: str, drawn: str) -> str:
-    """The page with the picture in its place."""
-    before, rest = page.split(BEGIN)
-    return f"{before}{BEGIN}\n\n{drawn}\n\n{END}{rest.split(END)[1]}"
+    return svg(FLOORS, reduced(edges), "Packages of xy_sysid: an arrow leads from what is imported to what imports it")
 
 
 if __name__ == "__main__":
     root = Path(__file__).parents[2]
     made = picture(root / "xy_sysid")
     if "--write" in sys.argv[1:]:
-        target = root / "docs" / "architecture.md"
-        target.write_text(placed(target.read_text(encoding="utf-8"), made), encoding="utf-8")
+        (root / PICTURE).write_text(made, encoding="utf-8")
     else:
-        sys.stdout.write(made + "\n")
+        sys.stdout.write(made)

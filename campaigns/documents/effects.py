@@ -50,7 +50,7 @@ def _section(e: Effect) -> str:
 - Valid for: {e.validity}{"; acts on the table: across a gap the motor does not feel it" if e.on_table else ""}
 - Shows as: {e.shows}
 - Taken for: {", ".join(e.look_alikes)}
-- Told apart by: {e.experiment}
+- Distinguished by: {e.experiment}
 - Source: {e.source}
 """
 

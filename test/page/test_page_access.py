@@ -62,10 +62,11 @@ def test_only_loopback_goes_without_a_token(host: str, here: bool) -> None:
 
 
 def test_a_token_in_the_address_becomes_a_cookie_and_leaves_the_address() -> None:
-    """Right token: a cookie, and on to the plain address. Wrong or none: 401 in words."""
+    """Right token: a cookie, and on to the address without it. Wrong or none: 401 in words."""
     access = Access("secret", ())
     entered = judge(access, {"host": "machine:8080"}, "token=secret&x=1")
-    assert (entered.status, entered.cookie, entered.to) == (303, "secret", "/")
+    assert (entered.status, entered.cookie, entered.to) == (303, "secret", "/?x=1")
+    assert judge(access, {"host": "machine:8080"}, "token=secret").to == "/"
     assert judge(access, {"host": "machine:8080", "cookie": f"a=b; {COOKIE}=secret"}, "").status == 200
     for headers, query in (({}, ""), ({}, "token=secre"), ({"cookie": f"{COOKIE}=secre"}, ""), ({"cookie": "\x00=;;"}, ""), ({}, "token=")):
         answer = judge(access, {"host": "machine:8080", **headers}, query)

@@ -231,6 +231,34 @@ def test_recordings_stand_side_by_side_and_a_lost_one_says_so(usual: Tab, server
     one.until(lambda: one.page.locator(".panel").count() == 1)
 
 
+def test_a_link_opens_the_same_view_and_a_reload_keeps_it(usual: Tab, tab: Callable[..., Tab], server: Server) -> None:
+    """Recording, axis, model, picture, theme and added effects stand in the address; a recording that is not there is said."""
+    one = ready(usual)
+    wanted = "rec=dry.npz&axis=y&model=rigid&pictures=residual_position&effects=y:coulomb_friction&rec=plain.npz&theme=dark"
+    link = f"{server.address}?{wanted}&rec=nowhere.npz"
+    other = tab(address=link)
+    other.until(lambda: "recording is 'nowhere.npz'" in other.notices(), 20)
+    second = other.page.locator(".panel").nth(1)
+    other.until(lambda: other.page.locator(".panel").count() == 2 and "8 s at 2000 Hz" in str(second.text_content()), 30)
+    first = other.page.locator(".panel").first
+
+    def shown() -> bool:
+        pressed = " ".join(first.locator("button[aria-pressed=true]").all_text_contents())
+        return len(other.ladder()) == 2 and "axis y" in pressed and "rigid, with delay" in pressed
+
+    other.until(shown, 60, "the effect of the link was not added, or axis or model are not those of the link")
+    assert first.locator(".js-plotly-plot[aria-label*=', residual position, axis y']").is_visible()
+    assert other.page.url == f"{server.address}?{wanted}"
+    other.page.reload()
+    other.until(shown, 30, "another view after a reload")
+    assert other.page.url == f"{server.address}?{wanted}" and other.page.evaluate("document.body.classList.contains('body--dark')")
+    other.page.get_by_role("button", name="close recording").nth(1).click()
+    one.until(lambda: "plain.npz" not in one.page.url and "effects=y:coulomb_friction" in one.page.url, 10, "the other tab keeps an old address")
+    first.locator("[data-act=reset]").click()
+    other.until(lambda: "effects" not in other.page.url, 30, "an effect that was taken out is still in the address")
+    assert other.errors == []
+
+
 def test_columns_without_names_that_tell_are_chosen_by_clicks_and_two_recordings_stand_in_one_picture(usual: Tab) -> None:
     """A table with columns A, B, C, in mm: listed with its numbers, opened as chosen; then both recordings in one picture."""
     one = ready(usual)

@@ -311,7 +311,7 @@ class _Decoder:
         for name, count in self.unreadable.items():
             self.bag.notes.append(f"{count} messages on {name} are left out: {self.example[name]}")
         for name, words in self.repeated.items():
-            self.bag.notes.append(f"{name} has {', '.join(words)} twice; nobody knows which is meant, and they are left out")
+            self.bag.notes.append(f"{name} has {', '.join(words)} twice, so it is not clear which is meant; they are left out")
         if self.from_log:
             self.bag.notes.append("the stamps of the joint states are zero; the time of recording is used")
         if self.live and self.source.output == "velocity":

@@ -20,7 +20,7 @@ def columns(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="a recording, a table or a rosbag2 (docs/files.md lists the formats)")],
     json: o.Json = False,
 ) -> None:
-    """What is in a file: its columns, arrays or topics, what each is taken for, and how to say it otherwise."""
+    """List the columns, arrays or topics of a file, how xy-sysid would use each, and the options that change it."""
     from xy_sysid.errors import BadRecording
     from xy_sysid.imports.listing import listing
 

@@ -41,7 +41,7 @@ def compare(
     effect_file: Own = None,
     json: o.Json = False,
 ) -> None:
-    """Where a model fails on data it has not seen: by frequency, speed, direction, position, amplitude and time; or which of two is better."""
+    """Show where a model fails on new data: by frequency, speed, direction, position, amplitude and time. Or show which of two models is better."""
     from xy_sysid.comparison.of_run import better, distorted, frequency_sentence, judge
     from xy_sysid.errors import BadInput
     from xy_sysid.files.effects import library

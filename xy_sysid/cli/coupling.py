@@ -14,7 +14,7 @@ from xy_sysid.cli.reading import read, reads
 if TYPE_CHECKING:
     from xy_sysid.imports.reading import Reading
 
-Combine = Annotated[str, typer.Option(help="of machines whose two drives move both axes: corexy (two motors), gantry (two sides)")]
+Combine = Annotated[str, typer.Option(help="for machines on which both drives move both axes: corexy (two motors) or gantry (two sides)")]
 
 
 @reads

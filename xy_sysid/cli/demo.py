@@ -26,11 +26,15 @@ def demo(
     page: Annotated[bool | None, typer.Option("--page/--no-page", help="open the page in a browser; default in a terminal")] = None,
     port: Annotated[int, typer.Option(help="port of the page, or the next free one; 0: any", min=0, max=65535)] = 8080,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="open a browser if there is a display")] = True,
-    settle: Annotated[bool, typer.Option("--settle", help="an ambiguous machine: experiments are designed and run until it is settled")] = False,
-    use: Annotated[bool, typer.Option("--use", help="then use the models: watch the tracking error of a path fall on the simulated table")] = False,
+    settle: Annotated[
+        bool, typer.Option("--settle", help="a machine with an ambiguous effect: design and run experiments until the effect is known")
+    ] = False,
+    use: Annotated[
+        bool, typer.Option("--use", help="afterwards use the models: follow a path on the simulated table and compare the tracking errors")
+    ] = False,
     json: o.Json = False,
 ) -> None:
-    """Watch two axes being identified live: all nodes run on this machine, and nothing else is needed."""
+    """Watch the live identification of two simulated axes. All nodes run on this machine."""
     from xy_sim.machine import Machine
     from xy_sysid.cli.demo_page import watch_page, wished
     from xy_sysid.cli.output import aside, emit, people

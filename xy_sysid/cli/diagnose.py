@@ -35,7 +35,7 @@ def diagnose(
     budget: o.Budget = None,
     json: o.Json = False,
 ) -> None:
-    """Name the physical effect that the rigid model of each axis misses, with evidence, or say that none is known."""
+    """Name the physical effect that the rigid model of each axis misses, with evidence, or report that no known effect explains the error."""
     from xy_sysid.axis.mechanics import drive_from
     from xy_sysid.diagnosis.findings import answer, findings
     from xy_sysid.diagnosis.of_run import diagnose as logic

@@ -19,7 +19,7 @@ def effects(
     effect_file: Annotated[list[Path] | None, typer.Option("--effect-file", metavar="FILE", help="a Python file with an effect of your own")] = None,
     json: o.Json = False,
 ) -> None:
-    """List the physical effects: law, parameters, how each shows itself, look-alikes and source."""
+    """List the physical effects: law, parameters, signs in the data, look-alikes and source."""
     from xy_sysid.files.effects import library
 
     known = library(effect_file or [])
@@ -57,7 +57,7 @@ def _show(effect: Effect) -> None:
     rows = [(item.name, item.unit or "1", item.bounds, f"{item.typical:g}", item.meaning) for item in effect.parameters]
     table("parameters", ("name", "unit", "allowed", "usual", "meaning"), rows)
     told = {"valid for": effect.validity, "shows as": effect.shows, "taken for": ", ".join(effect.look_alikes)}
-    told |= {"told apart by": effect.experiment, "source": effect.source}
+    told |= {"distinguished by": effect.experiment, "source": effect.source}
     say()
     for label, text in told.items():
         say(f"{label}: {text}")

@@ -32,7 +32,7 @@ def figures(
     force: Annotated[bool, typer.Option("--force", help="replace existing pictures of these axes")] = False,
     json: o.Json = False,
 ) -> None:
-    """Write every picture of the story of each axis, from where the rigid model fails to the falling error, as SVG, PDF and CSV."""
+    """Write all pictures of each axis as SVG, PDF and CSV, from the errors of the rigid model to the falling error."""
     from xy_sysid.errors import BadInput
     from xy_sysid.files.effects import library
     from xy_sysid.jit import cores

@@ -21,7 +21,9 @@ if TYPE_CHECKING:
 Follow = Annotated[
     list[str] | None,
     typer.Option(
-        "--follow", metavar="EFFECT", help="estimate this effect in every recording, named or not, so that a trend can compare (may be repeated)"
+        "--follow",
+        metavar="EFFECT",
+        help="estimate this effect in every recording, also where it is not found, so that its trend is complete (may be repeated)",
     ),
 ]
 EVERY = 30.0  # s between two lines where no terminal shows a bar
@@ -34,13 +36,13 @@ def fleet(
         list[Path] | None, typer.Argument(metavar="PATH", help="recordings, folders with recordings, or patterns in quotes, as 'data/*/2026*.csv'")
     ] = None,
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", metavar="TABLE", help="folder of Parquet files; what it has already is not done again")
+        Path | None, typer.Option("--out", "-o", metavar="TABLE", help="folder of Parquet files; recordings that it has already are skipped")
     ] = None,
     one: Annotated[
-        Path | None, typer.Option("--one", metavar="FILE", help="only this recording, in this process; -o names a Parquet file then")
+        Path | None, typer.Option("--one", metavar="FILE", help="analyse only this recording, in this process; -o then names a Parquet file")
     ] = None,
     pattern: Annotated[
-        str, typer.Option(metavar="PATTERN", help="of the end of a path: {machine}, {axis}, {date} and *, as '{machine}/{date}*.csv'")
+        str, typer.Option(metavar="PATTERN", help="how paths end: {machine}, {axis}, {date} and *, for example '{machine}/{date}*.csv'")
     ] = "",
     names: Annotated[
         Path | None, typer.Option(metavar="FILE", help="YAML with pattern, follow, and the names of single recordings (docs/fleet.md)")

@@ -13,8 +13,12 @@ if TYPE_CHECKING:
     from xy_sysid.axis.mechanics import Figure, Mechanical, Transmission
     from xy_sysid.units import Units
 
-Kt = Annotated[float | None, typer.Option("--kt", metavar="NM_PER_A", help="torque constant of the motor, N m/A: inertia and friction in SI, too")]
-Gear = Annotated[str, typer.Option("--gear", metavar="RATIO", help="turns of the motor for one of the joint (50), or the way of one turn (5mm)")]
+Kt = Annotated[
+    float | None, typer.Option("--kt", metavar="NM_PER_A", help="torque constant of the motor, N m/A; adds inertia and friction in SI units")
+]
+Gear = Annotated[
+    str, typer.Option("--gear", metavar="RATIO", help="gear ratio: turns of the motor for one turn of the joint (50), or travel of one turn (5mm)")
+]
 
 
 def mechanics_table(figures: Iterable[Figure], units: Units, drive: Transmission) -> None:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 NOTHING = "nothing"  # is known
 Between = Annotated[
     list[str] | None,
-    typer.Option("--between", metavar="EFFECTS", help="a set of effects, as a+b, or rigid; give it for each set that is to be distinguished"),
+    typer.Option("--between", metavar="EFFECTS", help="a set of effects to compare, for example a+b, or rigid; repeat it for each set"),
 ]
 
 
@@ -38,17 +38,19 @@ def next_(
         list[Path] | None, typer.Argument(metavar="[REC]", help="recordings of one machine, as of diagnose; none with --for nothing")
     ] = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", metavar="FILE", help="write the experiment for the excitation node")] = None,
-    replay: Annotated[Path | None, typer.Option("--replay", metavar="FOLDER", help="decide every step of a walk again from its bags")] = None,
+    replay: Annotated[Path | None, typer.Option("--replay", metavar="FOLDER", help="repeat the decisions of a folder settle_* from its bags")] = None,
     between: Between = None,
     precision: Annotated[
         str | None,
         typer.Option(
             "--for",
             metavar="PARAMETER",
-            help="make this parameter precise (gain, pole, effect.parameter), or nothing: a first experiment for an unknown axis",
+            help="measure this parameter precisely (gain, pole, effect.parameter), or nothing: design the first experiment for an unknown axis",
         ),
     ] = None,
-    to: Annotated[float, typer.Option("--to", metavar="PART", help="with --for: half of the 95 % interval, as a part of the value", min=1e-6)] = 0.02,
+    to: Annotated[
+        float, typer.Option("--to", metavar="PART", help="with --for: wanted half width of the 95 % interval, relative to the value", min=1e-6)
+    ] = 0.02,
     run_file: Annotated[
         Path | None,
         typer.Option("--params", metavar="FILE", help="ROS parameter file or run file; limit and travel of the excitation are the limits"),
@@ -60,7 +62,7 @@ def next_(
     speed: Annotated[float | None, typer.Option(help="largest speed, mm/s (rad/s)")] = None,
     acceleration: Annotated[float | None, typer.Option(help="largest acceleration, m/s^2 (rad/s^2)")] = None,
     rms: Annotated[
-        float | None, typer.Option(help="largest rms of the voltage, V (input in its own unit), which the drive's current allows for long")
+        float | None, typer.Option(help="largest rms of the voltage, V (input in its own unit), that the drive can give continuously")
     ] = None,
     seconds: Annotated[float, typer.Option(help="seconds of motion at most", min=2.0, max=3600.0)] = 60.0,
     effect_file: Own = None,
@@ -68,7 +70,7 @@ def next_(
     force: o.Force = False,
     json: o.Json = False,
 ) -> None:
-    """Design the experiment that settles what the recordings leave open, within the machine's limits."""
+    """Design the next experiment within the limits of the machine: it distinguishes the effects that the recordings do not."""
     from xy_sysid.diagnosis.of_run import diagnose
     from xy_sysid.experiment_design.of_run import next_experiment, sharpen
     from xy_sysid.experiment_design.rivals import check

@@ -178,6 +178,6 @@ Budget = Annotated[
         "--budget",
         metavar="S",
         min=0.1,
-        help="seconds of processor time for each axis, after which the best result so far is given; without it a fixed amount of work",
+        help="limit of processor time for each axis, s; the search then gives its best result so far. Default: a fixed amount of work",
     ),
 ]

@@ -41,7 +41,7 @@ def page(
     settle: Annotated[str, typer.Option(hidden=True, help="axis that is settled without being told, for the demo")] = "",
     json: o.Json = False,
 ) -> None:
-    """See measurement and model in a browser, where they part and what is missing; add it and watch the error fall. Ctrl-C ends it."""
+    """Show measurement and model in a browser, where they differ, and the missing effect; add it there and see the error fall. Ctrl-C ends it."""
     import re
 
     from xy_sysid.cli.output import aside, emit, people
@@ -92,16 +92,12 @@ def page(
 def reading(topics: list[str] | None, effort: bool, effect_files: list[Path] | None, tables: Mapping[str, list[str]] | None = None) -> Reading:
     """How recordings are read, for the page and for the reports that it makes; tables: options of tables as they were given. Raises BadInput."""
     from xy_sysid.files.effects import library
-    from xy_sysid.imports.reading import numbers, pairs
     from xy_sysid.page.orders import Reading
+    from xy_sysid.page.orders import tables as table_arguments
 
     library(effect_files or [])  # whatever is wrong with them is said here
     given = {option: texts for option, texts in (tables or {}).items() if texts}
-    load: dict[str, Any] = {**o.topics_from(topics), **({"effort_as_voltage": True} if effort else {})}
-    for option, name in (("--map", "columns"), ("--unit", "units")):
-        load |= {name: pairs(given[option], option)} if option in given else {}
-    load |= {"scales": numbers(given["--scale"], "--scale")} if "--scale" in given else {}
-    load |= {"rate": float(given["--rate"][0])} if "--rate" in given else {}
+    load: dict[str, Any] = {**o.topics_from(topics), **({"effort_as_voltage": True} if effort else {}), **table_arguments(given)}
     words = [word for topic in topics or [] for word in ("--topic", topic)] + ["--effort"] * effort
     words += [word for option, texts in given.items() for text in texts for word in (option, text)]
     words += [word for file in effect_files or [] for word in ("--effect-file", str(file))]

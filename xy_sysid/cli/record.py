@@ -20,7 +20,7 @@ def record(
     namespace: Annotated[str, typer.Option(help="ROS namespace")] = "/xy",
     json: o.Json = False,
 ) -> None:
-    """Record the topics of the contract to a rosbag2; Ctrl-C ends it and the bag is whole."""
+    """Record the topics of xy_sysid (docs/topics.md) to a rosbag2. Ctrl-C ends the recording and completes the bag."""
     from xy_sysid.cli.output import emit, people
     from xy_sysid.errors import BadInput, MissingExtra
 

@@ -32,13 +32,11 @@ def refine(
     auto: Annotated[bool, typer.Option("--auto", help="add effects until the noise floor is reached or no effect helps")] = False,
     effect_file: Own = None,
     tolerance: Annotated[
-        float, typer.Option(help="part of the signal that counts as noise; real machines need 0.01 or more", min=1e-6, max=0.5)
+        float, typer.Option(help="part of the signal that is treated as noise; real machines need 0.01 or more", min=1e-6, max=0.5)
     ] = 1e-3,
     simulate_alone: Annotated[
         bool,
-        typer.Option(
-            "--open-loop", help="fit the named effects again to the position of the whole record, for the best simulation from the input alone"
-        ),
+        typer.Option("--open-loop", help="also fit the effects to the position of the whole record; best for a simulation from the input alone"),
     ] = False,
     model: Annotated[Path | None, typer.Option("--model", metavar="FILE", help="write the model with its physical parameters as YAML")] = None,
     mat: Annotated[Path | None, typer.Option("--mat", metavar="FILE", help="write the linear part and all parameters for MATLAB")] = None,
@@ -48,7 +46,7 @@ def refine(
     budget: o.Budget = None,
     json: o.Json = False,
 ) -> None:
-    """Add physical effects to the rigid model, refit everything together, and print the ladder of falling errors."""
+    """Add physical effects to the rigid model, fit all parameters again after each, and print the falling error."""
     from xy_sysid.axis.mechanics import drive_from
     from xy_sysid.diagnosis.of_run import refined
     from xy_sysid.diagnosis.refine import Effort

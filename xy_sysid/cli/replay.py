@@ -31,12 +31,12 @@ def replay(
     joint: o.Joints = None,
     effort_lag: o.EffortLag = 0,
     velocity: o.Velocity = False,
-    diagnose: Annotated[bool, typer.Option("--diagnose", help="then diagnose and add missing effects, as the node diagnoser does")] = False,
+    diagnose: Annotated[bool, typer.Option("--diagnose", help="afterwards diagnose and add missing effects, like the node diagnoser")] = False,
     effect_file: Own = None,
-    out: Annotated[Path | None, typer.Option("--out", metavar="BAG", help="write the messages that the node would have published")] = None,
+    out: Annotated[Path | None, typer.Option("--out", metavar="BAG", help="write a bag with the messages that the node would have published")] = None,
     json: o.Json = False,
 ) -> None:
-    """Replay a bag through the identifier: the same numbers, bit for bit, as the live node."""
+    """Replay a bag through the identifier. The results are those of the live node, bit for bit."""
     import itertools
     from contextlib import ExitStack
 

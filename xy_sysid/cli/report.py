@@ -34,7 +34,7 @@ def report(
     force: o.Force = False,
     json: o.Json = False,
 ) -> None:
-    """Everything in one self-contained page: summary, experiment, response, fits, checks, what is missing, the falling error."""
+    """Write one self-contained page: summary, experiment, response, fits, checks, missing effects and the falling error."""
     from xy_sysid.bags.atomic import write_text
     from xy_sysid.files.effects import library
     from xy_sysid.report.axis_report import STAGES, Wanted, axis_reports

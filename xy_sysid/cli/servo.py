@@ -15,7 +15,9 @@ if TYPE_CHECKING:
 
 Inertia = Annotated[
     float | None,
-    typer.Option("--inertia", metavar="KG_M2", min=1e-12, help="of the joint with its load: parameters in SI, as MuJoCo names them"),
+    typer.Option(
+        "--inertia", metavar="KG_M2", min=1e-12, help="inertia of the joint with its load; adds parameters in SI units with the names of MuJoCo"
+    ),
 ]
 
 

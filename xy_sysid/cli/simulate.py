@@ -21,11 +21,11 @@ def simulate(
         typer.Option("--effect", metavar="NAME[=SIZE]", help="add an effect, [axis:]name[=size][,parameter=value] (may be repeated)"),
     ] = None,
     hidden: Annotated[
-        int | None, typer.Option(metavar="SEED", help="draw hidden effects and their sizes from this seed", min=0, max=2**31 - 1)
+        int | None, typer.Option(metavar="SEED", help="add hidden effects; this seed determines which, and their sizes", min=0, max=2**31 - 1)
     ] = None,
     duration: Annotated[float, typer.Option(help="seconds of data", min=0.01, max=1e6)] = 60.0,
     clean: Annotated[bool, typer.Option("--clean", help="without encoder noise and quantization")] = False,
-    seed: Annotated[int, typer.Option(help="seed of encoder noise; the seeds of the excitation are added to it", min=0, max=2**31 - 100)] = 0,
+    seed: Annotated[int, typer.Option(help="seed of encoder noise and excitation", min=0, max=2**31 - 100)] = 0,
     excite: Annotated[
         list[str] | None, typer.Option("--excite", "-e", metavar="NAME=VALUE", help="excitation setting for every axis, for example kind=multisine")
     ] = None,

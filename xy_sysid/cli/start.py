@@ -11,10 +11,10 @@ from xy_sysid.cli import options as o
 
 def run(
     params: Annotated[str, typer.Option("--params", metavar="FILE", help="run file: a path, or a name in config/")] = "demo.yaml",
-    first: Annotated[bool, typer.Option("--first", help="first motion of an unknown machine, in small steps that are checked one by one")] = False,
+    first: Annotated[bool, typer.Option("--first", help="first motion of an unknown machine: small steps, each of them checked")] = False,
     json: o.Json = False,
 ) -> None:
-    """Start the nodes that the file names, as processes, and watch them until Ctrl-C."""
+    """Start the nodes of a run file as processes and monitor them until Ctrl-C."""
     from xy_sysid.cli.output import aside, emit
     from xy_sysid.processes import starter
 

@@ -34,7 +34,7 @@ def study(
     force: o.Force = False,
     json: o.Json = False,
 ) -> None:
-    """The paper's study (figures 2-7, tables 1-2) of any recording, as one HTML page that opens offline."""
+    """Repeat the study of the paper (figures 2-7, tables 1-2) on any recording, as one HTML page that opens offline."""
     from xy_sysid.bags.atomic import write_text
     from xy_sysid.errors import BadInput
     from xy_sysid.report.captions import summary

@@ -17,7 +17,7 @@ def trajectory(
     position: Annotated[float, typer.Option(min=1e-9, help="largest motion about the start, rad or m")],
     speed: Annotated[float, typer.Option(min=1e-9, help="largest speed, per s")],
     acceleration: Annotated[float, typer.Option(min=1e-9, help="largest acceleration, per s^2")],
-    start: Annotated[float, typer.Option(help="where the joint stands, rad or m")] = 0.0,
+    start: Annotated[float, typer.Option(help="present position of the joint, rad or m")] = 0.0,
     kind: Annotated[str, typer.Option(help="multisine or sweep")] = "multisine",
     low: Annotated[float, typer.Option(min=1e-6, help="lowest frequency, Hz")] = 0.2,
     high: Annotated[float, typer.Option(min=1e-6, help="highest frequency, Hz")] = 10.0,
@@ -26,7 +26,7 @@ def trajectory(
     seed: int = 1,
     force: o.Force = False,
 ) -> None:
-    """The largest excitation within limits of position, speed and acceleration, from rest to rest, for a robot that takes only trajectories."""
+    """Write the largest excitation within limits of position, speed and acceleration as a trajectory, for a robot that accepts only trajectories."""
     from xy_sysid.bags.atomic import write_text
     from xy_sysid.excitation.trajectory import MotionLimits
     from xy_sysid.excitation.trajectory import trajectory as logic

@@ -22,19 +22,19 @@ SHOWN = 12  # parameters whose spread is told
 def trend(
     folder: Annotated[Path, typer.Argument(metavar="TABLE", help="the folder that xy-sysid fleet made; with --every a recording")],
     reading: Reading,
-    every: Annotated[str, typer.Option(metavar="TIME", help="compare parts of one long recording, each of so long: 10min, 90s, 1h")] = "",
+    every: Annotated[str, typer.Option(metavar="TIME", help="compare parts of one long recording; length of a part: 10min, 90s, 1h")] = "",
     machine: Annotated[list[str] | None, typer.Option("--machine", "-m", metavar="NAME", help="only this machine (may be repeated)")] = None,
     causes: Annotated[
         Path | None, typer.Option(metavar="FILE", help="YAML that adds to the table of changes and their causes (docs/fleet.md)")
     ] = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", metavar="FILE.html", help="write a page with every parameter over time")] = None,
     axis_months: Annotated[
-        float, typer.Option(metavar="N", min=1e-3, help="months of an axis that does not change, in which one false alarm is allowed")
+        float, typer.Option(metavar="N", min=1e-3, help="months of an unchanged axis in which one false alarm is allowed")
     ] = 1000.0,
     force: o.Force = False,
     json: o.Json = False,
 ) -> None:
-    """Every parameter of every axis over time: what changed, since when, by how much, how sure, and the likely cause."""
+    """Find changes of every parameter of every axis over time: since when, by how much, how certain, and the likely cause."""
     from xy_sysid.fleets.of_paths import Analysis
     from xy_sysid.fleets.parts import rows_of_parts, seconds
     from xy_sysid.fleets.trends import of_rows

@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 TURN = 6.283185307179586  # rad
 Models = Annotated[list[Path], typer.Argument(metavar="MODEL", help="model files of refine --model")]
 On = Annotated[
-    list[Path] | None, typer.Option("--on", metavar="REC", help="a recording of the machine: before and after on its own motion (may be repeated)")
+    list[Path] | None,
+    typer.Option("--on", metavar="REC", help="a recording of the machine: compare with and without the numbers on its motion (may be repeated)"),
 ]
 
 
@@ -35,13 +36,14 @@ def use(
     reading: Reading,
     on: On = None,
     controller_rate: Annotated[
-        float | None, typer.Option("--controller-rate", metavar="HZ", help="rate of the controller; the recording's by default, else 2000")
+        float | None, typer.Option("--controller-rate", metavar="HZ", help="rate of the controller; by default that of the recording, or 2000")
     ] = None,
     limit: Annotated[
-        float | None, typer.Option(metavar="V", help="largest input of the drive; the model's saturation or the recording's largest by default")
+        float | None,
+        typer.Option(metavar="V", help="largest input of the drive; by default the saturation of the model or the largest input of the recording"),
     ] = None,
     bandwidth: Annotated[
-        float | None, typer.Option(metavar="HZ", help="crossover asked of the loop; the highest with the margins by default")
+        float | None, typer.Option(metavar="HZ", help="crossover frequency of the loop; by default the highest with sufficient margins")
     ] = None,
     travel: Annotated[tuple[float, float] | None, typer.Option(metavar="LOW HIGH", help="positions that tables and paths cover, SI")] = None,
     to: Annotated[
@@ -52,7 +54,7 @@ def use(
     force: o.Force = False,
     json: o.Json = False,
 ) -> None:
-    """Numbers to paste into a controller, correction tables, margins, limits; and the model in the words of other programs."""
+    """Turn a model into numbers for a controller, correction tables, margins and limits, or into files for other programs."""
     from xy_sysid.control_design.exports import TARGETS, export
     from xy_sysid.control_design.use import use as logic
     from xy_sysid.errors import BadInput

@@ -33,7 +33,7 @@ def validate(
     effect_file: Own = None,
     json: o.Json = False,
 ) -> None:
-    """Check a model on a recording that it has not seen, in frequency and in time; exit code 1 if it does not hold on every axis."""
+    """Check a model on a recording that it was not fitted to, in frequency and in time; exit code 1 if it fails on an axis."""
     from xy_sysid.comparison.of_run import in_frequency
     from xy_sysid.errors import BadInput
     from xy_sysid.files.effects import library

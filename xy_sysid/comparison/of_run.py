@@ -22,7 +22,7 @@ from xy_sysid.settings import IdentifierSettings, build
 from xy_sysid.units import told
 
 HELD_OUT = 1.0 / 3.0  # of the recording, when a model was fitted to it
-SEEN = "the model was fitted to this very recording; only its last third is looked at"
+SEEN = "the model was fitted to this recording; only its last third is used"
 
 MOST_LEFT = 0.7  # of the motion: half of its power
 HARDLY = "The model leaves most of the motion: it hardly describes this axis, or input and output do not belong together."

@@ -203,10 +203,10 @@ def _parameter(name: str, place: int) -> Callable[[AxisModel], float]:
 def _notes(model: PhysicalModel, run: Run | None, found: Gains) -> tuple[str, ...]:
     notes = []
     if not model.parameters:
-        notes.append("the model has no intervals, so nobody knows how sure these numbers are: write it with refine --model")
+        notes.append("the model has no intervals, so the accuracy of these numbers is unknown: write it with refine --model")
     notes += [item.doubt for item in found.items if model.parameters and item.doubt]
     if run is not None and run.digest in model.data:
-        notes.append("the model was fitted to this very recording: before and after say how well it explains it, not how well it predicts another")
+        notes.append("the model was fitted to this recording: before and after show how well it explains it, not how well it predicts another")
     if model.doubt:
         notes.append(model.doubt)
     return tuple(notes)

@@ -161,7 +161,7 @@ def _tried(item: Candidate, fit: GreyboxFit, base: GreyboxFit) -> Tried:
             f"the encoder's noise alone is {bare(fit.noise_floor, unit)}"
         )
     else:
-        evidence = f"alone it takes away {100 * item.explained:.3g} % of the error's power: {bare(before, unit)} -> {moved(fit.held_out_error, unit)}"
+        evidence = f"alone it explains {100 * item.explained:.3g} % of the error's power: {bare(before, unit)} -> {moved(fit.held_out_error, unit)}"
     ratio = fit.held_out_error / before if before > 0 else None
     return Tried(
         effect=item.effect,
@@ -184,8 +184,8 @@ def _runner_up(ladder: Ladder) -> tuple[str, str] | None:
         left, right = (moved(fit.held_out_error, fit.units.judged) for fit in (rival.fit, ladder.final))
         return name, f"with {name} instead of {taken} the held-out error is {left}, not {right}."
     if rival.refused:
-        return name, f"{name} does nearly as well as {taken}, but {rival.refused}."
-    return name, f"{name} does nearly as well as {taken}: these data hardly tell them apart; the simpler is taken."
+        return name, f"{name} predicts nearly as well as {taken}, but {rival.refused}."
+    return name, f"{name} predicts nearly as well as {taken}: these data hardly distinguish them; the simpler one is taken."
 
 
 def _look_alikes(fitted: list[tuple[Candidate, GreyboxFit]], name: str, library: Library) -> tuple[LookAlike, ...]:

@@ -42,7 +42,7 @@ EFFECT = Effect(
     name="asymmetric_friction",
     law="F = coulomb (1 + asymmetry sign(v)) sign(v)",
     meaning="worn or tilted nut, one-sided wiper: forth costs more than back",
-    validity="speeds well above breakaway; one level each way; without backlash the very law of Coulomb friction and a smaller constant load",
+    validity="speeds well above breakaway; one level each way; without backlash the same as Coulomb friction and a smaller constant load",
     source="Armstrong-Helouvry, Control of Machines with Friction, Kluwer 1991, ch. 3",
     category="friction",
     parameters=(
@@ -51,7 +51,7 @@ EFFECT = Effect(
     ),
     shows="error of another size forth than back, that vanishes at rest",
     look_alikes=("constant_load", "coulomb_friction"),
-    experiment="another mounting or payload: a load changes with gravity, a nut does not; without backlash one mounting cannot tell them apart",
+    experiment="another mounting or payload: a load changes with gravity, a nut does not; without backlash one mounting cannot distinguish them",
     functions={"level": level},
     guesses=guesses,
     family="dry_friction",

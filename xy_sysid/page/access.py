@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from http.cookies import CookieError, SimpleCookie
 from urllib.parse import parse_qs, urlsplit
 
+from xy_sysid.page.address import without
+
 LARGEST = 1 << 20  # bytes of a request's body; the page itself sends next to nothing
 LOOPBACK = ("localhost", "127.0.0.1", "::1")
 COOKIE = "xy_sysid_token"
@@ -97,7 +99,8 @@ def judge(access: Access, headers: Mapping[str, str], query: str) -> Answer:
     if given:
         if not _equal(given, access.token):
             return Answer(401, "Wrong token for this page.")
-        return Answer(303, "", access.token, "/")
+        rest = without(query, "token")
+        return Answer(303, "", access.token, f"/?{rest}" if rest else "/")
     if _equal(cookie_of(headers.get("cookie", "")), access.token):
         return Answer()
     return Answer(401, "A token is needed: open the address that was printed when the page was started.")

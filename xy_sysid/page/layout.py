@@ -6,29 +6,32 @@ import time
 
 from nicegui import ui
 
+from xy_sysid.page.address import PageView, query_of
 from xy_sysid.page.files_dialog import open_dialog
 from xy_sysid.page.orders import Source
-from xy_sysid.page.panel import Panel
+from xy_sysid.page.panel import Panel, name_in_address
 from xy_sysid.page.session import Session
 from xy_sysid.page.together_card import TogetherCard
 from xy_sysid.page.trend_card import TrendCard
 
 EVERY = 0.4  # s between two looks for what is new
 SHOWN = 4  # messages on the page at a time
+THEMES, DARK = ("", "light", "dark"), (None, False, True)  # in the address, and for the page
 GOOD_STAYS, BAD_STAYS = 8.0, 60.0  # s that a message stays
 
 
-def build(session: Session) -> None:
-    """Everything; then look for news for as long as the browser is there."""
-    page = Page(session)
+def build(session: Session, view: PageView) -> None:
+    """Everything as the address asks for it; then look for news for as long as the browser is there."""
+    page = Page(session, view)
     ui.timer(EVERY, page.refresh)
 
 
 class Page:
     """One browser's view of the session."""
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: Session, view: PageView) -> None:
         self._session, self._client = session, ui.context.client
+        self._wanted, self._query = view, ""
         self._panels: dict[str, Panel] = {}
         self._told: list[int] = []
         self._alarms: list[str] = []
@@ -56,7 +59,7 @@ class Page:
         for source in sources:
             if source.key not in self._panels:
                 with self._grid:
-                    self._panels[source.key] = Panel(session, source)
+                    self._panels[source.key] = Panel(session, source, self._wanted.of(name_in_address(session, source)))
         for key in set(self._panels) - {source.key for source in sources}:
             self._panels.pop(key).delete()
         self._empty.set_visibility(not sources)
@@ -65,7 +68,16 @@ class Page:
             if not self._client.is_deleted:  # the browser may go while something is drawn
                 await panel.refresh()
         if not self._client.is_deleted:
+            self._keep_address()
             await self._together.refresh(sources)
+
+    def _keep_address(self) -> None:
+        """The address of the browser names what is shown, so that a reload or a link shows it again."""
+        view = PageView(tuple(panel.view() for panel in self._panels.values()), THEMES[self._theme.value])
+        query = query_of(view)
+        if query != self._query:
+            self._query = query
+            ui.navigate.history.replace(f"/?{query}" if query else "/")
 
     def _bar(self) -> None:
         session = self._session
@@ -75,9 +87,10 @@ class Page:
             ui.button("Open a recording", on_click=lambda: open_dialog(session)).props(
                 'flat dense no-caps icon=folder_open aria-label="Open a recording"'
             ).classes("opener")
-            dark = ui.dark_mode(None)
-            theme = ui.toggle({0: "auto", 1: "light", 2: "dark"}, value=0, on_change=lambda event: dark.set_value((None, False, True)[event.value]))
-            theme.props('flat dense no-caps aria-label="light or dark"').classes("hide")
+            chosen = THEMES.index(self._wanted.theme)
+            dark = ui.dark_mode(DARK[chosen])
+            self._theme = ui.toggle({0: "auto", 1: "light", 2: "dark"}, value=chosen, on_change=lambda event: dark.set_value(DARK[event.value]))
+            self._theme.props('flat dense no-caps aria-label="light or dark"').classes("hide")
             if session.live is not None:
                 with ui.button(color=None).classes("stop").props('id=stop aria-label="STOP: zero volts, now. Key: Escape"') as stop:
                     ui.html('STOP<span class="hint">Esc</span>', sanitize=False)

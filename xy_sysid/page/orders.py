@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, Protocol
+
+from xy_sysid.errors import BadInput
+from xy_sysid.imports.reading import Reading as FileReading
+from xy_sysid.imports.reading import numbers, pairs
 
 OrderKind = Literal["begin", "diagnose", "renew", "add", "remove", "next", "auto", "reset"]
 
@@ -64,6 +68,29 @@ class Reading:
     load: Mapping[str, Any] = field(default_factory=dict)
     words: tuple[str, ...] = ()
     effect_files: tuple[Path, ...] = ()
+
+
+def tables(given: Mapping[str, Sequence[str]]) -> dict[str, Any]:
+    """Arguments of ``imports.load`` of the options --map, --unit, --scale and --rate of a table. Raises BadInput for what they do not take."""
+    found: dict[str, Any] = {}
+    for option, name in (("--map", "columns"), ("--unit", "units")):
+        found |= {name: pairs(given[option], option)} if given.get(option) else {}
+    found |= {"scales": numbers(given["--scale"], "--scale")} if given.get("--scale") else {}
+    if given.get("--rate"):
+        try:
+            found["rate"] = float(given["--rate"][0])
+        except ValueError:
+            raise BadInput("--rate", repr(given["--rate"][0]), "a number", "Give the sampling rate in Hz.") from None
+    FileReading(**found)  # refuses what no reader takes
+    return found
+
+
+def read_so(usual: Reading, words: Sequence[str]) -> Reading:
+    """The usual reading with options of a table in words: ("--map", "time=A", "--rate", "500"). Raises BadInput for what they do not take."""
+    given: dict[str, list[str]] = {}
+    for option, text in zip(words[::2], words[1::2], strict=True):
+        given.setdefault(option, []).append(text)
+    return replace(usual, load={**usual.load, **tables(given)}, words=(*usual.words, *words))
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import MutableMapping
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
-from nicegui import app, ui
+from nicegui import ui
 
+from xy_sysid.errors import XySysidError
+from xy_sysid.page.address import SourceView
 from xy_sysid.page.control import Control
+from xy_sysid.page.document_words import model_effects
 from xy_sysid.page.facts import seconds_text
 from xy_sysid.page.failure_card import FailureCard
 from xy_sysid.page.live_card import LiveCards
 from xy_sysid.page.numbers_card import Numbers
 from xy_sysid.page.orders import Source
 from xy_sysid.page.picture_card import Cards
+from xy_sysid.page.recordings import OpenRecording
 from xy_sysid.page.session import Session
 from xy_sysid.page.settle_card import SettleCard
 from xy_sysid.page.story_card import StoryCard
@@ -26,8 +31,10 @@ SHORT = 3  # letters of an axis' name that needs the word axis before it
 class Panel:
     """A source in one browser."""
 
-    def __init__(self, session: Session, source: Source) -> None:
-        self._session, self._source = session, source
+    def __init__(self, session: Session, source: Source, wanted: SourceView) -> None:
+        """wanted: what the address asks for; effects that it names are added once the rigid model is fitted, unless others are there."""
+        self._session, self._source, self._wanted = session, source, wanted
+        self._adding = {} if source.live else dict(wanted.effects)
         self._axis = ""
         self._axes: tuple[str, ...] = ()
         self._control: Control | None = None
@@ -50,7 +57,7 @@ class Panel:
                     self._first = FailureCard(session, source)
                     self._live = LiveCards(session) if source.live else None
                     self._numbers = Numbers()
-                    self._cards = Cards(session, source, self._first.plots["frequency"])
+                    self._cards = Cards(session, source, self._first.plots["frequency"], wanted.pictures)
                 with ui.element("div").classes("stack side"):
                     settling = session.settling if source.live else None
                     self._settle = SettleCard(session) if settling is not None and settling.first else None
@@ -72,9 +79,10 @@ class Panel:
         axes = source.axes()
         if axes != self._axes:
             self._axes = axes
-            wanted = (self._axis, self._tab().get(self._source.key, ""), *axes)
+            wanted = (self._axis, self._wanted.axis, *axes)
             self._axis = next((axis for axis in wanted if axis in axes), "")
             self._choice.set_options({axis: f"axis {axis}" if len(axis) <= SHORT else axis for axis in axes}, value=self._axis or None)
+        self._add_wanted()
         begun = source.document(self._axis) is not None
         waits = self._control is not None and self._control.refresh(self._axes, begun)
         axis, view = self._axis, self._choose()  # without an axis every card keeps its place, and says what is waited for
@@ -96,7 +104,10 @@ class Panel:
         if goes_on != self._steps:
             awaited = self._steps[:2] == (self._axis, 0) and self._view.value in found
             self._steps, self._views = goes_on, found
-            self._view.set_options(found, value=self._view.value if awaited else next(iter(found), None))
+            value = self._view.value if awaited else next(iter(found), None)
+            if self._wanted.model in found and not self._adding.get(self._axis):
+                value, self._wanted = self._wanted.model, replace(self._wanted, model="")
+            self._view.set_options(found, value=value)
         elif found != self._views:  # other words for the same: what was chosen stays
             self._views = found
             self._view.set_options(found, value=self._view.value)
@@ -125,8 +136,46 @@ class Panel:
     def _turn(self, axis: str) -> None:
         if axis in self._axes:
             self._axis = axis
-            self._tab()[self._source.key] = axis
 
-    def _tab(self) -> MutableMapping[str, Any]:
-        """What this tab of the browser keeps over a reload: which axis it shows of each source."""
-        return app.storage.tab if ui.context.client.has_socket_connection else {}
+    def view(self) -> SourceView:
+        """What is shown, for the address; what the address asked for and has not come yet is still in it."""
+        source, chosen = self._source, str(self._view.value or "")
+        effects = {axis: tuple(effects_of(source.document(axis))) for axis in self._axes if not source.live}
+        for axis, names in self._adding.items():
+            effects[axis] = (*effects.get(axis, ()), *names)
+        return SourceView(
+            name=name_in_address(self._session, source),
+            words=self._session.own_words(source) if isinstance(source, OpenRecording) else (),
+            axis=self._wanted.axis if not self._axes else "" if self._axis == self._axes[0] else self._axis,
+            model=self._wanted.model or ("" if chosen == next(iter(self._views), "") else chosen),
+            pictures=self._cards.chosen(),
+            effects=effects,
+        )
+
+    def _add_wanted(self) -> None:
+        """Add the effects that the address names, one after the other. A story with other effects is somebody's, and stays."""
+        source = self._source
+        for axis, names in list(self._adding.items()):
+            if (self._axes and axis not in self._axes) or source.problem():
+                del self._adding[axis]
+            elif source.ready(axis) and source.job(axis) is None:
+                there = effects_of(source.document(axis))
+                missing = [name for name in names if name not in there]
+                if not missing or set(there) - set(self._wanted.effects[axis]):
+                    del self._adding[axis]
+                    continue
+                self._adding[axis] = tuple(missing[1:])
+                try:
+                    source.ask("add", axis, missing[0])
+                except XySysidError as problem:
+                    self._session.say(str(problem))
+
+
+def effects_of(document: Mapping[str, Any] | None) -> list[str]:
+    """Effects of the newest model of a story; none while there is no story."""
+    return model_effects(document) if document is not None else []
+
+
+def name_in_address(session: Session, source: Source) -> str:
+    """The name of a source in an address; empty for the machine."""
+    return session.name_of(source) if isinstance(source, OpenRecording) else ""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -133,9 +133,10 @@ PICTURES = (
 class Cards:
     """All pictures of the axis that is shown."""
 
-    def __init__(self, session: Session, source: Source, beside: Plot) -> None:
-        """beside: the plot over frequency of another card, which zooms with these."""
-        self._session, self._source, self._beside = session, source, beside
+    def __init__(self, session: Session, source: Source, beside: Plot, chosen: Sequence[str] = ()) -> None:
+        """beside: the plot over frequency of another card, which zooms with these; chosen: pictures of the tabs that are open at first."""
+        self._session, self._source, self._beside, self._wanted = session, source, beside, chosen
+        self._bars: list[tuple[str, ui.tab_panels]] = []
         self._plots: dict[str, Plot] = {}
         self._cards: dict[str, ui.element] = {}
         for title in dict.fromkeys(picture.card for picture in PICTURES):
@@ -143,6 +144,10 @@ class Cards:
                 ui.html(f"<h2>{title}</h2>", sanitize=False)
                 self._fill([picture for picture in PICTURES if picture.card == title])
             self._cards[title] = card
+
+    def chosen(self) -> tuple[str, ...]:
+        """Pictures of the open tabs that are not the first of their card."""
+        return tuple(str(panels.value) for first, panels in self._bars if panels.value != first)
 
     async def refresh(self, axis: str, view: View) -> None:
         """Draw again what has changed."""
@@ -172,7 +177,10 @@ class Cards:
         with ui.tabs().props("dense no-caps align=left inline-label") as bar:
             for picture in tabs:
                 ui.tab(picture.name, picture.tab)
-        with ui.tab_panels(bar, value=tabs[0].name, animated=False, keep_alive=True).props("animated=false").style("background: transparent"):
+        value = next((picture.name for picture in tabs if picture.name in self._wanted), tabs[0].name)
+        panels = ui.tab_panels(bar, value=value, animated=False, keep_alive=True).props("animated=false").style("background: transparent")
+        self._bars.append((tabs[0].name, panels))
+        with panels:
             for picture in tabs:
                 with ui.tab_panel(picture.name).style("padding: 0"):
                     self._plots[picture.name] = Plot(picture.reading, picture.name, picture.height)

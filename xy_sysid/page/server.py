@@ -10,12 +10,13 @@ from contextlib import closing
 from importlib.resources import files
 
 import uvicorn
-from fastapi import FastAPI
+from fastapi import FastAPI, Request
 from fastapi.responses import JSONResponse
 from nicegui import run, ui
 
 from xy_sysid.errors import BadInput
 from xy_sysid.page.access import Access, rules
+from xy_sysid.page.address import view_of_query
 from xy_sysid.page.guard import Guard
 from xy_sysid.page.layout import build
 from xy_sysid.page.session import Session
@@ -69,10 +70,12 @@ def application(session: Session, access: Access) -> FastAPI:
     script = (assets / "page.js").read_text(encoding="utf-8")
 
     @ui.page("/", title="xy_sysid", dark=None)
-    async def page() -> None:
+    async def page(request: Request) -> None:
         ui.add_css(style)
         ui.add_body_html(f"<script>{script}</script><div id=gone role=alert></div>")
-        build(session)
+        view = view_of_query(request.url.query)
+        await run.io_bound(session.open_view, view)
+        build(session, view)
 
     ui.run_with(app, title="xy_sysid", language="en-US", dark=None, tailwind=False, reconnect_timeout=10.0, show_welcome_message=False)
     app.add_middleware(Guard, access=access)

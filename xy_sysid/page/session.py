@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from xy_sysid.errors import BadInput
-from xy_sysid.page.orders import Reading, Source
+from xy_sysid.errors import BadInput, XySysidError
+from xy_sysid.page.address import PageView
+from xy_sysid.page.orders import Reading, Source, read_so
 from xy_sysid.page.recorder import Recorder
 from xy_sysid.page.recordings import OpenRecording
 from xy_sysid.page.settling import Settling
@@ -52,6 +53,7 @@ class Session:
         self.recorder = Recorder()
         self.messages: deque[Message] = deque(maxlen=MESSAGES)
         self.stopping = False
+        self._opening = threading.Lock()
         self._count = 0
         self._figures: dict[tuple[object, ...], dict[str, Any]] = {}
         self.link: Link | None = None
@@ -83,6 +85,27 @@ class Session:
         made = OpenRecording(path, title, self.say, reading or self.reading)
         self.recordings.append(made)
         return made
+
+    def name_of(self, one: OpenRecording) -> str:
+        """The name of an open recording in an address: that of the shelf, or its title if it is from elsewhere."""
+        path = one.path.resolve()
+        return str(path.relative_to(self.shelf.folder)) if path.is_relative_to(self.shelf.folder) else one.title
+
+    def own_words(self, one: OpenRecording) -> tuple[str, ...]:
+        """How an open recording is read, beyond how all are."""
+        return one.how.words[len(self.reading.words) :]
+
+    def open_view(self, view: PageView) -> None:
+        """Open the recordings of a view that are not open yet; those that cannot be opened are said on every page."""
+        with self._opening:
+            for wanted in view.sources:
+                there = {(self.name_of(one), self.own_words(one)) for one in self.recordings}
+                if not wanted.name or (wanted.name, wanted.words) in there:
+                    continue
+                try:
+                    self.open(self.shelf.find(wanted.name), wanted.name, read_so(self.reading, wanted.words))
+                except XySysidError as problem:
+                    self.say(str(problem))
 
     def close_recording(self, key: str) -> None:
         """Take one off the page."""

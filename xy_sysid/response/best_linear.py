@@ -21,7 +21,7 @@ DRIVEN = 1e-3  # of the strongest line's power: less is not excited
 FEWEST = 2  # realisations, and periods of each
 
 Realisation = tuple[FloatArray, FloatArray]
-"""Input (periods, length) and output (periods, length), the latter differenced where the response is."""
+"""Input (periods, length) and output (periods, length), the output differenced where the response is."""
 
 
 def best_linear(frf: FrequencyResponse, realisations: Sequence[Realisation]) -> FrequencyResponse:

@@ -27,12 +27,12 @@ def first_order_words(found: FirstOrder) -> tuple[str, ...]:
     if found.levels < 3 and "friction" not in found.terms and not found.both_ways:
         if "offset" in found.terms:
             said.append(
-                "Two levels of the input in one direction: the offset is friction and load together. A step in the other direction tells them apart."
+                "Two levels of the input in one direction: the offset is friction and load together. A step the other way distinguishes them."
             )
         else:
-            said.append("One level of the input: friction and gain cannot be told apart. Steps of two sizes, or a slow ramp, tell the friction (kS).")
+            said.append("One level of the input: friction and gain cannot be distinguished. Steps of two sizes or a slow ramp give kS.")
     elif "offset" in found.terms:
-        said.append("All motion is in one direction: the offset is friction and load together. A test in the other direction tells them apart.")
+        said.append("All motion is in one direction: the offset is friction and load together. A test in the other direction distinguishes them.")
     elif not found.both_ways:
         said.append("All motion is in one direction, and no friction is distinguished from zero. A slow ramp in both directions tells it.")
     if found.settled < SETTLED and constant.value > 0.0 and found.levels < 10:

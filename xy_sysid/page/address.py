@@ -1,0 +1,102 @@
+"""The view of the page as the query of its address: the open recordings, and for each the axis, the model, the pictures and the added effects.
+
+``?rec=dry.npz&axis=y&model=rigid&effects=x:coulomb_friction,cogging&rec=plain.npz``: each ``rec`` (or ``live``) begins a source, and what
+follows belongs to it. What is unknown is ignored, so that an old link still opens.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from urllib.parse import parse_qsl, urlencode
+
+LONGEST = 4000  # characters that are read
+MOST = 7  # sources that are read
+OPTIONS = ("map", "unit", "scale", "rate")  # how a table is read, as options of a command without their dashes
+
+
+@dataclass(frozen=True, slots=True)
+class SourceView:
+    """What is shown of one recording, or of the machine.
+
+    name: as the page lists it, empty for the machine; words: how it is read, as options of a command
+    model: empty for the newest; pictures: of the tabs that are not the first; effects: added to the model of each axis
+    """
+
+    name: str = ""
+    words: tuple[str, ...] = ()
+    axis: str = ""
+    model: str = ""
+    pictures: tuple[str, ...] = ()
+    effects: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class PageView:
+    """All sources, in order; theme: light, dark, or empty for that of the system."""
+
+    sources: tuple[SourceView, ...] = ()
+    theme: str = ""
+
+    def of(self, name: str) -> SourceView:
+        """The view of one source; of a source that is not named, an empty one."""
+        return next((one for one in self.sources if one.name == name), SourceView(name))
+
+
+def query_of(view: PageView) -> str:
+    """The query of an address, without its question mark."""
+    pairs: list[tuple[str, str]] = []
+    for one in view.sources:
+        own = [(option.removeprefix("--"), text) for option, text in zip(one.words[::2], one.words[1::2], strict=True)]
+        own += [(name, value) for name, value in (("axis", one.axis), ("model", one.model), ("pictures", ",".join(one.pictures))) if value]
+        own += [("effects", f"{axis}:{','.join(names)}") for axis, names in one.effects.items() if names]
+        if one.name or own:
+            pairs += [("rec", one.name) if one.name else ("live", "1"), *own]
+    if view.theme:
+        pairs.append(("theme", view.theme))
+    return urlencode(pairs, safe="/:,")
+
+
+def view_of_query(query: str) -> PageView:
+    """The view that a query asks for."""
+    sources: list[SourceView] = []
+    theme = ""
+    for name, value in _pairs(query):
+        if name in ("rec", "live"):
+            sources.append(SourceView(value if name == "rec" else ""))
+        elif name == "theme":
+            theme = value if value in ("light", "dark") else ""
+        elif sources:
+            sources[-1] = _with(sources[-1], name, value)
+    return PageView(tuple(sources[:MOST]), theme)
+
+
+def _pairs(query: str) -> Iterable[tuple[str, str]]:
+    try:
+        return parse_qsl(query[:LONGEST], max_num_fields=200)
+    except ValueError:  # too many
+        return ()
+
+
+def _with(one: SourceView, name: str, value: str) -> SourceView:
+    if name in OPTIONS:
+        return replace(one, words=(*one.words, f"--{name}", value))
+    if name == "axis":
+        return replace(one, axis=value)
+    if name == "model":
+        return replace(one, model=value)
+    if name == "pictures":
+        return replace(one, pictures=_names(value))
+    axis, colon, effects = value.rpartition(":")
+    if name == "effects" and colon:
+        return replace(one, effects={**one.effects, axis: _names(effects)})
+    return one
+
+
+def _names(text: str) -> tuple[str, ...]:
+    return tuple(name for name in text.split(",") if name)
+
+
+def without(query: str, name: str) -> str:
+    """The query without the values of one name."""
+    return urlencode([pair for pair in _pairs(query) if pair[0] != name], safe="/:,")
