@@ -97,7 +97,7 @@ def test_every_option_that_writes_a_file_is_looked_at_here() -> None:
     writing = {
         f"{command.name} {parameter.name}"
         for command in app.registered_commands
-        for parameter in get_params_from_function(command.callback).values()
+        for parameter in (get_params_from_function(command.callback) if command.callback is not None else {}).values()
         if isinstance(parameter.default, (OptionInfo, ArgumentInfo)) and re.match(WRITES, parameter.default.help or "") and parameter.name != "to"
     }
     assert writing == {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -90,7 +91,7 @@ def test_a_recording_that_cannot_be_opened_for_an_error_of_ours_is_closed_with_a
 
     words: Any = Words()
     monkeypatch.setattr(worker, "Desk", broken)
-    monkeypatch.setattr(worker.signal, "signal", lambda *_: None)
+    monkeypatch.setattr(signal, "signal", lambda *_: None)
     worker.main("a.npz", Reading(), words, words)
     assert [(news.kind, news.words) for news in sent] == [("closed", BROKEN)]
     assert "a.npz: ValueError in broken" in capsys.readouterr().err
