@@ -10,7 +10,8 @@ from xy_sysid.page.failure_card import READING
 from xy_sysid.page.picture_card import PICTURES
 from xy_sysid.report import captions, story_words
 
-FIXED = {**{picture.name: picture.reading for picture in PICTURES}, **READING}
+FIXED: dict[str, str] = {picture.name: picture.reading for picture in PICTURES}
+FIXED |= {str(by): text for by, text in READING.items()}
 FIXED |= {name: text for module in (story_words, captions) for name, text in vars(module).items() if name.isupper() and isinstance(text, str)}
 OF_ONE_RECORDING = r"half a second|[1-9][\d.]*\s*(?:ms|s|seconds?)\b|friction near|near 0\b|drag at|at the ends|last third|end of the record"
 
