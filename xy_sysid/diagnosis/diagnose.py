@@ -149,8 +149,8 @@ def judged(data: AxisData, ladder: Ladder, library: Library) -> Diagnosis:
     if ladder.kept_out is not None and verdict != "nothing_missing":
         several = len(ladder.kept_out.effects) > 1
         leaves = "would leave" if several else "alone would leave"
-        sentence += f" {_listed(ladder.kept_out.effects)} {leaves} {moved(ladder.kept_out.fit.held_out_error, unit)}, and {'are' if several else 'is'} refused:"
-        sentence += f" {ladder.kept_out.refused}."
+        sentence += f" {_listed(ladder.kept_out.effects)} {leaves} {moved(ladder.kept_out.fit.held_out_error, unit)}, and"
+        sentence += f" {'are' if several else 'is'} refused: {ladder.kept_out.refused}."
     if ladder.stopped:
         sentence += " The search was stopped by its budget."
         confidence *= 0.8
