@@ -147,9 +147,10 @@ def judged(data: AxisData, ladder: Ladder, library: Library) -> Diagnosis:
         if names and explained > 0.0:
             sentence += f" At best {_listed(names)} {'explain' if len(names) > 1 else 'explains'} {_percent(explained)} of the error's power."
     if ladder.kept_out is not None and verdict != "nothing_missing":
-        leaves = "would leave" if len(ladder.kept_out.effects) > 1 else "alone would leave"
-        sentence += f" {_listed(ladder.kept_out.effects)} {leaves} {moved(ladder.kept_out.fit.held_out_error, unit)}, and is refused:"
-        sentence += f" {ladder.kept_out.refused}."
+        several = len(ladder.kept_out.effects) > 1
+        leaves = "would leave" if several else "alone would leave"
+        sentence += f" {_listed(ladder.kept_out.effects)} {leaves} {moved(ladder.kept_out.fit.held_out_error, unit)}, and"
+        sentence += f" {'are' if several else 'is'} refused: {ladder.kept_out.refused}."
     if ladder.stopped:
         sentence += " The search was stopped by its budget."
         confidence *= 0.8
