@@ -49,7 +49,7 @@ setup(
         "figures": ["matplotlib"],
         "frames": ["pandas"],
         "control": ["control"],
-        "docs": ["mkdocs-material", "mkdocstrings[python]"],
+        "docs": ["mkdocs-material", "mkdocstrings[python]", "nbclient", "ipykernel"],
         "mat73": ["h5py"],
         "mf4": ["asammdf"],
         "tdms": ["npTDMS"],
