@@ -37,6 +37,7 @@ setup(
         (f"share/{NAME}/config", files("config/*.yaml", "config/*.xml", "config/*.json", "config/*.md")),
         (f"share/{NAME}/config/machines", files("config/machines/*.yaml")),
         (f"share/{NAME}/launch", files("launch/*.py")),
+        ("share/man/man1", ["docs/xy-sysid.1"]),
     ],
     zip_safe=False,
     install_requires=["numpy", "scipy", "numba", "rosbags", "pydantic>=2", "typer", "rich", "plotly", "threadpoolctl", "pyyaml", ISAL],
