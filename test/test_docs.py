@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import importlib
 import re
+import shutil
+import subprocess
 from pathlib import Path
 
 import pytest
 from helpers import ROOT
 
 from campaigns.documents.architecture import PICTURE, picture, reduced
+from campaigns.documents.man import document as man_page
 from campaigns.documents.settings import document
 from xy_sysid.cli.app import app
 from xy_sysid.live.messages import COMPARISON_COLUMNS, FRF_COLUMNS, LADDER_COLUMNS
@@ -22,6 +25,16 @@ PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").g
 def test_the_settings_page_is_made_from_the_settings() -> None:
     """python -m campaigns.documents.settings > docs/settings.md"""
     assert (ROOT / "docs" / "settings.md").read_text(encoding="utf-8") == document()
+
+
+def test_the_man_page_is_made_from_the_commands() -> None:
+    """python -m campaigns.documents.man --write; every command and each of its options is in it, and troff has nothing to warn of."""
+    page = (ROOT / "docs" / "xy-sysid.1").read_text(encoding="utf-8")
+    assert page == man_page()
+    groff = shutil.which("groff")
+    if groff is not None:
+        told = subprocess.run([groff, "-man", "-Tutf8", "-ww"], input=page, capture_output=True, text=True, check=True)
+        assert told.stderr == "" and "User Commands" in told.stdout
 
 
 def test_the_picture_of_the_packages_is_made_from_the_imports() -> None:
