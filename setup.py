@@ -50,7 +50,7 @@ setup(
         "figures": ["matplotlib"],
         "frames": ["pandas"],
         "control": ["control"],
-        "docs": ["mkdocs-material", "mkdocstrings[python]", "nbclient", "ipykernel"],
+        "docs": ["mkdocs-material", "mkdocstrings[python]", "nbclient", "ipykernel", "latex2mathml"],
         "mat73": ["h5py"],
         "mf4": ["asammdf"],
         "tdms": ["npTDMS"],

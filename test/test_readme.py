@@ -43,3 +43,10 @@ def test_every_block_of_the_readme_runs_in_order_in_an_empty_folder(tmp_path: Pa
         for path, content in before.items():
             assert path.read_bytes() == content, f"{path.name} was overwritten by\n{block}"
     assert ran["shell"] >= 2 and ran["notebook"] == 2
+
+
+def test_what_is_saved_in_a_notebook_may_be_saved_again() -> None:
+    """Restart and run all: no cell of README, of the quick start or of an example refuses because of its own file from the run before."""
+    pages = [ROOT / "README.md", ROOT / "docs" / "quick-start.md", *(ROOT / "docs" / "examples").glob("*.py")]
+    saved = [line.strip() for page in pages for line in page.read_text(encoding="utf-8").splitlines() if "xy.save(" in line]
+    assert len(saved) >= 4 and [line for line in saved if "force=True" not in line] == []

@@ -37,6 +37,8 @@ def test_the_site_shows_the_examples_and_the_docstrings(site: Path) -> None:
     assert "Four commands" in (site / "index.html").read_text(encoding="utf-8")
     gallery = re.sub(r"<[^>]+>", "", (site / "gallery.html").read_text(encoding="utf-8"))
     assert "xy.simulate(60, hidden=12)" in gallery
+    theory = (site / "theory.html").read_text(encoding="utf-8")
+    assert theory.count('display="block"') >= 8 and "$" not in re.sub(r"<[^>]+>", "", theory.partition("<article")[2].partition("</article>")[0])
     reference = (site / "api.html").read_text(encoding="utf-8")
     assert "H1 with coherence and sigma of every line" in reference and "Biometrika" in reference
 

@@ -17,4 +17,4 @@ for item in steps.model.parameters:
     print(f"{item.name:20} {item.value:.4g} [{item.low:.4g}, {item.high:.4g}] {item.unit}")
 
 xy.plot.ladder(steps).write_html("ladder.html", include_plotlyjs="cdn")
-xy.save(steps.model, "axis_x.yaml")
+xy.save(steps.model, "axis_x.yaml", force=True)
