@@ -76,5 +76,29 @@ def test_what_needs_no_motion_covers_the_noise_and_hardly_more(sigma: float) -> 
             rest[row : row + ROWS] = flickering(np.zeros((ROWS, 1)), sigma, random)
             noise.saw(np.round((speed * time + rest[row : row + ROWS]) / COUNT) * COUNT)
         assert np.ptp(rest) <= 1.6 * noise.still[0]
-        assert noise.still[0] < 8 * (sigma + COUNT) or speed
-        assert noise.still[0] < 8 * (sigma + COUNT) + 2 * speed / RATE
+        assert noise.still[0] < 12 * (sigma + COUNT) or speed
+        assert noise.still[0] < 12 * (sigma + COUNT) + 2 * speed / RATE
+
+
+LOOKED_AT = 11  # positions of a tenth of a second, one of each block of 10 ms, among which the travel guard looks for motion
+
+
+def test_noise_is_not_taken_for_motion_however_long_the_axis_rests() -> None:
+    """A quarter of an hour of blocks, with noise far beyond a count: no position is further from those before than noise explains."""
+    random, noise = np.random.default_rng(5), EncoderNoise(1)
+    noise.saw(flickering(np.zeros((4000, 1)), 1e-4, random))
+    places = flickering(np.zeros(90_000), 1e-4, random)
+    lowest = np.lib.stride_tricks.sliding_window_view(places, LOOKED_AT).min(axis=1)
+    assert (places[LOOKED_AT - 1 :] - lowest < noise.still[0]).all()
+
+
+@pytest.mark.parametrize("rows", [1, 2, 20])
+def test_the_first_positions_are_not_taken_for_motion_either(rows: int) -> None:
+    """A driver may send one position at a time: what few of them tell of the noise is not believed to be all of it."""
+    for seed in range(200):
+        random, noise, last = np.random.default_rng(seed), EncoderNoise(1), list[float]()
+        for _ in range(24):
+            block = flickering(np.zeros((rows, 1)), 1e-4, random)
+            noise.saw(block)
+            last.append(float(block[-1, 0]))
+            assert last[-1] - min(last[-LOOKED_AT:]) <= noise.still[0]

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 
 from xy_sysid.samples.block import FloatArray
 
-COUNTS, SIGMAS = 2.0, 6.0  # encoder counts, and standard deviations, by which two readings differ without motion
+COUNTS, SIGMAS = 2.0, 9.0  # encoder counts, and standard deviations, by which two readings differ without motion: once in months of readings
 MEMORY = 2000  # readings over which the noise is averaged
 BENT = 6.0  # variance of a second difference of white noise of variance 1
+THIRD = 20.0  # variance of a third difference
+WORTH = 0.433  # independent squares in each of these: neighbours share readings (correlations of -0.75, 0.3 and -0.05)
+RISK = 1e-3  # probability that few readings tell less noise than there is; SIGMAS leave room for the rest
 
 
 class EncoderNoise:
     """Learns from readings; ``still`` is the distance that needs no motion.
 
-    Noise is measured by second differences of consecutive readings: steady motion has none, and an acceleration can only
-    make the noise look larger.
+    Noise is measured by third differences of consecutive readings: motion of steady speed or acceleration has none, and a jerk can only
+    make the noise look larger. Few readings may tell too little: ``still`` counts on the upper limit of the variance that they leave possible.
     """
 
     def __init__(self, axes: int) -> None:
@@ -30,14 +34,19 @@ class EncoderNoise:
         steps = np.abs(np.diff(rows, axis=0))
         if len(steps):
             self.count = np.minimum(self.count, np.min(np.where(steps > 0, steps, np.inf), axis=0))
-        if len(rows) > 2:
-            bent = np.diff(rows, 2, axis=0)
+        if len(rows) > 3:
+            bent = np.diff(rows, 3, axis=0)
             self._readings = min(self._readings + len(bent), MEMORY)
             share = min(1.0, len(bent) / self._readings)
-            self.variance += share * (np.mean(bent * bent, axis=0) / BENT - self.variance)
-        self._last = rows[-2:]
+            self.variance += share * (np.mean(bent * bent, axis=0) / THIRD - self.variance)
+        self._last = rows[-3:]
 
     @property
     def still(self) -> FloatArray:
         """(axes,) m by which two readings differ at most while the axis rests."""
-        return np.asarray(COUNTS * np.where(np.isfinite(self.count), self.count, 0.0) + SIGMAS * np.sqrt(self.variance))
+        squares = WORTH * self._readings
+        if not squares:
+            return np.full(len(self.count), np.inf if len(self._last) > 1 else 0.0)  # nobody knows yet
+        least = 2.0 * float(scipy.special.gammaincinv(squares / 2.0, RISK))  # of a sum of so many squares (chi-squared)
+        sigma = np.sqrt(self.variance * max(squares / max(least, 1e-300), 1.0))
+        return np.asarray(COUNTS * np.where(np.isfinite(self.count), self.count, 0.0) + SIGMAS * sigma)
