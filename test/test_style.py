@@ -38,7 +38,7 @@ rclpy std_msgs sensor_msgs diagnostic_msgs rosbags typer rich plotly yaml
 pathlib os io sys shutil tempfile subprocess socket logging time datetime threading multiprocessing asyncio random
 """)
 NOT_CALLED_IN_CORE = {"print", "open", "input", "exec", "eval"}
-SHARED_WITH_THE_MACHINE = {"xy_sysid.jit", "xy_sysid.errors", "xy_sysid.samples.block", "xy_sysid.settings"}
+SHARED_WITH_THE_MACHINE = {"xy_sysid.jit", "xy_sysid.errors", "xy_sysid.samples.block", "xy_sysid.settings", "xy_sysid.bags.opening"}
 
 
 @functools.cache

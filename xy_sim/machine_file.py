@@ -9,11 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from xy_sim.drive import Drive
 from xy_sim.parts import PARTS
-from xy_sysid.errors import BadInput
+from xy_sysid.bags.opening import yaml_of
+from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.settings import build, unknown_name
 
 Parts = Mapping[str, Mapping[str, float]]
@@ -139,12 +138,10 @@ def _table(name: str | Path, beside: Path | None = None, depth: int = 0) -> tupl
     path = near if near is not None and near.is_file() else machine_path(name)
     if depth > 8:
         raise BadInput(f"{path.name}: base", repr(str(name)), "a chain of at most 8 files", "A file must not be its own base.")
-    if path.stat().st_size > LONGEST:
-        raise BadInput("machine file", f"{path}, {path.stat().st_size / 1e6:.3g} MB", f"{LONGEST / 1e3:.0f} kB at most", "Check the path.")
     try:
-        own = _mapping(yaml.safe_load(path.read_text(encoding="utf-8")), path.name)
-    except (yaml.YAMLError, UnicodeDecodeError, OSError) as error:
-        raise BadInput("machine file", str(path), "YAML text", f"It says: {str(error).splitlines()[0]}.") from None
+        own = _mapping(yaml_of(path, "a machine file", LONGEST), path.name)
+    except BadRecording as problem:
+        raise BadInput("machine file", f"{path}: {problem.problem}", "YAML text", problem.act) from None
     for key in own:
         if key not in _TOP:
             raise unknown_name(key, list(_TOP), path.name)

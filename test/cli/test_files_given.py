@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import socket
 import threading
@@ -11,15 +12,26 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from helpers import ROOT
 from helpers.busy import allowed
 from helpers.cli_tools import RIGID, Said, cli, npz
 
 from xy_sysid.bags.opening import too_much
-from xy_sysid.errors import BadRecording
+from xy_sysid.errors import BadRecording, XySysidError
+from xy_sysid.files.experiment import read_experiment
 from xy_sysid.files.state import load_state
+from xy_sysid.fleets.causes import causes
+from xy_sysid.settings import ExcitationSettings
 
 QUICK = 2.0  # s, for a refusal
 DOUBLING = [("", "n0"), *((f"n{k}", f"n{k + 1}") for k in range(30))]  # each list holds the one before twice
+
+
+def doubling() -> str:
+    """YAML of a few lines that is a thousand million values once it is read."""
+    return "".join(f"{b}: &{b} [*{a}, *{a}]\n" if a else f"{b}: &{b} [1, 2]\n" for a, b in DOUBLING)
+
+
 ENDLESS = 10.0  # s after which a command is taken to hang
 
 
@@ -39,6 +51,20 @@ def refusal(*words: object, seconds: float = ENDLESS) -> str:
     lines = [line for line in said.err.splitlines() if not line.startswith("note: ")]
     assert said.code == 2 and said.out == "" and len(lines) == 1, said
     return lines[0]
+
+
+def told_at_once(act: Callable[[], object], seconds: float = ENDLESS) -> str:
+    """The one line of a refusal by a function that raises it within its time."""
+
+    def said() -> Said:
+        try:
+            return Said(0, str(act()), "")
+        except XySysidError as problem:
+            return Said(2, "", str(problem))
+
+    found = at_once(said, seconds)
+    assert found.code == 2 and "\n" not in found.err, found
+    return found.err
 
 
 def fifo(path: Path) -> None:
@@ -84,6 +110,12 @@ READS = {
     "an effect": ("refine", "REC", "--auto", "--effect-file", "FILE.py"),
     "a run file": ("run", "--params", "FILE.yaml"),
     "a machine": ("simulate", "new", "--machine", "FILE.yaml"),
+    "limits": ("next", "--for", "nothing", "--params", "FILE.yaml"),
+    "a walk": ("next", "--replay", "FOLDER/walk.json"),
+    "a file of names": ("fleet", "REC", "-o", "table", "--names", "FILE.yaml"),
+    "a table of a fleet": ("trend", "FOLDER/one.parquet"),
+    "a model to use": ("use", "FILE.yaml"),
+    "a recording of a day": ("trend", "FILE.csv", "--every", "10min"),
 }
 
 
@@ -98,9 +130,33 @@ def test_what_is_no_regular_file_is_refused_wherever_one_is_read(what: str, odd:
     """It may never end: nothing waits for it."""
     if (what, odd) in (("a database", "a folder"), ("an mcap", "a folder")):
         pytest.skip("a folder may be a bag")
-    words = [str(rec) if word == "REC" else word.replace("FILE", str(tmp_path / "odd")) for word in READS[what]]
-    ODD[odd](next(Path(word) for word in words if word.startswith(str(tmp_path / "odd"))))
+    words = [
+        str(rec) if word == "REC" else word.replace("FILE", str(tmp_path / "odd")).replace("FOLDER", str(tmp_path / "odd")) for word in READS[what]
+    ]
+    file = next(Path(word) for word in words if word.startswith(str(tmp_path / "odd")))
+    if file.parent != tmp_path:  # of a folder the command is told the folder alone
+        file.parent.mkdir()
+        words[words.index(str(file))] = str(file.parent)
+    ODD[odd](file)
     assert "odd" in refusal(*words)
+
+
+@pytest.mark.parametrize("odd", ODD)
+def test_what_is_no_regular_file_is_a_row_with_its_problem_in_a_fleet(odd: str, tmp_path: Path) -> None:
+    """The others of the fleet are analysed all the same."""
+    ODD[odd](tmp_path / "odd.csv")
+    said = at_once(lambda: cli("fleet", "--one", tmp_path / "odd.csv"))
+    (row,) = said.json["rows"]
+    assert said.code == 0 and row["stage"] == "reading" and row["problem"]
+
+
+@pytest.mark.parametrize("odd", ODD)
+def test_an_experiment_that_is_no_regular_file_is_refused(odd: str, tmp_path: Path) -> None:
+    """The excitation reads it while it configures; nobody waits for a node that hangs."""
+    ODD[odd](tmp_path / "odd.yaml")
+
+    line = told_at_once(lambda: read_experiment(ExcitationSettings(), tmp_path / "odd.yaml"))
+    assert line.startswith("experiment is ") and "odd.yaml: not a file but a pipe" in line
 
 
 @pytest.fixture(scope="module")
@@ -189,6 +245,65 @@ def test_a_line_of_200_mb_is_refused_at_once(text: str, head: str, tmp_path: Pat
             file.write(text * 65536)
     line = refusal("columns", path, seconds=QUICK)
     assert "a line of more than 10 million characters" in line
+
+
+@pytest.mark.parametrize("kind", ["40 MB", "doubling"])
+@pytest.mark.parametrize(
+    "words",
+    [("simulate", "new", "--machine", "FILE"), ("fleet", "REC", "-o", "table", "--names", "FILE"), ("experiment", "FILE")],
+    ids=lambda words: words[0],
+)
+def test_yaml_that_is_or_becomes_far_too_long_is_one_line_at_once(words: tuple[str, ...], kind: str, rec: Path, tmp_path: Path) -> None:
+    """Whatever it is for: as text, or as what repeats itself is read."""
+    path = tmp_path / "p.yaml"
+    path.write_text("a: 1\n" + "# nothing\n" * 4_000_000 if kind == "40 MB" else f"{doubling()}pattern: *n30\ndescription: *n30\n")
+    if words[0] == "experiment":
+        assert "p.yaml" in told_at_once(lambda: read_experiment(ExcitationSettings(), path), QUICK)
+        return
+    line = refusal(*(str(rec) if word == "REC" else str(path) if word == "FILE" else word for word in words), seconds=QUICK)
+    assert str(path) in line
+
+
+def test_causes_that_repeat_themselves_are_one_line_at_once(tmp_path: Path) -> None:
+    """The file that a user adds to the table of causes."""
+    path = tmp_path / "causes.yaml"
+    path.write_text(f"{doubling()}causes: *n30\n")
+
+    assert "more than 20000 values" in told_at_once(lambda: causes(path), QUICK)
+
+
+OPENS = re.compile(r"\.read_text\(|\.read_bytes\(|\.open\(\"r|\bopen\(\w+, \"r|os\.open\(|\.read_table\(|loadmat\(|np\.load\(")
+LOOKS = re.compile(r"bags\.opening import|^def regular_file", re.MULTILINE)
+ALONE = {
+    "bags/atomic.py": "folders of our own",
+    "bags/compression.py": "bags/reading.py has looked",
+    "bags/mcap_file.py": "bags/reading.py has looked",
+    "bags/sums.py": "is_file",
+    "cli/__init__.py": "/dev/null",
+    "cli/record.py": "a bag of our own, just written",
+    "files/effects.py": "is_file",
+    "files/fmu.py": "what the compiler has just made",
+    "fleets/columns_doc.py": "a page of the documentation",
+    "imports/arrays.py": "imports/registry.py has looked, as for all of imports",
+    "imports/csv.py": "",
+    "imports/json_log.py": "",
+    "imports/libraries/mat.py": "",
+    "imports/libraries/parquet.py": "",
+    "page/downloads.py": "what the report has just written",
+    "page/server.py": "a file of the package",
+    "report/sheet.py": "a file of the package",
+}
+
+
+def test_who_opens_a_file_that_somebody_names_has_looked_at_it() -> None:
+    """A new reader goes through ``bags.opening``, or stands in this table with the reason why it need not."""
+    there = {
+        path.relative_to(ROOT / "xy_sysid").as_posix(): text
+        for path in (ROOT / "xy_sysid").rglob("*.py")
+        if OPENS.search(text := path.read_text(encoding="utf-8"))
+    }
+    bold = {name for name, text in there.items() if not LOOKS.search(text)}
+    assert bold == set(ALONE)
 
 
 def test_yaml_is_counted_as_it_reads_and_not_as_it_is_written() -> None:

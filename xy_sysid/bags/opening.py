@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import stat
 from pathlib import Path
+from typing import Any
 
 import yaml
 
@@ -46,6 +47,23 @@ def text_of(path: Path, what: str, most: int = LONGEST) -> str:
         raise BadRecording(path, problem.strerror or "cannot be read", "Check the path and the permissions.") from None
     except UnicodeDecodeError:
         raise BadRecording(path, "is not text in UTF-8", f"Give {what}.") from None
+
+
+def yaml_of(path: Path, what: str, most: int = LONGEST) -> Any:
+    """The document of a YAML file that people write.
+
+    what: kind of file, for the message; most: bytes
+    Raises BadRecording in one line as ``text_of``, and for what is no YAML or repeats itself to more than anybody writes.
+    """
+    text = text_of(path, what, most)
+    try:
+        problem = too_much(text)
+        document = None if problem else yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        raise BadRecording(path, "no YAML", f"Correct it: {str(error).splitlines()[-1].strip()}.") from None
+    if problem:
+        raise BadRecording(path, f"it holds {problem}, and {what} has fewer", "Check the path.")
+    return document
 
 
 def too_much(text: str, most: int = WORDS) -> str:

@@ -8,7 +8,8 @@ from typing import Any
 import yaml
 
 from xy_sysid.bags.atomic import write_text
-from xy_sysid.errors import BadInput
+from xy_sysid.bags.opening import text_of
+from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.excitation.designed import document_of, with_experiment
 from xy_sysid.experiment_design.of_run import NextExperiment
 from xy_sysid.files.ros_parameters import load
@@ -39,10 +40,9 @@ def write_experiment(path: Path, found: NextExperiment) -> None:
 def read_experiment(settings: ExcitationSettings, path: Path) -> ExcitationSettings:
     """Settings with the experiment of a file; raises BadInput for a file that cannot be read, or that asks for more than the settings allow."""
     try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as problem:
-        why = getattr(problem, "strerror", None) or "not text"
-        raise BadInput("experiment", f"{path}: {why}", "a file of xy-sysid next", "Check the path.") from None
+        text = text_of(path, "an experiment")
+    except BadRecording as problem:
+        raise BadInput("experiment", f"{path}: {problem.problem}", "a file of xy-sysid next", problem.act) from None
     return with_experiment(settings, load(text, path.name), path.name)
 
 

@@ -13,7 +13,8 @@ from typing import Any
 
 from xy_sysid.axis.model import STANDARD, Library
 from xy_sysid.bags.atomic import write_text
-from xy_sysid.errors import BadInput
+from xy_sysid.bags.opening import text_of
+from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.experiment_design.limits import MachineLimits
 from xy_sysid.experiment_design.loop import Budget
 from xy_sysid.experiment_design.walk import WalkPlan, WalkStep, steps
@@ -23,6 +24,7 @@ from xy_sysid.samples.recording import Run
 from xy_sysid.units import Units
 
 NAME = "walk.json"
+LONGEST = 1 << 24  # bytes of it; a step takes some thousand
 UNKNOWN = "Give the folder of a walk: xy-sysid demo --settle and the page make them."
 
 
@@ -85,10 +87,10 @@ def replayed(folder: Path, library: Library = STANDARD) -> list[tuple[dict[str, 
     A step that somebody stopped is compared with what would have followed. Raises BadInput for a folder that is none.
     """
     try:
-        told = json.loads((folder / NAME).read_text(encoding="utf-8"))
+        told = json.loads(text_of(folder / NAME, "the plan of a walk", LONGEST))
         plan, kept = plan_of(told["plan"], library), list(told["steps"])
-    except (OSError, ValueError, KeyError, TypeError) as problem:
-        raise BadInput("walk", f"{folder}: {problem}", f"a folder with {NAME}", UNKNOWN) from None
+    except (BadRecording, ValueError, KeyError, TypeError, RecursionError) as problem:
+        raise BadInput("walk", f"{folder}: {getattr(problem, 'problem', problem)}", f"a folder with {NAME}", UNKNOWN) from None
     recordings = [run_of(folder / str(number), plan.axis) for number in range(len(kept))]
     again = [json.loads(json.dumps(step_document(one))) for one in steps(plan, recordings)]
     return list(zip(kept, again, strict=False))

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Collection
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
-import yaml
-
-from xy_sysid.bags.opening import text_of
-from xy_sysid.errors import BadInput, BadRecording
+from xy_sysid.bags.opening import yaml_of
+from xy_sysid.errors import BadInput
 from xy_sysid.settings import Settings, build, knob
 
 Direction = Literal["up", "down"]
@@ -62,10 +60,7 @@ def causes(own: Path | None = None) -> Causes:
 
 
 def _read(path: Path) -> Causes:
-    try:
-        found: Any = yaml.safe_load(text_of(path, "a table of causes"))
-    except yaml.YAMLError as error:
-        raise BadRecording(path, "no YAML", f"Correct it: {str(error).splitlines()[-1].strip()}.") from None
+    found = yaml_of(path, "a table of causes")
     return build(Causes, found if isinstance(found, dict) else {"causes": found}, str(path))
 
 

@@ -8,9 +8,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-import yaml
-
-from xy_sysid.bags.opening import text_of
+from xy_sysid.bags.opening import yaml_of
 from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.samples.recording import Recording
 from xy_sysid.settings import Settings, build, knob
@@ -48,10 +46,7 @@ class Name:
 
 def names_from(path: Path) -> Names:
     """The names of a YAML file. Raises BadRecording or BadInput in one line."""
-    try:
-        found: Any = yaml.safe_load(text_of(path, "a file of names"))
-    except yaml.YAMLError as error:
-        raise BadRecording(path, "no YAML", f"Correct it: {str(error).splitlines()[-1].strip()}.") from None
+    found = yaml_of(path, "a file of names")
     if not isinstance(found, dict):
         raise BadRecording(path, "no keys", f"Write for example: pattern: '{EXAMPLE}'.")
     values = {

@@ -55,6 +55,8 @@ def rows_of_file(task: Task) -> Done:
         origin: Row = {"source": task.path, "file_sha256": digest(path)}
     except OSError as error:
         return Done(task.path, (failed(task.path, "reading", f"cannot be read ({error.strerror or error}). Check the path and the permissions."),))
+    except BadRecording as problem:
+        return Done(task.path, (failed(task.path, "reading", str(problem)),))
     try:
         name = name_of(path, task.names)
     except BadInput as problem:

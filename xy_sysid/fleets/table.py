@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from xy_sysid.axis.model import STANDARD, Library
 from xy_sysid.bags.atomic import whole
+from xy_sysid.bags.opening import regular_file
 from xy_sysid.errors import BadRecording, MissingExtra
 from xy_sysid.fleets.columns import Column, Kind, columns
 from xy_sysid.fleets.row import Row
@@ -78,6 +79,8 @@ def read(folder: Path, names: Sequence[str] | None = None) -> pyarrow.Table:
         files = [folder] if folder.is_file() else sorted(folder.glob(f"*{ENDING}"))
         if not files:
             raise BadRecording(folder, "no Parquet files in it", "Make the table first: xy-sysid fleet PATH -o TABLE.")
+        for file in files:
+            regular_file(file)
         parts = [pa.parquet.read_table(file, partitioning=None) for file in files]
     except (OSError, pa.ArrowInvalid) as error:
         raise BadRecording(folder, f"cannot be read as Parquet ({str(error).splitlines()[0]})", "Make the table again with xy-sysid fleet.") from None
