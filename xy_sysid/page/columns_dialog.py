@@ -10,6 +10,7 @@ from nicegui import run, ui
 
 from xy_sysid.errors import BadInput, XySysidError
 from xy_sysid.imports.reading import Reading as FileReading
+from xy_sysid.page.beside import beside
 from xy_sysid.page.fields import on_press, typed
 from xy_sysid.page.orders import Reading
 from xy_sysid.page.session import Session
@@ -70,16 +71,11 @@ def guesses(found: Listing) -> tuple[str, list[AxisColumns]]:
 
 async def columns_dialog(session: Session, name: str) -> None:
     """Show what is in a table of the shelf, let the user say what is what, and open it."""
+    waiting = ui.notification(f"Reading the columns of {name} ...", spinner=True, timeout=None)
     try:
-        path = session.shelf.find(name)
-        waiting = ui.notification(f"Reading the columns of {name} ...", spinner=True, timeout=None)
-        try:
-            found: Listing | None = await run.io_bound(_listed, path)
-        finally:
-            waiting.dismiss()
-    except (XySysidError, OSError) as problem:
-        session.say(str(problem))
-        return
+        found: Listing | None = await beside(session, lambda: run.io_bound(_listed, session.shelf.find(name)))
+    finally:
+        waiting.dismiss()
     if found is not None:
         ColumnsDialog(session, name, found)
 

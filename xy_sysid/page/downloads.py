@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
+import tempfile
 from collections.abc import Callable
+from pathlib import Path
 
 from nicegui import run, ui
 
-from xy_sysid.errors import XySysidError
 from xy_sysid.files.story_models import model_text
-from xy_sysid.page.orders import Source
+from xy_sysid.page.beside import asked, beside
+from xy_sysid.page.orders import Reading, Source
 from xy_sysid.page.session import Session
 
 
@@ -44,13 +46,20 @@ class Downloads:
             return
         waiting = ui.notification("The report is being written ...", spinner=True, timeout=None)
         try:
-            page = await run.io_bound(self._session.report, path, getattr(self._source, "how", self._session.reading))
+            reading = getattr(self._source, "how", self._session.reading)
+            page = await beside(self._session, lambda: run.io_bound(report_text, path, reading))
             if page:
                 ui.download.content(page, f"{plain_name(self._source.title)}.report.html")
-        except XySysidError as problem:
-            self._session.say(str(problem))
         finally:
             waiting.dismiss()
+
+
+def report_text(path: Path, reading: Reading) -> str:
+    """The report of a recording that is read so, as ``xy-sysid report`` writes it; raises BadInput with what it says. Takes a while."""
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "report.html"
+        asked(("report", str(path), "-o", str(out), *reading.words), ("report", "not written", "a recording with a usable axis"))
+        return out.read_text(encoding="utf-8")
 
 
 def plain_name(title: str) -> str:

@@ -18,6 +18,7 @@ from xy_sysid.page import worker
 from xy_sysid.page.orders import Order, OrderKind, OrderState, Reading, WorkerNews
 
 KEYS = itertools.count(1)
+ENDED = "its process has ended. Open it again; the log may say why."
 
 
 class OpenRecording:
@@ -123,14 +124,14 @@ class OpenRecording:
         try:
             self._orders.send(order)
         except OSError:
-            self._lost("its process has ended")
+            self._lost(ENDED)
 
     def _listen(self, words: Connection) -> None:
         while True:
             try:
                 self._hear(words.recv())
             except (EOFError, OSError):
-                self._lost("its process has ended")
+                self._lost(ENDED)
                 return
 
     def _hear(self, news: WorkerNews) -> None:

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
-import tempfile
 import threading
 import time
 from collections import deque
@@ -109,17 +106,6 @@ class Session:
         self.link.stop(told)
         answered.wait(patience)
         return answer[0]
-
-    def report(self, path: Path, reading: Reading) -> str:
-        """The report of a recording that is read so, as ``xy-sysid report`` writes it; raises BadInput with what it says. Takes a while."""
-        with tempfile.TemporaryDirectory() as folder:
-            out = Path(folder) / "report.html"
-            command = [sys.executable, "-m", "xy_sysid", "report", str(path), "-o", str(out), *reading.words]
-            done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
-            if done.returncode != 0 or not out.is_file():
-                lines = [line for line in done.stderr.splitlines() if line.strip()]
-                raise BadInput("report", "not written", "a recording with a usable axis", lines[-1] if lines else "")
-            return out.read_text(encoding="utf-8")
 
     def figure(self, key: tuple[object, ...], make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
         """The figure of that key, drawn once for all pages."""

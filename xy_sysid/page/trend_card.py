@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from nicegui import run, ui
 
-from xy_sysid.errors import BadInput, XySysidError
+from xy_sysid.errors import BadInput
+from xy_sysid.page.beside import beside
 from xy_sysid.page.plot import Plot
 from xy_sysid.page.session import Session
 from xy_sysid.page.shelf import Shelf
@@ -57,12 +58,8 @@ class TrendCard:
         self._wait.set_visibility(True)
         self._open.disable()
         name = str(self._table.value)
-        try:
-            self._found = await run.cpu_bound(found, find(self._session.shelf, name))
-            self._name = name
-        except XySysidError as problem:
-            self._found = None
-            self._session.say(str(problem))
+        self._found = await beside(self._session, lambda: run.cpu_bound(found, find(self._session.shelf, name)))
+        self._name = name
         self._wait.set_visibility(False)
         self._open.enable()
         if self._found is not None:

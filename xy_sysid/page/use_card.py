@@ -7,7 +7,7 @@ from typing import Any
 
 from nicegui import run, ui
 
-from xy_sysid.errors import XySysidError
+from xy_sysid.page.beside import beside
 from xy_sysid.page.buttons import heeded
 from xy_sysid.page.downloads import plain_name
 from xy_sysid.page.orders import Source
@@ -95,10 +95,7 @@ class UseCard:
         self._working = True
         waiting = ui.notification("xy-sysid use is running ...", spinner=True, timeout=None)
         try:
-            return await run.io_bound(act, *arguments)
-        except XySysidError as problem:
-            self._session.say(str(problem))
-            return None
+            return await beside(self._session, lambda: run.io_bound(act, *arguments))
         finally:
             self._working = False
             waiting.dismiss()

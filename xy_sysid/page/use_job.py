@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import io
-import subprocess
-import sys
 import tempfile
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from xy_sysid.errors import BadInput
 from xy_sysid.files.story_models import model_text
+from xy_sysid.page.beside import asked
 
 
 def used_text(documents: Mapping[str, Mapping[str, Any]], recording: Path | None, reading: tuple[str, ...], limit: float | None) -> str:
@@ -41,9 +39,4 @@ def _asked(folder: Path, documents: Mapping[str, Mapping[str, Any]], recording: 
     model = folder / "axes.yaml"
     model.write_text(model_text("page", documents), encoding="utf-8")
     on = () if recording is None else ("--on", str(recording))
-    command = [sys.executable, "-m", "xy_sysid", "use", str(model), *on, *more]
-    done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        lines = [line for line in done.stderr.splitlines() if line.strip()]
-        raise BadInput("model", "not to be used", "one that the data determine", lines[-1] if lines else "")
-    return done.stdout
+    return asked(("use", str(model), *on, *more), ("model", "not to be used", "one that the data determine"))

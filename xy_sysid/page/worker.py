@@ -14,9 +14,8 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
-from xy_sysid.errors import XySysidError
 from xy_sysid.page.orders import Order, Reading, WorkerNews
-from xy_sysid.story.attempt import Attempt
+from xy_sysid.story.attempt import BROKEN, Attempt
 
 if TYPE_CHECKING:
     from xy_sysid.story.acts import Act, Job
@@ -97,10 +96,11 @@ def main(path: str, reading: Reading, orders: Connection, words: Connection) -> 
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the page's; it closes the pipe
     signal.signal(LEAVE, leave)
-    try:
+    with Attempt(BROKEN) as opening:
         desk = Desk(Path(path), reading, say)
-    except XySysidError as problem:
-        words.send(WorkerNews("closed", words=str(problem)))
+    if opening.problem:
+        sys.stderr.write(f"{path}: {opening.detail}\n" if opening.detail else "")
+        words.send(WorkerNews("closed", words=opening.problem))
         return
     while True:
         try:

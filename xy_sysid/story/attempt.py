@@ -12,6 +12,7 @@ UNFORESEEN = (
     "This step could not be calculated, and the model stays as it was. Try another effect or another part of the recording. "
     "If it happens again, please report it with the recording and the log."
 )
+BROKEN = "This failed because of an error in xy_sysid. Try other data; if it fails again, please report it with the recording and the log."
 NO_MEMORY = "There is not enough memory for this step, and the model stays as it was. Use a shorter part of the recording, or close others."
 
 
@@ -21,8 +22,10 @@ class Attempt:
     Errors of a broken pipe or file pass: they end whoever talks through it.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, unforeseen: str = UNFORESEEN) -> None:
+        """unforeseen: the sentence for an error that nobody thought of."""
         self.problem, self.detail = "", ""
+        self._unforeseen = unforeseen
 
     def __enter__(self) -> Attempt:
         return self
@@ -36,5 +39,5 @@ class Attempt:
         frames = traceback.extract_tb(trace)
         place = f" in {frames[-1].name}, line {frames[-1].lineno}" if frames else ""
         self.detail = f"{type(error).__name__}{place}: {' '.join(str(error).split())[:LONGEST]}"
-        self.problem = NO_MEMORY if isinstance(error, MemoryError) else UNFORESEEN
+        self.problem = NO_MEMORY if isinstance(error, MemoryError) else self._unforeseen
         return True

@@ -1,0 +1,41 @@
+"""Work beside the page's loop: whatever goes wrong in it becomes a sentence on the page, and its place in the log."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Awaitable, Callable, Sequence
+from typing import TypeVar
+
+from xy_sysid.errors import BadInput
+from xy_sysid.page.session import Session
+from xy_sysid.story.attempt import BROKEN, Attempt
+
+Made = TypeVar("Made")
+
+
+async def beside(session: Session, work: Callable[[], Awaitable[Made]]) -> Made | None:
+    """What the work gives; None where it fails, which is told to everybody."""
+    try:
+        with Attempt(BROKEN) as attempt:
+            return await work()
+        problem = attempt.problem
+    except OSError as error:
+        problem = f"{f'{error.filename}: ' if error.filename else ''}{error.strerror or BROKEN}"
+    if attempt.detail:
+        sys.stderr.write(f"{attempt.detail}\n")
+    session.say(problem)
+    return None
+
+
+def asked(arguments: Sequence[str], what: tuple[str, str, str]) -> str:
+    """What a command of this program answers. what: name, value and what is allowed, of the refusal. Raises BadInput with what it says."""
+    command = [sys.executable, "-m", "xy_sysid", *arguments]
+    done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
+    if done.returncode == 0:
+        return done.stdout
+    lines = [line for line in done.stderr.splitlines() if line.strip()]
+    refused = bool(lines) and lines[-1].startswith("xy-sysid: ")
+    if not refused:
+        sys.stderr.write(done.stderr)
+    raise BadInput(*what, lines[-1] if refused else BROKEN)
