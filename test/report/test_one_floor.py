@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from helpers.cli_tools import cli
 
 import xy_sysid as xy
 from xy_sysid.cli.simulated_recording import simulate
+from xy_sysid.imports import save
 from xy_sysid.page.facts import story_facts
 from xy_sysid.report import story_figures as draw
 from xy_sysid.report.headline import headline
+from xy_sysid.report.story_words import size
 from xy_sysid.report.words import moved, number
 from xy_sysid.samples.recording import Run
 from xy_sysid.story.document import document
@@ -44,6 +48,19 @@ def test_tiles_and_compare_have_the_floor_of_the_ladder(story: dict[str, Any], r
     (tile,) = [fact for fact in story_facts(story) if fact.label == "noise floor"]
     assert tile.text == moved(floor, "m/s", 3)
     assert xy.compare(run).noise_floor == pytest.approx(floor, rel=0.02)
+
+
+def test_commands_report_and_page_say_the_floor_of_the_ladder(story: dict[str, Any], run: Run, tmp_path: Path) -> None:
+    """diagnose and refine have it in their documents, diagnose in its sentence where nothing is missing, and the report in its summary."""
+    floor = story["ladder"][0]["noise_floor"]
+    recording = simulate(20.0, effects=["cogging"], machine="rigid.yaml")
+    save(recording, tmp_path / "rec.npz")
+    diagnosed = cli("diagnose", tmp_path / "rec.npz", "--axis", "x", "--budget", "0.3", "--json").json["axes"]["x"]
+    refined = cli("refine", tmp_path / "rec.npz", "--axis", "x", "--add", "constant_load", "--json").json["axes"]["x"]
+    assert [diagnosed["error"]["noise_floor"], *(rung["noise_floor"] for rung in refined["ladder"])] == pytest.approx([floor] * 3, rel=1e-9)
+    table = cli("refine", tmp_path / "rec.npz", "--axis", "x", "--add", "constant_load").out
+    assert f"floor {1e3 * floor:.4g}" in table
+    assert f"the noise floor is {moved(floor, 'm/s', 3)}" in size(story, 1.0)
 
 
 def test_what_is_held_out_is_shaded_where_it_lies(story: dict[str, Any]) -> None:

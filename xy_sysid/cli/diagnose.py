@@ -87,7 +87,8 @@ def _show(name: str, item: Diagnosis, known: Library, drive: Transmission) -> No
         tried = [(c, c.fit) for c in item.candidates if c.fit is not None]
         tried.sort(key=lambda pair: (float(f"{pair[1].held_out_error:.2g}"), pair[0].effect not in item.effects))  # by what each leaves
         parts = ["-" if fit.one_step else f"{100 * told.get(c.effect, 0.0):.3g} %" for c, fit in tried]  # of another error, one sample ahead
-        rows = [(*error_cells(c.effect, fit), part) for (c, fit), part in zip(tried, parts, strict=True)]
+        names = [f"{c.effect} (refused)" if item.why_refused(c.effect) else c.effect for c, _ in tried]
+        rows = [(*error_cells(name, fit), part) for name, (_, fit), part in zip(names, tried, parts, strict=True)]
         if rows:
             table("alone, least left first", ("effect", f"held-out error {motion(item.units.judged)[1]}", "times floor", "share of error"), rows)
         parameter_table(item.ladder.final)

@@ -139,7 +139,9 @@ def _words(ladder: Ladder) -> str:
     said = {
         "explained": f"Explained by the rigid model and {names}: the held-out error is at the noise floor.",
         "partly": f"{names} explain {100 * ladder.explained:.3g} % of the error's power; {left}.",
-        "not_in_library": "No effect of the library reduces the error.",
+        "not_in_library": f"{names} explain only {100 * ladder.explained:.3g} % of the error's power; {left}."
+        if ladder.effects
+        else "No effect of the library reduces the error.",
     }[verdict(ladder)]
     return f"{said} The search was stopped at its time limit." if ladder.stopped else said
 

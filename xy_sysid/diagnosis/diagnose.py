@@ -63,6 +63,10 @@ class Diagnosis:
         """The first of the effects."""
         return self.effects[0] if self.effects else None
 
+    def why_refused(self, effect: str) -> str:
+        """Why an effect alone explains nothing, whatever it leaves; empty if it is not refused."""
+        return next((reason for names, reason in self.refused if names == (effect,)), "")
+
 
 def diagnose(
     sampling_rate: float,
@@ -113,7 +117,7 @@ def judged(data: AxisData, ladder: Ladder, library: Library) -> Diagnosis:
     motion = max(data.layout.rms(data.floor.motion), 1e-300)
     left = ladder.discrepancy / motion
     where, unit = where_base_fails(data, base), data.units.judged
-    explained, noise = ladder.explained, moved(ladder.noise, unit)
+    explained = ladder.explained
     hides = math.sqrt(math.expm1(AT_FLOOR)) * data.layout.rms(data.floor.power) / motion  # in the noise
     if names and (explained >= 1.0 - explained or final.excess < AT_FLOOR):
         verdict: Kind = "missing_effect"
@@ -131,19 +135,22 @@ def judged(data: AxisData, ladder: Ladder, library: Library) -> Diagnosis:
     elif base.excess < AT_FLOOR:
         verdict, names, explained, experiment = "nothing_missing", (), 0.0, "None is needed."
         confidence = (1.0 - max(base.excess, 0.0)) * (1.0 - _hidden(hides, data.floor.epsilon))
-        sentence = f"Nothing is missing: the rigid model with delay leaves {moved(base.held_out_error, unit)}, the noise alone is {noise}."
+        sentence = f"Nothing is missing: the rigid model with delay leaves {moved(base.held_out_error, unit)}, which is at the noise floor"
+        sentence += f" ({moved(base.noise_floor, unit)})."
         sentence += f" What changes the motion by less than {_percent(hides)} could hide in it."
     else:
         verdict, experiment = "not_in_library", _UNKNOWN
         confidence = (1.0 - ladder.helps) * (1.0 - _hidden(max(left, hides), data.floor.epsilon))
-        takes = "take" if len(names) > 1 else "takes"
-        best = f"; at best {_listed(names)} {takes} away {_percent(explained)}" if names and explained > 0.0 else ""
-        sentence = f"Not in the library: no effect explains what the rigid model leaves ({moved(base.held_out_error, unit)}, {_percent(left)} of the "
-        sentence += f"motion{best}; noise alone is {noise})."
+        beyond = data.layout.rms(_beyond_noise(data, base))
+        sentence = f"Not in the library: no effect explains what the rigid model leaves ({moved(base.held_out_error, unit)}). Beyond the encoder's "
+        sentence += f"noise that is {moved(beyond, unit)}, {_percent(beyond / motion)} of the motion{_mostly(data, base)}."
+        if names and explained > 0.0:
+            sentence += f" At best {_listed(names)} {'explain' if len(names) > 1 else 'explains'} {_percent(explained)} of the error's power."
     if ladder.kept_out is not None and verdict != "nothing_missing":
-        leaves = "would leave" if len(ladder.kept_out.effects) > 1 else "alone would leave"
-        sentence += f" {_listed(ladder.kept_out.effects)} {leaves} {moved(ladder.kept_out.fit.held_out_error, unit)}, and is refused:"
-        sentence += f" {ladder.kept_out.refused}."
+        several = len(ladder.kept_out.effects) > 1
+        leaves = "would leave" if several else "alone would leave"
+        sentence += f" {_listed(ladder.kept_out.effects)} {leaves} {moved(ladder.kept_out.fit.held_out_error, unit)}, and"
+        sentence += f" {'are' if several else 'is'} refused: {ladder.kept_out.refused}."
     if ladder.stopped:
         sentence += " The search was stopped by its budget."
         confidence *= 0.8
@@ -254,12 +261,17 @@ def _left(data: AxisData, ladder: Ladder, left: float) -> str:
 
 def _mostly(data: AxisData, final: GreyboxFit) -> str:
     """Where in frequency most of what is left lies."""
-    power = data.layout.lines * np.maximum(final.power - data.floor.noise, 0.0)
+    power = data.layout.lines * _beyond_noise(data, final)
     if not float(power.sum()) > 0.0:
         return ""
     edges, share = data.layout.edges(), np.cumsum(power) / power.sum()
     low, high = (int(np.searchsorted(share, at)) for at in (0.1, 0.8))
     return f", mostly between {edges[low]:.3g} and {edges[min(high + 1, edges.size - 1)]:.3g} Hz"
+
+
+def _beyond_noise(data: AxisData, fit: GreyboxFit) -> FloatArray:
+    """(bands,) power of the held-out error beyond the encoder's noise, band by band: noise that one band has less of hides nothing in another."""
+    return np.asarray(np.maximum(fit.power - data.floor.noise, 0.0))
 
 
 def where_base_fails(data: AxisData, fitted: GreyboxFit) -> Comparison | None:

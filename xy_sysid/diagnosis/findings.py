@@ -139,7 +139,7 @@ def findings(item: Diagnosis, library: Library) -> Findings:
         tolerance=item.tolerance,
         sentence=item.sentence,
         where=item.where.places if item.where is not None else (),
-        candidates=tuple(_tried(candidate, fit, ladder.base) for candidate, fit in fitted) if ladder is not None else (),
+        candidates=tuple(_tried(candidate, fit, ladder.base, item.why_refused(candidate.effect)) for candidate, fit in fitted) if ladder else (),
         runner_up=_runner_up(ladder) if named and ladder is not None else None,
         look_alikes=_look_alikes(fitted, item.effects[0], library) if named else (),
         ladder=rungs,
@@ -153,7 +153,7 @@ def findings(item: Diagnosis, library: Library) -> Findings:
     )
 
 
-def _tried(item: Candidate, fit: GreyboxFit, base: GreyboxFit) -> Tried:
+def _tried(item: Candidate, fit: GreyboxFit, base: GreyboxFit, refused: str) -> Tried:
     before, unit = base.held_out_error, base.units.judged
     if fit.one_step:
         evidence = (
@@ -162,6 +162,8 @@ def _tried(item: Candidate, fit: GreyboxFit, base: GreyboxFit) -> Tried:
         )
     else:
         evidence = f"alone it takes away {100 * item.explained:.3g} % of the error's power: {bare(before, unit)} -> {moved(fit.held_out_error, unit)}"
+    if refused:
+        evidence += f"; it is refused ({refused})"
     ratio = fit.held_out_error / before if before > 0 else None
     return Tried(
         effect=item.effect,
