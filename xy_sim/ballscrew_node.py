@@ -16,6 +16,7 @@ from std_msgs.msg import Float64MultiArray
 
 from xy_sim.machine import Machine
 from xy_sysid.errors import BadInput
+from xy_sysid.live.recent import Recent
 from xy_sysid.nodes.common import DATA_QOS, WalledNode, declare
 from xy_sysid.nodes.convert import from_message, status, to_message
 from xy_sysid.nodes.diagnostics import Diagnostics
@@ -43,6 +44,7 @@ class BallscrewNode(WalledNode):
         self._heard = time.monotonic()
         self._epoch = 0.0  # s, time of the sample with counter 0, as the voltage has it
         self._faults: dict[str, int] = {}
+        self._recent = Recent()
         self._said = "waiting for voltage"
         self._position = self.create_publisher(Float64MultiArray, "position", DATA_QOS)
         self._metrics = Diagnostics(self)
@@ -119,11 +121,12 @@ class BallscrewNode(WalledNode):
     def _report(self) -> None:
         silent = time.monotonic() - self._heard > IDLE
         message = "no voltage: motors off" if silent else "moving"
-        level = 1 if self._faults and not silent else 0
+        goes_on = self._recent.goes_on("faults", sum(self._faults.values()), time.monotonic())
+        level = 1 if goes_on and not silent else 0
         listeners = str(self._position.get_subscription_count())
         values = {
             "samples": str(self._machine.samples),
             "listeners": listeners,
             **{f"voltage {what}": str(number) for what, number in self._faults.items()},
         }
-        self._metrics.publish([status("ballscrew", level, self._said if self._faults else message, values)])
+        self._metrics.publish([status("ballscrew", level, self._said if goes_on else message, values)])

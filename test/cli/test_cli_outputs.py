@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 from helpers.cli_tools import RIGID, cli, npz, refused, rigid
+from typer.models import ArgumentInfo, OptionInfo
+from typer.utils import get_params_from_function
 
+from xy_sysid.cli.app import app
 from xy_sysid.imports import save
 from xy_sysid.samples.recording import Recording
 
 OLD = b"what was there before"
+WRITES = r"write |the page to write|folder of the new bag|new bag|output folder|folder for the files|folder of Parquet files|trajectory_msgs"
 QUICK = (*RIGID, "--set", "length=1024")
 
 
@@ -30,6 +35,12 @@ FILES: dict[str, tuple[str, ...]] = {
     "report -o": ("report", "REC", *QUICK, "-o", "OUT"),
     "study -o": ("study", "REC", *QUICK, "-o", "OUT"),
     "simulate --truth": ("simulate", "NEW", "--duration", "1", "--truth", "OUT"),
+    "trajectory": ("trajectory", "OUT", "--joint", "pan", "--position", "1", "--speed", "1", "--acceleration", "10", "--seconds", "12"),
+    "next -o": ("next", "--for", "nothing", "--voltage", "5", "--travel=-100:100", "-o", "OUT"),
+}
+REFUSED_AT_ONCE: dict[str, tuple[str, ...]] = {  # before the work, which is not done here
+    "trend -o": ("trend", "NONE", "-o", "OUT"),
+    "fleet --one -o": ("fleet", "--one", "NONE", "-o", "OUT"),
 }
 BAGS: dict[str, tuple[str, ...]] = {
     "simulate": ("simulate", "OUT", "--duration", "1"),
@@ -56,15 +67,43 @@ def test_a_file_is_replaced_with_force_only(name: str, rec: Path, tmp_path: Path
     assert out.read_bytes() != OLD
 
 
-@pytest.mark.parametrize("name", FILES)
+@pytest.mark.parametrize("name", [*FILES, *REFUSED_AT_ONCE])
 def test_a_link_is_followed_with_force_only(name: str, rec: Path, tmp_path: Path) -> None:
     """The line says where the link leads, be there a file or none yet."""
     other, link = tmp_path / "elsewhere" / "precious", tmp_path / "out"
     other.parent.mkdir()
     link.symlink_to(other)
-    assert str(other) in refused(*words(FILES[name], rec, link)) and not other.exists()
+    row = (FILES | REFUSED_AT_ONCE)[name]
+    assert str(other) in refused(*words(row, rec, link)) and not other.exists()
     other.write_bytes(OLD)
-    assert str(other) in refused(*words(FILES[name], rec, link)) and other.read_bytes() == OLD
+    assert str(other) in refused(*words(row, rec, link)) and other.read_bytes() == OLD
+
+
+def test_the_files_of_a_model_in_use_do_not_follow_links(rec: Path, tmp_path: Path) -> None:
+    """Its folder holds many: each name is looked at before any is written."""
+    model, out = tmp_path / "model.yaml", tmp_path / "out"
+    assert cli("refine", rec, "--add", "coulomb_friction", "--model", model).code == 0
+    assert cli("use", model, "--limit", "5", "--to", "c", "-o", out).code == 0
+    name, other = sorted(out.iterdir())[0], tmp_path / "precious"
+    other.write_bytes(OLD)
+    for made in out.iterdir():
+        made.unlink()
+    name.symlink_to(other)
+    assert str(other) in refused("use", model, "--limit", "5", "--to", "c", "-o", out) and other.read_bytes() == OLD
+
+
+def test_every_option_that_writes_a_file_is_looked_at_here() -> None:
+    """A new one goes into these tables: each command whose help says that an option or argument writes something."""
+    writing = {
+        f"{command.name} {parameter.name}"
+        for command in app.registered_commands
+        for parameter in (get_params_from_function(command.callback) if command.callback is not None else {}).values()
+        if isinstance(parameter.default, (OptionInfo, ArgumentInfo)) and re.match(WRITES, parameter.default.help or "") and parameter.name != "to"
+    }
+    assert writing == {
+        *("figures out", "fit mat", "fit model", "fleet out", "frf csv", "next output", "record out", "refine mat", "refine model", "replay out"),
+        *("report out", "simulate out", "simulate truth", "study out", "trajectory out", "trend out", "use out"),
+    }
 
 
 @pytest.mark.parametrize("name", BAGS)

@@ -321,6 +321,14 @@ def test_replay_of_a_robots_bag_takes_the_nodes_own_parameters(tmp_path: Path) -
     assert "rad/s/(N m)" in " ".join(told["axes"]["x"]["values"]) or told["axes"]["x"]["values"]["input unit"] == "N m"
 
 
+@pytest.mark.parametrize("name", ["ros2_control.yaml", "real.yaml"])
+def test_a_run_file_to_copy_fixes_no_orders(name: str) -> None:
+    """They come from the data of the machine, which the template does not know."""
+    nodes = yaml.safe_load((ROOT / "config" / name).read_text(encoding="utf-8"))["nodes"]
+    (own,) = [node.get("parameters") or {} for node in nodes if node["executable"] == "identifier"]
+    assert not {"numerator_order", "denominator_order"} & own.keys()
+
+
 def test_replay_takes_the_run_file_of_the_guide(tmp_path: Path) -> None:
     """docs/ros2-control.md writes one file for ``run`` and ``replay``: the template, with the names of the joint set, replays a bag of that joint."""
     robot_bag(tmp_path / "bag")

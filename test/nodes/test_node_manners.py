@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from helpers import ROOT
 from helpers.busy import allowed
 from helpers.cli_tools import bare
 from helpers.live_nodes import FAST, Source, newest
 from helpers.ros_tools import Integrator, World, needs_ros, world_in
+
+from xy_sysid.errors import BadInput
+from xy_sysid.files.ros_parameters import NODES
+from xy_sysid.samples.block import Block
+from xy_sysid.settings import build, knobs
 
 pytestmark = needs_ros
 
@@ -277,3 +284,53 @@ def test_joints_of_another_publisher_are_no_warning_and_a_fault_that_is_over_cle
     begun = time.monotonic()
     assert world.until(lambda: levels()[-1] == 0, 20.0), [one.message for one in statuses][-3:]
     assert time.monotonic() - begun < allowed(10.0) and int(newest(statuses, "streams")["messages refused"]) == 1
+
+
+def test_a_simulated_machine_that_missed_some_voltage_says_so_for_ten_seconds(world: World) -> None:
+    """A hole in the counter of the voltage is a WARN, and is none any more within 10 s; the count stays."""
+    import time
+
+    from std_msgs.msg import Float64MultiArray
+
+    from xy_sysid.nodes.common import DATA_QOS
+    from xy_sysid.nodes.convert import to_message
+
+    topic = world.node.create_publisher(Float64MultiArray, "voltage", DATA_QOS)
+    statuses = world.statuses()
+    world.start(BALLSCREW, {"machine": "rigid.yaml"})
+    assert world.until(lambda: topic.get_subscription_count() == 1, 40.0)
+    sent = [0]
+
+    def tick() -> None:
+        seq = np.arange(sent[0], sent[0] + 20, dtype=np.float64)
+        topic.publish(to_message(Block(("x", "y"), seq, 1e9 + seq / 2000.0, np.zeros((20, 2)))))
+        sent[0] += 20
+
+    def levels() -> list[int]:
+        return [status.level[0] for status in statuses if status.name == "ballscrew"]
+
+    world.node.create_timer(0.02, tick)
+    assert world.until(lambda: levels()[-3:] == [0, 0, 0], 20.0)
+    sent[0] += 100
+    assert world.until(lambda: levels()[-1] == 1, 5.0)
+    begun = time.monotonic()
+    assert world.until(lambda: levels()[-1] == 0, 20.0), [one.message for one in statuses][-3:]
+    assert time.monotonic() - begun < allowed(10.0) and newest(statuses, "ballscrew")["voltage lost"] == "1"
+
+
+@pytest.mark.parametrize("node", NODES)
+def test_no_range_of_a_descriptor_has_an_end_that_is_refused(node: str) -> None:
+    """Both ends of the range of every number of every node; what does not fit together with another setting is another matter."""
+    from xy_sysid.nodes.common import describe
+
+    refused = {}
+    for item in knobs(NODES[node]()):
+        descriptor = describe(item)
+        ends = [end for one in (*descriptor.floating_point_range, *descriptor.integer_range) for end in (one.from_value, one.to_value)]
+        for end in ends:
+            try:
+                build(NODES[node], {item.name: end})
+            except BadInput as problem:
+                if re.search(r"allowed: [<>]", str(problem)):
+                    refused[item.name] = str(problem)
+    assert refused == {}
