@@ -112,7 +112,7 @@ def words(name: str, row: Shared, folder: Path, short: bool) -> list[str]:
     found = [name, str(DATA / row.path)]
     if name == "columns":
         return found
-    own = {"refine": ["--auto"], "report": ["-o", str(folder / "report.html")]}.get(name, [])
+    own = {"refine": ["--auto"], "report": ["-o", str(folder / "report.html"), "--force"]}.get(name, [])
     return [*found, *own, *row.options, *(row.part if short else ()), *(SHORT.get(name, ()) if short else ())]
 
 
@@ -122,7 +122,10 @@ def told(name: str, row: Shared, folder: Path, short: bool = False, seconds: flo
     what = f"xy-sysid {' '.join(asked)}"
     with warnings.catch_warnings(record=True) as warned, at_most(seconds):
         warnings.simplefilter("always")
-        found = answered(command(*asked), what)
+        try:
+            found = answered(command(*asked), what)
+        except Exception as error:  # noqa: BLE001  whatever it is, it is what is looked for
+            return Found("traceback", note=f"{what}: {type(error).__name__}: {error}")
     if warned:
         return Found("not told", note=f"{what}: {warned[0].category.__name__}: {warned[0].message} ({warned[0].filename}:{warned[0].lineno})")
     return found

@@ -49,3 +49,17 @@ def test_an_axis_at_constant_speed_is_not_said_to_stand() -> None:
     position = np.cumsum(u) * 0.01 + 1e-4 * np.random.default_rng(1).normal(size=n)
     said = lacking(100.0, [(u + 1e-3 * np.random.default_rng(2).normal(size=n), position)])
     assert "stands" not in said
+
+
+def test_refine_refuses_what_diagnose_calls_not_enough_data(parts: list[Recording]) -> None:
+    """An output that stands, one that does not follow the input, and too few windows: one line with the same reason, as no fit tells anything."""
+    rng = np.random.default_rng(3)
+    drive = rng.normal(size=3000)
+    for position in (np.full(3000, 0.2), np.cumsum(rng.normal(size=3000)) * 1e-3):
+        run = Recording.from_arrays(100.0, drive, position).run("x")
+        found = xy.diagnose(run)
+        assert found.verdict == "not_enough_data"
+        with pytest.raises(xy.BadInput, match=found.next_experiment.split(";")[0].split("(")[0].strip()):
+            xy.refine(run)
+    with pytest.raises(xy.BadInput):
+        xy.refine(parts[0])

@@ -182,8 +182,12 @@ def refined(data: Data, names: tuple[str, ...], library: Library, effort: Effort
     for name in names:
         if library[name].category == "base":
             raise BadInput("add", name, "an effect that is not in every model already", "Leave it out.")
+    rate, signals, units = runs[0].sampling_rate, [(run.voltage, run.position) for run in runs], runs[0].units
     with threadpool_limits(1, "blas"):
-        prepared = prepare_all(runs[0].sampling_rate, [(run.voltage, run.position) for run in runs], tolerance, runs[0].units)
+        prepared = prepare_all(rate, signals, tolerance, units)
+        missing = lacking(rate, signals, units)
+        if missing:
+            raise BadInput(f"data of axis {runs[0].axis}", "not enough", "what a model can be fitted to and judged by", missing)
         ladder = search(prepared, library, names, effort)
     digests = tuple(run.digest for run in runs)
     steps = tuple(
