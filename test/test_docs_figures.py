@@ -11,7 +11,7 @@ def rows(name: str) -> list[list[str]]:
     """The cells of a table that a benchmark writes, without its heading."""
     part = PAGE.read_text(encoding="utf-8").split(f"<!-- made by python -m campaigns.bench {name} -->")[1].split(f"<!-- end of {name} -->")[0]
     lines = [line for line in part.splitlines() if line.startswith("| ") and "---" not in line]
-    return [[cell.strip() for cell in line.strip("| ").split("|")] for line in lines[1:]]
+    return [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines[1:]]
 
 
 def test_two_tables_of_real_machines_tell_the_same_error_of_the_same_recording() -> None:

@@ -45,7 +45,8 @@ def main(short: bool = False) -> None:
     for row in rows(short):
         answer, words, seconds = asked(row)
         if answer is None:
-            refused.append(f"- {words.removeprefix('xy-sysid: ')}")
+            reason = words.removeprefix("xy-sysid: ")
+            refused.append(f"- {reason}" if reason.startswith(row.path) else f"- {row.path}: {reason}")
             continue
         for number, (name, found) in enumerate(answer["axes"].items()):
             title = row.path if len(answer["axes"]) == 1 else f"{row.path}, {name}"

@@ -143,7 +143,7 @@ def ours(data: AxisData) -> dict[str, tuple[GreyboxFit, float]]:
 def compared(title: str, data: AxisData) -> list[tuple[str, ...]]:
     """The rows of one axis."""
     found: list[tuple[str, ...]] = []
-    unit = data.units.speed
+    unit = data.units.judged
     for structure, (fit, seconds) in ours(data).items():
         begun = time.process_time()
         reached = peers(data, COULOMB in fit.model)
