@@ -44,7 +44,7 @@ def test_before_and_after_are_told_on_the_machines_own_recording(model: xy.Physi
         assert item.worst >= item.whole and item.largest <= item.limit == np.max(np.abs(other.voltage))
     assert used.gains["kS"].low < 0.3 < used.gains["kS"].high
     assert not used.notes
-    assert "fitted to this very recording" in " ".join(use(model, recorded("coulomb_friction=0.3", 12.0).run("x")).notes)
+    assert "fitted to this recording" in " ".join(use(model, recorded("coulomb_friction=0.3", 12.0).run("x")).notes)
 
 
 def test_a_model_without_intervals_is_used_with_a_warning() -> None:

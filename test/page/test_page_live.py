@@ -205,7 +205,7 @@ def test_a_bag_is_recorded_and_opened_beside(scene: Scene) -> None:
     tab.until(lambda: (scene.folder / "taken").is_dir(), 15)
     tab.until(lambda: min(recorded(scene.folder / "taken", topic) for topic in ("voltage", "position")) > 300, 40, "the bag does not grow")
     tab.press("finish")
-    tab.until(lambda: "recorded taken" in tab.notices(), 15)
+    tab.until(lambda: "recorded taken" in tab.notices() or tab.page.locator("[data-act=open-bag]").is_visible(), 15)
     tab.press("open-bag")
     tab.until(lambda: tab.page.locator(".panel").count() == 2 and "2000 Hz" in str(tab.page.locator(".panel").nth(1).text_content()), 30)
     assert not (scene.folder.parent / "elsewhere").exists()

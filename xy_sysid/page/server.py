@@ -17,6 +17,7 @@ from nicegui import run, ui
 from xy_sysid.errors import BadInput
 from xy_sysid.page.access import Access, rules
 from xy_sysid.page.address import view_of_query
+from xy_sysid.page.beside import beside
 from xy_sysid.page.guard import Guard
 from xy_sysid.page.layout import build
 from xy_sysid.page.session import Session
@@ -74,7 +75,7 @@ def application(session: Session, access: Access) -> FastAPI:
         ui.add_css(style)
         ui.add_body_html(f"<script>{script}</script><div id=gone role=alert></div>")
         view = view_of_query(request.url.query)
-        await run.io_bound(session.open_view, view)
+        await beside(session, lambda: run.io_bound(session.open_view, view))
         build(session, view)
 
     ui.run_with(app, title="xy_sysid", language="en-US", dark=None, tailwind=False, reconnect_timeout=10.0, show_welcome_message=False)
