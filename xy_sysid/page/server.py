@@ -24,6 +24,7 @@ from xy_sysid.page.session import Session
 
 CONFIRMS = 2.0  # s in which the machine confirms a STOP; then the request is answered that it has not
 GRACE = 1  # s that open pages may take when the server ends
+PATIENCE = 60.0  # s that a page may take to be built, with the recordings that its address names
 PORTS = 20  # tried after the wished one when that is taken
 
 
@@ -70,12 +71,13 @@ def application(session: Session, access: Access) -> FastAPI:
     style = (assets / "page.css").read_text(encoding="utf-8")
     script = (assets / "page.js").read_text(encoding="utf-8")
 
-    @ui.page("/", title="xy_sysid", dark=None)
+    @ui.page("/", title="xy_sysid", dark=None, response_timeout=PATIENCE)
     async def page(request: Request) -> None:
         ui.add_css(style)
         ui.add_body_html(f"<script>{script}</script><div id=gone role=alert></div>")
         view = view_of_query(request.url.query)
-        await beside(session, lambda: run.io_bound(session.open_view, view))
+        if any(source.name for source in view.sources):
+            await beside(session, lambda: run.io_bound(session.open_view, view))
         build(session, view)
 
     ui.run_with(app, title="xy_sysid", language="en-US", dark=None, tailwind=False, reconnect_timeout=10.0, show_welcome_message=False)
