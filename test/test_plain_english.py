@@ -14,7 +14,7 @@ INSTEAD = {
     r"(told|tells?|telling)\b[^.:,;]{0,40} apart\b": "distinguish",
     r"\btakes? away\b": "explains, removes",
     r"\bthe (former|latter)\b": "the name itself",
-    r"\bit is so that\b": "",
+    r"\bit is so that\b": "the statement alone",
     r"\bfor ever\b": "how long, or no end",
     r"\bwhoever\b": "the person: an operator, a reader, you",
     r"\bunasked\b": "by itself, by default",
@@ -22,7 +22,7 @@ INSTEAD = {
     r"\bnobody (tells|knows|says)\b": "it is not known",
     r"\bin vain\b": "without success",
     r"\bthis very\b": "this",
-    r"\bof which the\b": "a sentence of its own",
+    r"\bof which the\b": "a second sentence",
     r"\bwhat is to be\b": "a noun",
 }
 

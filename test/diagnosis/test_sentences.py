@@ -76,13 +76,13 @@ def test_an_effect_that_leaves_little_and_is_refused_says_so_where_it_stands(dat
 
 
 def test_refine_does_not_say_that_nothing_helps_beside_a_falling_error(ladder: Ladder) -> None:
-    """An effect that takes away a tenth is named with its part; without any effect the sentence is another one."""
+    """If an effect explains a tenth of the error, the sentence gives the effect and the tenth. If no effect was found, it says that none helps."""
     assert verdict(ladder) == "not_in_library" and _words(ladder) == "No effect of the library reduces the error."
     falling = replace(
         ladder, effects=("cogging",), final=replace(ladder.base, held_out_error=0.95 * ladder.base.held_out_error), explained=0.1, discrepancy=1e-3
     )
     assert verdict(falling) == "not_in_library"
-    assert _words(falling) == "cogging explain only 10 % of the error's power; the residual error beyond the noise is 1 mm/s."
+    assert _words(falling) == "cogging explains only 10 % of the error's power; the residual error beyond the noise is 1 mm/s."
 
 
 def test_nothing_missing_is_told_with_the_floor_of_the_ladder(data: AxisData) -> None:

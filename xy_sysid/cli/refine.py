@@ -133,11 +133,12 @@ def verdict(ladder: Ladder) -> str:
 
 def _words(ladder: Ladder) -> str:
     names = ", ".join(ladder.effects) or "nothing"
+    explain = "explain" if len(ladder.effects) > 1 else "explains"
     left = f"the residual error beyond the noise is {moved(ladder.discrepancy, ladder.final.units.judged)}"
     said = {
         "explained": f"Explained by the rigid model and {names}: the held-out error is at the noise floor.",
-        "partly": f"{names} explain {100 * ladder.explained:.3g} % of the error's power; {left}.",
-        "not_in_library": f"{names} explain only {100 * ladder.explained:.3g} % of the error's power; {left}."
+        "partly": f"{names} {explain} {100 * ladder.explained:.3g} % of the error's power; {left}.",
+        "not_in_library": f"{names} {explain} only {100 * ladder.explained:.3g} % of the error's power; {left}."
         if ladder.effects
         else "No effect of the library reduces the error.",
     }[verdict(ladder)]

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from nicegui import run, ui
 
 from xy_sysid.errors import BadInput, XySysidError
-from xy_sysid.imports.reading import Reading as FileReading
 from xy_sysid.page.beside import beside
 from xy_sysid.page.fields import on_press, typed
-from xy_sysid.page.orders import Reading
+from xy_sysid.page.orders import Reading, read_so
 from xy_sysid.page.session import Session
 
 if TYPE_CHECKING:
@@ -49,12 +48,10 @@ def reading_of(time: str, rate: float | None, axes: Sequence[AxisColumns], usual
             columns[f"{one.axis}.{role}"] = column
             if unit:
                 units[f"{one.axis}.{role}"] = unit
-    FileReading(columns=columns, units=units, rate=rate)  # refuses what no reader takes
     words = [text for what, column in columns.items() for text in ("--map", f"{what}={column}")]
     words += [text for what, unit in units.items() for text in ("--unit", f"{what}={unit}")]
-    words += ["--rate", f"{rate:g}"] if rate else []
-    said = {"columns": columns, "units": units, **({"rate": rate} if rate else {})}
-    return replace(usual, load={**usual.load, **said}, words=(*usual.words, *words))
+    words += ["--rate", f"{rate:.15g}"] if rate else []
+    return read_so(usual, words)
 
 
 def guesses(found: Listing) -> tuple[str, list[AxisColumns]]:
