@@ -39,7 +39,7 @@ def test_four_commands_lead_from_a_hidden_effect_to_the_noise_floor(tmp_path: Pa
     for axis in ("x", "y"):
         assert re.search(rf"axis {axis}: the error is [\d.]+ times the noise floor", said[1].out)
     left = r"\. It explains 100 % of the error's power \(([\d.]+) -> ([\d.]+) mm/s\)\. "
-    left += r"The residual error is at the encoder's noise floor \(([\d.]+) mm/s\)"
+    left += r"The residual error is at the noise floor \(([\d.]+) mm/s\)"
     shown = re.findall(r"^    (axis \w+: Missing: \w+)" + left, part, re.MULTILINE)
     assert len(shown) == 2
     for sentence, *figures in shown:

@@ -45,7 +45,7 @@ def test_the_missing_effect_is_named_and_the_error_falls_to_the_floor(effect: st
     assert found.explained > 0.9
     assert found.discrepancy < 0.35 * found.noise
     assert not found.stopped
-    assert effect in found.sentence and "The residual error is at the encoder's noise floor" in found.sentence
+    assert effect in found.sentence and "The residual error is at the noise floor" in found.sentence
 
 
 def test_two_effects_are_both_named() -> None:

@@ -252,9 +252,9 @@ def _also_called(final: GreyboxFit, names: Sequence[str]) -> str:
 
 
 def _left(data: AxisData, ladder: Ladder, left: float) -> str:
-    noise, beyond = (moved(value, data.units.judged) for value in (ladder.noise, ladder.discrepancy))
+    noise, beyond, least = (moved(value, data.units.judged) for value in (ladder.noise, ladder.discrepancy, ladder.final.noise_floor))
     if ladder.final.excess < AT_FLOOR or not ladder.discrepancy > 0.0:
-        return f"The residual error is at the encoder's noise floor ({noise})."
+        return f"The residual error is at the noise floor ({least})."
     words = "" if ladder.final.one_step else f", {_percent(left)} of the motion"
     return f"What is left: {beyond}{words}, beyond the encoder's noise of {noise}{_mostly(data, ladder.final)}."
 
