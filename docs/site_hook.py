@@ -55,7 +55,7 @@ def _shown(found: re.Match[str], files: Files, config: Any) -> str:
     if not config.extra["notebooks"] or name in ELSEWHERE:
         return f"{found.group()}\n\n```python\n{script.read_text(encoding='utf-8')}```\n"
     own = (ROOT / "docs" / "your-own-effect.md").read_text(encoding="utf-8").split("```python\n")[1].split("```")[0]
-    notebook = executed(script, {"quadratic_drag.py": own})
+    notebook = executed(script, {"mains_hum.py": own})
     files.append(File.generated(config, f"examples/{name}.ipynb", content=nbformat.writes(notebook)))
     link = files.get_file_from_path(f"examples/{name}.ipynb")
     assert link is not None

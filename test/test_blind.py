@@ -169,7 +169,7 @@ def verdict(*effects: str, confidence: float = 1.0, kind: str = "missing_effect"
         (("coulomb_friction", "constant_load"), ("asymmetric_friction",), (), True),
         (("coulomb_friction", "constant_load"), ("asymmetric_friction", "dead_zone"), ("dead_zone",), True),
         (("cogging", "saturation"), ("cogging",), (), False),
-        (("quadratic_drag",), ("coulomb_friction",), ("coulomb_friction",), False),
+        (("thermal_viscosity",), ("coulomb_friction",), ("coulomb_friction",), False),
         ((), ("cogging",), ("cogging",), False),
     ],
 )
@@ -238,7 +238,7 @@ def test_each_set_counts_as_right_what_its_goal_asks_for() -> None:
     assert not hit(replace(second, case=replace(found.case, group="half")))
     assert hit(replace(second, first=True, right=False, case=replace(found.case, group="half")))
     assert not hit(replace(second, first=True, right=False, case=replace(found.case, truth=("coulomb_friction", "cogging"))))
-    for truth, dirt in (((), 0.01), (("quadratic_drag",), 0.0)):
+    for truth, dirt in (((), 0.01), (("thermal_viscosity",), 0.0)):
         case = replace(found.case, truth=truth, dirt=dirt)
         assert not hit(replace(found, case=case, confidence=0.9))
         assert hit(replace(found, case=case, confidence=0.89))

@@ -45,10 +45,10 @@ def test_a_csv_gives_a_transfer_function(tmp_path: Path) -> None:
 def test_an_effect_of_ones_own_is_fitted(tmp_path: Path) -> None:
     """The file of docs/your-own-effect.md; its coefficient comes back."""
     page = (ROOT / "docs" / "your-own-effect.md").read_text(encoding="utf-8")
-    (tmp_path / "quadratic_drag.py").write_text(page.split("```python\n")[1].split("```")[0], encoding="utf-8")
+    (tmp_path / "mains_hum.py").write_text(page.split("```python\n")[1].split("```")[0], encoding="utf-8")
     said = run("own_effect.py", tmp_path)
-    found = float(re.findall(r"^quadratic_drag.coefficient\s+([\d.e+-]+)", said, re.MULTILINE)[0])
-    assert found == pytest.approx(40.0, rel=0.05)
+    found = float(re.findall(r"^mains_hum.amplitude\s+([\d.e+-]+)", said, re.MULTILINE)[0])
+    assert found == pytest.approx(0.5, rel=0.05)
 
 
 def test_bags_of_two_days_are_compared(tmp_path: Path) -> None:

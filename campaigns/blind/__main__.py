@@ -1,7 +1,8 @@
 """python -m campaigns.blind [SET ...] [OPTION ...]: hidden effects, and how often the diagnosis is right; --help says which options there are.
 
 Sets: exact, imperfect 0.2 %, imperfect 1 %, imperfect 3 %, clean dirt, outside, hard, two effects, three effects, first order,
-1 % two effects, 10 s, half, 5 um, quarter, tenth, 5 s, multisine, sweep, prbs, 1 kHz, 5 kHz.
+1 % two effects, 10 s, half, 5 um, quarter, tenth, 5 s, multisine, sweep, prbs, 1 kHz, 5 kHz;
+of MuJoCo (extra foreign): foreign axes, foreign axes, closed loop, foreign joints.
 """
 
 from __future__ import annotations
@@ -21,8 +22,9 @@ def main() -> int:
         os.environ.setdefault(threads, "1")
     import joblib
 
-    from campaigns.blind.cases import sets
-    from campaigns.blind.judge import Judged, run
+    from campaigns.blind.cases import Case, sets
+    from campaigns.blind.foreign import Foreign, foreign, judged
+    from campaigns.blind.judge import Judged
     from campaigns.blind.page import text, with_remarks
     from campaigns.blind.store import add, load
 
@@ -36,7 +38,7 @@ def main() -> int:
     parser.add_argument("--recordings", type=Path, metavar="DIR", help="keep what was simulated there, and take it from there the next time")
     parser.add_argument("-o", type=Path, default=PAGE, metavar="FILE", help="page to write (docs/blind.md)")
     asked = parser.parse_args()
-    known = sets(asked.draws)
+    known: dict[str, list[Case | Foreign]] = {name: list(cases) for part in (sets(asked.draws), foreign(asked.draws)) for name, cases in part.items()}
     if asked.part < 1 or asked.first < 0:
         parser.error(f"--part {asked.part} --first {asked.first}: the one is at least 1, the other at least 0")
     for name in asked.sets:
@@ -58,7 +60,7 @@ def main() -> int:
             cases = known[name][asked.first :: asked.part]
             results[name] = [known_already[case] for case in cases if case in known_already]
             left = [case for case in cases if case not in known_already]
-            for item in joblib.Parallel(asked.jobs, return_as="generator_unordered")(joblib.delayed(run)(case, asked.recordings) for case in left):
+            for item in joblib.Parallel(asked.jobs, return_as="generator_unordered")(joblib.delayed(judged)(case, asked.recordings) for case in left):
                 results[name].append(item)
                 if asked.keep:
                     add(asked.keep, item)

@@ -36,7 +36,7 @@ EFFECTS = (
     "hardening_stiffness",
     "gain_drift",
 )
-OUTSIDE = ("loose_mode", "quadratic_drag", "thermal_viscosity")
+OUTSIDE = ("loose_mode", "thermal_viscosity")
 AMOUNTS = (0.002, 0.01, 0.03)  # of dirt
 SMOOTH = 5.0  # inner steps per sample that will do for an axis without effects
 FRICTION = ("coulomb_friction", "stribeck_friction", "presliding_hysteresis", "asymmetric_friction")

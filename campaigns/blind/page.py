@@ -29,10 +29,23 @@ WORDS = {
     "tenth": "effects at a tenth of their size",
     "5 s": "5 s records",
     "sweep": "swept sine",
+    "foreign axes": "motors of MuJoCo: 14 kinds, driven with noise",
+    "foreign axes, closed loop": "the same under a position controller",
+    "foreign joints": "robot joints of MuJoCo, current to angle, along slow paths",
     "prbs": "PRBS",
 }
 REMARKS = "\n## Remarks\n"  # from here on people write, and the command leaves it
-GOALS = {"imperfect 0.2 %": 97, "imperfect 1 %": 95, "imperfect 3 %": 90, "hard": 97, "two effects": 97, "three effects": 85}  # % right
+GOALS = {
+    "imperfect 0.2 %": 97,
+    "imperfect 1 %": 95,
+    "imperfect 3 %": 90,
+    "hard": 97,
+    "two effects": 97,
+    "three effects": 85,
+    "foreign axes": 95,
+    "foreign axes, closed loop": 95,
+    "foreign joints": 95,
+}  # % right
 BINS = (0.0, 0.3, 0.5, 0.7, 0.9, 0.99, 1.0)  # of confidence; the last one is closed
 
 

@@ -9,18 +9,20 @@ from pathlib import Path
 import numpy as np
 
 from campaigns.blind.cases import Case
+from campaigns.blind.foreign import Foreign
 from campaigns.blind.judge import Judged
 
 
-def load(path: Path) -> dict[Case, Judged]:
+def load(path: Path) -> dict[Case | Foreign, Judged]:
     """Every case of the file that was judged to its end; none if there is no file."""
-    found = {}
+    found: dict[Case | Foreign, Judged] = {}
     for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else ():
         try:
             row = json.loads(line)
         except ValueError:  # the last line of a run that was killed
             continue
-        case = Case(**row.pop("case") | {"truth": tuple(row.pop("truth"))})
+        words, truth = row.pop("case"), tuple(row.pop("truth"))
+        case = Foreign(**words) if "loop" in words else Case(**words | {"truth": truth})
         found[case] = Judged(case, **row | {name: tuple(row[name]) for name in ("effects", "phantoms", "kinds") if name in row})
     return found
 
@@ -28,7 +30,7 @@ def load(path: Path) -> dict[Case, Judged]:
 def add(path: Path, item: Judged) -> None:
     """One more line."""
     row = asdict(item)
-    row["truth"] = list(row["case"].pop("truth"))
+    row["truth"] = list(row["case"].pop("truth", ()))
     with path.open("a", encoding="utf-8") as file:
         file.write(json.dumps(row, default=_plain) + "\n")
 

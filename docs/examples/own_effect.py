@@ -1,6 +1,6 @@
 """An effect of your own: one file with its law, and it is simulated, fitted and diagnosed like those of the library.
 
-    python own_effect.py quadratic_drag.py
+    python own_effect.py mains_hum.py
 
 docs/your-own-effect.md has that file.
 """
@@ -11,7 +11,7 @@ import numpy as np
 
 import xy_sysid as xy
 
-known = xy.library(sys.argv[1] if len(sys.argv) > 1 else "quadratic_drag.py")
+known = xy.library(sys.argv[1] if len(sys.argv) > 1 else "mains_hum.py")
 name = list(known.effects)[-1]
 
 # A motion with it, made here so that the answer is known: half of what the effect is typically, and encoder noise.

@@ -121,7 +121,7 @@ def test_a_clean_axis_misses_nothing() -> None:
         assert diagnose(2000.0, *recording.axis(axis)).verdict == "nothing_missing"
 
 
-@pytest.mark.parametrize("effect", ["thermal_viscosity", "quadratic_drag"])
+@pytest.mark.parametrize("effect", ["thermal_viscosity", "loose_mode"])
 def test_what_is_not_in_the_library_is_not_named(effect: str) -> None:
     """Never a name with confidence for an effect that no hypothesis knows."""
     u, y = recorded(effect, seconds=20.0).axis("x")

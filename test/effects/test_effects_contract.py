@@ -32,7 +32,7 @@ BASE = AxisModel(0.097, 1.29e-3, 246.0)
 NAMES = names("""time_delay viscous_friction coulomb_friction stribeck_friction presliding_hysteresis asymmetric_friction
 constant_load dead_zone saturation amplifier_lag backlash cogging lead_error screw_compliance base_resonance
 load_side_resonance hardening_stiffness gain_drift position_dependent_gain asymmetric_viscous_friction gravity return_spring
-position_dependent_drag""")
+position_dependent_drag quadratic_drag""")
 ACTING = [name for name in EFFECTS if EFFECTS[name].category != "base"]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from pathlib import Path
 
@@ -31,7 +32,7 @@ RATE = 2000.0
 @pytest.fixture(scope="module")
 def example(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The guide's own file."""
-    path = tmp_path_factory.mktemp("own") / "quadratic_drag.py"
+    path = tmp_path_factory.mktemp("own") / "mains_hum.py"
     path.write_text(re.findall(r"```python\n(.*?)```", GUIDE, re.DOTALL)[0], encoding="utf-8")
     return path
 
@@ -58,21 +59,21 @@ def test_the_guide_names_every_word_that_a_law_can_use() -> None:
 def test_the_guides_example_is_simulated_screened_and_fitted(example: Path) -> None:
     """An effect from a file is found among all others and its size recovered to 2 per cent."""
     known = library([example])
-    assert set(known.effects) == {*EFFECTS, "quadratic_drag"}
+    assert set(known.effects) == {*EFFECTS, "mains_hum"}
     random = np.random.default_rng(4)
     n = 40_001
     voltage = sosfilt(butter(4, 300, fs=RATE, output="sos"), random.standard_normal(n)) * 3.0
     still = prepare(RATE, voltage, np.cumsum(random.standard_normal(n)) * 1e-6)
-    model = fit_base(still, known).model.__class__(0.097, 1.29e-3, 246.0, library=known).with_effect("quadratic_drag", (40.0,))
+    model = fit_base(still, known).model.__class__(0.097, 1.29e-3, 246.0, library=known).with_effect("mains_hum", (0.5, 0.3))
     velocity = simulate(model, RATE, voltage, np.zeros(n))
     position = np.concatenate(([0.0], np.cumsum(velocity) / RATE)) + 1e-7 * random.standard_normal(n)
     data = prepare(RATE, voltage, position)
     base = fit_base(data, known)
-    assert look(data, base, known.acting)[0].effect == "quadratic_drag"
-    better = fit_with(data, base, ["quadratic_drag"])
+    assert look(data, base, known.acting)[0].effect == "mains_hum"
+    better = fit_with(data, base, ["mains_hum"])
     assert base.excess > 0.5
     assert better.excess < 0.05
-    assert better.parameter("quadratic_drag.coefficient").value == pytest.approx(40.0, rel=0.02)
+    assert better.parameter("mains_hum.amplitude").value == pytest.approx(0.5, rel=0.02)
 
 
 def test_a_file_that_changes_changes_no_effect_that_was_loaded_before(example: Path, tmp_path: Path) -> None:
@@ -81,11 +82,11 @@ def test_a_file_that_changes_changes_no_effect_that_was_loaded_before(example: P
     files[1].parent.mkdir()
     effects = []
     for file, factor in ((files[0], 1.0), (files[0], 2.0), (files[1], 3.0)):
-        file.write_text(text.replace("return coefficient *", f"return {factor} * coefficient *"), encoding="utf-8")
-        effects.append(library([file]).effects["quadratic_drag"])
+        file.write_text(text.replace("return amplitude *", f"return {factor} * amplitude *"), encoding="utf-8")
+        effects.append(library([file]).effects["mains_hum"])
     for effect, factor in zip(effects, (1.0, 2.0, 3.0), strict=True):
-        assert effect.functions["force"](40.0, 1.0) == 40.0 * factor
-        assert [f"return {factor} * coefficient" in source for source in law_texts([effect])] == [True]
+        assert effect.functions["force"](2.0, math.pi / 2.0, 0.0) == 2.0 * factor
+        assert [f"return {factor} * amplitude" in source for source in law_texts([effect])] == [True]
 
 
 def test_a_file_without_an_effect_is_refused_in_one_line(tmp_path: Path) -> None:
@@ -106,9 +107,9 @@ def test_the_command_lists_every_effect_and_shows_one_in_full(app: typer.Typer, 
     assert listed.exit_code == 0
     for name in STANDARD.effects:
         assert name in listed.output
-    one = run.invoke(app, ["quadratic_drag", "--effect-file", str(example)])
-    assert "coefficient |v| v" in one.output
-    assert "V/(m/s)2" in one.output
+    one = run.invoke(app, ["mains_hum", "--effect-file", str(example)])
+    assert "amplitude sin(2 pi 50 t + phase)" in one.output
+    assert "size of the ripple" in one.output
     told = json.loads(run.invoke(app, ["--json"]).output)["effects"]
     assert told["cogging"]["parameters"]["period"]["unit"] == "m"
     assert told["cogging"]["look_alikes"]

@@ -222,13 +222,13 @@ def test_joint_states_and_an_effect_of_ones_own(world: World, tmp_path: Path) ->
     """Joints by name, effort as input, parameters effects.<joint>, and a file with an effect that the library has not."""
     from sensor_msgs.msg import JointState
 
-    own = tmp_path / "quadratic_drag.py"
+    own = tmp_path / "mains_hum.py"
     guide = (ROOT / "docs" / "your-own-effect.md").read_text(encoding="utf-8")
     own.write_text(re.findall(r"```python\n(.*?)```", guide, re.DOTALL)[0], encoding="utf-8")
     axes, results = ("y", "x"), Results(world)
     statuses = world.statuses()
     settings = {"axes": json.dumps(axes), "source": "joint_state", "effort_as_voltage": True, "effect_files": json.dumps([str(own)])}
-    node = world.start(DIAGNOSER, {**settings, "effects.x": '["quadratic_drag"]'})
+    node = world.start(DIAGNOSER, {**settings, "effects.x": '["mains_hum"]'})
     source = Source(world, axes, rate=125.0)
     publisher = world.node.create_publisher(JointState, "joint_states", 10_000)
     assert world.until(lambda: publisher.get_subscription_count() > 0, 30.0), node.output()
@@ -243,7 +243,7 @@ def test_joint_states_and_an_effect_of_ones_own(world: World, tmp_path: Path) ->
     ok, text = trigger(world, "diagnose")
     assert ok and "axis y: Nothing is missing" in text, node.output()
     assert world.until(lambda: len(results.held_out("x")) == 2, 5.0)
-    assert json.loads(results.stories["x"][-1])["ladder"][1]["added"] == "quadratic_drag"
+    assert json.loads(results.stories["x"][-1])["ladder"][1]["added"] == "mains_hum"
 
 
 @pytest.mark.parametrize(("arguments", "words"), [

@@ -10,7 +10,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.settings import unknown_name
 
 Kind = Literal["input", "drive", "friction", "force", "structure", "encoder", "integrator"]
-Group = Literal["base", "effect", "outside", "event", "imperfection"]
+Group = Literal["base", "effect", "added", "outside", "event", "imperfection"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +55,7 @@ class Part:
     source:     where the law comes from
     parameters: the first one is its size, the number of ``--effect NAME=SIZE``
     kind:       where it acts; group: who may suspect it ("outside": no hypothesis knows it; "event": happens meanwhile;
+                "added": known, but not drawn;
                 "imperfection": dirt that every real machine has a little of, and that has no law to be found)
     family:     parts of one family replace one another when effects are drawn
     drawn:      False for a part that came later: seeds keep the machines that they have always drawn

@@ -10,7 +10,7 @@ from xy_sim.parts.contract import Parameter, Part
 PART = Part(
     name="position_dependent_gain",
     kind="drive",
-    group="outside",
+    group="added",
     law="f = factor(q) v, back-EMF drag times factor(q)^2; factor = 1 + depth sin(2 pi q / period)",
     meaning="uneven magnets of a linear motor, uneven tension of a belt",
     source="Hanselman 2003, ch. 4: torque and back-EMF share one constant",

@@ -8,7 +8,7 @@ from xy_sim.parts.contract import Parameter, Part
 PART = Part(
     name="quadratic_drag",
     kind="friction",
-    group="outside",
+    group="added",
     law="f = coefficient |v| v",
     meaning="oil pushed through gaps, air under a bellow",
     source="Lord Rayleigh 1876; Worden & Tomlinson 2001, sec. 2.2.5",

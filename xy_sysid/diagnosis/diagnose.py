@@ -17,6 +17,7 @@ from xy_sysid.diagnosis.refine import Effort, never, refine
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.axis_data import AxisData, prepare_all
 from xy_sysid.greybox.free_run import GreyboxFit
+from xy_sysid.greybox.input_noise import input_noise
 from xy_sysid.hypotheses.criteria import AT_FLOOR, SIZE
 from xy_sysid.hypotheses.enough_data import lacking
 from xy_sysid.samples.block import FloatArray
@@ -132,11 +133,16 @@ def judged(data: AxisData, ladder: Ladder, library: Library) -> Diagnosis:
             rival = ladder.rivals[0]
             why = f" (refused, {rival.refused})" if rival.refused else ""
             sentence += f" Runner-up {' and '.join(rival.effects)}: {moved(rival.fit.held_out_error, unit)}{why}."
-    elif base.excess < AT_FLOOR:
+    elif base.excess < AT_FLOOR or (noise := input_noise(data, base)) is not None:
         verdict, names, explained, experiment = "nothing_missing", (), 0.0, "None is needed."
-        confidence = (1.0 - max(base.excess, 0.0)) * (1.0 - _hidden(hides, data.floor.epsilon))
-        sentence = f"Nothing is missing: the rigid model with delay leaves {moved(base.held_out_error, unit)}, which is at the noise floor"
-        sentence += f" ({moved(base.noise_floor, unit)})."
+        sentence = f"Nothing is missing: the rigid model with delay leaves {moved(base.held_out_error, unit)}, which is "
+        if base.excess < AT_FLOOR:
+            trust = 1.0 - max(base.excess, 0.0)
+            sentence += f"at the noise floor ({moved(base.noise_floor, unit)})."
+        else:
+            trust, hides = 1.0 - ladder.helps, max(left, hides)
+            sentence += f"what white noise of {noise:.3g} {data.units.input} rms on the input would leave."
+        confidence = trust * (1.0 - _hidden(hides, data.floor.epsilon))
         sentence += f" What changes the motion by less than {_percent(hides)} could hide in it."
     else:
         verdict, experiment = "not_in_library", _UNKNOWN

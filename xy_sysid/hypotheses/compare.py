@@ -47,9 +47,11 @@ def gain(one: GreyboxFit, other: GreyboxFit) -> Gain:
 
 
 def size(one: GreyboxFit, before: GreyboxFit) -> float:
-    """Power of the unmodelled force that a fit explains of what one before it left, over what it leaves itself.
+    """Power that a fit explains of what one before it left, over what it leaves itself: of the unmodelled force, or of the error, whichever is more.
 
-    By the likelihood: n nats over l lines in which that force stands out of the floor are a factor exp(2 n / l) of its power.
+    Of the force by the likelihood: n nats over l lines in which it stands out of the floor are a factor exp(2 n / l) of its power. That is
+    an average over frequencies; a load or a slow wave acts at few of them, and may still be most of the error.
     """
     nats = float(np.mean(before.scores) - np.mean(one.scores))
-    return math.expm1(min(max(2.0 * nats / max(before.forced, 1.0), -50.0), 50.0))
+    error = math.log(max(before.held_out_error, 1e-300) / max(one.held_out_error, 1e-300))
+    return math.expm1(min(max(2.0 * nats / max(before.forced, 1.0), 2.0 * error if nats > 0.0 else -50.0, -50.0), 50.0))

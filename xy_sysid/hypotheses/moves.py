@@ -78,8 +78,8 @@ def moves(data: AxisData, library: Library, now: GreyboxFit, brief: GreyboxFit, 
                 more = len(effect.parameters) - len(library[name].parameters)
                 swaps.append(Move(own - {name} | {effect.name}, more, promised([effect.name], begun), starts))
     pairs = _pairs(library, now, own, gains, screen.gain, lambda names: _both(data, now, [library[name] for name in names], traces))
-    best = [sorted(kind, key=lambda move: -move.promised)[:WIDTH] for kind in (singles, swaps, pairs)]
-    return [move for kind in best for move in kind]
+    best = [sorted(kind, key=lambda move: -move.promised)[:WIDTH] for kind in (swaps, pairs)]
+    return [*singles, *(move for kind in best for move in kind)]
 
 
 def _both(data: AxisData, now: GreyboxFit, effects: Sequence[Effect], traces: Mapping[str, tuple[float, ...]]) -> list[AxisModel]:

@@ -76,13 +76,13 @@ class Pool:
 
     @property
     def answer(self) -> Node:
-        """The best set whose held-out error in velocity (rms) is below that of the first, or the first.
+        """The best set whose held-out error in velocity (rms) is below that of every set that it contains, or the first.
 
         Of sets that are as good and have as many effects, that with dry friction, as every machine has it.
         """
         first = self.nodes[self.kept]
         lower = (node for node in self.nodes.values() if node.leads and not node.refused and node.whole)
-        better = [node for node in lower if node.fit.held_out_error < first.fit.held_out_error]
+        better = [node for node in lower if all(node.fit.held_out_error < less.fit.held_out_error for less in self._inside(node))]
         if self.best is first or not better:
             return first
         best = min(better, key=self.score)
@@ -110,6 +110,8 @@ class Pool:
 
     def search(self) -> Iterator[frozenset[str]]:
         """Try moves until none promises a better set; yields each set that is about to be fitted."""
+        if self.nodes[self.kept].moves is None:
+            yield from self._alone_first()
         while not self.late():
             best = self.best
             if best.fit.excess < AT_FLOOR:
@@ -118,11 +120,40 @@ class Pool:
                 if node.moves is None and len(node.effects - self.kept) < self.most:
                     node.moves = self._moves(node)
                     yield from self._ways_back(node)
+            refused = self._best_refused()
+            if refused is not None and refused.moves is None:  # its laws may do, by other names
+                refused.moves = [move for move in self._moves(refused) if not move.effects >= refused.effects]
             move = self._next()
             if move is None:
                 return
             yield move[1].effects
             self._try(*move)
+
+    def _alone_first(self) -> Iterator[frozenset[str]]:
+        """Try each effect alone before two are combined, the most promising first; yields as ``search``.
+
+        Promises are worth little where the first model is far from the data.
+        """
+        first = self.nodes[self.kept]
+        first.moves = self._moves(first)
+        for move in sorted(first.moves, key=lambda move: -move.promised):
+            if self.late() or self.best.fit.excess < AT_FLOOR:
+                return
+            if len(move.effects - self.kept) == 1 and self.scale * move.promised > PRICE * move.parameters:
+                yield move.effects
+                self._try(first, move)
+        alone = [node for node in self.nodes.values() if node is not first and node.leads and node.whole and not node.refused]
+        for node in sorted(alone, key=self.score):  # what is best alone need not be in the best pair
+            node.moves = self._moves(node)
+            move = self._next([node])
+            if move is not None and not self.late():
+                yield move[1].effects
+                self._try(*move)
+
+    def _best_refused(self) -> Node | None:
+        """The best of the sets that are refused, if its score is better than that of all others."""
+        refused = [node for node in self.nodes.values() if node.refused and node.whole and self.score(node) < self.score(self.best)]
+        return min(refused, key=self.score, default=None)
 
     def _ways_back(self, best: Node) -> Iterator[frozenset[str]]:
         """Ask for the moves from the best set without one of its effects, in whose place another may do better; yields as ``search``."""
@@ -143,10 +174,10 @@ class Pool:
         allowed = (move for move in found if self.kept <= move.effects and len(move.effects - self.kept) <= self.most)
         return [move for move in allowed if move.effects not in self.nodes]
 
-    def _next(self) -> tuple[Node, Move] | None:
-        """The move that promises the best score, of those that promise a better one than there is."""
-        least, chosen = self.score(self.best) - PRICE, None
-        for node in self.nodes.values():
+    def _next(self, nodes: Sequence[Node] = ()) -> tuple[Node, Move] | None:
+        """The move that promises the best score, of those that promise a better one than would be said; from some sets, or from all."""
+        least, chosen = self.score(self.answer) - PRICE, None
+        for node in nodes or self.nodes.values():
             if not node.whole:
                 continue
             for move in node.moves or ():
@@ -182,14 +213,18 @@ class Pool:
 
     def _near(self) -> float:
         """The score up to which a quick fit is fitted on all data."""
-        best = self.score(self.best)
+        best = self.score(self.answer)
         rigid = max(self.score(node) for node in self.nodes.values() if node.whole)
         return best + NEAR * (rigid - best) + PRICE
 
     def _is_worth(self, node: Node) -> bool:
         """It is better than the best set that it contains, by as much as what is new must be worth."""
-        inside = [item for item in self.nodes.values() if item.effects < node.effects and item.whole and not item.refused]
+        inside = self._inside(node)
         return not inside or self._is_better(node, min(inside, key=self.score))
+
+    def _inside(self, node: Node) -> list[Node]:
+        """The sets that a set contains, as far as they are fitted on all data."""
+        return [item for item in self.nodes.values() if item.effects < node.effects and item.whole and not item.refused]
 
     def _is_better(self, node: Node, simpler: Node) -> bool:
         """More than chance better than a simpler set, at the price of its parameters, and by as much as its effects must be worth.

@@ -1,0 +1,38 @@
+"""Drag that grows with the square of speed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from xy_sysid.effects._contract import Effect, Parameter, law
+from xy_sysid.effects._scene import Guess, Scene, columns
+
+LEAST = 1e-3  # V/(m/s)2: where a fit begins if the trace has the wrong sign
+
+
+@law
+def force(coefficient: float, v: float) -> float:
+    """Force against the drive, V."""
+    return coefficient * abs(v) * v
+
+
+def guesses(scene: Scene) -> Iterator[Guess]:
+    """The square of the speed, with its sign."""
+    v = scene.smooth(scene.velocity, 300.0)
+    yield Guess(columns(abs(v) * v), lambda c: (max(float(c[0]), LEAST),))
+
+
+EFFECT = Effect(
+    name="quadratic_drag",
+    law="F = coefficient |v| v",
+    meaning="fans, propellers and wheels in air, oil pushed through gaps, air under a bellow",
+    validity="turbulent flow: fast motion; at crawling speed it is nothing",
+    source="Worden & Tomlinson, Nonlinearity in Structural Dynamics, 2001, sec. 2.2.5",
+    category="force",
+    parameters=(Parameter("coefficient", "V/(m/s)2", LEAST, 1e5, 40.0, "input that it takes, per square of the speed"),),
+    shows="error against the motion that grows faster than speed; the gain looks smaller at large amplitude",
+    look_alikes=("viscous_friction", "saturation", "coulomb_friction"),
+    experiment="constant speeds both ways: the input needed is a parabola over speed",
+    functions={"force": force},
+    guesses=guesses,
+)

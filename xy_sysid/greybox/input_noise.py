@@ -1,0 +1,39 @@
+"""Is what a fit leaves noise on its input? A measured current or voltage has noise that the machine never felt, and it looks like a force."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import scipy
+
+from xy_sysid.greybox.axis_data import AxisData
+from xy_sysid.greybox.free_run import GreyboxFit
+from xy_sysid.greybox.objective import Objective, responder
+
+OVERLAP = 1.5  # half-overlapping Hann windows per independent one (Welch 1967)
+BY_CHANCE = 0.01  # probability that noise which is white is taken for something else
+
+
+def input_noise(data: AxisData, fit: GreyboxFit) -> float | None:
+    """rms of the white noise on the input, V, that explains by itself the spectrum of the held-out error beyond the floor; None if none does.
+
+    The spectrum is N + |G|^2 s; s is the likeliest one. The power of each band over it is a mean of chi-squares, so that twice the
+    logarithm of the likelihood ratio to a spectrum that fits every band is a chi-square, too (Wilks 1938). Friction, cables and
+    resonances leave a force that is not white.
+    """
+    lines = Objective.of(data.floor).lines
+    used = lines > 0.0
+    power, floor = fit.power[used], data.floor.power[used]
+    response, shape = responder(data.layout, fit.model)(fit.model.row)[used], lines[used] * data.held.begins.size / OVERLAP
+    if fit.one_step or int(used.sum()) < 3 or not np.all(np.isfinite(power)) or not np.all(response > 0.0):
+        return None
+
+    def deviance(logarithm: float) -> float:
+        ratio = power / (floor + math.exp(logarithm) * response)
+        return float(2.0 * shape @ (ratio - 1.0 - np.log(np.maximum(ratio, 1e-300))))
+
+    least, most = (math.log(float(limit(power / response))) for limit in (np.min, np.max))
+    found = scipy.optimize.minimize_scalar(deviance, bounds=(least - 20.0, most), method="bounded")
+    is_white = scipy.stats.chi2.sf(found.fun, int(used.sum()) - 1) > BY_CHANCE
+    return math.exp(0.5 * float(found.x)) if is_white else None
