@@ -54,7 +54,7 @@ def test_an_axis_model_reloads_bit_for_bit(fitted: GreyboxFit, tmp_path: Path) -
     write_axis_models(tmp_path / "m.yaml", {"y": fitted}, {"data_sha256": {"y": "abc"}})
     back = read_models(tmp_path / "m.yaml", STANDARD)["y"]
     assert isinstance(back, PhysicalModel) and back.model == fitted.model and back.data == ("abc",)
-    u, y = recorded("", seconds=5.0).axis("y")
+    u, y = recorded("", seconds=5.0, axes=("x", "y")).axis("y")
     assert back.velocity(2000.0, u, y).shape == (len(u) - 1,)
 
 
