@@ -78,7 +78,7 @@ def processor(process: subprocess.Popen[bytes]) -> float:
 
 def real_time(watched: float, windows: int) -> dict[str, float]:
     """Per cent of a core of each node over so many seconds, after the first windows."""
-    with nodes({"speed": "1.0", "lockstep": "false"}) as (monitor, started):
+    with nodes({"speed": "1.0", "lockstep": "false", "watchdog": "2.0"}) as (monitor, started):
         until(monitor, lambda: value(monitor, "axis x", "windows") >= windows, 180.0, "the first windows")
         before, begun = {name: processor(process) for name, process in started.items()}, time.monotonic()
         while time.monotonic() - begun < watched:
