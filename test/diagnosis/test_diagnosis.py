@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import scipy.signal
 import yaml
-from helpers.simulated import recorded
+from helpers import simulated
 
 from xy_sim.parts import PARTS
 from xy_sysid.axis.model import STANDARD, Library
@@ -30,6 +30,8 @@ from xy_sysid.hypotheses import one_step
 from xy_sysid.hypotheses.companions import grown
 from xy_sysid.hypotheses.criteria import AT_FLOOR, FEWEST
 from xy_sysid.imports import save
+
+recorded = partial(simulated.recorded, block=100)
 
 
 @cache

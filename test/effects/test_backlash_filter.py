@@ -66,7 +66,7 @@ EFFECT = Effect(
 @cache
 def machine(*effects: str) -> tuple[AxisData, GreyboxFit]:
     axes = {name: build(AxisExcitation, {"seed": seed}) for name, seed in (("x", 5), ("y", 6))}
-    settings = build(ExcitationSettings, {"rate": RATE, "lockstep": True, "speed": 0.0, "block": 100, "ahead": 1, "axes": axes})
+    settings = build(ExcitationSettings, {"rate": RATE, "lockstep": True, "speed": 0.0, "axes": axes})
     recording = drive(with_effects(Machine.from_file("rigid.yaml", 11), effects), settings, 20.0, lambda _: None)
     data = prepare(RATE, *recording.axis("x"))
     return data, fit_base(data)

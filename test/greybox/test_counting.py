@@ -58,7 +58,7 @@ def test_an_axis_behind_a_coarse_encoder_is_not_blamed_for_its_counts() -> None:
     machine = Machine.from_file("rigid.yaml", 21)
     axis = machine.spec.axes[0]
     coarse = replace(axis, drive=axis.drive.model_copy(update={"counts_per_revolution": 50.0}))
-    settings = ExcitationSettings(lockstep=True, speed=0.0, block=100, ahead=1, axes={"x": AxisExcitation(seed=21, rms=0.15)})
+    settings = ExcitationSettings(lockstep=True, speed=0.0, axes={"x": AxisExcitation(seed=21, rms=0.15)})
     found = diagnose(RATE, *drive(Machine(replace(machine.spec, axes=(coarse,))), settings, 30.0, lambda _: None).axis("x"))
     assert found.effects == () and found.confidence < 0.1
     assert found.discrepancy < 0.1 * found.noise

@@ -198,13 +198,12 @@ def test_a_transition_that_is_not_allowed_is_refused_and_ends_nothing(world: Wor
     node = world.start(MODULE, {"watchdog": 2.0, "ramp": 0.0})
     activate(world)
     assert world.until(lambda: len(blocks) > 10 and moving(blocks))
-    for refused, number in enumerate((1, 2, 5, 99), start=1):
+    for number in (1, 2, 5, 99):
         answer = world.call(ChangeState, "/xy/excitation/change_state", ChangeState.Request(transition=Transition(id=number)))
         assert not answer.success, number
         sent = len(blocks)
         assert world.until(lambda sent=sent: len(blocks) > sent + 10 and moving(blocks)) and world.state("excitation") == "active", number
-        assert node.output().count("could not be dealt with") >= refused, number
-    assert "Traceback" not in node.output()
+    assert "could not be dealt with" in node.output() and "Traceback" not in node.output()
 
 
 @needs_ros

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 from helpers.real_data import data
+from helpers.simulated import copied
 
 from campaigns.faults.attack import GOOD
 from campaigns.faults.shared import COMMANDS, RECORDINGS, Shared, told, unnamed
@@ -18,18 +19,15 @@ from xy_sysid.samples.recording import Recording
 
 @pytest.fixture(scope="module", autouse=True)
 def read_once() -> Iterator[None]:
-    """What one command has read, the next one takes, if it is read in the same way; nobody may write into it."""
+    """What one command has read, the next one takes, if it is read in the same way."""
     kept: dict[str, Recording] = {}
 
     def taken(path: Path, reading: Reading, **options: Any) -> Recording:
         how = f"{path} {reading}"
         if how not in kept:
             kept.clear()
-            made = load(path, reading, **options)
-            for array in (made.seq, made.time, made.voltage, made.position):
-                array.setflags(write=False)
-            kept[how] = made
-        return kept[how]
+            kept[how] = load(path, reading, **options)
+        return copied(kept[how])
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(several, "load", taken)

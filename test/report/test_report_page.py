@@ -32,7 +32,7 @@ SETTINGS = IdentifierSettings()
 def recording() -> Recording:
     """40 s of the simulated table."""
     axes = {"x": AxisExcitation(seed=1), "y": AxisExcitation(seed=2)}
-    settings = ExcitationSettings(rate=2000.0, lockstep=True, speed=0.0, block=100, ahead=1, axes=axes)
+    settings = ExcitationSettings(rate=2000.0, lockstep=True, speed=0.0, axes=axes)
     return drive(Machine.from_file("paper.yaml"), settings, 40.0, lambda seconds: None)
 
 
@@ -125,7 +125,7 @@ def test_unstable_poles_and_poles_outside_the_band_are_named_only_where_they_are
 def test_a_fallen_resonance_is_seen_against_a_second_recording(recording: Recording, study: dict[str, AxisStudy]) -> None:
     """A base that is 2 Hz lower moves antiresonance and resonance left, by an interval that holds the truth and not zero."""
     axes = {"x": AxisExcitation(seed=5), "y": AxisExcitation(seed=6)}
-    settings = ExcitationSettings(rate=2000.0, lockstep=True, speed=0.0, block=100, ahead=1, axes=axes)
+    settings = ExcitationSettings(rate=2000.0, lockstep=True, speed=0.0, axes=axes)
     loose = part(drive(Machine.from_file("loose_bolts.yaml"), settings, 75.0, lambda seconds: None), slice(2000 * 36, 2000 * 75))
     one = study_axis(recording, "x", SETTINGS, 0, loose)
     assert one.change is not None

@@ -16,7 +16,7 @@ def split(effect: str, kind: str = "multisine_detect") -> Distortion | None:
     machine = Machine.from_file("rigid.yaml", 3)
     machine = with_effects(machine, [effect]) if effect else machine
     axes = {axis: AxisExcitation.model_validate({"kind": kind, "seed": 4 + k, "period": 2.048}) for k, axis in enumerate(machine.axes)}
-    recording = drive(machine, ExcitationSettings(lockstep=True, speed=0.0, block=100, ahead=1, axes=axes), 20.0, lambda _: None)
+    recording = drive(machine, ExcitationSettings(lockstep=True, speed=0.0, axes=axes), 20.0, lambda _: None)
     u, y = recording.axis("x")
     period = find_period(u)
     assert period == 4096
