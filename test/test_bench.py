@@ -70,7 +70,7 @@ def test_a_benchmark_that_is_asked_for_by_name_runs(name: str, monkeypatch: pyte
         return
     monkeypatch.setattr("sys.argv", ["bench", "--short", name])
     if name in ("peers", "diagnoses"):
-        data("crane/crane_1.npz")
+        data("hsm150/hsm_pos_0.06_1.npz")
     if name == "emps_force":
         data("emps/emps_train.npz")
     pages = [ROOT / "docs" / name for name in ("benchmarks.md", "real-machines.md", "use.md")]

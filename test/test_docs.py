@@ -15,7 +15,8 @@ from campaigns.documents.architecture import PICTURE, picture, reduced
 from campaigns.documents.man import document as man_page
 from campaigns.documents.settings import document
 from xy_sysid.cli.app import app
-from xy_sysid.live.messages import COMPARISON_COLUMNS, FRF_COLUMNS, LADDER_COLUMNS
+from xy_sysid.live.diagnosis_messages import LADDER_COLUMNS
+from xy_sysid.live.messages import COMPARISON_COLUMNS, FRF_COLUMNS
 from xy_sysid.response.window_check import REASONS as WINDOW_REASONS
 from xy_sysid.samples.pairing import REASONS as STREAM_REASONS
 

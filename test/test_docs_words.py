@@ -1,4 +1,4 @@
-"""Words that must stay true: commands of the README run, quotations of the FAQ are said, names of topics and settings exist."""
+"""Words that must stay true: commands of the quick start run, quotations of the FAQ are said, names of topics and settings exist."""
 
 from __future__ import annotations
 
@@ -26,30 +26,6 @@ def commands(page: str, heading: str) -> list[list[str]]:
     """The indented xy-sysid lines below a heading, without their comments, as words."""
     part = page.split(heading)[1].split("\n## ")[0]
     return [line.split("#")[0].split()[1:] for line in part.splitlines() if line.startswith("    xy-sysid ")]
-
-
-def test_four_commands_lead_from_a_hidden_effect_to_the_noise_floor(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The README's walk, as it stands there: each command answers, names are those that it prints, the error ends at the floor."""
-    monkeypatch.chdir(tmp_path)
-    part = text(ROOT / "README.md").split("## What is missing? Four commands")[1].split("\n## ")[0]
-    walk = commands(text(ROOT / "README.md"), "## What is missing? Four commands")
-    assert [words[0] for words in walk] == ["simulate", "compare", "diagnose", "refine"]
-    said = [cli(*words) for words in walk]
-    assert [one.code for one in said] == [0, 0, 0, 0], said
-    for axis in ("x", "y"):
-        assert re.search(rf"axis {axis}: the error is [\d.]+ times the noise floor", said[1].out)
-    left = r"\. It explains 100 % of the error's power \(([\d.]+) -> ([\d.]+) mm/s\)\. "
-    left += r"The residual error is at the noise floor \(([\d.]+) mm/s\)"
-    shown = re.findall(r"^    (axis \w+: Missing: \w+)" + left, part, re.MULTILINE)
-    assert len(shown) == 2
-    for sentence, *figures in shown:
-        found = re.search(re.escape(sentence) + left, said[2].out)
-        assert found is not None, said[2].out
-        assert [float(value) for value in found.groups()] == pytest.approx([float(value) for value in figures], rel=0.05)
-    model = yaml.safe_load((tmp_path / "axes.yaml").read_text(encoding="utf-8"))
-    for axis in ("x", "y"):
-        assert model["axes"][axis]["held_out_error"] < 1.05 * model["axes"][axis]["noise_floor"]
-    assert said[3].out.count("the held-out error is at the noise floor") == 2
 
 
 def test_the_first_five_minutes_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

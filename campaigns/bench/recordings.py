@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from xy_sysid.imports.reading import Reading
 
 PAGE = Path(__file__).parents[2] / "docs" / "real-machines.md"
-SHORT = ("crane/crane_1.npz",)  # recordings of the short forms: small ones
+SHORT = ("hsm150/hsm_pos_0.06_1.npz",)  # recordings of the short forms: small ones
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ import xy_sysid as xy
 
 def example(name: str, seed: int) -> str:
     """A bag as ``xy-sysid record`` writes it, for those who have no machine at hand."""
-    subprocess.run([sys.executable, "-m", "xy_sysid", "simulate", name, "--duration", "60", "--seed", str(seed)], check=True)
+    subprocess.run([sys.executable, "-m", "xy_sysid", "simulate", name, "--duration", "30", "--seed", str(seed)], check=True)
     return name
 
 

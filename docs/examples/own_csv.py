@@ -13,7 +13,7 @@ import xy_sysid as xy
 
 def example(path: Path) -> Path:
     """A table as a data logger writes it, for those who have none at hand: time in s, input in V, position in mm."""
-    run = xy.simulate(60).run("x")
+    run = xy.simulate(30).run("x")
     time = np.arange(len(run)) / run.sampling_rate
     rows = np.column_stack([time, run.voltage, 1e3 * run.position])
     np.savetxt(path, rows, delimiter=",", header="time,x_voltage,x_position[mm]", comments="", fmt="%.9g")

@@ -153,7 +153,7 @@ def table(machine: str, effects: tuple[str, ...]) -> AxisData:
     """60 s of the other package's machine."""
     made = with_effects(Machine.from_file(machine, 11), effects)
     axes = {axis: build(AxisExcitation, {"seed": 12 + k}) for k, axis in enumerate(made.axes)}
-    settings = build(ExcitationSettings, {"rate": made.rate, "lockstep": True, "speed": 0.0, "axes": axes})
+    settings = build(ExcitationSettings, {"rate": made.rate, "lockstep": True, "speed": 0.0, "block": 100, "ahead": 1, "axes": axes})
     recording = drive(made, settings, 60.0, lambda _: None)
     return prepare(recording.sampling_rate, *recording.axis("x"))
 

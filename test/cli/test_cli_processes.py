@@ -11,16 +11,18 @@ from pathlib import Path
 
 import pytest
 from helpers.busy import allowed
-from helpers.cli_tools import COMMAND, bare, cli
+from helpers.cli_tools import COMMAND, bare
+from helpers.live_streams import recorded
 
 from campaigns.faults.strange import GOOD_EFFECT
+from xy_sysid.imports import save
 
 
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A minute of the paper's table: work for a second."""
     path = tmp_path_factory.mktemp("bag") / "bag"
-    assert cli("simulate", path, "--duration", 60).code == 0
+    save(recorded("paper.yaml", 60.0), path)
     return path
 
 
@@ -81,7 +83,7 @@ def test_a_signal_in_the_middle_of_an_import_is_its_code(number: signal.Signals,
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 @pytest.mark.parametrize(
-    "words", [("simulate", "OUT", "--duration", "60"), ("simulate", "CSV", "--duration", "60"), ("replay", "BAG", "--out", "OUT")]
+    "words", [("simulate", "OUT", "--duration", "20"), ("simulate", "CSV", "--duration", "20"), ("replay", "BAG", "--out", "OUT")]
 )
 def test_what_ends_a_command_while_it_writes_leaves_no_partial_file(
     words: tuple[str, ...], number: int, code: int, bag: Path, tmp_path: Path

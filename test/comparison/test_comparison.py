@@ -28,7 +28,7 @@ def compared(effect: str) -> Comparison:
     machine = Machine.from_file("rigid.yaml", 3)
     machine = with_effects(machine, [effect]) if effect else machine
     axes = {axis: AxisExcitation(seed=4 + k) for k, axis in enumerate(machine.axes)}
-    recording = drive(machine, ExcitationSettings(lockstep=True, speed=0.0, axes=axes), 45.0, lambda _: None)
+    recording = drive(machine, ExcitationSettings(lockstep=True, speed=0.0, block=100, ahead=1, axes=axes), 45.0, lambda _: None)
     training, unseen = split(recording, 1 / 3)
     fit = identify(estimate(training, "x", IdentifierSettings()).frf, Structure(0, 2, 1))
     u, y = unseen.axis("x")

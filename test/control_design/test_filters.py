@@ -10,7 +10,7 @@ from helpers.known_models import known
 from scipy import signal
 
 from xy_sysid.axis.model import STANDARD
-from xy_sysid.control_design.filters import best_shaper, low_pass, modes, notch, shapers, vibration
+from xy_sysid.control_design.filters import best_shaper, modes, notch, shapers, vibration
 from xy_sysid.control_design.path import Bounds, s_curve
 
 RATE = 2000.0
@@ -72,5 +72,3 @@ def test_a_notch_takes_the_resonance_and_says_what_it_costs() -> None:
 
     assert abs(response(made.frequency)) == pytest.approx(made.depth, rel=1e-3) and abs(response(0.1)) == pytest.approx(1.0, abs=1e-3)
     assert -np.degrees(np.angle(response(30.0))) == pytest.approx(made.phase_cost) and made.phase_cost > 0.0 and made.covers
-    section, cost = low_pass(200.0, RATE, 30.0)
-    assert section.shape == (5,) and 5.0 < cost < 30.0

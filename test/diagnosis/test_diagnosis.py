@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -14,14 +14,14 @@ import numpy as np
 import pytest
 import scipy.signal
 import yaml
-from helpers.simulated import recorded
+from helpers import simulated
 
 from xy_sim.parts import PARTS
 from xy_sysid.axis.model import STANDARD, Library
 from xy_sysid.cli import run
 from xy_sysid.diagnosis import rungs
 from xy_sysid.diagnosis.diagnose import Diagnosis, diagnose, judged
-from xy_sysid.diagnosis.ladder import Rival, Step, is_taken_for
+from xy_sysid.diagnosis.ladder import Ladder, Rival, Step, is_taken_for
 from xy_sysid.diagnosis.refine import Effort, refine, refine_steps
 from xy_sysid.effects import EFFECTS, Effect
 from xy_sysid.greybox.axis_data import AxisData, prepare
@@ -31,12 +31,27 @@ from xy_sysid.hypotheses.companions import grown
 from xy_sysid.hypotheses.criteria import AT_FLOOR, FEWEST
 from xy_sysid.imports import save
 
+recorded = partial(simulated.recorded, block=100)
+
+
+@cache
+def diagnosed(effect: str, seconds: float = 20.0) -> Diagnosis:
+    """The answer for an axis with these effects."""
+    return diagnose(2000.0, *recorded(effect, seconds=seconds).axis("x"))
+
+
+@cache
+def ladder_of(effect: str) -> Ladder:
+    """The search behind it."""
+    found = diagnosed(effect).ladder
+    assert found is not None
+    return found
+
 
 @pytest.mark.parametrize("effect", ["coulomb_friction", "cogging", "dead_zone", "constant_load", "saturation", "lead_error"])
 def test_the_missing_effect_is_named_and_the_error_falls_to_the_floor(effect: str) -> None:
     """First name right, held-out error within 5 % of the noise, confident; nearly all of the error's power explained, and that is said."""
-    u, y = recorded(effect).axis("x")
-    found = diagnose(2000.0, u, y)
+    found = diagnosed(effect, 30.0)
     assert (found.verdict, found.effects) == ("missing_effect", (effect,))
     assert found.ladder is not None
     assert found.ladder.final.held_out_error < 1.05 * found.ladder.final.noise_floor
@@ -50,15 +65,14 @@ def test_the_missing_effect_is_named_and_the_error_falls_to_the_floor(effect: st
 
 def test_two_effects_are_both_named() -> None:
     """One after the other, the larger one first."""
-    u, y = recorded("coulomb_friction+cogging").axis("x")
-    found = diagnose(2000.0, u, y)
+    found = diagnosed("coulomb_friction+cogging")
     assert found.verdict == "missing_effect"
     assert set(found.effects) == {"coulomb_friction", "cogging"}
 
 
 def test_what_was_found_comes_first_and_what_is_left_is_said() -> None:
     """Of an axis with one effect and something beside that no law has: the effect, what it explains, and what it does not."""
-    found = diagnose(2000.0, *recorded("coulomb_friction+thermal_viscosity", seconds=20.0).axis("x"))
+    found = diagnosed("coulomb_friction+thermal_viscosity")
     assert (found.verdict, found.effects[0]) == ("missing_effect", "coulomb_friction")
     assert found.sentence.startswith("Missing: coulomb_friction") and " of the error's power (" in found.sentence
     assert 0.9 < found.explained < 1.0
@@ -70,7 +84,7 @@ def test_what_was_found_comes_first_and_what_is_left_is_said() -> None:
 def test_words_for_people_steer_no_search(effect: str) -> None:
     """A library whose effects look like nothing finds the same, with the same confidence and in the same words."""
     u, y = recorded(effect, seconds=20.0).axis("x")
-    found, told = diagnose(2000.0, u, y), diagnose(2000.0, u, y, Library([replace(item, look_alikes=()) for item in EFFECTS.values()]))
+    found, told = diagnosed(effect), diagnose(2000.0, u, y, Library([replace(item, look_alikes=()) for item in EFFECTS.values()]))
     assert (found.verdict, found.effects) == ("missing_effect", (effect,))
     assert (told.verdict, told.effects, told.confidence, told.sentence) == (found.verdict, found.effects, found.confidence, found.sentence)
 
@@ -116,7 +130,7 @@ def test_that_nothing_is_missing_is_as_sure_as_the_noise_lets_one_see() -> None:
 
 def test_a_clean_axis_misses_nothing() -> None:
     """No false alarm on either axis."""
-    recording = recorded("")
+    recording = recorded("", axes=("x", "y"))
     for axis in recording.axes:
         assert diagnose(2000.0, *recording.axis(axis)).verdict == "nothing_missing"
 
@@ -124,8 +138,7 @@ def test_a_clean_axis_misses_nothing() -> None:
 @pytest.mark.parametrize("effect", ["thermal_viscosity", "loose_mode"])
 def test_what_is_not_in_the_library_is_not_named(effect: str) -> None:
     """Never a name with confidence for an effect that no hypothesis knows."""
-    u, y = recorded(effect, seconds=20.0).axis("x")
-    found = diagnose(2000.0, u, y)
+    found = diagnosed(effect)
     assert found.verdict == "not_in_library"
     assert found.effect is None or found.confidence <= 0.5
 
@@ -156,7 +169,7 @@ def test_one_sine_is_too_little_to_name_anything(samples: int) -> None:
 @pytest.fixture(scope="module")
 def rec(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("rec") / "rec.npz"
-    save(recorded("x:coulomb_friction", seconds=20.0), path)
+    save(recorded("x:coulomb_friction", seconds=20.0, axes=("x", "y")), path)
     return path
 
 
@@ -217,15 +230,14 @@ def test_what_is_compiled_at_first_use_costs_no_budget(monkeypatch: pytest.Monke
 
 def test_a_part_that_rattles_is_no_mode_with_confidence() -> None:
     """The mode explains most of the error and leaves some; a true mode of the same strength leaves none."""
-    rattles, rings = (diagnose(2000.0, *recorded(name, seconds=20.0).axis("x")) for name in ("loose_mode", "base_resonance"))
+    rattles, rings = (diagnosed(name) for name in ("loose_mode", "base_resonance"))
     assert rattles.effect is None or rattles.confidence < 0.9
     assert rings.effects == ("base_resonance",) and rings.confidence > 0.9
 
 
 def test_not_in_the_library_is_said_less_surely_the_more_is_left() -> None:
     """An effect may hide in it, or in the noise; and what some set takes away is no longer nowhere."""
-    data = prepare(2000.0, *recorded("quadratic_drag", seconds=20.0).axis("x"))
-    ladder = refine(data)
+    data, ladder = prepare(2000.0, *recorded("quadratic_drag", seconds=20.0).axis("x")), ladder_of("quadratic_drag")
     nothing = replace(ladder, effects=(), explained=0.0, helps=0.0)
     motion = data.layout.rms(data.floor.motion)
     sure = [judged(data, replace(nothing, discrepancy=part * motion), STANDARD).confidence for part in (0.0, 5e-4, 0.03, 0.3)]
@@ -236,8 +248,7 @@ def test_not_in_the_library_is_said_less_surely_the_more_is_left() -> None:
 
 def test_what_two_sets_share_is_named_and_what_they_differ_in_is_not() -> None:
     """A tie between a load and cogging beside friction: friction alone is told, and the load as what may be; a rival of friction itself counts."""
-    data = prepare(2000.0, *recorded("coulomb_friction", seconds=20.0).axis("x"))
-    alone = refine(data)
+    data, alone = prepare(2000.0, *recorded("coulomb_friction", seconds=20.0).axis("x")), ladder_of("coulomb_friction")
     both = fit_with(data, alone.final, ["constant_load"])
     tie = Rival(("coulomb_friction", "cogging"), both, 0.5)
     ladder = replace(
@@ -267,8 +278,7 @@ def test_a_refused_spring_that_leaves_as_little_as_a_wave_makes_the_wave_unsure(
     assert not is_taken_for(STANDARD, wave, spring)
     assert not is_taken_for(STANDARD, stiff, spring)
     assert not is_taken_for(STANDARD, frozenset({"cogging"}), wave)
-    data = prepare(2000.0, *recorded("cogging", seconds=20.0).axis("x"))
-    ladder = refine(data)
+    data, ladder = prepare(2000.0, *recorded("cogging", seconds=20.0).axis("x")), ladder_of("cogging")
     rival = Rival(("return_spring",), ladder.final, 0.5, "return_spring: it would give way")
     found = judged(data, replace(ladder, rivals=(rival,)), STANDARD)
     assert found.effects == ("cogging",) and found.confidence <= 0.5

@@ -15,7 +15,7 @@ from xy_sysid.effects import EFFECTS
 SLIDE = Joint(fs=1000.0, seconds=40.0, count=1e-6, mass=0.1, drag=10.0, shake=1.0, band=(0.5, 60.0))
 LINEAR_MOTOR = Joint(
     fs=2000.0,
-    seconds=30.0,
+    seconds=20.0,
     count=1e-6,
     mass=8.0,
     drag=20.0,

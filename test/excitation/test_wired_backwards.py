@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections import deque
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,6 +11,7 @@ from helpers import ROOT
 
 from campaigns.faults.backwards import LEVELS, TENTH, worst
 from xy_sysid.excitation.drive import Drive
+from xy_sysid.jit import compiled
 from xy_sysid.samples.block import Block, FloatArray
 from xy_sysid.settings import AxisExcitation, ExcitationSettings
 
@@ -34,22 +34,31 @@ class Axis:
     count: float = 5e-7
     place: float = 0.0
     speed: float = 0.0
-    late: deque[float] = field(default_factory=deque, init=False)
+    late: FloatArray = field(default_factory=lambda: np.empty(0), init=False)
 
     def play(self, voltage: FloatArray, random: np.random.Generator) -> FloatArray:
         """(n,) V -> (n,) m as the encoder shows them."""
-        self.late = self.late or deque([0.0] * round(self.delay * RATE))
-        out = np.empty(len(voltage))
-        for row, volts in enumerate(voltage):
-            out[row] = np.round((self.place + self.noise * random.standard_normal()) / self.count) * self.count
-            self.late.append(float(volts))
-            force = self.gain * (self.late.popleft() + self.load) / self.lag + self.unstable * self.place - self.speed / self.lag
-            rubs = self.gain * self.friction / self.lag
-            free = self.speed + (force - np.sign(self.speed or force) * rubs) / RATE
-            stuck = (self.speed == 0 and abs(force) <= rubs) or (rubs > 0 and free * self.speed < 0)
-            self.speed = 0.0 if stuck else free
-            self.place += self.speed / RATE
-        return out
+        late = self.late if self.late.size else np.zeros(round(self.delay * RATE))
+        arriving = np.concatenate((late, voltage))
+        self.late = arriving[len(voltage) :]
+        numbers = np.array([self.gain, self.lag, self.friction, self.load, self.unstable])
+        places, self.place, self.speed = _played(arriving[: len(voltage)], numbers, self.place, self.speed)
+        return np.asarray(np.round((places + self.noise * random.standard_normal(len(voltage))) / self.count) * self.count)
+
+
+@compiled
+def _played(voltage: FloatArray, numbers: FloatArray, place: float, speed: float) -> tuple[FloatArray, float, float]:
+    """(n,) m at the beginning of each sample, and place and speed after the last."""
+    gain, lag, friction, load, unstable = numbers
+    places, rubs = np.empty(voltage.size), gain * friction / lag
+    for row in range(voltage.size):
+        places[row] = place
+        force = gain * (voltage[row] + load) / lag + unstable * place - speed / lag
+        free = speed + (force - np.sign(speed if speed != 0.0 else force) * rubs) / RATE
+        stuck = (speed == 0.0 and abs(force) <= rubs) or (rubs > 0.0 and free * speed < 0.0)
+        speed = 0.0 if stuck else free
+        place += speed / RATE
+    return places, place, speed
 
 
 def driven(axis: Axis, excitation: AxisExcitation, seconds: float, sign: float = 1.0) -> tuple[Drive, float]:

@@ -35,7 +35,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Two recordings of an axis with friction; a rigid and a right model of the first, and a linear one."""
     where = tmp_path_factory.mktemp("models")
     save(recorded("x:coulomb_friction", seconds=30.0), where / "rec.npz")
-    save(recorded("x:coulomb_friction", seconds=20.0, seed=5), where / "other.npz")
+    save(recorded("x:coulomb_friction", seconds=20.0, seed=5, axes=("x", "y")), where / "other.npz")
     rec = str(where / "rec.npz")
     assert run(["refine", rec, "-a", "x", "--add", "coulomb_friction", "--model", str(where / "right.yaml"), "--mat", str(where / "right.mat")]) == 0
     assert run(["refine", rec, "-a", "x", "--add", "constant_load", "--model", str(where / "wrong.yaml")]) == 0
@@ -54,7 +54,7 @@ def test_an_axis_model_reloads_bit_for_bit(fitted: GreyboxFit, tmp_path: Path) -
     write_axis_models(tmp_path / "m.yaml", {"y": fitted}, {"data_sha256": {"y": "abc"}})
     back = read_models(tmp_path / "m.yaml", STANDARD)["y"]
     assert isinstance(back, PhysicalModel) and back.model == fitted.model and back.data == ("abc",)
-    u, y = recorded("", seconds=5.0).axis("y")
+    u, y = recorded("", seconds=5.0, axes=("x", "y")).axis("y")
     assert back.velocity(2000.0, u, y).shape == (len(u) - 1,)
 
 

@@ -15,8 +15,9 @@ from helpers.live_streams import blocks, last, recorded
 from helpers.stories import told
 
 from xy_sysid.files.viewer_layouts import LARGEST_BLOCK, foxglove, plotjuggler
+from xy_sysid.live.diagnosis_messages import LADDER_COLUMNS, diagnosis_status, ladder_message
 from xy_sysid.live.fitter import Update
-from xy_sysid.live.messages import COMPARISON_COLUMNS, LADDER_COLUMNS, comparison_message, diagnosis_status, ladder_message
+from xy_sysid.live.messages import COMPARISON_COLUMNS, comparison_message
 from xy_sysid.live.plain_messages import StatusMessage
 from xy_sysid.live.replay import replay
 from xy_sysid.samples.block import Block, columns, pack

@@ -90,7 +90,7 @@ def machine_data(name: str, seconds: float = 30.0) -> AxisData:
     file, excite = MACHINES.get(name, ("rigid.yaml", {}))
     machine = with_effects(Machine.from_file(file, 11), [] if name == "none" else [f"x:{name}"])
     axes = {axis: build(AxisExcitation, {"seed": 12 + k, **excite}) for k, axis in enumerate(machine.axes)}
-    settings = build(ExcitationSettings, {"rate": machine.rate, "lockstep": True, "speed": 0.0, "axes": axes})
+    settings = build(ExcitationSettings, {"rate": machine.rate, "lockstep": True, "speed": 0.0, "block": 100, "ahead": 1, "axes": axes})
     recording = drive(machine, settings, seconds, lambda _: None)
     return prepare(recording.sampling_rate, *recording.axis("x"))
 

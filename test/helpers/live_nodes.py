@@ -5,11 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from scipy import signal
 
 from helpers.ros_tools import World
 from xy_sysid.samples.block import Block
 
-FAST: dict[str, Any] = {"lockstep": True, "speed": 0.0, "duration": 30.0}
+FAST: dict[str, Any] = {"lockstep": True, "speed": 0.0, "duration": 30.0, "block": 100}
 
 
 def newest(statuses: list[Any], name: str) -> dict[str, str]:
@@ -49,11 +50,9 @@ class Source:
         self.u = random.standard_normal((200_000, len(axes)))
         pole, gain, period = 20.0 * rate / 125.0, 0.1, 1.0 / rate  # rad/s, m/s/V, s: exact steps of a lagging integrator behind a hold
         a = float(np.exp(-pole * period))
-        speed, path = np.zeros_like(self.u), np.zeros_like(self.u)
-        for n in range(len(self.u) - 1):
-            lag = speed[n] - gain * self.u[n]
-            path[n + 1] = path[n] + gain * period * self.u[n] + lag * (1 - a) / pole
-            speed[n + 1] = a * speed[n] + gain * (1 - a) * self.u[n]
+        speed = signal.lfilter([0.0, gain * (1 - a)], [1.0, -a], self.u, axis=0)
+        steps = gain * period * self.u + (speed - gain * self.u) * (1 - a) / pole
+        path = np.cumsum(steps, axis=0) - steps
         self.y = np.round(path / 5e-7) * 5e-7
 
     def found(self) -> bool:

@@ -17,7 +17,8 @@ AXES = ("x", "y")
 
 def recorded(machine: str, seconds: float, seed: int = 11) -> Recording:
     axes = {axis: AxisExcitation(seed=seed + k) for k, axis in enumerate(AXES)}
-    return drive(Machine.from_file(machine, seed), ExcitationSettings(lockstep=True, speed=0.0, axes=axes), seconds, lambda _: None)
+    settings = ExcitationSettings(lockstep=True, speed=0.0, block=100, ahead=1, axes=axes)
+    return drive(Machine.from_file(machine, seed), settings, seconds, lambda _: None)
 
 
 def blocks(recording: Recording, size: int = 20) -> Iterator[tuple[Quantity, Block]]:

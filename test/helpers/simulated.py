@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 from xy_sim.effect_text import with_effects
 from xy_sim.machine import Machine
@@ -11,12 +12,35 @@ from xy_sysid.samples.recording import Recording
 from xy_sysid.settings import AxisExcitation, ExcitationSettings
 
 
-def recorded(effect: str, seconds: float = 30.0, seed: int = 21, counts: float = 0.0, encoder_on: str = "motor") -> Recording:
-    """counts: of the encoder, per revolution of 5 mm; 0 as the machine has it; encoder_on: motor or table."""
+def recorded(
+    effect: str,
+    seconds: float = 30.0,
+    seed: int = 21,
+    counts: float = 0.0,
+    encoder_on: str = "motor",
+    axes: tuple[str, ...] = ("x",),
+    block: int = 20,
+) -> Recording:
+    """A copy for each who asks; it is simulated once.
+
+    counts: of the encoder, per revolution of 5 mm; 0 as the machine has it; encoder_on: motor or table; axes: of the table, x alone or both
+    block: samples that are driven at once; the more, the less work
+    """
+    return copied(_simulated(effect, seconds, seed, counts, encoder_on, axes, block))
+
+
+def copied(recording: Recording) -> Recording:
+    """The same with samples of its own."""
+    return replace(recording, voltage=recording.voltage.copy(), position=recording.position.copy())
+
+
+@cache
+def _simulated(effect: str, seconds: float, seed: int, counts: float, encoder_on: str, axes: tuple[str, ...], block: int) -> Recording:
     machine = Machine.from_file("rigid.yaml", seed)
     own: dict[str, object] = {"encoder_on": encoder_on, **({"counts_per_revolution": counts} if counts else {})}
-    if own != {"encoder_on": "motor"}:
-        machine = Machine(replace(machine.spec, axes=tuple(replace(a, drive=a.drive.model_copy(update=own)) for a in machine.spec.axes)))
+    spec = replace(machine.spec, axes=tuple(replace(a, drive=a.drive.model_copy(update=own)) for a in machine.spec.axes if a.name in axes))
+    machine = Machine(spec, seed if own == {"encoder_on": "motor"} else None)
     machine = with_effects(machine, effect.split("+")) if effect else machine
-    axes = {axis: AxisExcitation(seed=seed + k) for k, axis in enumerate(machine.axes)}
-    return drive(machine, ExcitationSettings(lockstep=True, speed=0.0, axes=axes), seconds, lambda _: None)
+    excited = {axis: AxisExcitation(seed=seed + k) for k, axis in enumerate(machine.axes)}
+    settings = ExcitationSettings(lockstep=True, speed=0.0, block=block, ahead=max(1, 60 // block), axes=excited)
+    return drive(machine, settings, seconds, lambda _: None)

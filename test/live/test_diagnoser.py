@@ -10,7 +10,7 @@ from helpers.simulated import recorded
 
 from xy_sysid.axis.model import STANDARD
 from xy_sysid.live.diagnoser import Diagnoser, all_at_once
-from xy_sysid.live.messages import ladder_message
+from xy_sysid.live.diagnosis_messages import ladder_message
 from xy_sysid.samples.block import Block
 from xy_sysid.samples.newest import Newest
 from xy_sysid.samples.recording import Recording, Run
@@ -24,12 +24,12 @@ AXES = ("x", "y")
 
 @cache
 def friction() -> Recording:
-    return recorded("x:coulomb_friction", seconds=12.0)
+    return recorded("x:coulomb_friction", seconds=12.0, axes=AXES)
 
 
 @cache
 def resonance() -> Recording:
-    return recorded("x:base_resonance+x:coulomb_friction", seconds=10.0)
+    return recorded("x:base_resonance+x:coulomb_friction", seconds=10.0, axes=AXES)
 
 
 def send(hearing: Newest | Diagnoser, first: int, last: int, size: int = 20, shift: int = 0, recording: Recording | None = None) -> None:

@@ -42,10 +42,12 @@ def heard(joints: JointCounter, times: FloatArray) -> Iterator[Block]:
             yield block
 
 
-def feed(sink: Identifier | Newest, joints: JointCounter, times: FloatArray) -> None:
+def feed(joints: JointCounter, times: FloatArray, *sinks: Identifier | Newest) -> None:
     for block in heard(joints, times):
         for place, kind in enumerate(QUANTITIES[::-1]):
-            sink.feed(kind, Block(("x",), block.seq, block.time, block.values[:, place : place + 1]))
+            given = Block(("x",), block.seq, block.time, block.values[:, place : place + 1])
+            for sink in sinks:
+                sink.feed(kind, given)
 
 
 @pytest.mark.parametrize(("rate", "change"), [*itertools.product(RATES[:-1], CHANGES), *((RATES[-1], change) for change in CHANGES[::5])])
@@ -56,18 +58,16 @@ def test_another_rate_of_joint_states_is_followed_within_ten_seconds(rate: float
         Identifier(IdentifierSettings(length=64), ("x",)),
         Newest(("x",), 60.0, 3.0, 0.5),
     )
-    first, second = stamps(rate, 13.0, 100.0), stamps(rate * change, SOON + 15.0, 115.0)
-    feed(identifier, joints, first)
+    read = SOON + 250.0 / rate / change  # s; the rate is read anew from 200 samples
+    first, second = stamps(rate, 13.0, 100.0), stamps(rate * change, read + 2.0, 115.0)
+    feed(joints, first, identifier, newest)
     assert identifier.sampling_rate == pytest.approx(rate, rel=2e-3)
-    soon = second < 115.0 + SOON + 250.0 / rate / change  # the rate is read anew from 200 samples
-    feed(identifier, joints, second[soon])
+    soon = second < 115.0 + read
+    feed(joints, second[soon], identifier, newest)
     assert identifier.sampling_rate == pytest.approx(rate * change, rel=2e-3)
     before = sum(identifier.faults.values())
-    feed(identifier, joints, second[~soon])
+    feed(joints, second[~soon], identifier, newest)
     assert sum(identifier.faults.values()) == before
-    again = JointCounter(("x",), with_voltage=False)
-    feed(newest, again, first)
-    feed(newest, again, second)
     assert newest.sampling_rate == pytest.approx(rate * change, rel=2e-3)
     assert newest.lacking() == ""
 
@@ -86,8 +86,8 @@ def test_two_drivers_on_one_topic_leave_no_trace(seconds: float) -> None:
     for before in (0.0, 6.0):
         joints, identifier = JointCounter(("x",), with_voltage=False), Identifier(IdentifierSettings(length=64), ("x",))
         one, other = stamps(250.0, before + seconds, 100.0, seed=2), stamps(250.0, seconds, 100.0 + before + 0.0013, seed=3)
-        feed(identifier, joints, np.sort(np.concatenate((one, other))))
-        feed(identifier, joints, stamps(250.0, SOON + 2.0, 100.0 + before + seconds, seed=4))
+        feed(joints, np.sort(np.concatenate((one, other))), identifier)
+        feed(joints, stamps(250.0, SOON + 2.0, 100.0 + before + seconds, seed=4), identifier)
         assert identifier.sampling_rate == pytest.approx(250.0, rel=2e-3)
 
 

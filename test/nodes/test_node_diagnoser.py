@@ -80,7 +80,7 @@ def test_hidden_friction_is_named_set_and_gone_and_the_bag_tells_the_same(world:
     world.start(MACHINE, {"machine": str(tmp_path / "hidden.yaml")})
     node = world.start(DIAGNOSER)
     recorder = world.start(RECORDER, {"output": str(bag), "topics": '["voltage", "position"]'})
-    world.start(EXCITATION, {**FAST, "duration": 20.0})
+    world.start(EXCITATION, {**FAST, "duration": 14.0})
     ready(world, statuses, "diagnoser", "ballscrew", "excitation")
     drive(world, statuses, listeners=3)
     results = Results(world)
@@ -113,7 +113,7 @@ def test_hidden_friction_is_named_set_and_gone_and_the_bag_tells_the_same(world:
 
 @cache
 def friction() -> Recording:
-    return recorded("x:coulomb_friction", seconds=20.0)
+    return recorded("x:coulomb_friction", seconds=20.0, axes=("x", "y"))
 
 
 class Sender:
@@ -185,8 +185,8 @@ def test_a_resonance_is_found_alone_then_by_steps_after_a_reset(world: World) ->
     """auto adds it; add_next goes on from a model that has it; after reset_model both find the same again, from the rigid model."""
     results, statuses = Results(world), world.statuses()
     node = world.start(DIAGNOSER)
-    Sender(world, recorded("x:base_resonance+x:coulomb_friction", seconds=20.0)).send(0, 40_000)
-    assert world.until(lambda: float(newest(statuses, "diagnoser").get("samples paired", "0")) == 40_000, 20.0)
+    Sender(world, recorded("x:base_resonance+x:coulomb_friction", seconds=12.0, axes=("x", "y"))).send(0, 24_000)
+    assert world.until(lambda: float(newest(statuses, "diagnoser").get("samples paired", "0")) == 24_000, 20.0)
 
     def ladder() -> list[str | None]:
         world.until(lambda: newest(results.diagnosis, "progress")["progress"] == "idle", 10.0)

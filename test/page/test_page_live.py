@@ -19,7 +19,7 @@ from helpers.ros_tools import World, needs_ros, world_in
 
 pytestmark = [needs_browser, needs_ros]
 
-SIMULATED = {"lockstep": True, "speed": 2.0, "ramp": 0.05, "abort_ramp": 0.01}
+SIMULATED = {"lockstep": True, "speed": 2.0, "block": 100, "ramp": 0.05, "abort_ramp": 0.01}
 
 
 class Scene:
@@ -203,7 +203,7 @@ def test_a_bag_is_recorded_and_opened_beside(scene: Scene) -> None:
     name.fill("taken")
     tab.press("record")
     tab.until(lambda: (scene.folder / "taken").is_dir(), 15)
-    tab.until(lambda: min(recorded(scene.folder / "taken", topic) for topic in ("voltage", "position")) > 300, 40, "the bag does not grow")
+    tab.until(lambda: min(recorded(scene.folder / "taken", topic) for topic in ("voltage", "position")) > 60, 40, "the bag does not grow")
     tab.press("finish")
     tab.until(lambda: "recorded taken" in tab.notices() or tab.page.locator("[data-act=open-bag]").is_visible(), 15)
     tab.press("open-bag")

@@ -19,7 +19,7 @@ from xy_sysid.imports import load
 pytestmark = [needs_browser, needs_ros]
 
 JOINT = {"axes": "[x]", "unit": "rad", "x.limit": VOLTAGE, "x.travel_min": -TRAVEL, "x.travel_max": TRAVEL}
-DRIVE = {**JOINT, **{f"x.{name}": value for name, value in QUIET.items()}, "rate": RATE, "lockstep": True, "speed": 8.0}
+DRIVE = {**JOINT, **{f"x.{name}": value for name, value in QUIET.items()}, "rate": RATE, "lockstep": True, "speed": 8.0, "block": 100}
 
 
 class Scene:

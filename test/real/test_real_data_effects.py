@@ -61,17 +61,6 @@ def test_the_position_of_emps_is_simulated_from_the_voltage_alone() -> None:
     assert power_gone(found) > 0.95
 
 
-def test_emps_is_refined_without_being_told() -> None:
-    """Dry friction and its direction dependence; at least 95 % of the held-out error power gone; no false end."""
-    found = refined(EMPS, "--auto", "--open-loop")
-    families = ("coulomb_friction", "asymmetric_friction", "stribeck_friction", "presliding_hysteresis")
-    assert set(families) & set(found["effects"])
-    assert "asymmetric_viscous_friction" in found["effects"]
-    assert power_gone(found) > 0.95
-    assert FORCE / (value(found, "gain") * value(found, "pole")) == pytest.approx(95.1089, rel=0.03)
-    assert found["open_loop"]["rms"] <= 2.5e-3
-
-
 def test_settling_keeps_what_the_fast_motion_knows_better() -> None:
     """Delay and cogging stay; the position comes nearer; the held-out error stays that of the fit that did not see it."""
     recording = load(data(EMPS))

@@ -22,15 +22,6 @@ def regular_file(path: Path) -> None:
         raise BadRecording(path, "not a file but a pipe, a device, a socket or a folder", "Copy its content into a file first.")
 
 
-def is_regular(path: Path) -> bool:
-    """Whether there is such a file."""
-    try:
-        regular_file(path)
-    except (BadRecording, OSError):
-        return False
-    return True
-
-
 def text_of(path: Path, what: str, most: int = LONGEST) -> str:
     """The text of a file in UTF-8.
 

@@ -197,10 +197,6 @@ def compare_motion(model: FloatArray, unseen: Unseen) -> Comparison:
     )
 
 
-def _worst_first(places: list[Place]) -> tuple[Place, ...]:
-    return tuple(sorted((place for place in places if place.error_over_floor >= TWICE), key=lambda place: -place.error_over_floor))
-
-
 def _inside(windows: Windows, samples: int) -> NDArray[np.bool_]:
     """(samples,) those in a window."""
     inside = np.zeros(samples, dtype=np.bool_)

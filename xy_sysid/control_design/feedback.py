@@ -214,8 +214,3 @@ def _cost(system: Sampled, crossover: float) -> str:
     """What the delay takes from the phase at the crossover."""
     late = (system.whole + 0.5) / system.sampling_rate
     return f"delay and hold take {math.degrees(crossover * late):.2g} degrees at the crossover"
-
-
-def of_models(models: Sequence[AxisModel], controller: Controller, sampling_rate: float) -> Margins:
-    """The least margins of a given controller over some models."""
-    return _least([margins(sampled(item, sampling_rate), controller) for item in models])

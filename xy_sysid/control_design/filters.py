@@ -180,11 +180,3 @@ def best_shaper(found: tuple[Shaper, ...], tolerated: float = TOLERATED) -> Shap
     """The shortest that leaves no more than ``tolerated`` over the interval of the frequency; else the one that leaves least."""
     good = [item for item in found if item.worst <= tolerated]
     return min(good, key=lambda item: item.duration) if good else min(found, key=lambda item: item.worst)
-
-
-def low_pass(frequency: float, sampling_rate: float, crossover: float) -> tuple[FloatArray, float]:
-    """(5,) second-order Butterworth section, and the phase that it costs at the crossover, Hz, in degrees."""
-    b, a = scipy.signal.butter(2, min(frequency, 0.49 * sampling_rate), fs=sampling_rate)
-    z = cmath.exp(2j * math.pi * crossover / sampling_rate)
-    own = (b[0] + b[1] / z + b[2] / z**2) / (1.0 + a[1] / z + a[2] / z**2)
-    return np.array([b[0], b[1], b[2], a[1], a[2]]), -math.degrees(cmath.phase(own))

@@ -14,7 +14,6 @@ from xy_sysid.units import USUAL, Units
 
 KEYS = ("axis", "rate", "seconds", "excitation", "needs", "units", "expects", "sets", "made_by")
 DRIVES = ("kind", "rms", "low", "high", "period", "steps", "offset", "seed", "centring", "slow", "slow_period")  # settings that it may have
-NEEDS = ("voltage", "travel")
 AGAIN = "Design it again within these limits: xy-sysid next with --params."
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import yaml
 
@@ -11,9 +11,11 @@ from xy_sysid.bags.atomic import write_text
 from xy_sysid.bags.opening import text_of
 from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.excitation.designed import document_of, with_experiment
-from xy_sysid.experiment_design.of_run import NextExperiment
 from xy_sysid.files.ros_parameters import load
 from xy_sysid.settings import ExcitationSettings
+
+if TYPE_CHECKING:
+    from xy_sysid.experiment_design.of_run import NextExperiment
 
 
 def document(found: NextExperiment) -> dict[str, Any]:

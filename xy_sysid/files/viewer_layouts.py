@@ -16,7 +16,8 @@ import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from xy_sysid.live.messages import COMPARISON_COLUMNS, LADDER_COLUMNS
+from xy_sysid.live.diagnosis_messages import LADDER_COLUMNS
+from xy_sysid.live.messages import COMPARISON_COLUMNS
 from xy_sysid.live.plain_messages import topic_of
 from xy_sysid.samples.block import columns
 

@@ -5,7 +5,6 @@ A task whose process dies is tried once more at the end, alone, so that no other
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from xy_sysid.errors import BadInput, MissingExtra
 from xy_sysid.fleets.of_file import Done, Task, failed, rows_of_file
+from xy_sysid.jit import cores
 from xy_sysid.processes.deaf import deaf
 
 if TYPE_CHECKING:
@@ -67,11 +67,6 @@ def connected(where: Cluster) -> Iterator[Client]:
         )  # fmt: skip
     with cluster, distributed.Client(cluster) as client:
         yield client
-
-
-def cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0))
 
 
 def processes(client: Client) -> int:

@@ -19,8 +19,8 @@ from std_srvs.srv import Trigger
 from xy_sysid.errors import BadInput
 from xy_sysid.files.effects import library
 from xy_sysid.live.diagnoser import Diagnoser
+from xy_sysid.live.diagnosis_messages import diagnosis_status, ladder_message
 from xy_sysid.live.heard import verdict
-from xy_sysid.live.messages import diagnosis_status, ladder_message
 from xy_sysid.live.plain_messages import OK, STALE, WARN, StatusMessage, topic_of
 from xy_sysid.nodes.common import LATCHED_QOS, WalledNode, declare
 from xy_sysid.nodes.convert import array_to_ros, status_to_ros, statuses_to_ros

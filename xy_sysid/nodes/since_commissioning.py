@@ -3,38 +3,44 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from xy_sysid.axis.model import Library
 from xy_sysid.errors import BadInput
-from xy_sysid.fitting.result import Interval
-from xy_sysid.fleets.baseline import Baseline
-from xy_sysid.fleets.baseline_words import status
-from xy_sysid.fleets.causes import causes
-from xy_sysid.fleets.columns import column_of
-from xy_sysid.fleets.commissioned import of_axis_models, of_transfer_functions, spreads
-from xy_sysid.fleets.trends import AXIS_MONTHS
-from xy_sysid.greybox.parameters import Estimate
-from xy_sysid.linear.transfer_function import TransferFunction
 from xy_sysid.live.plain_messages import StatusMessage
 from xy_sysid.settings import DiagnoserSettings, IdentifierSettings
+
+if TYPE_CHECKING:
+    from xy_sysid.axis.model import Library
+    from xy_sysid.fitting.result import Interval
+    from xy_sysid.fleets.baseline import Baseline
+    from xy_sysid.fleets.causes import Causes
+    from xy_sysid.greybox.parameters import Estimate
+    from xy_sysid.linear.transfer_function import TransferFunction
 
 Column = Callable[[str], str]
 
 
 class SinceCommissioning:
-    """The baselines of the axes that a model file has; nothing at all without a file. models: its transfer functions, by axis."""
+    """The baselines of the axes that a model file has; nothing at all without a file, and what compares is not even imported then.
+
+    models: its transfer functions, by axis
+    """
 
     def __init__(self, known: Mapping[str, tuple[Estimate, ...]], table: str, column: Column, models: Mapping[str, TransferFunction]) -> None:
         self.models = models
-        self._known, self._column, self._causes = known, column, causes()
-        self._spreads = spreads(Path(table).expanduser()) if table else {}
+        self._known, self._column, self._spreads = known, column, _spreads(table)
         self.forget()
 
     @classmethod
     def of_identifier(cls, settings: IdentifierSettings, axes: tuple[str, ...]) -> SinceCommissioning:
         """From a file of ``fit --model``. Raises BadRecording or BadInput for another one, or one of other axes."""
-        found = of_transfer_functions(Path(settings.baseline).expanduser()) if settings.baseline else {}
+        if not settings.baseline:
+            return cls({}, settings.baseline_table, str, {})
+        from xy_sysid.fleets.commissioned import of_transfer_functions
+
+        found = of_transfer_functions(Path(settings.baseline).expanduser())
         _same(settings.baseline, found, axes)
         known = {axis: estimates for axis, (_, estimates) in found.items()}
         return cls(known, settings.baseline_table, column_of_fit, {axis: tf for axis, (tf, _) in found.items()})
@@ -42,28 +48,60 @@ class SinceCommissioning:
     @classmethod
     def of_diagnoser(cls, settings: DiagnoserSettings, axes: tuple[str, ...], library: Library) -> SinceCommissioning:
         """From a file of ``refine --model``. Raises BadRecording or BadInput for another one, or one of other axes."""
-        known = of_axis_models(Path(settings.baseline).expanduser(), library) if settings.baseline else {}
+        if not settings.baseline:
+            return cls({}, settings.baseline_table, str, {})
+        from xy_sysid.fleets.columns import column_of
+        from xy_sysid.fleets.commissioned import of_axis_models
+
+        known = of_axis_models(Path(settings.baseline).expanduser(), library)
         _same(settings.baseline, known, axes)
         return cls(known, settings.baseline_table, column_of, {})
 
     def forget(self) -> None:
         """Nothing was heard yet."""
-        self._baselines = {axis: Baseline(known, self._spreads, self._column) for axis, known in self._known.items()}
+        self._baselines: dict[str, Baseline] = {}
+        if self._known:
+            from xy_sysid.fleets.baseline import Baseline
+
+            self._baselines = {axis: Baseline(known, self._spreads, self._column) for axis, known in self._known.items()}
 
     def hear(self, axis: str, estimates: Iterable[Estimate | Interval], begin: float, end: float) -> None:
         """The estimates of a stretch of data of an axis; see ``Baseline.hear``."""
         if axis in self._baselines:
+            from xy_sysid.greybox.parameters import Estimate
+
             found = [Estimate(name=one.name, value=one.value, unit=one.unit, low=one.low, high=one.high) for one in estimates]
             self._baselines[axis].hear(found, begin, end)
 
     def statuses(self) -> list[StatusMessage]:
         """One for each axis that has a baseline."""
+        if not self._baselines:
+            return []
+        from xy_sysid.fleets.baseline_words import status
+        from xy_sysid.fleets.trends import AXIS_MONTHS
+
         return [status(axis, baseline, self._causes, AXIS_MONTHS) for axis, baseline in self._baselines.items()]
+
+    @cached_property
+    def _causes(self) -> Causes:
+        from xy_sysid.fleets.causes import causes
+
+        return causes()
 
 
 def column_of_fit(name: str) -> str:
     """The column of the fleet's table of an estimate of a transfer function."""
+    from xy_sysid.fleets.columns import column_of
+
     return f"tf_{column_of(name)}"
+
+
+def _spreads(table: str) -> Mapping[str, float]:
+    if not table:
+        return {}
+    from xy_sysid.fleets.commissioned import spreads
+
+    return spreads(Path(table).expanduser())
 
 
 def _same(path: str, known: Mapping[str, object], axes: tuple[str, ...]) -> None:
