@@ -112,6 +112,8 @@ class DemoFollowerNode(WalledNode):
             raise BadInput("STOP", "on", "off", "Release it first.")
         if MACHINE not in self.get_node_names():
             raise BadInput("machine", "not simulated", f"the simulated machine (node {MACHINE})", "This controller is for the demo only.")
+        if self._here is None:
+            raise BadInput("position", "not heard", "a machine that answers", "Activate the excitation, so that it is known where the axes are.")
         models = {}
         for axis in self._axes:
             if axis not in self._stories:
