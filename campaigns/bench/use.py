@@ -27,7 +27,7 @@ from campaigns.bench.tables import Check, Table, at_most
 from campaigns.bench.use_machines import LIMIT, Case, followed, identify, joint_case, table_case, ziegler_nichols
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.comparison.physical_model import PhysicalModel
-from xy_sysid.control_design.closed_loop import Controller
+from xy_sysid.control_design.closed_loop import Controller, Encoder
 from xy_sysid.control_design.compensation import SIMPLE, Compensation, compensate, compensate_within
 from xy_sysid.control_design.feedback import feedback
 from xy_sysid.control_design.gains import Gains, gains, simple_feedforward
@@ -70,11 +70,11 @@ def outcomes(case: Case, seed: int, seconds: float = SECONDS, kept: Path | None 
     for number, axis in enumerate(axes):
         model = known.models[axis]
         found, of = gains(model), samples(model, DRAWS)
-        path, best = _chosen(of, found, places[number], bounds, relay[number], rate)
+        path, best = _chosen(of, found, places[number], bounds, relay[number], rate, known.encoders[axis])
         paths.append(path)
         simple.append(simple_feedforward(found, path))
         chosen.append(best)
-        with_own.append(compensate(of, found, path, own[number]))
+        with_own.append(compensate(of, found, path, own[number], known.encoders[axis]))
 
     def run(wanted: Sequence[SampledPath], extras: Sequence[FloatArray], controllers: Sequence[Controller]) -> tuple[FloatArray, NDArray[np.bool_]]:
         longer = _as_long(wanted)
@@ -95,11 +95,11 @@ def outcomes(case: Case, seed: int, seconds: float = SECONDS, kept: Path | None 
 
 
 def _chosen(
-    of: Sequence[AxisModel], found: Gains, places: Sequence[float], bounds: Bounds, controller: Controller, rate: float
+    of: Sequence[AxisModel], found: Gains, places: Sequence[float], bounds: Bounds, controller: Controller, rate: float, encoder: Encoder
 ) -> tuple[SampledPath, Compensation]:
     """The path and its compensation; kS, kV and kA on the path as it was asked for where the compensation is refused."""
     try:
-        return compensate_within(of, found, places, bounds, controller, rate)
+        return compensate_within(of, found, places, bounds, controller, rate, encoder)
     except BadInput as refused:
         path = s_curve(places, bounds, rate)
         simple, unknown = simple_feedforward(found, path), float("nan")

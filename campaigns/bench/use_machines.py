@@ -21,8 +21,9 @@ from xy_sim.hidden import draw
 from xy_sim.machine import Machine
 from xy_sysid.axis.model import STANDARD
 from xy_sysid.comparison.physical_model import PhysicalModel
-from xy_sysid.control_design.closed_loop import Controller
+from xy_sysid.control_design.closed_loop import Controller, Encoder
 from xy_sysid.control_design.path import SampledPath
+from xy_sysid.control_design.worth import encoder_of
 from xy_sysid.diagnosis.of_run import refine
 from xy_sysid.excitation.lockstep import drive
 from xy_sysid.files.models import read_models, save
@@ -83,10 +84,11 @@ class Case:
 
 @dataclass(frozen=True, slots=True)
 class Identified:
-    """Models of the axes, and the travel (low, high) of each that the recording covers, m or rad."""
+    """Models of the axes, the travel (low, high) of each that the recording covers, m or rad, and the encoder as the recording shows it."""
 
     models: dict[str, PhysicalModel]
     travel: dict[str, tuple[float, float]]
+    encoders: dict[str, Encoder]
 
 
 def table_case(seed: int) -> Case:
@@ -127,7 +129,7 @@ def identify(case: Case, seed: int, seconds: float, kept: Path | None = None) ->
         models = {axis: refine(run).model for axis, run in runs.items()}
         if file is not None:
             save(models, file, force=True)
-    return Identified(models, travel)
+    return Identified(models, travel, {axis: encoder_of(run) for axis, run in runs.items()})
 
 
 def followed(
@@ -211,4 +213,4 @@ def _tried(case: Case, controllers: list[Controller], paths: Sequence[SampledPat
     """Tracking error of each axis along its path, m rms, and whether its drive was at the limit."""
     place, full = followed(case, paths, [np.zeros(path.position.size) for path in paths], controllers)
     wanted = np.array([path.position for path in paths]).T
-    return np.sqrt(np.mean((wanted - place) ** 2, axis=0)), full.any(axis=0)
+    return np.asarray(np.sqrt(np.mean((wanted - place) ** 2, axis=0))), np.asarray(full.any(axis=0))

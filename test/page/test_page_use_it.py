@@ -1,4 +1,4 @@
-"""*Use it* on the page of the demo, over DDS: a click stops the excitation, the path is followed, and the tracking errors that fall stand on the page."""
+"""*Use it* on the page of the demo, over DDS: a click stops the excitation, a path is followed, and the tracking errors stand on the page."""
 
 from __future__ import annotations
 

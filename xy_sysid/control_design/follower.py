@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from xy_sysid.comparison.physical_model import PhysicalModel
-from xy_sysid.control_design.closed_loop import Controller
+from xy_sysid.control_design.closed_loop import Controller, Encoder
 from xy_sysid.control_design.compensation import Compensation, compensate_within
 from xy_sysid.control_design.feedback import feedback
 from xy_sysid.control_design.gains import Gains, gains, simple_feedforward
@@ -42,12 +42,14 @@ class Tryout:
     voltage: FloatArray
 
 
-def plan(model: PhysicalModel, sampling_rate: float, block: int, limit: float, places: Sequence[float], bounds: Bounds) -> Tryout:
+def plan(
+    model: PhysicalModel, sampling_rate: float, block: int, limit: float, places: Sequence[float], bounds: Bounds, encoder: Encoder | None = None
+) -> Tryout:
     """The plan of an axis along an S-curve through places, m. Raises BadInput where no controller has the margins, or the limit would be reached."""
     late = replace(model, model=replace(model.model, delay=model.model.delay + 1.0 / sampling_rate))  # the newest reading is of the sample before
     controller = feedback(late, sampling_rate / block, limit=limit).controller
     found = gains(model)
-    path, best = compensate_within(samples(model, DRAWS), found, places, bounds, controller, sampling_rate)
+    path, best = compensate_within(samples(model, DRAWS), found, places, bounds, controller, sampling_rate, encoder)
     asked = np.array([path.position, path.position, best.path.position])
     voltage = np.array([np.zeros(path.position.size), simple_feedforward(found, path), best.voltage])
     return Tryout(controller=controller, block=block, gains=found, compensation=best, path=path, asked=asked, voltage=voltage)

@@ -21,6 +21,7 @@ from std_srvs.srv import Trigger
 
 from xy_sysid.control_design.follower import KINDS, Follower, Tryout, plan
 from xy_sysid.control_design.path import Bounds
+from xy_sysid.control_design.worth import encoder_of_floor
 from xy_sysid.errors import BadInput, XySysidError
 from xy_sysid.files.story_models import model_of
 from xy_sysid.live.plain_messages import ERROR, OK, WARN, ArrayMessage, topic_of
@@ -124,15 +125,19 @@ class DemoFollowerNode(WalledNode):
             request = ChangeState.Request(transition=Transition(id=Transition.TRANSITION_DEACTIVATE))
             self._excitation.call_async(request)  # refused where it is at rest already
         rates = {axis: float(self._stories[axis]["sampling_rate"]) for axis in self._axes}
-        threading.Thread(target=self._design, args=(models, rates), daemon=True).start()
+        floors = {axis: float(self._stories[axis]["model"]["noise_floor"]) for axis in self._axes}
+        threading.Thread(target=self._design, args=(models, rates, floors), daemon=True).start()
         return "the controllers are being designed; then the path is followed three times"
 
-    def _design(self, models: dict[str, Any], rates: dict[str, float]) -> None:
+    def _design(self, models: dict[str, Any], rates: dict[str, float], floors: dict[str, float]) -> None:
         """In a thread of its own: it takes seconds. Reads parameters, and leaves a result."""
         far, speed, acceleration, limit = (self._number(name) for name in PARAMETERS)
         bounds = Bounds(speed, acceleration, acceleration / JERK_TIME)
         try:
-            self._plans = {axis: plan(model, rates[axis], BLOCK, limit, (0.0, far, -far, 0.0), bounds) for axis, model in models.items()}
+            self._plans = {
+                axis: plan(model, rates[axis], BLOCK, limit, (0.0, far, -far, 0.0), bounds, encoder_of_floor(floors[axis], rates[axis]))
+                for axis, model in models.items()
+            }
         except XySysidError as problem:
             self._plans = BadInput("path", "not to be followed", "a model that makes a controller", str(problem))
 
