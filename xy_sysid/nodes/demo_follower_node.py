@@ -113,13 +113,13 @@ class DemoFollowerNode(WalledNode):
             raise BadInput("STOP", "on", "off", "Release it first.")
         if MACHINE not in self.get_node_names():
             raise BadInput("machine", "not simulated", f"the simulated machine (node {MACHINE})", "This controller is for the demo only.")
-        if self._here is None:
-            raise BadInput("position", "not heard", "a machine that answers", "Activate the excitation, so that it is known where the axes are.")
         models = {}
         for axis in self._axes:
             if axis not in self._stories:
                 raise BadInput(f"axis {axis}", "without a story", "a diagnosed axis", "Press Diagnose or Auto first.")
             models[axis] = model_of(self._stories[axis], axis)
+        if self._here is None:
+            raise BadInput("position", "not heard", "a machine that answers", "Activate the excitation, so that it is known where the axes are.")
         self._state, self._words, self._errors, self._plans = STOPPING, "the excitation is stopped", {}, None
         if self._excitation.service_is_ready():
             request = ChangeState.Request(transition=Transition(id=Transition.TRANSITION_DEACTIVATE))
