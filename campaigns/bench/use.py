@@ -31,7 +31,7 @@ from xy_sysid.control_design.closed_loop import Controller, Encoder
 from xy_sysid.control_design.compensation import SIMPLE, Compensation, compensate, compensate_within
 from xy_sysid.control_design.feedback import feedback
 from xy_sysid.control_design.gains import Gains, gains, simple_feedforward
-from xy_sysid.control_design.path import Bounds, SampledPath, of_position, s_curve
+from xy_sysid.control_design.path import Bounds, Moves, SampledPath, of_position
 from xy_sysid.control_design.uncertain import samples
 from xy_sysid.errors import BadInput
 from xy_sysid.samples.block import FloatArray
@@ -63,14 +63,14 @@ def outcomes(case: Case, seed: int, seconds: float = SECONDS, kept: Path | None 
     known = identify(case, seed, seconds, kept)
     rate, size, axes = case.machine.rate, case.size, case.machine.axes
     bounds = Bounds(size * BOUNDS.speed, size * BOUNDS.acceleration, size * BOUNDS.jerk)
-    places = [_within(known.travel[axis], size) for axis in axes]
-    relay = ziegler_nichols(case, _as_long([s_curve(item, bounds, rate) for item in places]))
+    moves = [Moves(_within(known.travel[axis], size), bounds, rate) for axis in axes]
+    relay = ziegler_nichols(case, _as_long([item.sampled() for item in moves]))
     own = [_own(known.models[axis], rate, relay[number]) for number, axis in enumerate(axes)]
     paths, simple, chosen, with_own = [], [], [], []
     for number, axis in enumerate(axes):
         model = known.models[axis]
         found, of = gains(model), samples(model, DRAWS)
-        path, best = _chosen(of, found, places[number], bounds, relay[number], rate, known.encoders[axis])
+        path, best = _chosen(of, found, moves[number], relay[number], known.encoders[axis])
         paths.append(path)
         simple.append(simple_feedforward(found, path))
         chosen.append(best)
@@ -94,14 +94,12 @@ def outcomes(case: Case, seed: int, seconds: float = SECONDS, kept: Path | None 
     ]  # fmt: skip
 
 
-def _chosen(
-    of: Sequence[AxisModel], found: Gains, places: Sequence[float], bounds: Bounds, controller: Controller, rate: float, encoder: Encoder
-) -> tuple[SampledPath, Compensation]:
+def _chosen(of: Sequence[AxisModel], found: Gains, moves: Moves, controller: Controller, encoder: Encoder) -> tuple[SampledPath, Compensation]:
     """The path and its compensation; kS, kV and kA on the path as it was asked for where the compensation is refused."""
     try:
-        return compensate_within(of, found, places, bounds, controller, rate, encoder)
+        return compensate_within(of, found, moves, controller, encoder)
     except BadInput as refused:
-        path = s_curve(places, bounds, rate)
+        path = moves.sampled()
         simple, unknown = simple_feedforward(found, path), float("nan")
         left = tuple((name, str(refused)) for name, _ in of[0].effects)
         return path, Compensation(path, simple, (f"{SIMPLE}, refused",), left, unknown, unknown, unknown, unknown)

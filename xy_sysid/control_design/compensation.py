@@ -23,7 +23,7 @@ from xy_sysid.control_design.gains import Gains, simple_feedforward
 from xy_sysid.control_design.inverse import feedforward
 from xy_sysid.control_design.laws import along, force
 from xy_sysid.control_design.limits import RESERVE
-from xy_sysid.control_design.path import Bounds, SampledPath, of_position, s_curve
+from xy_sysid.control_design.path import Moves, SampledPath, of_position
 from xy_sysid.errors import BadInput
 from xy_sysid.samples.block import FloatArray
 
@@ -173,25 +173,18 @@ def compensate(models: Sequence[AxisModel], found: Gains, path: SampledPath, con
 
 
 def compensate_within(
-    models: Sequence[AxisModel],
-    found: Gains,
-    places: Sequence[float],
-    bounds: Bounds,
-    controller: Controller,
-    sampling_rate: float,
-    encoder: Encoder | None = None,
+    models: Sequence[AxisModel], found: Gains, moves: Moves, controller: Controller, encoder: Encoder | None = None
 ) -> tuple[SampledPath, Compensation]:
-    """The S-curve through places, m, as fast as the bounds allow, slowed until no sample's drive comes nearer to its limit than ``RESERVE``.
+    """The path of the moves, slowed until no sample's drive comes nearer to its limit than ``RESERVE``.
 
     Raises BadInput where it does even on a slow path, as under a controller that does not come to rest.
     """
     for scale in SLOWED ** np.arange(SLOWINGS):
-        slower = Bounds(scale * bounds.speed, scale**2 * bounds.acceleration, scale**3 * bounds.jerk)
-        path = s_curve(places, slower, sampling_rate)
+        path = moves.sampled(float(scale))
         made = compensate(models, found, path, controller, encoder)
         if made.largest <= (1.0 - RESERVE) * controller.limit:
             return path, made
-    allowed = f"up to {(1.0 - RESERVE) * controller.limit:.3g} V on a path of {slower.speed:.3g} m/s"
+    allowed = f"up to {(1.0 - RESERVE) * controller.limit:.3g} V on a path of {scale * moves.bounds.speed:.3g} m/s"
     raise BadInput("voltage", f"{made.largest:.3g} V", allowed, "Lower the controller's gains, or stay away from what holds the axis.")
 
 

@@ -20,7 +20,7 @@ from std_msgs.msg import Bool, Float64MultiArray, String
 from std_srvs.srv import Trigger
 
 from xy_sysid.control_design.follower import KINDS, Follower, Tryout, plan
-from xy_sysid.control_design.path import Bounds
+from xy_sysid.control_design.path import Bounds, Moves
 from xy_sysid.control_design.worth import encoder_of_floor
 from xy_sysid.errors import BadInput, XySysidError
 from xy_sysid.files.story_models import model_of
@@ -132,10 +132,10 @@ class DemoFollowerNode(WalledNode):
     def _design(self, models: dict[str, Any], rates: dict[str, float], floors: dict[str, float]) -> None:
         """In a thread of its own: it takes seconds. Reads parameters, and leaves a result."""
         far, speed, acceleration, limit = (self._number(name) for name in PARAMETERS)
-        bounds = Bounds(speed, acceleration, acceleration / JERK_TIME)
+        bounds, places = Bounds(speed, acceleration, acceleration / JERK_TIME), (0.0, far, -far, 0.0)
         try:
             self._plans = {
-                axis: plan(model, rates[axis], BLOCK, limit, (0.0, far, -far, 0.0), bounds, encoder_of_floor(floors[axis], rates[axis]))
+                axis: plan(model, Moves(places, bounds, rates[axis]), BLOCK, limit, encoder_of_floor(floors[axis], rates[axis]))
                 for axis, model in models.items()
             }
         except XySysidError as problem:
