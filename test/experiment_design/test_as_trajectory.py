@@ -33,11 +33,15 @@ def test_the_trajectory_is_the_motion_that_the_model_expects_from_rest_to_rest()
 
 @pytest.mark.parametrize(
     ("limits", "words"),
-    [({"travel": (0.04, 0.06)}, "travel of the trajectory"), ({"speed": 0.03}, "speed of the trajectory"), ({"acceleration": 0.1}, "acceleration")],
+    [
+        (replace(LIMITS, travel=(0.04, 0.06)), "travel of the trajectory"),
+        (replace(LIMITS, speed=0.03), "speed of the trajectory"),
+        (replace(LIMITS, acceleration=0.1), "acceleration of the trajectory"),
+    ],
 )
-def test_a_motion_that_leaves_a_limit_is_refused_in_one_line(limits: dict[str, object], words: str) -> None:
+def test_a_motion_that_leaves_a_limit_is_refused_in_one_line(limits: MachineLimits, words: str) -> None:
     """Nothing is scaled silently: another experiment has to be designed."""
-    tight = replace(FOUND, limits=replace(LIMITS, **limits))  # type: ignore[arg-type]
+    tight = replace(FOUND, limits=limits)
     with pytest.raises(BadInput, match=words):
         as_trajectory(tight, MODEL, 100.0)
     with pytest.raises(BadInput, match="points a second"):
