@@ -88,6 +88,7 @@ setup(
             "polars",
             "mujoco",
             "FMPy",
+            f"drake; {ROS_WHEELS}",
             "colcon-core",
             "colcon-ros",
             "colcon-bash",

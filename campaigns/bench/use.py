@@ -25,12 +25,13 @@ from numpy.typing import NDArray
 from campaigns.bench.recordings import between
 from campaigns.bench.tables import Check, Table, at_most
 from campaigns.bench.use_machines import LIMIT, Case, followed, identify, joint_case, table_case, ziegler_nichols
+from xy_sysid.axis.model import AxisModel
 from xy_sysid.comparison.physical_model import PhysicalModel
-from xy_sysid.control_design.closed_loop import Controller
-from xy_sysid.control_design.compensation import Compensation, compensate, compensate_within
+from xy_sysid.control_design.closed_loop import Controller, Encoder
+from xy_sysid.control_design.compensation import SIMPLE, Compensation, compensate, compensate_within
 from xy_sysid.control_design.feedback import feedback
-from xy_sysid.control_design.gains import gains, simple_feedforward
-from xy_sysid.control_design.path import Bounds, SampledPath, of_position
+from xy_sysid.control_design.gains import Gains, gains, simple_feedforward
+from xy_sysid.control_design.path import Bounds, Moves, SampledPath, of_position
 from xy_sysid.control_design.uncertain import samples
 from xy_sysid.errors import BadInput
 from xy_sysid.samples.block import FloatArray
@@ -61,24 +62,23 @@ def outcomes(case: Case, seed: int, seconds: float = SECONDS, kept: Path | None 
     """Every axis of a machine."""
     known = identify(case, seed, seconds, kept)
     rate, size, axes = case.machine.rate, case.size, case.machine.axes
-    relay = ziegler_nichols(case)
-    own = [_own(known.models[axis], rate, relay[number]) for number, axis in enumerate(axes)]
     bounds = Bounds(size * BOUNDS.speed, size * BOUNDS.acceleration, size * BOUNDS.jerk)
+    moves = [Moves(_within(known.travel[axis], size), bounds, rate) for axis in axes]
+    relay = ziegler_nichols(case, _as_long([item.sampled() for item in moves]))
+    own = [_own(known.models[axis], rate, relay[number]) for number, axis in enumerate(axes)]
     paths, simple, chosen, with_own = [], [], [], []
     for number, axis in enumerate(axes):
-        model, (low, high) = known.models[axis], known.travel[axis]
+        model = known.models[axis]
         found, of = gains(model), samples(model, DRAWS)
-        places = [min(max(size * place, WITHIN * low), WITHIN * high) for place in PLACES]
-        path, best = compensate_within(of, found, places, bounds, relay[number], rate)
+        path, best = _chosen(of, found, moves[number], relay[number], known.encoders[axis])
         paths.append(path)
         simple.append(simple_feedforward(found, path))
         chosen.append(best)
-        with_own.append(compensate(of, found, path, own[number]))
-    count = max(path.position.size for path in paths)
+        with_own.append(compensate(of, found, path, own[number], known.encoders[axis]))
 
     def run(wanted: Sequence[SampledPath], extras: Sequence[FloatArray], controllers: Sequence[Controller]) -> tuple[FloatArray, NDArray[np.bool_]]:
-        longer = [of_position(_padded(path.position, count), rate) for path in wanted]
-        return followed(case, longer, [_padded(extra, count) for extra in extras], controllers)
+        longer = _as_long(wanted)
+        return followed(case, longer, [_padded(extra, longer[0].position.size) for extra in extras], controllers)
 
     runs = (
         run(paths, [np.zeros(1)] * len(axes), relay),
@@ -92,6 +92,29 @@ def outcomes(case: Case, seed: int, seconds: float = SECONDS, kept: Path | None 
         ], FAR * size)
         for number, axis in enumerate(axes)
     ]  # fmt: skip
+
+
+def _chosen(of: Sequence[AxisModel], found: Gains, moves: Moves, controller: Controller, encoder: Encoder) -> tuple[SampledPath, Compensation]:
+    """The path and its compensation; kS, kV and kA on the path as it was asked for where the compensation is refused."""
+    try:
+        return compensate_within(of, found, moves, controller, encoder)
+    except BadInput as refused:
+        path = moves.sampled()
+        simple, unknown = simple_feedforward(found, path), float("nan")
+        left = tuple((name, str(refused)) for name, _ in of[0].effects)
+        return path, Compensation(path, simple, (f"{SIMPLE}, refused",), left, unknown, unknown, unknown, unknown)
+
+
+def _within(travel: tuple[float, float], size: float) -> list[float]:
+    """The places of the path, as far as they lie within the travel that the recording has."""
+    low, high = (WITHIN * end for end in travel)
+    return [min(max(size * place, low), high) for place in PLACES]
+
+
+def _as_long(paths: Sequence[SampledPath]) -> list[SampledPath]:
+    """The paths, all as long as the longest: the others wait at their ends."""
+    count = max(path.position.size for path in paths)
+    return [of_position(_padded(path.position, count), path.sampling_rate) for path in paths]
 
 
 def _padded(values: FloatArray, count: int) -> FloatArray:

@@ -6,6 +6,7 @@ load and a table by position are known where the axis has been, and not beyond.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -20,8 +21,9 @@ from xy_sim.hidden import draw
 from xy_sim.machine import Machine
 from xy_sysid.axis.model import STANDARD
 from xy_sysid.comparison.physical_model import PhysicalModel
-from xy_sysid.control_design.closed_loop import Controller
-from xy_sysid.control_design.path import Bounds, SampledPath, s_curve
+from xy_sysid.control_design.closed_loop import Controller, Encoder
+from xy_sysid.control_design.path import SampledPath
+from xy_sysid.control_design.worth import encoder_of
 from xy_sysid.diagnosis.of_run import refine
 from xy_sysid.excitation.lockstep import drive
 from xy_sysid.files.models import read_models, save
@@ -31,8 +33,8 @@ from xy_sysid.units import USUAL, Units
 
 LIMIT = 10.0  # V
 SLOW, SLOW_PERIOD, CENTRING = 0.35, 15.0, 8.0  # V, s and V/m: they take the table 30 to 40 mm to each side
-RELAY, RELAY_SECONDS = 1.0, 4.0  # V, s
-MOVE, TRIAL, HALVINGS = 0.01, Bounds(0.06, 1.0, 50.0), 8  # m: the move that a PID must manage, and how often its gains are halved until it does
+RELAY, RELAY_SECONDS, HYSTERESIS = 1.0, 4.0, 2e-6  # V, s, m: four counts
+HALVINGS = 8  # of the gains of a PID whose drive hums
 JOINT = 10.0  # rad of a joint for a metre of a table
 FOREIGN = (
     ("hinge", ("gravity",)),
@@ -82,10 +84,11 @@ class Case:
 
 @dataclass(frozen=True, slots=True)
 class Identified:
-    """Models of the axes, and the travel (low, high) of each that the recording covers, m or rad."""
+    """Models of the axes, the travel (low, high) of each that the recording covers, m or rad, and the encoder as the recording shows it."""
 
     models: dict[str, PhysicalModel]
     travel: dict[str, tuple[float, float]]
+    encoders: dict[str, Encoder]
 
 
 def table_case(seed: int) -> Case:
@@ -126,7 +129,7 @@ def identify(case: Case, seed: int, seconds: float, kept: Path | None = None) ->
         models = {axis: refine(run).model for axis, run in runs.items()}
         if file is not None:
             save(models, file, force=True)
-    return Identified(models, travel)
+    return Identified(models, travel, {axis: encoder_of(run) for axis, run in runs.items()})
 
 
 def followed(
@@ -157,43 +160,57 @@ def followed(
     return place, full
 
 
-def ziegler_nichols(case: Case) -> list[Controller]:
-    """PID of every axis from a relay experiment; the gains are halved until a move stays away from the drive's limit.
+def ziegler_nichols(case: Case, paths: Sequence[SampledPath]) -> list[Controller]:
+    """PID of every axis from a relay experiment; the gains are halved while that helps along the path of each axis (all of one length).
 
+    The relay has a hysteresis of a few counts of the encoder, and period and amplitude are medians over whole cycles. Without it the noise switches
+    the relay inside a gap or before the axis breaks away, and the period is not that of the oscillation.
     Source: Astrom & Hagglund, Automatica 20 (1984); Ziegler & Nichols, Trans. ASME 64 (1942).
     """
     machine = case.machine
     machine.reset()
     rate = machine.rate
     count, axes = int(RELAY_SECONDS * rate), len(machine.axes)
+    wide = HYSTERESIS * case.size
     shown, held = np.zeros((count, axes)), np.full(axes, RELAY)
     for k in range(count):
         shown[k] = machine.step(held[None, :])[0]
-        held = np.where(shown[k] > shown[: k + 1].mean(axis=0) * (k > rate), -RELAY, RELAY)
-    made = []
-    for column in range(axes):
-        late = shown[count // 2 :, column]
-        late = late - late.mean()
-        rising = np.flatnonzero((late[:-1] < 0.0) & (late[1:] >= 0.0))
-        period = float(np.mean(np.diff(rising))) / rate if rising.size > 2 else 0.02
-        size = 0.5 * float(np.ptp(late[rising[0] :])) if rising.size else 1e-4
-        ultimate = 4.0 * RELAY / (math.pi * max(size, 1e-7))
-        kp, integral, derivative = 0.6 * ultimate, 0.5 * period, 0.125 * period
-        made.append(Controller(kp=kp, ki=kp / integral, kd=kp * derivative, derivative_time=derivative / 10.0, limit=LIMIT))
-    return _calmed(case, made)
+        held = np.where(shown[k] > wide, -RELAY, np.where(shown[k] < -wide, RELAY, held))
+    return _calmed(case, [_from_cycles(row, rate, wide) for row in shown[count // 2 :].T], paths)
 
 
-def _calmed(case: Case, controllers: list[Controller]) -> list[Controller]:
-    """As anybody does whose drive hums: the gains are halved until a short move, and the rest after it, stay away from the drive's limit."""
-    bounds = Bounds(case.size * TRIAL.speed, case.size * TRIAL.acceleration, case.size * TRIAL.jerk)
-    path = s_curve([0.0, case.size * MOVE, -case.size * MOVE, 0.0], bounds, case.machine.rate)
+def _from_cycles(shown: FloatArray, rate: float, wide: float) -> Controller:
+    """The PID of Ziegler and Nichols from an oscillation (n,), m, under a relay of a hysteresis ``wide``, m."""
+    above = np.where(shown > wide, 1.0, np.where(shown < -wide, -1.0, 0.0))
+    last = np.maximum.accumulate(np.where(above != 0.0, np.arange(above.size), 0))
+    begins = np.flatnonzero((above[last][:-1] <= 0.0) & (above[last][1:] > 0.0))
+    assert begins.size > 2, "the relay does not make the axis oscillate"
+    period = float(np.median(np.diff(begins))) / rate
+    size = float(np.median([0.5 * np.ptp(shown[start:end]) for start, end in itertools.pairwise(begins)]))
+    ultimate = 4.0 * RELAY / (math.pi * math.sqrt(size**2 - wide**2))
+    kp, integral, derivative = 0.6 * ultimate, 0.5 * period, 0.125 * period
+    return Controller(kp=kp, ki=kp / integral, kd=kp * derivative, derivative_time=derivative / 10.0, limit=LIMIT)
+
+
+def _calmed(case: Case, controllers: list[Controller], paths: Sequence[SampledPath]) -> list[Controller]:
+    """As anybody does whose drive hums: the gains are halved until the path keeps the drive away from its limit, and on while its error falls.
+
+    While an axis slides, its dry friction no longer damps what the relay has measured, so that the gains may be too high.
+    """
+    best, error, loud = controllers, *_tried(case, controllers, paths)
     for _ in range(HALVINGS):
-        _, full = followed(case, [path] * len(controllers), [np.zeros(path.position.size)] * len(controllers), controllers)
-        loud = [bool(column.any()) for column in full.T]
-        if not any(loud):
+        halved = [replace(item, kp=0.5 * item.kp, ki=0.5 * item.ki, kd=0.5 * item.kd) for item in best]
+        now, still = _tried(case, halved, paths)
+        better = loud | (now < error)
+        if not better.any():
             break
-        controllers = [
-            replace(item, kp=0.5 * item.kp, ki=0.5 * item.ki, kd=0.5 * item.kd) if over else item
-            for item, over in zip(controllers, loud, strict=True)
-        ]
-    return controllers
+        best = [new if take else old for new, old, take in zip(halved, best, better, strict=True)]
+        error, loud = np.where(better, now, error), np.where(better, still, loud)
+    return best
+
+
+def _tried(case: Case, controllers: list[Controller], paths: Sequence[SampledPath]) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Tracking error of each axis along its path, m rms, and whether its drive was at the limit."""
+    place, full = followed(case, paths, [np.zeros(path.position.size) for path in paths], controllers)
+    wanted = np.array([path.position for path in paths]).T
+    return np.asarray(np.sqrt(np.mean((wanted - place) ** 2, axis=0))), np.asarray(full.any(axis=0))

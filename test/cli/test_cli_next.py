@@ -25,16 +25,21 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_it_says_what_to_run_and_what_to_expect_and_writes_the_file(recording: Path, tmp_path: Path) -> None:
-    """A sentence with the seconds and the probability, and a file that the excitation node loads."""
-    out = tmp_path / "next.yaml"
+    """A sentence with the seconds and the probability, a file that the excitation node loads, and a trajectory for a robot that takes no voltage."""
+    out, motion = tmp_path / "next.yaml", tmp_path / "motion.yaml"
     sets = ("--between", "rigid", "--between", "amplifier_lag")
-    said = cli("next", recording, *sets, "--voltage", 5, "--travel=-140:140", "-o", out)
+    said = cli("next", recording, *sets, "--voltage", 5, "--travel=-140:140", "-o", out, "--trajectory", motion)
     assert said.code == 0, said
     assert "the rigid model and amplifier_lag are distinguished with 95 % probability" in said.out
     told = yaml.safe_load(out.read_text())["experiment"]
     assert told["axis"] == "x" and told["needs"]["voltage"] <= 5.0
     assert told["excitation"]["high"] > 8.0  # beyond the band of the recording
     assert "not there yet" in refused("next", recording, *sets, "-o", out)
+    message = yaml.safe_load(motion.read_text())
+    assert message["joint_names"] == ["x"] and set(message["points"][5]) == {"positions", "velocities", "accelerations", "time_from_start"}
+    rows = np.loadtxt(motion.with_suffix(".csv"), delimiter=",", skiprows=1)
+    assert len(rows) == len(message["points"]) and np.max(np.abs(rows[:, 1])) < 0.14
+    assert "a recording" in refused("next", "--for", "nothing", "--voltage", 5, "--travel=-140:140", "--trajectory", tmp_path / "no.yaml")
 
 
 @pytest.mark.parametrize(

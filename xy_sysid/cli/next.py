@@ -19,12 +19,14 @@ from xy_sysid.errors import BadInput
 from xy_sysid.units import Units, readable
 
 if TYPE_CHECKING:
+    from xy_sysid.axis.model import Library
     from xy_sysid.experiment_design.limits import MachineLimits
     from xy_sysid.experiment_design.of_run import NextExperiment
     from xy_sysid.imports.reading import Reading
     from xy_sysid.samples.recording import Run
 
 NOTHING = "nothing"  # is known
+POINTS = 100.0  # a second, of a trajectory
 Between = Annotated[
     list[str] | None,
     typer.Option("--between", metavar="EFFECTS", help="a set of effects to compare, for example a+b, or rigid; repeat it for each set"),
@@ -38,6 +40,10 @@ def next_(
         list[Path] | None, typer.Argument(metavar="[REC]", help="recordings of one machine, as of diagnose; none with --for nothing")
     ] = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", metavar="FILE", help="write the experiment for the excitation node")] = None,
+    trajectory: Annotated[
+        Path | None,
+        typer.Option("--trajectory", metavar="FILE", help="write its motion too: trajectory_msgs/JointTrajectory as YAML, and as .csv"),
+    ] = None,
     replay: Annotated[Path | None, typer.Option("--replay", metavar="FOLDER", help="repeat the decisions of a folder settle_* from its bags")] = None,
     between: Between = None,
     precision: Annotated[
@@ -79,6 +85,11 @@ def next_(
     if replay is not None:
         raise typer.Exit(_replayed(replay, effect_file, json))
     o.output_file("--output", output, force)
+    if trajectory is not None:
+        if precision == NOTHING:
+            raise BadInput("--trajectory", "without a recording", "a recording, whose model says how the axis moves", "Leave out --for nothing.")
+        o.output_file("--trajectory", trajectory, force)
+        o.output_file("--trajectory", trajectory.with_suffix(".csv"), force)
     asked = partial(_asked, voltage=voltage, travel=travel, speed=speed, acceleration=acceleration)
     if precision == NOTHING:
         unknown = _first(reading, run_file, asked, rms, seconds)
@@ -107,7 +118,22 @@ def next_(
             answer = next_experiment(found, limits, sets, known, tell=lambda part: bar.update(task, completed=part))
     if not json:
         say(f"axis {names[0]}: {found.sentence.rstrip()}")
+    if trajectory is not None:
+        _write_trajectory(answer, runs, known, trajectory)
     _answered(answer, output, json)
+
+
+def _write_trajectory(answer: NextExperiment, runs: tuple[Run, ...], known: Library, to: Path) -> None:
+    """The motion of the experiment as the first of its sets predicts it; the joint has the name of the axis."""
+    from xy_sysid.bags.atomic import write_text
+    from xy_sysid.diagnosis.of_run import refine
+    from xy_sysid.experiment_design.as_trajectory import as_trajectory
+    from xy_sysid.files.trajectories import as_csv, as_yaml
+
+    fitted = refine(runs, add=answer.sets[0] if answer.sets else (), auto=False, library=known)
+    made = as_trajectory(answer, fitted.model.model, min(POINTS, answer.sampling_rate))
+    write_text(to, as_yaml(made, answer.axis))
+    write_text(to.with_suffix(".csv"), as_csv(made))
 
 
 def _replayed(folder: Path, effect_file: list[Path] | None, json: bool) -> int:

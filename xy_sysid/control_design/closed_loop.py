@@ -17,6 +17,7 @@ from xy_sysid.jit import compiled_text
 from xy_sysid.samples.block import FloatArray
 
 NO_LIMIT = 1e12  # V
+RESTS = 0.5  # s of rest, the second half of which shows how much noise shakes an axis
 APART = "apart"  # the state of an effect with a gap: motor minus load, m
 
 
@@ -47,6 +48,11 @@ class Encoder:
 
     noise: float = 0.0
     count: float = 0.0
+
+    @property
+    def white(self) -> Encoder:
+        """White noise alone, with the power of both: the mean over all places within a count (Widrow 1956)."""
+        return Encoder(noise=math.sqrt(self.noise**2 + self.count**2 / 12.0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,6 +142,17 @@ def follow_path(
     asked = (np.ascontiguousarray(path.position), given, gains, sections, noise, encoder.count, _behind(ready))
     _loop_of(library)(*asked, *numbers, position, shown, voltage, carried)
     return Tracked(position=position, shown=shown, voltage=voltage, error=path.position - position, carried=carried)
+
+
+def shake(model: AxisModel, place: float, sampling_rate: float, controller: Controller, encoder: Encoder) -> float:
+    """Mean absolute speed, m/s, that the encoder's noise gives the axis through its controller while it is asked to rest at a place, m.
+
+    Presliding friction (LuGre) forgets by this motion: with z' = v - |v| z / length, noise of mean 0 leaves z' = -mean(|v|) z / length.
+    """
+    count = round(RESTS * sampling_rate)
+    rest = SampledPath(sampling_rate, np.full(count, place), np.zeros(count), np.zeros(count))
+    shown = follow_path(model, rest, controller, None, encoder.white).position[count // 2 :]
+    return float(np.mean(np.abs(np.diff(shown)))) * sampling_rate
 
 
 def _behind(ready: Plant) -> int:

@@ -18,12 +18,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from xy_sysid.axis.model import AxisModel
-from xy_sysid.control_design.closed_loop import Controller, Encoder, follow_path
+from xy_sysid.control_design.closed_loop import Controller, Encoder, follow_path, shake
 from xy_sysid.control_design.gains import Gains, simple_feedforward
 from xy_sysid.control_design.inverse import feedforward
 from xy_sysid.control_design.laws import along, force
 from xy_sysid.control_design.limits import RESERVE
-from xy_sysid.control_design.path import Bounds, SampledPath, of_position, s_curve
+from xy_sysid.control_design.path import Moves, SampledPath, of_position
 from xy_sysid.errors import BadInput
 from xy_sysid.samples.block import FloatArray
 
@@ -129,7 +129,10 @@ def at_its_bound(model: AxisModel) -> str:
 
 
 def compensate(models: Sequence[AxisModel], found: Gains, path: SampledPath, controller: Controller, encoder: Encoder | None = None) -> Compensation:
-    """The laws of the first model that are worth undoing along the path. models: the model and samples of its parameters (``uncertain.samples``)."""
+    """The laws of the first model that are worth undoing along the path.
+
+    models: the model and samples of its parameters (``uncertain.samples``); encoder: with its noise presliding friction creeps while the axis rests
+    """
     others = alike(models[0])
     judges = (*models, *others)
 
@@ -138,11 +141,13 @@ def compensate(models: Sequence[AxisModel], found: Gains, path: SampledPath, con
         errors = np.array([_rms(path.position - run.carried) for run in runs])
         return _Tried(terms=terms, path=wanted, voltage=voltage, errors=errors, largest=max(float(np.max(np.abs(run.voltage))) for run in runs))
 
+    noise = shake(models[0], float(path.position[0]), path.sampling_rate, controller, encoder or Encoder())
+
     def undoing(model: AxisModel) -> Callable[[tuple[str, ...]], _Tried]:
         def these(terms: tuple[str, ...]) -> _Tried:
             kept = replace(model, effects=tuple(item for item in model.effects if item[0] in terms))
             wanted = asked_of_encoder(model, path, terms)
-            return judged(terms, wanted, feedforward(kept, wanted).voltage)
+            return judged(terms, wanted, feedforward(kept, wanted, noise).voltage)
 
         return these
 
@@ -168,24 +173,18 @@ def compensate(models: Sequence[AxisModel], found: Gains, path: SampledPath, con
 
 
 def compensate_within(
-    models: Sequence[AxisModel],
-    found: Gains,
-    places: Sequence[float],
-    bounds: Bounds,
-    controller: Controller,
-    sampling_rate: float,
+    models: Sequence[AxisModel], found: Gains, moves: Moves, controller: Controller, encoder: Encoder | None = None
 ) -> tuple[SampledPath, Compensation]:
-    """The S-curve through places, m, as fast as the bounds allow, slowed until no sample's drive comes nearer to its limit than ``RESERVE``.
+    """The path of the moves, slowed until no sample's drive comes nearer to its limit than ``RESERVE``.
 
     Raises BadInput where it does even on a slow path, as under a controller that does not come to rest.
     """
     for scale in SLOWED ** np.arange(SLOWINGS):
-        slower = Bounds(scale * bounds.speed, scale**2 * bounds.acceleration, scale**3 * bounds.jerk)
-        path = s_curve(places, slower, sampling_rate)
-        made = compensate(models, found, path, controller)
+        path = moves.sampled(float(scale))
+        made = compensate(models, found, path, controller, encoder)
         if made.largest <= (1.0 - RESERVE) * controller.limit:
             return path, made
-    allowed = f"up to {(1.0 - RESERVE) * controller.limit:.3g} V on a path of {slower.speed:.3g} m/s"
+    allowed = f"up to {(1.0 - RESERVE) * controller.limit:.3g} V on a path of {scale * moves.bounds.speed:.3g} m/s"
     raise BadInput("voltage", f"{made.largest:.3g} V", allowed, "Lower the controller's gains, or stay away from what holds the axis.")
 
 

@@ -5,17 +5,16 @@ The feedback is calculated once for a block of samples, from the newest reading;
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from xy_sysid.comparison.physical_model import PhysicalModel
-from xy_sysid.control_design.closed_loop import Controller
+from xy_sysid.control_design.closed_loop import Controller, Encoder
 from xy_sysid.control_design.compensation import Compensation, compensate_within
 from xy_sysid.control_design.feedback import feedback
 from xy_sysid.control_design.gains import Gains, gains, simple_feedforward
-from xy_sysid.control_design.path import Bounds, SampledPath, s_curve
+from xy_sysid.control_design.path import Bounds, Moves, SampledPath, s_curve
 from xy_sysid.control_design.uncertain import samples
 from xy_sysid.samples.block import FloatArray
 
@@ -42,12 +41,13 @@ class Tryout:
     voltage: FloatArray
 
 
-def plan(model: PhysicalModel, sampling_rate: float, block: int, limit: float, places: Sequence[float], bounds: Bounds) -> Tryout:
-    """The plan of an axis along an S-curve through places, m. Raises BadInput where no controller has the margins, or the limit would be reached."""
+def plan(model: PhysicalModel, moves: Moves, block: int, limit: float, encoder: Encoder | None = None) -> Tryout:
+    """The plan of an axis along the path of the moves. Raises BadInput where no controller has the margins, or the limit would be reached."""
+    sampling_rate = moves.sampling_rate
     late = replace(model, model=replace(model.model, delay=model.model.delay + 1.0 / sampling_rate))  # the newest reading is of the sample before
     controller = feedback(late, sampling_rate / block, limit=limit).controller
     found = gains(model)
-    path, best = compensate_within(samples(model, DRAWS), found, places, bounds, controller, sampling_rate)
+    path, best = compensate_within(samples(model, DRAWS), found, moves, controller, encoder)
     asked = np.array([path.position, path.position, best.path.position])
     voltage = np.array([np.zeros(path.position.size), simple_feedforward(found, path), best.voltage])
     return Tryout(controller=controller, block=block, gains=found, compensation=best, path=path, asked=asked, voltage=voltage)

@@ -50,9 +50,12 @@ def parts_of_sample(ready: Plant) -> int:
     return max(math.ceil(float(fastest) / (resonant_loop.STIFF * ready.sampling_rate)), 1)
 
 
-def feedforward(model: AxisModel, path: SampledPath) -> Feedforward:
-    """The voltage along a path, with delay, hold, lag, resonances and amplifier undone; see ``not_undone`` for the rest."""
-    ready = plant(model, path.sampling_rate)
+def feedforward(model: AxisModel, path: SampledPath, shake: float = 0.0) -> Feedforward:
+    """The voltage along a path, with delay, hold, lag, resonances and amplifier undone; see ``not_undone`` for the rest.
+
+    shake: m/s, mean absolute speed that noise gives the axis in its loop while it rests (``closed_loop.shake``): presliding friction relaxes by it
+    """
+    ready = plant(model, path.sampling_rate, shake=shake)
     ahead = ahead_of(model, path.sampling_rate)
     wanted = path.ahead(ahead)
     library = model.library.looped([model.library[name] for name, _ in model.effects])

@@ -109,12 +109,19 @@ class InverseText(LawText):
         for effect in self.of("bristle"):
             state = f"s[{self.layout.state(effect, effect.states[0])}]"
             words = {"v": "v", "h": "h", "level": "level"}
-            bristled += self.guard(
-                effect, [f"{state} = {self.call(effect, 'bend', words)}", f"effort += {turn} * {self.call(effect, 'force', words)}"]
-            )
+            bent = [f"{state} = {self.call(effect, 'bend', words)}"]
+            if self.guarded:
+                bent = self._shaken(effect, state, bent)
+            bristled += self.guard(effect, [*bent, f"effort += {turn} * {self.call(effect, 'force', words)}"])
         if not self.of("bristle"):
             return [*lines, rubbing]
         return [*lines, f"if not ({self.acts(self.of('bristle'))}):", f"    {rubbing}", *bristled] if self.guarded else [*lines, *bristled]
+
+    def _shaken(self, effect: Effect, state: str, calm: list[str]) -> list[str]:
+        """Noise moves the axis forth and back while it rests, and bristles that are moved so relax: half a sample each way."""
+        shake = self.numbers["shake"]
+        halves = [f"{state} = {self.call(effect, 'bend', {'v': f'(v {way} {shake})', 'h': '0.5 * h', 'level': 'level'})}" for way in ("+", "-")]
+        return [f"if {shake} > 0.0:", *("    " + line for line in halves), "else:", *("    " + line for line in calm)]
 
     def _forces(self) -> list[str]:
         """Added once; as often as needed where one asks for the voltage itself."""

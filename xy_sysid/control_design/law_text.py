@@ -11,7 +11,7 @@ from xy_sysid.effects import Effect
 from xy_sysid.effects._binding import call
 
 X, V, Q = 0, 1, 2  # places in a state: position, speed, what hangs on it
-NUMBERS = ("gain", "pole", "turn", "h_old", "h_new", "cuts_old", "cuts_new", "back_old", "back_new", "n", "ring")
+NUMBERS = ("gain", "pole", "turn", "h_old", "h_new", "cuts_old", "cuts_new", "back_old", "back_new", "n", "ring", "shake")
 
 
 @dataclass(frozen=True, slots=True)

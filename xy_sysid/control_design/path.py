@@ -33,6 +33,20 @@ class Bounds:
 
 
 @dataclass(frozen=True, slots=True)
+class Moves:
+    """From place to place: places: m; bounds: of each move; sampling_rate: Hz."""
+
+    places: Sequence[float]
+    bounds: Bounds
+    sampling_rate: float
+
+    def sampled(self, scale: float = 1.0) -> SampledPath:
+        """The path at the sampling rate, ``scale`` times as fast; see ``s_curve``."""
+        own = self.bounds
+        return s_curve(self.places, Bounds(scale * own.speed, scale**2 * own.acceleration, scale**3 * own.jerk), self.sampling_rate)
+
+
+@dataclass(frozen=True, slots=True)
 class SampledPath:
     """sampling_rate: Hz; position, speed, acceleration: (n,) at each sample, m, m/s, m/s2."""
 

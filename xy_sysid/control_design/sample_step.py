@@ -74,8 +74,10 @@ def sections(model: AxisModel, sampling_rate: float) -> tuple[FloatArray, FloatA
     return top, bottom
 
 
-def plant(model: AxisModel, sampling_rate: float, whole: bool = True) -> Plant:
+def plant(model: AxisModel, sampling_rate: float, whole: bool = True, shake: float = 0.0) -> Plant:
     """The model at this rate. whole: for the loop of the whole library, else with the layout of this model alone, for printing.
+
+    shake: m/s, mean absolute speed that noise gives the axis while it rests, which the feedforward expects
 
     Raises BadInput for a delay beyond reason, or a resonance that has no roots in s.
     """
@@ -105,6 +107,7 @@ def plant(model: AxisModel, sampling_rate: float, whole: bool = True) -> Plant:
         "back_new": back,
         "n": top.size + 2,
         "ring": back + 2,
+        "shake": shake,
     }
     library = model.library.looped([model.library[name] for name, _ in model.effects]) if whole else model.library
     effects = library.acting if whole else tuple(model.library[name] for name, _ in model.effects)

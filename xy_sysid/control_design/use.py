@@ -22,9 +22,8 @@ from xy_sysid.control_design.path import Bounds, recorded, s_curve
 from xy_sysid.control_design.state_feedback import StateFeedback, state_feedback
 from xy_sysid.control_design.tables import Correction, friction_table, position_tables
 from xy_sysid.control_design.uncertain import Derived, derive, samples
-from xy_sysid.control_design.worth import Predicted, Tracking, predicted, tracked
+from xy_sysid.control_design.worth import Predicted, Tracking, encoder_of, predicted, tracked
 from xy_sysid.errors import BadInput
-from xy_sysid.greybox.floor import count_size, encoder_noise
 from xy_sysid.linear.any_model import AnyModel
 from xy_sysid.samples.recording import Recording, Run, one_run
 
@@ -103,7 +102,7 @@ def use(
     between = travel or _travel(run)
     if not between[0] < between[1]:
         raise BadInput("travel", f"{between[0]:g} to {between[1]:g}", "two places, the lower first", "Give --travel LOW HIGH.")
-    encoder = Encoder() if run is None else _encoder(run)
+    encoder = Encoder() if run is None else encoder_of(run)
     refused: list[tuple[str, str]] = []
     found = gains(model)
     loop = _tried("feedback", lambda: feedback(model, rate, bandwidth, encoder=encoder, limit=drive), refused)
@@ -175,12 +174,6 @@ def _travel(run: Run | None) -> tuple[float, float]:
     if run is None:
         return -0.5 * SWING, 0.5 * SWING
     return float(np.min(run.position)), float(np.max(run.position))
-
-
-def _encoder(run: Run) -> Encoder:
-    count = count_size(run.position)
-    noise = encoder_noise(run.sampling_rate, run.position)
-    return Encoder(noise=math.sqrt(max(noise**2 - count**2 / 12.0, 0.0)), count=count)
 
 
 def _gap(model: PhysicalModel) -> Derived | None:

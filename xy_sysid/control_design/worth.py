@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -10,11 +11,11 @@ import scipy
 
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.comparison.physical_model import PhysicalModel
-from xy_sysid.control_design.closed_loop import Controller, Encoder, follow_path
+from xy_sysid.control_design.closed_loop import Controller, Encoder, follow_path, shake
 from xy_sysid.control_design.gains import Gains, simple_feedforward
 from xy_sysid.control_design.inverse import feedforward
 from xy_sysid.control_design.path import ORDER, SampledPath, recorded
-from xy_sysid.greybox.floor import encoder_noise
+from xy_sysid.greybox.floor import TOP, TOP_SHARE, count_size, encoder_noise
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import Run
 
@@ -56,6 +57,22 @@ class Tracking:
     limit: float
 
 
+def encoder_of(run: Run) -> Encoder:
+    """Noise and counts of the encoder of a recording."""
+    count = count_size(run.position)
+    noise = encoder_noise(run.sampling_rate, run.position)
+    return Encoder(noise=math.sqrt(max(noise**2 - count**2 / 12.0, 0.0)), count=count)
+
+
+def encoder_of_floor(noise_floor: float, sampling_rate: float) -> Encoder:
+    """White noise of an encoder that makes a noise floor, m/s rms, of the velocity below the highest frequency that is compared.
+
+    The difference of white noise has the power density 2 (1 - cos w), w = 0 .. pi.
+    """
+    top = min(TOP, TOP_SHARE * sampling_rate) / (0.5 * sampling_rate)
+    return Encoder(noise=noise_floor / sampling_rate / math.sqrt(2.0 * (top - math.sin(math.pi * top) / math.pi)))
+
+
 def predicted(model: PhysicalModel, found: Gains, run: Run) -> Predicted:
     """The voltage of a run from its motion. Raises BadInput where the run is too short."""
     below = clear_below(model, run)
@@ -84,7 +101,8 @@ def clear_below(model: PhysicalModel, run: Run) -> float:
 def tracked(models: Sequence[AxisModel], found: Gains, controller: Controller, path: tuple[str, SampledPath], encoder: Encoder) -> Tracking:
     """The path followed by the first model with each feedforward, and by the others with the whole one of the first."""
     name, wanted = path
-    simple, whole = simple_feedforward(found, wanted), feedforward(models[0], wanted).voltage
+    noise = shake(models[0], float(wanted.position[0]), wanted.sampling_rate, controller, encoder)
+    simple, whole = simple_feedforward(found, wanted), feedforward(models[0], wanted, noise).voltage
     runs = [follow_path(models[0], wanted, controller, extra, encoder) for extra in (None, simple, whole)]
     others = [follow_path(model, wanted, controller, whole, encoder).rms for model in models[1:]]
     return Tracking(

@@ -70,7 +70,7 @@ def trajectory(
         )
     time = np.arange(round(seconds * rate) + 1) / rate
     signal, first, second = (_multisine if kind == "multisine" else _sweep)(time, band, seconds, seed)
-    fade, slope, bend = _fade(time, seconds)
+    fade, slope, bend = faded(time, seconds)
     moved = fade * signal
     speed = slope * signal + fade * first
     push = bend * signal + 2.0 * slope * first + fade * second
@@ -105,7 +105,7 @@ def _sweep(time: FloatArray, band: tuple[float, float], seconds: float, seed: in
     return signal, first, second
 
 
-def _fade(time: FloatArray, seconds: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+def faded(time: FloatArray, seconds: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """A smooth step up at the beginning and down at the end, and its two derivatives."""
     length = FADE * seconds
     value, slope, bend = np.ones(time.size), np.zeros(time.size), np.zeros(time.size)

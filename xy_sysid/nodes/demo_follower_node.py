@@ -20,7 +20,8 @@ from std_msgs.msg import Bool, Float64MultiArray, String
 from std_srvs.srv import Trigger
 
 from xy_sysid.control_design.follower import KINDS, Follower, Tryout, plan
-from xy_sysid.control_design.path import Bounds
+from xy_sysid.control_design.path import Bounds, Moves
+from xy_sysid.control_design.worth import encoder_of_floor
 from xy_sysid.errors import BadInput, XySysidError
 from xy_sysid.files.story_models import model_of
 from xy_sysid.live.plain_messages import ERROR, OK, WARN, ArrayMessage, topic_of
@@ -117,20 +118,26 @@ class DemoFollowerNode(WalledNode):
             if axis not in self._stories:
                 raise BadInput(f"axis {axis}", "without a story", "a diagnosed axis", "Press Diagnose or Auto first.")
             models[axis] = model_of(self._stories[axis], axis)
+        if self._here is None:
+            raise BadInput("position", "not heard", "a machine that answers", "Activate the excitation, so that it is known where the axes are.")
         self._state, self._words, self._errors, self._plans = STOPPING, "the excitation is stopped", {}, None
         if self._excitation.service_is_ready():
             request = ChangeState.Request(transition=Transition(id=Transition.TRANSITION_DEACTIVATE))
             self._excitation.call_async(request)  # refused where it is at rest already
         rates = {axis: float(self._stories[axis]["sampling_rate"]) for axis in self._axes}
-        threading.Thread(target=self._design, args=(models, rates), daemon=True).start()
+        floors = {axis: float(self._stories[axis]["model"]["noise_floor"]) for axis in self._axes}
+        threading.Thread(target=self._design, args=(models, rates, floors), daemon=True).start()
         return "the controllers are being designed; then the path is followed three times"
 
-    def _design(self, models: dict[str, Any], rates: dict[str, float]) -> None:
+    def _design(self, models: dict[str, Any], rates: dict[str, float], floors: dict[str, float]) -> None:
         """In a thread of its own: it takes seconds. Reads parameters, and leaves a result."""
         far, speed, acceleration, limit = (self._number(name) for name in PARAMETERS)
-        bounds = Bounds(speed, acceleration, acceleration / JERK_TIME)
+        bounds, places = Bounds(speed, acceleration, acceleration / JERK_TIME), (0.0, far, -far, 0.0)
         try:
-            self._plans = {axis: plan(model, rates[axis], BLOCK, limit, (0.0, far, -far, 0.0), bounds) for axis, model in models.items()}
+            self._plans = {
+                axis: plan(model, Moves(places, bounds, rates[axis]), BLOCK, limit, encoder_of_floor(floors[axis], rates[axis]))
+                for axis, model in models.items()
+            }
         except XySysidError as problem:
             self._plans = BadInput("path", "not to be followed", "a model that makes a controller", str(problem))
 

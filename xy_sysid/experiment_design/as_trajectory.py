@@ -1,0 +1,56 @@
+"""A designed experiment for a robot that takes only trajectories: the motion that the model expects of it, from rest to rest, within the limits."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy
+
+from xy_sysid.axis.forward import move
+from xy_sysid.axis.model import AxisModel
+from xy_sysid.errors import BadInput
+from xy_sysid.excitation.trajectory import Trajectory, faded
+from xy_sysid.experiment_design.of_run import NextExperiment
+
+POINTS_EACH = 8.0  # points in a period of the highest frequency that the trajectory keeps
+ORDER = 4  # of the low-pass without delay
+
+
+def as_trajectory(found: NextExperiment, model: AxisModel, rate: float) -> Trajectory:
+    """Points of the motion that an experiment makes of the fitted model.
+
+    rate: points a second; what is faster than an eighth of it is left out, as no controller could follow it between its points
+    Raises BadInput where there is no experiment, for a rate above the recording's, and for a motion that would leave a limit of the machine.
+    """
+    if found.experiment is None:
+        raise BadInput("experiment", "none", "one that helps", "Give wider limits, or another setup.")
+    fine = found.sampling_rate
+    if not 1.0 <= rate <= fine:
+        raise BadInput("points a second", rate, f"1 to {fine:g}", "Give the rate of the trajectory's points.")
+    start = found.limits.start
+    motion = move(model, fine, found.experiment.drive(fine, found.seconds, start))
+    sos = scipy.signal.butter(ORDER, min(rate / POINTS_EACH, 0.45 * fine), fs=fine, output="sos")
+    time = np.arange(motion.position.size) / fine
+    window, _, _ = faded(time, float(time[-1]))
+    moved = window * scipy.signal.sosfiltfilt(sos, motion.position - start)
+    speed = np.gradient(moved) * fine
+    acceleration = np.gradient(speed) * fine
+    at = np.arange(int(time[-1] * rate) + 1) / rate
+    points = [np.interp(at, time, values) for values in (moved, speed, acceleration)]
+    made = Trajectory(time=at, position=start + points[0], speed=points[1], acceleration=points[2], limited_by="the design")
+    _within(found, made)
+    return made
+
+
+def _within(found: NextExperiment, made: Trajectory) -> None:
+    """Raises BadInput for a trajectory that comes nearer to a limit than the margin."""
+    limits = found.limits
+    free = 1.0 - limits.margin
+    low, high = (limits.start + free * (end - limits.start) for end in limits.travel)
+    act = "Design it again within these limits: xy-sysid next."
+    if not low <= float(made.position.min()) <= float(made.position.max()) <= high:
+        span = (float(made.position.min()), float(made.position.max()))
+        raise BadInput("travel of the trajectory", limits.span(span), limits.span((low, high)), act)
+    for name, values, most in (("speed", made.speed, limits.speed), ("acceleration", made.acceleration, limits.acceleration)):
+        peak = float(np.max(np.abs(values)))
+        if peak > free * most:
+            raise BadInput(f"{name} of the trajectory", f"{peak:.3g}", f"up to {free * most:.3g}", act)
