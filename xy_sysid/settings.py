@@ -350,6 +350,8 @@ class RecorderSettings(Settings):
             "metrics",
             "diagnosis",
             "comparison/.*",
+            "cross_frf/.*",
+            "coupling/.*",
             "error_ladder/.*",
             "story/.*",
         ],

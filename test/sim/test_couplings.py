@@ -17,12 +17,12 @@ from xy_sysid.response.windows import WindowShape
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.settings import AxisExcitation, ExcitationSettings
 
-SHAPE, BAND, SECONDS = WindowShape.of("hann", 2048, 0.5), (2.0, 200.0), 40.0
+SHAPE, BAND, SECONDS = WindowShape.of("hann", 1024, 0.5), (2.0, 200.0), 40.0
 
 
 def machine(**values: float) -> Machine:
     """The rigid table with these couplings."""
-    return Machine(replace(Machine.from_file("rigid.yaml").spec, coupling=Couplings(**values)))
+    return Machine(replace(Machine.from_file("rigid.yaml").spec, rate=1000.0, inner_rate=10_000.0, coupling=Couplings(**values)))
 
 
 def measured(table: Machine) -> Coupling:

@@ -22,6 +22,7 @@ SUFFICES = 0.01  # of the own motion: less is below what models of machines reac
 BANDS = 24  # over which coupling is averaged
 ALIKE = 0.95  # coherence of the two inputs from which they cannot be told apart
 FEWEST = 4.0  # independent windows
+LONGER = 4  # windows of coupling over those of one axis: bands average lines here, and the response of the own axis leaks less into them
 COMBINED = {
     "corexy": (np.array([[1.0, 1.0], [1.0, -1.0]]), np.array([[0.5, 0.5], [0.5, -0.5]])),
     "gantry": (np.array([[1.0, 1.0], [1.0, -1.0]]), np.array([[0.5, 0.5], [0.5, -0.5]])),
@@ -55,6 +56,11 @@ class Coupling:
         return self.largest < SUFFICES
 
     @property
+    def coupled(self) -> bool:
+        """They do not, for sure."""
+        return bool(np.any(self.coupling > SUFFICES))
+
+    @property
     def sentence(self) -> str:
         """For people."""
         one, other = self.axes
@@ -62,8 +68,7 @@ class Coupling:
         if self.suffice:
             level = 20 * np.log10(self.largest)
             return f"{one} and {other} are coupled by at most {100 * self.largest:.2g} % ({level:.0f} dB) in {span}: two single-axis models suffice."
-        sure = self.coupling > SUFFICES
-        if not bool(np.any(sure)):
+        if not self.coupled:
             place = int(np.argmax(self.at_most))
             where = f"{self.band_edges[place]:.3g} to {self.band_edges[place + 1]:.3g} Hz"
             return (
