@@ -48,7 +48,7 @@ class Coupled:
         light = 0.0 if what.base_mass == 0.0 else 1.0 / what.base_mass
         self._pushes = self._along * np.array([drive.table_mass for drive in drives]) * light
         self._omega, self._damping = 2.0 * np.pi * what.base_frequency, what.base_damping
-        numerator, self._denominator, _ = signal.cont2discrete(self._swing, 1.0 / rate, method="foh")
+        numerator, self._denominator, *_ = signal.cont2discrete((np.array(self._swing[0]), np.array(self._swing[1])), 1.0 / rate, method="foh")
         self._numerator = np.ravel(numerator)
         self._state = np.zeros(2)
 

@@ -13,6 +13,7 @@ from xy_sim.machine import Machine
 from xy_sysid.errors import BadInput
 from xy_sysid.excitation.lockstep import drive
 from xy_sysid.response.coupling import Coupling, coupling
+from xy_sysid.response.frf import ComplexArray
 from xy_sysid.response.windows import WindowShape
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.settings import AxisExcitation, ExcitationSettings
@@ -32,7 +33,7 @@ def measured(table: Machine) -> Coupling:
     return coupling(recording, SHAPE, BAND)
 
 
-def truth(table: Machine, frequency: FloatArray) -> tuple[FloatArray, FloatArray]:
+def truth(table: Machine, frequency: FloatArray) -> tuple[ComplexArray, ComplexArray]:
     """(n,) what each axis reads of the other's motion, over what the other reads of its own."""
     mix = table.mixing(frequency)
     return mix[:, 0, 1] / mix[:, 1, 1], mix[:, 1, 0] / mix[:, 0, 0]

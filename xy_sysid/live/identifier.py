@@ -220,7 +220,7 @@ class Identifier:
         """Of two axes whose inputs are what drives them; it remembers all since the start, and is not kept over a restart."""
         judged = len(self.axes) > 1 and self.settings.response == "h1" and self.settings.differenced
         self._long = WindowShape.of(self.settings.window, LONGER * self.settings.length, self.settings.overlap)
-        self._both = RunningCrossSpectra(self._long) if judged else None
+        self._both: RunningCrossSpectra | None = RunningCrossSpectra(self._long) if judged else None
         self._long_windower = Windower(self._long, len(self.axes), 1)
         self._long_windows: deque[Window] = deque()
 
