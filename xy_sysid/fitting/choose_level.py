@@ -55,9 +55,9 @@ def choose_level(frf: FrequencyResponse, family: Structure) -> Choice:
         best.setdefault(fit.structure.denominator_order, fit)
     trials = tuple(OrderTrial(order, order, fit.cost, description_length(fit, data, scale)) for order, fit in best.items())
     orders = f"{now.structure.numerator_order}/{now.structure.denominator_order}"
-    delay = "with delay" if now.structure.free_delay else "without delay"
+    late = "with delay" if now.structure.free_delay else "without delay"
     reason = (
-        f"Orders {orders} {delay}, chosen from the data: the response does not fall at its highest lines, so that it has as many zeros as poles; "
+        f"Orders {orders} {late}, chosen from the data: the response does not fall at its highest lines, so that it has as many zeros as poles; "
         f"it leaves {excess(now):.3g} times the cost of noise alone; nothing richer of {len(tried) - 1} tried is clearly better."
     )
     return Choice(now, trials, reason)

@@ -306,8 +306,8 @@ def with_orders(frf: FrequencyResponse, settings: IdentifierSettings) -> tuple[I
     family = structure_from(settings)
     if is_given(frf) and is_level(frf):
         choice = choose_level(frf, family)
-        orders = choice.fit.structure
-        level = {"numerator_order": orders.numerator_order, "denominator_order": orders.denominator_order, "delay": orders.free_delay}
+        at = choice.fit.structure
+        level = {"numerator_order": at.numerator_order, "denominator_order": at.denominator_order, "delay": at.free_delay}
         return settings.model_copy(update=level), choice
     open_question = derivative_of(frf.output_unit) == 2 and settings.integrators == USUAL.integrators
     choice = choose_among(frf, [replace(family, integrators=count) for count in (2, 1, 0)]) if open_question else choose(frf, family)

@@ -67,6 +67,8 @@ class FitRequest:
 class Identifier:
     """Pairs, cuts windows, runs spectra; ``feed`` gives the fits that fall due."""
 
+    _both: RunningCrossSpectra | None  # of the first two axes
+
     def __init__(self, settings: IdentifierSettings, axes: tuple[str, ...], units: Units = USUAL) -> None:
         if not axes:
             raise BadInput("axes", "empty", "one name or more", "Name the axes, for example x and y.")
@@ -220,7 +222,7 @@ class Identifier:
         """Of two axes whose inputs are what drives them; it remembers all since the start, and is not kept over a restart."""
         judged = len(self.axes) > 1 and self.settings.response == "h1" and self.settings.differenced
         self._long = WindowShape.of(self.settings.window, LONGER * self.settings.length, self.settings.overlap)
-        self._both: RunningCrossSpectra | None = RunningCrossSpectra(self._long) if judged else None
+        self._both = RunningCrossSpectra(self._long) if judged else None
         self._long_windower = Windower(self._long, len(self.axes), 1)
         self._long_windows: deque[Window] = deque()
 
