@@ -48,7 +48,6 @@ class ControllerNode(Node):
         machine = with_effects(Machine(replace(machine.spec, rate=rate)), effects)
         joints = [str(name) for name in self.declare_parameter("joints", [""]).value or [] if name] or list(machine.axes)
         self._interface = str(self.declare_parameter("interface", "effort").value)
-        controller = str(self.declare_parameter("controller", "/forward_command_controller").value)
         self._stiffness = float(self.declare_parameter("stiffness", 15.0).value or 0.0)  # effort a rad, of the position loop
         self._damping = float(self.declare_parameter("damping", 0.3).value or 0.0)  # effort a rad/s, of both loops
         self._integral = float(self.declare_parameter("integral", 10.0).value or 0.0)  # effort a rad, of the velocity loop
@@ -66,12 +65,18 @@ class ControllerNode(Node):
         self._position = self._read()
         self._before, self._effort, self._sum = self._position, np.zeros(len(joints)), np.zeros(len(joints))
         self._states = self.create_publisher(JointState, "/joint_states", qos_profile_system_default)
-        commands = f"{controller}/commands"
-        self.create_subscription(Float64MultiArray, commands, self._on_command, qos_profile_system_default)
+        controller = self._listen(joints)
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._manage, daemon=True)
         self._thread.start()
-        self.get_logger().info(f"{', '.join(joints)} under {controller} ({self._interface}) at {rate:g} Hz")
+        self.get_logger().info(f"{', '.join(joints)} under {controller} at {rate:g} Hz")
+
+    def _listen(self, joints: list[str]) -> str:
+        """Subscribe to commands; the name of the controller and of what it takes."""
+        controller = str(self.declare_parameter("controller", "/forward_command_controller").value)
+        commands = f"{controller}/commands"
+        self.create_subscription(Float64MultiArray, commands, self._on_command, qos_profile_system_default)
+        return f"{controller} ({self._interface})"
 
     def _on_command(self, message: Float64MultiArray) -> None:
         if len(message.data) != len(self._joints):

@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from xy_sim import kernel, truth
+from xy_sim.couplings import Coupled
 from xy_sim.drawing import drawn
 from xy_sim.layout import STATES, numbers
 from xy_sim.machine_file import Axis, Spec, fitting, parts_from, read
@@ -79,6 +81,8 @@ class Machine:
     def reset(self) -> None:
         """Back to rest at the origin, with the noise from its start."""
         self._moving = [_Moving(axis, self.spec.rate, self.seed, number) for number, axis in enumerate(self.spec.axes)]
+        drives = [axis.drive for axis in self.spec.axes]
+        self._coupled = Coupled(self.spec.coupling, drives, self.spec.rate) if self.spec.coupling.any else None
 
     def step(self, voltage: FloatArray) -> FloatArray:
         """(n, axes) encoder positions, m: row k is read at the instant at which row k of ``voltage`` (n, axes), V, begins to be held."""
@@ -99,8 +103,19 @@ class Machine:
                 self._inner(axis),
                 moving.parameters if moving.dirty else None,
             )
-            out[:, column] = seen if self.clean else self._encoder(axis, moving, seen)
+            out[:, column] = seen
+        if self._coupled is not None:
+            out = self._coupled.seen(out)
+        if not self.clean:
+            for column, (axis, moving) in enumerate(zip(self.spec.axes, self._moving, strict=True)):
+                out[:, column] = self._encoder(axis, moving, out[:, column])
         return out
+
+    def mixing(self, frequency: FloatArray) -> NDArray[np.complex128]:
+        """(n, axes, axes) what the encoder of axis i reads, over the motion of axis j alone, at (n,) Hz: the truth of coupling."""
+        if self._coupled is not None:
+            return self._coupled.mixing(frequency)
+        return np.tile(np.eye(len(self.axes), dtype=np.complex128), (len(frequency), 1, 1))
 
     def _inner(self, axis: Axis) -> float:
         """Fewest inner steps per second, Hz."""

@@ -5,10 +5,11 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from xy_sim.couplings import Couplings
 from xy_sim.drive import Drive
 from xy_sim.parts import PARTS
 from xy_sysid.bags.opening import yaml_of
@@ -16,7 +17,7 @@ from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.settings import build, unknown_name
 
 Parts = Mapping[str, Mapping[str, float]]
-_TOP = ("description", "base", "rate", "inner_rate", "seed", "unit", "axes", "hidden")
+_TOP = ("description", "base", "rate", "inner_rate", "seed", "unit", "axes", "hidden", "coupling")
 _HIDDEN = ("seed", "effects", "scale")
 LONGEST = 1 << 17  # bytes of a machine file
 
@@ -36,7 +37,8 @@ class Spec:
 
     rate: samples per second, Hz; inner_rate: fewest inner steps per second, Hz; seed: of the encoder noise;
     unit: of positions, m or rad; masses are inertias then
-    hidden: what ``xy_sim.drawing`` shall draw (keys seed, effects, scale), or empty.
+    hidden: what ``xy_sim.drawing`` shall draw (keys seed, effects, scale), or empty
+    coupling: what its two axes do to each other
     """
 
     axes: tuple[Axis, ...]
@@ -46,6 +48,7 @@ class Spec:
     description: str = ""
     hidden: Mapping[str, Any] | None = None
     unit: str = "m"
+    coupling: Couplings = field(default_factory=Couplings)
 
 
 def _folders() -> list[Path]:
@@ -175,4 +178,16 @@ def read(name: str | Path) -> Spec:
     unit = str(table.get("unit", default.unit))
     if unit not in ("m", "rad"):
         raise BadInput(f"{file}: unit", repr(unit), "m, rad", "Choose one of these.")
-    return Spec(axes, rate, inner, seed, str(table.get("description", "")), hidden, unit)
+    coupling = build(Couplings, _numeric(_mapping(table.get("coupling"), f"{file}: coupling")), f"{file}: coupling")
+    if coupling.any and len(axes) != 2:
+        raise BadInput(f"{file}: coupling", f"of {len(axes)} axes", "two axes", "Leave it out, or add an axis.")
+    return Spec(
+        axes=axes,
+        rate=rate,
+        inner_rate=inner,
+        seed=seed,
+        description=str(table.get("description", "")),
+        hidden=hidden,
+        unit=unit,
+        coupling=coupling,
+    )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from xy_sim.couplings import Couplings
 from xy_sim.drive import Drive
 from xy_sim.machine_file import Spec, machine_path, read
 from xy_sim.parts import PARTS
@@ -42,6 +43,12 @@ def drive() -> str:
     return _table(("key", "default", "unit", "meaning"), rows)
 
 
+def couplings() -> str:
+    """The keys of ``coupling``."""
+    rows = [(f"`{item.name}`", f"{item.default}", item.unit, item.meaning) for item in knobs(Couplings())]
+    return _table(("key", "default", "unit", "meaning"), rows)
+
+
 def _range(item: Parameter) -> str:
     ends = f"{item.low:g}" if item.low == item.high else f"{item.low:g} to {item.high:g}"
     return ("± " if item.signed else "") + ends
@@ -61,7 +68,7 @@ def parts() -> str:
     return "\n\n".join(texts)
 
 
-SECTIONS = {"files": files, "drive": drive, "parts": parts}
+SECTIONS = {"files": files, "drive": drive, "couplings": couplings, "parts": parts}
 
 
 def refreshed(text: str) -> str:

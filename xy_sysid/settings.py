@@ -43,7 +43,13 @@ class AxisExcitation(Settings):
     kind: Literal["noise", "multisine", "multisine_odd", "multisine_detect", "sweep", "stepped_sine", "prbs", "impulse", "step", "off"] = knob(
         "noise", "signal; multisine_detect is odd with one random line left out of each group of four, to show distortion"
     )
-    rms: float = knob(1.0, "root mean square of the signal (impulse and step: its height)", "V", ge=0.0, le=100.0)
+    rms: float = knob(
+        1.0,
+        "root mean square of the signal (impulse and step: its height); as joint_trajectory 0 is the largest that the limits allow",
+        "V",
+        ge=0.0,
+        le=100.0,
+    )
     limit: float = knob(10.0, "no sample leaves this magnitude", "V", gt=0.0, le=1000.0)
     low: float = knob(0.1, "lowest frequency excited", "Hz", ge=0.0, le=100_000.0)
     high: float = knob(300.0, "highest frequency excited", "Hz", gt=0.0, le=100_000.0)
@@ -59,6 +65,10 @@ class AxisExcitation(Settings):
     slow: float = knob(0.0, "amplitude of a slow sine added to the signal, which takes a joint through its range", "V", ge=0.0, le=1000.0)
     slow_period: float = knob(10.0, "period of that sine", "s", gt=0.0, le=3600.0)
     velocity_gain: float = knob(0.0, "steady speed per volt as the first run found it, for the guards; 0 is not known", "m/s/V", ge=0.0, le=1000.0)
+    max_speed: float = knob(0.0, "as joint_trajectory: the reference is never faster", "m/s", ge=0.0, le=1000.0)
+    max_acceleration: float = knob(
+        0.0, "as joint_trajectory: the reference never speeds up or slows down faster, not even to stop", "m/s^2", ge=0.0, le=100_000.0
+    )
     breakaway: float = knob(0.0, "voltage that may leave it at rest (friction), for the guards; 0 is 0.5 V or limit / 20", "V", ge=0.0, le=1000.0)
 
     @field_validator("kind", mode="before")
@@ -94,6 +104,16 @@ class ExcitationSettings(Settings):
     interface: Literal["effort", "velocity", "position"] = knob(
         "effort", "with commands: the controller's command interface; rms, limit, offset and all others in V are in its unit"
     )
+    command: Literal["forward", "joint_trajectory"] = knob(
+        "forward", "with commands: one number a joint for a forward controller, or pieces of trajectory for a JointTrajectoryController"
+    )
+    horizon: float = knob(
+        0.5,
+        "as joint_trajectory: motion that the controller is told ahead; without a newer message it brakes to rest after it",
+        "s",
+        ge=0.05,
+        le=10.0,
+    )
     unit: Literal["m", "rad"] = knob("m", "of positions: m, or rad of a joint that turns")
     command_topic: str = knob("/forward_command_controller/commands", "with commands: topic of the controller")
     controller_joints: Names = knob([""], "with commands: all joints of the controller, in its order; empty is those of the axes")
@@ -112,9 +132,27 @@ class ExcitationSettings(Settings):
             raise ValueError("axes is empty; allowed: at least one axis")
         if self.output == "commands":
             self._as_commands()
+        elif self.command != "forward":
+            raise ValueError(f"command is {self.command} with output {self.output}; allowed: output commands, interface position")
         return self
 
+    def _as_trajectory(self) -> None:
+        """A motion within limits that are given, and nothing that would be added to it."""
+        if self.interface != "position":
+            raise ValueError(f"command is joint_trajectory with interface {self.interface}; allowed: position")
+        for name, axis in self.axes.items():
+            if axis.kind not in ("multisine", "sweep", "off"):
+                raise ValueError(f"{name}.kind is {axis.kind} as joint_trajectory; allowed: multisine, sweep, off")
+            for limit, unit in (("max_speed", f"{self.unit}/s"), ("max_acceleration", f"{self.unit}/s^2")):
+                if axis.kind != "off" and not getattr(axis, limit) > 0.0:
+                    raise ValueError(f"{name}.{limit} is 0 {unit} as joint_trajectory; allowed: above 0, the joint's own limit or less")
+            for added in ("offset", "slow"):
+                if getattr(axis, added) != 0.0:
+                    raise ValueError(f"{name}.{added} is {getattr(axis, added):g} as joint_trajectory; allowed: 0, nothing is added to the motion")
+
     def _as_commands(self) -> None:
+        if self.command == "joint_trajectory":
+            self._as_trajectory()
         if self.lockstep or self.speed != 1.0:
             raise ValueError("output is commands with lockstep or a speed; allowed: the controller's own time, lockstep false and speed 1")
         for name, axis in self.axes.items():
@@ -312,6 +350,8 @@ class RecorderSettings(Settings):
             "metrics",
             "diagnosis",
             "comparison/.*",
+            "cross_frf/.*",
+            "coupling/.*",
             "error_ladder/.*",
             "story/.*",
         ],

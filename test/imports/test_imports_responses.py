@@ -142,12 +142,37 @@ def test_arrays_that_are_no_response_are_one_line(frequency: np.ndarray, respons
         xy.frf_from(F, H, coherense=np.ones(F.size))
 
 
-@pytest.mark.parametrize(("name", "orders"), [("G_I_PI_300_DP.csv", 1), ("G_I_PID_300_DP.csv", 1), ("G_I_PID_300_AP.dat", 1)])
-def test_responses_as_they_were_found(name: str, orders: int) -> None:
-    """Controllers, whose phase is in degrees though one header says rad: their high-frequency gain is met by a fit of first order."""
+@pytest.mark.parametrize(
+    ("name", "orders", "gain", "zero"),
+    [
+        ("G_I_PI_300_DP.csv", (2, 2), 8186.0, -9526.0),
+        ("G_I_PID_300_DP.csv", (3, 3), 3623.0, -2540.0),
+        ("G_I_PID_300_AP.dat", (3, 3), 3635.0, -2550.0),
+    ],
+)
+def test_responses_as_they_were_found(name: str, orders: tuple[int, int], gain: float, zero: float) -> None:
+    """Controllers, whose phase is in degrees though one header says rad: an integrator, a zero, and no fall at the highest lines.
+
+    The orders come from the data, and two measurements of one controller by different instruments agree within 1 %.
+    """
     found = xy.frf_from(data(f"frf_file/{name}"))
     assert len(found) == 300 and any("phases are in degrees" in note for note in found.origin.notes)
     assert any("magnitudes are in dB" in note for note in found.origin.notes)
-    model = xy.fit(found, numerator_order=orders, denominator_order=orders, delay=False)
-    low = np.abs(model.tf.response(found.frequency[:20]) / found.response[:20])
-    assert float(np.median(np.abs(np.log(low)))) < np.log(2.0)
+    model = xy.fit(found)
+    assert (model.tf.numerator.size - 1, model.tf.denominator.size - 1) == orders and model.tf.denominator[-1] == 0.0
+    assert model.tf.delay == 0.0 and model.tf.gain == pytest.approx(gain, rel=0.01)
+    assert max(model.tf.zeros().real) == pytest.approx(zero, rel=0.01)
+
+
+def test_a_lead_filter_keeps_its_level_and_a_delay_is_told() -> None:
+    """As many zeros as poles, no integrator; the delay is found where there is one and left out where there is none."""
+    f = np.geomspace(1.0, 1000.0, 200)
+    lead = 2.0 * (1 + 2j * np.pi * f / 60.0) / (1 + 2j * np.pi * f / 900.0)
+    random = np.random.default_rng(4)
+    for delay in (0.0, 2e-4):
+        true = lead * np.exp(-2j * np.pi * f * delay)
+        noise = 0.002 * np.abs(true) * (random.normal(size=f.size) + 1j * random.normal(size=f.size))
+        model = xy.fit(xy.frf_from(f, true + noise))
+        assert (model.tf.numerator.size - 1, model.tf.denominator.size - 1) == (1, 1) and model.tf.denominator[-1] != 0.0
+        assert model.tf.poles()[0].real == pytest.approx(-900.0, rel=0.02) and model.tf.zeros()[0].real == pytest.approx(-60.0, rel=0.02)
+        assert model.tf.delay == pytest.approx(delay, abs=4e-6)

@@ -69,6 +69,7 @@ def test_live_recorded_and_replayed_are_the_same_bit_for_bit(world: World, tmp_p
     recorder.send(signal.SIGINT)
     assert recorder.wait() == 0
     topics = [f"{kind}/{axis}" for kind in ("frf", "transfer_function", "comparison") for axis in ("x", "y")]
+    topics += ["cross_frf/x_from_y", "cross_frf/y_from_x", "coupling/x_and_y"]
     live: dict[str, list[bytes]] = {topic: [] for topic in topics}
     for topic, data in recorded_arrays(bag, topics):
         live[topic].append(data)

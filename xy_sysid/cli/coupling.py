@@ -20,17 +20,16 @@ Combine = Annotated[str, typer.Option(help="for machines on which both drives mo
 @reads
 def coupling(recs: o.Recs, reading: Reading, combine: Combine = "", set_: o.Set = None, params: o.Params = None, json: o.Json = False) -> None:
     """The 2 x 2 response of two axes driven at once, and whether two single-axis models suffice."""
-    from xy_sysid.response.coupling import coupling as logic
-    from xy_sysid.response.windows import WindowShape
+    from xy_sysid.fitting.two_axes import coupling_in
 
     settings = o.settings_from(params, set_)
     recording = read(recs, reading, json)
-    shape = WindowShape.of(settings.window, settings.length, settings.overlap)
-    found = logic(recording, shape, (settings.band_low, settings.band_high), combine)
+    found = coupling_in(recording, settings, combine)
     if json:
         emit(
             {
                 "axes": found.axes,
+                "notes": recording.notes,
                 "sentence": found.sentence,
                 "suffice": found.suffice,
                 "largest": found.largest,

@@ -68,14 +68,17 @@ def demo(
     aside.print("starting the nodes: a simulated table, an excitation and an identifier, over ROS 2 ...")
     code, monitor, lines, wall = _watch(_specs(table, machine, seconds, speed, seed), table.axes, seconds, plain=json)
     answer = {axis: result(monitor, axis, table.truth(axis)) for axis in table.axes}
+    coupled = together(monitor, table.axes)
     if json:
-        emit({"machine": machine, "seconds": seconds, "wall_seconds": wall, "axes": answer, "exit_code": code})
+        emit({"machine": machine, "seconds": seconds, "wall_seconds": wall, "axes": answer, "coupling": coupled, "exit_code": code})
     elif code == 0:
         people.print(_panel(monitor, table.axes, seconds))
         for axis in table.axes:
             people.print(function_text(monitor, axis), markup=False)
         for line in _summary(answer):
             people.print(line)
+        if coupled:
+            people.print(coupled)
         people.print(f"{seconds:g} s of data in {wall:.0f} s. Next: xy-sysid simulate rec && xy-sysid fit rec")
     if code not in (0, 130, 143):
         for line in lines[-20:]:
@@ -234,6 +237,13 @@ def function_text(monitor: Monitor, axis: str) -> str:
         return f"axis {axis}: no transfer function was published"
     tf, values = read_transfer_function(message), monitor.statuses.get(f"axis {axis}", (0, "", {}))[2]
     return f"H_{axis}(s) = ({polynomial(tf.numerator)}) / ({polynomial(tf.denominator)}) exp(-{tf.delay:.4g} s)  [{values.get('output unit', 'm')}/V]"
+
+
+def together(monitor: Monitor, axes: tuple[str, ...]) -> str:
+    """Whether two single-axis models suffice, in a sentence; empty where that was not judged."""
+    from xy_sysid.live.coupling_messages import coupling_name
+
+    return monitor.statuses[coupling_name(axes)][1] if len(axes) > 1 and coupling_name(axes) in monitor.statuses else ""
 
 
 def polynomial(coefficients: Any) -> str:

@@ -120,6 +120,7 @@ def replay(
         faults = ", ".join(f"{name} {count}" for name, count in identifier.faults.items()) or "no faults"
         raise BadRecording(bag, f"not enough samples for one window ({windows}; {faults})", "Give a longer bag or a shorter --set length=.")
     seconds_heard = identifier.samples / last.request.sampling_rate
+    coupled = "" if last.request.coupling is None else last.request.coupling.sentence
     if json:
         emit(
             {
@@ -132,7 +133,12 @@ def replay(
                 "dropped": identifier.dropped,
                 "alarms": alarms,
                 **({"stories": {name: document(story) for name, story in stories.items()}} if diagnose else {}),
-                "axes": {s.name.removeprefix("axis "): {"level": s.level, "message": s.message, "values": dict(s.values)} for s in last.statuses()},
+                "axes": {
+                    s.name.removeprefix("axis "): {"level": s.level, "message": s.message, "values": dict(s.values)}
+                    for s in last.statuses()
+                    if s.name.startswith("axis ")
+                },
+                "coupling": coupled,
             }
         )
         return
@@ -148,6 +154,8 @@ def replay(
             say(f"axis {name}: {part.problem}")
             continue
         estimates(f"axis {name}: relative error {100 * part.fit.relative_error:.2g} %", part.fit.intervals_with_misfit)
+    if coupled:
+        say(coupled)
     for name, story in stories.items():
         say(words(story))
         scale, unit = motion(story.units.judged)

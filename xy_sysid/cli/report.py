@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -18,7 +19,9 @@ from xy_sysid.cli.study import answer as linear_answer
 if TYPE_CHECKING:
     from xy_sysid.imports.reading import Reading
     from xy_sysid.report.axis_report import AxisReport
+    from xy_sysid.response.coupling import Coupling
     from xy_sysid.samples.recording import Recording
+    from xy_sysid.settings import IdentifierSettings
 
 
 @reads
@@ -57,16 +60,49 @@ def report(
     origin = provenance(named(recs), recording)
     units = recording.units
     title = ", ".join(rec.name for rec in recs)
-    told = Recorded(title=title, units=units, facts=facts(recording, names), origins={"Recording": origin}, notes=recording.notes)
+    found, why = coupled(recording, names, settings)
+    told = Recorded(
+        title=title,
+        units=units,
+        facts=facts(recording, names),
+        origins={"Recording": origin},
+        notes=(*recording.notes, *why),
+        coupling=found,
+    )
     page = report_page(told, made, settings.min_coherence, known)
     write_text(out, page)
     if json:
-        emit({"page": str(out), "bytes": len(page.encode()), "recording": origin, "axes": {name: answer(one) for name, one in made.items()}})
+        emit(
+            {
+                "page": str(out),
+                "bytes": len(page.encode()),
+                "recording": origin,
+                "axes": {name: answer(one) for name, one in made.items()},
+                "coupling": None if found is None else {"sentence": found.sentence, "suffice": found.suffice, "largest": found.largest},
+            }
+        )
         return
     for name, one in made.items():
         sentence = one.problem if one.story is None else str(one.story["sentence"])
         say(f"axis {name}: {status(one.story)}. {sentence}")
+    if found is not None:
+        say(found.sentence)
     say(f"wrote {out}, {len(page.encode()) / 1e6:.1f} MB")
+
+
+def coupled(recording: Recording, names: tuple[str, ...], settings: IdentifierSettings) -> tuple[Coupling | None, tuple[str, ...]]:
+    """What the first two of the axes do to each other, and notes; without an answer a note says why."""
+    from xy_sysid.errors import BadInput
+    from xy_sysid.fitting.two_axes import coupling_in
+
+    if len(names) < 2:
+        return None, ()
+    columns = [recording.axes.index(name) for name in names[:2]]
+    two = replace(recording, axes=names[:2], voltage=recording.voltage[:, columns], position=recording.position[:, columns], reference=None)
+    try:
+        return coupling_in(two, settings), ()
+    except BadInput as problem:
+        return None, (f"Coupling of {names[0]} and {names[1]} was not judged: {problem}",)
 
 
 def facts(recording: Recording, names: tuple[str, ...]) -> tuple[tuple[str, str], ...]:

@@ -5,6 +5,7 @@
     contract:                                      what every signal is
     multisine, sweep, stepped, noise, prbs, pulse: one kind of signal a file
     drive:                                         from a signal to the voltage that is really applied: ramps, centring, limits
+    trajectory, motion_plan, trajectory_drive:     a motion within limits of position, speed and acceleration, in pieces that end at rest
     motion_check:                                  does each axis do what its voltage can do?
     travel_limits:                                 the guard of the ends of travel
     designed:                                      an experiment from a file, within the machine's own limits

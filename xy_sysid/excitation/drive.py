@@ -257,6 +257,16 @@ class Drive:
             for stream in self._signals:
                 stream.next(n)
 
+    def catch_up(self, missed: int) -> Block:
+        """The next sample, after so many that nobody asked for; all that the controller has gone along since the last call, where it is known."""
+        self.skip(missed)
+        return self.next(1)
+
+    @property
+    def stopping_time(self) -> float:
+        """s that fading out takes at most."""
+        return self.settings.abort_ramp
+
     def _running(self) -> bool:
         return self.state in ("active", "stopping") and self._start is not None
 

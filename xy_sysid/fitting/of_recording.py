@@ -9,7 +9,9 @@ import numpy as np
 
 from xy_sysid.errors import BadInput
 from xy_sysid.fitting import Fit, identify
+from xy_sysid.fitting.choose_level import choose_level, is_level
 from xy_sysid.fitting.choose_orders import Choice, choose, choose_among
+from xy_sysid.fitting.of_given_response import is_given
 from xy_sysid.fitting.structure import structure_from
 from xy_sysid.response.best_linear import Realisation, best_linear
 from xy_sysid.response.frf import FrequencyResponse
@@ -302,6 +304,11 @@ def with_orders(frf: FrequencyResponse, settings: IdentifierSettings) -> tuple[I
     if not settings.orders_from_data:
         return settings, None
     family = structure_from(settings)
+    if is_given(frf) and is_level(frf):
+        choice = choose_level(frf, family)
+        at = choice.fit.structure
+        level = {"numerator_order": at.numerator_order, "denominator_order": at.denominator_order, "delay": at.free_delay}
+        return settings.model_copy(update=level), choice
     open_question = derivative_of(frf.output_unit) == 2 and settings.integrators == USUAL.integrators
     choice = choose_among(frf, [replace(family, integrators=count) for count in (2, 1, 0)]) if open_question else choose(frf, family)
     structure = choice.fit.structure

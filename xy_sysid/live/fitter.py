@@ -18,6 +18,7 @@ from xy_sysid.fitting.modes import pole_estimates
 from xy_sysid.fitting.result import Fit, Interval
 from xy_sysid.fitting.structure import FitOptions, Structure, structure_from
 from xy_sysid.linear.transfer_function import TransferFunction
+from xy_sysid.live.coupling_messages import coupling_messages, coupling_status
 from xy_sysid.live.identifier import AxisRequest, FitRequest
 from xy_sysid.live.messages import comparison_message, frf_message, transfer_function_message
 from xy_sysid.live.plain_messages import ERROR, OK, WARN, ArrayMessage, StatusMessage
@@ -70,11 +71,12 @@ class Update:
             if update.fit is not None and update.fit.converged:
                 found.append(transfer_function_message(axis, update.fit.tf))
                 found.append(comparison_message(axis, update.fit))
-        return found
+        return found + ([] if self.request.coupling is None else coupling_messages(self.request.coupling))
 
     def statuses(self) -> list[StatusMessage]:
-        """``metrics``: one status per axis."""
-        return [_status(axis, update, self.request) for axis, update in self.axes.items()]
+        """``metrics``: one status per axis, and one of what two axes do to each other."""
+        found = [_status(axis, update, self.request) for axis, update in self.axes.items()]
+        return found + ([] if self.request.coupling is None else [coupling_status(self.request.coupling)])
 
 
 class LiveFitter:

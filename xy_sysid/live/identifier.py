@@ -6,19 +6,20 @@ sample counter, and a fit falls due after a set number of seconds of data, never
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, deque
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from xy_sysid.errors import BadInput
 from xy_sysid.live.recent import Recent
+from xy_sysid.response.coupling import LONGER, Coupling, RunningCrossSpectra, coupling_of
 from xy_sysid.response.frf import FrequencyResponse
 from xy_sysid.response.h1 import H1Options
 from xy_sysid.response.methods import METHODS, Running
 from xy_sysid.response.spectra import State
 from xy_sysid.response.window_check import window_fault
-from xy_sysid.response.windows import Window, Windower
+from xy_sysid.response.windows import Window, Windower, WindowShape
 from xy_sysid.samples.block import Block, Samples, StreamName
 from xy_sysid.samples.pairing import QUANTITIES, RATE_TOLERANCE, Gap, Pairer
 from xy_sysid.samples.rate import StampLine
@@ -60,10 +61,13 @@ class FitRequest:
     axes: dict[str, AxisRequest]
     faults: dict[str, int]
     going_on: dict[str, tuple[str, ...]]
+    coupling: Coupling | None = None  # of the first two axes; None of one axis, in closed loop, and as long as it is not known
 
 
 class Identifier:
     """Pairs, cuts windows, runs spectra; ``feed`` gives the fits that fall due."""
+
+    _both: RunningCrossSpectra | None  # of the first two axes
 
     def __init__(self, settings: IdentifierSettings, axes: tuple[str, ...], units: Units = USUAL) -> None:
         if not axes:
@@ -85,6 +89,7 @@ class Identifier:
         self._windower = Windower(self._shape, len(self.axes), int(self.settings.differenced), self._method.reference)
         self._main: dict[str, Running] = {}
         self._recent: dict[str, Running] = {}
+        self._start_coupling()
         self._used: Counter[str] = Counter()
         self._dropped: dict[str, Counter[str]] = {axis: Counter() for axis in self.axes}
         self._counts: Counter[str] = Counter()
@@ -159,6 +164,8 @@ class Identifier:
         if self._rate is None:
             self._rate = sampling_rate or (self._pairer.rate if self._pairer else None)
         requests: list[FitRequest] = []
+        if self._both is not None:
+            self._long_windows += self._long_windower.feed(samples)
         for window in self._windower.feed(samples):
             if self._rate is None or (self._pairer is not None and sampling_rate is None and self._pairer.rate is None):
                 self._counts["no_rate"] += 1
@@ -175,6 +182,7 @@ class Identifier:
         self._said["rate_changed"] = f"the source came back at {rate:.6g} Hz, before it was {before:.6g} Hz; the spectra start anew"
         self._rate, self._samples, self._slot, self._line = rate, 0, -1, StampLine()
         self._main, self._recent, self._used = {}, {}, Counter()
+        self._both = None if self._both is None else RunningCrossSpectra(self._long)
         return rate
 
     def _gap(self, gap: Gap) -> list[FitRequest]:
@@ -183,6 +191,7 @@ class Identifier:
         if gap.reason in CUTS:
             self._line.cut()
         self._windower.reset()
+        self._long_windower.reset()
         for axis in self.axes:
             self._dropped[axis][gap.reason] += int(touched)
         return []
@@ -200,6 +209,7 @@ class Identifier:
             else:
                 self._dropped[axis][fault] += 1
         end = window.index * self._shape.hop + self._shape.length
+        self._hear_both(end, frozen)
         self._line.until(end)
         slot = end // max(round(self.settings.refit * rate), 1)
         if slot == self._slot or not any(self._used.values()):
@@ -207,6 +217,30 @@ class Identifier:
         self._slot = slot
         self._number += 1
         return [self.request(end, self._line.rate or rate)]
+
+    def _start_coupling(self) -> None:
+        """Of two axes whose inputs are what drives them; it remembers all since the start, and is not kept over a restart."""
+        judged = len(self.axes) > 1 and self.settings.response == "h1" and self.settings.differenced
+        self._long = WindowShape.of(self.settings.window, LONGER * self.settings.length, self.settings.overlap)
+        self._both = RunningCrossSpectra(self._long) if judged else None
+        self._long_windower = Windower(self._long, len(self.axes), 1)
+        self._long_windows: deque[Window] = deque()
+
+    def _hear_both(self, until: int, frozen: int) -> None:
+        """Long windows up to a counter, of which neither encoder stands or leaps."""
+        while self._both is not None and self._long_windows and self._long_windows[0].index * self._long.hop + self._long.length <= until:
+            window = self._long_windows.popleft()
+            if not any(window_fault(window.voltage[:, k], window.position[:, k], frozen) for k in (0, 1)):
+                self._both.update(window.voltage[:, :2], np.diff(window.position[:, :2], axis=0))
+
+    def _coupling(self, rate: float) -> Coupling | None:
+        if self._both is None:
+            return None
+        band = self.settings.band_low, self.settings.band_high
+        try:
+            return coupling_of(self._both.get(), self._long, rate, band, (self.axes[0], self.axes[1]), True)
+        except BadInput:
+            return None
 
     def _start_spectra(self, rate: float) -> None:
         memory = self.settings.memory
@@ -233,7 +267,16 @@ class Identifier:
                 windows=self._used[axis],
                 dropped=dict(self._dropped[axis]),
             )
-        return FitRequest(number=self._number, seq=seq, seconds=seconds, sampling_rate=rate, axes=axes, faults=self.faults, going_on=going_on)
+        return FitRequest(
+            number=self._number,
+            seq=seq,
+            seconds=seconds,
+            sampling_rate=rate,
+            axes=axes,
+            faults=self.faults,
+            going_on=going_on,
+            coupling=self._coupling(rate),
+        )
 
     def _frf(self, running: Running, rate: float) -> FrequencyResponse:
         settings = self.settings

@@ -2,6 +2,7 @@
 
 The controllers of the kind (forward_command_controller, effort_controllers, velocity_controllers, position_controllers) take a
 ``std_msgs/Float64MultiArray`` of one number a joint in their own order, without a layout, and keep to the last one they got.
+Those that take trajectories are in ``trajectories``.
 """
 
 from __future__ import annotations
@@ -9,7 +10,8 @@ from __future__ import annotations
 import array
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 from rclpy.lifecycle import LifecycleNode
@@ -18,6 +20,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
 from xy_sysid.errors import BadInput
+from xy_sysid.excitation.drive import Drive
 from xy_sysid.excitation.pacing import Clock
 from xy_sysid.nodes.hearing import Ear
 from xy_sysid.samples.block import FloatArray
@@ -31,7 +34,12 @@ SLEEP = 0.0002  # s that a sleep may come late: the rest of the way is waited fo
 
 
 class Commands:
-    """The controller's topic, and the positions of the axes' joints as they come."""
+    """The controller's topic, and the positions of the axes' joints as they come.
+
+    says: the type of its messages
+    """
+
+    says: Any = Float64MultiArray
 
     def __init__(
         self, node: LifecycleNode, settings: ExcitationSettings, on_positions: Callable[[float, FloatArray], None], complain: Callable[[str], None]
@@ -52,17 +60,28 @@ class Commands:
         self._heard = False  # a joint of ours
         self._kept: dict[str, float] = {}  # where positions are sent: the others stay where they are
         self._on_positions, self._complain, self._holds = on_positions, complain, settings.holds
-        self.publisher = node.create_publisher(Float64MultiArray, settings.command_topic, COMMAND_QOS)
+        self.publisher = node.create_publisher(self.says, settings.command_topic, COMMAND_QOS)
         self.states = Ear(node, JointState, settings.joint_topic, self._on_states, STATE_QOS)
 
-    def send(self, values: FloatArray) -> bool:
-        """One command: (axes,) values; nothing is sent, and False, as long as a number is not known."""
-        known = dict(zip(self._joints, values.tolist(), strict=True)) | (self._kept if self._holds else dict.fromkeys(self._others, 0.0))
-        numbers = [known.get(joint, np.nan) for joint in self._order]
+    def send(self, drive: Drive, values: FloatArray, at: float) -> bool:
+        """What the drive gave last, (axes,) values of ROS time ``at``, s; nothing is sent, and False, as long as a number is not known."""
+        return self._send(values)
+
+    def rest(self, drive: Drive) -> None:
+        """What is safe."""
+        self._send(drive.safe)
+
+    def _send(self, values: FloatArray) -> bool:
+        numbers = self._of_all(values, self._kept if self._holds else dict.fromkeys(self._others, 0.0))
         if not np.isfinite(numbers).all():
             return False
         self.publisher.publish(Float64MultiArray(data=array.array("d", numbers)))
         return True
+
+    def _of_all(self, values: FloatArray, others: Mapping[str, float]) -> FloatArray:
+        """(..., joints) in the order of the controller, of (..., axes) values; NaN where one is not known."""
+        known = dict(zip(self._joints, np.moveaxis(values, -1, 0), strict=True))
+        return np.stack([known.get(joint, np.full(values.shape[:-1], others.get(joint, np.nan))) for joint in self._order], axis=-1)
 
     def _on_states(self, message: JointState) -> None:
         ours = not set(self._joints).isdisjoint(message.name)

@@ -24,6 +24,7 @@ from std_msgs.msg import Float64MultiArray
 from xy_sysid.errors import BadInput
 from xy_sysid.excitation.drive import Drive
 from xy_sysid.excitation.pacing import CATCH_UP, Answers, Clock
+from xy_sysid.excitation.trajectory_drive import TrajectoryDrive, drive_of
 from xy_sysid.files.experiment import read_experiment
 from xy_sysid.live.recent import Recent
 from xy_sysid.nodes.commands import Beat, Commands
@@ -34,6 +35,7 @@ from xy_sysid.nodes.hearing import Ear
 from xy_sysid.nodes.quality import Overridable
 from xy_sysid.nodes.stop_topic import StopTopic
 from xy_sysid.nodes.streams import AXES, declare_axes
+from xy_sysid.nodes.trajectories import Trajectories
 from xy_sysid.nodes.wall import Wall
 from xy_sysid.processes.terminal import printable
 from xy_sysid.samples.block import Block, FloatArray
@@ -49,9 +51,10 @@ FOUND = 1.0  # s after which a node has found all who were there before it
 INTRODUCES = 0.5  # s in which a node that is seen becomes known by its name
 KILLED = "One that was killed is forgotten after 20 s."
 
-FIXED = ("output", "interface", "unit", "command_topic", "controller_joints", "joint_topic", "joints")  # when the node starts
+FIXED = ("output", "interface", "command", "unit", "command_topic", "controller_joints", "joint_topic", "joints")  # when the node starts
 LAST = 5  # times that the last command is sent: a controller listens with best effort
 FOLLOW = 0.01  # part by which the stamps of commands follow the ROS clock with every one, so that two clocks do not drift apart
+FOLLOW_MOTION = 0.0001  # the same for trajectories, whose motion lies along the stamps
 
 
 class ExcitationNode(Overridable, LifecycleNode):
@@ -88,8 +91,9 @@ class ExcitationNode(Overridable, LifecycleNode):
         self._hold = threading.RLock()  # of the drive, where a thread of its own sends commands
         self._beat: Beat | None = None
         self._rows: list[tuple[float, float, FloatArray]] = []  # seq, time and values of commands that no block holds yet
-        commanding = self._knobs.settings.output == "commands"
-        self._commands = Commands(self, self._knobs.settings, self._on_joints, self._complain) if commanding else None
+        commanding = {"forward": Commands, "joint_trajectory": Trajectories}[self._knobs.settings.command]
+        on_commands = self._knobs.settings.output == "commands"
+        self._commands = commanding(self, self._knobs.settings, self._on_joints, self._complain) if on_commands else None
         self._position = self._commands.states if self._commands else Ear(self, Float64MultiArray, "position", self._on_position, DATA_QOS)
         self._stop = StopTopic(self, self._wall)
         self.create_timer(STOP_LOOK, self._hear_stop, clock=self._steady)
@@ -114,9 +118,11 @@ class ExcitationNode(Overridable, LifecycleNode):
             return self._refuse(f"{rivals}: no configure beside it. End one of the two. {KILLED}")
         try:
             self._take_experiment()
-            self._drive = Drive(self._knobs.settings, 0 if self._drive is None else self._drive.seq)  # the counter never goes back
+            self._drive = drive_of(self._knobs.settings, 0 if self._drive is None else self._drive.seq)  # the counter never goes back
         except BadInput as error:
             return self._refuse(str(error))
+        if isinstance(self._drive, TrajectoryDrive):
+            self.get_logger().info(self._drive.sizes)
         return super().on_configure(state)
 
     def _take_experiment(self) -> None:
@@ -138,7 +144,7 @@ class ExcitationNode(Overridable, LifecycleNode):
         others = self._others()
         if others:
             return self._refuse(f"{' and '.join(others)} publishes {self._way}, too: no activate beside it. {KILLED}")
-        strange = "" if self._commands else self._no_blocks()
+        strange = self._no_commands(self._commands) if self._commands else self._no_blocks()
         if strange:
             return self._refuse(strange)
         settings, now = self._knobs.settings, time.monotonic()
@@ -147,7 +153,7 @@ class ExcitationNode(Overridable, LifecycleNode):
             if not settings.lockstep:  # a pause is a gap in the counter
                 self._first += max(1, math.ceil((now - self._until) * settings.rate * settings.speed))
         try:
-            self._drive = Drive(settings, self._first)
+            self._drive = drive_of(settings, self._first)
         except BadInput as error:
             self.get_logger().error(str(error))
             return TransitionCallbackReturn.FAILURE
@@ -239,6 +245,19 @@ class ExcitationNode(Overridable, LifecycleNode):
             )
         return ""
 
+    def _no_commands(self, commands: Commands) -> str:
+        """Why no trajectories may be sent: nobody there takes them. Empty if all is well, and where one number a joint is sent."""
+        if not isinstance(commands, Trajectories):
+            return ""
+        kinds = {info.topic_type for info in self.get_subscriptions_info_by_topic(self._way)}
+        if "trajectory_msgs/msg/JointTrajectory" in kinds:
+            return ""
+        there = f"its subscribers expect {', '.join(sorted(kinds))}" if kinds else "nobody listens there"
+        return (
+            f"trajectories would go to {self._way}, and {there}: no activate. Start the JointTrajectoryController, "
+            "and set command_topic to its topic, /NAME_OF_CONTROLLER/joint_trajectory."
+        )
+
     def _others(self) -> list[str]:
         """Who else drives the machine."""
         topic = self._way
@@ -326,7 +345,7 @@ class ExcitationNode(Overridable, LifecycleNode):
         assert self._commands is not None
         with self._hold:
             drive.stop(reason, drive.settings.abort_ramp)
-        until = time.monotonic() + drive.settings.abort_ramp + ARRIVES.nanoseconds * 1e-9
+        until = time.monotonic() + drive.stopping_time + ARRIVES.nanoseconds * 1e-9
         while drive.state == "stopping" and beat.alive and time.monotonic() < until:
             self._obey_stop()
             time.sleep(beat.clock.period)
@@ -334,7 +353,7 @@ class ExcitationNode(Overridable, LifecycleNode):
         self._beat = None
         self._report()
         for _ in range(LAST):
-            self._commands.send(drive.safe)
+            self._commands.rest(drive)
             time.sleep(beat.clock.period)
         self._publish_rows()
         self._commands.publisher.wait_for_all_acked(ARRIVES)
@@ -358,16 +377,17 @@ class ExcitationNode(Overridable, LifecycleNode):
             return
         with self._wall, self._hold:
             drive.tick(time.monotonic())
-            drive.skip(skipped)
-            block = drive.next(1)
-            if commands.send(block.values[0]):
+            block = drive.catch_up(skipped)
+            newest = self._stamp(float(block.seq[-1]))
+            if commands.send(drive, block.values[-1], newest):
                 self._blocks, self._until = self._blocks + 1, time.monotonic() + 1.0 / drive.settings.rate
-                self._rows.append((float(block.seq[0]), self._stamp(float(block.seq[0])), block.values[0]))
+                stamps = newest + (block.seq - block.seq[-1]) / drive.settings.rate
+                self._rows += list(zip(block.seq.tolist(), stamps.tolist(), block.values, strict=True))
             if len(self._rows) >= drive.settings.block:
                 self._publish_rows()
         if self._wall.count > before:
             for _ in range(LAST):
-                commands.send(drive.safe)
+                commands.rest(drive)
             self.exit_code = 1
             if self._beat is not None:
                 self._beat.close()
@@ -377,7 +397,10 @@ class ExcitationNode(Overridable, LifecycleNode):
         assert self._drive is not None and self._epoch is not None
         count = seq / self._drive.settings.rate
         apart = self.get_clock().now().nanoseconds * 1e-9 - count - self._epoch
-        self._epoch += apart if abs(apart) > SAME_EPOCH else FOLLOW * apart
+        if isinstance(self._commands, Trajectories):  # a jump of the stamps would be one of the motion
+            self._epoch += FOLLOW_MOTION * apart
+        else:
+            self._epoch += apart if abs(apart) > SAME_EPOCH else FOLLOW * apart
         return self._epoch + count
 
     def _publish_rows(self) -> None:

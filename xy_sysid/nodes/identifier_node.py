@@ -16,6 +16,7 @@ from std_srvs.srv import Trigger
 
 from xy_sysid.errors import BadInput, XySysidError
 from xy_sysid.files.state import load_state, save_state, set_aside
+from xy_sysid.live.coupling_messages import coupling_topics
 from xy_sysid.live.fitter import LiveFitter, Update, warm_up
 from xy_sysid.live.heard import verdict
 from xy_sysid.live.identifier import Identifier
@@ -55,6 +56,8 @@ class IdentifierNode(WalledNode):
         for axis in self._axes:
             for kind in ("frf", "transfer_function", "comparison"):
                 self._publisher(topic_of(kind, axis))
+        for topic in coupling_topics(self._axes):
+            self._publisher(topic)
         self._resume()
         warm_up(settings)  # before anything is subscribed to: compiling holds up the data path
         self._streams = Streams(self, self._axes, settings, self._feed)

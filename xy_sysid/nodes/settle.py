@@ -42,7 +42,7 @@ WHOLE = 0.95  # part of its seconds with which an experiment counts as carried o
 LATE = 10.0  # s on the wall without a sample after which a recording ends, however busy the computer is
 SETTLES = 0.5  # s in which the node tells its state after a change
 QUALITY = QoSProfile(depth=1000, history=HistoryPolicy.KEEP_LAST)
-FIXED = ("output", "interface", "unit", "command_topic", "controller_joints", "joint_topic", "joints")  # of the excitation, while it runs
+FIXED = ("output", "interface", "command", "unit", "command_topic", "controller_joints", "joint_topic", "joints")  # of the excitation, while it runs
 
 
 @dataclass(frozen=True, slots=True)

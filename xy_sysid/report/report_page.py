@@ -10,6 +10,8 @@ from typing import Any
 from xy_sysid.axis.model import STANDARD, Library
 from xy_sysid.report import captions, figures, story_figures, story_words
 from xy_sysid.report.axis_report import AxisReport
+from xy_sysid.report.coupling import CAPTION as COUPLED
+from xy_sysid.report.coupling import coupling_figure
 from xy_sysid.report.headline import headline
 from xy_sysid.report.remarks import NOT_A_CONFIDENCE, axis_remarks
 from xy_sysid.report.sheet import Drawing, block, listing, paragraph, pictures, provenance_html, section, table_html, whole
@@ -18,6 +20,7 @@ from xy_sysid.report.story_parts import words
 from xy_sysid.report.story_words import spoken
 from xy_sysid.report.tables import Table, coefficient_table, order_table, result_table
 from xy_sysid.report.words import quantity
+from xy_sysid.response.coupling import Coupling
 
 ABOUT = (
     "Recording, response and model of each axis, the places where the model fails, the missing effects, and the uncertainty of "
@@ -52,6 +55,7 @@ class Recorded:
 
     title: its name; units: of input and output; facts: (what, value) of the experiment
     origins: label -> provenance; notes: what was odd while reading
+    coupling: what two axes that were driven at once do to each other, None of one axis or where the notes say why not
     """
 
     title: str
@@ -59,6 +63,7 @@ class Recorded:
     facts: tuple[tuple[str, str], ...]
     origins: Mapping[str, Mapping[str, Any]]
     notes: tuple[str, ...] = ()
+    coupling: Coupling | None = None
 
 
 def report_page(recorded: Recorded, axes: Mapping[str, AxisReport], least_coherence: float, library: Library = STANDARD) -> str:
@@ -67,6 +72,10 @@ def report_page(recorded: Recorded, axes: Mapping[str, AxisReport], least_cohere
     _summary(page, axes, library)
     _experiment(page, axes, recorded.units, recorded.facts)
     _response(page, axes, least_coherence)
+    if recorded.coupling is not None:
+        found = recorded.coupling
+        drawn = [page.draw("coupling-bands", coupling_figure(found), f"{found.sentence} {COUPLED}")]
+        page.add("coupling", "Two axes at once", section("coupling", "Two axes at once", drawn, f"{found.sentence} {COUPLED}"))
     _fits(page, axes)
     for number_, one in enumerate(axes.values()):
         if one.story is not None and one.story["ladder"]:

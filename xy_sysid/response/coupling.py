@@ -22,6 +22,7 @@ SUFFICES = 0.01  # of the own motion: less is below what models of machines reac
 BANDS = 24  # over which coupling is averaged
 ALIKE = 0.95  # coherence of the two inputs from which they cannot be told apart
 FEWEST = 4.0  # independent windows
+LONGER = 4  # windows of coupling over those of one axis: bands average lines here, and the response of the own axis leaks less into them
 COMBINED = {
     "corexy": (np.array([[1.0, 1.0], [1.0, -1.0]]), np.array([[0.5, 0.5], [0.5, -0.5]])),
     "gantry": (np.array([[1.0, 1.0], [1.0, -1.0]]), np.array([[0.5, 0.5], [0.5, -0.5]])),
@@ -55,6 +56,11 @@ class Coupling:
         return self.largest < SUFFICES
 
     @property
+    def coupled(self) -> bool:
+        """They do not, for sure."""
+        return bool(np.any(self.coupling > SUFFICES))
+
+    @property
     def sentence(self) -> str:
         """For people."""
         one, other = self.axes
@@ -62,11 +68,12 @@ class Coupling:
         if self.suffice:
             level = 20 * np.log10(self.largest)
             return f"{one} and {other} are coupled by at most {100 * self.largest:.2g} % ({level:.0f} dB) in {span}: two single-axis models suffice."
-        sure = self.coupling > SUFFICES
-        if not bool(np.any(sure)):
+        if not self.coupled:
+            place = int(np.argmax(self.at_most))
+            where = f"{self.band_edges[place]:.3g} to {self.band_edges[place + 1]:.3g} Hz"
             return (
-                f"No coupling of {one} and {other} above {100 * SUFFICES:g} % is distinguished from noise in {span}, and up to "
-                f"{100 * self.largest:.2g} % cannot be ruled out: record longer, or excite both axes more."
+                f"No coupling of {one} and {other} above {100 * SUFFICES:g} % is distinguished from noise in {span}. Up to "
+                f"{100 * self.largest:.2g} % cannot be ruled out in {where}: record longer, or excite both axes more there."
             )
         worst = int(np.argmax(self.coupling))
         low, high = self.band_edges[worst], self.band_edges[worst + 1]
@@ -75,6 +82,39 @@ class Coupling:
             f"{one} and {other} are coupled by {100 * self.coupling[worst]:.2g} % ({level:.0f} dB) in {low:.3g} to {high:.3g} Hz: "
             "two single-axis models do not suffice there."
         )
+
+
+@dataclass(frozen=True, slots=True)
+class CrossSpectra:
+    """Sums over windows of U U*, Y U*, Y Y*, each (lines, 2, 2), and how many independent windows they are worth."""
+
+    inputs: ComplexArray
+    between: ComplexArray
+    outputs: ComplexArray
+    averages: float
+
+
+class RunningCrossSpectra:
+    """``update`` with windows of both axes, ``get`` the sums."""
+
+    def __init__(self, shape: WindowShape) -> None:
+        """shape: of the windows."""
+        self._taper = shape.taper()[:, None]
+        self._sums = np.zeros((3, shape.length // 2 + 1, 2, 2), dtype=np.complex128)
+        self._count = 0
+        self._shared = 1.0 + 2.0 * float(np.sum(error_correlation(shape)[1:, 0]))
+
+    def update(self, inputs: FloatArray, outputs: FloatArray) -> None:
+        """One more window: (length, 2) of inputs and of outputs, positions differenced."""
+        one, other = (np.fft.rfft((signal - signal.mean(axis=0)) * self._taper, axis=0) for signal in (inputs, outputs))
+        for total, first, second in zip(self._sums, (one, other, other), (one, one, other), strict=True):
+            total += first[:, :, None] * second[:, None, :].conj()
+        self._count += 1
+
+    def get(self) -> CrossSpectra:
+        """The sums so far."""
+        inputs, between, outputs = self._sums
+        return CrossSpectra(inputs=inputs, between=between, outputs=outputs, averages=self._count / self._shared)
 
 
 def coupling(recording: Recording, shape: WindowShape, band: tuple[float, float], combine: str = "") -> Coupling:
@@ -89,25 +129,37 @@ def coupling(recording: Recording, shape: WindowShape, band: tuple[float, float]
     drives, moves = COMBINED.get(combine, (np.eye(2), np.eye(2)))
     names = {"corexy": ("x", "y"), "gantry": ("travel", "yaw")}.get(combine, recording.axes[:2])
     u, y = recording.voltage[:, :2] @ drives.T, recording.position[:, :2] @ moves.T
-    suu, syu, syy, averages = _spectra(recording, u, y, shape)
-    every = np.arange(suu.shape[0]) * recording.sampling_rate / shape.length
-    used = np.flatnonzero((every > 2 * recording.sampling_rate / shape.length) & (every >= band[0]) & (every <= band[1]))
+    spectra = _of_recording(recording, u, y, shape)
+    return coupling_of(spectra, shape, recording.sampling_rate, band, (names[0], names[1]), recording.measured == "position")
+
+
+def coupling_of(
+    spectra: CrossSpectra, shape: WindowShape, rate: float, band: tuple[float, float], axes: tuple[str, str], differenced: bool
+) -> Coupling:
+    """Of sums over windows; rate: Hz; differenced: whether the outputs are differences of positions. Raises BadInput as ``coupling`` does."""
+    suu, syu, syy = spectra.inputs, spectra.between, spectra.outputs
+    every = np.arange(suu.shape[0]) * rate / shape.length
+    used = np.flatnonzero((every > 2 * rate / shape.length) & (every >= band[0]) & (every <= band[1]))
     power = np.real(np.einsum("kii->ki", suu))
-    used = used[np.all(power[used] > 1e-3 * np.quantile(power[used], 0.9, axis=0), axis=1)]
-    if averages < FEWEST or used.size < 2 * BANDS // 3:
-        raise BadInput("recording", f"{averages:.1f} independent windows, {used.size} excited lines", f"{FEWEST:g} and more", "Record longer.")
+    if used.size and bool(np.all(power[used].max(axis=0) > 0.0)):
+        used = used[np.all(power[used] > 1e-3 * np.quantile(power[used], 0.9, axis=0), axis=1)]
+    else:
+        raise BadInput("inputs of the two axes", "one that stands still in this band", "both moving", "Drive both axes at once.")
+    if spectra.averages < FEWEST or used.size < 2 * BANDS // 3:
+        told = f"{spectra.averages:.1f} independent windows, {used.size} excited lines"
+        raise BadInput("recording", told, f"{FEWEST:g} and more", "Record longer.")
     alike = float(np.median(np.abs(suu[used, 0, 1]) ** 2 / (power[used, 0] * power[used, 1])))
     if alike > ALIKE:
         raise BadInput("inputs of the two axes", f"alike (coherence {alike:.2f})", f"less than {ALIKE}", "Give each axis a signal of its own (seed).")
     inverse = np.linalg.inv(suu[used])
     response = np.einsum("kij,kjl->kil", syu[used], inverse)
     left = np.real(np.einsum("kii->ki", syy[used] - np.einsum("kij,klj->kil", response, syu[used].conj())))
-    sigma = np.sqrt(np.maximum(left[:, :, None] * np.real(np.einsum("kii->ki", inverse))[:, None, :], 0.0) / max(averages - 2.0, 1.0))
-    if recording.measured == "position":
-        step = divisor(every[used], recording.sampling_rate)[:, None, None]
+    sigma = np.sqrt(np.maximum(left[:, :, None] * np.real(np.einsum("kii->ki", inverse))[:, None, :], 0.0) / max(spectra.averages - 2.0, 1.0))
+    if differenced:
+        step = divisor(every[used], rate)[:, None, None]
         response, sigma = response / step, sigma / np.abs(step)
     edges, size, most = _by_band(every[used], response, sigma)
-    return Coupling(axes=(names[0], names[1]), frequency=every[used], response=response, sigma=sigma, band_edges=edges, coupling=size, at_most=most)
+    return Coupling(axes=axes, frequency=every[used], response=response, sigma=sigma, band_edges=edges, coupling=size, at_most=most)
 
 
 def single(found: Coupling, output: int, driven: int, recording: Recording) -> FrequencyResponse:
@@ -126,12 +178,10 @@ def single(found: Coupling, output: int, driven: int, recording: Recording) -> F
     )
 
 
-def _spectra(recording: Recording, u: FloatArray, y: FloatArray, shape: WindowShape) -> tuple[ComplexArray, ComplexArray, ComplexArray, float]:
-    """Sums over windows of U U*, Y U*, Y Y* (lines, 2, 2), the output differenced, and how many independent windows they are worth."""
-    lines, taper, count = shape.length // 2 + 1, shape.taper()[:, None], 0
-    suu, syu, syy = np.zeros((3, lines, 2, 2), dtype=np.complex128)
+def _of_recording(recording: Recording, u: FloatArray, y: FloatArray, shape: WindowShape) -> CrossSpectra:
+    """Of all windows of a recording, with positions differenced; (n, 2) inputs and outputs."""
+    running = RunningCrossSpectra(shape)
     for run in recording.runs():
-        own = u[run]
         moved = (
             np.diff(y[run], axis=0)
             if recording.measured == "position"
@@ -139,16 +189,11 @@ def _spectra(recording: Recording, u: FloatArray, y: FloatArray, shape: WindowSh
         )
         for begin in range(0, len(moved) - shape.length + 1, shape.hop):
             part = slice(begin, begin + shape.length)
-            one, other = (np.fft.rfft((signal[part] - signal[part].mean(axis=0)) * taper, axis=0) for signal in (own, moved))
-            suu += one[:, :, None] * one[:, None, :].conj()
-            syu += other[:, :, None] * one[:, None, :].conj()
-            syy += other[:, :, None] * other[:, None, :].conj()
-            count += 1
-    if not count:
+            running.update(u[run][part], moved[part])
+    spectra = running.get()
+    if spectra.averages == 0.0:
         raise BadInput("longest gap-free run", f"{len(u)} samples", f"more than {shape.length}", "Record longer, or shorten the window.")
-    overlap = error_correlation(shape)[:, 0]
-    worth = count / (1.0 + 2.0 * float(np.sum(overlap[1:])))
-    return suu, syu, syy, worth
+    return spectra
 
 
 def _by_band(frequency: FloatArray, response: ComplexArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -1,0 +1,219 @@
+"""The drive of a robot that takes only trajectories, and a controller that follows what it is told: never outside the limits, always to rest."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from xy_sim.following import Following, Point
+from xy_sysid.errors import BadInput
+from xy_sysid.excitation.motion_plan import MotionPoints
+from xy_sysid.excitation.trajectory_drive import TrajectoryDrive, drive_of
+from xy_sysid.samples.block import Block, FloatArray
+from xy_sysid.settings import AxisExcitation, ExcitationSettings, build
+
+RATE, START = 200.0, 0.4
+JOINT: dict[str, Any] = {
+    "kind": "multisine",
+    "rms": 0.0,
+    "limit": 0.3,
+    "max_speed": 0.8,
+    "max_acceleration": 6.0,
+    "low": 0.5,
+    "high": 8.0,
+    "period": 8.0,
+    "travel_min": -1.0,
+    "travel_max": 1.5,
+    "brake": 0.1,
+}
+
+
+def settings(**x: Any) -> ExcitationSettings:
+    """One joint of a JointTrajectoryController."""
+    given = {"output": "commands", "interface": "position", "command": "joint_trajectory", "unit": "rad", "rate": RATE}
+    return build(ExcitationSettings, {**given, "axes": {"x": AxisExcitation(**{**JOINT, **x})}})
+
+
+class Robot:
+    """A controller that hears the drive, and a joint that follows it exactly; its clock may be late."""
+
+    def __init__(self, drive: TrajectoryDrive, late: float = 0.0) -> None:
+        self.drive, self.late, self.following = drive, late, Following(["x"])
+        self.place, self.path, self.refused = START, [START], ""
+        self.drive.start()
+        self.see()
+
+    def see(self) -> bool:
+        """A joint state with the stamp of now."""
+        at = np.array([self.drive.seq - 1.0 - self.late * RATE])
+        return self.drive.see(Block(("x",), at, at / RATE, np.array([[self.place]])))
+
+    def hear(self, points: MotionPoints) -> None:
+        """Take a message as it comes."""
+        made = [
+            Point(at=(s - points.sample[0]) / RATE, position=p, speed=v, push=a if k < points.brakes else np.empty(0))
+            for k, (s, p, v, a) in enumerate(zip(points.sample, points.position, points.speed, points.acceleration, strict=True))
+        ]
+        begins = 1000.0 + (self.drive.stamp_from + points.sample[0]) / RATE
+        none = np.zeros(1)
+        self.refused = self.following.take(["x"], made, begins, self.clock(), Point(0.0, np.array([self.place]), none, none)) or self.refused
+
+    def clock(self) -> float:
+        """Of the controller, s."""
+        return 1000.0 + (self.drive.seq - 1) / RATE - self.late
+
+    def go(self, samples: int, deaf: bool = False, held_up: int = 0) -> FloatArray:
+        """(samples,) places, ten a sample; deaf: nothing is heard; held_up: samples that the first step comes late."""
+        before = len(self.path)
+        for k in range(samples):
+            last = self.clock()
+            self.drive.catch_up(held_up if k == 0 else 0)
+            points = self.drive.message()
+            for at in np.arange(last, self.clock() - 1e-9, 0.1 / RATE) + 0.1 / RATE:
+                wanted = self.following.now(float(at))
+                self.place = self.place if wanted is None else float(wanted[0][0])
+                self.path.append(self.place)
+            if points is not None and not deaf:
+                self.hear(points)
+            self.see()
+        return np.array(self.path[before:])
+
+    def limits_kept(self) -> None:
+        """Position, speed and acceleration of all the way, by differences."""
+        path, step = np.array(self.path), 0.1 / RATE
+        assert np.abs(path - START).max() <= JOINT["limit"] * (1 + 1e-9)
+        assert np.abs(np.diff(path)).max() / step <= JOINT["max_speed"] * 1.001
+        assert np.abs(np.diff(path, 2)).max() / step**2 <= JOINT["max_acceleration"] * 1.02  # the points are 25 in a period of the highest frequency
+
+
+def robot(late: float = 0.0, **x: Any) -> Robot:
+    drive = drive_of(settings(**x))
+    assert isinstance(drive, TrajectoryDrive)
+    return Robot(drive, late)
+
+
+@pytest.mark.parametrize("late", [0.0, 0.08, -0.01])
+@pytest.mark.parametrize("kind", ["multisine", "sweep"])
+def test_pieces_are_one_motion_within_the_limits(kind: str, late: float) -> None:
+    """Over a whole period and into the next, for a controller whose clock is late or early, one limit is reached and none exceeded."""
+    one = robot(late, kind=kind)
+    one.go(2000)
+    assert one.drive.state == "active" and not one.refused, one.drive.reason
+    one.limits_kept()
+    path, step = np.array(one.path), 0.1 / RATE
+    parts = np.ptp(path) / 0.6, np.abs(np.diff(path)).max() / step / 0.8, np.abs(np.diff(path, 2)).max() / step**2 / 6.0
+    assert max(parts) > 0.95
+
+
+@pytest.mark.parametrize(("late", "words"), [(-0.2, "stamped 0.2 s after it comes"), (0.12, "stamped 0.12 s before it comes")])
+def test_a_robot_whose_clock_is_another_is_not_moved(late: float, words: str) -> None:
+    """Pieces would not fit together there: its joint states are not usable, and the reason says by how much the clocks differ."""
+    one = robot(late)
+    assert np.ptp(one.go(100)) == 0.0 and words in one.drive.unusable
+
+
+@pytest.mark.parametrize("samples", [301, 517, 733, 1048])
+def test_stop_brakes_within_the_limits_and_the_reference_says_where_it_rests(samples: int) -> None:
+    """STOP, from any speed: the joint is at rest after LEAD and speed over acceleration, and the last reference is its place."""
+    one = robot()
+    one.go(samples)
+    one.drive.obey_stop()
+    one.go(60)
+    assert one.drive.state == "stopped" and one.drive.reason == "STOP"
+    assert np.ptp(one.go(20)) == 0.0 and one.drive.safe[0] == pytest.approx(one.place, abs=1e-9)
+    one.limits_kept()
+
+
+@pytest.mark.parametrize("samples", [301, 517, 733])
+def test_a_computer_that_dies_leaves_a_joint_that_comes_to_rest_by_itself(samples: int) -> None:
+    """No further message: after the horizon the controller brakes as it was told, within the limits."""
+    one = robot()
+    one.go(samples)
+    one.go(150, deaf=True)
+    assert np.ptp(one.go(20, deaf=True)) == 0.0
+    one.limits_kept()
+
+
+def test_a_stall_longer_than_the_horizon_ends_it_and_a_shorter_one_is_not_noticed() -> None:
+    """After a shorter one the motion goes on where it would be; after a longer one nothing goes on by itself, and the reason is told."""
+    one = robot()
+    one.go(400)
+    one.go(200, held_up=70)
+    assert not one.drive.reason
+    one.go(10, held_up=200)
+    assert one.drive.fault and "longer than horizon" in one.drive.reason
+    assert one.drive.state == "stopped" and one.drive.safe[0] == pytest.approx(one.place, abs=1e-9)
+    one.limits_kept()
+
+
+def test_a_joint_that_something_holds_back_stays_where_it_is_in_the_end() -> None:
+    """The drive brakes, says that the joint does not follow, and where it was measured is what it is told to keep."""
+    one = robot()
+    one.go(400)
+    held = one.place - 0.5
+    for _ in range(100):
+        one.place = held
+        one.see()
+        one.drive.catch_up(0)
+        one.drive.message()
+    assert one.drive.fault and "does not follow" in one.drive.reason
+    assert one.drive.strayed is not None and one.drive.strayed[0] == held
+
+
+def test_a_joint_whose_motion_would_leave_its_travel_is_not_moved() -> None:
+    """Place, motion and travel are told; no message goes out."""
+    one = robot(travel_max=0.6)
+    assert one.drive.fault and "x stands at 0.4 rad: its motion from 0.1 to 0.7 rad would leave its travel" in one.drive.reason
+    assert np.ptp(one.go(100)) == 0.0 and one.drive.state == "stopped"
+
+
+def test_an_axis_that_is_off_stays() -> None:
+    """It is told its place, with speed 0."""
+    two = {"x": AxisExcitation(**JOINT), "y": AxisExcitation(**{**JOINT, "kind": "off", "max_speed": 0.0, "max_acceleration": 0.0})}
+    drive = drive_of(settings().model_copy(update={"axes": two}))
+    assert isinstance(drive, TrajectoryDrive)
+    drive.start()
+    drive.see(Block(("x", "y"), np.array([-1.0]), np.array([0.0]), np.array([[0.1, -0.2]])))
+    drive.next(1)
+    points = drive.message()
+    assert points is not None and np.ptp(points.position[:, 0]) > 0.0
+    assert set(points.position[:, 1]) == {-0.2} and not points.speed[:, 1].any()
+
+
+@pytest.mark.parametrize(
+    ("x", "words"),
+    [
+        ({"rms": 0.2, "max_acceleration": 600.0}, "x.max_speed would be exceeded"),
+        ({"rms": 0.05, "limit": 0.05, "max_speed": 5.0, "max_acceleration": 300.0}, "x.limit would be exceeded"),
+        ({"rms": 0.2, "max_speed": 50.0}, "x.max_acceleration would be exceeded"),
+        ({"high": 60.0}, "8.*60 Hz"),
+        ({"low": 0.1, "period": 4.0}, "cycles of the lowest"),
+        ({"max_speed": 0.0}, "x.max_speed is 0 rad/s as joint_trajectory; allowed: above 0"),
+        ({"kind": "noise"}, "x.kind is noise as joint_trajectory; allowed: multisine, sweep, off"),
+        ({"slow": 0.1}, "x.slow is 0.1 as joint_trajectory"),
+    ],
+)
+def test_what_exceeds_the_limits_is_refused_before_anything_moves(x: dict[str, Any], words: str) -> None:
+    """The limit is named, with the largest size that it allows."""
+    with pytest.raises(BadInput, match=words):
+        drive_of(settings(**x))
+
+
+def test_a_size_within_the_limits_is_kept_and_nothing_changes_while_active() -> None:
+    """rms is that of the motion; limits of a motion that is under way are not raised."""
+    one = robot(rms=0.004)
+    one.go(1604)
+    assert np.std(one.path) == pytest.approx(0.004, rel=0.02)
+    with pytest.raises(BadInput, match="while active"):
+        one.drive.change(settings(rms=0.004, limit=0.4))
+    one.limits_kept()
+
+
+@pytest.mark.parametrize("more", [{"output": "blocks"}, {"interface": "velocity"}])
+def test_trajectories_are_positions_for_a_controller(more: dict[str, Any]) -> None:
+    """The command says what else has to be set."""
+    given = {**settings().model_dump(), **more}
+    with pytest.raises(BadInput, match="interface"):
+        build(ExcitationSettings, given)

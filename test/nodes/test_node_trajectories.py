@@ -1,0 +1,170 @@
+"""A robot that takes only trajectories, from a JointTrajectoryController to its response, over real DDS.
+
+The controller is ``xy_sim.trajectory_node``: topic, interpolation and refusals of ros2_controllers around a simulated joint.
+"""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from helpers import ROOT
+from helpers.live_nodes import newest
+from helpers.ros_tools import NodeProcess, World, needs_ros, world_in
+
+from xy_sysid.samples.block import FloatArray
+
+pytestmark = needs_ros
+
+JOINT, TOPIC = "shoulder_pan_joint", "/joint_trajectory_controller/joint_trajectory"
+RUN = {node["executable"]: node["parameters"] for node in yaml.safe_load((ROOT / "config" / "ros2_trajectory.yaml").read_text())["nodes"]}
+LIMITS = RUN["excitation"]["x"]
+
+
+@pytest.fixture
+def world(tmp_path: Path) -> Iterator[World]:
+    with world_in(tmp_path) as made:
+        yield made
+
+
+def start(world: World, executable: str, **more: Any) -> NodeProcess:
+    """A node as the run file sets it, with a watchdog and a horizon for busy test machines."""
+    arguments = more.pop("arguments", ())
+    told = {**RUN[executable], **({"watchdog": 3.0, "horizon": 3.0} if executable == "excitation" else {})}
+    axis = {f"x.{name}": value for name, value in told.pop("x", {}).items()}
+    written = {name: f'"{value}"' if isinstance(value, str) else value for name, value in {**told, **axis, **more}.items()}
+    return world.start(f"xy_sysid.nodes.{executable}", written, arguments=arguments)
+
+
+def controller(world: World, **more: Any) -> NodeProcess:
+    return world.start("xy_sim.trajectory_node", {"joints": f'["{JOINT}"]', "update_rate": 200.0, **more})
+
+
+def trajectories(world: World) -> list[Any]:
+    """A list that fills with what a controller hears."""
+    from trajectory_msgs.msg import JointTrajectory
+
+    heard: list[Any] = []
+    world.node.create_subscription(JointTrajectory, TOPIC, heard.append, 100)
+    return heard
+
+
+def arrays(world: World, topic: str) -> list[Any]:
+    """A list that fills with a node's results."""
+    from std_msgs.msg import Float64MultiArray
+
+    heard: list[Any] = []
+    world.node.create_subscription(Float64MultiArray, topic, heard.append, 10)
+    return heard
+
+
+def places(world: World) -> list[float]:
+    """A list that fills with the positions of the joint."""
+    from sensor_msgs.msg import JointState
+
+    seen: list[float] = []
+    world.node.create_subscription(JointState, "/joint_states", lambda message: seen.append(message.position[message.name.index(JOINT)]), 1000)
+    return seen
+
+
+def of(message: Any) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """(n,) times of the points, ROS time in s; positions; speeds."""
+    begins = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
+    times = np.array([begins + point.time_from_start.sec + 1e-9 * point.time_from_start.nanosec for point in message.points])
+    return times, np.array([point.positions[0] for point in message.points]), np.array([point.velocities[0] for point in message.points])
+
+
+def within_limits(heard: list[Any]) -> None:
+    """Every message that was sent: position, speed and acceleration, and rest at its end."""
+    for message in heard:
+        times, position, speed = of(message)
+        assert message.joint_names == [JOINT] and (np.diff(times) > 0).all()
+        assert np.abs(position - heard[0].points[0].positions[0]).max() <= LIMITS["limit"]
+        assert np.abs(speed).max() <= LIMITS["max_speed"] * (1 + 1e-9)
+        assert np.abs(np.diff(speed) / np.diff(times)).max() <= LIMITS["max_acceleration"] * 1.001
+        assert speed[-1] == 0.0
+
+
+def test_a_robot_that_takes_only_trajectories_is_identified_and_stopped(world: World) -> None:
+    """With the run file that comes along: the reference as instrument gives the joint's gain, and as input the response of joint and controller.
+
+    STOP brakes within the limits; then it stands.
+    """
+    from std_msgs.msg import Bool
+
+    control = controller(world, load=0.1)
+    short = {"length": 512, "band_low": 1.0}
+    start(world, "identifier", numerator_order=0, denominator_order=2, **short)
+    command = {"effort_as_voltage": False, "effort_lag": 0, "response": "h1", "input_unit": "rad", "integrators": 0}
+    plain = ("-r", "__ns:=/plain", "-r", "voltage:=/xy/voltage")
+    start(world, "identifier", arguments=plain, numerator_order=0, denominator_order=3, **short, **command)
+    heard, seen, statuses, whole = trajectories(world), places(world), world.statuses(), arrays(world, "/plain/frf/x")
+    drive = start(world, "excitation", **{"x.period": 2.56, "x.low": 0.8})
+    assert world.until(lambda: bool(seen) and bool(newest(statuses, "streams")), 60.0), control.output()
+    assert world.transition("excitation", "configure"), drive.output()
+    assert "rms" in drive.output() and "(acceleration)" in drive.output()
+    assert world.transition("excitation", "activate"), drive.output()
+    assert world.until(lambda: int(newest(statuses, "axis x").get("windows", "0")) >= 8, 120.0), drive.output() + control.output()
+    wanted = ("gain 95 % low", "gain (rad/s/(N m))", "gain 95 % high")
+    assert world.until(lambda: all(newest(statuses, "axis x").get(key) for key in wanted), 30.0)
+    low, gain, high = (float(newest(statuses, "axis x")[key]) for key in wanted)
+    assert abs(gain - 3.0) < max(3.5 / 3.92 * (high - low), 0.15), (low, gain, high)
+    assert world.until(lambda: bool(whole), 60.0)
+    f, real, imaginary, _, _ = np.array(whole[-1].data).reshape(-1, 5).T
+    s = 2j * np.pi * f[(f > 1.0) & (f < 4.0)]
+    loop = (15.0 + 0.3 * s) * 3.0 / (s * (s / 40.0 + 1.0)) * np.exp(-0.0073 * s)  # of the stand-in: its delay and one and a half of its cycles
+    closed, measured = loop / (1.0 + loop), (real + 1j * imaginary)[(f > 1.0) & (f < 4.0)]
+    assert np.abs(np.abs(measured) - np.abs(closed)).max() < 0.1, (measured, closed)
+    stop = world.node.create_publisher(Bool, "stop", 1)
+    assert world.until(lambda: stop.get_subscription_count() > 0)
+    stop.publish(Bool(data=True))
+    assert world.until(lambda: world.state("excitation") == "inactive", 20.0), drive.output()
+    assert "STOP is on" in drive.output()
+    world.spin(1.0)
+    rests, ends = len(seen), of(heard[-1])[1][-1]
+    world.spin(0.5)
+    assert np.ptp(seen[rests:]) < 0.05 and abs(np.mean(seen[rests:]) - ends) < 0.05, control.output()  # the load goes on
+    within_limits(heard)
+    assert "Traceback" not in drive.output() + control.output()
+
+
+def test_a_sender_that_is_killed_leaves_a_joint_that_comes_to_rest(world: World) -> None:
+    """Before: limits that are exceeded are refused at configure, a topic where nobody takes trajectories at activate. Then kill -9, and rest."""
+    drive = start(world, "excitation", **{"x.rms": 0.1})
+    assert not world.transition("excitation", "configure")
+    assert "x.rms is 0.1 rad; allowed: up to" in drive.output() and "x.max_acceleration would be exceeded" in drive.output()
+    changed, why = world.set_parameter("excitation", "x.rms", 0.0)
+    assert changed, why
+    assert world.transition("excitation", "configure") and not world.transition("excitation", "activate")
+    assert f"trajectories would go to {TOPIC}, and nobody listens there: no activate" in drive.output()
+    control = controller(world)
+    heard, seen = trajectories(world), places(world)
+    assert world.until(lambda: bool(seen), 60.0), control.output()
+    assert world.until(lambda: world.transition("excitation", "activate"), 20.0), drive.output()
+    assert world.until(lambda: len(seen) > 400 and np.ptp(seen[-100:]) > 0.002, 30.0), drive.output() + control.output()
+    drive.send(signal.SIGKILL)
+    drive.wait()
+    moves = len(seen)
+    assert world.until(lambda: len(seen) > moves + 600 and np.ptp(seen[-100:]) < 1e-3, 30.0), control.output()
+    assert np.mean(seen[-100:]) == pytest.approx(of(heard[-1])[1][-1], abs=1e-3)
+    within_limits(heard)
+
+
+def test_a_driver_that_goes_silent_ends_the_motion(world: World) -> None:
+    """Joint states that stop: the excitation brakes, goes inactive and says why, and the last trajectory ends at rest."""
+    control = controller(world)
+    heard, seen = trajectories(world), places(world)
+    drive = start(world, "excitation", autostart=True, watchdog=1.0)
+    assert world.until(lambda: len(heard) > 20 and len(seen) > 200, 60.0), drive.output() + control.output()
+    control.send(signal.SIGSTOP)
+    assert world.until(lambda: "inactive: no position from the machine" in drive.output(), 30.0), drive.output()
+    world.spin(0.3)
+    within_limits(heard)
+    spans = [float(np.ptp(of(message)[0])) for message in heard[-2:]]
+    assert spans[1] < 0.3 < spans[0]  # the way to rest instead of the motion of the horizon
+    control.send(signal.SIGCONT)

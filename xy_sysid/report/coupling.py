@@ -1,0 +1,32 @@
+"""Do two single-axis models suffice? The verdict on two axes that were driven at once, as a section of the report."""
+
+from __future__ import annotations
+
+import numpy as np
+import plotly.graph_objects as go
+
+from xy_sysid.report.parts import frequency_axis, plain, rows
+from xy_sysid.report.theme import axis_colour
+from xy_sysid.response.coupling import SUFFICES, Coupling
+
+CAPTION = (
+    "Coupling is the motion of one axis by the input of the other, over the geometric mean of what each input does to its own axis: "
+    "the larger of both directions, rms in each band. Solid and dotted: lower and upper 95 % limit. Dashed: below it two single-axis models suffice."
+)
+
+
+def coupling_figure(found: Coupling) -> go.Figure:
+    """Coupling in each band, and its 95 % limit, in per cent over log frequency."""
+    figure = rows(1, shared=False, gap=0.0)
+    edges = np.repeat(found.band_edges, 2)[1:-1]
+    one, other = (plain(axis) for axis in found.axes)
+    for values, name, dash in ((found.coupling, f"{one} and {other}, at least", "solid"), (found.at_most, "at most", "dot")):
+        shown = 100 * np.where(values > 0.0, values, np.nan)
+        figure.add_scatter(
+            x=edges, y=np.repeat(shown, 2), mode="lines", line={"color": axis_colour(0), "width": 1.6, "dash": dash}, name=name, connectgaps=False
+        )
+    line = {"color": axis_colour(1), "width": 1.2, "dash": "dash"}
+    figure.add_scatter(x=edges[[0, -1]], y=[100 * SUFFICES] * 2, mode="lines", line=line, name="two models suffice below")
+    frequency_axis(figure, 1, [found.band_edges])
+    figure.update_yaxes(title_text="coupling (%)", type="log", dtick=1, tickformat="~g")
+    return figure
