@@ -66,6 +66,7 @@ setup(
             "pandas",
             "nicegui>=3.13,<4",
             "playwright",
+            "pypdfium2",
             "pytest",
             "pytest-xdist",
             "hypothesis",

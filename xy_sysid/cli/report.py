@@ -11,14 +11,13 @@ import typer
 from xy_sysid.cli import options as o
 from xy_sysid.cli.diagnose import Own
 from xy_sysid.cli.output import emit, progress, say
-from xy_sysid.cli.provenance import provenance
-from xy_sysid.cli.reading import chosen, named, read, reads
+from xy_sysid.cli.reading import chosen, read, reads
 from xy_sysid.cli.study import answer as linear_answer
+from xy_sysid.cli.written_report import Asked, written_report
 
 if TYPE_CHECKING:
     from xy_sysid.imports.reading import Reading
     from xy_sysid.report.axis_report import AxisReport
-    from xy_sysid.samples.recording import Recording
 
 
 @reads
@@ -26,6 +25,14 @@ def report(
     recs: o.Recs,
     reading: Reading,
     out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="the page to write")] = Path("report.html"),
+    title: Annotated[str, typer.Option("--title", metavar="TEXT", help="title of the report. Default: the name of the recording")] = "",
+    machine: Annotated[
+        str, typer.Option("--machine", metavar="TEXT", help="name of the machine. Default: the one that the recording names in its meta data")
+    ] = "",
+    author: Annotated[str, typer.Option("--author", metavar="TEXT", help="who answers for the report")] = "",
+    recorded: Annotated[
+        str, typer.Option("--date", metavar="DATE", help="day of the recording, as 2026-03-03. Default: what its clock or its name tells")
+    ] = "",
     set_: o.Set = None,
     params: o.Params = None,
     period: o.Period = "auto",
@@ -34,16 +41,22 @@ def report(
     force: o.Force = False,
     json: o.Json = False,
 ) -> None:
-    """Write one self-contained page: summary, experiment, response, fits, checks, missing effects and the falling error."""
+    """Write one self-contained page: summary, experiment, response, fits, checks, missing effects and the falling error.
+
+    The browser prints it with page numbers.
+    """
     from xy_sysid.bags.atomic import write_text
     from xy_sysid.files.effects import library
-    from xy_sysid.report.axis_report import STAGES, Wanted, axis_reports
-    from xy_sysid.report.report_page import Recorded, report_page
+    from xy_sysid.fleets.naming import date_of
+    from xy_sysid.report.axis_report import STAGES, Wanted
+    from xy_sysid.report.cover import Cover
     from xy_sysid.report.story_words import status
 
     settings = o.settings_from(params, set_)
     samples = o.period_from(period)
     o.output_file("--out", out, force)
+    if recorded:
+        date_of(recorded)
     known = library(effect_file or [])
     recording = read(recs, reading, json)
     names = chosen(recording, reading.axes)
@@ -53,37 +66,19 @@ def report(
         def tell(name: str, stage: str) -> None:
             bar.update(tasks[name], description=f"axis {name}: {stage}", completed=STAGES.index(stage))
 
-        made = axis_reports(recording, names, Wanted(settings, samples, known, math.inf if budget is None else budget), tell)
-    origin = provenance(named(recs), recording)
-    units = recording.units
-    title = ", ".join(rec.name for rec in recs)
-    told = Recorded(title=title, units=units, facts=facts(recording, names), origins={"Recording": origin}, notes=recording.notes)
-    page = report_page(told, made, settings.min_coherence, known)
-    write_text(out, page)
+        wanted = Wanted(settings, samples, known, math.inf if budget is None else budget)
+        cover = Cover(title=title, machine=machine, author=author, recorded=recorded)
+        made = written_report(recording, Asked(paths=tuple(recs), axes=names, cover=cover, wanted=wanted, tell=tell))
+    write_text(out, made.page)
     if json:
-        emit({"page": str(out), "bytes": len(page.encode()), "recording": origin, "axes": {name: answer(one) for name, one in made.items()}})
+        head = {"title": made.cover.title, "machine": made.cover.machine, "author": made.cover.author, "date": made.cover.recorded}
+        axes = {name: answer(one) for name, one in made.axes.items()}
+        emit({"page": str(out), "bytes": len(made.page.encode()), **head, "recording": made.origin, "axes": axes})
         return
-    for name, one in made.items():
+    for name, one in made.axes.items():
         sentence = one.problem if one.story is None else str(one.story["sentence"])
         say(f"axis {name}: {status(one.story)}. {sentence}")
-    say(f"wrote {out}, {len(page.encode()) / 1e6:.1f} MB")
-
-
-def facts(recording: Recording, names: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
-    """What was recorded: (what, value)."""
-    runs = recording.runs()
-    longest = recording.run(names[0]).seconds if names and len(recording) else 0.0
-    rate = float(recording.sampling_rate)
-    return (
-        ("axes", ", ".join(names)),
-        ("sampling rate", f"{rate:.6g} Hz"),
-        ("samples", str(len(recording))),
-        ("duration", f"{len(recording) / rate:.4g} s"),
-        ("gaps", str(max(len(runs) - 1, 0))),
-        ("longest stretch without a gap", f"{longest:.4g} s"),
-        ("input", recording.input_unit),
-        ("output", recording.output_unit if recording.measured == "position" else f"{recording.output_unit}, from a measured {recording.measured}"),
-    )
+    say(f"wrote {out}, {len(made.page.encode()) / 1e6:.1f} MB")
 
 
 def answer(one: AxisReport) -> dict[str, Any]:
