@@ -41,8 +41,8 @@
     const columns = [];
     plot.data.forEach((trace, place) => ["x", "y"].forEach((letter) => {
       const axis = plot.layout[`${letter}axis${(trace[`${letter}axis`] || letter).slice(1)}`] || {};
-      const title = axis.title && axis.title.text || letter;
-      if (trace[letter]) columns.push([`${trace.name || `curve ${place + 1}`}: ${title}`, ...numbers(trace[letter])]);
+      const title = axis.title && axis.title.text || (trace.meta || {})[letter] || letter;
+      if (trace[letter]) columns.push([`${(trace.name || `curve ${place + 1}`).replace(/<br>/g, " ")}: ${title}`, ...numbers(trace[letter])]);
     }));
     const longest = Math.max(0, ...columns.map((column) => column.length));
     const lines = Array.from({ length: longest }, (_, k) => columns.map((column) => column[k] == null || Number.isNaN(column[k]) ? "" : quoted(String(column[k]))).join(","));
