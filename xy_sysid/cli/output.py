@@ -127,7 +127,7 @@ def progress() -> Progress:
 def compiling() -> tuple[Callable[[], None], Callable[[], None]]:
     """(what shows that laws are compiled, with a bar and the time that has passed; what takes it away again).
 
-    The bar only moves: nobody knows how far a compiler is. It may stand above another bar.
+    The bar only moves, as a compiler does not tell how far it is. It may stand above another bar.
     """
     shown: list[Progress] = []
 
