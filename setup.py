@@ -40,7 +40,7 @@ setup(
         ("share/man/man1", ["docs/xy-sysid.1"]),
     ],
     zip_safe=False,
-    install_requires=["numpy", "scipy", "numba", "rosbags", "pydantic>=2", "typer", "rich", "plotly", "threadpoolctl", "pyyaml", ISAL],
+    install_requires=["numpy", "scipy", "numba", "rosbags", "pydantic>=2", "typer", "rich>=14.1", "plotly", "threadpoolctl", "pyyaml", ISAL],
     extras_require={
         "ros": [
             f"ros-jazzy-rclpy[fastrtps]==7.1.6; {ROS_WHEELS}",
@@ -66,6 +66,7 @@ setup(
             "pandas",
             "nicegui>=3.13,<4",
             "playwright",
+            "pypdfium2",
             "pytest",
             "pytest-xdist",
             "hypothesis",

@@ -10,9 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import plotly.graph_objects as go
 import pytest
 
 import xy_sysid as xy
+from xy_sysid.report.notebook import whole
 
 ROOT = Path(__file__).parents[1]
 RATE = 500.0
@@ -228,7 +230,8 @@ def test_what_is_missing_is_added_saved_and_better_on_data_neither_has_seen(tmp_
         assert len(figure.data) >= 2
     for result, words in ((found, "friction"), (steps, "rigid"), (xy.frf(third), "frequency (Hz)"), (xy.compare(third, model), "noise floor")):
         html = notebook(result)
-        assert html.startswith("<p>&lt;") and words in html and "plotly" in html, html[:200]
+        assert html.startswith("<p>&lt;") and words in html and "<svg" in html, html[:200]
+        assert not re.search(r"(src|href|import)\s*=?\s*[\"'](https?:)?//", html), "an exported notebook asks another host for its picture"
     assert notebook(xy.frf(third).select(slice(0, 0))) is None
 
 
@@ -245,3 +248,10 @@ def test_too_little_data_is_an_answer_and_no_error() -> None:
     """Whoever asks gets told what lacks."""
     still = xy.Recording.from_arrays(RATE, np.ones(2000), np.zeros(2000)).run("x")
     assert xy.diagnose(still).verdict == "not_enough_data"
+
+
+def test_without_matplotlib_a_picture_of_a_notebook_brings_plotly_along(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The figure is drawn by a copy of plotly.js in the output, and no other host is asked for one."""
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    html = whole(go.Figure(go.Scatter(x=[1.0], y=[1.0])))
+    assert "cdn.plot.ly" not in re.sub(r"<script[^>]*>.{100000,}?</script>", "", html, flags=re.DOTALL) and len(html) > 1_000_000

@@ -41,6 +41,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from xy_sysid.axis.model import AxisModel
     from xy_sysid.cli.simulated_recording import simulate
+    from xy_sysid.cli.written_report import write_report
     from xy_sysid.comparison.of_run import better, compare, validate
     from xy_sysid.comparison.physical_model import PhysicalModel
     from xy_sysid.control_design.use import use
@@ -100,6 +101,7 @@ __all__ = [
     "trend",
     "use",
     "validate",
+    "write_report",
 ]
 
 _HOMES = {
@@ -123,6 +125,7 @@ _HOMES = {
     "fleets.of_paths": ("fleet",),
     "fleets.trends": ("trend",),
     "cli.simulated_recording": ("simulate",),
+    "cli.written_report": ("write_report",),
     "errors": ("BadInput", "BadRecording", "MissingExtra", "XySysidError"),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}

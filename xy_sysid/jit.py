@@ -30,16 +30,26 @@ def spent_compiling() -> float:
     return float(_COMPILING.duration) if _COMPILING.done else 0.0
 
 
-def tell_compiling(tell: Callable[[], None]) -> None:
-    """Call it when this process first makes machine code, which the disk then keeps for all others; never if the disk has all that is needed."""
+def tell_compiling(begins: Callable[[], None], ends: Callable[[], None] = lambda: None) -> None:
+    """Call these when this process begins to make machine code and when it has made it; the disk then keeps it for all others.
 
-    waiting = [tell]
+    Functions that are compiled for another one are a part of it, and not told. Neither is called if the disk has all that is needed.
+    """
+    deep = 0
 
-    def begins(listener: object, happening: object) -> None:
-        if waiting:
-            waiting.pop()()
+    def on_start(listener: object, happening: object) -> None:
+        nonlocal deep
+        deep += 1
+        if deep == 1:
+            begins()
 
-    listener = type("Told", (event.Listener,), {"on_start": begins, "on_end": lambda listener, happening: None})
+    def on_end(listener: object, happening: object) -> None:
+        nonlocal deep
+        deep -= 1
+        if deep == 0:
+            ends()
+
+    listener = type("Told", (event.Listener,), {"on_start": on_start, "on_end": on_end})
     cast("Callable[..., None]", event.register)("numba:compile", listener())
 
 

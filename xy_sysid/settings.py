@@ -358,6 +358,7 @@ class RecorderSettings(Settings):
         description="topics to record, as regular expressions relative to the namespace",
     )
     seconds: float = knob(0.0, "stop after so long; 0 is until told", "s", ge=0.0, le=1e9)
+    machine: str = knob("", "name of the machine, kept in the meta data of the bag and shown by report")
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,6 +7,9 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import Literal, NamedTuple
 
 SCALES = {
@@ -33,6 +36,11 @@ SCALES = {
     "ns": ("s", 1e-9),
 }
 MOVED = ("m", "rad")  # motion is read in thousandths of these
+CHOICES = {  # what a reader may choose for each of them, the usual one first, with its factor; rpm is rev for an angle
+    "m": {"mm": 1e3, "um": 1e6, "m": 1.0, "in": 1 / 0.0254},
+    "rad": {"mrad": 1e3, "rad": 1.0, "deg": 180 / math.pi, "rpm": 30 / math.pi},
+}
+_CHOSEN: ContextVar[tuple[str, ...]] = ContextVar("chosen units", default=())
 
 BEYOND_REASON = 1e6  # times, sigma or per cent: nobody needs to know how much more
 
@@ -114,25 +122,67 @@ USUAL = Units()
 MODEL_UNIT = re.compile(r"(/?)(?<![A-Za-z])([Vm])(?![A-Za-z])")
 
 
+@contextmanager
+def shown_in(units: Iterable[str]) -> Iterator[None]:
+    """Within it, in this task or thread, ``readable``, ``motion`` and what they make are in these of CHOICES; what is none of them is ignored."""
+    token = _CHOSEN.set(tuple(name for name in units if any(name in names for names in CHOICES.values())))
+    try:
+        yield
+    finally:
+        _CHOSEN.reset(token)
+
+
+def chosen_units() -> tuple[str, ...]:
+    """What ``shown_in`` has chosen."""
+    return _CHOSEN.get()
+
+
+def _as_chosen(unit: str) -> tuple[float, str] | None:
+    """Factor and unit in what the reader has chosen; None where nothing was chosen for it."""
+    counted = _counted(unit)
+    rest = unit[len(counted) :]
+    name = next((name for name in _CHOSEN.get() if name in CHOICES.get(counted, {})), "")
+    if not name or rest.startswith("^"):
+        return None
+    factor = CHOICES[counted][name]
+    if name != "rpm":
+        return factor, f"{name}{rest}"
+    if rest.startswith("/s^2"):
+        return factor, f"rpm/s{rest[4:]}"
+    return (factor, f"rpm{rest[2:]}") if rest.startswith("/s") else (factor / 60, f"rev{rest}")
+
+
 def readable(unit: str) -> tuple[float, str]:
-    """Factor and unit as people read it: times and lengths in thousandths, anything else as it is."""
+    """Factor and unit as people read it: times and lengths in thousandths, anything else as it is; or as chosen."""
+    chosen = _as_chosen(unit)
+    if chosen is not None:
+        return chosen
     return (1e3, f"m{unit}") if unit == "s" or _counted(unit) == "m" else (1.0, unit)
 
 
 def motion(unit: str) -> tuple[float, str]:
-    """Factor and unit as people read a motion or its speed: mm and mm/s, mrad and mrad/s, counts as they are."""
+    """Factor and unit as people read a motion or its speed: mm and mm/s, mrad and mrad/s, counts as they are; or as chosen."""
+    chosen = _as_chosen(unit)
+    if chosen is not None:
+        return chosen
     return (1e3, f"m{unit}") if _counted(unit) in MOVED else (1.0, unit)
 
 
 def moved(value: float, unit: str, digits: int = 3) -> str:
     """A motion or its speed with its unit: 0.33 mm/s."""
     scale, shown = motion(unit)
-    return f"{scale * value:.{digits}g} {shown}"
+    return f"{_digits(scale * value, digits)} {shown}"
 
 
 def bare(value: float, unit: str, digits: int = 3) -> str:
     """As ``moved``, without the unit, where another figure beside it names it."""
-    return f"{motion(unit)[0] * value:.{digits}g}"
+    return _digits(motion(unit)[0] * value, digits)
+
+
+def _digits(value: float, digits: int) -> str:
+    """So many significant digits, large numbers in full: 3900, not 3.9e+03."""
+    text = f"{value:.{digits}g}"
+    return f"{float(text):.0f}" if "e+" in text and abs(value) < BEYOND_REASON else text
 
 
 def _counted(unit: str) -> str:

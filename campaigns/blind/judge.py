@@ -6,7 +6,7 @@ import math
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -18,9 +18,6 @@ from xy_sysid.diagnosis.diagnose import Diagnosis, diagnose
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.free_run import EPSILON, fit, prepare
 from xy_sysid.greybox.score_test import bounded
-
-if TYPE_CHECKING:
-    from campaigns.blind.foreign import Foreign
 
 CONFIDENT = 0.9
 FAINT = 0.1  # of noise and dirt together: what changes the motion less can hardly be seen in 60 s
@@ -39,7 +36,7 @@ class Judged:
     change, noise, dirt, kinds: see ``recordings.Seen``
     """
 
-    case: Case | Foreign
+    case: Any  # a Case, or a Foreign of MuJoCo
     verdict: str
     effects: tuple[str, ...]
     confidence: float

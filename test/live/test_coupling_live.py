@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from xy_sysid.cli.report import coupled
+from xy_sysid.cli.written_report import coupled
 from xy_sysid.live.coupling_messages import COUPLING_COLUMNS, CROSS_COLUMNS
 from xy_sysid.live.fitter import Update
 from xy_sysid.live.identifier import FitRequest, Identifier

@@ -23,8 +23,10 @@ SOURCES = st.builds(
     effects=st.dictionaries(WORDS, st.lists(WORDS, min_size=1, max_size=3).map(tuple), max_size=2),
 )
 
+UNITS = st.sampled_from([(), ("um",), ("rpm",), ("in", "deg")])
 
-@given(st.builds(PageView, sources=st.lists(SOURCES, max_size=3).map(tuple), theme=st.sampled_from(["", "light", "dark"])))
+
+@given(st.builds(PageView, sources=st.lists(SOURCES, max_size=3).map(tuple), theme=st.sampled_from(["", "light", "dark"]), units=UNITS))
 def test_a_view_that_is_written_into_an_address_is_read_again(view: PageView) -> None:
     """Names in any script, several recordings, options of a table: the same view."""
     assert view_of_query(query_of(view)) == view
@@ -44,6 +46,12 @@ def test_an_address_reads_as_people_would_write_it() -> None:
     written = "live=1&model=linear&rec=days/dry.npz&axis=y&model=rigid&effects=x:coulomb_friction,cogging&theme=dark"
     assert query_of(view) == written and view_of_query(written) == view
     assert query_of(PageView((SourceView(),))) == "" and view_of_query("axis=y&nonsense=1&%FF=&effects=x") == PageView()
+
+
+def test_units_that_are_usual_or_unknown_are_not_kept() -> None:
+    """One of lengths and one of angles, whatever their order; the usual ones need no word."""
+    assert view_of_query("units=deg,parsec,mm,um").units == ("um", "deg")
+    assert query_of(PageView(units=("um", "deg"))) == "units=um,deg" and view_of_query("units=mm,mrad") == PageView()
 
 
 def test_a_long_address_is_cut() -> None:

@@ -158,7 +158,7 @@ def test_the_whole_page_follows_the_story_from_failing_to_explained(usual: Tab, 
         seen.until(functools.partial(explained, seen, 2), 60, "not explained")
         assert seen.ladder()[1] < 1.2 and "at the noise floor" in seen.verdict() and "missing" not in (seen.headline() + seen.verdict()).lower()
         assert seen.fact("gain") != gain and seen.page.locator(".fact.unsure").count() == 0
-        measured, model = seen.curves("Measured and modelled over frequency, bode", "measured, 95 % band", "model")
+        measured, model = seen.curves("Measured and modelled over frequency, bode", "measured, 95 % band", "model with coulomb friction")
         assert abs(measured[3] - model[3]) < 0.5
     assert one.filled() == ["Download the model"] and "coulomb friction" in str(one.page.locator(".math").first.text_content())
     one.page.get_by_role("button", name="rigid, with delay").click()
@@ -234,7 +234,7 @@ def test_recordings_stand_side_by_side_and_a_lost_one_says_so(usual: Tab, server
 def test_a_link_opens_the_same_view_and_a_reload_keeps_it(usual: Tab, tab: Callable[..., Tab], server: Server) -> None:
     """Recording, axis, model, picture, theme and added effects stand in the address; a recording that is not there is said."""
     one = ready(usual)
-    wanted = "rec=dry.npz&axis=y&model=rigid&pictures=residual_position&effects=y:coulomb_friction&rec=plain.npz&theme=dark"
+    wanted = "rec=dry.npz&axis=y&model=rigid&pictures=residual_position&effects=y:coulomb_friction&rec=plain.npz&theme=dark&units=um"
     link = f"{server.address}?{wanted}&rec=nowhere.npz"
     other = tab(address=link)
     other.until(lambda: "recording is 'nowhere.npz'" in other.notices(), 20)
@@ -248,6 +248,7 @@ def test_a_link_opens_the_same_view_and_a_reload_keeps_it(usual: Tab, tab: Calla
 
     other.until(shown, 60, "the effect of the link was not added, or axis or model are not those of the link")
     assert first.locator(".js-plotly-plot[aria-label*=', residual position, axis y']").is_visible()
+    assert " um/s" in str(first.locator("[data-part=headline]").text_content()) and "um/s" in str(first.locator(".facts").text_content())
     assert other.page.url == f"{server.address}?{wanted}"
     other.page.reload()
     other.until(shown, 30, "another view after a reload")

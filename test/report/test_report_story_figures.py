@@ -120,7 +120,7 @@ def test_lines_that_are_not_trusted_are_grey_and_leave_the_curve() -> None:
     trusted = np.array(story()["measured"]["frequency_response"]["trusted"])
     crosses = next(item for item in figure.data if item.name == "not trusted")
     assert len(crosses.x) == int((~trusted).sum()) > 0
-    model = next(item for item in figure.data if item.name == "model")
+    model = next(item for item in figure.data if item.name == "model with coulomb friction")
     assert max(model.x) == pytest.approx(np.array(story()["measured"]["frequency_response"]["frequency"])[trusted].max())
 
 

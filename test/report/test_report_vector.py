@@ -14,7 +14,7 @@ from helpers.cli_tools import cli, refused
 from helpers.stories import told
 
 from xy_sysid.errors import MissingExtra
-from xy_sysid.report.gallery import gallery
+from xy_sysid.report.gallery import gallery, written
 from xy_sysid.report.vector import vectors
 from xy_sysid.story.document import document
 
@@ -26,12 +26,61 @@ def paths(svg: bytes) -> int:
 def test_every_picture_of_a_story_becomes_vectors() -> None:
     """All of the gallery, not empty, not a bitmap, and the same bytes each time."""
     figures = gallery(document(told()))
-    assert {"ladder", "bode", "candidates", "before_after", "rigid_fails_by_speed", "fails_by_frequency"} <= set(figures)
+    assert {"error_ladder", "frequency_response", "candidate_effects", "rigid_model_fails_by_speed", "last_model_fails_by_frequency"} <= set(figures)
     for name, figure in figures.items():
         svg = vectors(figure, ["svg"])["svg"]
         assert b"<image" not in svg and paths(svg) > 20, name
-    assert vectors(figures["ladder"], ["svg"]) == vectors(figures["ladder"], ["svg"])
-    assert vectors(figures["ladder"], ["pdf"])["pdf"][:5] == b"%PDF-"
+    assert vectors(figures["error_ladder"], ["svg"]) == vectors(figures["error_ladder"], ["svg"])
+    assert vectors(figures["error_ladder"], ["pdf"])["pdf"][:5] == b"%PDF-"
+
+
+@pytest.mark.parametrize(("columns", "width"), [(1, 88.0), (2, 181.0)])
+def test_a_figure_is_as_wide_as_the_columns_of_a_journal_and_clips_nothing(columns: int, width: float) -> None:
+    """88 and 181 mm, and every word, from the name of an effect to the runner-up's error, lies on the paper."""
+    for name, figure in gallery(document(told())).items():
+        size, words = words_on(figure, columns)
+        assert size[0] == pytest.approx(width / 25.4), name
+        assert words
+        for text, box in words.items():
+            assert box.x0 >= -0.5 and box.y0 >= -0.5 and box.x1 <= size[0] * 100 + 0.5 and box.y1 <= size[1] * 100 + 0.5, (name, text)
+
+
+def words_on(figure: go.Figure, columns: int) -> tuple[tuple[float, float], dict[str, Any]]:
+    """(width, height) in inches and the box of all that is written in dots of 1/100 inch."""
+    from xy_sysid.report.vector import drawn
+
+    paper = drawn(figure, columns)
+    assert paper.dpi == 100
+    paper.draw_without_rendering()
+    texts = [*paper.texts, *(text for legend in paper.legends for text in legend.get_texts()), *(text for axes in paper.axes for text in axes.texts)]
+    boxes: dict[str, Any] = {text.get_text(): text.get_window_extent() for text in texts if text.get_text()}
+    boxes |= {f"axes {number}, with all names and numbers": axes.get_tightbbox() for number, axes in enumerate(paper.axes)}
+    return (float(paper.get_figwidth()), float(paper.get_figheight())), boxes
+
+
+def test_upright_bars_stand_where_their_numbers_say() -> None:
+    """As many bars as numbers, all of one width, from zero to the number."""
+    from xy_sysid.report.vector import drawn
+
+    figure = go.Figure([go.Bar(x=[0.0, 2.0], y=[1.0, -1.0], name="few"), go.Bar(x=[1.0], y=[0.5], name="many")])
+    (axes,) = drawn(figure, 2).axes
+    bars = [(bar.get_x() + bar.get_width() / 2, bar.get_height()) for group in axes.containers for bar in group]
+    assert bars == [(0.0, 1.0), (2.0, -1.0), (1.0, 0.5)]
+
+
+def test_legends_and_tables_name_the_axis_and_all_effects_of_the_model() -> None:
+    """With two effects in the model, every picture that shows it names both; its table has the axis and both effects as names of columns."""
+    story: Any = document(told())
+    for step in story["steps"][1:]:
+        step["effects"] = ["coulomb_friction", "cogging"]
+    figures = gallery(story)
+    for name in ("frequency_response", "error_by_frequency", "error_by_speed", "velocity", "position", "velocity_at_largest_error",
+                 "before_and_after", "last_model_fails_by_time"):  # fmt: skip
+        names = [str(trace.name).replace("<br>", " ") for trace in figures[name].data if trace.showlegend is not False]
+        assert any("with coulomb friction, cogging" in text for text in names), name
+    made = written(story, ["csv"], 2, ["velocity", "candidate_effects"])
+    assert "axis x, simulated with coulomb friction, cogging: velocity (mm/s)" in made["velocity"]["csv"].decode().splitlines()[0]
+    assert made["candidate_effects"]["csv"].decode().splitlines()[0].endswith(': effect"')
 
 
 def test_a_curve_lies_where_its_numbers_say() -> None:
@@ -62,6 +111,6 @@ def test_figures_writes_them_into_a_folder(tmp_path: Path, monkeypatch: pytest.M
     said = cli("figures", rec, "-o", tmp_path / "out", "--axis", "x", "--kind", "svg", "--kind", "csv", "--json")
     assert said.code == 0, said.err
     names = said.json["files"]["x"]
-    assert sorted(names) == sorted(path.name for path in (tmp_path / "out").iterdir()) and "x_ladder.svg" in names
-    lines = (tmp_path / "out" / "x_bode.csv").read_text().splitlines()
-    assert "measured, 95 % band: frequency (Hz)" in lines[0]
+    assert sorted(names) == sorted(path.name for path in (tmp_path / "out").iterdir()) and "axis_x_error_ladder.svg" in names
+    lines = (tmp_path / "out" / "axis_x_frequency_response.csv").read_text().splitlines()
+    assert "axis x, measured, 95 % band: frequency (Hz)" in lines[0]

@@ -47,9 +47,8 @@ $hang
         cuts_old, cuts_new = pieces(part, min(max(wanted / fs, stiff), $most * fine) if heeded or curved else 1.0)
         h_old, h_new = part / fs / cuts_old, (1.0 - part) / fs / cuts_new
         size = top.size + 2
-        moving, still = np.empty((2, size, size)), np.empty((2, size, size))  # over each piece
-        moving[0], moving[1] = exponential(generator_moving, h_old), exponential(generator_moving, h_new)
-        still[0], still[1] = exponential(generator_still, h_old), exponential(generator_still, h_new)
+        moving = exponentials(generator_moving, h_old, h_new)  # over each piece
+        still = exponentials(generator_still, h_old, h_new)
         swung, spare, series = np.zeros(size), np.zeros(size), np.zeros(($terms, size))
         swung[1], swung[2] = start, start / top[0]  # what hangs on it moves along
         for i in range(n):
@@ -262,10 +261,12 @@ def $name(u, x, p, on, fs, held, where, against):
 $unpack
 $flags
 $places
-    where[:] = x[: n + 1]
+    for i in range(n + 1):
+        where[i] = x[i]
     through = 1.0
 $motions
-    held[:] = u[:n]
+    for i in range(n):
+        held[i] = u[i]
 $inputs
 $states
     h, late = 1.0 / fs, int(delay * fs + 0.5)

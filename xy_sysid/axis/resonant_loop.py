@@ -83,7 +83,8 @@ def generator(gain: float, pole: float, top: FloatArray, bottom: FloatArray, rat
 def resting(moving: FloatArray) -> FloatArray:
     """The generator while friction holds v at zero."""
     made = moving.copy()
-    made[:2, :] = 0.0
+    for j in range(made.shape[1]):
+        made[0, j] = made[1, j] = 0.0
     return made
 
 
@@ -111,18 +112,41 @@ def product(a: FloatArray, b: FloatArray) -> FloatArray:
 
 @compiled
 def exponential(a: FloatArray, h: float) -> FloatArray:
-    """exp(a h) by scaling and squaring."""
+    """exp(a h) by scaling and squaring. In loops: expressions of arrays take ten times as long to compile."""
     n, norm = a.shape[0], 0.0
     for i in range(n):
-        norm = max(norm, np.sum(np.abs(a[i])) * h)
+        total = 0.0
+        for j in range(n):
+            total += abs(a[i, j])
+        norm = max(norm, total * h)
     halvings = max(math.ceil(math.log2(norm / 0.25)), 0) if norm > 0.0 else 0
-    small = a * (h / 2.0**halvings)
-    made, term = np.eye(n), np.eye(n)
+    scale = h / 2.0**halvings
+    small, made, term = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n))
+    for i in range(n):
+        made[i, i] = term[i, i] = 1.0
+        for j in range(n):
+            small[i, j] = a[i, j] * scale
     for k in range(1, 13):
-        term = product(term, small) / k
-        made += term
+        term = product(term, small)
+        for i in range(n):
+            for j in range(n):
+                term[i, j] /= k
+                made[i, j] += term[i, j]
     for _ in range(halvings):
         made = product(made, made)
+    return made
+
+
+@compiled
+def exponentials(a: FloatArray, first: float, second: float) -> FloatArray:
+    """(2, n, n) exp(a h) for two steps h. The assignment of a whole matrix would compile numba's words for one of another shape, 3 s long."""
+    n = a.shape[0]
+    made = np.empty((2, n, n))
+    for piece in range(2):
+        over = exponential(a, first if piece == 0 else second)
+        for i in range(n):
+            for j in range(n):
+                made[piece, i, j] = over[i, j]
     return made
 
 
@@ -285,4 +309,4 @@ def hold(
     return follow(series, h - gone, state)
 
 
-LOOP = {item.__name__: item for item in (roots, times, generator, resting, fastest, exponential, ahead, step, tug, stop, hold)}
+LOOP = {item.__name__: item for item in (roots, times, generator, resting, fastest, exponentials, ahead, step, tug, stop, hold)}

@@ -27,6 +27,7 @@ def figures(
     reading: Reading,
     out: Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="output folder, created if needed")] = Path("figures"),
     kind: Annotated[list[str] | None, typer.Option("--kind", metavar="KIND", help="svg, pdf or csv (may be repeated; default all three)")] = None,
+    columns: Annotated[int, typer.Option("--columns", min=1, max=2, help="width: 1 (88 mm) or 2 (181 mm) columns of a journal")] = 2,
     effect_file: Own = None,
     budget: o.Budget = None,
     force: Annotated[bool, typer.Option("--force", help="replace existing pictures of these axes")] = False,
@@ -51,7 +52,7 @@ def figures(
     names = chosen(recording, reading.axes)
     if not force:
         _free(out, names, kinds)
-    drawers = Drawers(kinds, cores())
+    drawers = Drawers(kinds, columns, cores())
     with drawers:
 
         def work(name: str) -> dict[str, Any]:
@@ -60,7 +61,7 @@ def figures(
             return story
 
         found, refused = each(names, work)
-        written = {name: _write(out, name, kinds, drawers.drawn(name)) for name in found}
+        written = {name: _write(out, name, drawers.drawn(name)) for name in found}
     if json:
         emit({"folder": str(out), "files": written, "refused": refused})
         return
@@ -72,8 +73,8 @@ def figures(
 
 
 def _plain(name: str) -> str:
-    """The name of an axis as the beginning of a file's name: it comes from a recording, and leads into no other folder."""
-    return re.sub(r"[/\\\0-\x1f]", "_", name)
+    """axis_x: the beginning of a file's name; the name of an axis comes from a recording, and leads into no other folder."""
+    return "axis_" + re.sub(r"[/\\\0-\x1f]", "_", name)
 
 
 def _free(out: Path, names: tuple[str, ...], kinds: tuple[str, ...]) -> None:
@@ -88,12 +89,12 @@ def _free(out: Path, names: tuple[str, ...], kinds: tuple[str, ...]) -> None:
                 free("--out", path, force=False, act="add --force")
 
 
-def _write(out: Path, name: str, kinds: tuple[str, ...], drawn: Mapping[str, Mapping[str, bytes]]) -> list[str]:
+def _write(out: Path, name: str, drawn: Mapping[str, Mapping[str, bytes]]) -> list[str]:
     """Write the pictures of an axis; names of the files."""
     from xy_sysid.bags.atomic import whole
 
     out.mkdir(parents=True, exist_ok=True)
-    made = {f"{_plain(name)}_{title}.{kind}": content[kind] for title, content in drawn.items() for kind in kinds}
+    made = {f"{_plain(name)}_{title}.{kind}": one for title, content in drawn.items() for kind, one in content.items()}
     for file, content in made.items():
         with whole(out / file) as part:
             part.write_bytes(content)

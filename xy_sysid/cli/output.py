@@ -7,13 +7,13 @@ import math
 import re
 import sys
 import textwrap
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import Console, ConsoleOptions, RenderableType
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.segment import Segment
 from rich.table import Table
 
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 PLAIN = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 POWER = re.compile("^·10")
 NARROW = 40  # columns below which nothing is broken
+COMPILING = "compiling the effect laws, once on this machine: about 20 s"
 TEXT = ("unit", "in words")  # columns
 
 
@@ -121,6 +122,26 @@ def progress() -> Progress:
     """A progress bar on stderr that disappears at its end; none where nobody watches."""
     words = TextColumn("{task.description}", markup=False)
     return Progress(words, BarColumn(), TaskProgressColumn(), TimeRemainingColumn(), console=aside, transient=True, disable=not aside.is_terminal)
+
+
+def compiling() -> tuple[Callable[[], None], Callable[[], None]]:
+    """(what shows that laws are compiled, with a bar and the time that has passed; what takes it away again).
+
+    The bar only moves, as a compiler does not tell how far it is. It may stand above another bar.
+    """
+    shown: list[Progress] = []
+
+    def begins() -> None:
+        columns = TextColumn("{task.description}", markup=False), BarColumn(), TimeElapsedColumn()
+        bar = Progress(*columns, console=aside, transient=True, disable=not aside.is_terminal)
+        bar.add_task(COMPILING, total=None)
+        bar.start()
+        shown.append(bar)
+
+    def ends() -> None:
+        shown.pop().stop()
+
+    return begins, ends
 
 
 def quantity(value: float, unit: str, digits: int = 4) -> str:

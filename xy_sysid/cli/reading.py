@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_type_hints
 import typer
 
 from xy_sysid.cli import options as o
-from xy_sysid.cli.output import aside, progress
+from xy_sysid.cli.output import aside, compiling, progress
 from xy_sysid.errors import BadInput
 from xy_sysid.samples.recording import Recording, Run
 
@@ -96,7 +96,7 @@ def read_each(paths: Sequence[Path], reading: Reading, quiet: bool) -> tuple[Rec
     from xy_sysid.jit import tell_compiling
 
     if aside.is_terminal:
-        tell_compiling(lambda: aside.print("compiling the effect laws, once on this machine: about half a minute"))
+        tell_compiling(*compiling())
     with progress() as bar:
         task = bar.add_task(f"reading {', '.join(path.name for path in paths)}", total=1.0)
         found = read_all(paths, reading, lambda part: bar.update(task, completed=part))

@@ -18,6 +18,7 @@ def record(
     seconds: Annotated[float, typer.Option(help="stop this many seconds after the first message; 0: until Ctrl-C", min=0.0)] = 0.0,
     topic: Annotated[list[str] | None, typer.Option("--topic", help="topic below the namespace, a regular expression (may be repeated)")] = None,
     namespace: Annotated[str, typer.Option(help="ROS namespace")] = "/xy",
+    machine: Annotated[str, typer.Option("--machine", metavar="TEXT", help="name of the machine, kept in the bag and shown by report")] = "",
     json: o.Json = False,
 ) -> None:
     """Record the topics of xy_sysid (docs/topics.md) to a rosbag2. Ctrl-C ends the recording and completes the bag."""
@@ -37,6 +38,8 @@ def record(
     values: dict[str, Any] = {"output": str(out), "storage": storage, "seconds": float(seconds)}
     if topic:
         values["topics"] = list(topic)
+    if machine:
+        values["machine"] = machine
     code = _run(_arguments(values, namespace))
     if code:
         raise typer.Exit(code)

@@ -145,10 +145,10 @@ class Pool:
         alone = [node for node in self.nodes.values() if node is not first and node.leads and node.whole and not node.refused]
         for node in sorted(alone, key=self.score):  # what is best alone need not be in the best pair
             node.moves = self._moves(node)
-            move = self._next([node])
-            if move is not None and not self.late():
-                yield move[1].effects
-                self._try(*move)
+            chosen = self._next([node])
+            if chosen is not None and not self.late():
+                yield chosen[1].effects
+                self._try(*chosen)
 
     def _best_refused(self) -> Node | None:
         """The best of the sets that are refused, if its score is better than that of all others."""

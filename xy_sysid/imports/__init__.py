@@ -121,9 +121,12 @@ def _blocks(recording: Recording, rows: int) -> list[tuple[Block, Block, slice]]
 
 def _write_bag(path: Path, recording: Recording) -> None:
     units = {"input_unit": recording.input_unit, "output_unit": recording.output_unit}
+    custom = units if (recording.input_unit, recording.output_unit) != ("V", "m") else {}
+    if recording.machine and not path.suffix:  # a bare file has no place for it
+        custom = {**custom, "machine": recording.machine}
     earliest = float(recording.time.min()) if len(recording) else 0.0
     shift = min(0.0, earliest)  # a bag's clock has no negative times
-    with BagWriter(path, custom=units if (recording.input_unit, recording.output_unit) != ("V", "m") else None) as writer:
+    with BagWriter(path, custom=custom or None) as writer:
         for voltage, position, part in _blocks(recording, ROWS):
             now = int((voltage.time[-1] - shift) * 1e9)
             writer.write_block(VOLTAGE, voltage, now)

@@ -62,7 +62,7 @@ def load_bag(path: Path, reading: Reading, progress: Callable[[float], None] | N
         paired = cut(pair(streams, str(path), units(bag, source), notes, bag.bad), first["position"], start, stop)
         if source.output == "velocity":
             paired = dataclasses.replace(paired, measured="velocity", output_unit=paired.units.speed)
-        return in_units(paired, reading)
+        return in_units(dataclasses.replace(paired, machine=bag.custom.get("machine", "")), reading)
 
 
 def _collect(

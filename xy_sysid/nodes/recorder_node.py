@@ -35,7 +35,8 @@ class RecorderNode(WalledNode):
         except re.error as problem:
             raise BadInput("node recorder: topics", problem.pattern, "regular expressions", f"{problem}; correct it.") from None
         output = settings.output or f"xy_{datetime.now():%Y-%m-%d_%H-%M-%S}"
-        self._bag = BagWriter(Path(output).expanduser(), settings.storage)
+        custom = {"machine": settings.machine} if settings.machine else None
+        self._bag = BagWriter(Path(output).expanduser(), settings.storage, custom)
         self._heard: dict[str, int] = {}
         self._unknown: set[str] = set()
         self._started: float | None = None

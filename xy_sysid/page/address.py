@@ -1,6 +1,6 @@
 """The view of the page as the query of its address: the open recordings, and for each the axis, the model, the pictures and the added effects.
 
-``?rec=dry.npz&axis=y&model=rigid&effects=x:coulomb_friction,cogging&rec=plain.npz``: each ``rec`` (or ``live``) begins a source, and what
+``?rec=dry.npz&axis=y&model=rigid&effects=x:coulomb_friction,cogging&rec=plain.npz&units=um``: each ``rec`` (or ``live``) begins a source, and what
 follows belongs to it. What is unknown is ignored, so that an old link still opens.
 """
 
@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from urllib.parse import parse_qsl, urlencode
+
+from xy_sysid.units import CHOICES
 
 LONGEST = 4000  # characters that are read
 MOST = 7  # sources that are read
@@ -33,10 +35,11 @@ class SourceView:
 
 @dataclass(frozen=True, slots=True)
 class PageView:
-    """All sources, in order; theme: light, dark, or empty for that of the system."""
+    """All sources, in order; theme: light, dark, or empty for that of the system; units: those of ``units.CHOICES`` that are not the usual ones."""
 
     sources: tuple[SourceView, ...] = ()
     theme: str = ""
+    units: tuple[str, ...] = ()
 
     def of(self, name: str) -> SourceView:
         """The view of one source; of a source that is not named, an empty one."""
@@ -52,8 +55,8 @@ def query_of(view: PageView) -> str:
         own += [("effects", f"{axis}:{','.join(names)}") for axis, names in one.effects.items() if names]
         if one.name or own:
             pairs += [("rec", one.name) if one.name else ("live", "1"), *own]
-    if view.theme:
-        pairs.append(("theme", view.theme))
+    pairs += [("theme", view.theme)] if view.theme else []
+    pairs += [("units", ",".join(view.units))] if view.units else []
     return urlencode(pairs, safe="/:,")
 
 
@@ -61,14 +64,17 @@ def view_of_query(query: str) -> PageView:
     """The view that a query asks for."""
     sources: list[SourceView] = []
     theme = ""
+    units: tuple[str, ...] = ()
     for name, value in _pairs(query):
         if name in ("rec", "live"):
             sources.append(SourceView(value if name == "rec" else ""))
         elif name == "theme":
             theme = value if value in ("light", "dark") else ""
+        elif name == "units":
+            units = tuple(own for kind in CHOICES.values() for own in [*kind][1:] if own in _names(value))
         elif sources:
             sources[-1] = _with(sources[-1], name, value)
-    return PageView(tuple(sources[:MOST]), theme)
+    return PageView(tuple(sources[:MOST]), theme, units)
 
 
 def _pairs(query: str) -> Iterable[tuple[str, str]]:

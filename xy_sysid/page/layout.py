@@ -13,6 +13,8 @@ from xy_sysid.page.panel import Panel, name_in_address
 from xy_sysid.page.session import Session
 from xy_sysid.page.together_card import TogetherCard
 from xy_sysid.page.trend_card import TrendCard
+from xy_sysid.page.units_choice import UnitsChoice
+from xy_sysid.units import shown_in
 
 EVERY = 0.4  # s between two looks for what is new
 SHOWN = 4  # messages on the page at a time
@@ -51,7 +53,11 @@ class Page:
         ui.skip_link("to the pictures", target=main)
 
     async def refresh(self) -> None:
-        """Draw what has changed."""
+        """Draw what has changed, in the units that this browser has chosen."""
+        with shown_in(self._units.chosen):
+            await self._refresh()
+
+    async def _refresh(self) -> None:
         session = self._session
         if session.live is not None:
             session.live.begin()
@@ -63,6 +69,7 @@ class Page:
         for key in set(self._panels) - {source.key for source in sources}:
             self._panels.pop(key).delete()
         self._empty.set_visibility(not sources)
+        self._units.refresh(sources)
         self._tell(sources)
         for panel in list(self._panels.values()):
             if not self._client.is_deleted:  # the browser may go while something is drawn
@@ -73,7 +80,7 @@ class Page:
 
     def _keep_address(self) -> None:
         """The address of the browser names what is shown, so that a reload or a link shows it again."""
-        view = PageView(tuple(panel.view() for panel in self._panels.values()), THEMES[self._theme.value])
+        view = PageView(tuple(panel.view() for panel in self._panels.values()), THEMES[self._theme.value], self._units.chosen)
         query = query_of(view)
         if query != self._query:
             self._query = query
@@ -87,6 +94,7 @@ class Page:
             ui.button("Open a recording", on_click=lambda: open_dialog(session)).props(
                 'flat dense no-caps icon=folder_open aria-label="Open a recording"'
             ).classes("opener")
+            self._units = UnitsChoice(self._wanted.units)
             chosen = THEMES.index(self._wanted.theme)
             dark = ui.dark_mode(DARK[chosen])
             self._theme = ui.toggle({0: "auto", 1: "light", 2: "dark"}, value=chosen, on_change=lambda event: dark.set_value(DARK[event.value]))

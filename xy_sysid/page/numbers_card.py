@@ -15,6 +15,7 @@ from xy_sysid.page.views import View
 from xy_sysid.report.parts import plain
 from xy_sysid.report.story_parts import pictured
 from xy_sysid.report.story_parts import words as spoken
+from xy_sysid.units import chosen_units
 
 AWAITED = ("held-out error", "noise floor", "worst place", "linear part", "gain", "delay", "pole")  # of the rigid model, before it is fitted
 
@@ -31,7 +32,7 @@ class Numbers:
     def refresh(self, session: Session, source: Source, axis: str, view: View) -> None:
         """Write them again if they have changed."""
         heard = session.heard.version.get(f"axis {axis}", 0) if view.linear else 0
-        stamp = (source.key, axis, source.stamp(axis), view, heard)
+        stamp = (source.key, axis, source.stamp(axis), view, heard, chosen_units())
         if stamp == self._shown:
             return
         self._shown = stamp

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextvars import copy_context
 from functools import partial
 from typing import Any
 
@@ -11,6 +12,7 @@ from nicegui import events, run, ui
 
 from xy_sysid.page.session import Session
 from xy_sysid.report.figure_data import table
+from xy_sysid.units import chosen_units
 
 EMPTY = {"paper_bgcolor": "rgba(0,0,0,0)", "plot_bgcolor": "rgba(0,0,0,0)"}
 CONFIG = {"displayModeBar": False, "responsive": True, "scrollZoom": False}  # its tools would lie over legends and words
@@ -37,10 +39,11 @@ class Plot:
 
     async def show(self, session: Session, key: tuple[object, ...], make: Callable[..., go.Figure], *arguments: Any, **named: Any) -> None:
         """Draw it unless it is drawn already; made beside the page's loop, so that nothing waits for it."""
+        key = (*key, chosen_units())
         if key == self._shown:
             return
         self._shown = key
-        drawn = await run.io_bound(session.figure, key, lambda: plain(make(*arguments, **named)))
+        drawn = await run.io_bound(copy_context().run, session.figure, key, lambda: plain(make(*arguments, **named)))
         if drawn is not None:
             self._drawn = drawn
             self.root.classes(remove="awaited")

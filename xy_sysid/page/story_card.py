@@ -19,6 +19,7 @@ from xy_sysid.page.plot import Plot
 from xy_sysid.page.session import Session
 from xy_sysid.report import story_figures as draw
 from xy_sysid.report.headline import detail, headline, next_act
+from xy_sysid.units import chosen_units
 
 BUTTONS: tuple[tuple[OrderKind, str, str], ...] = (
     ("diagnose", "Diagnose", "Find the effect that the rigid model misses."),
@@ -111,7 +112,7 @@ class StoryCard:
         effects = self._source.effects()
         if len(effects) != len(self._choice.options):
             self._choice.set_options({name: _words(name) for name in effects})
-        stamp = (axis, at, document is None and self._source.words(axis))
+        stamp = (axis, at, chosen_units(), document is None and self._source.words(axis))
         if stamp != self._shown:
             self._shown = stamp
             self._write(document)

@@ -19,13 +19,13 @@ Drawn = dict[str, dict[str, bytes]]
 class Drawers:
     """ask(name, document) for the pictures of each axis, then drawn(name) for what they are, by title and kind. Raises MissingExtra at once.
 
-    kinds: svg, pdf, csv; share: processes, each of which draws a part of every story
+    kinds: svg, pdf, csv; columns: of a journal, 1 or 2; share: processes, each of which draws a part of every story
     """
 
-    def __init__(self, kinds: Sequence[str], share: int) -> None:
+    def __init__(self, kinds: Sequence[str], columns: int, share: int) -> None:
         if {*kinds} - {"csv"}:
             installed()
-        self._kinds, self._share = tuple(kinds), share
+        self._kinds, self._columns, self._share = tuple(kinds), columns, share
         self._asked: dict[str, tuple[list[str], list[AsyncResult[Drawn]]]] = {}
 
     def __enter__(self) -> None:
@@ -39,7 +39,7 @@ class Drawers:
         """Begin to draw."""
         titles = list(drawings(document))
         parts = [titles[first :: self._share] for first in range(self._share)]
-        self._asked[name] = titles, [self._pool.apply_async(written, (document, self._kinds, part)) for part in parts]
+        self._asked[name] = titles, [self._pool.apply_async(written, (document, self._kinds, self._columns, part)) for part in parts]
 
     def drawn(self, name: str) -> Drawn:
         """All pictures, as soon as they are there."""

@@ -11,18 +11,19 @@ from typing import Any
 import numpy as np
 
 
-def table(figure: Mapping[str, Any]) -> str:
-    """CSV of a figure in Plotly's JSON: two columns for each curve, named by the curve and by the titles of its axes."""
+def table(figure: Mapping[str, Any], start: str = "") -> str:
+    """CSV of a figure in Plotly's JSON: two columns for each curve, named by ``start``, the curve and the titles of its axes."""
     layout = figure.get("layout", {})
     columns: list[tuple[str, list[str]]] = []
     for number, trace in enumerate(figure.get("data", ())):
-        name = str(trace.get("name") or f"curve {number + 1}")
+        name = str(trace.get("name") or f"curve {number + 1}").replace("<br>", " ")
+        told = trace.get("meta") or {}
         for letter in ("x", "y"):
             values = trace.get(letter)
             if values is None:
                 continue
             title = _title(layout, letter, str(trace.get(f"{letter}axis") or letter))
-            columns.append((f"{name}: {title or letter}", [_text(value) for value in _row(values)]))
+            columns.append((f"{start}{name}: {title or told.get(letter, letter)}", [_text(value) for value in _row(values)]))
     written = io.StringIO()
     writer = csv.writer(written, lineterminator="\n")
     writer.writerow([name for name, _ in columns])

@@ -11,27 +11,46 @@ import plotly.graph_objects as go
 from xy_sysid.report import story_figures as draw
 from xy_sysid.report.figure_data import table
 from xy_sysid.report.story_failure import By, failure
-from xy_sysid.report.story_parts import Document
+from xy_sysid.report.story_parts import Document, legend_name, pictured, words
 from xy_sysid.report.vector import vectors
 
 FAILS: tuple[By, ...] = ("frequency", "speed", "position", "time")
-OF_A_STEP = (
-    "bode", "coherence", "residual", "residual_speed", "residual_position", "residual_time", "residual_correlation", "zoom", "velocity",
-    "position", "poles_zeros",
-)  # fmt: skip
+OF_A_STEP = {  # what a picture shows, in the name of its file: the function that draws it
+    "frequency_response": draw.bode,
+    "coherence": draw.coherence,
+    "error_by_frequency": draw.residual,
+    "error_by_speed": draw.residual_speed,
+    "error_by_position": draw.residual_position,
+    "error_by_time": draw.residual_time,
+    "error_correlation": draw.residual_correlation,
+    "velocity_at_largest_error": draw.zoom,
+    "velocity": draw.velocity,
+    "position": draw.position,
+    "poles_and_zeros": draw.poles_zeros,
+}
 
 
 def drawings(document: Document) -> dict[str, Callable[[], go.Figure]]:
     """How to draw every picture of a story, by name: of the rigid model where it fails, of the newest model, and of the way between them."""
-    made: dict[str, Callable[[], go.Figure]] = {f"rigid_fails_by_{by}": partial(failure, document, by, 0) for by in FAILS}
+    made: dict[str, Callable[[], go.Figure]] = {f"rigid_model_fails_by_{by}": partial(_fails, document, by, 0) for by in FAILS}
     if len(document["steps"]) > 1:
-        made |= {f"fails_by_{by}": partial(failure, document, by) for by in FAILS}
-    made |= {name: partial(getattr(draw, name), document) for name in (*OF_A_STEP, "ladder")}
+        made |= {f"last_model_fails_by_{by}": partial(_fails, document, by) for by in FAILS}
+    made |= {name: partial(drawn, document) for name, drawn in OF_A_STEP.items()}
+    made["error_ladder"] = partial(draw.ladder, document)
     if document["candidates"]:
-        made["candidates"] = partial(draw.candidates, document)
+        made["candidate_effects"] = partial(draw.candidates, document)
     if len(document["steps"]) > 1:
-        made["before_after"] = partial(draw.before_after, document)
+        made["before_and_after"] = partial(draw.before_after, document)
     return made
+
+
+def _fails(document: Document, by: By, step: int | None = None) -> go.Figure:
+    """Where a step fails, as the page shows it, with a legend that names the model: in a folder no words stand beside it."""
+    figure, shown = failure(document, by, step), pictured(document, step)
+    if figure.data and shown is not None:
+        figure.data[-1].name = legend_name("model", shown) if shown["effects"] else words(str(shown["label"]))
+        figure.update_layout(showlegend=True)
+    return figure
 
 
 def gallery(document: Document) -> dict[str, go.Figure]:
@@ -39,12 +58,12 @@ def gallery(document: Document) -> dict[str, go.Figure]:
     return {name: drawn() for name, drawn in drawings(document).items()}
 
 
-def written(document: Document, kinds: Sequence[str], names: Sequence[str]) -> dict[str, dict[str, bytes]]:
-    """Some pictures of a story, by name and kind: svg, pdf, or csv with the numbers that are drawn."""
+def written(document: Document, kinds: Sequence[str], columns: int, names: Sequence[str]) -> dict[str, dict[str, bytes]]:
+    """Some pictures of a story, by name and kind: svg, pdf, or csv with the numbers that are drawn. columns: of a journal, 1 or 2."""
     found = {}
     for name in names:
         figure = drawings(document)[name]()
-        found[name] = vectors(figure, [kind for kind in kinds if kind != "csv"])
+        found[name] = vectors(figure, [kind for kind in kinds if kind != "csv"], columns)
         if "csv" in kinds:
-            found[name]["csv"] = table(json.loads(figure.to_json())).encode()
+            found[name]["csv"] = table(json.loads(figure.to_json()), f"axis {document['axis']}, ").encode()
     return found

@@ -3,7 +3,7 @@
   const { plots, templates } = JSON.parse(document.getElementById("plots").textContent);
   const dark = matchMedia("(prefers-color-scheme: dark)");
   const config = { responsive: true, displayModeBar: false };
-  const PAPER = 0.8; // of a figure's height on paper
+  const PAPER = { titles: 90, curves: 0.45, font: 11 }; // px of a figure's height that stay, the part of the rest that is kept, px of its words
   const drawn = new Set();
   let printing = false;
   const draw = (name) => {
@@ -11,9 +11,9 @@
     const mode = dark.matches && !printing ? "dark" : "light";
     const layout = { ...structuredClone(plot.layout), template: templates[mode], autosize: true };
     const box = document.getElementById(name);
-    const height = Math.round(plot.layout.height * (printing ? PAPER : 1));
+    const height = printing ? Math.round(PAPER.titles + PAPER.curves * plot.layout.height) : plot.layout.height;
     box.style.height = `${height}px`;
-    if (printing) Object.assign(layout, { autosize: false, width: box.clientWidth, height });
+    if (printing) Object.assign(layout, { autosize: false, width: box.clientWidth, height, font: { ...layout.font, size: PAPER.font } });
     drawn.add(name);
     return Plotly.react(name, structuredClone(plot.data), layout, config);
   };
@@ -41,8 +41,8 @@
     const columns = [];
     plot.data.forEach((trace, place) => ["x", "y"].forEach((letter) => {
       const axis = plot.layout[`${letter}axis${(trace[`${letter}axis`] || letter).slice(1)}`] || {};
-      const title = axis.title && axis.title.text || letter;
-      if (trace[letter]) columns.push([`${trace.name || `curve ${place + 1}`}: ${title}`, ...numbers(trace[letter])]);
+      const title = axis.title && axis.title.text || (trace.meta || {})[letter] || letter;
+      if (trace[letter]) columns.push([`${(trace.name || `curve ${place + 1}`).replace(/<br>/g, " ")}: ${title}`, ...numbers(trace[letter])]);
     }));
     const longest = Math.max(0, ...columns.map((column) => column.length));
     const lines = Array.from({ length: longest }, (_, k) => columns.map((column) => column[k] == null || Number.isNaN(column[k]) ? "" : quoted(String(column[k]))).join(","));

@@ -98,7 +98,7 @@ def band(figure: go.Figure, row: int, around: tuple[FloatArray, FloatArray], col
     """The area inside an outline; without a name it has no legend."""
     figure.add_scatter(
         x=around[0], y=around[1], mode="lines", line={"width": 0}, fill="toself",
-        fillcolor=fade(colour, 0.25), hoverinfo="skip", name=name, legendgroup=axis, showlegend=bool(name), row=row, col=1,
+        fillcolor=fade(colour, 0.25), hoverinfo="skip", name=name or "95 % band", legendgroup=axis, showlegend=bool(name), row=row, col=1,
     )  # fmt: skip
 
 

@@ -12,6 +12,7 @@ from xy_sysid.report import captions, figures, story_figures, story_words
 from xy_sysid.report.axis_report import AxisReport
 from xy_sysid.report.coupling import CAPTION as COUPLED
 from xy_sysid.report.coupling import coupling_figure
+from xy_sysid.report.cover import Cover
 from xy_sysid.report.headline import headline
 from xy_sysid.report.remarks import NOT_A_CONFIDENCE, axis_remarks
 from xy_sysid.report.sheet import Drawing, block, listing, paragraph, pictures, provenance_html, section, table_html, whole
@@ -53,12 +54,12 @@ class _Page:
 class Recorded:
     """What is told of the recording itself.
 
-    title: its name; units: of input and output; facts: (what, value) of the experiment
+    cover: title, machine, author, date; units: of input and output; facts: (what, value) of the experiment
     origins: label -> provenance; notes: what was odd while reading
     coupling: what two axes that were driven at once do to each other, None of one axis or where the notes say why not
     """
 
-    title: str
+    cover: Cover
     units: tuple[str, str]
     facts: tuple[tuple[str, str], ...]
     origins: Mapping[str, Mapping[str, Any]]
@@ -89,8 +90,9 @@ def report_page(recorded: Recorded, axes: Mapping[str, AxisReport], least_cohere
     page.add("provenance", "Provenance", provenance_html(recorded.origins))
     links = "".join(f'<li><a href="#{name}">{escape(text)}</a></li>' for name, text in page.links)
     stands = "".join(f'<p class="stand"><strong>Axis {escape(axis)}</strong>: {escape(_stands(one, library))}</p>' for axis, one in axes.items())
-    head = f'<h1>Report on {escape(recorded.title)}</h1>{stands}{paragraph(ABOUT)}<nav aria-label="sections"><ul>{links}</ul></nav>'
-    return whole(f"Report on {recorded.title}", head, page.parts, page.drawings)
+    title = f"<h1>{escape(recorded.cover.title)}</h1>{recorded.cover.html}"
+    head = f'{title}{stands}{paragraph(ABOUT)}<nav aria-label="sections"><ul>{links}</ul></nav>'
+    return whole(recorded.cover, head, page.parts, page.drawings)
 
 
 def _summary(page: _Page, axes: Mapping[str, AxisReport], library: Library) -> None:

@@ -15,6 +15,7 @@ from typing import Any
 import plotly.graph_objects as go
 from plotly.offline import get_plotlyjs
 
+from xy_sysid.report.cover import Cover, css_string
 from xy_sysid.report.tables import Table
 from xy_sysid.report.theme import template
 
@@ -32,8 +33,8 @@ class Drawing:
     title: str = ""
 
 
-def whole(title: str, head: str, parts: Iterable[str], drawings: Iterable[Drawing]) -> str:
-    """The page. title: of the window; head: what stands above all sections, HTML; parts: the sections, HTML."""
+def whole(cover: Cover, head: str, parts: Iterable[str], drawings: Iterable[Drawing]) -> str:
+    """The page. cover: title of the window, and the words at the foot of each printed page; head: above all sections, HTML; parts: the sections."""
     plots = {drawing.name: json.loads(drawing.figure.to_json()) for drawing in drawings}
     for plot in plots.values():
         plot["layout"].pop("template", None)
@@ -46,7 +47,8 @@ def whole(title: str, head: str, parts: Iterable[str], drawings: Iterable[Drawin
             "<!DOCTYPE html>",
             '<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">',
             '<meta name="color-scheme" content="light dark">',
-            f"<title>{escape(title)}</title><style>{style}</style></head><body><main>",
+            f'<meta name="author" content="{escape(cover.author)}">' if cover.author else "",
+            f"<title>{escape(cover.title)}</title><style>:root {{ --running: {css_string(cover.foot)}; }}\n{style}</style></head><body><main>",
             f"<header>{head}</header>",
             "<noscript><p>The figures need JavaScript; tables and remarks do not.</p></noscript>",
             *parts,

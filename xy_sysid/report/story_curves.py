@@ -6,7 +6,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from xy_sysid.report.parts import band, broken, frequency_axis, outline, plain, turns
-from xy_sysid.report.story_parts import SMALL, Document, drawing, grey, nothing, pictured, row
+from xy_sysid.report.story_parts import SMALL, Document, drawing, grey, legend_name, nothing, pictured, row
 from xy_sysid.report.theme import FAILS, MEASURED, MODEL, fade
 from xy_sysid.report.words import number
 from xy_sysid.samples.block import FloatArray
@@ -41,7 +41,7 @@ def bode(document: Document, step: int | None = None, mode: str = "light") -> go
             )  # fmt: skip
         line = {"color": MODEL, "width": 1.8, "dash": "dash"}
         figure.add_scatter(
-            x=frequency[seen], y=(row(model[name]) + up)[seen], mode="lines", line=line, name="model",
+            x=frequency[seen], y=(row(model[name]) + up)[seen], mode="lines", line=line, name=legend_name("model", shown),
             legendgroup="model", showlegend=first, row=at, col=1,
         )  # fmt: skip
         if not bool(trusted.all()):

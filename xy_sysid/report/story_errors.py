@@ -6,7 +6,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from xy_sysid.report.parts import frequency_axis, plain, positive
-from xy_sysid.report.story_parts import Document, drawing, floor_line, nothing, pictured, ratio_axis, row, shade, shade_held_out
+from xy_sysid.report.story_parts import Document, drawing, floor_line, legend_name, nothing, pictured, ratio_axis, row, shade, shade_held_out
 from xy_sysid.report.theme import FAILS, MODEL, UNTRUSTED, fade
 from xy_sysid.units import motion
 
@@ -37,8 +37,9 @@ def residual(document: Document, step: int | None = None, mode: str = "light") -
     used = known & inside
     figure.add_scatter(
         x=frequency[used], y=positive(ratio[used]), mode="lines+markers", line={"color": MODEL, "width": 1.8}, marker={"size": 5},
-        name="error of the model", row=1, col=1,
+        name=legend_name("error of the model", shown), row=1, col=1,
     )  # fmt: skip
+    figure.update_layout(showlegend=True)
     ratio_axis(figure, [ratio])
     floor_line(figure)
     places = [item for item in shown["pictures"]["failing"] if item["kind"] == "frequency" and item["to"] > frequency[0]]
@@ -102,9 +103,9 @@ def _against(document: Document, kind: str, step: int | None, mode: str) -> go.F
     picture = shown["pictures"]["residual"][kind]
     by, ratio, mean = row(picture[kind]), row(picture["error_over_floor"]), row(picture["mean_error"])
     figure = drawing([0.55, 0.45], 340, mode)
-    style = {"mode": "lines+markers", "line": {"color": MODEL, "width": 1.8}, "marker": {"size": 4}, "showlegend": False}
-    figure.add_scatter(x=by * scale, y=positive(ratio), name="rms error over the floor", **style, row=1, col=1)
-    figure.add_scatter(x=by * scale, y=mean * faster, name=f"mean error ({speed})", **style, row=2, col=1)
+    style = {"mode": "lines+markers", "line": {"color": MODEL, "width": 1.8}, "marker": {"size": 4}}
+    figure.add_scatter(x=by * scale, y=positive(ratio), name=legend_name("error of the model", shown), **style, row=1, col=1)
+    figure.add_scatter(x=by * scale, y=mean * faster, name=f"mean error ({speed})", **style, showlegend=False, row=2, col=1)
     ratio_axis(figure, [ratio])
     floor_line(figure)
     places = [item for item in shown["pictures"]["failing"] if item["kind"] == kind and item["to"] > item["from"]]
@@ -116,6 +117,7 @@ def _against(document: Document, kind: str, step: int | None, mode: str) -> go.F
         shade_held_out(figure, document, shown, at=(1, 2))
     least = LEAST * faster * float(shown["noise_floor"])
     reach = 1.1 * max(least, faster * float(np.nanmax(np.abs(mean), initial=0.0)))
+    figure.update_layout(showlegend=True)
     figure.update_yaxes(title_text=f"mean ({plain(speed)})", range=[-reach, reach], tickformat="~g", row=2, col=1)
     figure.update_xaxes(title_text=f"{'velocity' if kind == 'speed' else kind} ({plain(unit)})", row=2, col=1)
     return figure

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -17,6 +18,7 @@ from xy_sysid.units import motion
 Document = Mapping[str, Any]
 
 AHEAD = "one sample ahead"  # in the label of a step whose error is not that of a free simulation
+WIDE = 44  # letters of a line of a legend
 NAMED, LINE = 3, 14  # places of a picture that are named, and px of a line of small words
 MARGIN = {"l": 8, "r": 10, "t": 30, "b": 8}
 SMALL = 220  # px, height of a figure of one row
@@ -104,6 +106,12 @@ def ratio_axis(figure: go.Figure, values: Sequence[FloatArray], title: str = "er
 def words(name: str) -> str:
     """coulomb_friction -> coulomb friction."""
     return name.replace("_", " ")
+
+
+def legend_name(start: str, shown: Document) -> str:
+    """The name of a model's curve with all effects of the model, in lines that a legend has room for."""
+    effects = ", ".join([words(str(name)) for name in shown["effects"]] + [AHEAD] * (AHEAD in str(shown["label"])))
+    return "<br>".join(textwrap.wrap(f"{start} with {effects}", WIDE)) if effects else start
 
 
 def shade_held_out(figure: go.Figure, document: Document, shown: Document, at: tuple[int, ...] = (1,)) -> None:

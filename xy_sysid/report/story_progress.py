@@ -10,7 +10,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from xy_sysid.report.parts import frequency_axis, plain, positive
-from xy_sysid.report.story_parts import LINE, Document, drawing, floor_line, nothing, pictured, ratio_axis, row, speed_unit, words
+from xy_sysid.report.story_parts import LINE, Document, drawing, floor_line, legend_name, nothing, pictured, ratio_axis, row, speed_unit, words
 from xy_sysid.report.theme import AFTER, BEFORE, FLOOR, MODEL, UNTRUSTED, fade
 from xy_sysid.report.words import number, quantity
 
@@ -27,14 +27,14 @@ def ladder(document: Document, mode: str = "light") -> go.Figure:
     scale, unit = speed_unit(document)
     count = len(rungs)
     edges = np.repeat(np.arange(count + 1) - 0.5, 2)[1:-1]
+    steps = {"x": "step ({})".format("; ".join(f"{place}: {words(str(item['label']))}" for place, item in enumerate(rungs)))}  # for a table
     errors = {name: np.repeat([float(item[name]) for item in rungs], 2) * scale for name in ("noise_floor", "train_error", "held_out_error")}
     figure = drawing([1.0], 320, mode)
-    figure.add_scatter(
-        x=edges, y=errors["noise_floor"], mode="lines", line={"color": FLOOR, "width": 2, "dash": "dot"}, name="noise floor", hoverinfo="y+name"
-    )
+    dotted = {"color": FLOOR, "width": 2, "dash": "dot"}
+    figure.add_scatter(x=edges, y=errors["noise_floor"], mode="lines", line=dotted, name="noise floor", hoverinfo="y+name", meta=steps)
     figure.add_scatter(
         x=edges, y=errors["held_out_error"], mode="lines", line={"color": MODEL, "width": 3}, fill="tonexty", fillcolor=fade(MODEL, 0.13),
-        name="held-out error", hoverinfo="y+name",
+        name="held-out error", hoverinfo="y+name", meta=steps,
     )  # fmt: skip
     figure.add_scatter(
         x=edges,
@@ -43,6 +43,7 @@ def ladder(document: Document, mode: str = "light") -> go.Figure:
         line={"color": BEFORE, "width": 1.6, "dash": "dash"},
         name="training error",
         hoverinfo="y+name",
+        meta=steps,
     )
     for place, item in enumerate(rungs):
         value = float(item["held_out_error"]) * scale
@@ -90,13 +91,13 @@ def before_after(document: Document, first: int = 0, last: int | None = None, mo
             y=positive(ratio[known]),
             mode="lines",
             line=line,
-            name=f"{name}: {words(shown['label'])}",
+            name=_of_step(name, shown),
             legendgroup=name,
             row=1,
             col=1,
         )
-        error = (measured - row(shown["pictures"]["zoom"]["velocity"])) * scale
-        figure.add_scatter(x=time, y=error, mode="lines", line={**line, "width": 1.3}, legendgroup=name, showlegend=False, name=name, row=2, col=1)
+        error, thin = (measured - row(shown["pictures"]["zoom"]["velocity"])) * scale, {**line, "width": 1.3}
+        figure.add_scatter(x=time, y=error, mode="lines", line=thin, legendgroup=name, showlegend=False, name=_of_step(name, shown), row=2, col=1)
         frequency_axis(figure, 1, [frequency])
     figure.update_xaxes(
         type="linear", title_text="time (s)", range=[float(time[0]), float(time[-1])], dtick=None, tickformat="", minor={}, row=2, col=1
@@ -134,6 +135,7 @@ def candidates(document: Document, mode: str = "light", most: int = 8) -> go.Fig
     figure.add_bar(
         x=errors, y=[words(item["effect"]) for item in tried], orientation="h", marker={"color": colours}, text=figures, textposition=inside,
         insidetextanchor="end", cliponaxis=False, hovertext=[_evidence(item) for item in tried], hoverinfo="text", showlegend=False,
+        name="only this effect added", meta={"y": "effect"},
     )  # fmt: skip
     for at, (level, told, colour, dash, anchor) in enumerate(
         ((floor, "floor", FLOOR, "dot", "left"), (base, "none added", UNTRUSTED, "dash", "right"))
@@ -153,6 +155,11 @@ def candidates(document: Document, mode: str = "light", most: int = 8) -> go.Fig
     figure.update_xaxes(title_text=f"held-out error ({plain(unit)})", range=[0, 1.04 * most_left], row=1, col=1)
     figure.update_yaxes(autorange="reversed", row=1, col=1)
     return figure
+
+
+def _of_step(name: str, shown: Mapping[str, Any]) -> str:
+    """before: rigid, with delay; after: with all effects that the model then has."""
+    return legend_name(f"{name}:", shown) if shown["effects"] else f"{name}: {words(str(shown['label']))}"
 
 
 def _in_lines(item: Mapping[str, Any]) -> str:

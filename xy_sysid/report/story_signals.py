@@ -6,7 +6,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from xy_sysid.report.parts import plain
-from xy_sysid.report.story_parts import SMALL, Document, drawing, nothing, pictured, row, shade_held_out, speed_unit
+from xy_sysid.report.story_parts import SMALL, Document, drawing, legend_name, nothing, pictured, row, shade_held_out, speed_unit
 from xy_sysid.report.theme import FAILS, MEASURED, MODEL, fade
 from xy_sysid.units import readable
 
@@ -23,7 +23,7 @@ def zoom(document: Document, step: int | None = None, mode: str = "light") -> go
     figure = drawing([0.66, 0.34], 360, mode)
     curves = (
         (1, measured, {"color": MEASURED, "width": 1.8}, "measured"),
-        (1, model, {"color": MODEL, "width": 1.6, "dash": "dash"}, "simulated"),
+        (1, model, {"color": MODEL, "width": 1.6, "dash": "dash"}, legend_name("simulated", shown)),
         (2, measured - model, {"color": FAILS, "width": 1.3}, "difference"),
     )
     for at, values, line, name in curves:
@@ -43,7 +43,8 @@ def velocity(document: Document, step: int | None = None, mode: str = "light") -
     measured = document["measured"]["time"]
     time = row(measured["time"])
     figure = drawing([1.0], SMALL, mode)
-    for part, colour, opacity, name in ((measured, MEASURED, 0.35, "measured"), (shown["pictures"]["time"], MODEL, 0.3, "simulated")):
+    simulated = legend_name("simulated", shown)
+    for part, colour, opacity, name in ((measured, MEASURED, 0.35, "measured"), (shown["pictures"]["time"], MODEL, 0.3, simulated)):
         low, high = row(part["velocity_low"]) * scale, row(part["velocity_high"]) * scale
         around, edge = np.concatenate((time, time[::-1])), np.concatenate((high, low[::-1]))
         figure.add_scatter(
@@ -70,7 +71,7 @@ def position(document: Document, step: int | None = None, mode: str = "light") -
     )
     figure.add_scatter(
         x=time, y=row(shown["pictures"]["time"]["position"]) * scale, mode="lines", line={"color": MODEL, "width": 1.6, "dash": "dash"},
-        name="simulated", row=1, col=1,
+        name=legend_name("simulated", shown), row=1, col=1,
     )  # fmt: skip
     shade_held_out(figure, document, shown)
     figure.update_xaxes(title_text="time (s)", row=1, col=1)

@@ -7,6 +7,7 @@ from html import escape
 from typing import Any
 
 from xy_sysid.report import captions, figures
+from xy_sysid.report.cover import Cover
 from xy_sysid.report.remarks import NOT_A_CONFIDENCE, PAPER_VALUES, PRINTED, axis_remarks
 from xy_sysid.report.sheet import Drawing, block, listing, paragraph, provenance_html, section, table_html, whole
 from xy_sysid.report.study import AxisStudy
@@ -66,4 +67,4 @@ def study_page(
     parts.append(f'<section id="remarks"><h2>Remarks</h2>{listing(remarks)}</section>')
     parts.append(provenance_html(origins))
     head = f"<h1>Study of {escape(title)}</h1>{listing(captions.summary(one) for one in studies.values())}{paragraph(captions.INTRODUCTION)}"
-    return whole(f"Study of {title}", head, parts, drawings)
+    return whole(Cover(f"Study of {title}"), head, parts, drawings)

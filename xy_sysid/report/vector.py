@@ -18,14 +18,13 @@ import numpy as np
 import plotly.graph_objects as go
 
 from xy_sysid.errors import MissingExtra
+from xy_sysid.report.paper import fit, legend, rows, sheet
 from xy_sysid.samples.block import FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-WIDTH, PIXELS = 6.8, 100.0  # inches; px of an inch of height
-LEFT, RIGHT, TOP, BOTTOM = 0.85, 0.15, 0.45, 0.55  # inches around the rows
 DASHES = {"solid": "-", "dash": "--", "dot": ":", "dashdot": "-."}
 SYMBOLS = {"x-thin": "x", "circle-open": "o", "circle": "o", "diamond": "D"}
 RGBA = re.compile(r"rgba?\(([^)]*)\)")
@@ -36,11 +35,15 @@ LETTERS = (  # ranges of Unicode, the last not included; what is not among them 
     (0x20, 0x180), (0x391, 0x3CA), (0x2010, 0x2040), (0x2070, 0x20A0), (0x2190, 0x2194), (0x2212, 0x2213), (0x221A, 0x221B), (0x2248, 0x2249),
     (0x2264, 0x2266),
 )  # fmt: skip
+BAR = 0.85  # of the room for a bar
 DECADES = 1.6  # of a logarithmic axis below which 2 and 5 are named, too
 
 
-def vectors(figure: go.Figure, kinds: Sequence[str]) -> dict[str, bytes]:
-    """The figure as svg, pdf or both, by kind: drawn once, written in each. Raises MissingExtra without Matplotlib."""
+def vectors(figure: go.Figure, kinds: Sequence[str], columns: int = 2) -> dict[str, bytes]:
+    """The figure as svg, pdf or both, by kind: drawn once, written in each. Raises MissingExtra without Matplotlib.
+
+    columns: of a journal, 1 or 2, whose width it has; words have the same size in both
+    """
     mpl = installed()
     look: Any = {
         "font.family": [_font()[0], "DejaVu Sans"],
@@ -52,8 +55,8 @@ def vectors(figure: go.Figure, kinds: Sequence[str]) -> dict[str, bytes]:
         "axes.labelcolor": INK,
     }
     with mpl.rc_context(look):
-        drawn = _drawn(figure)
-        return {kind: _written(drawn, kind) for kind in kinds}
+        paper = drawn(figure, columns)
+        return {kind: _written(paper, kind) for kind in kinds}
 
 
 def installed() -> ModuleType:
@@ -88,26 +91,23 @@ def _font() -> tuple[str, tempfile.TemporaryDirectory[str]]:
     return SANS, folder
 
 
-def _written(drawn: Figure, kind: str) -> bytes:
+def _written(paper: Figure, kind: str) -> bytes:
     written = io.BytesIO()
-    drawn.savefig(written, format=kind, metadata={"Date" if kind == "svg" else "CreationDate": None})
+    paper.savefig(written, format=kind, metadata={"Date" if kind == "svg" else "CreationDate": None})
     return written.getvalue()
 
 
-def _drawn(figure: go.Figure) -> Figure:
-    from matplotlib.figure import Figure as Paper
-
+def drawn(figure: go.Figure, columns: int) -> Figure:
+    """The figure on a sheet of its width."""
     layout = figure.layout
-    height = float(layout.height or 400) / PIXELS
-    paper = Paper(figsize=(WIDTH, height + 0.3))
-    named = any(trace.type == "bar" for trace in figure.data)
-    axes = _rows(paper, layout, height + 0.3, (2.0 if named else 1.0) * LEFT)
+    paper = sheet(float(layout.height or 400), columns)
+    axes = rows(paper, layout)
     previous: dict[str, tuple[FloatArray, FloatArray]] = {}
     for trace in figure.data:
         name = str(trace.yaxis or "y")
         ax = axes[name]
         if trace.type == "bar":
-            _bars(ax, trace)
+            _bars(ax, trace, [other for other in figure.data if other.type == "bar" and str(other.yaxis or "y") == name])
         else:
             x, y = _numbers(trace.x), _numbers(trace.y)
             _area(ax, trace, (x, y), previous.get(name))
@@ -119,32 +119,14 @@ def _drawn(figure: go.Figure) -> Figure:
         _shape(axes, shape)
     for note in layout.annotations:
         _note(paper, axes, note)
-    _legend(paper, axes)
+    fit(paper, axes, legend(paper, axes, layout.showlegend))
     return paper
-
-
-def _rows(paper: Figure, layout: Any, height: float, left: float) -> dict[str, Axes]:
-    """One set of axes for each y axis, in its place."""
-    inner = height - TOP - BOTTOM
-    found: dict[str, Axes] = {}
-    for key in ("yaxis", *(f"yaxis{k}" for k in range(2, 9))):
-        if key not in layout:
-            continue
-        low, high = layout[key].domain or (0.0, 1.0)
-        box = (left / WIDTH, (BOTTOM + low * inner) / height, (WIDTH - left - RIGHT) / WIDTH, (high - low) * inner / height)
-        ax = paper.add_axes(box)
-        ax.grid(visible=True, color="#dfe3e8", linewidth=0.6)
-        ax.set_axisbelow(True)
-        for side in ("top", "right"):
-            ax.spines[side].set_visible(False)
-        found[key.replace("axis", "")] = ax
-    return found
 
 
 def _line(ax: Axes, trace: Any, x: FloatArray, y: FloatArray) -> None:
     mode = str(trace.mode or "lines")
     colour, shown = _colour(trace.line.color), trace.showlegend is not False and bool(trace.name)
-    label = str(trace.name) if shown else "_nolegend_"
+    label = _words(trace.name) if shown else "_nolegend_"
     width = 0.75 * float(trace.line.width if trace.line.width is not None else 1.5)
     if "lines" in mode and width > 0:
         ax.plot(x, y, color=colour, linestyle=DASHES.get(str(trace.line.dash or "solid"), "-"), linewidth=width, label=label)
@@ -160,7 +142,7 @@ def _area(ax: Axes, trace: Any, curve: tuple[FloatArray, FloatArray], before: tu
     x, y = curve
     colour = _colour(trace.fillcolor)
     if trace.fill == "toself":
-        label = str(trace.name) if trace.showlegend is not False and trace.name else "_nolegend_"
+        label = _words(trace.name) if trace.showlegend is not False and trace.name else "_nolegend_"
         for piece in np.split(np.arange(x.size), np.flatnonzero(np.isnan(x))):
             known = piece[np.isfinite(x[piece]) & np.isfinite(y[piece])]
             if known.size:
@@ -172,11 +154,18 @@ def _area(ax: Axes, trace: Any, curve: tuple[FloatArray, FloatArray], before: tu
         ax.fill_between(x, y, before[1], color=colour, linewidth=0)
 
 
-def _bars(ax: Axes, trace: Any) -> None:
-    names, values = [_words(name) for name in trace.y], _numbers(trace.x)
+def _bars(ax: Axes, trace: Any, together: Sequence[Any]) -> None:
+    """Bars from the left with their names, or from below. together: all that stand on these axes, as wide as the closest two allow."""
     colours = [_colour(each) for each in trace.marker.color] if isinstance(trace.marker.color, (list, tuple)) else _colour(trace.marker.color)
-    drawn = ax.barh(names, values, color=colours)
-    ax.bar_label(drawn, [_words(text) for text in trace.text or [""] * len(names)], padding=2, fontsize=7.5)
+    label = _words(trace.name) if trace.showlegend is not False and trace.name else "_nolegend_"
+    if trace.orientation != "h":
+        places = np.unique(np.concatenate([_numbers(each.x) for each in together]))
+        width = BAR * float(np.min(np.diff(places))) if places.size > 1 else BAR
+        ax.bar(_numbers(trace.x), _numbers(trace.y), width=width, color=colours, linewidth=0, label=label)
+        return
+    names, values = [_words(name) for name in trace.y], _numbers(trace.x)
+    bars = ax.barh(names, values, color=colours, label=label)
+    ax.bar_label(bars, [_words(text) for text in trace.text or [""] * len(names)], padding=2, fontsize=7.5)
 
 
 def _shape(axes: Mapping[str, Axes], shape: Any) -> None:
@@ -188,6 +177,8 @@ def _shape(axes: Mapping[str, Axes], shape: Any) -> None:
     across, along = str(shape.yref).endswith("domain"), str(shape.xref).endswith("domain")
     if shape.type == "rect" and across:
         ax.axvspan(float(shape.x0), float(shape.x1), color=_colour(shape.fillcolor), linewidth=0)
+    elif shape.type == "rect" and along:
+        ax.axhspan(float(shape.y0), float(shape.y1), color=_colour(shape.fillcolor), linewidth=0, zorder=0.5)
     elif shape.type == "line" and across:
         ax.axvline(float(shape.x0), color=colour, linestyle=style, linewidth=0.8)
     elif shape.type == "line" and along:
@@ -245,15 +236,6 @@ def _scales(ax: Axes, layout: Any, name: str) -> None:
     for axis, shown in ((ax.xaxis, across.visible), (ax.yaxis, own.visible)):
         if shown is False:
             axis.set_visible(False)
-
-
-def _legend(paper: Figure, axes: Mapping[str, Axes]) -> None:
-    found: dict[str, Any] = {}
-    for ax in axes.values():
-        for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
-            found.setdefault(label, handle)
-    if len(found) > 1:
-        paper.legend(list(found.values()), list(found), loc="upper left", ncols=4, frameon=False, fontsize=7.5)
 
 
 def _numbers(values: Any) -> FloatArray:

@@ -126,6 +126,7 @@ class Recording:
     reference:     (n, axes) the commanded position where the file has one (a sign of closed loop), else None
     notes:         what was converted or assumed while reading, one sentence each
     measured:      what the sensor reads; ``position`` is the integral of a velocity or an acceleration
+    machine:       its name where the meta data of the file tell it, else empty
     """
 
     sampling_rate: float
@@ -140,6 +141,7 @@ class Recording:
     source: str = ""
     notes: tuple[str, ...] = ()
     measured: Sensed = "position"
+    machine: str = ""
 
     @property
     def units(self) -> Units:

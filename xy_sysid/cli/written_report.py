@@ -1,0 +1,132 @@
+"""The report as a page: what ``xy-sysid report`` and a notebook share."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from datetime import UTC, date, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from xy_sysid.errors import BadInput
+from xy_sysid.samples.recording import Recording, Run
+
+if TYPE_CHECKING:
+    from xy_sysid.report.axis_report import AxisReport, Wanted
+    from xy_sysid.report.cover import Cover
+    from xy_sysid.response.coupling import Coupling
+    from xy_sysid.settings import IdentifierSettings
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """A finished report. page: HTML; axes: what it says, by axis; cover: its head; origin: where the numbers come from.
+
+    coupling: what the first two axes do to each other, or None
+    """
+
+    page: str
+    axes: dict[str, AxisReport]
+    cover: Cover
+    origin: dict[str, Any]
+    coupling: Coupling | None
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """A report that is asked for. paths: of the recording; axes: to report on; cover: what was said; command: how it was asked for."""
+
+    paths: tuple[Path, ...]
+    axes: tuple[str, ...]
+    cover: Cover
+    wanted: Wanted
+    command: str = ""
+    tell: Callable[[str, str], None] = field(default=lambda axis, stage: None)
+
+
+def written_report(recording: Recording, asked: Asked) -> Written:
+    """The whole page. Raises BadInput for a date that is none, before any work is done."""
+    from xy_sysid.cli.provenance import provenance
+    from xy_sysid.report.axis_report import axis_reports
+    from xy_sysid.report.cover import cover_of
+    from xy_sysid.report.report_page import Recorded, report_page
+
+    cover = cover_of(recording, asked.cover, asked.paths, datetime.now(UTC).astimezone().date())
+    made = axis_reports(recording, asked.axes, asked.wanted, asked.tell)
+    source = ", ".join(str(path) for path in asked.paths) or recording.source
+    origin = provenance(source, recording) | ({"command": asked.command} if asked.command else {})
+    coupling, why = coupled(recording, asked.axes, asked.wanted.settings)
+    told = Recorded(
+        cover=cover,
+        units=recording.units,
+        facts=facts(recording, asked.axes),
+        origins={"Recording": origin},
+        notes=(*recording.notes, *why),
+        coupling=coupling,
+    )
+    page = report_page(told, made, asked.wanted.settings.min_coherence, asked.wanted.library)
+    return Written(page=page, axes=made, cover=cover, origin=origin, coupling=coupling)
+
+
+def write_report(
+    data: Run | Recording,
+    path: Path | str = "report.html",
+    *,
+    title: str = "",
+    machine: str = "",
+    author: str = "",
+    recorded: str | date = "",
+    budget: float = math.inf,
+    force: bool = False,
+) -> None:
+    """Write the report of a recording as one HTML page that opens offline and prints with page numbers.
+
+    title, machine, author: words for its head; the machine is by default the one that the recording names in its meta data
+    recorded: the day, as 2026-03-03 or 2026-03-03T14:30:00; by default what the recording's clock or the name of its file tells
+    budget: processor time for the diagnosis of each axis, s; force: replace the file
+    Raises BadInput if the file is there and not ``force``, and for a date that is none.
+    """
+    from xy_sysid.bags.atomic import write_text
+    from xy_sysid.files.unasked import free
+    from xy_sysid.report.axis_report import Wanted
+    from xy_sysid.report.cover import Cover
+
+    path = Path(path)
+    free("file", path, force, "say force=True")
+    recording = data.recording() if isinstance(data, Run) else data
+    paths = (Path(recording.source),) if recording.source and Path(recording.source).exists() else ()
+    cover = Cover(title=title, machine=machine, author=author, recorded=str(recorded))
+    asked = Asked(paths=paths, axes=recording.axes, cover=cover, wanted=Wanted(budget=budget), command="xy_sysid.write_report")
+    write_text(path, written_report(recording, asked).page)
+
+
+def coupled(recording: Recording, names: tuple[str, ...], settings: IdentifierSettings) -> tuple[Coupling | None, tuple[str, ...]]:
+    """What the first two of the axes do to each other, and notes; without an answer a note says why."""
+    from xy_sysid.fitting.two_axes import coupling_in
+
+    if len(names) < 2:
+        return None, ()
+    columns = [recording.axes.index(name) for name in names[:2]]
+    two = replace(recording, axes=names[:2], voltage=recording.voltage[:, columns], position=recording.position[:, columns], reference=None)
+    try:
+        return coupling_in(two, settings), ()
+    except BadInput as problem:
+        return None, (f"Coupling of {names[0]} and {names[1]} was not judged: {problem}",)
+
+
+def facts(recording: Recording, names: Sequence[str]) -> tuple[tuple[str, str], ...]:
+    """What was recorded: (what, value)."""
+    runs = recording.runs()
+    longest = recording.run(names[0]).seconds if names and len(recording) else 0.0
+    rate = float(recording.sampling_rate)
+    return (
+        ("axes", ", ".join(names)),
+        ("sampling rate", f"{rate:.6g} Hz"),
+        ("samples", str(len(recording))),
+        ("duration", f"{len(recording) / rate:.4g} s"),
+        ("gaps", str(max(len(runs) - 1, 0))),
+        ("longest stretch without a gap", f"{longest:.4g} s"),
+        ("input", recording.input_unit),
+        ("output", recording.output_unit if recording.measured == "position" else f"{recording.output_unit}, from a measured {recording.measured}"),
+    )
