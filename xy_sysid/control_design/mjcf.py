@@ -30,10 +30,11 @@ EXACT = 1e-6  # of the largest force: by which a law may differ from what it is 
 class Said:
     """What was said so far.
 
-    polynomial: (4,) of the position, V, lowest power first; waves: (name, amplitude, wave number, phase); lost: (effect, why)
+    polynomial: (4,) of the position, V, lowest power first; square: drag over the square of speed, V/(m/s)2; waves: (name, amplitude, wave number, phase); lost: (effect, why)
     """
 
     polynomial: FloatArray = field(default_factory=lambda: np.zeros(4))
+    square: float = 0.0
     waves: list[tuple[str, float, float, float]] = field(default_factory=list)
     lost: list[tuple[str, str]] = field(default_factory=list)
 
@@ -61,6 +62,7 @@ def mjcf(model: AxisModel, sampling_rate: float, name: str = "axis") -> Mjcf:
     behind, tendon = _behind(hung, name)
     steps = _steps(model, sampling_rate, 2.0 * FINE if dry == 0.0 and lag is None else RUBBING)
     bend, spring = _spring(said.polynomial)
+    curve = f" {_num(said.square)} 0" if said.square else ""
     step = 1.0 / (sampling_rate * steps)
     joint = 'type="hinge" axis="0 0 1"' if any(effect.angular for effect, _ in of_category(model, "force")) else 'type="slide" axis="1 0 0"'
     drive = [f'name="drive" joint="{name}" gear="{turn:g}" gainprm="1" biastype="affine" biasprm="{_num(-bend)} 0 0"']
@@ -87,7 +89,7 @@ def mjcf(model: AxisModel, sampling_rate: float, name: str = "axis") -> Mjcf:
         f'  <option timestep="{step!r}" gravity="0 0 0" integrator="{integrator}"/>',
         "  <worldbody>",
         f'    <body name="{name}">',
-        f'      <joint name="{name}" {joint} damping="{_num(drag)}"{spring}{held}/>',
+        f'      <joint name="{name}" {joint} damping="{_num(drag)}{curve}"{spring}{held}/>',
         f"      {moving}",
         "    </body>",
         *behind,
@@ -120,12 +122,28 @@ def _forces(model: AxisModel, said: Said) -> None:
         words = asks(effect)
         if "u" in words:
             said.lost.append((effect.name, "a motor constant that changes with the place"))
+        elif "v" in words and not words & {"x", "direction"} and _square(effect, values, model, said):
+            continue
         elif "v" in words:
             said.lost.append((effect.name, "drag that depends on direction or place; its mean is kept"))
         elif "t" in words:
             said.lost.append((effect.name, "it changes with time"))
         elif not _wave(effect, values, model, said):
             _power(effect, values, model, said)
+
+
+def _square(effect: Effect, values: tuple[float, ...], model: AxisModel, said: Said) -> bool:
+    """Whether a law is drag with the square of speed, against the motion."""
+    fast = abs(model.gain)
+
+    def at(v: float) -> float:
+        return ask(effect, values, "force", {"v": v, "x": 0.0, "u": 0.0, "t": 0.0, "gain": model.gain, "pole": model.pole})
+
+    top = at(fast) / fast**2
+    if not np.allclose([at(part * fast) for part in (-1.0, -0.4, 0.3, 0.7)], [top * fast**2 * part * abs(part) for part in (-1.0, -0.4, 0.3, 0.7)]):
+        return False
+    said.square += abs(top)
+    return True
 
 
 def _wave(effect: Effect, values: tuple[float, ...], model: AxisModel, said: Said) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 from xy_sysid.effects._contract import Effect, Parameter, law
@@ -11,15 +12,15 @@ LEAST = 1e-3  # V/(m/s)2: where a fit begins if the trace has the wrong sign
 
 
 @law
-def force(coefficient: float, v: float) -> float:
-    """Force against the drive, V."""
-    return coefficient * abs(v) * v
+def force(coefficient: float, v: float, gain: float) -> float:
+    """Force against the drive, V; the drive may be wired the other way round."""
+    return math.copysign(coefficient, gain) * abs(v) * v
 
 
 def guesses(scene: Scene) -> Iterator[Guess]:
     """The square of the speed, with its sign."""
     v = scene.smooth(scene.velocity, 300.0)
-    yield Guess(columns(abs(v) * v), lambda c: (max(float(c[0]), LEAST),))
+    yield Guess(columns(math.copysign(1.0, scene.gain) * abs(v) * v), lambda c: (max(float(c[0]), LEAST),))
 
 
 EFFECT = Effect(
