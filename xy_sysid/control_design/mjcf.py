@@ -30,7 +30,8 @@ EXACT = 1e-6  # of the largest force: by which a law may differ from what it is 
 class Said:
     """What was said so far.
 
-    polynomial: (4,) of the position, V, lowest power first; square: drag over the square of speed, V/(m/s)2; waves: (name, amplitude, wave number, phase); lost: (effect, why)
+    polynomial: (4,) of the position, V, lowest power first; square: drag over the square of speed, V/(m/s)2
+    waves: (name, amplitude, wave number, phase); lost: (effect, why)
     """
 
     polynomial: FloatArray = field(default_factory=lambda: np.zeros(4))
