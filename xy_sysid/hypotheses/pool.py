@@ -47,7 +47,10 @@ class Node:
 
 @dataclass
 class Pool:
-    """The sets of one axis. worth: size of what is added at least; most: effects; late: time is up; kept: effects that every set has."""
+    """The sets of one axis. worth: size of what is added at least; most: effects; late: time is up; kept: effects that every set has.
+
+    tried: (from, to) of the moves that were fitted
+    """
 
     data: AxisData
     library: Library
@@ -56,6 +59,7 @@ class Pool:
     most: int = MOST_EFFECTS
     late: Callable[[], bool] = in_time
     nodes: dict[frozenset[str], Node] = field(default_factory=dict)
+    tried: set[tuple[frozenset[str], frozenset[str]]] = field(default_factory=set)
 
     @property
     def scale(self) -> float:
@@ -100,6 +104,8 @@ class Pool:
         refused = self._refusal(effects, found)
         node = Node(effects, parameters, brief, found, refused=refused, leads=leads, promised=promised)
         known = self.nodes.get(effects)
+        if known is not None and not known.whole and not node.whole and known.brief.excess <= brief.excess:
+            return known
         if known is not None and known.whole and (not node.whole or (self.score(known) <= self.score(node) and not known.refused)):
             return known
         self.nodes[effects] = node
@@ -172,7 +178,12 @@ class Pool:
     def _moves(self, node: Node, early: bool = True) -> list[Move]:
         found = moves(self.data, self.library, node.fit, node.brief, early)
         allowed = (move for move in found if self.kept <= move.effects and len(move.effects - self.kept) <= self.most)
-        return [move for move in allowed if move.effects not in self.nodes]
+        return [move for move in allowed if self._is_open(node, move)]
+
+    def _is_open(self, parent: Node, move: Move) -> bool:
+        """A set that is not known; or that is known from one bad start only, and may begin from a relative in the place of one of its laws."""
+        known = self.nodes.get(move.effects)
+        return known is None or (not known.whole and len(move.effects) == len(parent.effects) and (parent.effects, move.effects) not in self.tried)
 
     def _next(self, nodes: Sequence[Node] = ()) -> tuple[Node, Move] | None:
         """The move that promises the best score, of those that promise a better one than would be said; from some sets, or from all."""
@@ -182,7 +193,7 @@ class Pool:
                 continue
             for move in node.moves or ():
                 hoped = self.score(node) - self.scale * move.promised + PRICE * move.parameters
-                if move.effects not in self.nodes and hoped < least and self._may_be_worth(node, move):
+                if self._is_open(node, move) and hoped < least and self._may_be_worth(node, move):
                     least, chosen = hoped, (node, move)
         return chosen
 
@@ -194,6 +205,7 @@ class Pool:
 
     def _try(self, parent: Node, move: Move) -> Node | None:
         """Fit the set of a move, on all data if it comes near the best."""
+        self.tried.add((parent.effects, move.effects))
         begun = [*move.starts()]
         new = move.effects - parent.effects
         alone = self.nodes.get(new | self.kept)
