@@ -74,10 +74,10 @@ def ladder_of_search(pool: Pool, given: Given, filtered: Filtered | None) -> Lad
     if filtered is not None:
         return _of_one_step(pool, base, filtered, tried, refused)
     final = joined(data, node.fit, pool.late)
-    own = {name: pool.size_without(node, name) for name in sorted(node.effects - pool.kept)}
+    own = {name: pool.without(node, name) for name in sorted(node.effects - pool.kept)}
     names = tuple(name for name, _ in final.model.effects)
     parts = {name: [own[part] for part in _parts(library, name) if part in own] for name in names}
-    ordered = _ordered(library, {name: max(each, default=0.0) for name, each in parts.items()})
+    ordered = _ordered(library, {name: max((force for _, force in each), default=0.0) for name, each in parts.items()})
     ordered = (*given.names, *(name for name in ordered if name not in given.names))
     others = [
         item
@@ -98,7 +98,7 @@ def ladder_of_search(pool: Pool, given: Given, filtered: Filtered | None) -> Lad
         effects=ordered,
         tried=tuple(tried),
         rivals=tuple(rivals),
-        sizes={name: min(each) for name, each in parts.items() if each},
+        sizes={name: min(size for size, _ in each) for name, each in parts.items() if each},
         helps=max((part_explained(data, base, item.fit) for item in whole), default=0.0),
         kept_out=_kept_out(pool, node),
         refused=refused,

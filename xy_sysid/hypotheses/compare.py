@@ -49,9 +49,14 @@ def gain(one: GreyboxFit, other: GreyboxFit) -> Gain:
 def size(one: GreyboxFit, before: GreyboxFit) -> float:
     """Power that a fit explains of what one before it left, over what it leaves itself: of the unmodelled force, or of the error, whichever is more.
 
-    Of the force by the likelihood: n nats over l lines in which it stands out of the floor are a factor exp(2 n / l) of its power. That is
-    an average over frequencies; a load or a slow wave acts at few of them, and may still be most of the error.
+    That of the force is an average over frequencies; a load or a slow wave acts at few of them, and may still be most of the error.
     """
-    nats = float(np.mean(before.scores) - np.mean(one.scores))
+    force = force_explained(one, before)
     error = math.log(max(before.held_out_error, 1e-300) / max(one.held_out_error, 1e-300))
-    return math.expm1(min(max(2.0 * nats / max(before.forced, 1.0), 2.0 * error if nats > 0.0 else -50.0, -50.0), 50.0))
+    return max(force, math.expm1(min(2.0 * error, 50.0))) if force > 0.0 else force
+
+
+def force_explained(one: GreyboxFit, before: GreyboxFit) -> float:
+    """The same of the unmodelled force alone: n nats over l lines in which it stands out of the floor are a factor exp(2 n / l) of its power."""
+    nats = float(np.mean(before.scores) - np.mean(one.scores))
+    return math.expm1(min(max(2.0 * nats / max(before.forced, 1.0), -50.0), 50.0))

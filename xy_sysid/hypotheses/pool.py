@@ -15,7 +15,7 @@ from xy_sysid.effects._contract import in_time
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit, best_start, finish, first_excess, fit
 from xy_sysid.hypotheses import starts
-from xy_sysid.hypotheses.compare import gain, size
+from xy_sysid.hypotheses.compare import force_explained, gain, size
 from xy_sysid.hypotheses.criteria import AT_FLOOR, HOPELESS, MOST_EFFECTS, NEAR, OPTIMISM, PRICE, RIVAL, WORTH
 from xy_sysid.hypotheses.moves import Move, count, moves
 from xy_sysid.hypotheses.refusal import refusal
@@ -309,10 +309,13 @@ class Pool:
             node.refused = self._refusal(node.effects, node.fit)
         return node
 
-    def size_without(self, node: Node, name: str) -> float:
-        """What an effect explains over what is left with it: against the best of the sets that have the same effects but for this one."""
-        fewer = (item for item in self.nodes.values() if item.effects <= node.effects - {name})
-        return max(min(size(*alike(node, item)) for item in fewer), 0.0)
+    def without(self, node: Node, name: str) -> tuple[float, float]:
+        """What an effect explains over what is left with it: its size, and that of the force alone.
+
+        Against the best of the sets that have the same effects but for this one.
+        """
+        fewer = [alike(node, item) for item in self.nodes.values() if item.effects <= node.effects - {name}]
+        return max(min(size(*pair) for pair in fewer), 0.0), max(min(force_explained(*pair) for pair in fewer), 0.0)
 
 
 def alike(one: Node, other: Node) -> tuple[GreyboxFit, GreyboxFit]:
