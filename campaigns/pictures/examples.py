@@ -184,6 +184,12 @@ EXAMPLES = (
         "6",
     ),
     Example(
+        "quadratic_drag",
+        (FREQUENCY, SPEED, TIME),
+        "The mean error against velocity is an S: the model is too slow at moderate speed and too fast at both ends, as the fit made its drag fit "
+        "the usual speed. With dry friction it is the other way round.",
+    ),
+    Example(
         "gain_drift",
         (FREQUENCY, SPEED, TIME),
         "A V against time: the fit is right in the middle of its data. The error grows to both sides.",

@@ -101,7 +101,19 @@ def test_every_option_that_writes_a_file_is_looked_at_here() -> None:
         if isinstance(parameter.default, (OptionInfo, ArgumentInfo)) and re.match(WRITES, parameter.default.help or "") and parameter.name != "to"
     }
     assert writing == {
-        *("figures out", "fit mat", "fit model", "fleet out", "frf csv", "next output", "record out", "refine mat", "refine model", "replay out"),
+        *(
+            "figures out",
+            "fit mat",
+            "fit model",
+            "fleet out",
+            "frf csv",
+            "next output",
+            "next trajectory",
+            "record out",
+            "refine mat",
+            "refine model",
+            "replay out",
+        ),
         *("report out", "simulate out", "simulate truth", "study out", "trajectory out", "trend out", "use out"),
     }
 
@@ -139,4 +151,4 @@ def test_the_name_of_an_axis_leads_into_no_other_folder(tmp_path: Path) -> None:
     save(Recording(1000.0, (axis,), np.arange(12_000), t, u[:, None], y[:, None]), tmp_path / "bag")
     said = cli("figures", tmp_path / "bag", "-o", out, "--kind", "csv")
     assert said.code == 0, said.err
-    assert list(out.glob(".._.._left_wrist_*.csv")) and {item.name for item in tmp_path.iterdir()} == {"bag", "a"}
+    assert list(out.glob("axis_.._.._left_wrist_*.csv")) and {item.name for item in tmp_path.iterdir()} == {"bag", "a"}

@@ -136,5 +136,5 @@ def test_every_worker_of_the_page_is_behind_such_a_sentence() -> None:
     assert bold == {
         "files_dialog.py: names = await run.io_bound(session.shelf.names)",
         "control.py: words = await run.io_bound(session.recorder.stop)",
-        "plot.py: drawn = await run.io_bound(session.figure, key, lambda: plain(make(*arguments, **named)))",
+        "plot.py: drawn = await run.io_bound(copy_context().run, session.figure, key, lambda: plain(make(*arguments, **named)))",
     }

@@ -10,7 +10,12 @@ import pytest
 from helpers import ROOT
 
 SHARED = {"xy_sysid.jit", "xy_sysid.errors", "xy_sysid.samples.block", "xy_sysid.settings", "xy_sysid.bags.opening"}
-ADAPTERS = {"node.py", "ballscrew_node.py", "controller_node.py"}  # the ROS side of the machine: they share the plumbing of nodes, too
+ADAPTERS = {
+    "node.py",
+    "ballscrew_node.py",
+    "controller_node.py",
+    "trajectory_node.py",
+}  # the ROS side of the machine: they share the plumbing of nodes, too
 SIM = sorted((ROOT / "xy_sim").rglob("*.py"))
 CORE = sorted(path for path in (ROOT / "xy_sysid").rglob("*.py") if "cli" not in path.relative_to(ROOT / "xy_sysid").parts)
 

@@ -9,10 +9,8 @@ from xy_sysid.axis.forward import move
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.errors import BadInput
 from xy_sysid.excitation.trajectory import Trajectory, faded
+from xy_sysid.experiment_design.criteria import ORDER, POINTS_EACH
 from xy_sysid.experiment_design.of_run import NextExperiment
-
-POINTS_EACH = 8.0  # points in a period of the highest frequency that the trajectory keeps
-ORDER = 4  # of the low-pass without delay
 
 
 def as_trajectory(found: NextExperiment, model: AxisModel, rate: float) -> Trajectory:

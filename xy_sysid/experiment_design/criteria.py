@@ -67,3 +67,5 @@ MARGIN = _number("margin", 0.15, "1", "part of speed, acceleration and travel th
 DRAWN = _number("drawn", 2, "draws", "parameters of the one set whose interval is to become narrow: it depends on them little")
 SHORTEST = _number("shortest", 4.0, "s", "of motion at least: a few windows")
 LONGER = _number("longer", 1.4, "1", "times as long, where a rehearsal does not reach what was asked for")
+POINTS_EACH = _number("points", 8.0, "1", "points of a trajectory in a period of the highest frequency that it keeps")
+ORDER = _number("order", 4, "1", "of the low-pass without delay through which a motion becomes a trajectory")

@@ -104,9 +104,9 @@ class Pool:
         refused = self._refusal(effects, found)
         node = Node(effects, parameters, brief, found, refused=refused, leads=leads, promised=promised)
         known = self.nodes.get(effects)
-        if known is not None and not known.whole and not node.whole and known.brief.excess <= brief.excess:
+        if known is not None and not node.whole and known.brief.excess <= brief.excess + PRICE / self.scale:
             return known
-        if known is not None and known.whole and (not node.whole or (self.score(known) <= self.score(node) and not known.refused)):
+        if known is not None and known.whole and node.whole and self.score(known) <= self.score(node) and not known.refused:
             return known
         self.nodes[effects] = node
         return node
@@ -181,9 +181,11 @@ class Pool:
         return [move for move in allowed if self._is_open(node, move)]
 
     def _is_open(self, parent: Node, move: Move) -> bool:
-        """A set that is not known; or that is known from one bad start only, and may begin from a relative in the place of one of its laws."""
+        """A set that is not known; or that came to nothing from one start, and may begin from a relative in the place of one of its laws."""
         known = self.nodes.get(move.effects)
-        return known is None or (not known.whole and len(move.effects) == len(parent.effects) and (parent.effects, move.effects) not in self.tried)
+        return known is None or (
+            (not known.whole or known.refused != "") and len(move.effects) == len(parent.effects) and (parent.effects, move.effects) not in self.tried
+        )
 
     def _next(self, nodes: Sequence[Node] = ()) -> tuple[Node, Move] | None:
         """The move that promises the best score, of those that promise a better one than would be said; from some sets, or from all."""
@@ -209,7 +211,7 @@ class Pool:
         begun = [*move.starts()]
         new = move.effects - parent.effects
         alone = self.nodes.get(new | self.kept)
-        if parent.effects > self.kept and alone is not None:
+        if move.effects > parent.effects > self.kept and alone is not None:
             begun += starts.merged(parent.fit.model, alone.fit.model)
         limit = parent.brief.excess + (self._near() - self.score(parent) - PRICE * move.parameters) / self.scale
         brief = fit(self.data, best_start(self.data, begun), brief=True, hopeless=limit + HOPELESS, late=self.late)

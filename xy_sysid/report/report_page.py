@@ -73,14 +73,14 @@ def report_page(recorded: Recorded, axes: Mapping[str, AxisReport], least_cohere
     _summary(page, axes, library)
     _experiment(page, axes, recorded.units, recorded.facts)
     _response(page, axes, least_coherence)
-    if recorded.coupling is not None:
-        found = recorded.coupling
-        drawn = [page.draw("coupling-bands", coupling_figure(found), f"{found.sentence} {COUPLED}")]
-        page.add("coupling", "Two axes at once", section("coupling", "Two axes at once", drawn, f"{found.sentence} {COUPLED}"))
     _fits(page, axes)
     for number_, one in enumerate(axes.values()):
         if one.story is not None and one.story["ladder"]:
             _axis(page, number_, one, one.story, library)
+    if recorded.coupling is not None:
+        found = recorded.coupling
+        drawn = [page.draw("coupling-bands", coupling_figure(found), f"{found.sentence} {COUPLED}")]
+        page.add("coupling", "Two axes at once", section("coupling", "Two axes at once", drawn, f"{found.sentence} {COUPLED}"))
     remarks = [*recorded.notes]
     for one in axes.values():
         remarks += [f"Axis {one.axis}: {one.note}"] if one.note else []
