@@ -17,9 +17,9 @@ from xy_sysid.diagnosis.refine import Effort, never, refine
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.axis_data import AxisData, prepare_all
 from xy_sysid.greybox.free_run import GreyboxFit
-from xy_sysid.greybox.input_noise import input_noise
 from xy_sysid.hypotheses.criteria import AT_FLOOR, SIZE
 from xy_sysid.hypotheses.enough_data import lacking
+from xy_sysid.hypotheses.input_noise import input_noise
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import USUAL, Units, bare, moved
 

@@ -32,6 +32,7 @@ def _number(name: str, value: N, unit: str, because: str) -> N:
 PRICE = _number("price", 4.0, "nats", "cost of a parameter: half the logarithm of the number of independent lines (Schwarz 1978)")
 CHANCE = _number("chance", 0.977, "1", "least probability that a held-out gain is real: two standard errors")
 OVERLAP = _number("overlap", 1.5, "windows", "half-overlapping Hann windows per independent window (Welch 1967)")
+WHITE = _number("white", 0.01, "1", "probability that white noise on the input is taken for something that is missing")
 DOUBTFUL = _number("doubtful", 0.1, "1", "above this probability that it predicts as well, a rival is mentioned")
 SIZE = _number("size", 0.7, "1", "least size of a named effect; an unmodelled force could imitate a smaller one")
 WORTH = _number("worth adding", 0.25, "1", "least size of an effect that is added without being named")

@@ -312,9 +312,9 @@ class Pool:
         return node
 
     def without(self, node: Node, name: str) -> tuple[float, float]:
-        """What an effect explains over what is left with it: its size, and that of the force alone.
+        """Size of one effect of a set, and its size by the unmodelled force alone.
 
-        Against the best of the sets that have the same effects but for this one.
+        Both compare the set with the best set that has the same effects except this one.
         """
         fewer = [alike(node, item) for item in self.nodes.values() if item.effects <= node.effects - {name}]
         return max(min(size(*pair) for pair in fewer), 0.0), max(min(force_explained(*pair) for pair in fewer), 0.0)

@@ -11,7 +11,7 @@ from xy_sysid.axis.model import AxisModel, simulate
 from xy_sysid.diagnosis.diagnose import diagnose_prepared
 from xy_sysid.greybox.axis_data import AxisData, prepare_all
 from xy_sysid.greybox.free_run import fit_base
-from xy_sysid.greybox.input_noise import input_noise
+from xy_sysid.hypotheses.input_noise import input_noise
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import Units
 

@@ -10,9 +10,7 @@ import scipy
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.greybox.objective import Objective, responder
-
-OVERLAP = 1.5  # half-overlapping Hann windows per independent one (Welch 1967)
-BY_CHANCE = 0.01  # probability that noise which is white is taken for something else
+from xy_sysid.hypotheses.criteria import FEWEST, OVERLAP, WHITE
 
 
 def input_noise(data: AxisData, fit: GreyboxFit) -> float | None:
@@ -26,7 +24,7 @@ def input_noise(data: AxisData, fit: GreyboxFit) -> float | None:
     used = lines > 0.0
     power, floor = fit.power[used], data.floor.power[used]
     response, shape = responder(data.layout, fit.model)(fit.model.row)[used], lines[used] * data.held.begins.size / OVERLAP
-    if fit.one_step or int(used.sum()) < 3 or not np.all(np.isfinite(power)) or not np.all(response > 0.0):
+    if fit.one_step or int(used.sum()) < FEWEST or not np.all(np.isfinite(power)) or not np.all(response > 0.0):
         return None
 
     def deviance(logarithm: float) -> float:
@@ -35,5 +33,5 @@ def input_noise(data: AxisData, fit: GreyboxFit) -> float | None:
 
     least, most = (math.log(float(limit(power / response))) for limit in (np.min, np.max))
     found = scipy.optimize.minimize_scalar(deviance, bounds=(least - 20.0, most), method="bounded")
-    is_white = scipy.stats.chi2.sf(found.fun, int(used.sum()) - 1) > BY_CHANCE
+    is_white = scipy.stats.chi2.sf(found.fun, int(used.sum()) - 1) > WHITE
     return math.exp(0.5 * float(found.x)) if is_white else None
