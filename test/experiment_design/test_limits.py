@@ -9,9 +9,11 @@ import pytest
 
 from xy_sysid.axis.forward import Motion
 from xy_sysid.errors import BadInput
+from xy_sysid.excitation.motion_check import check_loop, most_centring
 from xy_sysid.experiment_design.limits import MachineLimits, as_recorded
 from xy_sysid.experiment_design.proposals import neighbours, proposals
 from xy_sysid.samples.recording import Recording
+from xy_sysid.settings import AxisExcitation, ExcitationSettings
 
 RATE = 1000.0
 
@@ -63,3 +65,18 @@ def test_no_proposal_asks_for_more_than_the_voltage() -> None:
         drive = item.drive(RATE, 4.0, 0.0)
         assert item.excitation.limit == 3.0
         assert float(np.max(np.abs(drive.voltage))) < 3.0 * 1.1, item.words  # Gaussian noise has a tail, which the drive clips
+
+
+def test_no_proposal_pulls_harder_than_the_excitation_allows() -> None:
+    """A joint driven in long blocks: whatever is proposed, the excitation takes it, and an offset holds it inside the travel."""
+    axis = AxisExcitation(limit=1.2, travel_min=-2.5, travel_max=2.5)
+    settings = ExcitationSettings(axes={"x": axis}, rate=RATE, block=100, lockstep=True, unit="rad")
+    limits = MachineLimits(voltage=1.2, travel=(-2.5, 2.5), start=0.8, centring=float(most_centring(settings)[0]))
+    assert limits.centring < 0.95 * limits.voltage / limits.room  # what would be proposed otherwise is refused
+    held = 0
+    for item in proposals(limits, RATE):
+        check_loop(settings.model_copy(update={"axes": {"x": item.excitation}}))
+        if item.excitation.offset:
+            held += 1
+            assert abs(item.excitation.offset / item.excitation.centring) < limits.room
+    assert held >= 4

@@ -133,6 +133,18 @@ def test_a_machine_that_never_answers_is_named(world: World) -> None:
 
 
 @needs_ros
+def test_a_machine_that_is_found_late_is_asked_again(world: World) -> None:
+    """In lockstep, a first block that nobody heard, or whose answer nobody heard, is followed by another zero, not by silence for ever."""
+    blocks = world.blocks()
+    world.start(MODULE, {**LOCKSTEP, "patience": 20.0})
+    activate(world)
+    assert world.until(lambda: len(blocks) > 0)
+    world.machine(Integrator())
+    assert world.until(lambda: moving(blocks), 10)
+    assert world.state("excitation") == "active"
+
+
+@needs_ros
 def test_lockstep_is_bit_for_bit_what_the_drive_makes_of_the_positions(world: World) -> None:
     """Lockstep: block k goes out on the answer to block k - ahead and uses exactly that position; duration ends it."""
     blocks, machine = world.blocks(), Integrator()

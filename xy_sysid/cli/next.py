@@ -233,6 +233,9 @@ def _asked(unit: str, voltage: float | None, travel: str, speed: float | None, a
 
 def _own_limits(run_file: Path | None, axis: str) -> dict[str, Any]:
     """MachineLimits of the excitation in a parameter file."""
+    from xy_sysid.excitation.motion_check import most_centring
+    from xy_sysid.settings import ExcitationSettings, changed, for_axes, knobs
+
     if run_file is None:
         return {}
     told: Mapping[str, Any] = o.told_to("excitation", run_file).parameters
@@ -241,7 +244,10 @@ def _own_limits(run_file: Path | None, axis: str) -> dict[str, Any]:
         found["voltage"] = float(told[f"{axis}.limit"])
     if f"{axis}.travel_min" in told and f"{axis}.travel_max" in told:
         found["travel"] = (float(told[f"{axis}.travel_min"]), float(told[f"{axis}.travel_max"]))
-    return found
+    settings = for_axes(ExcitationSettings, [axis])
+    names = {item.name for item in knobs(settings)}
+    settings = changed(settings, {name: value for name, value in told.items() if name in names})
+    return {**found, "centring": float(most_centring(settings)[0])}
 
 
 def _limits(runs: tuple[Run, ...], own: Mapping[str, Any], asked: Mapping[str, Any], rms: float | None, seconds: float) -> MachineLimits:

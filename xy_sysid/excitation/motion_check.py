@@ -73,12 +73,16 @@ def age(settings: ExcitationSettings) -> float:
     return blocks * settings.step / settings.rate + reaction(settings)
 
 
-def check_loop(settings: ExcitationSettings) -> None:
-    """Raises BadInput if the centring would make an axis swing, as far as it is known; where positions are sent, there is none."""
+def most_centring(settings: ExcitationSettings) -> FloatArray:
+    """(axes,) V/m beyond which the axis would swing, as far as it is known; inf where positions are sent, which nothing pulls."""
     if settings.holds:
-        return
-    for (name, axis), gain in zip(settings.axes.items(), gains(settings), strict=True):
-        most = STEADY / (gain * age(settings))
+        return np.full(len(settings.axes), np.inf)
+    return np.asarray(STEADY / (gains(settings) * age(settings)))
+
+
+def check_loop(settings: ExcitationSettings) -> None:
+    """Raises BadInput if the centring would make an axis swing, as far as it is known."""
+    for (name, axis), gain, most in zip(settings.axes.items(), gains(settings), most_centring(settings), strict=True):
         if axis.centring > most:
             sent, unit = settings.units
             reckoned = over(settings.units.speed, sent)

@@ -24,6 +24,7 @@ class MachineLimits:
     voltage: V, of each sample; rms: V, that the drive stands for long (its current); speed: m/s; acceleration: m/s^2
     travel: (low, high) m; start: m, where the axis stands when an experiment begins
     margin: part of speed, acceleration and travel that is kept free; seconds: s of one experiment at most
+    centring: V/m, of the excitation's pull to the start, beyond which the axis would swing
     units: of the axis, in which the limits are told; V and m stand for them above
     """
 
@@ -35,10 +36,11 @@ class MachineLimits:
     acceleration: float = math.inf
     margin: float = MARGIN
     seconds: float = SECONDS
+    centring: float = math.inf
     units: Units = USUAL
 
     def __post_init__(self) -> None:
-        for name in ("voltage", "rms", "speed", "acceleration", "seconds"):
+        for name in ("voltage", "rms", "speed", "acceleration", "seconds", "centring"):
             if not getattr(self, name) > 0.0:
                 raise BadInput(f"limit of {name}", getattr(self, name), "above 0", "Give what the machine may do.")
         if not 0.0 <= self.margin < 1.0:

@@ -66,26 +66,25 @@ def _grid(limits: MachineLimits, sampling_rate: float) -> Iterator[dict[str, Any
 
 def _held(limits: MachineLimits, top: float) -> Iterator[dict[str, Any]]:
     """Away from the start, or along a path, both held by the pull."""
-    pull = FULL * limits.voltage / limits.room
-    for side, part, quiet in product((-PLACES, PLACES), HALVES[:2], HALVES[1::2]):
-        offset = side * part * FULL * limits.voltage
+    pulls = [min(part * FULL * limits.voltage / limits.room, limits.centring) for part in HALVES[:2]]
+    for side, pull, quiet in product((-PLACES, PLACES), pulls, HALVES[1::2]):
         yield {
             "kind": "noise",
             "low": 0.1,
             "high": top,
             "rms": quiet * (1.0 - PLACES) * limits.voltage / CREST,
-            "offset": offset,
-            "centring": part * pull,
+            "offset": side * pull * limits.room,
+            "centring": pull,
         }
-    for part, period in product(HALVES[:2], (3.0, LONGEST)):
-        yield {"kind": "off", "rms": 0.0, "slow": PLACES * part * FULL * limits.voltage, "slow_period": period, "centring": part * pull}
+    for pull, period in product(pulls, (3.0, LONGEST)):
+        yield {"kind": "off", "rms": 0.0, "slow": PLACES * pull * limits.room, "slow_period": period, "centring": pull}
 
 
 def _experiment(limits: MachineLimits, sampling_rate: float, told: dict[str, Any]) -> Experiment:
     """With the limits of the axis, and numbers that its settings allow."""
     told = {**told, "limit": limits.voltage, "travel_min": limits.travel[0], "travel_max": limits.travel[1]}
     told["brake"] = min(AxisExcitation.model_fields["brake"].default, 0.2 * (limits.travel[1] - limits.travel[0]))
-    told["centring"] = min(max(told.get("centring", 0.0), _centring(limits)), 1e4)
+    told["centring"] = min(max(told.get("centring", 0.0), _centring(limits)), limits.centring, 1e4)
     told["rms"] = min(told["rms"], PART.get(told["kind"], 0.0) * limits.voltage)
     told["slow"] = min(told.get("slow", 0.0), max(0.95 * limits.voltage - told["rms"] / PART.get(told["kind"], 1.0), 0.0))
     if "high" in told and told.get("kind") != "off":
@@ -96,4 +95,4 @@ def _experiment(limits: MachineLimits, sampling_rate: float, told: dict[str, Any
 
 def _centring(limits: MachineLimits) -> float:
     """V/m: a fiftieth of the voltage at the nearer end; enough against drift, too little to matter else."""
-    return min(0.02 * limits.voltage / limits.room, 1e4)
+    return min(0.02 * limits.voltage / limits.room, limits.centring, 1e4)

@@ -46,6 +46,7 @@ SAME_EPOCH = 0.05  # s by which the ROS time of counter 0 may move over a pause 
 SETTLED = 0.5  # s without a new listener before starting by itself: whoever was started together hears the first sample
 SAME_NODE = 2.0  # s to look for one node that reads voltage and writes position, before any two will do
 ALONE = 0.1  # s between two looks whether somebody else drives
+KNOCK = 1.0  # s after which zeros go out once more in lockstep, while no machine has answered yet
 STOP_LOOK = 0.02  # s between two looks whether STOP was asked for
 FOUND = 1.0  # s after which a node has found all who were there before it
 INTRODUCES = 0.5  # s in which a node that is seen becomes known by its name
@@ -441,6 +442,8 @@ class ExcitationNode(Overridable, LifecycleNode):
         now = time.monotonic()
         drive.tick(now)
         if drive.settings.lockstep:
+            if not drive.answered and self._until is not None and now > self._until + KNOCK and drive.state == "active":
+                self._send(drive)  # one of the two had not found the other yet when the last one went out
             self._in_lockstep(drive)
             return
         drive.skip(self._pacer.skip(now) * drive.settings.block)

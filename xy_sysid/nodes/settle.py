@@ -25,6 +25,7 @@ from std_msgs.msg import Float64MultiArray
 from xy_sysid.bags import BagWriter
 from xy_sysid.bags.atomic import write_text
 from xy_sysid.errors import BadInput, XySysidError
+from xy_sysid.excitation.motion_check import most_centring
 from xy_sysid.experiment_design.limits import MachineLimits
 from xy_sysid.experiment_design.loop import Budget
 from xy_sysid.experiment_design.walk import WalkPlan
@@ -133,7 +134,10 @@ class Settler(ExcitationClient):
         own = settings.axes[axis]
         middle = 0.5 * (own.travel_min + own.travel_max)
         travel = own.travel_min, own.travel_max
-        limits = MachineLimits(voltage=own.limit, travel=travel, start=middle, units=settings.units, seconds=self.wishes.budget.seconds)
+        centring = float(most_centring(settings)[list(settings.axes).index(axis)])
+        limits = MachineLimits(
+            voltage=own.limit, travel=travel, start=middle, units=settings.units, seconds=self.wishes.budget.seconds, centring=centring
+        )
         return WalkPlan(axis, limits, self.wishes.budget, self.wishes.sets)
 
     # the machine
