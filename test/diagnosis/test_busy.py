@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from itertools import count
 
+import numpy as np
 import pytest
 from helpers.simulated import recorded
 
@@ -27,3 +28,14 @@ def test_a_computer_that_stands_still_between_two_steps_gives_the_same_answer(ru
     story = diagnosed(begin(run), run, clock=lambda: float(next(hours)))
     assert story.diagnosis is not None and story.diagnosis.sentence == quick.sentence and not story.diagnosis.stopped
     assert diagnose(run, budget=1.0, clock=lambda: float(next(hours))).stopped
+
+
+def test_wherever_the_time_is_up_an_answer_comes() -> None:
+    """A gap with friction and a spring, where every kind of trial has its turn: a budget that ends at any of them ends with a verdict."""
+    gap = recorded("backlash+coulomb_friction+return_spring", seconds=4.0).run("x")
+    looks = count()
+    diagnose(gap, budget=1e9, clock=lambda: float(next(looks)))
+    for last in np.linspace(1, next(looks) - 1, 12):
+        passed = count()
+        found = diagnose(gap, budget=float(last), clock=lambda passed=passed: float(next(passed)))  # type: ignore[misc]
+        assert found.verdict in ("missing_effect", "not_in_library", "nothing_missing") and found.stopped == (found.sentence.find("stopped") > 0)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from helpers.simulated import recorded
@@ -134,3 +136,16 @@ def test_the_better_of_two_fits_gains_and_a_fit_gains_nothing_over_itself(both: 
     assert same.nats == 0.0 and same.probability == 0.5 and not same.is_sure
     assert size(best.fit, rigid.fit) > 100.0
     assert size(best.fit, best.fit) == 0.0
+
+
+def test_a_quick_fit_never_takes_the_place_of_one_on_all_data() -> None:
+    """A better quick fit of a known set is fitted on all data, too; when the time is up, what was known stays, and goes on leading."""
+    pool = Pool(data_of("coulomb_friction", seconds=5.0), STANDARD)
+    begun = pool.begin(fit_base(pool.data))
+    quick = begun.brief
+    begun.brief = replace(quick, excess=quick.excess + 1.0)
+    pool.late = lambda: True
+    assert pool.remember(frozenset(), quick, quick, leads=False) is begun
+    pool.late = lambda: False
+    better = pool.remember(frozenset(), quick, quick, leads=False)
+    assert better.whole and better.leads and pool.best is pool.nodes[frozenset()]

@@ -180,24 +180,24 @@ def judged(data: AxisData, ladder: Ladder, library: Library) -> Diagnosis:
 
 
 def _surest(data: AxisData, ladder: Ladder) -> tuple[Ladder, float]:
-    """The ladder down to where its effects are surer than not, and the confidence in these.
+    """The ladder down to where each of its effects is surer than not, and the confidence in all of these together.
 
     Where two sets do the same, what they share is sure, and what they differ in is not. If nothing is surer than not, all are told.
     """
     together = ladder.final.one_step  # judged one sample ahead, as one: a rung may have brought two of them
     for count in range(len(ladder.effects), len(ladder.effects) - 1 if together else 0, -1):
         names = ladder.effects[:count]
-        confidence = _confidence(ladder, names)
+        surest = min(_confidence(ladder, (name,)) for name in names)
         rungs = (place for place, step in enumerate(ladder.steps) if {name for name, _ in step.fit.model.effects} == set(names))
         place = next(rungs, None)
         if place is None and names != ladder.effects:
             continue
         fit = ladder.final if place is None or names == ladder.effects else ladder.steps[place].fit
         explained = ladder.explained if fit is ladder.final else part_explained(data, ladder.base, fit)
-        if confidence < 0.5 or explained < 0.5:
+        if surest < 0.5 or explained < 0.5:
             continue
         if fit is ladder.final:
-            return ladder, confidence
+            return ladder, _confidence(ladder, names)
         library = fit.model.library
         rivals = tuple(rival for rival in ladder.rivals if not contains(library, frozenset(rival.effects), frozenset(names)))
         told = replace(
@@ -209,7 +209,7 @@ def _surest(data: AxisData, ladder: Ladder) -> tuple[Ladder, float]:
             explained=explained,
             discrepancy=math.sqrt(max(fit.held_out_error**2 - data.noise**2, 0.0)),
         )
-        return told, confidence
+        return told, _confidence(ladder, names)
     return ladder, _confidence(ladder, ladder.effects)
 
 

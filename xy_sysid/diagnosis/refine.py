@@ -86,7 +86,7 @@ def refine_steps(
 
 
 def _sets(pool: Pool, trials: OneStepTrials | None) -> Iterator[Trying]:
-    """Search, simplify, and search again from what is simpler, until neither changes the best set; rivals of it last."""
+    """Search, simplify, and search again from what is simpler, until neither changes the best set."""
     before = None
     while pool.best is not before and not pool.late():
         before = pool.best
@@ -97,9 +97,8 @@ def _sets(pool: Pool, trials: OneStepTrials | None) -> Iterator[Trying]:
                     yield Trying(tuple(sorted(tried)))
                 if trials.found is not None:
                     return
-        for step in (pool.simplified(), pool.rivals(pool.best.effects)):
-            for names in step:
-                yield Trying(tuple(sorted(names)))
+        for names in pool.simplified():
+            yield Trying(tuple(sorted(names)))
     if trials is not None and pool.best.fit.excess >= AT_FLOOR:
         for tried in trials.tried(last=True):
             yield Trying(tuple(sorted(tried)))

@@ -15,7 +15,7 @@ from xy_sysid.greybox.one_step import follower, one_step_fit
 from xy_sysid.hypotheses import starts
 from xy_sysid.hypotheses.companions import put_beside
 from xy_sysid.hypotheses.compare import gain
-from xy_sysid.hypotheses.criteria import AT_FLOOR, PRICE, RIVAL, TELLS
+from xy_sysid.hypotheses.criteria import ALMOST, AT_FLOOR, PRICE, TELLS
 from xy_sysid.hypotheses.one_step import Filtered
 from xy_sysid.hypotheses.pool import Node, Pool, alike
 
@@ -148,7 +148,7 @@ def _of_one_step(
 def _ordered(library: Library, sizes: Mapping[str, float]) -> tuple[str, ...]:
     """Names, the largest size first; of what is alike to the largest dry friction first, as every machine has it."""
     order = sorted(sizes, key=lambda name: -sizes[name])
-    alike = [name for name in order if library[name].is_dry and sizes[name] >= RIVAL * sizes[order[0]]]
+    alike = [name for name in order if library[name].is_dry and sizes[name] >= ALMOST * sizes[order[0]]]
     return tuple(dict.fromkeys((*alike, *order)))
 
 

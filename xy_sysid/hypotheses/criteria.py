@@ -37,7 +37,9 @@ DOUBTFUL = _number("doubtful", 0.1, "1", "above this probability that it predict
 SIZE = _number("size", 0.7, "1", "least size of a named effect; an unmodelled force could imitate a smaller one")
 WORTH = _number("worth adding", 0.25, "1", "least size of an effect that is added without being named")
 WIDTH = _number("width", 6, "moves", "most swaps, and most pairs, from one set; the true one was among the first four")
-RIVAL = _number("rival", 0.7, "1", "another effect is fitted if it promises this part of the chosen effect's gain")
+ALMOST = _number(
+    "almost", 0.7, "1", "of two gains or sizes the smaller is almost as large: dry friction is then named first, a pair promises no more"
+)
 OPTIMISM = _number("optimism", 3.0, "1", "a fit gains at most this multiple of its first-order prediction")
 HOPELESS = _number("hopeless", 1.5, "nats a line", "a quick fit this far behind after one round stops; none came near the best")
 NEAR = _number("near", 0.03, "1", "a quick fit within this part of the best gain is fitted to all data")

@@ -11,7 +11,7 @@ from xy_sysid.axis.model import AxisModel, Library
 from xy_sysid.effects import Effect
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import TOLD, GreyboxFit, first_excess, is_read, other_starts, scene_of, screened
-from xy_sysid.hypotheses.criteria import RIVAL, WIDTH
+from xy_sysid.hypotheses.criteria import ALMOST, WIDTH
 from xy_sysid.hypotheses.starts import added, swapped
 
 
@@ -104,7 +104,7 @@ def _pairs(
         if is_twice(library, own | {one, other}):
             continue
         both = together((one, other))
-        if RIVAL * both > gains[one]:
+        if ALMOST * both > gains[one]:
             names = (one, other)
             found.append(Move(own | {one, other}, count(library, names), both, partial(starts, names)))
     return found

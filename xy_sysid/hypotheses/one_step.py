@@ -95,7 +95,7 @@ class OneStepTrials:
             for name in sorted(best.effects - names):
                 less = less.without(name)
             node = pool.fitted(names, lambda: [less])
-            found += [pool.finished(node)] if node is not None else []
+            found += [node] if node is not None and pool.finished(node).whole else []
         return found if found and self._explains(found[0]) else list(dict.fromkeys((*found, pool.nodes[pool.kept])))
 
     def ahead(self, found: GreyboxFit) -> float:

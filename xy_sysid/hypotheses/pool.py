@@ -16,7 +16,7 @@ from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit, best_start, finish, first_excess, fit
 from xy_sysid.hypotheses import starts
 from xy_sysid.hypotheses.compare import force_explained, gain, size
-from xy_sysid.hypotheses.criteria import AT_FLOOR, HOPELESS, MOST_EFFECTS, NEAR, OPTIMISM, PRICE, RIVAL, WORTH
+from xy_sysid.hypotheses.criteria import AT_FLOOR, HOPELESS, MOST_EFFECTS, NEAR, OPTIMISM, PRICE, WORTH
 from xy_sysid.hypotheses.moves import Move, count, moves
 from xy_sysid.hypotheses.refusal import refusal
 
@@ -99,12 +99,12 @@ class Pool:
         return self.remember(frozenset(name for name, _ in start.model.effects), brief, start)
 
     def remember(self, effects: frozenset[str], brief: GreyboxFit, found: GreyboxFit, leads: bool = True, promised: float = 0.0) -> Node:
-        """A set with its fit, in the place of a worse one of the same set."""
-        parameters = count(self.library, effects - self.kept)
-        refused = self._refusal(effects, found)
-        node = Node(effects, parameters, brief, found, refused=refused, leads=leads, promised=promised)
-        known = self.nodes.get(effects)
-        if known is not None and not node.whole and known.brief.excess <= brief.excess + PRICE / self.scale:
+        """A set with its fit, in the place of a worse one of the same set; a fit on all data gives way to another one only."""
+        parameters, known = count(self.library, effects - self.kept), self.nodes.get(effects)
+        leads = leads or (known is not None and known.leads)
+        node = Node(effects, parameters, brief, found, refused=self._refusal(effects, found), leads=leads, promised=promised)
+        lower = known is None or brief.excess < known.brief.excess - PRICE / self.scale
+        if known is not None and not node.whole and not (lower and (not known.whole or self.finished(node).whole)):
             return known
         if known is not None and known.whole and node.whole and self.score(known) <= self.score(node) and not known.refused:
             return known
@@ -125,7 +125,6 @@ class Pool:
             for node in dict.fromkeys((best, self.answer)):  # what would be said if the search ended here is another place to go on from
                 if node.moves is None and len(node.effects - self.kept) < self.most:
                     node.moves = self._moves(node)
-                    yield from self._ways_back(node)
             refused = self._best_refused()
             if refused is not None and refused.moves is None:  # its laws may do, by other names
                 refused.moves = [move for move in self._moves(refused) if not move.effects >= refused.effects]
@@ -161,16 +160,6 @@ class Pool:
         refused = [node for node in self.nodes.values() if node.refused and node.whole and self.score(node) < self.score(self.best)]
         return min(refused, key=self.score, default=None)
 
-    def _ways_back(self, best: Node) -> Iterator[frozenset[str]]:
-        """Ask for the moves from the best set without one of its effects, in whose place another may do better; yields as ``search``."""
-        for name in sorted(best.effects - self.kept) if len(best.effects - self.kept) > 1 else ():
-            effects = best.effects - {name}
-            if effects not in self.nodes:
-                yield effects
-            node = self.fitted(effects, partial(starts.dropped, self.data, best.fit, name, self._alone(effects)))
-            if node is not None and not node.refused and node.moves is None and self.finished(node).whole:
-                node.moves = self._moves(node)
-
     def _alone(self, effects: frozenset[str]) -> list[AxisModel]:
         """Models of single effects of a set, as far as they are known."""
         return [self.nodes[one].fit.model for other in sorted(effects) if (one := self.kept | {other}) in self.nodes]
@@ -188,16 +177,23 @@ class Pool:
         )
 
     def _next(self, nodes: Sequence[Node] = ()) -> tuple[Node, Move] | None:
-        """The move that promises the best score, of those that promise a better one than would be said; from some sets, or from all."""
-        least, chosen = self.score(self.answer) - PRICE, None
+        """The move that promises the best score, of those that promise a better one than would be said; from some sets, or from all.
+
+        Two effects at once only where no other move promises that: one after the other costs less, and says which of them helps.
+        """
+        found: dict[bool, tuple[float, Node, Move]] = {}
+        least = self.score(self.answer) - PRICE
         for node in nodes or self.nodes.values():
-            if not node.whole:
-                continue
-            for move in node.moves or ():
-                hoped = self.score(node) - self.scale * move.promised + PRICE * move.parameters
-                if self._is_open(node, move) and hoped < least and self._may_be_worth(node, move):
-                    least, chosen = hoped, (node, move)
-        return chosen
+            for move in node.moves or () if node.whole else ():
+                hoped, pair = self.score(node) - self.scale * move.promised + PRICE * move.parameters, self._is_pair(node, move)
+                if hoped < min(least, found[pair][0] if pair in found else least) and self._is_open(node, move) and self._may_be_worth(node, move):
+                    found[pair] = hoped, node, move
+        chosen = found.get(False, found.get(True))
+        return None if chosen is None else chosen[1:]
+
+    def _is_pair(self, parent: Node, move: Move) -> bool:
+        """It adds two effects at once."""
+        return len(move.effects - parent.effects) > 1
 
     def _may_be_worth(self, node: Node, move: Move) -> bool:
         """What is new may be worth adding, if it gains a few times what it promises to first order."""
@@ -251,16 +247,6 @@ class Pool:
         better, new = gain(one, other), len(node.effects) - len(simpler.effects)
         least = (1.0 + self.worth) ** new - 1.0 if new > 0 else WORTH
         return better.is_sure and better.nats > PRICE * (node.parameters - simpler.parameters) and size(one, other) >= least
-
-    def rivals(self, taken: frozenset[str], most: int = 2) -> Iterator[frozenset[str]]:
-        """Fit on all data what promised nearly as much as what was taken, and was not tried as that did well; yields as ``search``."""
-        waiting = [(node, move) for node in self.nodes.values() for move in node.moves or () if move.effects not in self.nodes]
-        for parent, move in sorted(waiting, key=lambda item: -item[1].promised):
-            own = [node.promised for node in self.nodes.values() if parent.effects < node.effects <= taken]
-            if most and own and not self.late() and len(move.effects) <= len(taken) and move.promised > RIVAL * max(own):
-                most -= 1
-                yield move.effects
-                self._try(parent, move)
 
     def simplified(self) -> Iterator[frozenset[str]]:
         """Try simpler sets than the best; yields as ``search``. What the best gains over a simpler one by chance, or too little, it does not keep."""
