@@ -8,15 +8,20 @@ import numpy as np
 import pytest
 from helpers.simulated import recorded
 
+from xy_sim.machine import Machine
 from xy_sysid.axis.model import STANDARD
+from xy_sysid.diagnosis.ladder import contains
 from xy_sysid.diagnosis.refine import Effort, refine
 from xy_sysid.diagnosis.rungs import with_one_more
+from xy_sysid.excitation.lockstep import drive
 from xy_sysid.greybox.axis_data import AxisData, prepare
-from xy_sysid.greybox.free_run import fit_base
+from xy_sysid.greybox.free_run import fit, fit_base
 from xy_sysid.hypotheses.compare import gain, size
 from xy_sysid.hypotheses.criteria import AT_FLOOR, MOST_EFFECTS, SIZE
 from xy_sysid.hypotheses.moves import is_twice, moves
 from xy_sysid.hypotheses.pool import Pool
+from xy_sysid.settings import AxisExcitation, ExcitationSettings
+from xy_sysid.units import Units
 
 
 def data_of(effect: str, seconds: float = 20.0) -> AxisData:
@@ -149,3 +154,22 @@ def test_a_quick_fit_never_takes_the_place_of_one_on_all_data() -> None:
     pool.late = lambda: False
     better = pool.remember(frozenset(), quick, quick, leads=False)
     assert better.whole and better.leads and pool.best is pool.nodes[frozenset()]
+
+
+def test_what_pulls_back_with_the_sine_of_an_angle_is_a_weight_and_no_wave() -> None:
+    """A wave whose period was fitted to one turn gives way to gravity, its special case, which has one parameter less."""
+    machine = Machine.from_file("hanging.yaml")
+    axis = AxisExcitation(rms=1.5, low=0.1, high=5.0, limit=8.0, centring=0.0, travel_min=-9.0, travel_max=9.0, brake=0.5, seed=3)
+    made = drive(machine, ExcitationSettings(lockstep=True, speed=0.0, rate=1000.0, block=50, unit="rad", axes={"x": axis}), 30.0)
+    data = prepare(1000.0, *made.axis("x"), units=Units("V", "rad"))
+    pool = Pool(data, STANDARD)
+    base = pool.begin(fit_base(data)).fit
+    weight = with_one_more(data, STANDARD, base, "gravity").model
+    amplitude, phase = dict(weight.effects)["gravity"]
+    wave = fit(data, weight.without("gravity").with_effect("cogging", (amplitude, 6.2, phase)))
+    pool.remember(frozenset({"cogging"}), wave, wave)
+    assert pool.best.effects == {"cogging"}
+    assert frozenset({"gravity"}) in list(pool.simplified())
+    assert pool.best.effects == {"gravity"}
+    assert contains(STANDARD, frozenset({"cogging"}), frozenset({"gravity"}))
+    assert not contains(STANDARD, frozenset({"gravity"}), frozenset({"cogging"}))

@@ -198,8 +198,8 @@ def _look_alikes(fitted: list[tuple[Candidate, GreyboxFit]], name: str, library:
     for other in library[name].look_alikes:
         if other not in library.effects or library[other].category == "base":
             continue
-        richer = len(library[other].parameters) > len(library[name].parameters)
-        if other not in fits and richer and library[other].family and library[other].family == library[name].family:
+        richer = library[name].is_special_case(library[other])
+        if other not in fits and richer:
             apart, text = False, f"{other}, with more parameters, was not fitted: nothing in these data asks for more than {name}"
         elif other not in fits:
             apart, text = True, f"the error has no trace of {other}, or a weak one"
@@ -207,7 +207,7 @@ def _look_alikes(fitted: list[tuple[Candidate, GreyboxFit]], name: str, library:
             apart = True
             left, least = fits[other], fits[name].held_out_error
             text = f"{other} leaves {moved(left.held_out_error, left.units.judged)}, {name} {bare(least, left.units.judged)}"
-        elif library[other].family and library[other].family == library[name].family and richer:
+        elif richer:
             apart, text = False, f"{other} contains {name} and does as well; nothing in these data asks for more than {name}"
         else:
             apart, text = False, f"these data cannot tell {name} from {other}"

@@ -104,7 +104,6 @@ def is_taken_for(library: Library, names: frozenset[str], others: frozenset[str]
 
 
 def contains(library: Library, names: frozenset[str], others: frozenset[str]) -> bool:
-    """A set has every law of another: the very effects, or richer relatives of them."""
+    """A set has every law of another: the very effects, or more general ones."""
     laws = set(names) | {part for name in names if (whole := library[name].sum_of) is not None for part in whole.parts}
-    families = {library[name].family: len(library[name].parameters) for name in names if library[name].family}
-    return all(name in laws or families.get(library[name].family, 0) > len(library[name].parameters) for name in others)
+    return all(name in laws or any(library[name].is_special_case(library[own]) for own in names) for name in others)

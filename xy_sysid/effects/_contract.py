@@ -269,6 +269,7 @@ class Effect:
                  for effects so large that the base alone is led astray
     states:      names of the law's states; all start at zero
     family:      effects of one family replace one another
+    special_of:  the effect, of no such family, that becomes this one at certain values of its parameters
     order:       place among the effects of its category, in the direction of the signal
     simulable:   False if free simulation cannot judge it
     refusal:     why values explain nothing on a travel between two positions (m), though each is within its bounds: in words, or empty
@@ -298,6 +299,7 @@ class Effect:
     joint: Callable[[Scene], Iterable[tuple[float, float, float, tuple[float, ...]]]] | None = None
     states: tuple[str, ...] = ()
     family: str = ""
+    special_of: str = ""
     order: int = 0
     simulable: bool = True
     one_step: OneStep | None = None
@@ -335,6 +337,10 @@ class Effect:
             raise BadInput(f"effect {self.name}: straight", "of another law", "a force in proportion to v alone, forth and back", act)
         if self.mode_frequency and self.mode_frequency not in self.names:
             raise BadInput(f"effect {self.name}: mode_frequency", repr(self.mode_frequency), ", ".join(self.names), "Name one of these.")
+
+    def is_special_case(self, other: Effect) -> bool:
+        """The other law becomes this one at certain values of its parameters: of one family the one with fewer parameters is taken for it."""
+        return self.special_of == other.name or bool(self.family and self.family == other.family and len(self.names) < len(other.names))
 
     def _is_straight(self) -> bool:
         """Whether it is a force that asks for nothing but speed and base, and is twice as large at twice the speed."""

@@ -48,5 +48,6 @@ EFFECT = Effect(
     guesses=guesses,
     on_table=True,
     angular=True,
+    special_of="cogging",
     suspects=("return_spring",),
 )

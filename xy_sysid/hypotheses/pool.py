@@ -274,8 +274,8 @@ class Pool:
             effect = library[name]
             alone = self._alone(best.effects - {name})
             for relative in sorted(library.acting, key=lambda item: len(item.parameters)):
-                related = effect.family and relative.family == effect.family and relative.simulable and relative.name not in best.effects
-                if related and len(relative.parameters) < len(effect.parameters):
+                fits = relative.simulable and relative.name not in best.effects and (data.units.output == "rad" or not relative.angular)
+                if fits and relative.is_special_case(effect):
                     yield best.effects - {name} | {relative.name}, partial(starts.swapped, data, best.fit, name, relative, None)
             yield best.effects - {name}, partial(starts.dropped, data, best.fit, name, alone)
 
