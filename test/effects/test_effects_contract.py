@@ -19,7 +19,7 @@ from xy_sysid.samples.block import FloatArray
 
 RATE = 2000.0
 PACKAGE = Path(__file__).parents[2] / "xy_sysid"
-RELATIONS = ("look_alikes", "suspects", "sum_of", "rubs", "hides")  # fields in which an effect may name others
+RELATIONS = ("look_alikes", "suspects", "special_of", "sum_of", "rubs", "hides")  # fields in which an effect may name others
 IN_WORK: tuple[str, ...] = ()  # these still name some; take them off when they no longer do
 
 

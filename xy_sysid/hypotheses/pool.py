@@ -126,8 +126,8 @@ class Pool:
                 if node.moves is None and len(node.effects - self.kept) < self.most:
                     node.moves = self._moves(node)
             refused = self._best_refused()
-            if refused is not None and refused.moves is None:  # its laws may do, by other names
-                refused.moves = [move for move in self._moves(refused) if not move.effects >= refused.effects]
+            if refused is not None and refused.moves is None:  # its laws may do, by other names, or without the one that is refused
+                refused.moves = [*self._without_refused(refused), *(move for move in self._moves(refused) if not move.effects >= refused.effects)]
             move = self._next()
             if move is None:
                 return
@@ -160,6 +160,15 @@ class Pool:
         refused = [node for node in self.nodes.values() if node.refused and node.whole and self.score(node) < self.score(self.best)]
         return min(refused, key=self.score, default=None)
 
+    def _without_refused(self, node: Node) -> list[Move]:
+        """The set without the effect for which it is refused."""
+        name = node.refused.partition(":")[0]
+        if name not in node.effects - self.kept:
+            return []
+        less = node.effects - {name}
+        begun = partial(starts.dropped, self.data, node.fit, name, self._alone(less))
+        return [move for move in [Move(less, -count(self.library, [name]), 0.0, begun)] if self._is_open(node, move)]
+
     def _alone(self, effects: frozenset[str]) -> list[AxisModel]:
         """Models of single effects of a set, as far as they are known."""
         return [self.nodes[one].fit.model for other in sorted(effects) if (one := self.kept | {other}) in self.nodes]
@@ -170,30 +179,29 @@ class Pool:
         return [move for move in allowed if self._is_open(node, move)]
 
     def _is_open(self, parent: Node, move: Move) -> bool:
-        """A set that is not known; or that came to nothing from one start, and may begin from a relative in the place of one of its laws."""
+        """A set that is not known; or that came to nothing from one start, and may begin from another, in the place of a law or without one."""
         known = self.nodes.get(move.effects)
         return known is None or (
-            (not known.whole or known.refused != "") and len(move.effects) == len(parent.effects) and (parent.effects, move.effects) not in self.tried
+            (not known.whole or known.refused != "") and len(move.effects) <= len(parent.effects) and (parent.effects, move.effects) not in self.tried
         )
 
     def _next(self, nodes: Sequence[Node] = ()) -> tuple[Node, Move] | None:
         """The move that promises the best score, of those that promise a better one than would be said; from some sets, or from all.
 
-        Two effects at once only where no other move promises that: one after the other costs less, and says which of them helps.
+        Two effects at once only where no other move from their set promises that: one after the other costs less, and says which of them helps.
         """
-        found: dict[bool, tuple[float, Node, Move]] = {}
-        least = self.score(self.answer) - PRICE
+        least, chosen = self.score(self.answer) - PRICE, None
         for node in nodes or self.nodes.values():
-            for move in node.moves or () if node.whole else ():
-                hoped, pair = self.score(node) - self.scale * move.promised + PRICE * move.parameters, self._is_pair(node, move)
-                if hoped < min(least, found[pair][0] if pair in found else least) and self._is_open(node, move) and self._may_be_worth(node, move):
-                    found[pair] = hoped, node, move
-        chosen = found.get(False, found.get(True))
-        return None if chosen is None else chosen[1:]
+            hopeful = [move for move in node.moves or () if self._hoped(node, move) < least and self._is_open(node, move)]
+            hopeful = [move for move in hopeful if self._may_be_worth(node, move)]
+            for move in [move for move in hopeful if len(move.effects - node.effects) < 2] or hopeful:
+                if chosen is None or self._hoped(node, move) < self._hoped(*chosen):
+                    chosen = node, move
+        return chosen
 
-    def _is_pair(self, parent: Node, move: Move) -> bool:
-        """It adds two effects at once."""
-        return len(move.effects - parent.effects) > 1
+    def _hoped(self, node: Node, move: Move) -> float:
+        """The score that a move promises, nats."""
+        return self.score(node) - self.scale * move.promised + PRICE * move.parameters
 
     def _may_be_worth(self, node: Node, move: Move) -> bool:
         """What is new may be worth adding, if it gains a few times what it promises to first order."""
