@@ -24,6 +24,7 @@ from xy_sysid.samples.recording import Recording, Run
 from xy_sysid.settings import IdentifierSettings
 
 Row = dict[str, Any]
+FirstSets = tuple[tuple[str, tuple[str, ...]], ...]  # axes, and the effects that are tried first in each
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,10 +32,12 @@ class Plan:
     """How an axis is analysed.
 
     follow:  effects whose parameters are estimated in every recording, named or not, together with those that are named
+    first:   by axis, effects that are tried before all others, as an earlier recording has them
     library: the effects that are known; clock: processor time, s
     """
 
     follow: tuple[str, ...] = ()
+    first: FirstSets = ()
     library: Library = STANDARD
     clock: Callable[[], float] = never
 
@@ -104,7 +107,7 @@ def _of_transfer_function(found: Fit) -> Row:
 def _diagnosis(recording: Recording, run: Run, plan: Plan) -> Row:
     runs = runs_together(recording.stretches(run.axis))
     several_moves(runs)
-    found = diagnose(runs, plan.library)
+    found = diagnose(runs, plan.library, first=dict(plan.first).get(run.axis, ()))
     row: Row = {
         "verdict": found.verdict,
         "effects": _listed(found.effects),
@@ -117,7 +120,7 @@ def _diagnosis(recording: Recording, run: Run, plan: Plan) -> Row:
     if found.ladder is None:  # not enough data
         return row | {"noise": None, "discrepancy": None, "explained": None}
     named = found.ladder.final if found.effects else found.ladder.base
-    row |= _of_fit(named) | {"rigid_error": found.ladder.base.held_out_error}
+    row |= _of_fit(named) | {"rigid_error": found.ladder.base.held_out_error, "tried_first": _listed(found.ladder.tried_first)}
     return row | _followed(runs, plan, found) if plan.follow else row
 
 
