@@ -15,13 +15,17 @@ from xy_sysid.diagnosis.of_run import diagnose, refined, runs_together
 from xy_sysid.diagnosis.refine import Effort, never
 from xy_sysid.errors import BadInput
 from xy_sysid.fitting import Fit
+from xy_sysid.fitting.choose_orders import choose
+from xy_sysid.fitting.of_recording import judged, structure_from
 from xy_sysid.fitting.of_run import fit_response, frf
+from xy_sysid.fitting.verdicts import Validation, validate
 from xy_sysid.fleets.columns import ROOTS, column_of
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.response.frf import FrequencyResponse
 from xy_sysid.samples.moves import several_moves
 from xy_sysid.samples.recording import Recording, Run
 from xy_sysid.settings import IdentifierSettings
+from xy_sysid.units import derivative_of
 
 Row = dict[str, Any]
 FirstSets = tuple[tuple[str, tuple[str, ...]], ...]  # axes, and the effects that are tried first in each
@@ -69,8 +73,22 @@ def row_of(recording: Recording, axis: str, plan: Plan) -> Row:
 
 def _linear(recording: Recording, run: Run, plan: Plan) -> Row:
     response = frf(run)
-    found, checks = fit_response(response, IdentifierSettings())
+    found, checks = _fitted(response)
     return _of_response(response) | _of_transfer_function(found) | {"tf_trustworthy": checks.trustworthy}
+
+
+def _fitted(response: FrequencyResponse) -> tuple[Fit, Validation]:
+    """A transfer function of the fewest orders that noise explains; others are tried only where it does not, as in the live nodes."""
+    settings = IdentifierSettings()
+    if derivative_of(response.output_unit) == 2:  # which of three families it is has to be found out, too
+        return fit_response(response, settings)
+    judged(response)
+    try:
+        with np.errstate(all="ignore"):  # what overflows ends in a figure that the verdicts judge
+            choice = choose(response, structure_from(settings), thorough=False)
+            return choice.fit, validate(choice.fit, response, choice=choice)
+    except (np.linalg.LinAlgError, ZeroDivisionError):
+        raise BadInput("fit", "beyond what numbers can hold", "orders that the data determine", "Record for longer.") from None
 
 
 def _of_response(response: FrequencyResponse) -> Row:
