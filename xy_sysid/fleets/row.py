@@ -16,8 +16,9 @@ from xy_sysid.diagnosis.refine import Effort, never
 from xy_sysid.errors import BadInput
 from xy_sysid.fitting import Fit
 from xy_sysid.fitting.choose_orders import choose
-from xy_sysid.fitting.of_recording import judged, structure_from
+from xy_sysid.fitting.of_recording import judged
 from xy_sysid.fitting.of_run import fit_response, frf
+from xy_sysid.fitting.structure import structure_from
 from xy_sysid.fitting.verdicts import Validation, validate
 from xy_sysid.fleets.columns import ROOTS, column_of
 from xy_sysid.greybox.free_run import GreyboxFit
