@@ -9,13 +9,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-import pytest
-from helpers.cli_tools import refused
 from helpers.simulated import recorded
 
-from xy_sysid.errors import BadRecording
 from xy_sysid.fleets.columns import TIMES
-from xy_sysid.fleets.journal import FILE, journal
 from xy_sysid.fleets.naming import Names
 from xy_sysid.fleets.of_file import Done, Task, rows_of_file
 from xy_sysid.fleets.reference import References
@@ -101,24 +97,3 @@ def test_a_row_from_a_known_set_has_the_parameters_of_a_whole_search(tmp_path: P
     differs = {*TIMES, "key"}
     assert {k: v for k, v in wrong.items() if k not in differs} == {k: v for k, v in whole.items() if k not in differs}
     assert len({row["key"] for row in (whole, known, wrong)}) == 3 and whole["tried_first"] == ""
-
-
-@pytest.mark.parametrize("name", [FILE, "mill-01.parquet"])
-def test_a_run_follows_no_link_in_its_table(name: str, tmp_path: Path) -> None:
-    """Refused in one line before any work is done; what the link leads to is untouched, and is not made where it is not there."""
-    data, table, other = tmp_path / "mill-01" / "2026-03-01.csv", tmp_path / "table", tmp_path / "precious"
-    data.parent.mkdir()
-    data.write_text("rubbish\n", encoding="utf-8")
-    table.mkdir()
-    (table / name).symlink_to(other)
-    assert f"a link to {other}" in refused("fleet", data.parent, "-o", table) and not other.exists()
-    other.write_bytes(b"what was there before")
-    assert f"a link to {other}" in refused("fleet", data.parent, "-o", table)
-    assert other.read_bytes() == b"what was there before"
-
-
-def test_a_journal_that_is_no_file_is_refused(tmp_path: Path) -> None:
-    """A folder of its name."""
-    (tmp_path / FILE).mkdir()
-    with pytest.raises(BadRecording, match="no file"), journal(tmp_path):
-        pass
