@@ -12,6 +12,7 @@ import numpy as np
 from xy_sysid.axis.model import STANDARD, Library
 from xy_sysid.comparison.where_it_fails import Comparison, compare_velocity
 from xy_sysid.diagnosis.equal_laws import equals, likelihood
+from xy_sysid.diagnosis.first_set import settled
 from xy_sysid.diagnosis.ladder import Candidate, Ladder, contains, part_explained
 from xy_sysid.diagnosis.refine import Effort, never, refine
 from xy_sysid.errors import BadInput
@@ -93,9 +94,20 @@ def diagnose_all(
     return not_enough(missing) if missing else diagnose_prepared(prepare_all(sampling_rate, recordings), library, budget, clock)
 
 
-def diagnose_prepared(data: AxisData, library: Library = STANDARD, budget: float = math.inf, clock: Callable[[], float] = never) -> Diagnosis:
-    """Diagnose one axis from data that suffice."""
-    return judged(data, refine(data, library, effort=Effort(budget=budget, clock=clock, size=SIZE)), library)
+def diagnose_prepared(
+    data: AxisData,
+    library: Library = STANDARD,
+    budget: float = math.inf,
+    clock: Callable[[], float] = never,
+    first: tuple[str, ...] = (),
+) -> Diagnosis:
+    """Diagnose one axis from data that suffice. first: effects that are tried before all others (see ``first_set``)."""
+    effort = Effort(budget=budget, clock=clock, size=SIZE)
+    begun = effort.now()
+    ladder = settled(data, library, first, effort)
+    if ladder is None:
+        ladder = refine(data, library, effort=replace(effort, budget=budget + begun - effort.now()))
+    return judged(data, ladder, library)
 
 
 def not_enough(missing: str, units: Units = USUAL) -> Diagnosis:

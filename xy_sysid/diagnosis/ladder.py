@@ -65,6 +65,7 @@ class Ladder:
     refused:  (effects, why they explain nothing); explained: part (0..1) of the base's error power beyond the noise that is gone
     noise, discrepancy: of the held-out error, m/s rms: what the encoder adds, and what no effect explains
     stopped:  the budget ended the search
+    tried_first: a set that was known before and ended the search, as it explains the data down to the noise floor; see ``first_set``
     """
 
     steps: tuple[Step, ...]
@@ -80,6 +81,7 @@ class Ladder:
     noise: float = 0.0
     discrepancy: float = 0.0
     stopped: bool = False
+    tried_first: tuple[str, ...] = ()
 
     @property
     def base(self) -> GreyboxFit:

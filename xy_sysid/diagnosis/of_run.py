@@ -138,6 +138,7 @@ def diagnose(
     budget: float = math.inf,
     clock: Callable[[], float] = never,
     tolerance: float = EPSILON,
+    first: tuple[str, ...] = (),
 ) -> Diagnosed:
     """Which physical effects the rigid model misses, with evidence and runner-up; or that nothing is missing, or that none is known.
 
@@ -146,6 +147,8 @@ def diagnose(
     budget: s after which the best so far is said, if ``clock`` (for example ``time.process_time``) tells the time; without one the search
             ends after a fixed amount of work, and the same data give the same answer however busy the machine is
     tolerance: part of the motion that a model may leave
+    first:  effects of an earlier recording of this axis. If they explain the data down to the noise floor, and no simpler set does as well,
+            no other set is tried
     Too little data is an answer, ``not_enough_data``, and no error. Raises BadInput for runs that do not belong together.
     """
     runs = runs_together(data)
@@ -155,7 +158,7 @@ def diagnose(
         if missing:
             found = one.not_enough(missing, units)
         else:
-            found = one.diagnose_prepared(prepare_all(rate, signals, tolerance, units), library, budget, clock)
+            found = one.diagnose_prepared(prepare_all(rate, signals, tolerance, units), library, budget, clock, first)
     values = {item.name: getattr(found, item.name) for item in fields(found)}
     return Diagnosed(**values, runs=runs)
 

@@ -65,6 +65,7 @@ _DIAGNOSIS = (
     Column("noise", "number", "m/s", "what the encoder adds to the error, rms", trended=True),
     Column("discrepancy", "number", "m/s", "what no effect explains, rms"),
     Column("model", "text", "", "effects of the model whose parameters follow: those that are named, and those that the fleet follows"),
+    Column("tried_first", "text", "", "effects of the axis' first recording, if they explain this one too, so that no others were tried; else empty"),
     Column("one_step", "truth", "", "the model is judged one sample ahead (backlash), and its held-out error is of that"),
 )
 _ORIGIN = (

@@ -17,7 +17,7 @@ from typing import IO, Any
 from xy_sysid.axis.model import STANDARD, Library
 from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.fleets.row import Row
-from xy_sysid.fleets.table import merged
+from xy_sysid.fleets.table import ENDING, merged
 
 FILE = ".journal.jsonl"  # readers of Parquet leave out names that begin with a dot
 MANY = 500  # rows after which they go into the table
@@ -62,7 +62,8 @@ def journal(folder: Path, library: Library = STANDARD) -> Iterator[Journal]:
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        file = (folder / FILE).open("a+", encoding="utf-8")
+        own_files(folder)
+        file = os.fdopen(os.open(folder / FILE, os.O_RDWR | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW, 0o666), "a+", encoding="utf-8")
     except OSError as error:
         raise BadRecording(folder, f"cannot be written ({error.strerror or error})", "Choose a folder that you may write to.") from None
     with file:
@@ -75,6 +76,17 @@ def journal(folder: Path, library: Library = STANDARD) -> Iterator[Journal]:
             yield kept
         finally:
             kept.fold()
+
+
+def own_files(folder: Path) -> None:
+    """Raises BadRecording where a file that a run writes is a link or no file: it would change something outside of the table.
+
+    The journal is opened without following links, too, in case one comes there meanwhile.
+    """
+    for path in (folder / FILE, *sorted(folder.glob(f"*{ENDING}"))):
+        if path.is_symlink() or (path.exists() and not path.is_file()):
+            what = f"a link to {path.resolve()}" if path.is_symlink() else "no file"
+            raise BadRecording(path, f"{what}, and a run writes only files of the table's folder", "Remove it, or choose another folder.")
 
 
 def _written(value: Any) -> Any:

@@ -17,11 +17,11 @@ from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.files.effects import library
 from xy_sysid.fleets.digest import digest
 from xy_sysid.fleets.naming import Name, Names, date_within, name_of
-from xy_sysid.fleets.row import Plan, Row, row_of
+from xy_sysid.fleets.row import FirstSets, Plan, Row, row_of
 from xy_sysid.imports import load
 from xy_sysid.imports.reading import Reading
 
-ROWS = 1  # version of what a row means; raised whenever the same data give other numbers or columns
+ROWS = 2  # version of what a row means; raised whenever the same data give other numbers or columns
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,23 +29,25 @@ class Task:
     """One recording to be analysed.
 
     path: of it; names: how it is named; reading: which columns of it mean what; effect_files: with effects of the user's own
-    known: keys under which it is in the table already
+    first: by axis, effects that are tried before all others; known: keys under which it is in the table already
     """
 
     path: str
     names: Names = field(default_factory=Names)
     reading: Reading = field(default_factory=Reading)
     effect_files: tuple[str, ...] = ()
+    first: FirstSets = ()
     known: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """What came of a task. rows: one for each axis; empty where the table has them already (``unchanged``)."""
+    """What came of a task. rows: one for each axis; empty where the table has them already (``unchanged``), with this key."""
 
     path: str
     rows: tuple[Row, ...]
     unchanged: bool = False
+    key: str = ""
 
 
 def rows_of_file(task: Task) -> Done:
@@ -63,7 +65,7 @@ def rows_of_file(task: Task) -> Done:
         return Done(task.path, (failed(task.path, "naming", str(problem)) | origin,))
     origin |= {"machine": name.machine, "versions": versions(), "key": key_of(task, name, origin["file_sha256"])}
     if origin["key"] in task.known:
-        return Done(task.path, (), unchanged=True)
+        return Done(task.path, (), unchanged=True, key=origin["key"])
     with threadpool_limits(1, "blas"):
         begun = process_time()
         try:
@@ -77,7 +79,7 @@ def rows_of_file(task: Task) -> Done:
             return Done(task.path, (failed(task.path, "reading", str(problem)) | {"date": name.date} | origin,))
         seconds = process_time() - begun
         origin |= {"date": name.date or date_within(recording), "seconds_reading": seconds}
-        plan = Plan(follow=follow, library=known, clock=process_time)
+        plan = Plan(follow=follow, first=task.first, library=known, clock=process_time)
         rows = [row_of(recording, axis, plan) for axis in recording.axes]
     return Done(task.path, tuple(row | ({"axis": name.axis} if name.axis else {}) | origin for row in rows))
 
@@ -91,7 +93,18 @@ def failed(path: str, stage: str, problem: str) -> Row:
 def key_of(task: Task, name: Name, content: str) -> str:
     """What makes a recording the same one: its content, its name, how it is read and analysed, and by which version."""
     own = [digest(Path(file)) for file in task.effect_files]
-    parts = [content, name.machine, name.axis, str(name.date), repr(task.reading), sorted(task.names.follow), own, package_version(), ROWS]
+    parts = [
+        content,
+        name.machine,
+        name.axis,
+        str(name.date),
+        repr(task.reading),
+        sorted(task.names.follow),
+        own,
+        task.first,
+        package_version(),
+        ROWS,
+    ]
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
 

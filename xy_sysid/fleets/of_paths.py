@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,8 +17,9 @@ from xy_sysid.fleets.estimate import Progress
 from xy_sysid.fleets.finding import recordings
 from xy_sysid.fleets.journal import journal
 from xy_sysid.fleets.naming import Names, compiled
-from xy_sysid.fleets.of_file import Task, rows_of_file
-from xy_sysid.fleets.table import arrow, as_table, keys_in, read
+from xy_sysid.fleets.of_file import Done, Task, rows_of_file
+from xy_sysid.fleets.reference import COLUMNS, References
+from xy_sysid.fleets.table import arrow, as_table, keys_of, read, rows_so_far
 from xy_sysid.imports.reading import Reading
 
 if TYPE_CHECKING:
@@ -79,13 +80,14 @@ def run(paths: Paths, folder: Path, how: Analysis, where: Cluster | Client, tell
     how.check()
     found = recordings([paths] if isinstance(paths, (str, Path)) else paths, folder)
     with journal(folder, library(how.effect_files)) as kept, ExitStack() as stack:
-        known = keys_in(folder)
+        before = rows_so_far(folder, COLUMNS)
+        known = keys_of(before)
         tasks = [dataclasses.replace(how.task(path), known=known.get(path.name, frozenset())) for path in found]
         client = stack.enter_context(connected(where)) if isinstance(where, Cluster) else where
         now = Progress(total=len(tasks), workers=processes(client), place=client.dashboard_link)
         tell(now)
         begun = perf_counter()
-        for done, seconds in results(client, tasks):
+        for done, seconds in _in_order(client, References(tasks, before)):
             kept.add(done.rows)
             worked = 0.0 if done.unchanged else seconds
             now = dataclasses.replace(
@@ -99,6 +101,15 @@ def run(paths: Paths, folder: Path, how: Analysis, where: Cluster | Client, tell
             )
             tell(now)
     return now
+
+
+def _in_order(client: Client, references: References) -> Iterator[tuple[Done, float]]:
+    """What came of each task, and the s that it took: the first recordings of all machines, and then the others."""
+    while tasks := references.next():
+        for done, seconds in results(client, tasks):
+            references.hear(done)
+            yield done, seconds
+    yield from results(client, references.rest())
 
 
 def one(path: Path, how: Analysis) -> pyarrow.Table:

@@ -53,6 +53,9 @@ def rows_of_parts(path: Path, every: float, how: Analysis, tell: Callable[[int],
         begin = begin or name.date or date_within(part) or BEGIN
         for axis in part.axes:
             own = {"machine": name.machine, "source": f"{path}#{number}", "date": begin + timedelta(seconds=number * every)}
-            rows.append(row_of(part, axis, plan) | ({"axis": name.axis} if name.axis and len(part.axes) == 1 else {}) | own)
+            row = row_of(part, axis, plan)
+            if row.get("effects") and axis not in dict(plan.first):
+                plan = dataclasses.replace(plan, first=(*plan.first, (axis, tuple(row["effects"].split(", ")))))
+            rows.append(row | ({"axis": name.axis} if name.axis and len(part.axes) == 1 else {}) | own)
         number += 1
         tell(number)

@@ -15,15 +15,21 @@ from xy_sysid.diagnosis.of_run import diagnose, refined, runs_together
 from xy_sysid.diagnosis.refine import Effort, never
 from xy_sysid.errors import BadInput
 from xy_sysid.fitting import Fit
+from xy_sysid.fitting.choose_orders import choose
+from xy_sysid.fitting.of_recording import judged
 from xy_sysid.fitting.of_run import fit_response, frf
+from xy_sysid.fitting.structure import structure_from
+from xy_sysid.fitting.verdicts import Validation, validate
 from xy_sysid.fleets.columns import ROOTS, column_of
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.response.frf import FrequencyResponse
 from xy_sysid.samples.moves import several_moves
 from xy_sysid.samples.recording import Recording, Run
 from xy_sysid.settings import IdentifierSettings
+from xy_sysid.units import derivative_of
 
 Row = dict[str, Any]
+FirstSets = tuple[tuple[str, tuple[str, ...]], ...]  # axes, and the effects that are tried first in each
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,10 +37,12 @@ class Plan:
     """How an axis is analysed.
 
     follow:  effects whose parameters are estimated in every recording, named or not, together with those that are named
+    first:   by axis, effects that are tried before all others, as an earlier recording has them
     library: the effects that are known; clock: processor time, s
     """
 
     follow: tuple[str, ...] = ()
+    first: FirstSets = ()
     library: Library = STANDARD
     clock: Callable[[], float] = never
 
@@ -66,8 +74,22 @@ def row_of(recording: Recording, axis: str, plan: Plan) -> Row:
 
 def _linear(recording: Recording, run: Run, plan: Plan) -> Row:
     response = frf(run)
-    found, checks = fit_response(response, IdentifierSettings())
+    found, checks = _fitted(response)
     return _of_response(response) | _of_transfer_function(found) | {"tf_trustworthy": checks.trustworthy}
+
+
+def _fitted(response: FrequencyResponse) -> tuple[Fit, Validation]:
+    """A transfer function of the fewest orders that noise explains; others are tried only where it does not, as in the live nodes."""
+    settings = IdentifierSettings()
+    if derivative_of(response.output_unit) == 2:  # which of three families it is has to be found out, too
+        return fit_response(response, settings)
+    judged(response)
+    try:
+        with np.errstate(all="ignore"):  # what overflows ends in a figure that the verdicts judge
+            choice = choose(response, structure_from(settings), thorough=False)
+            return choice.fit, validate(choice.fit, response, choice=choice)
+    except (np.linalg.LinAlgError, ZeroDivisionError):
+        raise BadInput("fit", "beyond what numbers can hold", "orders that the data determine", "Record for longer.") from None
 
 
 def _of_response(response: FrequencyResponse) -> Row:
@@ -104,7 +126,7 @@ def _of_transfer_function(found: Fit) -> Row:
 def _diagnosis(recording: Recording, run: Run, plan: Plan) -> Row:
     runs = runs_together(recording.stretches(run.axis))
     several_moves(runs)
-    found = diagnose(runs, plan.library)
+    found = diagnose(runs, plan.library, first=dict(plan.first).get(run.axis, ()))
     row: Row = {
         "verdict": found.verdict,
         "effects": _listed(found.effects),
@@ -117,7 +139,7 @@ def _diagnosis(recording: Recording, run: Run, plan: Plan) -> Row:
     if found.ladder is None:  # not enough data
         return row | {"noise": None, "discrepancy": None, "explained": None}
     named = found.ladder.final if found.effects else found.ladder.base
-    row |= _of_fit(named) | {"rigid_error": found.ladder.base.held_out_error}
+    row |= _of_fit(named) | {"rigid_error": found.ladder.base.held_out_error, "tried_first": _listed(found.ladder.tried_first)}
     return row | _followed(runs, plan, found) if plan.follow else row
 
 

@@ -119,11 +119,15 @@ def file_name(machine: str) -> str:
     return f"{plain}{ENDING}" if plain == machine else f"{plain}-{hashlib.sha256(machine.encode()).hexdigest()[:8]}{ENDING}"
 
 
-def keys_in(folder: Path) -> dict[str, frozenset[str]]:
-    """By the last part of their paths, which stays when a folder moves: the keys of the recordings that are in the table."""
-    if not folder.is_dir() or not any(folder.glob(f"*{ENDING}")):
-        return {}
+def rows_so_far(folder: Path, names: Sequence[str]) -> list[Row]:
+    """The rows of a table with these columns; none where there is no table yet."""
+    there = folder.is_dir() and any(folder.glob(f"*{ENDING}"))
+    return read(folder, names).to_pylist() if there else []
+
+
+def keys_of(rows: Iterable[Row]) -> dict[str, frozenset[str]]:
+    """By the last part of their paths, which stays when a folder moves: the keys of recordings that are in the table."""
     found: dict[str, set[str]] = {}
-    for row in read(folder, ("source", "key")).to_pylist():
+    for row in rows:
         found.setdefault(Path(row["source"]).name, set()).add(row["key"])
     return {name: frozenset(keys) - {""} for name, keys in found.items()}

@@ -58,22 +58,22 @@ class StampLine:
         begin, instant, period = self._origin
         place = (seq - begin).astype(np.float64)
         off = (time - instant) - place * period
-        for x, rows in zip(place.reshape(-1, BATCH).mean(axis=1).tolist(), off.reshape(-1, BATCH), strict=True):
-            self._take(x, rows / period)
+        self._take(place.reshape(-1, BATCH).mean(axis=1), off.reshape(-1, BATCH) / period)
 
-    def _take(self, x: float, rows: FloatArray) -> None:
-        """One batch, in periods off; if a number slipped in it or at the end of the one before, neither counts, and a new stretch begins."""
-        before, self._waiting = self._waiting, (x, rows)
-        if before is None:
-            return
-        both = np.concatenate((before[1], rows))
-        at = np.arange(BATCH - ASIDE + 1, 2 * BATCH - ASIDE + 1)
-        sums = np.concatenate(([0.0], np.cumsum(both)))
-        after, ahead = sums[at + ASIDE] - sums[at], sums[at] - sums[at - ASIDE]
-        if bool(np.any((np.abs(both[at] - both[at - 1]) > LEAP) & (np.abs(after - ahead) > ASIDE * STEP))):
-            self._known, self._waiting, self._sums = self._both(), None, np.zeros(6)
-        else:
-            _grow(self._sums, before[0], float(before[1].mean()))
+    def _take(self, x: FloatArray, rows: FloatArray) -> None:
+        """Batches (n,), (n, BATCH), in periods off; if a number slipped in one or at the end of that before, neither counts, and a new stretch
+        begins."""
+        if self._waiting is not None:
+            x, rows = np.concatenate(([self._waiting[0]], x)), np.concatenate((self._waiting[1][None], rows))
+        slipped, means, waiting = _slips(rows), rows.mean(axis=1).tolist(), True
+        for k, bad in enumerate(slipped.tolist()):
+            if not waiting:
+                waiting = True  # the batch before this pair belongs to none
+            elif bad:
+                self._known, self._sums, waiting = self._both(), np.zeros(6), False
+            else:
+                _grow(self._sums, float(x[k]), means[k])
+        self._waiting = (float(x[-1]), rows[-1]) if waiting else None
 
     def cut(self) -> None:
         """What follows lies on another line of the same rate: what is known of the rate is kept."""
@@ -130,6 +130,16 @@ def error_of_rate(time: FloatArray, seq: NDArray[np.int64]) -> float:
             line.add(int(seq[piece[0]]), time[piece])
         line.until(int(seq[stop - 1]) + 1)
     return line.error
+
+
+def _slips(rows: FloatArray) -> NDArray[np.bool_]:
+    """(n - 1,) whether a number slipped in a batch, or at the end of that before it; rows: (n, BATCH) periods off."""
+    both = np.concatenate((rows[:-1], rows[1:]), axis=1)
+    at = np.arange(BATCH - ASIDE + 1, 2 * BATCH - ASIDE + 1)
+    sums = np.concatenate((np.zeros((len(both), 1)), np.cumsum(both, axis=1)), axis=1)
+    after, ahead = sums[:, at + ASIDE] - sums[:, at], sums[:, at] - sums[:, at - ASIDE]
+    leaps = np.abs(both[:, at] - both[:, at - 1]) > LEAP
+    return np.asarray(np.any(leaps & (np.abs(after - ahead) > ASIDE * STEP), axis=1))
 
 
 @compiled

@@ -1,0 +1,98 @@
+"""Which effects are tried first in a recording: those that were found in the first recording of the same axis.
+
+The first recording, by date, is searched without knowing anything. So what is tried first depends on the recordings alone, and not on the order in
+which they are analysed, nor on the number of processes. Recordings whose path does not tell the date are all searched without knowing anything.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+from xy_sysid.errors import BadInput
+from xy_sysid.fleets.naming import Name, name_of
+from xy_sysid.fleets.of_file import Done, Task
+from xy_sysid.fleets.row import FirstSets, Row
+
+COLUMNS = ("machine", "axis", "date", "source", "key", "verdict", "effects")  # that this file reads of a table
+Place = tuple[datetime, str]  # date and file name, in whose order recordings stand
+
+
+@dataclass
+class _Machine:
+    """The recordings of one machine, or of one axis of it where paths tell the axis.
+
+    given: to be analysed, in their order; earlier: rows of the table that are not among these; found: what is tried first, None until it is known
+    """
+
+    given: list[tuple[Place, Task]]
+    earlier: dict[Place, list[Row]]
+    found: FirstSets | None = None
+
+    def next(self) -> Task | None:
+        """The recording that has to be analysed to know what is tried first; None where that is known, or no recording is left."""
+        while self.found is None and self.earlier and (not self.given or min(self.earlier) < self.given[0][0]):
+            self.hear(self.earlier.pop(min(self.earlier)))
+        return self.given.pop(0)[1] if self.found is None and self.given else None
+
+    def hear(self, rows: Iterable[Row]) -> None:
+        """What an analysis found; one without an answer tells nothing."""
+        answered = [row for row in rows if row.get("verdict") not in (None, "not_enough_data")]
+        if answered:
+            self.found = tuple(sorted((row["axis"], tuple(row["effects"].split(", "))) for row in answered if row["effects"]))
+
+
+class References:
+    """Tasks in the order in which they can be done: first ``next`` until it is empty, with ``hear`` for each of them; then ``rest``."""
+
+    def __init__(self, tasks: Sequence[Task], table: Iterable[Row]) -> None:
+        """table: rows with ``COLUMNS`` of recordings that were analysed before."""
+        self._machines: dict[tuple[str, str], _Machine] = {}
+        self._undated: list[Task] = []
+        self._asked: dict[str, _Machine] = {}
+        self._by_key: dict[str, list[Row]] = {}
+        for task in tasks:
+            name = _name(task)
+            if name is None or name.date is None:
+                self._undated.append(task)
+            else:
+                machine = self._machines.setdefault((name.machine, name.axis), _Machine([], {}))
+                machine.given.append(((name.date, Path(task.path).name), task))
+        for machine in self._machines.values():
+            machine.given.sort(key=lambda item: (item[0], item[1].path))
+        self._remember(table)
+
+    def _remember(self, table: Iterable[Row]) -> None:
+        given = {key: {place for place, _ in machine.given} for key, machine in self._machines.items()}
+        for row in table:
+            self._by_key.setdefault(row["key"], []).append(row)
+            for key in {(row["machine"], ""), (row["machine"], row["axis"])} & given.keys() if row["date"] is not None else ():
+                place = row["date"], Path(row["source"]).name
+                if place not in given[key]:
+                    self._machines[key].earlier.setdefault(place, []).append(row)
+
+    def next(self) -> list[Task]:
+        """One recording of each machine of which nothing is known yet."""
+        asked = [(machine, task) for machine in self._machines.values() if (task := machine.next()) is not None]
+        self._asked = {task.path: machine for machine, task in asked}
+        return [task for _, task in asked]
+
+    def hear(self, done: Done) -> None:
+        """What came of a task of ``next``."""
+        self._asked[done.path].hear(self._by_key.get(done.key, []) if done.unchanged else done.rows)
+
+    def rest(self) -> list[Task]:
+        """All other recordings, with what is tried first in them."""
+        known = [dataclasses.replace(task, first=machine.found or ()) for machine in self._machines.values() for _, task in machine.given]
+        return [*known, *self._undated]
+
+
+def _name(task: Task) -> Name | None:
+    """None where the path fits no pattern, which the row of the recording will say."""
+    try:
+        return name_of(Path(task.path), task.names)
+    except BadInput:
+        return None
