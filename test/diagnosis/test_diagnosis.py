@@ -286,7 +286,7 @@ def test_a_refused_spring_that_leaves_as_little_as_a_wave_makes_the_wave_unsure(
 
 def test_effects_come_in_the_order_of_what_each_would_cost() -> None:
     """By the best set known without it, so that there is an answer where the time left no fit without it, too."""
-    data = prepare(2000.0, *recorded("coulomb_friction+cogging", seconds=10.0).axis("x"))
+    data = prepare(2000.0, *recorded("coulomb_friction+cogging", seconds=20.0).axis("x"))
     budget, stopped = math.inf, []
     for _ in range(2):
         ticks = count()
