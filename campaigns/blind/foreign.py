@@ -314,11 +314,12 @@ def run(case: Foreign) -> Judged:
     lack = lacking(rate, [(voltage, position)])
     found = not_enough(lack, units) if lack else diagnose_prepared(prepare_all(rate, [(voltage, position)], units=units))
     seconds = time.process_time() - begun
-    first = bool(found.effects) and found.effects[0] in case.there
-    every = all({name, *ALSO.get(name, ())} & set(found.effects) for name in case.truth)
+    named = judge.names(found)
+    first = bool(named) and named[0] in case.there
+    every = all({name, *ALSO.get(name, ())} & set(named) for name in case.truth)
     right = (first and every) if case.truth else found.verdict == "nothing_missing"
-    phantoms = tuple(name for name in found.effects if name not in case.there)
-    return judge.outcome(case, found, seconds, right=right, first=first, stray=bool(found.effects) and not first, phantoms=phantoms)
+    phantoms = tuple(name for name in named if name not in case.there)
+    return judge.outcome(case, found, seconds, right=right, first=first, stray=bool(named) and not first, phantoms=phantoms)
 
 
 def judged(case: Case | Foreign, folder: Path | None = None) -> Judged:

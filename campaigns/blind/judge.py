@@ -72,7 +72,7 @@ def run(case: Case, folder: Path | None = None) -> Judged:
     begun = time.process_time()
     found = diagnose(recording.rate, u, y, clock=time.process_time)
     seconds = time.process_time() - begun
-    named = found.effects
+    named = names(found)
     one = len(case.truth) == 1 and not case.nuisance
     if not case.known:
         right = found.verdict in ("not_in_library", "nothing_missing")
@@ -88,6 +88,11 @@ def run(case: Case, folder: Path | None = None) -> Judged:
     ratio, errors, inside = _measured(case, machine, recording.rate, u, y, found) if right and one and case.known else (None, {}, {})
     made = outcome(case, found, seconds, right=right, first=first, stray=stray, phantoms=phantoms)
     return replace(made, ratio=ratio, errors=errors, inside=inside, change=seen.change, noise=seen.noise, dirt=seen.dirt, kinds=seen.kinds)
+
+
+def names(found: Diagnosis) -> tuple[str, ...]:
+    """What a diagnosis names as missing."""
+    return found.effects if found.verdict == "missing_effect" else ()
 
 
 def outcome(case: Any, found: Diagnosis, seconds: float, *, right: bool, first: bool, stray: bool, phantoms: tuple[str, ...]) -> Judged:
