@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import os
 import signal
+from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
+
+if TYPE_CHECKING:
+    from helpers.ros_tools import World
 
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):  # as commands and nodes set it: bit for bit, and quicker
     os.environ.setdefault(_name, "1")
@@ -48,3 +53,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     root = Path(__file__).parent
     place = {name: number for number, name in enumerate(LONG)}
     items.sort(key=lambda item: place.get(item.path.relative_to(root).as_posix(), len(place)))
+
+
+@pytest.fixture
+def world(tmp_path: Path) -> Iterator[World]:
+    """A ROS domain of its own, in which every process ends with the test."""
+    from helpers.ros_tools import world_in
+
+    with world_in(tmp_path) as made:
+        yield made

@@ -70,12 +70,21 @@ def test_the_page_of_commands_lists_every_command() -> None:
     assert set(re.findall(r"`xy-sysid (\w+)", " ".join(first))) == names
 
 
+def anchors(page: Path) -> set[str]:
+    """The names of a page's headings in links, as GitHub and MkDocs make them."""
+    plain = (re.sub(r"[^\w\s-]", "", heading.lower()) for heading in re.findall(r"^#+ +(.*)$", page.read_text(encoding="utf-8"), re.MULTILINE))
+    return {name for heading in plain for name in (re.sub(r"\s", "-", heading), re.sub(r"[-\s]+", "-", heading))}
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_every_link_of_a_page_leads_somewhere(page: Path) -> None:
-    """Relative links point at files that are there."""
-    for target in re.findall(r"\]\(([^)#]+?)\)", page.read_text(encoding="utf-8")):
+    """Relative links point at files that are there, and at headings in them."""
+    for target in re.findall(r"\]\(([^)]+)\)", page.read_text(encoding="utf-8")):
         if "://" not in target:
-            assert (page.parent / target).exists(), f"{page.name}: {target}"
+            name, _, heading = target.partition("#")
+            to = page.parent / name if name else page
+            assert to.exists(), f"{page.name}: {target}"
+            assert not heading or heading in anchors(to), f"{page.name}: {target}"
 
 
 def test_the_topics_page_names_every_column_and_reason() -> None:

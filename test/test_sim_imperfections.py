@@ -11,7 +11,7 @@ import pytest
 from xy_sim.hidden import draw
 from xy_sim.layout import numbers, slot
 from xy_sim.machine import Machine
-from xy_sim.parts import PARTS, cable_pull, chance, curve, friction_wander, gain_wander, uneven_drag, uneven_gain, uneven_lines
+from xy_sim.parts import PARTS, cable_pull, chance, curve, uneven_lines
 from xy_sysid.samples.block import FloatArray
 
 GAIN, POLE, RATE = 0.097, 246.0, 2000.0  # of axis x of rigid.yaml: m/s/V, rad/s, Hz
@@ -73,7 +73,7 @@ def test_speed_follows_the_uneven_drag() -> None:
     machine = axis(uneven_drag={"depth": 0.1})
     p, first = curve_of(machine, "uneven_drag")
     _, y, v = crawl(machine, 0.05, 4.0)
-    factor = np.array([uneven_drag.factor(p, first, 0.1, 3e-3, q) for q in y])
+    factor = np.array([curve.around_one(p, first, 0.1, q / 3e-3) for q in y])
     assert np.ptp(factor) > 0.2
     assert np.abs(v * factor / (GAIN * 0.05) - 1.0).max() < 5e-3
 
@@ -83,7 +83,7 @@ def test_speed_falls_where_the_motor_constant_is_high() -> None:
     machine = axis(uneven_gain={"depth": 0.1})
     p, first = curve_of(machine, "uneven_gain")
     _, y, v = crawl(machine)
-    factor = np.array([uneven_gain.factor(p, first, 0.1, 3e-3, q) for q in y])
+    factor = np.array([curve.around_one(p, first, 0.1, q / 3e-3) for q in y])
     assert np.abs(v * factor / (GAIN * 0.1) - 1.0).max() < 5e-3
 
 
@@ -92,11 +92,11 @@ def test_speed_follows_the_wandering_gain_and_friction() -> None:
     machine = axis(gain_wander={"depth": 0.1, "time": 0.5})
     p, first = curve_of(machine, "gain_wander")
     t, _, v = crawl(machine, 1.0, 1.0)
-    assert v == pytest.approx(GAIN * np.array([gain_wander.factor(p, first, 0.1, 0.5, x) for x in t - 1 / POLE]), rel=2e-3)
+    assert v == pytest.approx(GAIN * np.array([curve.around_one(p, first, 0.1, x / 0.5) for x in t - 1 / POLE]), rel=2e-3)
     machine = axis(friction_wander={"depth": 0.1, "time": 0.5}, coulomb_friction=0.3)
     p, first = curve_of(machine, "friction_wander")
     t, _, v = crawl(machine, 1.0, 1.0)
-    factor = np.array([friction_wander.factor(p, first, 0.1, 0.5, x) for x in t])
+    factor = np.array([curve.around_one(p, first, 0.1, x / 0.5) for x in t])
     assert v == pytest.approx(GAIN * (1.0 / factor - 0.3), rel=5e-3)
 
 
@@ -109,7 +109,7 @@ def test_wandering_friction_moves_the_breakaway_and_the_bristles() -> None:
     assert moved(axis(coulomb_friction=0.3, friction_wander=wander), volts)[-1] > 1e-4
     machine = axis(presliding_hysteresis=0.3, friction_wander=wander)
     p, first = curve_of(machine, "friction_wander")
-    factor = friction_wander.factor(p, first, 0.2, 1e3, 0.5)
+    factor = curve.around_one(p, first, 0.2, 0.5 / 1e3)
     assert crawl(machine, 1.0, 1.0)[2][-1] == pytest.approx(GAIN * (1.0 / factor - 0.3), rel=2e-3)
 
 

@@ -7,18 +7,7 @@ from __future__ import annotations
 
 from xy_sim.inlined import inlined
 from xy_sim.layout import CABLE, SECOND_WEAK, SECOND_WEAK_SPEED, WEAK, WEAK_SPEED, slot
-from xy_sim.parts import (
-    cable_pull,
-    friction_wander,
-    gain_wander,
-    late_drive,
-    mains_hum,
-    sample_jitter,
-    uneven_drag,
-    uneven_gain,
-    uneven_lines,
-    weak_modes,
-)
+from xy_sim.parts import cable_pull, curve, late_drive, mains_hum, sample_jitter, uneven_lines, weak_modes
 from xy_sysid.samples.block import FloatArray
 
 _DRAG, _DRAG_LENGTH, _DRAG_CURVE = slot("uneven_drag.depth"), slot("uneven_drag.length"), slot("uneven_drag.curve.0")
@@ -42,13 +31,13 @@ def gain_and_drag(p: FloatArray, t: float, q: float) -> tuple[float, float]:
     """Force per volt over its mean, and drag over its mean, at ``t`` (s) and ``q`` (m)."""
     gain, drag = 1.0, 1.0
     if p[_WANDER] != 0.0:
-        gain = gain_wander.factor(p, _WANDER_CURVE, p[_WANDER], p[_WANDER_TIME], t)
+        gain = curve.around_one(p, _WANDER_CURVE, p[_WANDER], t / p[_WANDER_TIME])
     if p[_GAIN] != 0.0:
-        uneven = uneven_gain.factor(p, _GAIN_CURVE, p[_GAIN], p[_GAIN_LENGTH], q)
+        uneven = curve.around_one(p, _GAIN_CURVE, p[_GAIN], q / p[_GAIN_LENGTH])
         gain *= uneven
         drag = uneven * uneven
     if p[_DRAG] != 0.0:
-        drag *= uneven_drag.factor(p, _DRAG_CURVE, p[_DRAG], p[_DRAG_LENGTH], q)
+        drag *= curve.around_one(p, _DRAG_CURVE, p[_DRAG], q / p[_DRAG_LENGTH])
     return gain, drag
 
 
@@ -61,7 +50,7 @@ def hum(p: FloatArray, t: float) -> float:
 @inlined
 def friction(p: FloatArray, t: float) -> float:
     """All friction over its mean, at ``t`` (s)."""
-    return friction_wander.factor(p, _RUB_CURVE, p[_RUB], p[_RUB_TIME], t) if p[_RUB] != 0.0 else 1.0
+    return curve.around_one(p, _RUB_CURVE, p[_RUB], t / p[_RUB_TIME]) if p[_RUB] != 0.0 else 1.0
 
 
 @inlined

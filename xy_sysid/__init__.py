@@ -41,7 +41,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from xy_sysid.axis.model import AxisModel
     from xy_sysid.cli.simulated_recording import simulate
-    from xy_sysid.cli.written_report import write_report
     from xy_sysid.comparison.of_run import better, compare, validate
     from xy_sysid.comparison.physical_model import PhysicalModel
     from xy_sysid.control_design.use import use
@@ -60,6 +59,7 @@ if TYPE_CHECKING:
     from xy_sysid.linear.to_others import to_control, to_scipy
     from xy_sysid.linear.transfer_function import TransferFunction
     from xy_sysid.report import plots as plot
+    from xy_sysid.report.written import write_report
     from xy_sysid.response.frf import FrequencyResponse
     from xy_sysid.samples.recording import Recording, Run
 
@@ -125,7 +125,7 @@ _HOMES = {
     "fleets.of_paths": ("fleet",),
     "fleets.trends": ("trend",),
     "cli.simulated_recording": ("simulate",),
-    "cli.written_report": ("write_report",),
+    "report.written": ("write_report",),
     "errors": ("BadInput", "BadRecording", "MissingExtra", "XySysidError"),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}

@@ -18,7 +18,7 @@ import scipy
 
 from campaigns.blind import judge
 from campaigns.blind.cases import STREAMS, Case, Draws
-from campaigns.blind.judge import CONFIDENT, Judged
+from campaigns.blind.judge import Judged
 from xy_sysid.axis.model import STANDARD
 from xy_sysid.diagnosis.diagnose import diagnose_prepared, not_enough
 from xy_sysid.diagnosis.equal_laws import equals
@@ -314,20 +314,12 @@ def run(case: Foreign) -> Judged:
     lack = lacking(rate, [(voltage, position)])
     found = not_enough(lack, units) if lack else diagnose_prepared(prepare_all(rate, [(voltage, position)], units=units))
     seconds = time.process_time() - begun
-    named = found.effects if found.verdict == "missing_effect" else ()
+    named = judge.names(found)
     first = bool(named) and named[0] in case.there
     every = all({name, *ALSO.get(name, ())} & set(named) for name in case.truth)
-    return Judged(
-        case=case,
-        verdict=found.verdict,
-        effects=tuple(found.effects),
-        confidence=float(found.confidence),
-        seconds=seconds,
-        right=(first and every) if case.truth else found.verdict == "nothing_missing",
-        first=first,
-        wrong=bool(named) and not first and found.confidence >= CONFIDENT,
-        phantoms=tuple(name for name in named if name not in case.there),
-    )
+    right = (first and every) if case.truth else found.verdict == "nothing_missing"
+    phantoms = tuple(name for name in named if name not in case.there)
+    return judge.outcome(case, found, seconds, right=right, first=first, stray=bool(named) and not first, phantoms=phantoms)
 
 
 def judged(case: Case | Foreign, folder: Path | None = None) -> Judged:

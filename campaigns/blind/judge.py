@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -72,7 +72,7 @@ def run(case: Case, folder: Path | None = None) -> Judged:
     begun = time.process_time()
     found = diagnose(recording.rate, u, y, clock=time.process_time)
     seconds = time.process_time() - begun
-    named = found.effects if found.verdict == "missing_effect" else ()
+    named = names(found)
     one = len(case.truth) == 1 and not case.nuisance
     if not case.known:
         right = found.verdict in ("not_in_library", "nothing_missing")
@@ -85,8 +85,18 @@ def run(case: Case, folder: Path | None = None) -> Judged:
     first = bool(named) and (named[0] in case.truth or (right and _laws(named[:1]) <= _laws(case.truth)))
     phantoms = tuple(name for name in named if not _laws((name,)) <= _there(machine))
     stray = bool(named) and not first and not (case.nuisance and _laws(named[:1]) <= _there(machine))
-    wrong = stray and found.confidence >= CONFIDENT
     ratio, errors, inside = _measured(case, machine, recording.rate, u, y, found) if right and one and case.known else (None, {}, {})
+    made = outcome(case, found, seconds, right=right, first=first, stray=stray, phantoms=phantoms)
+    return replace(made, ratio=ratio, errors=errors, inside=inside, change=seen.change, noise=seen.noise, dirt=seen.dirt, kinds=seen.kinds)
+
+
+def names(found: Diagnosis) -> tuple[str, ...]:
+    """What a diagnosis names as missing."""
+    return found.effects if found.verdict == "missing_effect" else ()
+
+
+def outcome(case: Any, found: Diagnosis, seconds: float, *, right: bool, first: bool, stray: bool, phantoms: tuple[str, ...]) -> Judged:
+    """A diagnosis that was judged. stray: a name that is not in the truth came first."""
     return Judged(
         case=case,
         verdict=found.verdict,
@@ -95,15 +105,8 @@ def run(case: Case, folder: Path | None = None) -> Judged:
         seconds=seconds,
         right=right,
         first=first,
-        wrong=wrong,
+        wrong=stray and found.confidence >= CONFIDENT,
         phantoms=phantoms,
-        ratio=ratio,
-        errors=errors,
-        inside=inside,
-        change=seen.change,
-        noise=seen.noise,
-        dirt=seen.dirt,
-        kinds=seen.kinds,
     )
 
 

@@ -128,27 +128,22 @@ def test_a_recording_never_replaces_anything(name: str, rec: Path, tmp_path: Pat
     assert place.is_symlink() and not (tmp_path / "elsewhere").exists()
 
 
-def test_pictures_are_replaced_with_force_only(rec: Path, tmp_path: Path) -> None:
-    """Those of the axes that are drawn; other files of the folder matter to nobody."""
-    given = ("figures", rec, "-o", tmp_path, "--kind", "csv")
-    (tmp_path / "notes.csv").write_bytes(OLD)
+def test_pictures_are_replaced_with_force_only_and_an_axis_leads_into_no_other_folder(tmp_path: Path) -> None:
+    """Those of the axes that are drawn; other files of the folder matter to nobody. The name of an axis comes from the recording."""
+    t, u, y = rigid(12_000).values()
+    axis, out = "../../left/wrist", tmp_path / "a" / "b" / "pictures"
+    save(Recording(1000.0, (axis,), np.arange(12_000), t, u[:, None], y[:, None]), tmp_path / "bag")
+    given = ("figures", tmp_path / "bag", "-o", out, "--kind", "csv")
+    out.mkdir(parents=True)
+    (out / "notes.csv").write_bytes(OLD)
     assert cli(*given).code == 0
-    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    assert list(out.glob("axis_.._.._left_wrist_*.csv")) and {item.name for item in tmp_path.iterdir()} == {"bag", "a"}
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
     assert len(before) > 1 and "add --force to replace it" in refused(*given)
     assert cli(*given, "--force").code == 0
-    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
 
 
 def test_what_goes_into_a_pipe_replaces_nothing(rec: Path) -> None:
     """A device is there always, and takes whatever is written to it."""
     assert cli("frf", rec, "--csv", "/dev/null").code == 0
-
-
-def test_the_name_of_an_axis_leads_into_no_other_folder(tmp_path: Path) -> None:
-    """It comes from the recording, and the pictures are named after it."""
-    t, u, y = rigid(12_000).values()
-    axis, out = "../../left/wrist", tmp_path / "a" / "b" / "pictures"
-    save(Recording(1000.0, (axis,), np.arange(12_000), t, u[:, None], y[:, None]), tmp_path / "bag")
-    said = cli("figures", tmp_path / "bag", "-o", out, "--kind", "csv")
-    assert said.code == 0, said.err
-    assert list(out.glob("axis_.._.._left_wrist_*.csv")) and {item.name for item in tmp_path.iterdir()} == {"bag", "a"}

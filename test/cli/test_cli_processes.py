@@ -38,8 +38,15 @@ def test_a_refusal_of_a_process_is_code_2_and_one_line(tmp_path: Path) -> None:
     assert done.returncode == 2 and done.stdout == b"" and done.stderr.count(b"\n") == 1 and done.stderr.startswith(b"xy-sysid: ")
 
 
-@pytest.mark.parametrize("arguments", [("simulate", "OUT", "--duration", "100000"), ("replay", "BAG", "--json"), ("fit", "BAG", "--json")])
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize(
+    ("arguments", "number", "code"),
+    [
+        (("simulate", "OUT", "--duration", "100000"), signal.SIGINT, 130),
+        (("simulate", "OUT", "--duration", "100000"), signal.SIGTERM, 143),
+        (("replay", "BAG", "--json"), signal.SIGINT, 130),
+        (("fit", "BAG", "--json"), signal.SIGTERM, 143),
+    ],
+)
 def test_a_signal_in_the_middle_of_long_work_is_its_code_without_a_traceback(
     arguments: tuple[str, ...], number: signal.Signals, code: int, bag: Path, tmp_path: Path
 ) -> None:
@@ -81,9 +88,14 @@ def test_a_signal_in_the_middle_of_an_import_is_its_code(number: signal.Signals,
     assert (done.returncode, done.stderr) == (code, b"")
 
 
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 @pytest.mark.parametrize(
-    "words", [("simulate", "OUT", "--duration", "20"), ("simulate", "CSV", "--duration", "20"), ("replay", "BAG", "--out", "OUT")]
+    ("words", "number", "code"),
+    [
+        (("simulate", "OUT", "--duration", "20"), signal.SIGINT, 130),
+        (("simulate", "CSV", "--duration", "20"), signal.SIGTERM, 143),
+        (("replay", "BAG", "--out", "OUT"), signal.SIGINT, 130),
+        (("replay", "BAG", "--out", "OUT"), signal.SIGTERM, 143),
+    ],
 )
 def test_what_ends_a_command_while_it_writes_leaves_no_partial_file(
     words: tuple[str, ...], number: int, code: int, bag: Path, tmp_path: Path
@@ -137,8 +149,11 @@ finally:
 """
 
 
-@pytest.mark.parametrize("first", [SWALLOWED, CAUGHT, CLEARED], ids=["swallowed", "caught", "cleared"])
-@pytest.mark.parametrize(("name", "code"), [("SIGINT", 130), ("SIGTERM", 143)])
+@pytest.mark.parametrize(
+    ("first", "name", "code"),
+    [(SWALLOWED, "SIGINT", 130), (SWALLOWED, "SIGTERM", 143), (CAUGHT, "SIGINT", 130), (CLEARED, "SIGTERM", 143)],
+    ids=["swallowed", "swallowed by SIGTERM", "caught", "cleared"],
+)
 def test_an_interrupt_that_is_swallowed_is_raised_again(first: str, name: str, code: int, tmp_path: Path) -> None:
     """In a weak reference's callback, as importlib has them, or caught by whoever it was: the command ends; clearing away is not cut short."""
     file = tmp_path / "own.py"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from dataclasses import replace
 from functools import cache, partial
 from itertools import count
@@ -28,7 +27,7 @@ from xy_sysid.greybox.axis_data import AxisData, prepare
 from xy_sysid.greybox.free_run import GreyboxFit, fit_base, fit_with
 from xy_sysid.hypotheses import one_step
 from xy_sysid.hypotheses.companions import grown
-from xy_sysid.hypotheses.criteria import AT_FLOOR, FEWEST
+from xy_sysid.hypotheses.criteria import AT_FLOOR, FEWEST, SIZE
 from xy_sysid.imports import save
 
 recorded = partial(simulated.recorded, block=100)
@@ -63,9 +62,17 @@ def test_the_missing_effect_is_named_and_the_error_falls_to_the_floor(effect: st
     assert effect in found.sentence and "The residual error is at the noise floor" in found.sentence
 
 
+@cache
+def two_effects() -> tuple[Diagnosis, int]:
+    """The answer for an axis with two effects, and how often the search looked at its clock."""
+    ticks = count()
+    found = diagnose(2000.0, *recorded("coulomb_friction+cogging", seconds=20.0).axis("x"), clock=partial(next, ticks))
+    return found, next(ticks)
+
+
 def test_two_effects_are_both_named() -> None:
     """One after the other, the larger one first."""
-    found = diagnosed("coulomb_friction+cogging")
+    found, _ = two_effects()
     assert found.verdict == "missing_effect"
     assert set(found.effects) == {"coulomb_friction", "cogging"}
 
@@ -287,17 +294,15 @@ def test_a_refused_spring_that_leaves_as_little_as_a_wave_makes_the_wave_unsure(
 def test_effects_come_in_the_order_of_what_each_would_cost() -> None:
     """By the best set known without it, so that there is an answer where the time left no fit without it, too."""
     data = prepare(2000.0, *recorded("coulomb_friction+cogging", seconds=20.0).axis("x"))
-    budget, stopped = math.inf, []
-    for _ in range(2):
-        ticks = count()
-        ladder = refine(data, effort=Effort(budget=budget, clock=partial(next, ticks)))
-        stopped.append(ladder.stopped)
+    found, ticks = two_effects()
+    ladders = (found.ladder, refine(data, effort=Effort(budget=0.3 * ticks, clock=partial(next, count()), size=SIZE)))
+    for ladder in ladders:
+        assert ladder is not None
         assert ladder.effects and set(ladder.effects) == set(ladder.sizes)
         alone = {item.effect: float(np.sum(item.fit.scores)) for item in ladder.tried if item.fit is not None}
         costs = [alone[other] for other in reversed(ladder.effects) if len(ladder.effects) == 2]
         assert costs == sorted(costs, reverse=True) and min(ladder.sizes.values()) > 0.0
-        budget = 0.3 * next(ticks)
-    assert stopped == [False, True]
+    assert [ladder is not None and ladder.stopped for ladder in ladders] == [False, True]
 
 
 def test_a_spring_beside_friction_is_not_taken_for_a_pendulum_and_bumps() -> None:

@@ -108,7 +108,7 @@ def machine(*effects: str) -> tuple[AxisData, GreyboxFit]:
     own = build(AxisExcitation, {"seed": 5})
     both = {"x": own, "y": build(AxisExcitation, {"seed": 6})}
     settings = build(ExcitationSettings, {"rate": RATE, "lockstep": True, "speed": 0.0, "block": 100, "ahead": 1, "axes": both})
-    recording = drive(with_effects(Machine.from_file("rigid.yaml", 11), effects), settings, 30.0, lambda _: None)
+    recording = drive(with_effects(Machine.from_file("rigid.yaml", 11), effects), settings, 16.0, lambda _: None)
     data = prepare(RATE, *recording.axis("x"))
     return data, fit_base(data)
 

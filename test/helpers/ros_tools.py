@@ -150,6 +150,12 @@ class World:
             self._executor.spin_once(timeout_sec=0.01)
         return done()
 
+    def hears(self, kind: Any, topic: str, depth: int = 10) -> list[Any]:
+        """A list that fills with the messages of a topic; kind: their type."""
+        heard: list[Any] = []
+        self.node.create_subscription(kind, topic, heard.append, depth)
+        return heard
+
     def blocks(self, topic: str = "voltage") -> list[Block]:
         """A list that fills with the blocks of a topic."""
         from std_msgs.msg import Float64MultiArray

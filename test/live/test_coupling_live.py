@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from xy_sysid.cli.written_report import coupled
 from xy_sysid.live.coupling_messages import COUPLING_COLUMNS, CROSS_COLUMNS
 from xy_sysid.live.fitter import Update
 from xy_sysid.live.identifier import FitRequest, Identifier
 from xy_sysid.live.plain_messages import OK, WARN
 from xy_sysid.report.coupling import coupling_figure
+from xy_sysid.report.written import coupled
 from xy_sysid.response.coupling import coupling
 from xy_sysid.response.windows import WindowShape
 from xy_sysid.samples.block import Samples

@@ -7,14 +7,12 @@ from __future__ import annotations
 
 import re
 import signal
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from helpers import ROOT
-from helpers.ros_tools import NodeProcess, World, needs_ros, world_in
+from helpers.ros_tools import NodeProcess, World, needs_ros
 
 pytestmark = needs_ros
 
@@ -27,12 +25,6 @@ OF_INTERFACE: dict[str, dict[str, float]] = {
     "velocity": {"rms": 0.3, "limit": 2.0, "centring": 0.5},
     "position": {"rms": 0.02, "limit": 0.2, "slow": 0.1, "slow_period": 4.0},
 }
-
-
-@pytest.fixture
-def world(tmp_path: Path) -> Iterator[World]:
-    with world_in(tmp_path) as made:
-        yield made
 
 
 def excitation(world: World, interface: str, **more: Any) -> NodeProcess:
@@ -59,26 +51,20 @@ def commands(world: World, topic: str = COMMANDS) -> list[Any]:
     """A list that fills with what a controller hears."""
     from std_msgs.msg import Float64MultiArray
 
-    heard: list[Any] = []
-    world.node.create_subscription(Float64MultiArray, topic, heard.append, 1000)
-    return heard
+    return world.hears(Float64MultiArray, topic, 1000)
 
 
 def arrays(world: World, topic: str) -> list[Any]:
     """A list that fills with a node's results."""
     from std_msgs.msg import Float64MultiArray
 
-    heard: list[Any] = []
-    world.node.create_subscription(Float64MultiArray, topic, heard.append, 10)
-    return heard
+    return world.hears(Float64MultiArray, topic)
 
 
 def states(world: World) -> list[Any]:
     from sensor_msgs.msg import JointState
 
-    heard: list[Any] = []
-    world.node.create_subscription(JointState, "/joint_states", heard.append, 1000)
-    return heard
+    return world.hears(JointState, "/joint_states", 1000)
 
 
 def value(statuses: list[Any], name: str, key: str) -> str:

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-import pytest
 from helpers import ROOT
-from helpers.ros_tools import HAS_ROS, World, needs_ros, world_in
+from helpers.ros_tools import HAS_ROS, World, needs_ros
 
 from xy_sysid.control_design.follower import KINDS
 from xy_sysid.samples.block import Block
@@ -42,12 +40,6 @@ def story(axis: str) -> str:
     parameters = {name: {"value": value, "unit": "", "ci95": [0.999 * value, 1.001 * value]} for name, value in TRUTH[axis].items()}
     model = {"effects": ["coulomb_friction"], "parameters": parameters, "held_out_error": 3e-4, "noise_floor": 3e-4}
     return json.dumps({"axis": axis, "model": model, "sampling_rate": 2000.0, "units": {"input": "V", "output": "m"}})
-
-
-@pytest.fixture
-def world(tmp_path: Path) -> Iterator[World]:
-    with world_in(tmp_path) as made:
-        yield made
 
 
 def test_the_tracking_error_falls_from_pid_to_feedforward_to_compensation(world: World, tmp_path: Path) -> None:

@@ -8,7 +8,6 @@ import re
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,7 @@ import pytest
 import yaml
 from helpers import ROOT
 from helpers.live_nodes import FAST, Source, drive, newest, ready
-from helpers.ros_tools import World, needs_ros, new_domain, world_in
+from helpers.ros_tools import World, needs_ros, new_domain
 from helpers.simulated import recorded
 
 from xy_sysid.cli import run
@@ -29,12 +28,6 @@ from xy_sysid.samples.recording import Recording
 
 pytestmark = needs_ros
 DIAGNOSER, EXCITATION, MACHINE, RECORDER = "xy_sysid.nodes.diagnoser", "xy_sysid.nodes.excitation", "xy_sim.node", "xy_sysid.nodes.recorder"
-
-
-@pytest.fixture
-def world(tmp_path: Path) -> Iterator[World]:
-    with world_in(tmp_path) as made:
-        yield made
 
 
 def trigger(world: World, name: str, seconds: float = 60.0, times: int = 1) -> tuple[bool, str]:

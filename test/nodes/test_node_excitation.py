@@ -8,7 +8,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,7 @@ import numpy as np
 import pytest
 import yaml
 from helpers import ROOT
-from helpers.ros_tools import World, needs_ros, world_in
+from helpers.ros_tools import World, needs_ros
 
 from xy_sysid.excitation.designed import document_of
 from xy_sysid.excitation.drive import Drive
@@ -41,12 +40,6 @@ class Integrator:
         path = self.place + np.cumsum(block.values, axis=0) * 0.1 / 2000
         self.place = path[-1]
         return Block(block.axes, block.seq, block.time, path)
-
-
-@pytest.fixture
-def world(tmp_path: Path) -> Iterator[World]:
-    with world_in(tmp_path) as made:
-        yield made
 
 
 def activate(world: World) -> None:

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from helpers import ROOT
 from helpers.live_nodes import FAST, Source, drive, newest, ready
-from helpers.ros_tools import World, needs_ros, new_domain, world_in
+from helpers.ros_tools import World, needs_ros, new_domain
 
 from xy_sysid.bags import Bag, BagWriter, stream_blocks
 from xy_sysid.bags.sums import check_sums
@@ -28,12 +28,6 @@ from xy_sysid.settings import IdentifierSettings
 
 pytestmark = needs_ros
 IDENTIFIER, EXCITATION, MACHINE, RECORDER = "xy_sysid.nodes.identifier", "xy_sysid.nodes.excitation", "xy_sim.node", "xy_sysid.nodes.recorder"
-
-
-@pytest.fixture
-def world(tmp_path: Path) -> Iterator[World]:
-    with world_in(tmp_path) as made:
-        yield made
 
 
 def arrays(world: World, topics: list[str]) -> dict[str, list[ArrayMessage]]:

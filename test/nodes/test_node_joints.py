@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,7 @@ import yaml
 from helpers import ROOT
 from helpers.cli_tools import cli
 from helpers.live_nodes import newest
-from helpers.ros_tools import World, needs_ros, world_in
+from helpers.ros_tools import World, needs_ros
 
 pytestmark = needs_ros
 
@@ -21,12 +20,6 @@ AXES = ["joint-2", "pan"]
 HEARS: dict[str, Any] = {"source": "joint_state", "joint_topic": "/joint_states", "effort_as_voltage": True, "effort_lag": 1}
 UNITS = {"input_unit": "N m", "output_unit": "rad"}
 JOINT = {"rms": 1.0, "limit": 2.0, "centring": 0.5, "velocity_gain": 3.0, "breakaway": 0.4, "travel_min": -2.0, "travel_max": 2.0, "brake": 0.3}
-
-
-@pytest.fixture
-def world(tmp_path: Path) -> Iterator[World]:
-    with world_in(tmp_path) as made:
-        yield made
 
 
 def files(folder: Path) -> tuple[Path, Path]:

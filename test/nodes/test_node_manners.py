@@ -6,8 +6,6 @@ import json
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,7 +14,7 @@ from helpers import ROOT
 from helpers.busy import allowed
 from helpers.cli_tools import bare
 from helpers.live_nodes import FAST, Source, newest
-from helpers.ros_tools import Integrator, World, needs_ros, world_in
+from helpers.ros_tools import Integrator, World, needs_ros
 
 from xy_sysid.errors import BadInput
 from xy_sysid.files.ros_parameters import NODES
@@ -28,12 +26,6 @@ pytestmark = needs_ros
 EXCITATION, IDENTIFIER, DIAGNOSER = (f"xy_sysid.nodes.{name}" for name in ("excitation", "identifier", "diagnoser"))
 BALLSCREW = "xy_sim.node"
 QUICK: dict[str, Any] = {"length": 512, "refit": 2.0, "reorder": 0.2, "numerator_order": 0, "denominator_order": 2}
-
-
-@pytest.fixture
-def world(tmp_path: Path) -> Iterator[World]:
-    with world_in(tmp_path) as made:
-        yield made
 
 
 def test_qos_overrides_of_publishers_are_obeyed(world: World) -> None:

@@ -2,24 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from helpers.live_nodes import newest, ready
-from helpers.ros_tools import World, needs_ros, world_in
+from helpers.ros_tools import World, needs_ros
 
 pytestmark = needs_ros
 HEARS: dict[str, Any] = {"axes": '["x"]', "source": "joint_state", "joint_topic": "/joint_states", "effort_as_voltage": True}
 NODES = {"identifier": ("reset", "streams"), "diagnoser": ("forget", "diagnoser")}
-
-
-@pytest.fixture
-def world(tmp_path: Path) -> Iterator[World]:
-    with world_in(tmp_path) as made:
-        yield made
 
 
 def test_after_a_reset_the_driver_may_have_another_rate(world: World) -> None:

@@ -6,7 +6,6 @@ import json
 import signal
 import time
 import urllib.request
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -14,19 +13,13 @@ import numpy as np
 import pytest
 from helpers.browser_tools import Server
 from helpers.busy import allowed
-from helpers.ros_tools import Integrator, World, needs_ros, world_in
+from helpers.ros_tools import Integrator, World, needs_ros
 
 from xy_sysid.samples.block import Block
 
 pytestmark = needs_ros
 EXCITATION, MACHINE = "xy_sysid.nodes.excitation", "xy_sim.node"
 PUSH = {"x.kind": '"off"', "x.offset": 1.0, "x.centring": 0.0, "y.kind": '"off"', "y.centring": 0.0, "ramp": 0.05, "watchdog": 1.0}
-
-
-@pytest.fixture
-def world(tmp_path: Path) -> Iterator[World]:
-    with world_in(tmp_path) as made:
-        yield made
 
 
 def activate(world: World, node: str = "excitation") -> None:

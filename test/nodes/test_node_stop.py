@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
 from helpers.busy import allowed
-from helpers.ros_tools import Integrator, NodeProcess, World, needs_ros, world_in
+from helpers.ros_tools import Integrator, NodeProcess, World, needs_ros
 
 from xy_sysid.samples.block import Block
 
@@ -26,12 +24,6 @@ topic = node.create_publisher(Bool, "stop", LATCHED_QOS)
 topic.publish(Bool(data=True))
 rclpy.spin(node)
 """
-
-
-@pytest.fixture
-def world(tmp_path: Path) -> Iterator[World]:
-    with world_in(tmp_path) as made:
-        yield made
 
 
 def driving(world: World, blocks: list[Block]) -> None:

@@ -6,8 +6,6 @@ The controller is ``xy_sim.trajectory_node``: topic, interpolation and refusals 
 from __future__ import annotations
 
 import signal
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,7 +13,7 @@ import pytest
 import yaml
 from helpers import ROOT
 from helpers.live_nodes import newest
-from helpers.ros_tools import NodeProcess, World, needs_ros, world_in
+from helpers.ros_tools import NodeProcess, World, needs_ros
 
 from xy_sysid.samples.block import FloatArray
 
@@ -24,12 +22,6 @@ pytestmark = needs_ros
 JOINT, TOPIC = "shoulder_pan_joint", "/joint_trajectory_controller/joint_trajectory"
 RUN = {node["executable"]: node["parameters"] for node in yaml.safe_load((ROOT / "config" / "ros2_trajectory.yaml").read_text())["nodes"]}
 LIMITS = RUN["excitation"]["x"]
-
-
-@pytest.fixture
-def world(tmp_path: Path) -> Iterator[World]:
-    with world_in(tmp_path) as made:
-        yield made
 
 
 def start(world: World, executable: str, **more: Any) -> NodeProcess:
@@ -49,18 +41,14 @@ def trajectories(world: World) -> list[Any]:
     """A list that fills with what a controller hears."""
     from trajectory_msgs.msg import JointTrajectory
 
-    heard: list[Any] = []
-    world.node.create_subscription(JointTrajectory, TOPIC, heard.append, 100)
-    return heard
+    return world.hears(JointTrajectory, TOPIC, 100)
 
 
 def arrays(world: World, topic: str) -> list[Any]:
     """A list that fills with a node's results."""
     from std_msgs.msg import Float64MultiArray
 
-    heard: list[Any] = []
-    world.node.create_subscription(Float64MultiArray, topic, heard.append, 10)
-    return heard
+    return world.hears(Float64MultiArray, topic)
 
 
 def places(world: World) -> list[float]:

@@ -3,25 +3,17 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 import pytest
 from helpers.live_nodes import Source, newest
-from helpers.ros_tools import World, needs_ros, world_in
+from helpers.ros_tools import World, needs_ros
 
 pytestmark = needs_ros
 
 RATE = 125.0
 HEARS = {"axes": json.dumps(["left", "right"]), "source": "joint_state", "effort_as_voltage": True, "input_unit": "N m", "output_unit": "rad/s"}
 SHAPE = {"length": 256, "band_high": 60.0, "refit": 2.0, "numerator_order": 0, "denominator_order": 2}
-
-
-@pytest.fixture
-def world(tmp_path: Path) -> Iterator[World]:
-    with world_in(tmp_path) as made:
-        yield made
 
 
 def test_wheels_without_positions_are_identified_by_their_velocities_and_refused_in_words_by_who_waits_for_positions(world: World) -> None:

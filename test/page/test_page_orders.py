@@ -3,23 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
-from helpers.ros_tools import World, needs_ros, world_in
+from helpers.ros_tools import World, needs_ros
 
 from xy_sysid.live.plain_messages import StatusMessage
 from xy_sysid.page.live import Live
 from xy_sysid.page.orders import Wish
 from xy_sysid.page.topics_state import TopicsState
-
-
-@pytest.fixture
-def world(tmp_path: Path) -> Iterator[World]:
-    with world_in(tmp_path) as made:
-        yield made
 
 
 class Deaf:

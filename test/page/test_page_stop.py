@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from helpers.busy import allowed
-from helpers.ros_tools import Integrator, World, needs_ros, world_in
+from helpers.ros_tools import Integrator, World, needs_ros
 
 from xy_sysid.page.session import Session
 from xy_sysid.page.shelf import Shelf
@@ -21,12 +21,6 @@ from xy_sysid.samples.block import Block
 
 EXCITATION = "xy_sysid.nodes.excitation"
 BRACKETS = "[" * 100_000
-
-
-@pytest.fixture
-def world(tmp_path: Path) -> Iterator[World]:
-    with world_in(tmp_path) as made:
-        yield made
 
 
 class Driven:

@@ -10,7 +10,8 @@ import pytest
 from helpers import ROOT
 
 from campaigns.blind.cases import EFFECTS
-from xy_sim import effect_text, tables
+from campaigns.documents import machines
+from xy_sim import effect_text
 from xy_sim.hidden import draw, hidden
 from xy_sim.machine import Machine
 from xy_sim.machine_file import machine_path, read
@@ -186,7 +187,7 @@ def test_an_installation_is_searched_where_ros_keeps_its_share(tmp_path: Path, m
 
 
 def test_the_document_says_what_the_parts_say() -> None:
-    """docs/machines.md is made from files, keys and parts; refresh it with xy_sim.tables.refresh."""
+    """docs/machines.md is made from files, keys and parts; refresh it with python -m campaigns.documents.machines"""
     text = (ROOT / "docs" / "machines.md").read_text(encoding="utf-8")
-    assert tables.refreshed(text) == text
+    assert machines.refreshed(text) == text
     assert all(f"#### `{name}`" in text for name in PARTS)

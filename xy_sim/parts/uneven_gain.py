@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from xy_sim.inlined import inlined
-from xy_sim.parts import curve
 from xy_sim.parts.contract import Parameter, Part
-from xy_sysid.samples.block import FloatArray
 
 PART = Part(
     name="uneven_gain",
@@ -21,9 +18,3 @@ PART = Part(
     ),
     drawn=False,
 )
-
-
-@inlined
-def factor(p: FloatArray, first: int, depth: float, length: float, q: float) -> float:
-    """Motor constant at ``q`` (m) over its mean; the curve begins at ``first`` of ``p``."""
-    return curve.around_one(p, first, depth, q / length)

@@ -8,8 +8,8 @@ opening:                               what is looked at before a file is opened
 atomic:                                files that are written whole or not at all
 cdr, stride:                           proof of layout, then arrays without deserializing each
 streaming:                             blocks of voltage and position in log order
-writing:                               a bag that is complete at any moment
-sqlite_writer, mcap_writer, typestore: its files and the definitions that they carry
+writing:                               a bag that is complete at any moment, and the definitions that it carries
+sqlite_writer, mcap_writer:            its files
 """
 
 from xy_sysid.bags.reading import Bag, Topic

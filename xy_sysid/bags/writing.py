@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import os
 import time
@@ -16,7 +17,6 @@ from xy_sysid.bags.cdr import ARRAY_TYPE, encode_array
 from xy_sysid.bags.mcap_writer import McapWriter
 from xy_sysid.bags.sqlite_writer import SqliteWriter
 from xy_sysid.bags.sums import Sums
-from xy_sysid.bags.typestore import definition
 from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.samples.block import Block, FloatArray, columns, pack
 
@@ -191,3 +191,19 @@ class _Closed:
 
     def close(self, metadata: str) -> None:
         return
+
+
+@functools.cache
+def definition(kind: str) -> tuple[str, str]:
+    """(text of the definition, hash) of a message type of ROS 2 Jazzy, which a bag carries along so that others can read it without ROS.
+
+    Empty for a type that is not one.
+    """
+    from rosbags.typesys import Stores, get_typestore
+    from rosbags.typesys.base import TypesysError
+
+    store = get_typestore(Stores.ROS2_JAZZY)
+    try:
+        return store.generate_msgdef(kind, ros_version=2)[0], store.hash_rihs01(kind)
+    except (TypesysError, KeyError):
+        return "", ""

@@ -10,7 +10,7 @@ import typer
 
 from xy_sysid.cli import options as o
 from xy_sysid.cli.diagnose import Own
-from xy_sysid.cli.output import aside, emit, say, table
+from xy_sysid.cli.output import aside, emit, say, say_refused, table
 from xy_sysid.cli.reading import chosen, each, read, reads
 from xy_sysid.units import moved, told
 
@@ -70,8 +70,7 @@ def compare(
                 if held[name].doubt:
                     say(f"axis {name}: {held[name].doubt}", aside)
             say(f"axis {name}: {pair.sentence}")
-        for name, text in refused.items():
-            say(f"axis {name}: {text}")
+        say_refused(refused)
         return
     splits: dict[str, Distortion | None] = {}
 

@@ -11,7 +11,7 @@ import typer
 
 from xy_sysid.cli import options as o
 from xy_sysid.cli.mechanics import Gear, Kt, mechanics_document, mechanics_table
-from xy_sysid.cli.output import emit, estimate, progress, say, table
+from xy_sysid.cli.output import emit, estimate, say, say_refused, table
 from xy_sysid.cli.reading import chosen, each, read_each, reads, runs_of
 from xy_sysid.units import motion
 
@@ -47,16 +47,8 @@ def diagnose(
     recording = recordings[0]
     names = chosen(recording, reading.axes)
     drive = drive_from(kt, gear, recording.units)
-    with progress() as bar:
-        task = bar.add_task("diagnosing", total=len(names))
-
-        def work(name: str) -> Diagnosis:
-            bar.update(task, description=f"diagnosing axis {name}")
-            found = logic(runs_of(recordings, name), known, math.inf if budget is None else budget, time.process_time)
-            bar.advance(task)
-            return found
-
-        found, refused = each(names, work)
+    limit = math.inf if budget is None else budget
+    found, refused = each(names, lambda name: logic(runs_of(recordings, name), known, limit, time.process_time), "diagnosing ")
     seconds = time.perf_counter() - begun
     if json:
         answers: dict[str, Any] = {name: answer(findings(item, known)) | _mechanics(item, drive) for name, item in found.items()}
@@ -65,8 +57,7 @@ def diagnose(
         return
     for name, item in found.items():
         _show(name, item, known, drive)
-    for name, text in refused.items():
-        say(f"axis {name}: {text}")
+    say_refused(refused)
 
 
 def _mechanics(item: Diagnosis, drive: Transmission) -> dict[str, Any]:

@@ -12,7 +12,7 @@ import typer
 
 from xy_sysid.cli import options as o
 from xy_sysid.cli.diagnose import Own
-from xy_sysid.cli.output import emit, say
+from xy_sysid.cli.output import emit, say, say_refused
 from xy_sysid.cli.reading import chosen, each, read, reads
 
 if TYPE_CHECKING:
@@ -67,8 +67,7 @@ def figures(
         return
     for name, story in found.items():
         say(f"axis {name}: {headline(story)}. {len(written[name])} files.")
-    for name, text in refused.items():
-        say(f"axis {name}: {text}")
+    say_refused(refused)
     say(f"wrote {sum(len(names) for names in written.values())} files into {out}")
 
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from xy_sysid.cli import options as o
-from xy_sysid.cli.output import aside, emit, estimates, say
-from xy_sysid.cli.provenance import provenance, provenance_of_response
+from xy_sysid.cli.output import aside, emit, estimates, say, say_refused
 from xy_sysid.cli.reading import chosen, each, measured_responses, named, read, reads
+from xy_sysid.files.provenance import provenance, provenance_of_response
 
 if TYPE_CHECKING:
     from xy_sysid.fitting import Fit
@@ -78,8 +78,7 @@ def fit(
         return
     for parts in done.values():
         _show(*parts)
-    for name, text in problems.items():
-        say(f"axis {name}: no model. {text}")
+    say_refused(problems, "no model. ")
 
 
 def _of_response(name: str, response: FrequencyResponse, settings: IdentifierSettings, way: Method) -> tuple[AxisEstimate, Fit, Validation]:

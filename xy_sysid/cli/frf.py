@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from xy_sysid.cli import options as o
-from xy_sysid.cli.output import aside, emit, say, table
+from xy_sysid.cli.output import aside, emit, say, say_refused, table
 from xy_sysid.cli.reading import chosen, each, named, read, reads
 from xy_sysid.units import over
 
@@ -65,8 +65,7 @@ def frf(
         rows = [_row(f, int(k)) for k in lines]
         unit = over(f.output_unit, f.input_unit)
         table(f"axis {item.axis}, {unit}", ("Hz", f"dB ({unit})", "phase deg", "coherence", "sigma %", "trusted"), rows)
-    for name, text in problems.items():
-        say(f"axis {name}: no response. {text}")
+    say_refused(problems, "no response. ")
 
 
 def _row(f: FrequencyResponse, k: int) -> tuple[str, ...]:

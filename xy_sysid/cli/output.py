@@ -88,6 +88,12 @@ def say(text: str = "", to: Terminal = people, style: str | None = None) -> None
             to.print(part, style=style)
 
 
+def say_refused(refused: Mapping[str, str], before: str = "") -> None:
+    """Why axes have no answer. before: words before each reason."""
+    for name, text in refused.items():
+        say(f"axis {name}: {before}{text}")
+
+
 def table(title: str, columns: Iterable[str], rows: Iterable[Iterable[str]]) -> None:
     """A table on stdout; the first column and those of TEXT are text, the others are figures."""
     made = Table(title=title, title_justify="left", title_style="bold", header_style="bold", box=None, pad_edge=False)

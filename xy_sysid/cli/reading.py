@@ -162,14 +162,17 @@ def chosen(recording: Recording, axes: Sequence[str] | None) -> tuple[str, ...]:
     return tuple(axes) if axes else recording.axes
 
 
-def each(names: tuple[str, ...], work: Callable[[str], Found]) -> tuple[dict[str, Found], dict[str, str]]:
-    """What ``work`` finds for each axis, and why there is nothing for the others; raises the first refusal if no axis has an answer."""
+def each(names: tuple[str, ...], work: Callable[[str], Found], doing: str = "") -> tuple[dict[str, Found], dict[str, str]]:
+    """What ``work`` finds for each axis, and why there is nothing for the others; raises the first refusal if no axis has an answer.
+
+    doing: what the progress bar says of an axis, as "refining "
+    """
     found: dict[str, Found] = {}
     refusals: dict[str, BadInput] = {}
     with progress() as bar:
         task = bar.add_task("", total=len(names))
         for name in names:
-            bar.update(task, description=f"axis {name}")
+            bar.update(task, description=f"{doing}axis {name}")
             try:
                 found[name] = work(name)
             except BadInput as refusal:

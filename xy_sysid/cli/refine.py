@@ -13,9 +13,9 @@ import typer
 from xy_sysid.cli import options as o
 from xy_sysid.cli.diagnose import Own, error_cells, parameter_table
 from xy_sysid.cli.mechanics import Gear, Kt, mechanics_document, mechanics_table
-from xy_sysid.cli.output import emit, progress, say, table
-from xy_sysid.cli.provenance import provenance
+from xy_sysid.cli.output import emit, say, say_refused, table
 from xy_sysid.cli.reading import chosen, each, named, read_each, reads, runs_of
+from xy_sysid.files.provenance import provenance
 from xy_sysid.units import bare, motion, moved
 
 if TYPE_CHECKING:
@@ -70,23 +70,19 @@ def refine(
     names = chosen(recording, reading.axes)
     drive = drive_from(kt, gear, recording.units)
     alone: dict[str, OpenLoop] = {}
-    with progress() as bar:
-        task = bar.add_task("refining", total=len(names))
 
-        def work(name: str) -> Ladder:
-            bar.update(task, description=f"refining axis {name}")
-            runs = runs_of(recordings, name)
-            run, effort = runs[0], Effort(MOST_EFFECTS if auto else 0, math.inf if budget is None else budget, time.process_time)
-            found = refined(runs, tuple(add or ()), known, effort, tolerance).ladder
-            if not found.final.one_step and len(runs) == 1:  # free simulation says nothing about those
-                if simulate_alone:
-                    data = prepare(run.sampling_rate, run.voltage, run.position, tolerance, run.units)
-                    found = replace(found, final=settled(data, found.final))
-                alone[name] = open_loop(run.sampling_rate, run.position, found.final.simulated, found.final.model.pole)
-            bar.advance(task)
-            return found
+    def work(name: str) -> Ladder:
+        runs = runs_of(recordings, name)
+        run, effort = runs[0], Effort(MOST_EFFECTS if auto else 0, math.inf if budget is None else budget, time.process_time)
+        found = refined(runs, tuple(add or ()), known, effort, tolerance).ladder
+        if not found.final.one_step and len(runs) == 1:  # free simulation says nothing about those
+            if simulate_alone:
+                data = prepare(run.sampling_rate, run.voltage, run.position, tolerance, run.units)
+                found = replace(found, final=settled(data, found.final))
+            alone[name] = open_loop(run.sampling_rate, run.position, found.final.simulated, found.final.model.pole)
+        return found
 
-        found, refused = each(names, work)
+    found, refused = each(names, work, "refining ")
     origin = provenance(named(recs), recording)
     if model is not None:
         write_axis_models(model, {name: ladder.final for name, ladder in found.items()}, origin)
@@ -116,8 +112,7 @@ def refine(
         if name in alone:
             say(f"  {_alone_in_words(alone[name], recording.output_unit)}")
         say()
-    for name, text in refused.items():
-        say(f"axis {name}: {text}")
+    say_refused(refused)
 
 
 def verdict(ladder: Ladder) -> str:

@@ -13,7 +13,6 @@ from xy_sysid.cli.diagnose import Own
 from xy_sysid.cli.output import emit, progress, say
 from xy_sysid.cli.reading import chosen, read, reads
 from xy_sysid.cli.study import answer as linear_answer
-from xy_sysid.cli.written_report import Asked, written_report
 
 if TYPE_CHECKING:
     from xy_sysid.imports.reading import Reading
@@ -52,6 +51,7 @@ def report(
     from xy_sysid.report.axis_report import STAGES, Wanted
     from xy_sysid.report.cover import Cover
     from xy_sysid.report.story_words import status
+    from xy_sysid.report.written import Asked, written_report
 
     settings = o.settings_from(params, set_)
     samples = o.period_from(period)

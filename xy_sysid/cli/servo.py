@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from xy_sysid.cli import options as o
-from xy_sysid.cli.output import emit, estimate, say, table
+from xy_sysid.cli.output import emit, estimate, say, say_refused, table
 from xy_sysid.cli.reading import chosen, each, read_each, reads, stretches_of
 
 if TYPE_CHECKING:
@@ -53,5 +53,4 @@ def servo(recs: o.Recs, reading: Reading, inertia: Inertia = None, json: o.Json 
         for sentence in rest:
             say(f"  {sentence}")
         say()
-    for name, text in refused.items():
-        say(f"axis {name}: {text}")
+    say_refused(refused)

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from xy_sysid.cli import options as o
+
+if TYPE_CHECKING:
+    from xy_sysid.processes.run_plan import ProcessSpec
 
 
 def run(
@@ -21,8 +26,6 @@ def run(
     o.ros_domain()
     say = (lambda line: aside.print(line, markup=False)) if json else starter._print
     if first:
-        from xy_sysid.cli.first import first_run
-
         answer = first_run(starter.load(params), say)
         if json:
             emit({"run": params, **answer})
@@ -31,3 +34,24 @@ def run(
     if json:
         emit({"run": params, "exit_code": code})
     raise typer.Exit(code)
+
+
+def first_run(specs: Sequence[ProcessSpec], say: Callable[[str], None]) -> dict[str, Any]:
+    """Start the nodes, find out by small pushes what the machine is, stop them; the answer as JSON has it."""
+    import threading
+
+    from xy_sysid.nodes.first_run import Conductor
+    from xy_sysid.processes import starter
+
+    over = threading.Event()
+    conductor = Conductor(lambda words: say(f"first run: {words}"), over.is_set)
+    thread = threading.Thread(target=conductor.run, name="first run", daemon=True)
+    thread.start()
+    try:
+        code = starter.run(specs, say=say, enough=lambda: not thread.is_alive())
+    finally:
+        over.set()
+        thread.join(15.0)
+        conductor.close()
+    found = {axis: asdict(one) for axis, one in conductor.found.items()}
+    return {"exit_code": code or (1 if conductor.problem else 0), "problem": conductor.problem or None, "axes": found}

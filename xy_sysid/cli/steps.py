@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from xy_sysid.cli import options as o
 from xy_sysid.cli.mechanics import Gear, Kt, mechanics_document, mechanics_table
-from xy_sysid.cli.output import emit, estimate, say, table
+from xy_sysid.cli.output import emit, estimate, say, say_refused, table
 from xy_sysid.cli.reading import chosen, each, read_each, reads, stretches_of
 
 if TYPE_CHECKING:
@@ -45,5 +45,4 @@ def steps(recs: o.Recs, reading: Reading, kt: Kt = None, gear: Gear = "", json: 
         for sentence in rest:
             say(f"  {sentence}")
         say()
-    for name, text in refused.items():
-        say(f"axis {name}: {text}")
+    say_refused(refused)

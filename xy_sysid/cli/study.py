@@ -10,8 +10,8 @@ import typer
 
 from xy_sysid.cli import options as o
 from xy_sysid.cli.output import aside, emit, progress, say
-from xy_sysid.cli.provenance import provenance
 from xy_sysid.cli.reading import chosen, read, reads
+from xy_sysid.files.provenance import provenance
 
 if TYPE_CHECKING:
     from xy_sysid.imports.reading import Reading

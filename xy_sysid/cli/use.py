@@ -10,7 +10,7 @@ import typer
 
 from xy_sysid.cli import options as o
 from xy_sysid.cli.diagnose import Own
-from xy_sysid.cli.output import aside, emit, estimate, plain, quantity, say, table
+from xy_sysid.cli.output import aside, emit, estimate, plain, quantity, say, say_refused, table
 from xy_sysid.cli.reading import each, read, reads
 from xy_sysid.units import bare, motion, moved
 
@@ -95,8 +95,7 @@ def use(
                 say(f"  {target}: {item.note}.")
     for text in written:
         say(f"wrote {text}", aside)
-    for name, text in refused.items():
-        say(f"axis {name}: {text}")
+    say_refused(refused)
 
 
 def _models(paths: list[Path], effect_file: list[Path] | None, axes: Sequence[str] | None) -> dict[str, PhysicalModel]:

@@ -9,7 +9,7 @@ import typer
 
 from xy_sysid.cli import options as o
 from xy_sysid.cli.diagnose import Own
-from xy_sysid.cli.output import aside, emit, plain, say, table
+from xy_sysid.cli.output import aside, emit, plain, say, say_refused, table
 from xy_sysid.cli.reading import chosen, each, read, reads
 from xy_sysid.units import moved, told
 
@@ -95,8 +95,7 @@ def validate(
                 f"axis {name}: simulated from the input alone, the position of the whole record has an error of {off} rms; "
                 f"{100 * alone[name]['explained']:.3g} % of the power of the motion is explained."
             )
-    for name, text in problems.items():
-        say(f"axis {name}: not checked. {text}")
+    say_refused(problems, "not checked. ")
     raise typer.Exit(0 if holds else DOES_NOT_HOLD)
 
 

@@ -163,11 +163,11 @@ def feedback(
     for crossover in tries.tolist():
         controller = shaped(systems[0], crossover, filters, limit)
         nominal = margins(systems[0], controller)
-        if not _holds(nominal):
+        if not holds(nominal):
             worst = nominal
             continue
         worst = _least([margins(system, controller) for system in systems])
-        if _holds(worst):
+        if holds(worst):
             return _made(systems, controller, crossover, (nominal, worst), encoder or Encoder())
     said = f"phase margin {worst.phase:.3g} degrees and gain margin {worst.gain:.3g}" if worst.stable else "unstable"
     what = f"{bandwidth:g} Hz" if bandwidth is not None else "any"
@@ -184,7 +184,8 @@ def _within_a_gap(model: AxisModel) -> tuple[AxisModel, ...]:
     return tuple(found)
 
 
-def _holds(found: Margins) -> bool:
+def holds(found: Margins) -> bool:
+    """Enough phase and gain are left."""
     return found.stable and found.phase >= PHASE_MARGIN and found.gain >= GAIN_MARGIN
 
 

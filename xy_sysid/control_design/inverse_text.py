@@ -6,11 +6,9 @@ speed, so that a resonance is undone without differentiating anything. As ``step
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from string import Template
 
-from xy_sysid.axis.model import AxisModel
-from xy_sysid.control_design.law_text import LawText, StateLayout, given_numbers
+from xy_sysid.control_design.law_text import LawText, indented
 from xy_sysid.effects import Effect
 from xy_sysid.effects._contract import arguments
 
@@ -48,11 +46,7 @@ $inputs
 
 
 class InverseText(LawText):
-    """Writes the feedforward of some effects: behind flags, or of one model with its numbers."""
-
-    def __init__(self, effects: Sequence[Effect], hanging: int, model: AxisModel | None = None, numbers: Mapping[str, str] | None = None) -> None:
-        kept = tuple(effect for effect in effects if effect.category != "base")
-        super().__init__(StateLayout(kept, hanging), model, numbers or given_numbers())
+    """Writes the feedforward."""
 
     def text(self, name: str) -> str:
         """Source of ``name(r, v, acc, h, cuts, p, on, z, moving, guided, s, w)``, V; of one model without ``p, on, z``.
@@ -66,15 +60,12 @@ class InverseText(LawText):
             signature="r, v, acc, h, cuts, p, on, z, moving, guided, s, w" if self.guarded else "r, v, acc, h, cuts, moving, guided, s, w",
             n=n,
             cuts="cuts",
-            encoder=_lines(1, self._encoder()),
-            friction=_lines(1, self._friction()),
-            forces=_lines(1, self._forces()),
-            lag=_lines(1, self._lag()),
-            inputs=_lines(1, self._inputs()),
+            encoder=indented(1, self._encoder()),
+            friction=indented(1, self._friction()),
+            forces=indented(1, self._forces()),
+            lag=indented(1, self._lag()),
+            inputs=indented(1, self._inputs()),
         )
-
-    def _asks_voltage(self) -> bool:
-        return any("u" in arguments(effect.functions["force"]) for effect in self.of("force"))
 
     def _encoder(self) -> list[str]:
         effects = self.of("encoder")
@@ -132,7 +123,8 @@ class InverseText(LawText):
             words = {"u": "total", "v": "v", "x": "x", "t": "0.0"}
             lines += self.guard(effect, [f"pull += {self.call(effect, 'force', words)}"])
         lines.append("total = effort + pull")
-        return [f"for _ in range({PASSES}):", *("    " + line for line in lines)] if self._asks_voltage() else lines
+        asks = any("u" in arguments(effect.functions["force"]) for effect in self.of("force"))
+        return [f"for _ in range({PASSES}):", *("    " + line for line in lines)] if asks else lines
 
     def _lag(self) -> list[str]:
         """A first-order lag needs more by its time constant times the rate of change; where it stands still it needs none."""
@@ -155,7 +147,3 @@ class InverseText(LawText):
         tried = [*lines, "total = total + (wanted - held)"]
         last = [*lines, "if abs(held - wanted) > 1e-6 * abs(wanted):", "    total = held"]
         return ["wanted = total", f"for _ in range({TRIES}):", *("    " + line for line in tried), *last]
-
-
-def _lines(depth: int, lines: Sequence[str]) -> str:
-    return "\n".join("    " * depth + line for line in lines)

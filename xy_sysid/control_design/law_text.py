@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from xy_sysid.axis.loop_source import slots
@@ -49,15 +49,15 @@ def given_numbers() -> dict[str, str]:
 
 
 class LawText:
-    """Writes calls of laws: with the numbers of a model, or behind flags with those of ``p``."""
+    """Writes calls of the laws of some effects: behind flags with the numbers of ``p``, or of one model with its numbers (``NUMBERS``, as text)."""
 
-    def __init__(self, layout: StateLayout, model: AxisModel | None, numbers: Mapping[str, str]) -> None:
-        self.effects = layout.effects
-        self.layout = layout
+    def __init__(self, effects: Sequence[Effect], hanging: int, model: AxisModel | None = None, numbers: Mapping[str, str] | None = None) -> None:
+        self.effects = tuple(effect for effect in effects if effect.category != "base")
+        self.layout = StateLayout(self.effects, hanging)
         self.model = model
         self.guarded = model is None
         self.places = slots(self.effects)
-        self.numbers = numbers
+        self.numbers = numbers or given_numbers()
 
     def of(self, *categories: str) -> list[Effect]:
         """The effects of some categories, in the direction of the signal."""
@@ -81,3 +81,8 @@ class LawText:
     def acts(self, effects: list[Effect]) -> str:
         """Whether one of the effects acts."""
         return " or ".join(f"on[{self.effects.index(effect)}] != 0" for effect in effects) or "False"
+
+
+def indented(depth: int, lines: Sequence[str]) -> str:
+    """Lines as a block of source."""
+    return "\n".join("    " * depth + line for line in lines)

@@ -16,7 +16,7 @@ import numpy as np
 import scipy.linalg
 
 from xy_sysid.comparison.physical_model import PhysicalModel
-from xy_sysid.control_design.feedback import ADVICE, COUNT, GAIN_MARGIN, HIGHEST, LINES, PHASE_MARGIN, Margins
+from xy_sysid.control_design.feedback import ADVICE, COUNT, GAIN_MARGIN, HIGHEST, LINES, PHASE_MARGIN, Margins, holds
 from xy_sysid.control_design.sampled import Sampled, sampled
 from xy_sysid.control_design.uncertain import samples, undetermined
 from xy_sysid.errors import BadInput
@@ -87,7 +87,7 @@ def state_feedback(model: PhysicalModel, sampling_rate: float, bandwidth: float 
         parts = free + np.outer(drive, c), b, c
         nominal = _margins(systems[0], *parts)
         worst = nominal
-        if not _holds(nominal):
+        if not holds(nominal):
             continue
         found = [_margins(system, *parts) for system in systems]
         worst = Margins(
@@ -97,7 +97,7 @@ def state_feedback(model: PhysicalModel, sampling_rate: float, bandwidth: float 
             crossover=min(item.crossover for item in found),
             stable=all(item.stable for item in found),
         )
-        if _holds(worst):
+        if holds(worst):
             rejects, settles = _load_step(systems[0], *parts)
             return StateFeedback(
                 free=free,
@@ -115,10 +115,6 @@ def state_feedback(model: PhysicalModel, sampling_rate: float, bandwidth: float 
     said = f"phase margin {worst.phase:.3g} degrees and gain margin {worst.gain:.3g}" if worst.stable else "unstable"
     what = f"{bandwidth:g} Hz" if bandwidth is not None else "any"
     raise BadInput("bandwidth of the state feedback", f"{what}: {said}", f"at least {PHASE_MARGIN:g} degrees and {GAIN_MARGIN:g}", ADVICE)
-
-
-def _holds(found: Margins) -> bool:
-    return found.stable and found.phase >= PHASE_MARGIN and found.gain >= GAIN_MARGIN
 
 
 def _designed(system: Sampled, bandwidth: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:

@@ -7,11 +7,9 @@ simulation is this one. The axis is where its own motion brings it; in ``axis.mo
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-
 from xy_sysid.axis.loop_source import heeds_speed, needs_speed
 from xy_sysid.axis.model import AxisModel
-from xy_sysid.control_design.law_text import LawText, StateLayout, given_numbers
+from xy_sysid.control_design.law_text import LawText, indented
 from xy_sysid.control_design.series import TERMS
 from xy_sysid.control_design.step_template import BRISTLED, DRY, FREE, PLAIN, TEMPLATE
 from xy_sysid.effects import Effect
@@ -19,11 +17,7 @@ from xy_sysid.effects._contract import arguments
 
 
 class StepText(LawText):
-    """Writes the sample step of some effects: behind flags, or of one model with its numbers (``NUMBERS``, as text)."""
-
-    def __init__(self, effects: Sequence[Effect], hanging: int, model: AxisModel | None = None, numbers: Mapping[str, str] | None = None) -> None:
-        kept = tuple(effect for effect in effects if effect.category != "base")
-        super().__init__(StateLayout(kept, hanging), model, numbers or given_numbers())
+    """Writes the sample step."""
 
     def text(self, name: str) -> str:
         """Source of ``name(u, p, on, z, a, still, s, w)``, or for one model of ``name(u, a, still, s, w)``: the position shown after the sample.
@@ -38,10 +32,10 @@ class StepText(LawText):
             head=at.head,
             time=at.time,
             first=at.ring,
-            inputs=_lines(1, ["held = u", *self._inputs()]),
-            advance=_lines(3, self._advance()),
-            pulls=_lines(3, self._forces("pull", False, "v")),
-            move=_lines(3, self._move()),
+            inputs=indented(1, ["held = u", *self._inputs()]),
+            advance=indented(3, self._advance()),
+            pulls=indented(3, self._forces("pull", False, "v")),
+            move=indented(3, self._move()),
             shown=self._shown(),
             **{key: self.numbers[key] for key in ("cuts_old", "cuts_new", "h_old", "h_new", "back_old", "back_new", "ring")},
         )
@@ -148,10 +142,6 @@ def _filled(template: str, words: dict[str, str], parts: dict[str, list[str]]) -
         indent, _, name = line.partition("\0")
         lines += [indent + part for part in parts[name]] if name else [line]
     return lines
-
-
-def _lines(depth: int, lines: Sequence[str]) -> str:
-    return "\n".join("    " * depth + line for line in lines)
 
 
 ROOM = TERMS  # numbers of ``w`` for each of the n

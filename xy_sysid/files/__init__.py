@@ -6,5 +6,6 @@ models:         models of either kind, saved and loaded
 state:          the identifier's memory on disk
 ros_parameters: parameter files of ROS, checked and written
 effects:        effects from outside
+provenance:     where an answer comes from: versions, command, fingerprint of the data
 viewer_layouts: layouts for PlotJuggler and Foxglove
 """

@@ -123,7 +123,7 @@ def declare(
     """Declare every knob with its type, meaning, unit and limits; take what was given; keep up with changes.
 
     The node must be made with automatically_declare_parameters_from_overrides. also: names that the node declares itself;
-    fixed: those that never change while it runs, None for all of them.
+    fixed: those that never change while it runs, None for all of them; rclpy refuses them before it asks ``accept``.
     Raises BadInput for an unknown name (with the nearest spelling) and for a value that is not allowed.
     """
     given = {name: value for name, value in overrides(node).items() if name not in also}

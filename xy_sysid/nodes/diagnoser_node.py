@@ -171,9 +171,6 @@ class DiagnoserNode(WalledNode):
         if not self._ready:
             return
         before = self._own.settings
-        for name in FIXED:
-            if getattr(before, name) != getattr(settings, name):
-                raise BadInput(name, "not to be changed while the node runs", str(getattr(before, name)), "Start the node again with it.")
         self._check(settings)
         self._diagnoser.change(settings)
         for axis in self._axes:

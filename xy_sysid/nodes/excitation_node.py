@@ -488,10 +488,6 @@ class ExcitationNode(Overridable, LifecycleNode):
     # parameters, diagnostics, start
 
     def _accept(self, settings: ExcitationSettings) -> None:
-        for name in FIXED:
-            before = getattr(self._knobs.settings, name)
-            if getattr(settings, name) != before:
-                raise BadInput(name, "not to be changed while the node runs", str(before), "Start the node again with it.")
         with self._hold:
             self._change(settings)
 

@@ -124,9 +124,6 @@ class IdentifierNode(WalledNode):
         if not self._ready:
             return
         before = self._own.settings
-        for name in FIXED:
-            if getattr(before, name) != getattr(settings, name):
-                raise BadInput(name, "not to be changed while the node runs", str(getattr(before, name)), "Start the node again with it.")
         if any(getattr(before, name) != getattr(settings, name) for name in SHAPES_SPECTRA):
             self._identifier = Identifier(settings, self._axes, settings.units)
             self._worker.change(self._fitter(settings))

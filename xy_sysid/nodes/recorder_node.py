@@ -28,7 +28,7 @@ class RecorderNode(WalledNode):
 
     def __init__(self) -> None:
         super().__init__("recorder")
-        self._own = declare(self, RecorderSettings(), self._accept, fixed=None)
+        self._own = declare(self, RecorderSettings(), fixed=None)
         settings = self._own.settings
         try:
             self._patterns = [re.compile(pattern) for pattern in settings.topics]
@@ -44,10 +44,6 @@ class RecorderNode(WalledNode):
         self.create_timer(FLUSH, self._flush)
         self.get_logger().info(f"recording to {self._bag.path}")
         self._look()
-
-    def _accept(self, settings: RecorderSettings) -> None:
-        if getattr(self, "_bag", None) is not None and settings != self._own.settings:
-            raise BadInput("recorder", "not to be changed while it records", "as it is", "Start another one.")
 
     def _look(self) -> None:
         """Subscribe to what is new and wanted."""

@@ -5,6 +5,6 @@ study:          the study of the paper, parameter by parameter, and what its tab
 words, captions, remarks, story_words: what is said
 figures, signals, story_*: what is drawn, in the colours of ``theme``
 parts, sheet:   pieces of a page, and the page around them
-report_page, study_page: the two pages
+report_page, study_page: the two pages; written: a report of a recording, as command and notebook ask for it
 plots, notebook: single pictures, and results as a notebook shows them
 """

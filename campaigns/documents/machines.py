@@ -1,4 +1,4 @@
-"""What docs/machines.md says about files, keys and parts, made from the files, keys and parts themselves."""
+"""What docs/machines.md says about files, keys and parts, made from these: python -m campaigns.documents.machines"""
 
 from __future__ import annotations
 
@@ -80,6 +80,6 @@ def refreshed(text: str) -> str:
     return text
 
 
-def refresh(path: Path) -> None:
-    """Rewrites the document in place."""
+if __name__ == "__main__":
+    path = Path("docs/machines.md")
     path.write_text(refreshed(path.read_text(encoding="utf-8")), encoding="utf-8")

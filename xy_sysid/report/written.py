@@ -7,16 +7,19 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, date, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from xy_sysid.bags.atomic import write_text
 from xy_sysid.errors import BadInput
+from xy_sysid.files.provenance import provenance
+from xy_sysid.files.unasked import free
+from xy_sysid.fitting.two_axes import coupling_in
+from xy_sysid.report.axis_report import AxisReport, Wanted, axis_reports
+from xy_sysid.report.cover import Cover, cover_of
+from xy_sysid.report.report_page import Recorded, report_page
+from xy_sysid.response.coupling import Coupling
 from xy_sysid.samples.recording import Recording, Run
-
-if TYPE_CHECKING:
-    from xy_sysid.report.axis_report import AxisReport, Wanted
-    from xy_sysid.report.cover import Cover
-    from xy_sysid.response.coupling import Coupling
-    from xy_sysid.settings import IdentifierSettings
+from xy_sysid.settings import IdentifierSettings
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,11 +50,6 @@ class Asked:
 
 def written_report(recording: Recording, asked: Asked) -> Written:
     """The whole page. Raises BadInput for a date that is none, before any work is done."""
-    from xy_sysid.cli.provenance import provenance
-    from xy_sysid.report.axis_report import axis_reports
-    from xy_sysid.report.cover import cover_of
-    from xy_sysid.report.report_page import Recorded, report_page
-
     cover = cover_of(recording, asked.cover, asked.paths, datetime.now(UTC).astimezone().date())
     made = axis_reports(recording, asked.axes, asked.wanted, asked.tell)
     source = ", ".join(str(path) for path in asked.paths) or recording.source
@@ -87,11 +85,6 @@ def write_report(
     budget: processor time for the diagnosis of each axis, s; force: replace the file
     Raises BadInput if the file is there and not ``force``, and for a date that is none.
     """
-    from xy_sysid.bags.atomic import write_text
-    from xy_sysid.files.unasked import free
-    from xy_sysid.report.axis_report import Wanted
-    from xy_sysid.report.cover import Cover
-
     path = Path(path)
     free("file", path, force, "say force=True")
     recording = data.recording() if isinstance(data, Run) else data
@@ -103,8 +96,6 @@ def write_report(
 
 def coupled(recording: Recording, names: tuple[str, ...], settings: IdentifierSettings) -> tuple[Coupling | None, tuple[str, ...]]:
     """What the first two of the axes do to each other, and notes; without an answer a note says why."""
-    from xy_sysid.fitting.two_axes import coupling_in
-
     if len(names) < 2:
         return None, ()
     columns = [recording.axes.index(name) for name in names[:2]]
