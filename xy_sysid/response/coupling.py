@@ -34,6 +34,7 @@ class Coupling:
     """What two axes do to each other.
 
     axes: their names; response: (lines, 2, 2) complex, output i over input j; sigma: (lines, 2, 2); frequency: (lines,) Hz, those used
+    windows, seconds: that were averaged; needed: s of such a recording with which the largest 95 % limit would come down to SUFFICES
     band_edges: (bands + 1,) Hz; coupling, at_most: (bands,) |G_ij| / sqrt(|G_ii G_jj|), rms in the band, the larger way: what is sure, and 95 % limit
     """
 
@@ -44,6 +45,9 @@ class Coupling:
     band_edges: FloatArray
     coupling: FloatArray
     at_most: FloatArray
+    windows: int
+    seconds: float
+    needed: float
 
     @property
     def largest(self) -> float:
@@ -72,8 +76,9 @@ class Coupling:
             place = int(np.argmax(self.at_most))
             where = f"{self.band_edges[place]:.3g} to {self.band_edges[place + 1]:.3g} Hz"
             return (
-                f"No coupling of {one} and {other} above {100 * SUFFICES:g} % is distinguished from noise in {span}. Up to "
-                f"{100 * self.largest:.2g} % cannot be ruled out in {where}: record longer, or excite both axes more there."
+                f"No coupling of {one} and {other} was found in {span}. In {where} the recording has too few windows ({self.windows}) to exclude "
+                f"it: there it may be up to {100 * min(self.largest, 1.0):.2g} %. With this excitation, {_lasting(self.needed)} would exclude "
+                f"more than {100 * SUFFICES:g} %; more excitation of both axes there needs less."
             )
         worst = int(np.argmax(self.coupling))
         low, high = self.band_edges[worst], self.band_edges[worst + 1]
@@ -92,6 +97,7 @@ class CrossSpectra:
     between: ComplexArray
     outputs: ComplexArray
     averages: float
+    windows: int
 
 
 class RunningCrossSpectra:
@@ -114,7 +120,7 @@ class RunningCrossSpectra:
     def get(self) -> CrossSpectra:
         """The sums so far."""
         inputs, between, outputs = self._sums
-        return CrossSpectra(inputs=inputs, between=between, outputs=outputs, averages=self._count / self._shared)
+        return CrossSpectra(inputs=inputs, between=between, outputs=outputs, averages=self._count / self._shared, windows=self._count)
 
 
 def coupling(recording: Recording, shape: WindowShape, band: tuple[float, float], combine: str = "") -> Coupling:
@@ -159,7 +165,19 @@ def coupling_of(
         step = divisor(every[used], rate)[:, None, None]
         response, sigma = response / step, sigma / np.abs(step)
     edges, size, most = _by_band(every[used], response, sigma)
-    return Coupling(axes=axes, frequency=every[used], response=response, sigma=sigma, band_edges=edges, coupling=size, at_most=most)
+    seconds = ((spectra.windows - 1) * shape.hop + shape.length) / rate
+    return Coupling(
+        axes=axes,
+        frequency=every[used],
+        response=response,
+        sigma=sigma,
+        band_edges=edges,
+        coupling=size,
+        at_most=most,
+        windows=spectra.windows,
+        seconds=seconds,
+        needed=seconds * max(float(np.max(most)) / SUFFICES, 1.0) ** 2,  # the limit falls with the root of the number of windows
+    )
 
 
 def single(found: Coupling, output: int, driven: int, recording: Recording) -> FrequencyResponse:
@@ -213,3 +231,11 @@ def _by_band(frequency: FloatArray, response: ComplexArray, sigma: FloatArray) -
             size[k] = max(size[k], np.sqrt(max(power - noise - 2.0 * spread, 0.0)))
             most[k] = max(most[k], np.sqrt(real + 2.0 * spread))
     return np.append(edges[there], edges[there[-1] + 1]), size, most
+
+
+def _lasting(seconds: float) -> str:
+    """A recording of that length, for people."""
+    for unit, size in (("h", 3600.0), ("min", 60.0)):
+        if seconds > 2.0 * size:
+            return f"a recording of about {seconds / size:.2g} {unit}"
+    return f"a recording of about {seconds:.2g} s"

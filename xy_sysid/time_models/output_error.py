@@ -7,7 +7,7 @@ scores up to the lag at which the error forgets itself (Newey & West, Econometri
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -67,6 +67,11 @@ class Minimized:
     def length(self, independent: float) -> float:
         """Description length, nats, of so many independent numbers: the error's cost, and each parameter's (Rissanen 1978, Schwarz 1978)."""
         return independent * float(np.log(max(self.cost, 1e-300))) + 0.5 * self.values.size * float(np.log(max(independent, 2.0)))
+
+    def parameter(self, name: str, place: int, unit: str, low: float, high: float) -> Told:
+        """A parameter that the fit looked for between two bounds, in which its interval lies, too."""
+        found = self.quantity(name, float(self.values[place]), np.eye(self.values.size)[place], unit)
+        return replace(found, low=max(found.low, low), high=min(found.high, high))
 
     def quantity(self, name: str, value: float, slope: FloatArray, unit: str = "", positive: bool = False) -> Told:
         """A function of the parameters with its interval, by its derivatives (p,) to them; positive: the interval is one of its logarithm."""
