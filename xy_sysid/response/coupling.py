@@ -17,6 +17,7 @@ from xy_sysid.response.h1 import divisor
 from xy_sysid.response.windows import WindowShape, error_correlation
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import Recording, as_sensed
+from xy_sysid.tables import Table
 
 SUFFICES = 0.01  # of the own motion: less is below what models of machines reach
 BANDS = 24  # over which coupling is averaged
@@ -29,7 +30,7 @@ COMBINED = {
 }  # (inputs, outputs) -> of the mean and of the difference: x and y of a CoreXY's two motors, travel and yaw of a gantry's two sides
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Coupling:
     """What two axes do to each other.
 
@@ -63,6 +64,19 @@ class Coupling:
     def coupled(self) -> bool:
         """They do not, for sure."""
         return bool(np.any(self.coupling > SUFFICES))
+
+    @property
+    def table(self) -> Table:
+        """Coupling by band: what is sure, and the 95 % limit, parts of the own motion."""
+        rows = zip(self.band_edges[:-1].tolist(), self.band_edges[1:].tolist(), self.coupling.tolist(), self.at_most.tolist(), strict=True)
+        return Table(("from (Hz)", "to (Hz)", "at least (1)", "at most (1)"), tuple(rows))
+
+    def __str__(self) -> str:
+        """The sentence and the table."""
+        return f"{self.sentence}\n\n{self.table}"
+
+    def __repr__(self) -> str:
+        return f"<Coupling: {self.sentence}>"
 
     @property
     def sentence(self) -> str:

@@ -14,6 +14,7 @@ import numpy as np
 import scipy
 
 from xy_sysid.samples.block import FloatArray
+from xy_sysid.tables import Table
 
 FORGOTTEN = 0.1  # autocorrelation at which an error has forgotten itself
 FLAT = 1e-5  # smallest singular value of the scaled Jacobian, of the largest, of parameters that the data tell
@@ -36,6 +37,11 @@ class Told:
     def told(self) -> bool:
         """The interval does not hold zero."""
         return bool(np.isfinite(self.low) and np.isfinite(self.high) and self.low * self.high > 0.0)
+
+
+def told_table(items: Sequence[Told]) -> Table:
+    """A row for each number."""
+    return Table(("parameter", "value", "from", "to", "unit"), tuple((item.name, item.value, item.low, item.high, item.unit) for item in items))
 
 
 @dataclass(frozen=True, slots=True)
