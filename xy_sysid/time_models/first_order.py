@@ -17,8 +17,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.jit import compiled
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import Run
-from xy_sysid.tables import Table
-from xy_sysid.time_models.output_error import Minimized, Told, shortest, solved, told_table
+from xy_sysid.time_models.output_error import Minimized, Told, shortest, solved
 from xy_sysid.units import Units
 
 FEWEST = 12  # samples
@@ -33,7 +32,7 @@ LONGEST = 0.5  # of the longest recording: a delay or a time constant beyond it 
 Term = Literal["friction", "load", "offset"]
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@dataclass(frozen=True, slots=True)
 class FirstOrder:
     """What short tests tell of an axis.
 
@@ -63,25 +62,6 @@ class FirstOrder:
     def __getitem__(self, name: str) -> Told:
         """A quantity by its name; raises KeyError."""
         return {item.name: item for item in self.quantities}[name]
-
-    @property
-    def sentences(self) -> tuple[str, ...]:
-        """The answer, then each thing that these tests do not determine, with what would."""
-        from xy_sysid.time_models.as_words import first_order_words
-
-        return first_order_words(self)
-
-    @property
-    def table(self) -> Table:
-        """Each quantity with its 95 % interval."""
-        return told_table(self.quantities)
-
-    def __str__(self) -> str:
-        """The sentences and the table."""
-        return "\n".join((*self.sentences, "", str(self.table)))
-
-    def __repr__(self) -> str:
-        return f"<StepTest: {self.sentences[0]}>"
 
 
 def first_order(runs: Sequence[Run]) -> FirstOrder:

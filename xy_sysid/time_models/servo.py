@@ -19,8 +19,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.jit import compiled
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import Run
-from xy_sysid.tables import Table
-from xy_sysid.time_models.output_error import Minimized, Told, shortest, solved, told_table
+from xy_sysid.time_models.output_error import Minimized, Told, shortest, solved
 from xy_sysid.units import Units
 
 FINEST = 1e-3  # s, of a step
@@ -34,7 +33,7 @@ REACHED = 0.02  # part of the time at the limit from which it is told
 STILL = 0.02  # part of the range of the target within which an angle stands
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@dataclass(frozen=True, slots=True)
 class Servo:
     """What target and angle tell.
 
@@ -61,33 +60,6 @@ class Servo:
     def __getitem__(self, name: str) -> Told:
         """A quantity by its name; raises KeyError."""
         return {item.name: item for item in self.quantities}[name]
-
-    @property
-    def sentences(self) -> tuple[str, ...]:
-        """The answer, then what target and angle alone cannot tell."""
-        from xy_sysid.time_models.as_words import servo_words
-
-        return servo_words(self, None)
-
-    @property
-    def table(self) -> Table:
-        """Each quantity, over the inertia, with its 95 % interval."""
-        return told_table(self.quantities)
-
-    def in_si(self, inertia: float) -> Table:
-        """Armature, kp, damping, frictionloss and forcerange, as MuJoCo calls them, for an inertia of joint and load, kg m^2."""
-        from xy_sysid.time_models.as_words import robot_parameters
-
-        if not inertia > 0.0:
-            raise BadInput("inertia", f"{inertia:g} kg m^2", "more than 0", "Give that of the joint with its load.")
-        return told_table(robot_parameters(self, inertia))
-
-    def __str__(self) -> str:
-        """The sentences and the table."""
-        return "\n".join((*self.sentences, "", str(self.table)))
-
-    def __repr__(self) -> str:
-        return f"<Servo: {self.sentences[0]}>"
 
 
 def servo(runs: Sequence[Run]) -> Servo:
