@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -67,6 +68,12 @@ def test_too_little_data_rule_nothing_out_and_how_long_a_recording_would_is_said
     assert not found.suffice and not found.coupled
     assert f"too few windows ({found.windows})" in found.sentence and "may be up to" in found.sentence
     assert "With this excitation, a recording of about" in found.sentence
+
+
+def test_the_sentence_of_a_few_windows_has_no_exponents() -> None:
+    """Where noise is larger than the own motion the size is any, and hours are whole numbers."""
+    found = replace(of(noisy(6.0)), at_most=np.full(1, 1.4), coupling=np.zeros(1), band_edges=np.array([1.0, 1.3]), needed=468_000.0)
+    assert "there it may be of any size" in found.sentence and "about 130 h" in found.sentence
 
 
 def test_the_time_that_is_said_to_suffice_does_not_depend_on_the_recording() -> None:

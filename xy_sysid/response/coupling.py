@@ -89,9 +89,10 @@ class Coupling:
         if not self.coupled:
             place = int(np.argmax(self.at_most))
             where = f"{self.band_edges[place]:.3g} to {self.band_edges[place + 1]:.3g} Hz"
+            size = f"up to {_figures(100 * self.largest)} %" if self.largest < 1.0 else "of any size"
             return (
                 f"No coupling of {one} and {other} was found in {span}. In {where} the recording has too few windows ({self.windows}) to exclude "
-                f"it: there it may be up to {100 * min(self.largest, 1.0):.2g} %. With this excitation, {_lasting(self.needed)} would exclude "
+                f"it: there it may be {size}. With this excitation, {_lasting(self.needed)} would exclude "
                 f"more than {100 * SUFFICES:g} %; more excitation of both axes there needs less."
             )
         worst = int(np.argmax(self.coupling))
@@ -251,5 +252,10 @@ def _lasting(seconds: float) -> str:
     """A recording of that length, for people."""
     for unit, size in (("h", 3600.0), ("min", 60.0)):
         if seconds > 2.0 * size:
-            return f"a recording of about {seconds / size:.2g} {unit}"
-    return f"a recording of about {seconds:.2g} s"
+            return f"a recording of about {_figures(seconds / size)} {unit}"
+    return f"a recording of about {_figures(seconds)} s"
+
+
+def _figures(value: float) -> str:
+    """Two of them, without an exponent."""
+    return f"{float(f'{value:.2g}'):.10g}"
