@@ -35,7 +35,7 @@ def test_the_first_five_minutes_run(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert [words[0] for words in commands(page, "## Minute 3")] == ["simulate", "diagnose", "report"]
     rows = re.findall(r"^    ([\d.]+,.*|time,.*)$", page, re.MULTILINE)
     assert rows[0].startswith("time,") and len(rows) == 3
-    more = [f"{k * 0.0005:.4f},{0.1 * (-1) ** k:.3f},{10 + 0.0001 * k:.4f}" for k in range(2, 30_000)]
+    more = [f"{k * 0.0005:.4f},{0.1 * (-1) ** k:.3f},{10 + 0.0001 * k + 0.0002 * (k // 7 % 2):.4f}" for k in range(2, 30_000)]
     (tmp_path / "mine.csv").write_text("\n".join([*rows, *more]) + "\n", encoding="utf-8")
     said = cli("frf", "mine.csv", "--json")
     assert said.code == 0 and said.json["axes"]["x"], said

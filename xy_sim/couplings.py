@@ -13,8 +13,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import signal
 
 from xy_sim.drive import Drive
 from xy_sysid.samples.block import FloatArray
@@ -48,7 +48,7 @@ class Coupled:
         light = 0.0 if what.base_mass == 0.0 else 1.0 / what.base_mass
         self._pushes = self._along * np.array([drive.table_mass for drive in drives]) * light
         self._omega, self._damping = 2.0 * np.pi * what.base_frequency, what.base_damping
-        numerator, self._denominator, *_ = signal.cont2discrete((np.array(self._swing[0]), np.array(self._swing[1])), 1.0 / rate, method="foh")
+        numerator, self._denominator, *_ = scipy.signal.cont2discrete((np.array(self._swing[0]), np.array(self._swing[1])), 1.0 / rate, method="foh")
         self._numerator = np.ravel(numerator)
         self._state = np.zeros(2)
 
@@ -59,11 +59,13 @@ class Coupled:
     def seen(self, motion: FloatArray) -> FloatArray:
         """(n, 2) of the encoders, of the (n, 2) motion of the axes."""
         one, other = motion[:, 0], motion[:, 1]  # summed by hand: a product of matrices rounds otherwise for other lengths
-        swings, self._state = signal.lfilter(self._numerator, self._denominator, one * self._pushes[0] + other * self._pushes[1], zi=self._state)
+        swings, self._state = scipy.signal.lfilter(
+            self._numerator, self._denominator, one * self._pushes[0] + other * self._pushes[1], zi=self._state
+        )
         read = [one * row[0] + other * row[1] + swings * along for row, along in zip(self._frame, self._along, strict=True)]
         return np.column_stack(read)
 
     def mixing(self, frequency: FloatArray) -> NDArray[np.complex128]:
         """(n, 2, 2) what encoder i reads, over the motion of axis j, at these frequencies, Hz."""
-        _, swings = signal.freqs(*self._swing, worN=2.0 * np.pi * np.asarray(frequency))
+        _, swings = scipy.signal.freqs(*self._swing, worN=2.0 * np.pi * np.asarray(frequency))
         return np.asarray(self._frame + swings[:, None, None] * np.outer(self._along, self._pushes))

@@ -30,6 +30,7 @@ class Following:
         """joints: in the order of the controller."""
         self._joints = tuple(joints)
         self._points: list[Point] = []
+        self._times = np.empty(0)
         self._begins = 0.0
 
     def take(self, names: Sequence[str], points: Sequence[Point], begins: float, now: float, state: Point) -> str:
@@ -48,6 +49,7 @@ class Following:
         mine = [Point(point.at, *(value[order] if value.size else value for value in (point.position, point.speed, point.push))) for point in points]
         before = Point(now - self._begins, state.position, state.speed, state.push)
         self._points = [before, *mine] if before.at < mine[0].at else mine
+        self._times = np.array([point.at for point in self._points])
         return ""
 
     def now(self, now: float) -> tuple[FloatArray, FloatArray] | None:
@@ -55,9 +57,8 @@ class Following:
         if not self._points:
             return None
         since = now - self._begins
-        times = [point.at for point in self._points]
-        k = int(np.searchsorted(times, since, side="right")) - 1
-        if k >= len(times) - 1:
+        k = int(np.searchsorted(self._times, since, side="right")) - 1
+        if k >= self._times.size - 1:
             return self._points[-1].position, np.zeros(len(self._joints))
         one, other = self._points[max(k, 0)], self._points[max(k, 0) + 1]
         return _between(one, other, since - one.at)

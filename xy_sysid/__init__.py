@@ -53,6 +53,7 @@ if TYPE_CHECKING:
     from xy_sysid.fitting.of_run import LinearModel, fit, frf
     from xy_sysid.fleets.of_paths import fleet
     from xy_sysid.fleets.trends import trend
+    from xy_sysid.front_door.small_models import coupling, mechanics, servo, steps
     from xy_sysid.imports import load
     from xy_sysid.imports.response_file import frf_from
     from xy_sysid.linear.reduction import balanced_truncation
@@ -82,6 +83,7 @@ __all__ = [
     "balanced_truncation",
     "better",
     "compare",
+    "coupling",
     "diagnose",
     "fit",
     "fleet",
@@ -90,12 +92,15 @@ __all__ = [
     "library",
     "load",
     "load_model",
+    "mechanics",
     "next_experiment",
     "plot",
     "refine",
     "save",
+    "servo",
     "sharpen",
     "simulate",
+    "steps",
     "to_control",
     "to_scipy",
     "trend",
@@ -124,6 +129,7 @@ _HOMES = {
     "files.models": ("load_model", "save"),
     "fleets.of_paths": ("fleet",),
     "fleets.trends": ("trend",),
+    "front_door.small_models": ("coupling", "mechanics", "servo", "steps"),
     "cli.simulated_recording": ("simulate",),
     "report.written": ("write_report",),
     "errors": ("BadInput", "BadRecording", "MissingExtra", "XySysidError"),

@@ -56,7 +56,7 @@ RECORDINGS = (
         part=("--span", "0:10"),
     ),
     Shared("emps/emps_train.npz", part=("--span", "0:1.5")),
-    Shared("f16/f-16.txt", mapped("input=1,output=3", "--rate", "400", "--unit", "output=m/s^2"), part=("--span", "0:21")),
+    Shared("f16/f-16.txt", mapped("input=2,output=3", "--rate", "400", "--unit", "input=N", "--unit", "output=m/s^2"), part=("--span", "0:21")),
     Shared("frf_file/G_I_PID_300_AP.dat"),
     Shared("frf_file/G_I_PID_300_DP.csv"),
     Shared("frf_file/G_I_PI_300_DP.csv"),
@@ -76,8 +76,8 @@ RECORDINGS = (
     Shared("lsb250/lsb250_exp2.npz", part=("--span", "0:1.2")),
     Shared("raw_mat/crane_meas1.mat", mapped("input=motorinput,output=Motor positie"), part=("--span", "0:30")),
     Shared("raw_mat/hsm150_idf_pos_0.06_1.mat", mapped("time=data:1,input=data:5,output=data:3", "--unit", "output=rad"), part=("--span", "0:3")),
-    Shared("rm_arm/joint_1.npz", part=("--axis", "axis1", "--span", "0:40")),
-    Shared("rm_arm/joint_3.npz", part=("--axis", "axis3", "--span", "0:40")),
+    Shared("rm_arm/joint_1.npz", mapped("input=tau_measured:1,output=q:1", "--unit", "input=N m", "--unit", "output=rad"), part=("--span", "0:40")),
+    Shared("rm_arm/joint_3.npz", mapped("input=tau_measured:3,output=q:3", "--unit", "input=N m", "--unit", "output=rad"), part=("--span", "0:40")),
     Shared("servo_target/chirp0.csv", mapped("time=time,input=target,output=position")),
     Shared("servo_target/response.json"),
     Shared("tue_bench/load_side.mat", mapped("input=1,output=2", "--rate", "4000", "--unit", "output=rad"), part=("--span", "0:1")),
@@ -91,8 +91,8 @@ RECORDINGS = (
     Shared("vendor_exports/ctrlx_step.trace.csv"),
     Shared("vendor_exports/dspace_bldc.mat", mapped("input=Switch2,output=Sum3", "--unit", "output=rpm")),
     Shared("vendor_exports/mitsubishi_mr.csv"),
-    Shared("vendor_exports/tc3_decimalcomma.csv", mapped("input=var_INT8,output=func_OS")),
-    Shared("vendor_exports/tc3_default.csv", mapped("input=var_INT8,output=func_OS")),
+    Shared("vendor_exports/tc3_decimalcomma.csv", mapped("input=var_INT8,output=var_UINT8")),
+    Shared("vendor_exports/tc3_default.csv", mapped("input=var_INT8,output=var_UINT8")),
 )
 NO_RECORDINGS = ("README.md",)
 COMMANDS = ("columns", "fit", "compare", "diagnose", "refine", "report")

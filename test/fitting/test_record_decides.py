@@ -132,3 +132,20 @@ def test_friction_that_holds_the_output_in_every_window_is_no_broken_encoder() -
     dead = np.where(np.arange(t.size) < 100, sticking, sticking[100])
     with pytest.raises(BadInput, match="number of sound windows is 0"):
         estimate(Recording.from_arrays(RATE, u, dead), "x", IdentifierSettings(frozen=0.05))
+
+
+def test_an_input_that_is_constant_in_every_stretch_is_no_excitation() -> None:
+    """Twelve speeds in twelve stretches, resampled with some rounding: refused, with the command that reads such tests, and no line of rounding."""
+    level = np.repeat(np.random.default_rng(2).uniform(-2.0, 2.0, 12), 400)
+    u = level * (1.0 + 1e-12 * noise(level.size))
+    whole = Recording.from_arrays(RATE, u, answer(level))
+    apart = dataclasses.replace(whole, seq=whole.seq + 200 * (whole.seq // 400))
+    with pytest.raises(BadInput, match=r"the input kept one value.*xy-sysid steps"):
+        estimate(apart, "x", IdentifierSettings())
+
+
+def test_a_counter_is_no_output() -> None:
+    """What rises evenly, as a clock does, has no response; it is named instead of lines at -600 dB."""
+    u = noise(20_000)
+    with pytest.raises(BadInput, match=r"rose evenly.*another output"):
+        estimate(Recording.from_arrays(RATE, u, 0.2 * np.arange(u.size)), "x", IdentifierSettings())

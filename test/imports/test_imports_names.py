@@ -339,3 +339,31 @@ def test_structs_of_control_desk_simulink_and_iddata(tmp_path: Path) -> None:
     assert any("foh" in note for note in recording.notes)
     scipy.io.savemat(path, {"lab": {"run": {"first": {"t": T, "u": U, "y": Y}}, "date": "today"}})
     assert_the_axis(load(path))
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "scale"),
+    [
+        ("commanded_deg_s", "deg/s", np.pi / 180),
+        ("joint_velocity_rad_s", "rad/s", 1.0),
+        ("feedback_mm_s", "mm/s", 1e-3),
+        ("acc_mm_s2", "mm/s^2", 1e-3),
+        ("feedback_deg", "deg", np.pi / 180),
+    ],
+)
+def test_a_unit_at_the_end_of_a_mapped_name_is_read(tmp_path: Path, name: str, unit: str, scale: float) -> None:
+    """As programs write them, without brackets and strokes; the note says what was converted."""
+    t = np.arange(400) / 1e3
+    y = np.cumsum(np.cumsum(np.random.default_rng(1).normal(size=400)))
+    path = tmp_path / "a.csv"
+    np.savetxt(path, np.column_stack((t, np.sin(50 * t), y)), "%.9g", ",", header=f"time,u,{name}", comments="")
+    found = load(path, columns={"output": name})
+    told = [note for note in found.notes if "converted from" in note]
+    assert scale == 1.0 or any(f"from {unit} to" in note for note in told), found.notes
+    assert found.measured == {"deg": "position"}.get(unit, "acceleration" if "^2" in unit else "velocity")
+
+
+def test_a_time_in_s_is_no_speed() -> None:
+    """inch per second is written another way."""
+    found = meaning("time_in_s", "")
+    assert found is not None and found.role == "time"

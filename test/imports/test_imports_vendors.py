@@ -49,6 +49,17 @@ def test_twincat_scope_exports_as_they_were_found(name: str, rows: int) -> None:
     assert len(sizes) == rows and sizes["func_OS"] == 4996 and sizes["var_REAL64"] == 1000 and sizes["func_freesample"] == 201
 
 
+def test_a_channel_that_rises_evenly_is_not_the_time_of_others(tmp_path: Path) -> None:
+    """Each channel has its own time, so that a counter beside them is a channel as any."""
+    names = ("MAIN.u", "MAIN.angle", "MAIN.cycle")
+    lines = ["\t".join(f"{what}\t{one}" for one in cells) for what, cells in (("Name", names), ("SampleTime[ms]", ("1",) * 3))]
+    for row, values in enumerate(zip(U.tolist(), Y.tolist(), (0.2 * np.arange(len(U))).tolist(), strict=True)):
+        lines.append("\t".join(f"{1e3 * T[row]:.9g}\t{value:.9g}" for value in values))
+    (tmp_path / "scope.csv").write_text("\n".join([*lines, "EOF"]) + "\n", "utf-8")
+    found = load(tmp_path / "scope.csv", columns={"input": "MAIN.u", "output": "MAIN.angle"})
+    assert found.sampling_rate == RATE and np.allclose(found.position[:, 0], Y, rtol=1e-6, atol=1e-12)
+
+
 def test_a_codesys_trace_is_read(tmp_path: Path) -> None:
     """Variables below each other, each with samples of its own; of a bad row the number is said."""
     head = "[key]; [value]\nVersion; 0x03050000\n"

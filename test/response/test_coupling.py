@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -55,11 +56,31 @@ def test_axes_that_are_coupled_are_said_to_be(cross: float) -> None:
     assert float(np.median(np.abs(across - cross))) < 0.2 * cross
 
 
-def test_too_little_data_rules_nothing_out() -> None:
-    """Neither suffice nor coupled: how much cannot be ruled out, and what to do."""
-    noisy = machine(0.0, seconds=6.0)
-    found = of(Recording.from_arrays(RATE, noisy.voltage, noisy.position + 2e-4 * np.random.default_rng(1).normal(size=noisy.position.shape)))
-    assert not found.suffice and "cannot be ruled out" in found.sentence
+def noisy(seconds: float) -> Recording:
+    """Two axes that are not coupled, with noise in their encoders."""
+    quiet = machine(0.0, seconds=seconds)
+    return Recording.from_arrays(RATE, quiet.voltage, quiet.position + 2e-4 * np.random.default_rng(1).normal(size=quiet.position.shape))
+
+
+def test_too_little_data_rule_nothing_out_and_how_long_a_recording_would_is_said() -> None:
+    """Neither suffice nor coupled: in which band too few windows exclude it, up to how much it may be there, and the time that would do."""
+    found = of(noisy(6.0))
+    assert not found.suffice and not found.coupled
+    assert f"too few windows ({found.windows})" in found.sentence and "may be up to" in found.sentence
+    assert "With this excitation, a recording of about" in found.sentence
+
+
+def test_the_sentence_of_a_few_windows_has_no_exponents() -> None:
+    """Where noise is larger than the own motion the size is any, and hours are whole numbers."""
+    found = replace(of(noisy(6.0)), at_most=np.full(1, 1.4), coupling=np.zeros(1), band_edges=np.array([1.0, 1.3]), needed=468_000.0)
+    assert "there it may be of any size" in found.sentence and "about 130 h" in found.sentence
+
+
+def test_the_time_that_is_said_to_suffice_does_not_depend_on_the_recording() -> None:
+    """The limit falls with the root of the time: from 30 s and from 240 s follows the same time, within what noise allows."""
+    short, long = of(noisy(30.0)), of(noisy(240.0))
+    assert long.largest < 0.6 * short.largest
+    assert 0.4 < long.needed / short.needed < 2.5
 
 
 def test_the_two_motors_of_a_corexy_are_taken_apart() -> None:

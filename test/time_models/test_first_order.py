@@ -74,6 +74,14 @@ def test_an_input_that_never_changes_is_refused() -> None:
         first_order([run])
 
 
+def test_a_delay_that_no_step_shows_is_unknown_and_within_what_was_looked_for() -> None:
+    """Levels that change between recordings only: gain is told, the delay is any up to half of a recording, and the answer says so."""
+    found = first_order([moved(np.full(200, level), 0.0, seed=k) for k, level in enumerate((5.0, -5.0, 2.0))])
+    assert found["gain"].value == pytest.approx(GAIN, rel=0.05)
+    assert found["delay"].low >= 0.0 and found["delay"].high <= 0.5 * 200 / RATE
+    assert any("The delay is unknown: any up to 498 ms" in sentence for sentence in first_order_words(found))
+
+
 def test_the_command_gives_si_with_a_torque_constant(tmp_path: Path) -> None:
     """Inertia, damping and friction at the joint and at the motor, in the names of MuJoCo and URDF."""
     paths = []

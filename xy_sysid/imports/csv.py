@@ -130,8 +130,10 @@ def _quick(rows: Rows, separator: str, width: int) -> FloatArray | None:
     if not rows:
         return np.empty((0, width))
     try:
-        text = (line.replace(",", ".") if separator != "," else line for _, line in rows)
-        table = np.loadtxt(text, delimiter=None if separator == BLANKS else separator, ndmin=2, comments=None)
+        lines = [line for _, line in rows]
+        if separator != ",":
+            lines = "\n".join(lines).replace(",", ".").split("\n")
+        table = np.loadtxt(lines, delimiter=None if separator == BLANKS else separator, ndmin=2, comments=None)
     except (ValueError, IndexError):
         return None
     return np.asarray(table) if table.shape == (len(rows), width) else None

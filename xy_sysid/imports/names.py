@@ -6,9 +6,10 @@ Only the words in the tables below are known; whoever calls things otherwise say
 from __future__ import annotations
 
 import re
+from collections.abc import Container
 from dataclasses import dataclass
 
-from xy_sysid.imports.foreign_units import DRIVES, FOLDED, KNOWN, MOTIONS, Quantity, unit_of
+from xy_sysid.imports.foreign_units import DRIVES, FOLDED, KNOWN, MOTIONS, POSITIONS, Quantity, unit_of
 from xy_sysid.imports.sheet import spoken
 
 HEADER = re.compile(r"^\s*(?P<name>.*?)\s*(?:[\[\(]\s*(?P<unit>[^\]\)]*?)\s*[\]\)])?\s*$")
@@ -37,6 +38,7 @@ ANGLES = "angle winkel hoek theta phi omega drehzahl"
 LETTERS = ("t", "u", "y", "r", "q")  # roles of one letter give way to a word: y_position is of the axis y
 QUADRATURE = re.compile(r"(?<![a-zA-Z])[iI]_[qQ](?![a-zA-Z])")
 SYMBOLS = {"V": "input", "F": "input", "I": "input", "i": "input", "x": "output"}  # of physics: a role where nothing else has it
+RATE = re.compile(r"[\s_.\-](?P<of>(?!in[_/])[a-zA-Z]+)[_/]s(?P<twice>\^?2)?$")  # mm_s, deg/s, rad_s2; time_in_s is none
 LONG = 5  # letters from which a word counts inside a longer one: motorvoltage
 
 
@@ -126,7 +128,10 @@ def _hits(word: str) -> list[tuple[str, Quantity, int]]:
 
 
 def _unit(name: str, unit: str, words: list[str]) -> tuple[str, list[str]]:
-    """A unit at the end of a name (time_ms, pos_mm, speed_rpm, torque_nm) where it fits what stands before it."""
+    """A unit at the end of a name (time_ms, pos_mm, speed_rpm, torque_nm, vel_deg_s) where it fits what stands before it."""
+    rate = "" if unit else rate_at_end(name)
+    if rate and any(role in ("output", "reference") or quantity == "command" for word in words[:-2] for role, quantity, _ in _hits(word)):
+        return rate, words[:-2]
     last = re.split(r"[\s_.\-/]+", name.strip())[-1]
     if unit or len(words) < 2 or words[-1] != last.casefold():
         return unit, words
@@ -138,6 +143,21 @@ def _unit(name: str, unit: str, words: list[str]) -> tuple[str, list[str]]:
         if fits != "unknown" and any(quantity == fits or (role == "input" and drives.get(quantity, False)) for role, quantity, _ in before):
             return spelling, words[:-1]
     return unit, words
+
+
+def rate_at_end(name: str) -> str:
+    """deg/s of speed_deg_s, mm/s^2 of acc_mm_s2; nothing of other names."""
+    found = RATE.search(name)
+    return f"{found['of']}/s{'^2' if found['twice'] else ''}" if found is not None and found["of"] in POSITIONS else ""
+
+
+def unit_at_end(name: str, quantities: Container[Quantity]) -> str:
+    """The unit at the end of a name that says nothing else, if it is one of these quantities: deg of feedback_deg."""
+    last = re.split(r"[\s_.\-]+", name.strip())[-1]
+    rate = rate_at_end(name)
+    if rate and unit_of(rate).quantity in quantities:
+        return rate
+    return last if 1 < len(last) < len(name.strip()) and last in KNOWN and KNOWN[last].quantity in quantities else ""
 
 
 def usual_unit(name: str, found: Meaning) -> str:

@@ -49,9 +49,10 @@ def assigned(sheet: Sheet, reading: Reading, notes: list[str]) -> Roles:
     meanings = {column.name: understood for column in sheet.columns if (understood := meaning(column.name, column.unit)) is not None}
     found, guessed = _sides(sheet, reading, said, meanings, notes)
     pairs = _named(sheet, found, notes)
-    time, by_name = _time(sheet, said, meanings)
+    own = any(column.clock is not None for column in pairs["output"].values())  # then no other column needs to be the time
+    time, by_name = (said.get("time"), False) if own else _time(sheet, said, meanings)
     counter = said.get("seq") or next((sheet.usable(column) for column in sheet.columns if column.name == "seq"), None)
-    if time is None and counter is None and sheet.fs is None and reading.rate is None:
+    if not own and time is None and counter is None and sheet.fs is None and reading.rate is None:
         taken = {column.name for columns in pairs.values() for column in columns.values()}
         time = _by_steps(sheet, {*meanings, *taken}, notes)
     return Roles(
@@ -185,9 +186,10 @@ def _named(sheet: Sheet, found: dict[str, Found], notes: list[str]) -> dict[str,
         found = {"input": inputs, "output": outputs, "reference": {axis: next(iter(references.values()))} if len(references) == 1 else references}
     axes = [axis for axis in found["input"] if axis in found["output"]]
     if not axes:
-        raise BadRecording(sheet.path, f"no axis has both voltage and position; {sheet.names()}", EXAMPLE)
+        raise BadRecording(sheet.path, f"no axis has both an input and an output; {sheet.names()}", EXAMPLE)
     if set(found["input"]) != set(found["output"]):
-        notes.append(f"only {', '.join(_axis(axis) for axis in axes)} has both voltage and position; the others are left out")
+        have = f"{' and '.join(_axis(axis) for axis in axes)} {'has' if len(axes) == 1 else 'have'}"
+        notes.append(f"only {have} both an input and an output; the others are left out")
     return {role: {_axis(axis): column for axis, column in columns.items()} for role, columns in found.items()}
 
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.imports import instants
-from xy_sysid.imports.foreign_units import COUNTS, MOTIONS, Unit, to_si, unit_of
-from xy_sysid.imports.names import meaning, usual_unit
+from xy_sysid.imports.foreign_units import COUNTS, DRIVES, MOTIONS, Unit, to_si, unit_of
+from xy_sysid.imports.names import meaning, unit_at_end, usual_unit
 from xy_sysid.imports.own_times import on_one_clock
 from xy_sysid.imports.reading import Reading
 from xy_sysid.imports.roles import Found, Roles, assigned
@@ -161,7 +161,7 @@ def scaled(values: FloatArray, text: str, scale: float | None, what: str, notes:
 def _usual(column: Column, role: str) -> str:
     known = meaning(column.name, "")
     if known is None or known.role not in (role, "reference"):
-        return "V" if role == "input" else "m"
+        return unit_at_end(column.name, DRIVES if role == "input" else MOTIONS) or ("V" if role == "input" else "m")
     if known.unit:
         return known.unit
     return usual_unit(column.name, known) if known.role == role else "m"

@@ -40,9 +40,14 @@ class TextTable:
 
 def text_table(text: str, notes: list[str]) -> TextTable:
     """The table of a text, and notes on what stands above it and how it is read; empty if there are no rows at all."""
-    lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
-    remarks = [(number, line.lstrip().lstrip("#").strip()) for number, line in lines if line.lstrip().startswith("#")]
-    rows = [(number, line) for number, line in lines if not line.lstrip().startswith("#")]
+    lines = text.splitlines()
+    rows = list(enumerate(lines, 1))
+    if not all(map(str.strip, lines)):
+        rows = [row for row in rows if row[1].strip()]
+    remarks: Rows = []
+    if "#" in text:
+        remarks = [(number, line.lstrip().lstrip("#").strip()) for number, line in rows if line.lstrip().startswith("#")]
+        rows = [row for row in rows if not row[1].lstrip().startswith("#")]
     if not rows:
         return TextTable(",", [], [])
     separator = _separator(rows)

@@ -54,16 +54,17 @@ def _unit(header: dict[str, list[str]], place: int) -> str:
 
 def _table(rows: list[list[str]], width: int) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
     """(n, width) numbers; what is missing at the end of a row or blank is none."""
-    found = np.full((len(rows), width), np.nan)
-    for at, row in enumerate(rows):
-        for place, cell in enumerate(row[:width]):
-            if _is_number(cell):
-                found[at, place] = number_of(cell.strip(), "\t")
+    found = np.array([[_number(cell) for cell in row[:width]] + [np.nan] * (width - len(row)) for row in rows])
+    found[~np.isfinite(found)] = np.nan
     return found
 
 
-def _is_number(cell: str) -> bool:
+def _number(cell: str) -> float:
     try:
-        return bool(np.isfinite(number_of(cell.strip(), "\t")))
+        return number_of(cell.strip(), "\t")
     except ValueError:
-        return False
+        return float("nan")
+
+
+def _is_number(cell: str) -> bool:
+    return bool(np.isfinite(_number(cell)))

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from nicegui import run, ui
+from nicegui.events import ValueChangeEventArguments
 
 from xy_sysid.errors import BadInput, XySysidError
 from xy_sysid.page.beside import beside
@@ -66,6 +68,11 @@ def guesses(found: Listing) -> tuple[str, list[AxisColumns]]:
     return roles.get("time", clock), [AxisColumns(axis, column(axis, "input"), column(axis, "output")) for axis in axes]
 
 
+def usable(found: Listing) -> list[str]:
+    """Columns of numbers."""
+    return [one.name for one in found.columns if one.looks not in ("words", "no numbers")]
+
+
 async def columns_dialog(session: Session, name: str) -> None:
     """Show what is in a table of the shelf, let the user say what is what, and open it."""
     waiting = ui.notification(f"Reading the columns of {name} ...", spinner=True, timeout=None)
@@ -82,7 +89,7 @@ class ColumnsDialog:
 
     def __init__(self, session: Session, name: str, found: Listing) -> None:
         self._session, self._name = session, name
-        self._names = [one.name for one in found.columns if one.looks not in ("words", "no numbers")]
+        self._names = usable(found)
         self._rows: list[dict[str, Any]] = []
         time, axes = guesses(found)
         with ui.dialog() as self._dialog, ui.element("div").classes("card wide").props('data-part="columns"'):
@@ -94,6 +101,10 @@ class ColumnsDialog:
             with ui.element("div").classes("buttons"):
                 self._time = self._column("time", time)
                 self._rate = typed(ui.number("or rate (Hz)", value=None, min=0)).props('outlined dense data-pick="rate"')
+                files = [one for one in session.shelf.names(texts=True) if one != name]
+                ui.select(files, label="columns of another file, too", with_input=True, on_change=self._more).props(
+                    'outlined dense data-pick="other"'
+                ).classes("pick").set_visibility(bool(files))
             self._axes = ui.element("div").classes("stack")
             for one in axes:
                 self._add(one)
@@ -107,6 +118,18 @@ class ColumnsDialog:
     def _column(self, role: str, value: str) -> ui.select:
         chosen = value if value in self._names else NONE
         return ui.select([NONE, *self._names], value=chosen, label=role).props(f'outlined dense data-pick="{role}"').classes("pick")
+
+    async def _more(self, event: ValueChangeEventArguments[Any]) -> None:
+        """Columns of another file of the shelf can be chosen, too."""
+        other = str(event.value)
+        found: Listing | None = await beside(self._session, lambda: run.io_bound(_listed, self._session.shelf.find(other)))
+        if found is None:
+            return
+        folder = self._session.shelf.folder
+        file = os.path.relpath(folder / other, (folder / self._name).parent)
+        self._names += [name for one in usable(found) if (name := f"{file}:{one}") not in self._names]
+        for pick in (self._time, *(row[role] for row in self._rows for role in ("input", "output"))):
+            pick.set_options([NONE, *self._names], value=pick.value)
 
     def _add(self, one: AxisColumns) -> None:
         with self._axes, ui.element("div").classes("buttons"):
@@ -130,7 +153,9 @@ class ColumnsDialog:
         try:
             axes = [AxisColumns(**{name: _text(element.value) for name, element in row.items()}) for row in self._rows]
             reading = reading_of(_text(self._time.value), self._rate.value or None, axes, self._session.reading)
-            self._session.open(self._session.shelf.find(self._name), self._name, reading)
+            path = self._session.shelf.find(self._name)
+            self._session.shelf.beside(path, reading.load.get("columns", {}))
+            self._session.open(path, self._name, reading)
         except XySysidError as problem:
             self._session.say(str(problem))
             ui.notify(str(problem), type="negative", multi_line=True)

@@ -8,16 +8,19 @@ from xy_sysid.errors import XySysidError
 from xy_sysid.imports import TABLES
 from xy_sysid.page.columns_dialog import columns_dialog
 from xy_sysid.page.session import Session
+from xy_sysid.page.shelf import TEXTS
 
 
 async def open_dialog(session: Session) -> None:
     """Let the user choose, and open it beside the others."""
-    names = await run.io_bound(session.shelf.names)
+    names = await run.io_bound(session.shelf.names) or await run.io_bound(session.shelf.names, texts=True)
     with ui.dialog() as dialog, ui.element("div").classes("card").style("min-width: min(90vw, 420px)"):
         ui.html("<h2>Open a recording</h2>", sanitize=False)
         ui.label(f"Bags and tables of {session.shelf.folder.name}").classes("soft small")
         if names:
             choice = ui.select(names, value=names[0], label="recording", with_input=len(names) > 8).props("outlined dense")
+            texts = ui.checkbox(f"also {', '.join(TEXTS)}").props("data-part=texts")
+            texts.on_value_change(lambda event: choice.set_options(session.shelf.names(texts=bool(event.value)), value=choice.value))
         else:
             ui.label("This folder has no recordings. Record a bag, or start the page in another folder.")
         with ui.element("div").classes("buttons"):

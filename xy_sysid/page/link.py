@@ -30,13 +30,13 @@ from xy_sysid.live.plain_messages import StatusMessage
 from xy_sysid.nodes.common import LATCHED_QOS, NAMESPACE, STOP_TOPIC
 from xy_sysid.nodes.convert import array_from_ros
 from xy_sysid.nodes.wall import Wall
-from xy_sysid.page.topics_state import TopicsState
+from xy_sysid.page.topics_state import COUPLING, TopicsState
 
 WATCHERS = ("page", "page_stop", "demo", "settle")  # nodes of the page and of commands, which come and go
 LOOK = 0.5  # s between two looks at the graph and the lifecycle
 PATIENCE = 5.0  # s for an answer of a node
 AGAIN = 2  # times that parameters are asked for or set once more without an answer
-TABLES = ("frf", "transfer_function", "comparison")
+TABLES = ("frf", "transfer_function", "comparison", COUPLING)
 STOP_AGAIN = 0.5  # s after which STOP is sent again while nobody has confirmed it
 STOP_LOOK = 0.05  # s between two looks whether the excitation has said that it stands
 STOP_GIVES_UP = 6.0  # s

@@ -11,6 +11,7 @@ from nicegui import ui
 from xy_sysid.errors import XySysidError
 from xy_sysid.page.address import SourceView
 from xy_sysid.page.control import Control
+from xy_sysid.page.coupling_card import CouplingCard
 from xy_sysid.page.document_words import model_effects
 from xy_sysid.page.facts import seconds_text
 from xy_sysid.page.failure_card import FailureCard
@@ -18,7 +19,9 @@ from xy_sysid.page.live_card import LiveCards
 from xy_sysid.page.numbers_card import Numbers
 from xy_sysid.page.orders import Source
 from xy_sysid.page.picture_card import Cards
+from xy_sysid.page.questions_card import QuestionsCard
 from xy_sysid.page.recordings import OpenRecording
+from xy_sysid.page.response_card import ResponseCard
 from xy_sysid.page.session import Session
 from xy_sysid.page.settle_card import SettleCard
 from xy_sysid.page.story_card import StoryCard
@@ -64,6 +67,9 @@ class Panel:
                     self._story = StoryCard(session, source, self._machine if source.live else lambda: None)
                     self._settle = self._settle or (SettleCard(session) if source.live else None)
                     self._use = UseCard(session, source)
+                    self._coupling = CouplingCard(session, source)
+                    self._questions = None if source.live else QuestionsCard(session, source)
+            self._response = ResponseCard(session, source) if isinstance(source, OpenRecording) else None
 
     def _machine(self) -> None:
         self._control = Control(self._session)
@@ -94,6 +100,11 @@ class Panel:
         await self._first.refresh(axis, view)
         if self._live is not None:
             await self._live.refresh(axis, view.linear)
+        await self._coupling.refresh()
+        if self._questions is not None:
+            self._questions.refresh()
+        if self._response is not None:
+            await self._response.refresh()
         await self._cards.refresh(axis, view)
 
     def _choose(self) -> View:
@@ -118,7 +129,7 @@ class Panel:
         source = self._source
         about: dict[str, Any] = getattr(source, "about", {})
         words = source.title if not source.live else f"The machine, live{self._control.pace() if self._control is not None else ''}"
-        if about:
+        if "seconds" in about:
             words += f" · {seconds_text(about['seconds'])} at {about['rate']:g} Hz"
         self._title.set_text(words)
         problem = source.problem()

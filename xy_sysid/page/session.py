@@ -100,7 +100,9 @@ class Session:
                 if not wanted.name or (wanted.name, wanted.words) in there:
                     continue
                 try:
-                    self.open(self.shelf.find(wanted.name), wanted.name, read_so(self.reading, wanted.words))
+                    path, reading = self.shelf.find(wanted.name), read_so(self.reading, wanted.words)
+                    self.shelf.beside(path, reading.load.get("columns", {}) if wanted.words else {})
+                    self.open(path, wanted.name, reading)
                 except XySysidError as problem:
                     self.say(str(problem))
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 
 from xy_sysid.errors import BadInput
 from xy_sysid.imports.registry import TABLES
+from xy_sysid.imports.several_files import others
 
-TEXTS = (".txt", ".log", ".json")  # which are mostly something else; as arguments of the command they are opened all the same
+TEXTS = (".txt", ".log", ".json")  # which are mostly something else: listed when asked for
 LISTED = (*(ending for ending in TABLES if ending not in TEXTS), ".mcap", ".db3")
 MOST = 200  # recordings listed
 DEEP = 2  # folders below the shelf that are looked into
@@ -21,13 +23,13 @@ class Shelf:
     def __init__(self, folder: Path) -> None:
         self.folder = folder.resolve()
 
-    def names(self) -> list[str]:
-        """What can be opened: bags (folders with a metadata.yaml) and tables, by their path below the folder."""
+    def names(self, texts: bool = False) -> list[str]:
+        """What can be opened: bags (folders with a metadata.yaml) and tables, by their path below the folder. texts: with those of TEXTS."""
         found: list[str] = []
-        self._look(self.folder, DEEP, found)
+        self._look(self.folder, DEEP, found, (*LISTED, *TEXTS) if texts else LISTED)
         return sorted(found)[:MOST]
 
-    def _look(self, folder: Path, deep: int, found: list[str]) -> None:
+    def _look(self, folder: Path, deep: int, found: list[str], endings: tuple[str, ...]) -> None:
         try:
             entries = sorted(folder.iterdir())
         except OSError:
@@ -40,15 +42,22 @@ class Shelf:
                 if (entry / "metadata.yaml").is_file():
                     found.append(name)
                 elif deep > 1 and len(found) < MOST:
-                    self._look(entry, deep - 1, found)
-            elif entry.suffix.lower() in LISTED:
+                    self._look(entry, deep - 1, found, endings)
+            elif entry.suffix.lower() in endings:
                 found.append(name)
 
     def find(self, name: str) -> Path:
         """The recording of that name; raises BadInput for whatever is not in the list, a path that leads elsewhere included."""
-        if name not in self.names():
+        if name not in self.names(texts=True):
             raise BadInput("recording", repr(name[:80]), f"one of the list of {self.folder.name}", "Choose one.")
         return self.folder / name
+
+    def beside(self, path: Path, columns: Mapping[str, str]) -> None:
+        """Raises BadInput where one of the columns (FILE:COLUMN) lies in a file that is not in the list."""
+        here = {self.folder / name for name in self.names(texts=True)}
+        for other in others(path, columns):
+            if other not in here:
+                raise BadInput("file of a column", repr(other.name[:80]), f"one of the list of {self.folder.name}", "Choose one.")
 
     def new(self, name: str) -> Path:
         """Where a new bag of that name goes; raises BadInput for anything but a plain name that is still free."""

@@ -21,6 +21,7 @@ LOST = 4.0  # s without a word or a place in the graph after which a node is cal
 HISTORY = 2000  # resonances remembered for each axis
 IDLE = "idle"  # what the diagnoser says of an axis that nothing is done for
 KNOWN = ("excitation", "identifier", "ballscrew", "diagnoser", "recorder")
+COUPLING, COUPLED = "coupling", "coupling of "  # beginnings of the topic and of the status about two axes
 SPEAKER = {"streams": "identifier"}  # who sends a status that does not have its own name
 OFTEN = {"excitation", "ballscrew", "identifier"}  # say something at least once a second
 
@@ -64,7 +65,13 @@ class TopicsState:
 
     def axes(self) -> tuple[str, ...]:
         """Axes of which something was heard, in the order of their names."""
-        return tuple(sorted({self._axis(topic.partition("/")[2]) for topic in list(self.arrays)} | self._named()))
+        ends = {self._axis(end) for kind, _, end in (topic.partition("/") for topic in list(self.arrays)) if kind != COUPLING}
+        return tuple(sorted(ends | self._named()))
+
+    def coupling(self) -> tuple[str, ArrayMessage | None]:
+        """The verdict on two axes that are driven at once, and the coupling by band; empty while there is none."""
+        said = next((status.message for name, status in list(self.statuses.items()) if name.startswith(COUPLED)), "")
+        return said, next((array for topic, array in list(self.arrays.items()) if topic.startswith(f"{COUPLING}/")), None)
 
     def table(self, kind: str, axis: str) -> ArrayMessage | None:
         """The newest of ``frf``, ``comparison``, ``transfer_function`` or ``error_ladder`` of an axis."""

@@ -34,9 +34,14 @@ class Desk:
     def __init__(self, path: Path, reading: Reading, say: Callable[[WorkerNews], None]) -> None:
         from xy_sysid.files.effects import library
         from xy_sysid.imports import load
+        from xy_sysid.page.responses import fitted_responses
 
         self._say = say
         self._library = library(reading.effect_files)
+        responses = fitted_responses(path, reading.load)
+        if responses is not None:
+            say(WorkerNews("opened", content={"axes": [], "responses": responses, "effects": []}))
+            return
         self._recording = load(path, **reading.load, progress=lambda part: say(WorkerNews("progress", words=f"reading {path.name}", part=part)))
         self._stories: dict[str, Any] = {}
         seconds, rate = self._recording.duration, self._recording.sampling_rate

@@ -18,10 +18,12 @@ from xy_sysid.fitting.check_on_data import through_window
 from xy_sysid.fitting.of_run import LinearModel
 from xy_sysid.linear.any_model import AnyModel
 from xy_sysid.report import story_progress
+from xy_sysid.report.coupling import coupling_figure
 from xy_sysid.report.figures import coherence_figure, response_figure
 from xy_sysid.report.parts import decibel, phase_of, plain
 from xy_sysid.report.story_parts import drawing
 from xy_sysid.report.theme import FLOOR
+from xy_sysid.response.coupling import Coupling
 from xy_sysid.response.frf import FrequencyResponse
 from xy_sysid.samples.recording import Recording, Run, one_run
 from xy_sysid.settings import IdentifierSettings
@@ -62,6 +64,11 @@ def bode(frf: FrequencyResponse, *others: FrequencyResponse | AnyModel) -> go.Fi
 def coherence(frf: FrequencyResponse) -> go.Figure:
     """Coherence of every line; lines that no fit uses are small crosses."""
     return coherence_figure({frf.origin.axis or "measured": frf}, IdentifierSettings().min_coherence)
+
+
+def coupling(found: Coupling) -> go.Figure:
+    """Coupling of two axes in each band, with its 95 % limit, in per cent of the own motion."""
+    return coupling_figure(found)
 
 
 def ladder(found: Diagnosis | Refinement | Ladder) -> go.Figure:

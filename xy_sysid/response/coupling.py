@@ -17,6 +17,7 @@ from xy_sysid.response.h1 import divisor
 from xy_sysid.response.windows import WindowShape, error_correlation
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import Recording, as_sensed
+from xy_sysid.tables import Table
 
 SUFFICES = 0.01  # of the own motion: less is below what models of machines reach
 BANDS = 24  # over which coupling is averaged
@@ -29,11 +30,12 @@ COMBINED = {
 }  # (inputs, outputs) -> of the mean and of the difference: x and y of a CoreXY's two motors, travel and yaw of a gantry's two sides
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Coupling:
     """What two axes do to each other.
 
     axes: their names; response: (lines, 2, 2) complex, output i over input j; sigma: (lines, 2, 2); frequency: (lines,) Hz, those used
+    windows, seconds: that were averaged; needed: s of such a recording with which the largest 95 % limit would come down to SUFFICES
     band_edges: (bands + 1,) Hz; coupling, at_most: (bands,) |G_ij| / sqrt(|G_ii G_jj|), rms in the band, the larger way: what is sure, and 95 % limit
     """
 
@@ -44,6 +46,9 @@ class Coupling:
     band_edges: FloatArray
     coupling: FloatArray
     at_most: FloatArray
+    windows: int
+    seconds: float
+    needed: float
 
     @property
     def largest(self) -> float:
@@ -61,6 +66,19 @@ class Coupling:
         return bool(np.any(self.coupling > SUFFICES))
 
     @property
+    def table(self) -> Table:
+        """Coupling by band: what is sure, and the 95 % limit, parts of the own motion."""
+        rows = zip(self.band_edges[:-1].tolist(), self.band_edges[1:].tolist(), self.coupling.tolist(), self.at_most.tolist(), strict=True)
+        return Table(("from (Hz)", "to (Hz)", "at least (1)", "at most (1)"), tuple(rows))
+
+    def __str__(self) -> str:
+        """The sentence and the table."""
+        return f"{self.sentence}\n\n{self.table}"
+
+    def __repr__(self) -> str:
+        return f"<Coupling: {self.sentence}>"
+
+    @property
     def sentence(self) -> str:
         """For people."""
         one, other = self.axes
@@ -71,9 +89,11 @@ class Coupling:
         if not self.coupled:
             place = int(np.argmax(self.at_most))
             where = f"{self.band_edges[place]:.3g} to {self.band_edges[place + 1]:.3g} Hz"
+            size = f"up to {_figures(100 * self.largest)} %" if self.largest < 1.0 else "of any size"
             return (
-                f"No coupling of {one} and {other} above {100 * SUFFICES:g} % is distinguished from noise in {span}. Up to "
-                f"{100 * self.largest:.2g} % cannot be ruled out in {where}: record longer, or excite both axes more there."
+                f"No coupling of {one} and {other} was found in {span}. In {where} the recording has too few windows ({self.windows}) to exclude "
+                f"it: there it may be {size}. With this excitation, {_lasting(self.needed)} would exclude "
+                f"more than {100 * SUFFICES:g} %; more excitation of both axes there needs less."
             )
         worst = int(np.argmax(self.coupling))
         low, high = self.band_edges[worst], self.band_edges[worst + 1]
@@ -92,6 +112,7 @@ class CrossSpectra:
     between: ComplexArray
     outputs: ComplexArray
     averages: float
+    windows: int
 
 
 class RunningCrossSpectra:
@@ -114,7 +135,7 @@ class RunningCrossSpectra:
     def get(self) -> CrossSpectra:
         """The sums so far."""
         inputs, between, outputs = self._sums
-        return CrossSpectra(inputs=inputs, between=between, outputs=outputs, averages=self._count / self._shared)
+        return CrossSpectra(inputs=inputs, between=between, outputs=outputs, averages=self._count / self._shared, windows=self._count)
 
 
 def coupling(recording: Recording, shape: WindowShape, band: tuple[float, float], combine: str = "") -> Coupling:
@@ -159,7 +180,19 @@ def coupling_of(
         step = divisor(every[used], rate)[:, None, None]
         response, sigma = response / step, sigma / np.abs(step)
     edges, size, most = _by_band(every[used], response, sigma)
-    return Coupling(axes=axes, frequency=every[used], response=response, sigma=sigma, band_edges=edges, coupling=size, at_most=most)
+    seconds = ((spectra.windows - 1) * shape.hop + shape.length) / rate
+    return Coupling(
+        axes=axes,
+        frequency=every[used],
+        response=response,
+        sigma=sigma,
+        band_edges=edges,
+        coupling=size,
+        at_most=most,
+        windows=spectra.windows,
+        seconds=seconds,
+        needed=seconds * max(float(np.max(most)) / SUFFICES, 1.0) ** 2,  # the limit falls with the root of the number of windows
+    )
 
 
 def single(found: Coupling, output: int, driven: int, recording: Recording) -> FrequencyResponse:
@@ -213,3 +246,16 @@ def _by_band(frequency: FloatArray, response: ComplexArray, sigma: FloatArray) -
             size[k] = max(size[k], np.sqrt(max(power - noise - 2.0 * spread, 0.0)))
             most[k] = max(most[k], np.sqrt(real + 2.0 * spread))
     return np.append(edges[there], edges[there[-1] + 1]), size, most
+
+
+def _lasting(seconds: float) -> str:
+    """A recording of that length, for people."""
+    for unit, size in (("h", 3600.0), ("min", 60.0)):
+        if seconds > 2.0 * size:
+            return f"a recording of about {_figures(seconds / size)} {unit}"
+    return f"a recording of about {_figures(seconds)} s"
+
+
+def _figures(value: float) -> str:
+    """Two of them, without an exponent."""
+    return f"{float(f'{value:.2g}'):.10g}"

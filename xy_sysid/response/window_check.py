@@ -20,6 +20,15 @@ REASONS = {
     "frozen": "the encoder repeated one value while the voltage moved",
     "leap": "the encoder leapt further than the voltage can explain",
 }
+SILENT = {
+    "level": "the input kept one value",
+    "even": "the output rose evenly, as a clock or a counter does",
+}
+ACTS = {
+    "level": "A response needs an input that changes within a window; steps between recordings or stretches are for xy-sysid steps.",
+    "even": "Choose another output with --map.",
+}
+STILL, EVEN = 1e-9, 1e-12  # of a signal's size: an input (as resampled) or a speed that changes by less is rounding; no converter has 30 bits
 
 
 def stands_still(voltage: FloatArray, position: FloatArray, frozen: int) -> bool:
@@ -50,6 +59,13 @@ def window_fault(voltage: FloatArray, position: FloatArray, frozen: int) -> str 
     return "leap" if float(np.max(np.abs(step))) > CREST_FACTOR * usual * rms else None
 
 
+def silent(voltage: FloatArray, position: FloatArray) -> str | None:
+    """The reason (a key of SILENT) why a window tells nothing of a response: input or speed do not change in it by more than rounding."""
+    if float(np.ptp(voltage)) <= STILL * float(np.max(np.abs(voltage))):
+        return "level"
+    return "even" if float(np.ptp(np.diff(position))) <= EVEN * float(np.max(np.abs(position))) else None
+
+
 def _resumes(voltage: FloatArray, position: FloatArray) -> bool:
     """Whether a position (n,) that stands at times moves often, at the beginning and at the end too: friction holds it, and no encoder died."""
     moves = np.diff(position) != 0.0
@@ -60,11 +76,12 @@ def _resumes(voltage: FloatArray, position: FloatArray) -> bool:
 def stretches(pieces: list[Piece], shape: WindowShape, differenced: bool, frozen: int) -> tuple[list[tuple[int, int, int]], list[str]]:
     """(number of the piece, first sample, last sample + 1) of what holds windows without a fault, and a sentence about those left out.
 
-    differenced: a window needs one sample more. Raises BadInput if every window has a fault.
+    differenced: a window needs one sample more. Raises BadInput if every window has a fault or is silent.
     """
     kept: list[tuple[int, int, int]] = []
     held: list[tuple[int, int, int]] = []  # windows that stand at times and go on
     faults: dict[str, int] = {}
+    says: list[str | None] = []  # of each window without a fault, why it tells nothing
     total = 0
     for number, (seq, u, y) in enumerate(pieces):
         follows = False
@@ -76,11 +93,17 @@ def stretches(pieces: list[Piece], shape: WindowShape, differenced: bool, frozen
                 held.append((number, start, stop))
             if fault is not None:
                 faults[fault] = faults.get(fault, 0) + 1
-            elif follows:
+                follows = False
+                continue
+            says.append(silent(u[start:stop], y[start:stop]))
+            if follows:
                 kept[-1] = (number, kept[-1][1], stop)
             else:
                 kept.append((number, start, stop))
-            follows = fault is None
+            follows = True
+    if says and None not in says:
+        most = max(SILENT, key=says.count)
+        raise BadInput(f"windows in which {SILENT[most]}", f"{says.count(most)} of {total}", "fewer", ACTS[most])
     if not faults:
         return [(number, 0, len(u)) for number, (_, u, _) in enumerate(pieces)], []
     why = "; ".join(f"in {count} {REASONS[name]}" for name, count in faults.items())

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from xy_sysid.time_models.first_order import FirstOrder
 from xy_sysid.time_models.output_error import Told
 from xy_sysid.time_models.servo import Servo
@@ -40,9 +42,16 @@ def first_order_words(found: FirstOrder) -> tuple[str, ...]:
             f"The longest level lasts {found.settled:.2g} time constants: gain and time constant are extrapolated. "
             f"Hold each level for {SETTLED * constant.value:.2g} s or longer."
         )
-    if constant.value * found.sampling_rate < 1.0 or not constant.told or constant.high > 3.0 * constant.low:
+    if not math.isfinite(constant.high):
+        said.append("These tests do not determine every parameter together: add a step of another size, or in the other direction.")
+    elif constant.value * found.sampling_rate < 1.0 or not constant.told or constant.high > 3.0 * constant.low:
         said.append(f"The time constant is known only to {_span(constant)} ms: sample faster, or repeat the step.")
-    if not delay.told:
+    if delay.high >= found.longest_delay:
+        said.append(
+            f"The delay is unknown: any up to {1e3 * delay.high:.3g} ms fits as well. A quick step within a recording, after some samples at "
+            "rest, tells it."
+        )
+    elif not delay.told:
         said.append(f"No delay is distinguished from zero (at most {1e3 * delay.high:.3g} ms).")
     if found.repeats * found.sampling_rate > REPEATS and found.explained >= GOOD:
         said.append(

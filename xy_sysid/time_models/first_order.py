@@ -40,6 +40,7 @@ class FirstOrder:
     levels:      of the input that last; both_ways: it moves in both directions; settled: time constants that the longest level lasts
     error:       rms of what the model leaves, in the speed's unit; explained: part of the speed's power about its mean
     repeats:     s over which what is left goes on: more than a few samples is no noise; seconds: of the recordings that were used
+    longest_delay: that was looked for, s; an interval that reaches it tells nothing
     measured, simulated: (n,) speeds of all recordings
     """
 
@@ -52,6 +53,7 @@ class FirstOrder:
     error: float
     explained: float
     repeats: float
+    longest_delay: float
     seconds: float
     terms: tuple[Term, ...]
     measured: FloatArray
@@ -110,13 +112,18 @@ def _fitted(rate: float, inputs: Sequence[FloatArray], speeds: Sequence[FloatArr
         parts = [_run(u, rate, values[0], values[1], values[2], friction, load, v) for u, v in zip(inputs, mean, strict=True)]
         return np.concatenate(parts)
 
-    longest = LONGEST * max(sizes) / rate
+    longest = _longest(rate, inputs)
     large = 10.0 * max(float(np.max(np.abs(item))) for item in inputs)
     low = np.array([-np.inf, 0.05 / rate, 0.0, *([0.0] if "friction" in terms else []), *([-large] if set(terms) & {"load", "offset"} else [])])
     high = np.array(
         [np.inf, 4.0 * longest, longest, *([large] if "friction" in terms else []), *([large] if set(terms) & {"load", "offset"} else [])]
     )
     return solved(simulate, _starts(rate, inputs, speeds, terms, longest), measured, sizes, low, high)
+
+
+def _longest(rate: float, inputs: Sequence[FloatArray]) -> float:
+    """The longest delay that is looked for, s."""
+    return LONGEST * max(map(len, inputs)) / rate
 
 
 def _terms(values: FloatArray, terms: tuple[Term, ...]) -> tuple[float, float]:
@@ -169,7 +176,7 @@ def _answer(
     quantities = [
         best.quantity("gain", gain, one[0], units.of("m/s/V")),
         best.quantity("time_constant", constant, one[1], "s", positive=True),
-        best.quantity("delay", float(best.values[2]), one[2], "s"),
+        best.parameter("delay", 2, "s", 0.0, _longest(rate, inputs)),
         *(best.quantity(name, float(best.values[3 + k]), one[3 + k], units.input) for k, name in enumerate(terms)),
         best.quantity("kV", 1.0 / gain, -one[0] / gain**2, units.of("V/(m/s)")),
         best.quantity("kA", constant / gain, one[1] / gain - constant * one[0] / gain**2, units.of("V/(m/s2)"), gain > 0.0),
@@ -188,6 +195,7 @@ def _answer(
         settled=lasting / rate / constant,
         error=best.cost,
         explained=explained,
+        longest_delay=_longest(rate, inputs),
         seconds=measured.size / rate,
         repeats=best.error.size / best.independent / rate,
         terms=terms,

@@ -7,13 +7,14 @@ scores up to the lag at which the error forgets itself (Newey & West, Econometri
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 import scipy
 
 from xy_sysid.samples.block import FloatArray
+from xy_sysid.tables import Table
 
 FORGOTTEN = 0.1  # autocorrelation at which an error has forgotten itself
 FLAT = 1e-5  # smallest singular value of the scaled Jacobian, of the largest, of parameters that the data tell
@@ -36,6 +37,11 @@ class Told:
     def told(self) -> bool:
         """The interval does not hold zero."""
         return bool(np.isfinite(self.low) and np.isfinite(self.high) and self.low * self.high > 0.0)
+
+
+def told_table(items: Sequence[Told]) -> Table:
+    """A row for each number."""
+    return Table(("parameter", "value", "from", "to", "unit"), tuple((item.name, item.value, item.low, item.high, item.unit) for item in items))
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +73,11 @@ class Minimized:
     def length(self, independent: float) -> float:
         """Description length, nats, of so many independent numbers: the error's cost, and each parameter's (Rissanen 1978, Schwarz 1978)."""
         return independent * float(np.log(max(self.cost, 1e-300))) + 0.5 * self.values.size * float(np.log(max(independent, 2.0)))
+
+    def parameter(self, name: str, place: int, unit: str, low: float, high: float) -> Told:
+        """A parameter that the fit looked for between two bounds, in which its interval lies, too."""
+        found = self.quantity(name, float(self.values[place]), np.eye(self.values.size)[place], unit)
+        return replace(found, low=max(found.low, low), high=min(found.high, high))
 
     def quantity(self, name: str, value: float, slope: FloatArray, unit: str = "", positive: bool = False) -> Told:
         """A function of the parameters with its interval, by its derivatives (p,) to them; positive: the interval is one of its logarithm."""

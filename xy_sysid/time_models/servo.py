@@ -27,6 +27,7 @@ FEWEST = 40  # samples in all
 SHORTEST = 8  # samples of a recording that is used
 HELD = 4  # every fourth recording judges; of fewer the last quarter of each
 FREQUENCIES, DAMPINGS, DELAYS = (5.0, 10.0, 20.0, 40.0, 80.0), (0.3, 0.7, 1.5), (0.5, 2.5)  # rad/s, ratios and samples of the starts
+LONGEST_DELAY = 0.25  # s
 BEST = 3  # starts that are followed
 REACHED = 0.02  # part of the time at the limit from which it is told
 STILL = 0.02  # part of the range of the target within which an angle stands
@@ -100,7 +101,7 @@ def _fitted(runs: list[Run], limited: bool) -> Minimized:
             starts.append(np.array([*row, 0.5 * span * frequency**2] if limited else row))
     starts.sort(key=lambda row: float(np.sum((measured - simulate(row)) ** 2)))
     low = np.array([1.0, 0.0, 0.0, 0.0, -1e4 * span, *([1e-3 * span] if limited else [])])
-    high = np.array([1e6, 1e4, 1e4 * span, 0.25, 1e4 * span, *([1e6 * span] if limited else [])])
+    high = np.array([1e6, 1e4, 1e4 * span, LONGEST_DELAY, 1e4 * span, *([1e6 * span] if limited else [])])
     return solved(simulate, starts[:BEST], measured, [len(run) for run in runs], low, high)
 
 
@@ -135,7 +136,7 @@ def _answer(used: list[Run], seen: list[Run], unseen: list[Run], best: Minimized
         best.quantity("friction", float(v[2]), one[2], f"{per}/s^2"),
         best.quantity("load", float(v[4]), one[4], f"{per}/s^2"),
         *([best.quantity("limit", float(v[5]), one[5], f"{per}/s^2", positive=True)] if limited else []),
-        best.quantity("delay", float(v[3]), one[3], "s"),
+        best.parameter("delay", 3, "s", 0.0, LONGEST_DELAY),
         best.quantity("frequency", root / (2.0 * np.pi), one[0] / (4.0 * np.pi * root), "Hz", positive=True),
         best.quantity("damping_ratio", ratio, one[1] / (2.0 * root) - one[0] * v[1] / (4.0 * root**3), ""),
     ]

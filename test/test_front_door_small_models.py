@@ -1,0 +1,66 @@
+"""Short tests, servos, two axes at once and numbers in SI from Python: as the commands, with results that print themselves."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import plotly.graph_objects as go
+import pytest
+from scipy import signal
+
+import xy_sysid as xy
+
+RATE = 200.0
+
+
+def step_test(level: float) -> xy.Recording:
+    """A first order of 0.5 rad/s per unit with 0.1 s, from rest."""
+    u = np.concatenate((np.zeros(20), np.full(200, level)))
+    keep = float(np.exp(-1.0 / RATE / 0.1))
+    speed = signal.lfilter([0.0, 0.5 * (1.0 - keep)], [1.0, -keep], u) + np.random.default_rng(3).normal(0.0, 1e-3, u.size)
+    return xy.Recording.from_arrays(RATE, u, np.concatenate(([0.0], np.cumsum(speed[:-1]) / RATE)), units=("A", "rad"))
+
+
+def test_step_tests_of_several_recordings_give_gain_and_inertia() -> None:
+    """Gain, time constant and their sentences; with a torque constant and a gear the inertia at the joint and at the motor."""
+    found = xy.steps([step_test(5.0), step_test(-5.0)])
+    assert found["gain"].value == pytest.approx(0.5, rel=0.02) and found["time_constant"].value == pytest.approx(0.1, rel=0.05)
+    assert found.sentences[0] in str(found) and "gain" in str(found.table) and "explains" in repr(found)
+    rows = {str(row[0]): row for row in xy.mechanics(found, kt=0.12, gear="10")}
+    assert rows["inertia"][1] == pytest.approx(0.12 * 10.0 * 0.1 / 0.5, rel=0.05)
+    assert rows["inertia"][5] == pytest.approx(0.12 * 0.1 / 0.5 / 10.0, rel=0.05) and rows["inertia"][7] == "armature"
+    assert len(xy.mechanics(found)) == 0
+
+
+def test_a_servo_gives_its_stiffness_and_the_numbers_of_mujoco(tmp_path: Path) -> None:
+    """From a file, too; an inertia gives kp = inertia times stiffness."""
+    rng = np.random.default_rng(1)
+    target = np.repeat(rng.uniform(-0.5, 0.5, 24), 25)
+    plant = signal.cont2discrete((np.array([400.0]), np.array([1.0, 28.0, 400.0])), 1 / 50.0)
+    angle = signal.lfilter(plant[0].ravel(), plant[1], target)
+    np.savetxt(tmp_path / "servo.csv", np.column_stack((np.arange(600) / 50.0, target, angle)), "%.9g", ",", header="time,target,angle", comments="")
+    columns, units = {"input": "target", "output": "angle"}, {"input": "rad", "output": "rad"}
+    found = xy.servo(xy.load(tmp_path / "servo.csv", columns=columns, units=units))
+    assert found["stiffness"].value == pytest.approx(400.0, rel=0.1)
+    rows = {str(row[0]): row for row in found.in_si(0.01)}
+    assert rows["kp"][1] == pytest.approx(0.01 * found["stiffness"].value)
+    assert found.sentences[0] in str(found)
+    with pytest.raises(xy.BadInput, match="inertia is -1"):
+        found.in_si(-1.0)
+
+
+def test_two_axes_at_once_give_a_verdict_and_a_picture() -> None:
+    """The sentence, the bands as a table, and a figure; a recording of one axis is refused in one line."""
+    rng = np.random.default_rng(2)
+    u = rng.normal(size=(20_000, 2))
+    moved = signal.lfilter([0.1], [1.0, -0.9], u + 0.05 * u[:, ::-1], axis=0)
+    two = xy.Recording.from_arrays(500.0, u, np.cumsum(moved, axis=0) / 500.0, axes=("x", "y"))
+    found = xy.coupling(two, band_low=2.0, band_high=100.0)
+    assert not found.suffice and "do not suffice" in found.sentence and found.sentence in str(found)
+    assert len(found.table) == len(found.coupling)
+    assert isinstance(xy.plot.coupling(found), go.Figure)
+    with pytest.raises(xy.BadInput, match="two"):
+        xy.coupling(step_test(1.0))
+    with pytest.raises(xy.BadInput, match="one axis"):
+        xy.steps(two)

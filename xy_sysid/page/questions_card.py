@@ -1,0 +1,90 @@
+"""The card *More about this recording*: step tests, servos, and numbers in SI, as the commands say them."""
+
+from __future__ import annotations
+
+import html
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from nicegui import run, ui
+
+from xy_sysid.page.beside import asked, beside
+from xy_sysid.page.buttons import heeded
+from xy_sysid.page.orders import Source
+from xy_sysid.page.session import Session
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """A command that is asked about a recording. options: that it takes of the card's fields."""
+
+    command: str
+    text: str
+    meaning: str
+    options: tuple[str, ...] = ()
+
+
+QUESTIONS = (
+    Question("steps", "Step test", "Short step and ramp tests: gain, time constant, delay and friction (kS, kV, kA).", ("--kt", "--gear")),
+    Question("servo", "Servo", "A position-controlled joint, target to angle: stiffness, damping, friction, torque limit and delay.", ("--inertia",)),
+    Question("diagnose", "What is missing, in SI", "Inertia or mass and friction in SI: give the torque constant of a current.", ("--kt", "--gear")),
+    Question("frf", "Response", "The frequency response as a table, with what was noticed."),
+)
+
+
+class QuestionsCard:
+    """One recording in one browser."""
+
+    def __init__(self, session: Session, source: Source) -> None:
+        self._session, self._source = session, source
+        self._working = False
+        with ui.element("section").classes("card use").props('aria-label="more about this recording"') as self._card:
+            ui.html("<h2>More about this recording</h2>", sanitize=False)
+            with ui.element("div").classes("buttons"):
+                self._fields: dict[str, Any] = {
+                    "--kt": ui.number("torque constant (N m/A)", min=1e-9).props("outlined dense data-part=kt").style("width:14rem"),
+                    "--gear": ui.input("gear (50, or 5mm)").props("outlined dense data-part=gear").style("width:11rem"),
+                    "--inertia": ui.number("inertia (kg m^2)", min=1e-12).props("outlined dense data-part=inertia").style("width:11rem"),
+                }
+            with ui.element("div").classes("buttons"):
+                for question in QUESTIONS:
+                    button = ui.button(question.text, on_click=partial(self._ask, question))
+                    with heeded(button.props(f"outline dense no-caps data-ask={question.command}")):
+                        ui.tooltip(question.meaning).props("delay=700")
+            self._text = ui.element("div").classes("use-text").props('tabindex=0 role=region aria-label="answer" data-part=answer')
+        self._text.set_visibility(False)
+
+    def refresh(self) -> None:
+        """Shown for what was read."""
+        self._card.set_visibility(bool(self._source.axes()))
+
+    async def _ask(self, question: Question) -> None:
+        path, how = getattr(self._source, "path", None), getattr(self._source, "how", self._session.reading)
+        if path is None or self._working:
+            return
+        given = [(option, self._fields[option].value) for option in question.options]
+        words = [word for option, value in given if value not in (None, "") for word in (option, str(value))]
+        self._working = True
+        waiting = ui.notification(f"xy-sysid {question.command} is running ...", spinner=True, timeout=None)
+        try:
+            text = await beside(self._session, lambda: run.io_bound(answer, question.command, path, (*how.words, *words)))
+        finally:
+            self._working = False
+            waiting.dismiss()
+        if text:
+            self._text.clear()
+            with self._text:
+                ui.html(as_html(str(text)), sanitize=False)
+            self._text.set_visibility(True)
+
+
+def answer(command: str, path: Path, words: tuple[str, ...]) -> str:
+    """What a command says of a recording that is read so. Raises BadInput with what it says."""
+    return asked((command, str(path), *words), (command, "not told", "a recording that tells it"))
+
+
+def as_html(text: str) -> str:
+    """Lines as the command prints them."""
+    return f'<pre class="wrap">{html.escape(text)}</pre>'

@@ -1,0 +1,27 @@
+"""What the page shows of a measured frequency response: made in the worker's process."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from xy_sysid.fitting.of_run import fit
+from xy_sysid.imports.reading import OF_A_RESPONSE, Reading
+from xy_sysid.imports.registry import format_of, sheet_of
+from xy_sysid.imports.response_file import responses
+from xy_sysid.report.plots import bode
+
+
+def fitted_responses(path: Path, load: Mapping[str, Any]) -> dict[str, dict[str, Any]] | None:
+    """Picture and words of the fit of each response in a file; None of a file of samples. Raises BadInput and BadRecording. Takes seconds."""
+    kind, reading = format_of(path), Reading(**load)
+    if kind.kind != "response" and not any(role in reading.columns for role in OF_A_RESPONSE):
+        return None
+    found = {}
+    for name, response in responses(path, sheet_of(path, kind), reading).items():
+        model = fit(response)
+        said = [f"{'ok  ' if verdict.ok else 'WARN'} {verdict.sentence}" for verdict in model.verdicts]
+        words = "\n".join((str(model), "", *said, "", *response.origin.notes))
+        found[name] = {"figure": bode(response, model).to_plotly_json(), "words": words}
+    return found
