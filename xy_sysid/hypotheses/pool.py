@@ -85,13 +85,16 @@ class Pool:
         Of sets that are as good and have as many effects, that with dry friction, as every machine has it.
         """
         first = self.nodes[self.kept]
-        lower = (node for node in self.nodes.values() if node.leads and not node.refused and node.whole)
-        better = [node for node in lower if all(node.fit.held_out_error < less.fit.held_out_error for less in self._inside(node))]
+        better = [node for node in self.nodes.values() if node.leads and not node.refused and node.whole and self._lowers(node)]
         if self.best is first or not better:
             return first
         best = min(better, key=self.score)
         same = (node for node in better if len(node.effects) == len(best.effects) and self.score(node) < self.score(best) + PRICE)
         return min(same, key=lambda node: (-sum(self.library[name].is_dry for name in node.effects), self.score(node)))
+
+    def _lowers(self, node: Node) -> bool:
+        """Its held-out error is below that of every set that it contains."""
+        return all(node.fit.held_out_error < less.fit.held_out_error for less in self._inside(node))
 
     def begin(self, start: GreyboxFit) -> Node:
         """The first set, from which the search begins."""
@@ -189,15 +192,14 @@ class Pool:
         """The move that promises the best score, of those that promise a better one than would be said; from some sets, or from all.
 
         Two effects at once only where no other move from their set promises that: one after the other costs less, and says which of them helps.
+        Sets that raise the held-out error are gone on from last.
         """
-        least, chosen = self.score(self.answer) - PRICE, None
+        least, hopeful = self.score(self.answer) - PRICE, []
         for node in nodes or self.nodes.values():
-            hopeful = [move for move in node.moves or () if self._hoped(node, move) < least and self._is_open(node, move)]
-            hopeful = [move for move in hopeful if self._may_be_worth(node, move)]
-            for move in [move for move in hopeful if len(move.effects - node.effects) < 2] or hopeful:
-                if chosen is None or self._hoped(node, move) < self._hoped(*chosen):
-                    chosen = node, move
-        return chosen
+            own = [move for move in node.moves or () if self._hoped(node, move) < least and self._is_open(node, move)]
+            own = [move for move in own if self._may_be_worth(node, move)]
+            hopeful += [(node, move) for move in [move for move in own if len(move.effects - node.effects) < 2] or own]
+        return min(hopeful, key=lambda item: (not self._lowers(item[0]), self._hoped(*item)), default=None)
 
     def _hoped(self, node: Node, move: Move) -> float:
         """The score that a move promises, nats."""
