@@ -134,7 +134,7 @@ def test_every_worker_of_the_page_is_behind_such_a_sentence() -> None:
         if ("io_bound(" in line or "cpu_bound(" in line) and "beside(" not in line
     }
     assert bold == {
-        "files_dialog.py: names = await run.io_bound(session.shelf.names)",
+        "files_dialog.py: names = await run.io_bound(session.shelf.names) or await run.io_bound(session.shelf.names, texts=True)",
         "control.py: words = await run.io_bound(session.recorder.stop)",
         "plot.py: drawn = await run.io_bound(copy_context().run, session.figure, key, lambda: plain(make(*arguments, **named)))",
     }

@@ -69,6 +69,7 @@ def test_the_page_answers_what_the_commands_answer(tmp_path: Path) -> None:
             page.wait_for_timeout(500)
             for role, column in (("input", "1"), ("output", "y.csv:1")):
                 page.locator(f"[data-pick={role}]").last.click()
+                tab.until(lambda: page.get_by_role("listbox").count() == 1, 20.0, "the list before is still open")
                 page.get_by_role("option", name=column, exact=True).click()
             page.locator("[data-pick=open]").last.click()
             tab.until(lambda: "u.csv" in (page.locator("[role=banner]").text_content() or ""), 20.0, "two files were not opened")
