@@ -145,15 +145,23 @@ def test_the_better_of_two_fits_gains_and_a_fit_gains_nothing_over_itself(both: 
 
 def test_a_quick_fit_never_takes_the_place_of_one_on_all_data() -> None:
     """A better quick fit of a known set is fitted on all data, too; when the time is up, what was known stays, and goes on leading."""
+    pool, effects = Pool(data_of("coulomb_friction", seconds=5.0), STANDARD), frozenset({"coulomb_friction"})
+    base = pool.begin(fit_base(pool.data))
+    whole = with_one_more(pool.data, STANDARD, base.fit, "coulomb_friction")
+    quick = fit(pool.data, whole.model, brief=True)
+    known = pool.remember(effects, replace(quick, excess=quick.excess + 1.0), whole)
+    pool.late = lambda: True
+    assert pool.remember(effects, quick, quick, leads=False) is known
+    pool.late = lambda: False
+    assert pool.remember(effects, quick, quick, leads=False).whole and pool.nodes[effects].whole and pool.best is pool.nodes[effects]
+
+
+def test_the_first_set_stays_as_it_was_given() -> None:
+    """Answers are shown beside its error, so no other fit takes its place."""
     pool = Pool(data_of("coulomb_friction", seconds=5.0), STANDARD)
     begun = pool.begin(fit_base(pool.data))
-    quick = begun.brief
-    begun.brief = replace(quick, excess=quick.excess + 1.0)
-    pool.late = lambda: True
-    assert pool.remember(frozenset(), quick, quick, leads=False) is begun
-    pool.late = lambda: False
-    better = pool.remember(frozenset(), quick, quick, leads=False)
-    assert better.whole and better.leads and pool.best is pool.nodes[frozenset()]
+    better = replace(begun.fit, excess=begun.fit.excess - 1.0, scores=begun.fit.scores - 1.0)
+    assert pool.remember(frozenset(), better, better) is begun and pool.nodes[frozenset()] is begun
 
 
 def test_what_pulls_back_with_the_sine_of_an_angle_is_a_weight_and_no_wave() -> None:

@@ -102,8 +102,13 @@ class Pool:
         return self.remember(frozenset(name for name, _ in start.model.effects), brief, start)
 
     def remember(self, effects: frozenset[str], brief: GreyboxFit, found: GreyboxFit, leads: bool = True, promised: float = 0.0) -> Node:
-        """A set with its fit, in the place of a worse one of the same set; a fit on all data gives way to another one only."""
+        """A set with its fit, in the place of a worse one of the same set; a fit on all data gives way to another one only.
+
+        The first set stays as it was given: its error is the one that every answer is shown beside.
+        """
         parameters, known = count(self.library, effects - self.kept), self.nodes.get(effects)
+        if known is not None and effects == self.kept:
+            return known
         leads = leads or (known is not None and known.leads)
         node = Node(effects, parameters, brief, found, refused=self._refusal(effects, found), leads=leads, promised=promised)
         lower = known is None or brief.excess < known.brief.excess - PRICE / self.scale
