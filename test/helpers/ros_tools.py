@@ -65,14 +65,14 @@ def clean(domain: int) -> None:
 
 
 class NodeProcess:
-    """A node in a process of its own; what it writes goes to a file and can be read at any time."""
+    """A node in a process of its own, beside its log; what it writes goes there and can be read at any time."""
 
     def __init__(self, program: Sequence[str], arguments: Sequence[str], domain: int, log: Path) -> None:
         environment = bare(ROS_DOMAIN_ID=str(domain), ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST")
         self._log = log
         with log.open("wb") as out:
             command = [sys.executable, *program, *arguments]
-            self.process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.STDOUT, env=environment)
+            self.process = subprocess.Popen(command, cwd=log.parent, stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.STDOUT, env=environment)
 
     def output(self) -> str:
         """All it wrote so far."""

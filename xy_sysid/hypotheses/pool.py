@@ -201,10 +201,12 @@ class Pool:
         """
         least, hopeful = self.score(self.answer) - PRICE, []
         for node in nodes or self.nodes.values():
-            own = [move for move in node.moves or () if self._hoped(node, move) < least and self._is_open(node, move)]
-            own = [move for move in own if self._may_be_worth(node, move)]
-            hopeful += [(node, move) for move in [move for move in own if len(move.effects - node.effects) < 2] or own]
-        return min(hopeful, key=lambda item: (not self._lowers(item[0]), self._hoped(*item)), default=None)
+            own = [(self._hoped(node, move), move) for move in node.moves or () if self._is_open(node, move) and self._may_be_worth(node, move)]
+            own = [(hoped, move) for hoped, move in own if hoped < least]
+            lowers = bool(own) and self._lowers(node)
+            single = [item for item in own if len(item[1].effects - node.effects) < 2]
+            hopeful += [(not lowers, hoped, node, move) for hoped, move in single or own]
+        return min(hopeful, key=lambda item: item[:2])[2:] if hopeful else None
 
     def _hoped(self, node: Node, move: Move) -> float:
         """The score that a move promises, nats."""
