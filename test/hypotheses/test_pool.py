@@ -160,8 +160,8 @@ def test_the_first_set_stays_as_it_was_given() -> None:
     """Answers are shown beside its error, so no other fit takes its place."""
     pool = Pool(data_of("coulomb_friction", seconds=5.0), STANDARD)
     begun = pool.begin(fit_base(pool.data))
-    better = replace(begun.fit, excess=begun.fit.excess - 1.0, scores=begun.fit.scores - 1.0)
-    assert pool.remember(frozenset(), better, better) is begun and pool.nodes[frozenset()] is begun
+    begun.fit = replace(begun.fit, model=replace(begun.fit.model, gain=2.0 * begun.fit.model.gain))  # of which a refit would be better
+    assert pool.fitted(frozenset(), lambda: [begun.brief.model]) is begun and pool.nodes[frozenset()] is begun
 
 
 def test_what_pulls_back_with_the_sine_of_an_angle_is_a_weight_and_no_wave() -> None:

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 import yaml
 from helpers.browser_tools import Server, Tab, browser, needs_browser
+from helpers.live_nodes import ready
 from helpers.ros_tools import World, needs_ros, world_in
 
 from xy_sysid.cli.demo_settle import QUIET, RATE, TRAVEL, VOLTAGE
@@ -59,8 +60,7 @@ def scene(tmp_path: Path) -> Iterator[Scene]:
 def test_run_it_goes_on_by_itself_until_nothing_is_left_to_settle(scene: Scene, tmp_path: Path) -> None:
     """Design the next experiment, Run it, and the card says what it is. Every step is a bag; afterwards the excitation is as it was."""
     tab, world = scene.tab, scene.world
-    statuses = world.statuses()
-    assert world.until(lambda: any(status.name == "ballscrew" for status in statuses), 60.0), "the machine is not there"
+    ready(world, world.statuses(), "ballscrew")
     assert world.transition("excitation", "configure") and world.transition("excitation", "activate")
     tab.until(tab.page.locator("[data-act=design]").is_enabled, 30, "no axis is heard")
     assert not tab.page.locator("[data-act=run-it]").is_enabled()

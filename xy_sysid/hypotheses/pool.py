@@ -102,13 +102,8 @@ class Pool:
         return self.remember(frozenset(name for name, _ in start.model.effects), brief, start)
 
     def remember(self, effects: frozenset[str], brief: GreyboxFit, found: GreyboxFit, leads: bool = True, promised: float = 0.0) -> Node:
-        """A set with its fit, in the place of a worse one of the same set; a fit on all data gives way to another one only.
-
-        The first set stays as it was given: its error is the one that every answer is shown beside.
-        """
+        """A set with its fit, in the place of a worse one of the same set; a fit on all data gives way to another one only."""
         parameters, known = count(self.library, effects - self.kept), self.nodes.get(effects)
-        if known is not None and effects == self.kept:
-            return known
         leads = leads or (known is not None and known.leads)
         node = Node(effects, parameters, brief, found, refused=self._refusal(effects, found), leads=leads, promised=promised)
         lower = known is None or brief.excess < known.brief.excess - PRICE / self.scale
@@ -297,9 +292,12 @@ class Pool:
             yield best.effects - {name}, partial(starts.dropped, data, best.fit, name, alone)
 
     def fitted(self, effects: frozenset[str], begun: Callable[[], Sequence[AxisModel]]) -> Node | None:
-        """A set fitted on the first stage's data; a known one again where a start is already better than its fit."""
+        """A set fitted on the first stage's data; a known one again where a start is already better than its fit.
+
+        The first set stays as it was given: its error is the one that every answer is shown beside.
+        """
         known = self.nodes.get(effects)
-        if self.late():
+        if self.late() or (known is not None and effects == self.kept):
             return known
         start = best_start(self.data, list(begun()))
         if known is not None and first_excess(self.data, known.fit.model) <= first_excess(self.data, start) + PRICE / self.scale:
