@@ -22,7 +22,7 @@ from xy_sysid.axis.model import FINE, STANDARD, AxisModel, simulator, start_of
 from xy_sysid.greybox.axis_data import AxisData, prepare_all
 from xy_sysid.greybox.floor import Windows
 from xy_sysid.greybox.free_run import GreyboxFit, fit_base, fit_with
-from xy_sysid.greybox.objective import Objective, responder
+from xy_sysid.greybox.objective import Objective
 from xy_sysid.hypotheses.enough_data import lacking
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import moved
@@ -57,13 +57,13 @@ def simulated(data: AxisData, model: AxisModel, fine: float = FINE) -> FloatArra
 
 def judged(data: AxisData, model: AxisModel) -> Judged:
     """What a model leaves."""
-    error, response = data.velocity - simulated(data, model), responder(data.layout, model)(model.row)
+    error = data.velocity - simulated(data, model)
 
     def power(windows: Windows) -> FloatArray:
         found = data.layout.power(windows.spectrum(error))
         return np.asarray(np.where(np.isfinite(found), found, np.inf))
 
-    return Judged(model, data.layout.rms(power(data.held)), Objective.of(data.floor).of_power(power(data.fitted), response))
+    return Judged(model, data.layout.rms(power(data.held)), Objective.of(data.floor).of_power(power(data.fitted)))
 
 
 def made(gain: float, delay: float, pole: float, coulomb: float | None) -> AxisModel:

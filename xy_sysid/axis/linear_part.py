@@ -35,6 +35,13 @@ def nonlinear(model: AxisModel) -> tuple[str, ...]:
     return tuple(name for name, values in model.effects if np.array_equal(_section(model.library[name], values), ([1.0], [1.0])))
 
 
+def sections(model: AxisModel, sampling_rate: float) -> tuple[tuple[float, ...], ...]:
+    """b0, b1, b2, a1, a2 of each section that the motion passes behind the base, at this rate (Hz)."""
+    passed = [(model.library[name], values) for name, values in model.effects if model.library[name].category == "motion"]
+    laws = [(effect.functions["section"], effect, values) for effect, values in passed]
+    return tuple(tuple(law(**_bound(law, effect, values, {"fs": sampling_rate}))) for law, effect, values in laws)
+
+
 def _section(effect: Effect, values: tuple[float, ...]) -> tuple[Any, Any]:
     """Numerator and denominator with gain 1 at 0 Hz; 1 and 1 for an effect that is not linear."""
     if effect.category == "motion":

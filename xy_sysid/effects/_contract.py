@@ -17,6 +17,7 @@ the simulation knows at that moment (``WORDS``). So a law reads as the equation 
 
 from __future__ import annotations
 
+import functools
 import inspect
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -434,6 +435,7 @@ class Effect:
         return tuple(float(min(max(value, low), item.high)) for value, low, item in zip(given, least, items, strict=True))
 
 
+@functools.cache
 def arguments(function: Law) -> tuple[str, ...]:
     """The names of a law's arguments."""
     return tuple(inspect.signature(function).parameters)

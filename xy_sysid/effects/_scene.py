@@ -30,6 +30,7 @@ class Scene:
     error:    (n,) measured velocity minus the model's, m/s
     recordings: samples of each recording that it is made of, one after the other; empty for one
     prompt: the same motion behind a drive that answers at once, where the delay that the base has is so long that it may be astray
+    sections: b0, b1, b2, a1, a2 of each that the motion passes behind the base
     """
 
     sampling_rate: float
@@ -41,6 +42,7 @@ class Scene:
     error: FloatArray
     recordings: tuple[int, ...] = ()
     prompt: Scene | None = None
+    sections: tuple[tuple[float, ...], ...] = ()
     _known: dict[tuple[str, float], FloatArray] = field(init=False, repr=False, compare=False, default_factory=dict)
     _guesses: dict[str, list[Guess]] = field(init=False, repr=False, compare=False, default_factory=dict)
 

@@ -24,7 +24,7 @@ from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.floor import Windows
 from xy_sysid.greybox.free_run import MIDDLING, GreyboxFit
 from xy_sysid.greybox.least_squares import STEP, Scale
-from xy_sysid.greybox.objective import Objective, responder
+from xy_sysid.greybox.objective import Objective
 from xy_sysid.greybox.parameters import problem, unit_of
 from xy_sysid.samples.block import FloatArray
 
@@ -91,19 +91,18 @@ class Evidence:
         power = self.data.layout.power(error)
         if not np.all(np.isfinite(power)):
             return math.inf
-        score = self.objective.of_power(power, responder(self.data.layout, model)(model.row))
+        score = self.objective.of_power(power)
         return 0.5 * self.objective.count * score * self.windows.begins.size
 
-    def spectrum(self, model: AxisModel, error: NDArray[np.complex128]) -> tuple[FloatArray, float, float]:
-        """(bands,) expected power of the error of a model, and the powers of the unmodelled force and motion."""
-        response = responder(self.data.layout, model)(model.row)
-        force, motion = self.objective.unmodelled(self.data.layout.power(error), response)
-        return self.objective.floor + force * response + motion, force, motion
+    def spectrum(self, error: NDArray[np.complex128]) -> tuple[FloatArray, float, float]:
+        """(bands,) expected power of an error, and the powers of the unmodelled force and motion."""
+        force, motion = self.objective.unmodelled(self.data.layout.power(error))
+        return self.objective.floor + force * self.objective.response + motion, force, motion
 
     def whitened(self, model: AxisModel, scale: Scale) -> tuple[FloatArray, FloatArray]:
         """(k, m) derivatives of the error by the coordinates, and (m,) the error itself, both over its expected size."""
         error, inner = self.error(model), scale.inner(model.row)
-        spectrum, _, _ = self.spectrum(model, error)
+        spectrum, _, _ = self.spectrum(error)
         weight = ((self.objective.lines > 0.0) / np.sqrt(spectrum))[self.data.layout.band]
         rows = []
         for k in range(inner.size):
@@ -250,7 +249,7 @@ def _root(precision: FloatArray) -> FloatArray:
 
 
 def _belief(evidence: Evidence, model: AxisModel, draws: list[AxisModel], scale: Scale, precision: FloatArray) -> Belief:
-    _, force, motion = evidence.spectrum(model, evidence.error(model))
+    _, force, motion = evidence.spectrum(evidence.error(model))
     return Belief(
         effects=tuple(name for name, _ in model.effects),
         model=model,

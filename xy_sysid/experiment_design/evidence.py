@@ -19,7 +19,6 @@ from xy_sysid.diagnosis.ladder import contains
 from xy_sysid.experiment_design.beliefs import Belief
 from xy_sysid.experiment_design.criteria import JUDGED, ODDS, ROUNDS, SURE
 from xy_sysid.experiment_design.prediction import Recorded, expected_error, predicted, slopes
-from xy_sysid.greybox.objective import responder
 from xy_sysid.hypotheses.criteria import PRICE
 
 
@@ -60,7 +59,7 @@ def nats(sets: tuple[Belief, Belief], model: AxisModel, item: Recorded, rounds: 
     What each set has to leave of the data at hand counts for both.
     """
     own, rival = sets
-    least, response = expected_error(item, own, model)
+    least = expected_error(item, own)
     lines = item.objective.lines > 0.0
     weight = (lines / np.sqrt(least))[item.windows.layout.band]
     centre = rival.inner(rival.model)
@@ -74,7 +73,7 @@ def nats(sets: tuple[Belief, Belief], model: AxisModel, item: Recorded, rounds: 
         if not np.all(np.isfinite(power)):
             break
         off = inner - centre
-        score = item.objective.of_power(least + power, responder(item.windows.layout, other)(other.row))
+        score = item.objective.of_power(least + power)
         best = min(best, _all(item, score) + 0.5 * float(off @ rival.precision @ off))
         if last == rounds:
             break
@@ -85,7 +84,7 @@ def nats(sets: tuple[Belief, Belief], model: AxisModel, item: Recorded, rounds: 
         inner = inner + np.linalg.lstsq(columns @ columns.T + rival.precision, columns @ left - rival.precision @ off)[0]
         inner = rival.scale.inner(rival.scale.outer(inner))
     drawn = own.inner(model) - own.inner(own.model)
-    truth = _all(item, item.objective.of_power(least, response)) + 0.5 * float(drawn @ own.precision @ drawn)
+    truth = _all(item, item.objective.of_power(least)) + 0.5 * float(drawn @ own.precision @ drawn)
     return max(best - truth, 0.0) if math.isfinite(best) else 1e6
 
 

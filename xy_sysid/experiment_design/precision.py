@@ -42,7 +42,7 @@ class Information:
 
 def information(belief: Belief, model: AxisModel, item: Recorded) -> Information:
     """Of a recording that a model would make."""
-    least, _ = expected_error(item, belief, model)
+    least = expected_error(item, belief)
     layout = item.windows.layout
     weight = ((item.objective.lines > 0.0) / np.sqrt(least))[layout.band]
     change = slopes(item, belief, model, predicted(item, model)) * weight

@@ -15,7 +15,7 @@ from xy_sysid.experiment_design.experiment import RAMP, Experiment
 from xy_sysid.greybox.axis_data import HELD, ROOM, SEEN, WINDOWS, AxisData
 from xy_sysid.greybox.floor import Bands, Windows, bands, floor
 from xy_sysid.greybox.least_squares import STEP
-from xy_sysid.greybox.objective import Objective, responder
+from xy_sysid.greybox.objective import Objective
 from xy_sysid.samples.block import FloatArray
 
 
@@ -82,7 +82,7 @@ def seen(setting: Setting, motion: Motion) -> Recorded:
     velocity = np.diff(motion.position) * rate
     first = min(round(RAMP * rate), max(velocity.size - length, 0))
     windows = Windows(setting.layout, np.arange(first, max(velocity.size - length, first) + 1, max(length // 2, 1), dtype=np.int64))
-    least = floor(windows, velocity, setting.encoder, setting.epsilon)
+    least = floor(windows, velocity, setting.encoder, setting.epsilon, motion.voltage[:-1])
     steady = (windows.end - first) / rate
     return Recorded(
         motion=motion,
@@ -115,7 +115,6 @@ def slopes(item: Recorded, belief: Belief, model: AxisModel, now: NDArray[np.com
     return np.nan_to_num(np.array(found))
 
 
-def expected_error(item: Recorded, belief: Belief, model: AxisModel) -> tuple[FloatArray, FloatArray]:
-    """(bands,) power of a model's error where the model is true, m^2/s^2: noise, unmodelled force and motion; and its |G|^2."""
-    response = responder(item.windows.layout, model)(model.row)
-    return item.objective.floor + belief.force * response + belief.motion, response
+def expected_error(item: Recorded, belief: Belief) -> FloatArray:
+    """(bands,) power of a model's error where the model is true, m^2/s^2: noise, unmodelled force and motion."""
+    return np.asarray(item.objective.floor + belief.force * item.objective.response + belief.motion)

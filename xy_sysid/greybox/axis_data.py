@@ -210,7 +210,8 @@ def prepare_all(
     whole = Windows(layout, np.concatenate([_begins(layout.length, *span) for span in spans]))
     encoder = max(encoder_noise(sampling_rate, position, units.sensed, voltage) for voltage, position in recordings)
     fitted, held = _split(layout, spans, velocity)
-    least = floor(whole, velocity, encoder, epsilon)
+    driven = np.concatenate([voltage[:-1] for voltage, _ in recordings])
+    least = floor(whole, velocity, encoder, epsilon, driven)
     steps = [slice(*span) for span in spans]
     early = _early(whole, fitted, velocity, least, steps)
     return AxisData(
@@ -259,7 +260,7 @@ def _within(windows: Windows, steps: Sequence[slice], early: Sequence[int] | NDA
 def loosened(data: AxisData, epsilon: float) -> AxisData:
     """The same axis with laws that are trusted less."""
     both = Windows(data.layout, np.concatenate((data.fitted.begins, data.held.begins)))
-    return replace(data, floor=floor(both, data.velocity, data.floor.encoder, epsilon))
+    return replace(data, floor=replace(floor(both, data.velocity, data.floor.encoder, epsilon), response=data.floor.response))
 
 
 def _begins(length: int, start: int, stop: int) -> NDArray[np.int64]:

@@ -25,6 +25,7 @@ TOP_SHARE = 0.35  # of the sampling rate, for slow sampling
 WINDOW = 2.0  # s, nearly: the lowest band is 1/2 Hz wide
 NOISE_BAND = (0.6, 0.94)  # of Nyquist: the quietest twentieth there is the encoder's; friction's harmonics may reach in
 BINS, HARMONICS, SPARSE = 128, 16, 4  # of the spectrum of what counting adds, from every fourth sample
+POLES = 60  # of rigid axes that are tried
 SEEN = 3.0  # a band is excited if the measured velocity has this many times the encoder's noise
 
 
@@ -134,6 +135,7 @@ class Floor:
     motion:  (bands,) of what is measured; excited: (bands,) bool
     encoder: rms of the sensor's white noise, in the unit of what it measures
     epsilon: part of the motion to which laws are trusted; lines: (bands,) in each
+    response: (bands,) |G|^2, (m/s/V)^2, of the machine to a force at the motor, which acts as its input does
     """
 
     noise: FloatArray
@@ -143,6 +145,7 @@ class Floor:
     encoder: float
     epsilon: float
     lines: FloatArray
+    response: FloatArray
 
     def rest(self, reference: FloatArray) -> Callable[[FloatArray], float]:
         """power (bands,) of an error -> that beyond the noise, over the same of a reference (bands,); never below what laws are trusted to.
@@ -206,8 +209,8 @@ def count_size(position: FloatArray) -> float:
     return least if whole.size >= 2 and float(np.mean(fits)) > 0.9 else 0.0
 
 
-def floor(windows: Windows, velocity: FloatArray, encoder: float, epsilon: float) -> Floor:
-    """The floor of data with this measured velocity (n,), m/s."""
+def floor(windows: Windows, velocity: FloatArray, encoder: float, epsilon: float, driven: FloatArray | None = None) -> Floor:
+    """The floor of data with this measured velocity (n,), m/s. driven: (n,) V, its input, without which no response is known (0)."""
     layout = windows.layout
     unit = np.ones(layout.band.size)  # of the sensor's white noise, by line
     if layout.sensed == "position":
@@ -231,7 +234,34 @@ def floor(windows: Windows, velocity: FloatArray, encoder: float, epsilon: float
         encoder=encoder,
         epsilon=epsilon,
         lines=layout.lines,
+        response=np.zeros(layout.count) if driven is None else _response(windows, velocity, driven),
     )
+
+
+def _response(windows: Windows, velocity: FloatArray, driven: FloatArray) -> FloatArray:
+    """(bands,) |G|^2: measured where input and output are coherent, elsewhere that of the rigid axis which predicts the motion best.
+
+    In a closed loop that follows a smooth path, friction makes the input broadband while the motion stays smooth: the estimate H1 (Bendat &
+    Piersol, Random Data, 4th ed., sec. 6.1) is then far too small. Between the two the mean of the logarithms counts, by the coherence.
+    """
+    layout = windows.layout
+    force, moved = windows.spectrum(driven), windows.spectrum(velocity)
+    cross, own, all_of_it = np.mean(force.conj() * moved, axis=0), np.mean(np.abs(force) ** 2, axis=0), np.mean(np.abs(moved) ** 2, axis=0)
+
+    def banded(lines: FloatArray) -> FloatArray:
+        return np.asarray(np.maximum(np.bincount(layout.band, lines, layout.count), 1e-300))
+
+    def rigid(pole: float) -> tuple[float, FloatArray]:
+        """The motion's power that a drive with this pole predicts, and (lines,) power of its response; any phase, as no delay is known here."""
+        answer = 1.0 / (1.0 + 2j * np.pi * layout.frequency / pole)
+        seen, size = abs(np.sum(answer.conj() * cross)), max(float(np.sum(np.abs(answer) ** 2 * own)), 1e-300)
+        return seen**2 / size, (seen / size * np.abs(answer)) ** 2
+
+    poles = 2.0 * np.pi * np.geomspace(0.1 * layout.frequency[1], 10.0 * layout.frequency[-1], POLES)
+    _, best = max((rigid(pole) for pole in poles.tolist()), key=lambda item: item[0])
+    coherence = banded(np.abs(cross) ** 2) / banded(own * all_of_it)
+    measured, assumed = banded(np.abs(cross) ** 2) / banded(own**2), banded(best) / layout.lines
+    return np.asarray(measured**coherence * assumed ** (1.0 - coherence) * banded(layout.amplitude**2) / layout.lines)
 
 
 def counted(layout: Bands, velocity: FloatArray, count: float, top: float) -> FloatArray:

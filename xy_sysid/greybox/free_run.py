@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from xy_sysid.axis.linear_part import sections
 from xy_sysid.axis.model import FINE, STANDARD, AxisModel, Library, undoer
 from xy_sysid.effects import Effect, Scene
 from xy_sysid.effects._contract import in_time
@@ -18,7 +19,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.greybox.axis_data import EPSILON, AxisData, loosened, prepare, prepare_all
 from xy_sysid.greybox.forces import force_of, friction_of, pushing, rubbing
 from xy_sysid.greybox.least_squares import Scale, Schedule, Solution, Target, solve
-from xy_sysid.greybox.objective import Objective, responder
+from xy_sysid.greybox.objective import Objective
 from xy_sysid.greybox.parameters import Estimate, estimates, model_of, problem
 from xy_sysid.greybox.score_test import Screen, Trace, bounded, screen
 from xy_sysid.greybox.start_inverse import CUTOFFS, inverse_starts, rigid_starts
@@ -143,7 +144,7 @@ def fit_with(
 def fitted_score(data: AxisData, fitted: GreyboxFit) -> float:
     """What a fit minimises, of the windows that it was fitted to: nats a line."""
     power = data.layout.power(data.fitted.spectrum(fitted.error))
-    return Objective.of(data.floor).of_power(np.where(np.isfinite(power), power, np.inf), responder(data.layout, fitted.model)(fitted.model.row))
+    return Objective.of(data.floor).of_power(np.where(np.isfinite(power), power, np.inf))
 
 
 def _begun(data: AxisData, base: GreyboxFit, model: AxisModel, name: str) -> AxisModel:
@@ -231,7 +232,7 @@ def first_excess(data: AxisData, model: AxisModel) -> float:
     run, values, _ = problem(data, model, True, COARSE)
     power = data.layout.power(data.brief.spectrum(data.begun(data.velocity) - run(values)))
     power = np.where(np.isfinite(power), power, np.inf)
-    return Objective.of(data.floor).of_power(power, responder(data.layout, model)(values))
+    return Objective.of(data.floor).of_power(power)
 
 
 def look(data: AxisData, fitted: GreyboxFit, effects: Iterable[Effect]) -> list[Trace]:
@@ -250,7 +251,7 @@ def screened(data: AxisData, fitted: GreyboxFit, effects: Iterable[Effect], scen
         moved = inner.copy()
         moved[k] += 1e-4
         nuisance.append(run(scale.outer(moved)) - here)
-    return screen(effects, scene, np.array(nuisance), data.brief if early else data.fitted, data.floor, responder(data.layout, fitted.model)(values))
+    return screen(effects, scene, np.array(nuisance), data.brief if early else data.fitted, data.floor)
 
 
 def scene_of(data: AxisData, fitted: GreyboxFit, early: bool = True) -> Scene:
@@ -272,6 +273,7 @@ def _scene(data: AxisData, model: AxisModel, error: FloatArray, part: Callable[[
         position=part(data.middle()),
         error=error,
         recordings=data.counts(part is not np.asarray),
+        sections=sections(model, data.sampling_rate),
     )
 
 
@@ -279,7 +281,7 @@ def fit(data: AxisData, start: AxisModel, brief: bool = False, hopeless: float =
     """All parameters of a model, from where it is; brief, hopeless: see ``fit_with``; late: then the best so far is taken."""
     rate = sub_steps(data, start, True, COARSE)
     run, values, scale = problem(data, start, True, rate)
-    target = Target(data.begun(data.velocity), data.brief, data.floor, responder(data.layout, start))
+    target = Target(data.begun(data.velocity), data.brief, data.floor)
     found = solve(run, target, scale, values, replace(FIRST_LOOK, late=late))
     if not (late() or (brief and found.score > hopeless)):
         nearer = solve(run, target, scale, found.values, replace(NEARER, late=late), found)
@@ -296,7 +298,7 @@ def fit(data: AxisData, start: AxisModel, brief: bool = False, hopeless: float =
 def finish(data: AxisData, start: AxisModel, runs: int = 0, late: Callable[[], bool] = in_time) -> GreyboxFit:
     """The second stage alone, on all windows that are not held out, from a model that is nearly there."""
     run, values, scale = problem(data, start, False, sub_steps(data, start, False, FINE))
-    target = Target(data.velocity, data.fitted, data.floor, responder(data.layout, start))
+    target = Target(data.velocity, data.fitted, data.floor)
     found = solve(run, target, scale, values, replace(LONG, late=late))
     return _result(data, start, scale, replace(found, runs=runs + found.runs))
 
@@ -344,8 +346,8 @@ def _result(data: AxisData, start: AxisModel, scale: Scale, found: Solution, bri
     error = (data.begun(data.velocity) if brief else data.velocity) - simulated
     fitted, judging = (data.brief, data.first_windows()) if brief else (data.fitted, data.held)
     held = data.layout.powers(judging.spectrum(error))
-    response, objective = responder(data.layout, model)(found.values), Objective.of(data.floor)
-    expected = objective.spectrum(held.mean(axis=0), response)
+    objective = Objective.of(data.floor)
+    expected = objective.spectrum(held.mean(axis=0))
     return GreyboxFit(
         model=model,
         parameters=estimates(data, model, scale, found),
@@ -355,7 +357,7 @@ def _result(data: AxisData, start: AxisModel, scale: Scale, found: Solution, bri
         excess=objective.score(held.mean(axis=0), expected),
         scores=objective.each(held, expected),
         forced=objective.forced(expected),
-        force=math.sqrt(objective.unmodelled(held.mean(axis=0), response)[0]),
+        force=math.sqrt(objective.unmodelled(held.mean(axis=0))[0]),
         simulated=simulated,
         error=error,
         runs=found.runs,

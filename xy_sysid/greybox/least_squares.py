@@ -24,7 +24,6 @@ from xy_sysid.jit import cores
 from xy_sysid.samples.block import FloatArray
 
 TRUSTED = 0.25  # a step whose fall differs by less than this part from the one expected needs no new derivatives; with 0.75 long valleys take longer
-HALVES = 4  # times that the way of a round is halved which does not lower the objective
 STEP = 1e-4  # of a logarithm, or of a parameter's scale: far above rounding, far below what bends
 
 
@@ -65,15 +64,11 @@ class Scale:
 
 @dataclass(frozen=True)
 class Target:
-    """What is to be explained: velocity (n,) m/s, in some windows of it.
-
-    respond: row of parameters -> (bands,) power of the model's response to a force (``objective.responder``)
-    """
+    """What is to be explained: velocity (n,) m/s, in some windows of it."""
 
     velocity: FloatArray
     windows: Windows
     least: Floor
-    respond: Callable[[FloatArray], FloatArray]
 
     @cached_property
     def measured(self) -> NDArray[np.complex128]:
@@ -85,10 +80,10 @@ class Target:
         """Scores an error by band."""
         return Objective.of(self.least)
 
-    def spectrum(self, error: NDArray[np.complex128], values: FloatArray) -> tuple[FloatArray, float]:
+    def spectrum(self, error: NDArray[np.complex128]) -> tuple[FloatArray, float]:
         """(bands,) expected power of an error (windows, lines), and the error's score, nats a line; infinite for a model that runs away."""
         power = self.windows.layout.power(error)
-        expected = self.objective.spectrum(power, self.respond(values))
+        expected = self.objective.spectrum(power)
         return expected, self.objective.score(power, expected)
 
 
@@ -171,7 +166,7 @@ def solve(
         normal, cost, converged = np.eye(size), np.inf, False
         change = slopes(inner, error) if known is None else known.change
         exact = known is None
-        expected, score = target.spectrum(error, scale.outer(inner))
+        expected, score = target.spectrum(error)
         weight = _weight(target, expected)
         for _ in range(schedule.rounds):
             before = inner, error, change, exact
@@ -210,13 +205,7 @@ def solve(
                     if damping > 1e6:
                         converged = True
                         break
-            expected, now = target.spectrum(error, scale.outer(inner))
-            for _ in range(HALVES):  # the weights held for a step that was too long
-                if now < score:
-                    break
-                inner, exact = scale.inner(scale.outer(0.5 * (before[0] + inner))), False
-                error, runs = left(inner), runs + 1
-                expected, now = target.spectrum(error, scale.outer(inner))
+            expected, now = target.spectrum(error)
             if not now < score:
                 inner, error, change, exact = before
                 break

@@ -38,7 +38,7 @@ class Screen:
 
     traces: largest share first; rows: of each effect in what follows, the columns of its best trace
     inner: (bands, k, k) products of all columns in each band; seen: (bands, k) of the columns with the error; error: (bands,) of it with
-    itself, whitened; power: (bands,) of the error; response: (bands,) of the model to a force (``objective``)
+    itself, whitened; power: (bands,) of the error
     """
 
     traces: tuple[Trace, ...]
@@ -48,12 +48,11 @@ class Screen:
     error: FloatArray
     power: FloatArray
     objective: Objective
-    response: FloatArray
 
     @cached_property
     def score(self) -> float:
         """Of the error as it is, nats a line."""
-        return self.objective.of_power(self.power, self.response)
+        return self.objective.of_power(self.power)
 
     def gain(self, names: Iterable[str]) -> float:
         """Nats a line by which effects lower the score to first order, each with its best trace: linear algebra alone."""
@@ -63,7 +62,7 @@ class Screen:
         left = self.error - 2.0 * seen @ coefficients + np.einsum("bij,i,j->b", inner, coefficients, coefficients)
         # 0 in bands that are not excited: nobody knows what happens there
         ratio = np.where(self.error > 0.0, np.maximum(left, 0.0) / np.maximum(self.error, 1e-300), 1.0)
-        return self.score - self.objective.of_power(self.power * np.minimum(ratio, 1.0), self.response)
+        return self.score - self.objective.of_power(self.power * np.minimum(ratio, 1.0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,14 +109,13 @@ def best_trace(
     return best, chosen
 
 
-def screen(effects: Iterable[Effect], scene: Scene, nuisance: FloatArray, windows: Windows, least: Floor, response: FloatArray) -> Screen:
+def screen(effects: Iterable[Effect], scene: Scene, nuisance: FloatArray, windows: Windows, least: Floor) -> Screen:
     """The best trace of each effect.
 
     nuisance: (k, n) change of the model's velocity per unit of each parameter that it has already; windows: of the scene that are looked at
-    response: (bands,) of the model to a force
     """
     objective, left = Objective.of(least), windows.layout.power(windows.spectrum(scene.error))
-    weight = ((objective.lines > 0.0) / np.sqrt(objective.spectrum(left, response)))[windows.layout.band]
+    weight = ((objective.lines > 0.0) / np.sqrt(objective.spectrum(left)))[windows.layout.band]
 
     def white(signals: FloatArray) -> FloatArray:
         """(k, n) -> (k, m)"""
@@ -147,7 +145,6 @@ def screen(effects: Iterable[Effect], scene: Scene, nuisance: FloatArray, window
         error=inner[:, 0, 0],
         power=left,
         objective=objective,
-        response=response,
     )
 
 
@@ -175,6 +172,9 @@ def bounded(effect: Effect, values: Iterable[float], similar: Similarity) -> tup
 
 
 def _through_base(forces: FloatArray, scene: Scene) -> FloatArray:
-    """(k, n) V against the drive -> m/s."""
+    """(k, n) V against the drive -> m/s, behind the base and what the motion passes."""
     b, a = mean_velocity_filter(scene.gain, scene.pole, scene.sampling_rate)
-    return np.asarray(-scipy.signal.lfilter(b, a, forces, axis=1))
+    moved = -scipy.signal.lfilter(b, a, forces, axis=1)
+    for b0, b1, b2, a1, a2 in scene.sections:
+        moved = scipy.signal.lfilter((b0, b1, b2), (1.0, a1, a2), moved, axis=1)
+    return np.asarray(moved)

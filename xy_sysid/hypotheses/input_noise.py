@@ -9,7 +9,7 @@ import scipy
 
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit
-from xy_sysid.greybox.objective import Objective, responder
+from xy_sysid.greybox.objective import Objective
 from xy_sysid.hypotheses.criteria import FEWEST, OVERLAP, WHITE
 
 
@@ -23,7 +23,7 @@ def input_noise(data: AxisData, fit: GreyboxFit) -> float | None:
     lines = Objective.of(data.floor).lines
     used = lines > 0.0
     power, floor = fit.power[used], data.floor.power[used]
-    response, shape = responder(data.layout, fit.model)(fit.model.row)[used], lines[used] * data.held.begins.size / OVERLAP
+    response, shape = data.floor.response[used], lines[used] * data.held.begins.size / OVERLAP
     if fit.one_step or int(used.sum()) < FEWEST or not np.all(np.isfinite(power)) or not np.all(response > 0.0):
         return None
 

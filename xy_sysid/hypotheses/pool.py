@@ -125,7 +125,7 @@ class Pool:
             best = self.best
             if best.fit.excess < AT_FLOOR:
                 return
-            for node in dict.fromkeys((best, self.answer)):  # what would be said if the search ended here is another place to go on from
+            for node in dict.fromkeys((best, self.answer, self._likeliest)):  # confirmed, to be said, or not confirmed yet
                 if node.moves is None and len(node.effects - self.kept) < self.most:
                     node.moves = self._moves(node)
             refused = self._best_refused()
@@ -150,13 +150,18 @@ class Pool:
             if len(move.effects - self.kept) == 1 and self.scale * move.promised > PRICE * move.parameters:
                 yield move.effects
                 self._try(first, move)
-        alone = [node for node in self.nodes.values() if node is not first and node.leads and node.whole and not node.refused]
+        alone = [node for node in self.nodes.values() if node.whole and not node.refused and self.score(node) < self.score(first)]
         for node in sorted(alone, key=self.score):  # what is best alone need not be in the best pair
             node.moves = self._moves(node)
             chosen = self._next([node])
             if chosen is not None and not self.late():
                 yield chosen[1].effects
                 self._try(*chosen)
+
+    @property
+    def _likeliest(self) -> Node:
+        """The set with the least score that is not refused, be it worth its effects or not: one more may make it so."""
+        return min((node for node in self.nodes.values() if node.whole and not node.refused), key=self.score)
 
     def _best_refused(self) -> Node | None:
         """The best of the sets that are refused, if its score is better than that of all others."""
