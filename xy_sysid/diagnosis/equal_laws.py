@@ -20,8 +20,7 @@ from xy_sysid.greybox.free_run import GreyboxFit
 def equals(library: Library, name: str) -> list[Effect]:
     """Effects with this one's very law, itself among them."""
     effect = library[name]
-    alike = (other for other in library.acting if other.family == effect.family and other.names == effect.names and other.law == effect.law)
-    return list(alike) if effect.family else [effect]
+    return [other for other in library.acting if other is effect or other.has_equations_of(effect)]
 
 
 def likelihood(library: Library, name: str, values: Sequence[float]) -> float:

@@ -106,6 +106,10 @@ def is_taken_for(library: Library, names: frozenset[str], others: frozenset[str]
 
 
 def contains(library: Library, names: frozenset[str], others: frozenset[str]) -> bool:
-    """A set has every law of another: the very effects, or more general ones."""
+    """A set has every law of another: the very effects, others of the same equations, or more general ones."""
     laws = set(names) | {part for name in names if (whole := library[name].sum_of) is not None for part in whole.parts}
-    return all(name in laws or any(library[name].is_special_case(library[own]) for own in names) for name in others)
+
+    def holds(own: str, name: str) -> bool:
+        return library[name].has_equations_of(library[own]) or library[name].is_special_case(library[own])
+
+    return all(name in laws or any(holds(own, name) for own in names) for name in others)

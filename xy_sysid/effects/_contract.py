@@ -339,6 +339,10 @@ class Effect:
         if self.mode_frequency and self.mode_frequency not in self.names:
             raise BadInput(f"effect {self.name}: mode_frequency", repr(self.mode_frequency), ", ".join(self.names), "Name one of these.")
 
+    def has_equations_of(self, other: Effect) -> bool:
+        """The law of both is one and the same, as of a base that gives and a screw that gives: no data tell them apart."""
+        return bool(self.family) and (self.family, self.names, self.law) == (other.family, other.names, other.law)
+
     def is_special_case(self, other: Effect) -> bool:
         """The other law becomes this one at certain values of its parameters: of one family the one with fewer parameters is taken for it."""
         return self.special_of == other.name or bool(self.family and self.family == other.family and len(self.names) < len(other.names))
