@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 from math import inf
 
 import numpy as np
@@ -26,7 +26,8 @@ class Node:
     """One set that was fitted.
 
     brief, fit: on the first stage's data, and on all (the brief one where it was not worth that); refused: why it explains nothing, or empty
-    leads: what it adds to the set that it was reached from is worth adding; promised: gain of the move to it, nats a line
+    large: what it adds to the best set that it contains is worth adding; leads: and more than chance
+    promised: gain of the move to it, nats a line
     moves: what may be tried from it, None until asked for
     """
 
@@ -35,6 +36,7 @@ class Node:
     brief: GreyboxFit
     fit: GreyboxFit
     refused: str = ""
+    large: bool = True
     leads: bool = True
     promised: float = 0.0
     moves: list[Move] | None = None
@@ -150,7 +152,7 @@ class Pool:
             if len(move.effects - self.kept) == 1 and self.scale * move.promised > PRICE * move.parameters:
                 yield move.effects
                 self._try(first, move)
-        alone = [node for node in self.nodes.values() if node.whole and not node.refused and self.score(node) < self.score(first)]
+        alone = [node for node in self.nodes.values() if node is not first and node.large and node.whole and not node.refused]
         for node in sorted(alone, key=self.score):  # what is best alone need not be in the best pair
             node.moves = self._moves(node)
             chosen = self._next([node])
@@ -160,8 +162,8 @@ class Pool:
 
     @property
     def _likeliest(self) -> Node:
-        """The set with the least score that is not refused, be it worth its effects or not: one more may make it so."""
-        return min((node for node in self.nodes.values() if node.whole and not node.refused), key=self.score)
+        """The set with the least score of those that are worth their effects, be it by chance or not: with one more it may be sure."""
+        return min((node for node in self.nodes.values() if node.large and node.whole and not node.refused), key=self.score)
 
     def _best_refused(self) -> Node | None:
         """The best of the sets that are refused, if its score is better than that of all others."""
@@ -187,11 +189,24 @@ class Pool:
         return [move for move in allowed if self._is_open(node, move)]
 
     def _is_open(self, parent: Node, move: Move) -> bool:
-        """A set that is not known; or that came to nothing from one start, and may begin from another, in the place of a law or without one."""
+        """A set that is not known, by other names neither; or that came to nothing from one start, and may begin from another, in the place of a law
+        or without one."""
+        laws = self._laws(move.effects)
+        if any(node.whole and not node.refused and self._laws(effects) == laws for effects, node in self.nodes.items()):
+            return False
         known = self.nodes.get(move.effects)
         return known is None or (
             (not known.whole or known.refused != "") and len(move.effects) <= len(parent.effects) and (parent.effects, move.effects) not in self.tried
         )
+
+    def _laws(self, effects: frozenset[str]) -> frozenset[str]:
+        """One name for each law: effects with the same equations are one."""
+        return frozenset(self._names.get(name, name) for name in effects)
+
+    @cached_property
+    def _names(self) -> dict[str, str]:
+        acting = self.library.acting
+        return {one.name: other.name for k, one in enumerate(acting) for other in acting[:k] if one.has_equations_of(other)}
 
     def _next(self, nodes: Sequence[Node] = ()) -> tuple[Node, Move] | None:
         """The move that promises the best score, of those that promise a better one than would be said; from some sets, or from all.
@@ -235,7 +250,10 @@ class Pool:
         if brief.excess < limit:
             found = finish(self.data, brief.model, brief.runs, self.late)
         node = self.remember(move.effects, brief, found, promised=move.promised)
-        node.leads = node.whole and self._is_worth(node)
+        inside = self._inside(node)
+        simpler = min(inside, key=self.score, default=None)
+        node.large = node.whole and (simpler is None or self._is_large(node, simpler))
+        node.leads = node.whole and (simpler is None or self._is_better(node, simpler))
         return node
 
     def _near(self) -> float:
@@ -244,36 +262,37 @@ class Pool:
         rigid = max(self.score(node) for node in self.nodes.values() if node.whole)
         return best + NEAR * (rigid - best) + PRICE
 
-    def _is_worth(self, node: Node) -> bool:
-        """It is better than the best set that it contains, by as much as what is new must be worth."""
-        inside = self._inside(node)
-        return not inside or self._is_better(node, min(inside, key=self.score))
-
     def _inside(self, node: Node) -> list[Node]:
         """The sets that a set contains, as far as they are fitted on all data."""
         return [item for item in self.nodes.values() if item.effects < node.effects and item.whole and not item.refused]
 
     def _is_better(self, node: Node, simpler: Node) -> bool:
-        """More than chance better than a simpler set, at the price of its parameters, and by as much as its effects must be worth.
+        """More than chance better than a simpler set, and by as much as its effects must be worth."""
+        return self._is_large(node, simpler) and gain(*alike(node, simpler)).is_sure
+
+    def _is_large(self, node: Node, simpler: Node) -> bool:
+        """Better than a simpler set at the price of its parameters, and by as much as its effects must be worth.
 
         Of a richer law in the place of a simpler one WORTH is asked. Beside a set at the floor nothing more is needed.
         """
         one, other = alike(node, simpler)
-        if other.excess < AT_FLOOR:
-            return False
-        better, new = gain(one, other), len(node.effects) - len(simpler.effects)
+        new = len(node.effects) - len(simpler.effects)
         least = (1.0 + self.worth) ** new - 1.0 if new > 0 else WORTH
-        return better.is_sure and better.nats > PRICE * (node.parameters - simpler.parameters) and size(one, other) >= least
+        better = gain(one, other).nats > PRICE * (node.parameters - simpler.parameters)
+        return other.excess >= AT_FLOOR and better and size(one, other) >= least
 
     def simplified(self) -> Iterator[frozenset[str]]:
-        """Try simpler sets than the best; yields as ``search``. What the best gains over a simpler one by chance, or too little, it does not keep."""
-        while not self.late():
+        """Try simpler sets than the best; yields as ``search``. What the best gains over a simpler one by chance, or too little, it does not keep.
+
+        When time is up, of those that are known on all data.
+        """
+        while True:
             best, simpler = self.best, None
             for effects, begun in self._simpler(best):
-                if effects not in self.nodes:
+                if effects not in self.nodes and not self.late():
                     yield effects
                 node = self.fitted(effects, begun)
-                if node is None or node.refused or self._is_better(best, node):
+                if node is None or node.refused or (self.late() and not node.whole) or self._is_better(best, node):
                     continue
                 if not self._is_better(best, self.finished(node)):
                     simpler = node
