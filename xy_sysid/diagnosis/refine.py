@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Generator, Iterable, Iterator
 from dataclasses import dataclass
+from itertools import chain
 
 from xy_sysid.axis.model import STANDARD, Library
 from xy_sysid.diagnosis.ladder import Ladder
@@ -97,7 +98,7 @@ def _sets(pool: Pool, trials: OneStepTrials | None) -> Iterator[Trying]:
                     yield Trying(tuple(sorted(tried)))
                 if trials.found is not None:
                     return
-        for names in pool.simplified():
+        for names in chain(pool.suspected(), pool.simplified()):
             yield Trying(tuple(sorted(names)))
     if trials is not None and pool.best.fit.excess >= AT_FLOOR:
         for tried in trials.tried(last=True):

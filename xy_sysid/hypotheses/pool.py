@@ -160,6 +160,19 @@ class Pool:
                 yield chosen[1].effects
                 self._try(*chosen)
 
+    def suspected(self) -> Iterator[frozenset[str]]:
+        """Try the laws that those of the answer are mistaken for, though they promise no more; yields as ``search``.
+
+        If one does as well, the name is in doubt.
+        """
+        node = self.answer
+        node.moves = self._moves(node) if node.moves is None and not self.late() else node.moves
+        for move in node.moves or ():
+            gone = node.effects - move.effects
+            if any(gone & set(self.library[name].suspects) for name in move.effects) and self._is_open(node, move) and not self.late():
+                yield move.effects
+                self._try(node, move)
+
     @property
     def _likeliest(self) -> Node:
         """The set with the least score of those that are worth their effects, be it by chance or not: with one more it may be sure."""
