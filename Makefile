@@ -13,6 +13,8 @@ LAWS = OPENBLAS_NUM_THREADS=1 $(BIN)/python -c "import xy_sysid as xy; xy.diagno
   xy.use(xy.PhysicalModel(xy.AxisModel(0.1, 1e-3, 200.0)), limit=5.0)"
 FITS := import ensurepip, sys, venv; sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 14))
 
+unexport PYTHONDONTWRITEBYTECODE # or each worker compiles every test again, 9 s of each
+
 .DEFAULT_GOAL := help
 .PHONY: help install demo test faults soak test-busy lint types unit laws docs bench blind pictures clean
 

@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 import pytest
@@ -25,8 +26,9 @@ from xy_sysid.greybox.axis_data import prepare
 HERE = [name for name in TABLES if name != "live"]  # which starts processes that talk to each other
 
 
+@cache
 def short(name: str) -> Table:
-    """The short form of a benchmark in this process."""
+    """The short form of a benchmark in this process; each is measured once."""
     run: Callable[..., Table] = importlib.import_module(f"campaigns.bench.{name}").run
     return run(lambda line: None, short=True)
 

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 import yaml
 from helpers import ROOT
+from helpers.cli_tools import bare
 from helpers.ros_tools import World, needs_ros
 
 from xy_sysid.excitation.designed import document_of
@@ -321,6 +322,16 @@ def test_without_ros_it_says_in_one_line_what_to_install() -> None:
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=30, check=False)
     assert done.returncode == 2 and done.stdout == ""
     assert done.stderr.splitlines() == ["ROS 2 (rclpy) is not installed. Install it with: pip install 'xy_sysid[ros]'"]
+
+
+@needs_ros
+def test_what_drives_is_there_at_once() -> None:
+    """The node that drives and what starts all nodes need no compiler; what hears the machine needs no scipy.signal (half a second)."""
+    modules = {"nodes.excitation_node": {"numba", "scipy.signal"}, "processes.starter": {"numba", "scipy"}, "live.identifier": {"scipy.signal"}}
+    for module, heavy in modules.items():
+        code = f"import sys, xy_sysid.{module}; print(*sorted({heavy!r} & set(sys.modules)))"
+        done = subprocess.run([sys.executable, "-c", code], env=bare(), capture_output=True, text=True, check=True)
+        assert done.stdout == "\n", module
 
 
 @needs_ros

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -12,8 +12,9 @@ from xy_sysid.errors import BadInput
 from xy_sysid.response.batch_spectra import batch_spectra
 from xy_sysid.response.h1 import H1Options, frequency_response
 from xy_sysid.response.spectra import RunningSpectra, Spectra, Transformer
-from xy_sysid.response.windows import Window, Windower, WindowShape, blur_kernel, error_correlation
+from xy_sysid.response.windows import COSINES, Window, Windower, WindowShape, blur_kernel, error_correlation
 from xy_sysid.samples.block import Samples
+from xy_sysid.settings import IdentifierSettings
 
 FS = 2000.0
 FILTER = signal.butter(2, 47.0, fs=FS)
@@ -62,6 +63,16 @@ def test_the_plain_variant_agrees_with_scipy_on_the_same_windows(name: str) -> N
     expected = (gyx / gxx)[1:]
     assert np.max(np.abs(ours.response - expected)) < 1e-12 * np.max(np.abs(expected))
     assert np.max(np.abs(ours.coherence - coherence[1:])) < 1e-12
+
+
+def test_every_taper_of_the_settings_is_scipys_bit_for_bit() -> None:
+    """Odd lengths and even ones; and a name that is none is refused with those that there are."""
+    assert set(COSINES) == set(get_args(IdentifierSettings.model_fields["window"].annotation))
+    for name in COSINES:
+        for length in (16, 255, 1000, 4096):
+            assert np.array_equal(WindowShape.of(name, length, 0.5).taper(), signal.get_window(name, length)), (name, length)
+    with pytest.raises(BadInput, match="hann, hamming"):
+        WindowShape.of("hanning", 16, 0.5).taper()
 
 
 @pytest.mark.parametrize("differenced", [False, True])

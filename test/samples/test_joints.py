@@ -7,7 +7,8 @@ import pytest
 
 from xy_sysid.errors import BadInput
 from xy_sysid.samples.block import Block
-from xy_sysid.samples.joint_states import JointCounter, joints_of
+from xy_sysid.samples.joint_fields import joints_of
+from xy_sysid.samples.joint_states import JointCounter
 
 
 def feed(counter: JointCounter, times: np.ndarray) -> tuple[list[float], list[float]]:

@@ -16,12 +16,11 @@ import numpy as np
 from xy_sysid.bags.cdr import Bytes
 from xy_sysid.bags.checksum import crc32
 from xy_sysid.bags.compression import Damaged, decompressor, whole_ones
+from xy_sysid.bags.mcap_records import CHANNEL, CHUNK, DATA_END, FOOTER, MAGIC, MESSAGE, SCHEMA
 from xy_sysid.bags.stride import Batch, Indices
 from xy_sysid.errors import BadRecording
 from xy_sysid.jit import compiled
 
-MAGIC = b"\x89MCAP0\r\n"
-FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, DATA_END = 2, 3, 4, 5, 6, 15
 WINDOW = 1 << 20  # bytes read at once where messages are not in chunks
 LARGEST = 1 << 31  # bytes; a record that claims to be longer is damage
 BECOMES = 1 << 28  # bytes; a chunk that becomes longer is damage, or made to fill the memory

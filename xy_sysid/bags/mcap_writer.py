@@ -10,7 +10,7 @@ import struct
 from pathlib import Path
 
 from xy_sysid.bags.checksum import crc32
-from xy_sysid.bags.mcap_file import CHANNEL, CHUNK, DATA_END, FOOTER, MAGIC, MESSAGE, SCHEMA
+from xy_sysid.bags.mcap_records import CHANNEL, CHUNK, DATA_END, FOOTER, MAGIC, MESSAGE, SCHEMA
 from xy_sysid.errors import BadRecording
 
 HEADER, MESSAGE_INDEX, CHUNK_INDEX, STATISTICS, METADATA, METADATA_INDEX = 1, 7, 8, 11, 12, 13

@@ -17,8 +17,8 @@ from xy_sysid.jit import compiled
 from xy_sysid.samples.block import Block, FloatArray, StreamName, unpack
 from xy_sysid.samples.integral import Path as Moved
 from xy_sysid.samples.integral import integrated
-from xy_sysid.samples.joint_fields import FIELDS, PLURAL, JointOutput
-from xy_sysid.samples.joint_states import JointCounter, joints_of
+from xy_sysid.samples.joint_fields import FIELDS, PLURAL, JointOutput, joints_of
+from xy_sysid.samples.joint_states import JointCounter
 from xy_sysid.units import Units
 
 VOLTAGE, POSITION, REFERENCE = "/xy/voltage", "/xy/position", "/xy/reference"

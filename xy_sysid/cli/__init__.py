@@ -6,7 +6,8 @@ import atexit
 import io
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import cache
 from typing import TextIO
 
 from xy_sysid.cli.interrupt import Interrupts
@@ -55,7 +56,7 @@ def _command(arguments: Sequence[str]) -> int:
     names = [command.name for command in app.registered_commands if command.name]
     known = arguments[0] if arguments and arguments[0] in names else ""
     try:
-        code = app(list(arguments) or ["--help"], prog_name="xy-sysid", standalone_mode=False)
+        code = _commands()(list(arguments) or ["--help"], prog_name="xy-sysid", standalone_mode=False)
     except typer.Abort:
         return _stopped()
     except typer.Exit as end:
@@ -67,6 +68,16 @@ def _command(arguments: Sequence[str]) -> int:
         return _refuse("Give a command, for example xy-sysid demo.")
     sys.stdout.flush()
     return _unless_terminated(code)
+
+
+@cache
+def _commands() -> Callable[..., object]:
+    """What parses the arguments of every command, made once."""
+    from typer.main import get_command
+
+    from xy_sysid.cli.app import app
+
+    return get_command(app)
 
 
 def _refuse(text: str) -> int:

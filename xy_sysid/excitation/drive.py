@@ -279,7 +279,8 @@ class Drive:
             self.state = "stopped"
         if n and np.isfinite(values).all():
             self._travel.sent(self.seq, values)
-            self._motion.sent(self.seq, values)
+            if self._watched:
+                self._motion.sent(self.seq, values)
             self._last = values[-1]
             moved = values - self._start if self.settings.holds and self._start is not None else values
             self._squares += np.sum(moved * moved, axis=0)
@@ -342,7 +343,8 @@ class Drive:
     def _voltage(self, n: int) -> FloatArray:
         excitation, driven = self._driven(n)
         guarded = self._travel.within(driven, self.seq)
-        self._sign.sent(self.seq, np.clip(excitation, -self._limit, self._limit), (guarded != driven).any(axis=0))
+        if self._watched:
+            self._sign.sent(self.seq, np.clip(excitation, -self._limit, self._limit), (guarded != driven).any(axis=0))
         if self.state == "stopping":
             guarded *= np.array([self._level(self._fade_at + i) for i in range(n)])[:, None]
             self._fade_at += n

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import scipy
 
@@ -47,6 +49,11 @@ class EncoderNoise:
         squares = WORTH * self._readings
         if not squares:
             return np.full(len(self.count), np.inf if len(self._last) > 1 else 0.0)  # nobody knows yet
-        least = 2.0 * float(scipy.special.gammaincinv(squares / 2.0, RISK))  # of a sum of so many squares (chi-squared)
-        sigma = np.sqrt(self.variance * max(squares / max(least, 1e-300), 1.0))
+        sigma = np.sqrt(self.variance * max(squares / max(_least(squares), 1e-300), 1.0))
         return np.asarray(COUNTS * np.where(np.isfinite(self.count), self.count, 0.0) + SIGMAS * sigma)
+
+
+@lru_cache(maxsize=MEMORY)
+def _least(squares: float) -> float:
+    """What a sum of so many squares falls below with the probability RISK (chi-squared)."""
+    return 2.0 * float(scipy.special.gammaincinv(squares / 2.0, RISK))

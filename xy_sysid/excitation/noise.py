@@ -11,6 +11,7 @@ Processing", ch. 7; the random numbers are Philox, J. Salmon et al., "Parallel r
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 
 import numpy as np
 import scipy
@@ -43,6 +44,13 @@ def power_gain(sos: FloatArray, low: float, high: float, rate: float) -> float:
     return float(np.trapezoid(gain, frequency) / (rate / 2))
 
 
+@lru_cache(maxsize=32)
+def _designed(low: float, high: float, rate: float) -> tuple[FloatArray, float]:
+    """Sections, which nobody writes to, and power gain: a drive needs them again when it starts again, and its axes share a band."""
+    sos = sections(low, high, rate)
+    return sos, power_gain(sos, low, high, rate)
+
+
 def _filtered(sos: FloatArray, scale: float, seed: int) -> Iterator[FloatArray]:
     white, state = np.random.Generator(np.random.Philox(seed)), np.zeros((sos.shape[0], 2))
     while True:
@@ -58,6 +66,6 @@ def noise(settings: AxisExcitation, rate: float) -> Parts:
         raise BadInput("low", f"{settings.low:g} Hz", f"0, or at least {least:g} Hz at this rate", "Raise low, or set it to 0.")
     if settings.high < least:
         raise BadInput("high", f"{settings.high:g} Hz", f"at least {least:g} Hz at this rate", "Raise high or lower the rate.")
-    sos = sections(settings.low, settings.high, rate)
-    scale = settings.rms / float(np.sqrt(power_gain(sos, settings.low, settings.high, rate)))
+    sos, gain = _designed(settings.low, settings.high, rate)
+    scale = settings.rms / float(np.sqrt(gain))
     return Parts.of(_filtered(sos, scale, settings.seed))

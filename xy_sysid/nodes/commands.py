@@ -24,7 +24,7 @@ from xy_sysid.excitation.drive import Drive
 from xy_sysid.excitation.pacing import Clock
 from xy_sysid.nodes.hearing import Ear
 from xy_sysid.samples.block import FloatArray
-from xy_sysid.samples.joint_states import joints_of
+from xy_sysid.samples.joint_fields import joints_of
 from xy_sysid.settings import ExcitationSettings, given
 
 COMMAND_QOS = QoSProfile(depth=1, history=HistoryPolicy.KEEP_LAST, reliability=ReliabilityPolicy.RELIABLE)  # only the newest one counts

@@ -22,12 +22,13 @@ from xy_sysid.live.diagnoser import Diagnoser
 from xy_sysid.live.diagnosis_messages import diagnosis_status, ladder_message
 from xy_sysid.live.heard import verdict
 from xy_sysid.live.plain_messages import OK, STALE, WARN, StatusMessage, topic_of
+from xy_sysid.nodes.axes import AXES, declare_axes
 from xy_sysid.nodes.common import LATCHED_QOS, WalledNode, declare
 from xy_sysid.nodes.convert import array_to_ros, status_to_ros, statuses_to_ros
 from xy_sysid.nodes.diagnostics import Diagnostics
 from xy_sysid.nodes.later import LaterTrigger
 from xy_sysid.nodes.since_commissioning import SinceCommissioning
-from xy_sysid.nodes.streams import AXES, HEARING, Streams, answered, declare_axes
+from xy_sysid.nodes.streams import HEARING, Streams, answered
 from xy_sysid.processes.story_process import StoryWorker
 from xy_sysid.settings import DiagnoserSettings, given
 from xy_sysid.story.acts import Act

@@ -27,6 +27,7 @@ from xy_sysid.excitation.pacing import CATCH_UP, Answers, Clock
 from xy_sysid.excitation.trajectory_drive import TrajectoryDrive, drive_of
 from xy_sysid.files.experiment import read_experiment
 from xy_sysid.live.recent import Recent
+from xy_sysid.nodes.axes import AXES, declare_axes
 from xy_sysid.nodes.commands import Beat, Commands
 from xy_sysid.nodes.common import DATA_QOS, NAMESPACE, declare
 from xy_sysid.nodes.convert import from_message, status, to_message
@@ -34,7 +35,6 @@ from xy_sysid.nodes.diagnostics import Diagnostics
 from xy_sysid.nodes.hearing import Ear
 from xy_sysid.nodes.quality import Overridable
 from xy_sysid.nodes.stop_topic import StopTopic
-from xy_sysid.nodes.streams import AXES, declare_axes
 from xy_sysid.nodes.trajectories import Trajectories
 from xy_sysid.nodes.wall import Wall
 from xy_sysid.processes.terminal import printable

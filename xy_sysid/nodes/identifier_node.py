@@ -21,11 +21,12 @@ from xy_sysid.live.fitter import LiveFitter, Update, warm_up
 from xy_sysid.live.heard import verdict
 from xy_sysid.live.identifier import Identifier
 from xy_sysid.live.plain_messages import WARN, StatusMessage, topic_of
+from xy_sysid.nodes.axes import AXES, declare_axes
 from xy_sysid.nodes.common import LATCHED_QOS, WalledNode, declare
 from xy_sysid.nodes.convert import array_to_ros, status_to_ros
 from xy_sysid.nodes.diagnostics import Diagnostics
 from xy_sysid.nodes.since_commissioning import SinceCommissioning
-from xy_sysid.nodes.streams import AXES, HEARING, Streams, answered, declare_axes
+from xy_sysid.nodes.streams import HEARING, Streams, answered
 from xy_sysid.processes.fit_thread import FitWorker
 from xy_sysid.samples.block import Block, StreamName
 from xy_sysid.settings import IdentifierSettings

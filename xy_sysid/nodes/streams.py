@@ -13,38 +13,21 @@ from std_msgs.msg import Float64MultiArray
 
 from xy_sysid.errors import BadInput, XySysidError
 from xy_sysid.live.heard import Heard
-from xy_sysid.live.plain_messages import topic_of
 from xy_sysid.live.recent import Recent
-from xy_sysid.nodes.common import DATA_QOS, declare_fixed, overrides
+from xy_sysid.nodes.common import DATA_QOS
 from xy_sysid.nodes.convert import from_message
 from xy_sysid.nodes.hearing import Ear
 from xy_sysid.processes.terminal import printable
 from xy_sysid.samples.block import Block, StreamName
 from xy_sysid.samples.integral import integrated
-from xy_sysid.samples.joint_fields import JointReader
-from xy_sysid.samples.joint_states import JointCounter, joints_of
+from xy_sysid.samples.joint_fields import JointReader, joints_of
+from xy_sysid.samples.joint_states import JointCounter
 from xy_sysid.samples.pairing import QUANTITIES
 from xy_sysid.settings import DiagnoserSettings, IdentifierSettings, given
 from xy_sysid.units import USUAL
 
 JOINT_QOS = QoSProfile(depth=20_000, history=HistoryPolicy.KEEP_LAST)  # ten seconds of single samples at 2 kHz
-AXES = "axes"
 HEARING = ("source", "output", "effort_as_voltage", "joints", "joint_topic", "effort_lag", "input_unit", "output_unit")  # fixed from the start
-
-
-def declare_axes(node: Node) -> tuple[str, ...]:
-    """The parameter ``axes``, x and y by default; raises BadInput if it is no list of names."""
-    axes = overrides(node).get(AXES, ["x", "y"])
-    if not isinstance(axes, list) or not axes or not all(isinstance(axis, str) and axis for axis in axes):
-        raise BadInput(f"node {node.get_name()}: parameter {AXES}", axes, 'a list of names like ["x", "y"]', "Change it and try again.")
-    topics = {topic_of("frf", axis) for axis in axes}
-    if any("," in axis or "=" in axis or axis.strip() != axis for axis in axes) or len(topics) < len(axes):
-        what = "names without , and = that differ in more than signs other than letters, digits and _"
-        raise BadInput(
-            f"node {node.get_name()}: parameter {AXES}", axes, what, 'Give joints short names, for example axes ["x"] and joints ["x=NAME"].'
-        )
-    declare_fixed(node, AXES, axes, "names of the axes")
-    return tuple(axes)
 
 
 class Streams:

@@ -10,6 +10,7 @@ from typing import Literal, Protocol
 
 import numpy as np
 
+from xy_sysid.errors import BadInput
 from xy_sysid.samples.block import FloatArray
 
 JointOutput = Literal["position", "velocity"]
@@ -17,6 +18,24 @@ JointField = Literal["position", "velocity", "effort"]
 FIELDS: tuple[JointField, JointField, JointField] = ("position", "velocity", "effort")  # in the order of the message
 PLURAL = {"position": "positions", "velocity": "velocities", "effort": "efforts"}
 INSTEAD: dict[JointField, JointOutput] = {"position": "velocity", "velocity": "position"}
+
+
+def joints_of(axes: tuple[str, ...], entries: tuple[str, ...]) -> dict[str, str]:
+    """The joint of each axis, from entries like ``x=shoulder_pan_joint``; an axis without one is named like its joint.
+
+    Raises BadInput for an entry that is none, an axis that is not there, and a joint or an axis named twice.
+    """
+    found = {axis: axis for axis in axes}
+    named: set[str] = set()
+    for entry in entries:
+        axis, sign, joint = (part.strip() for part in entry.partition("="))
+        if not sign or not joint or axis not in found or axis in named:
+            raise BadInput("parameter joints", repr(entry), f"axis=joint, once for each of {', '.join(axes)}", "Change it and try again.")
+        named.add(axis)
+        found[axis] = joint
+    if len(set(found.values())) < len(axes):
+        raise BadInput("parameter joints", ", ".join(found.values()), "a joint of its own for each axis", "Change it and try again.")
+    return found
 
 
 class JointMessage(Protocol):

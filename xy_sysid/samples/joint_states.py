@@ -10,7 +10,6 @@ from collections import deque
 
 import numpy as np
 
-from xy_sysid.errors import BadInput
 from xy_sysid.jit import compiled
 from xy_sysid.samples.block import Block, FloatArray
 from xy_sysid.samples.integral import Path
@@ -28,24 +27,6 @@ OTHER_RATE = 1.01  # factor by which their counted and their mean step must both
 COUNTED = 3  # rounds in which the step that stamps are counted by becomes that of the line through them
 STICKS = 0.8  # samples by which a sample may leave its voltage sample before it is given to another
 STILL = 20  # messages in a row with one stamp that mean that nobody stamps them
-
-
-def joints_of(axes: tuple[str, ...], entries: tuple[str, ...]) -> dict[str, str]:
-    """The joint of each axis, from entries like ``x=shoulder_pan_joint``; an axis without one is named like its joint.
-
-    Raises BadInput for an entry that is none, an axis that is not there, and a joint or an axis named twice.
-    """
-    found = {axis: axis for axis in axes}
-    named: set[str] = set()
-    for entry in entries:
-        axis, sign, joint = (part.strip() for part in entry.partition("="))
-        if not sign or not joint or axis not in found or axis in named:
-            raise BadInput("parameter joints", repr(entry), f"axis=joint, once for each of {', '.join(axes)}", "Change it and try again.")
-        named.add(axis)
-        found[axis] = joint
-    if len(set(found.values())) < len(axes):
-        raise BadInput("parameter joints", ", ".join(found.values()), "a joint of its own for each axis", "Change it and try again.")
-    return found
 
 
 def counted_step(times: FloatArray) -> float:
