@@ -40,7 +40,8 @@ class Compensation:
     path: what the encoder is asked to show; voltage: (n,) V, added to the feedback
     terms: laws that are undone; left: (law, why) of those that are not
     feedback, simple, chosen: tracking error of the worst sample of the parameters, m rms: alone, with kS kV kA, with what was chosen
-    largest: V, that any sample's drive gives
+    centre: the same three of the model itself; largest: V, that any sample's drive gives
+    inverse: the model with the laws that are undone, of which ``voltage`` is the feedforward; None with kS, kV and kA
     """
 
     path: SampledPath
@@ -51,17 +52,23 @@ class Compensation:
     simple: float
     chosen: float
     largest: float
+    centre: tuple[float, float, float]
+    inverse: AxisModel | None
 
 
 @dataclass(frozen=True, slots=True)
 class _Tried:
-    """A choice of laws: what the encoder has to show, the voltage, and for each sample the error, m rms, and the largest voltage, V."""
+    """A choice of laws: what the encoder has to show, the voltage, and for each sample the error, m rms, and the largest voltage, V.
+
+    inverse: the model with these laws; None with kS, kV and kA
+    """
 
     terms: tuple[str, ...]
     path: SampledPath
     voltage: FloatArray
     errors: FloatArray
     largest: float
+    inverse: AxisModel | None = None
 
     def against(self, other: _Tried) -> float:
         """The error of the worst sample over that of another choice."""
@@ -136,10 +143,11 @@ def compensate(models: Sequence[AxisModel], found: Gains, path: SampledPath, con
     others = alike(models[0])
     judges = (*models, *others)
 
-    def judged(terms: tuple[str, ...], wanted: SampledPath, voltage: FloatArray) -> _Tried:
+    def judged(terms: tuple[str, ...], wanted: SampledPath, voltage: FloatArray, inverse: AxisModel | None = None) -> _Tried:
         runs = [follow_path(model, wanted, controller, voltage, encoder) for model in judges]
         errors = np.array([_rms(path.position - run.carried) for run in runs])
-        return _Tried(terms=terms, path=wanted, voltage=voltage, errors=errors, largest=max(float(np.max(np.abs(run.voltage))) for run in runs))
+        largest = max(float(np.max(np.abs(run.voltage))) for run in runs)
+        return _Tried(terms=terms, path=wanted, voltage=voltage, errors=errors, largest=largest, inverse=inverse)
 
     noise = shake(models[0], float(path.position[0]), path.sampling_rate, controller, encoder or Encoder())
 
@@ -147,7 +155,7 @@ def compensate(models: Sequence[AxisModel], found: Gains, path: SampledPath, con
         def these(terms: tuple[str, ...]) -> _Tried:
             kept = replace(model, effects=tuple(item for item in model.effects if item[0] in terms))
             wanted = asked_of_encoder(model, path, terms)
-            return judged(terms, wanted, feedforward(kept, wanted, noise).voltage)
+            return judged(terms, wanted, feedforward(kept, wanted, noise).voltage, kept)
 
         return these
 
@@ -169,6 +177,8 @@ def compensate(models: Sequence[AxisModel], found: Gains, path: SampledPath, con
         simple=float(np.max(simple.errors)),
         chosen=float(np.max(best.errors)),
         largest=best.largest,
+        centre=(float(alone.errors[0]), float(simple.errors[0]), float(best.errors[0])),
+        inverse=best.inverse,
     )
 
 

@@ -24,6 +24,7 @@ from xy_sysid.samples.block import FloatArray
 POSITION, INTEGRAL = 4.0, 10.0  # times below the crossover where position loop and integral begin: they cost 14 and 6 degrees there
 DERIVATIVE = 8.0  # times above it where the derivative is cut: 7 degrees
 PHASE_MARGIN, GAIN_MARGIN = 45.0, 2.0  # degrees, and times: Astrom & Murray, Feedback Systems, 2nd ed., sec. 10.3 ask for 30 to 60 and 2 to 5
+MOST_PHASE, MOST_GAIN = 90.0, 100.0  # that may be asked for
 COUNT = 24  # samples of the parameters
 STEPS = 60  # crossovers that are tried
 LINES = 600  # frequencies of a response
@@ -43,26 +44,52 @@ class Margins:
 
 
 @dataclass(frozen=True, slots=True)
+class Asked:
+    """What a loop has to keep. phase: degrees; gain: times, upwards. Raises BadInput out of range."""
+
+    phase: float = PHASE_MARGIN
+    gain: float = GAIN_MARGIN
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.phase < MOST_PHASE:
+            raise BadInput("phase margin", f"{self.phase:g} degrees", f"above 0, below {MOST_PHASE:g} degrees", "Ask for 30 to 60 degrees.")
+        if not 1.0 < self.gain <= MOST_GAIN:
+            raise BadInput("gain margin", f"{self.gain:g}", f"above 1, up to {MOST_GAIN:g} (times, not dB)", "Ask for 2 to 5.")
+
+    def met(self, found: Margins) -> bool:
+        """Whether a loop is stable and keeps both."""
+        return found.stable and found.phase >= self.phase and found.gain >= self.gain
+
+    def __str__(self) -> str:
+        return f"at least {self.phase:g} degrees and {self.gain:g}"
+
+
+USUAL = Asked()
+
+
+@dataclass(frozen=True, slots=True)
 class Feedback:
     """A controller with what it is worth.
 
     controller: as ``closed_loop`` runs it; sampling_rate: Hz; crossover: rad/s asked for
-    nominal, worst: margins of the model, and the least of each over the samples; count: of these
-    bare: the least margins without the filter on the derivative, which some controllers lack
+    asked: margins that were asked for; nominal, worst: those of the model, and the least of each over the samples; count: of these
+    bare, counted: the least margins without the filter on the derivative, which some controllers lack, and with times in whole ms
     bandwidth: Hz, where the closed loop falls below -3 dB
-    noise: V rms that encoder noise and counting make; allowed: what limits the bandwidth, in words
+    noise: V rms that encoder noise and counting make; short: the margin that allows no more bandwidth, ``phase`` or ``gain``
     """
 
     controller: Controller
     sampling_rate: float
     crossover: float
+    asked: Asked
     nominal: Margins
     worst: Margins
     bare: Margins
+    counted: Margins
     count: int
     bandwidth: float
     noise: float
-    allowed: str
+    short: str
 
     @property
     def position_gain(self) -> float:
@@ -139,10 +166,11 @@ def feedback(
     sections: FloatArray | None = None,
     encoder: Encoder | None = None,
     limit: float = NO_LIMIT,
+    asked: Asked = USUAL,
 ) -> Feedback:
     """The controller of the largest crossover, or of ``bandwidth`` Hz, whose margins hold for every sample of the parameters.
 
-    sections: filters that the feedback passes, (k, 5); encoder: whose noise is counted; limit: of the drive, V
+    sections: filters that the feedback passes, (k, 5); encoder: whose noise is counted; limit: of the drive, V; asked: the margins
     Raises BadInput where gain or pole are not determined by the data, or where no bandwidth has the margins.
     """
     doubtful = undetermined(model, ("gain", "pole"))
@@ -163,15 +191,15 @@ def feedback(
     for crossover in tries.tolist():
         controller = shaped(systems[0], crossover, filters, limit)
         nominal = margins(systems[0], controller)
-        if not holds(nominal):
+        if not asked.met(nominal):
             worst = nominal
             continue
         worst = _least([margins(system, controller) for system in systems])
-        if holds(worst):
-            return _made(systems, controller, crossover, (nominal, worst), encoder or Encoder())
+        if asked.met(worst):
+            return _made(systems, controller, crossover, asked, (nominal, worst), encoder or Encoder())
     said = f"phase margin {worst.phase:.3g} degrees and gain margin {worst.gain:.3g}" if worst.stable else "unstable"
     what = f"{bandwidth:g} Hz" if bandwidth is not None else "any"
-    raise BadInput("bandwidth", f"{what}: {said}", f"at least {PHASE_MARGIN:g} degrees and {GAIN_MARGIN:g}", ADVICE)
+    raise BadInput("bandwidth", f"{what}: {said}", str(asked), ADVICE)
 
 
 def _within_a_gap(model: AxisModel) -> tuple[AxisModel, ...]:
@@ -184,34 +212,37 @@ def _within_a_gap(model: AxisModel) -> tuple[AxisModel, ...]:
     return tuple(found)
 
 
-def holds(found: Margins) -> bool:
-    """Enough phase and gain are left."""
-    return found.stable and found.phase >= PHASE_MARGIN and found.gain >= GAIN_MARGIN
+def in_milliseconds(controller: Controller) -> Controller:
+    """The controller with its integral, derivative and filter times rounded to whole milliseconds, at least one for the first two."""
+
+    def rounded(seconds: float, least: float = 1.0) -> float:
+        return 1e-3 * max(round(1e3 * seconds), least)
+
+    kp = controller.kp
+    ki, kd = kp / rounded(kp / controller.ki), kp * rounded(controller.kd / kp)
+    return replace(controller, ki=ki, kd=kd, derivative_time=rounded(controller.derivative_time, 0.0))
 
 
-def _made(systems: list[Sampled], controller: Controller, crossover: float, found: tuple[Margins, Margins], encoder: Encoder) -> Feedback:
+def _made(
+    systems: list[Sampled], controller: Controller, crossover: float, asked: Asked, found: tuple[Margins, Margins], encoder: Encoder
+) -> Feedback:
     rate = systems[0].sampling_rate
     frequency = np.geomspace(1e-4 * rate, 0.499 * rate, LINES)
     loop = systems[0].response(frequency) * controller_response(controller, frequency, rate)
     low = np.flatnonzero(np.abs(loop / (1.0 + loop)) < math.sqrt(0.5))
     seen = math.hypot(encoder.noise, encoder.count / math.sqrt(12.0))
     worst = found[1]
-    short = "phase" if worst.phase / PHASE_MARGIN < worst.gain / GAIN_MARGIN else "gain"
     return Feedback(
         controller=controller,
         sampling_rate=rate,
         crossover=crossover,
+        asked=asked,
         nominal=found[0],
         worst=worst,
         bare=_least([margins(system, replace(controller, derivative_time=0.0)) for system in systems]),
+        counted=_least([margins(system, in_milliseconds(controller)) for system in systems]),
         count=len(systems),
         bandwidth=float(frequency[low[0]]) if low.size else 0.5 * rate,
         noise=seen * max(noise_to_voltage(system, controller) for system in systems[:4]),
-        allowed=f"the {short} margin is what limits it ({_cost(systems[0], crossover)})",
+        short="phase" if worst.phase / asked.phase < worst.gain / asked.gain else "gain",
     )
-
-
-def _cost(system: Sampled, crossover: float) -> str:
-    """What the delay takes from the phase at the crossover."""
-    late = (system.whole + 0.5) / system.sampling_rate
-    return f"delay and hold take {math.degrees(crossover * late):.2g} degrees at the crossover"

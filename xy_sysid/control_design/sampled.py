@@ -96,6 +96,17 @@ def controller_response(controller: Controller, frequency: FloatArray, sampling_
     return np.asarray(found)
 
 
+def coefficients(controller: Controller, sampling_rate: float) -> FloatArray:
+    """(1 + k, 5) b0, b1, b2, a1, a2 of the PID and of each filter behind it: u[n] = b0 e[n] + b1 e[n-1] + b2 e[n-2] - a1 u[n-1] - a2 u[n-2]."""
+    h, keeps = 1.0 / sampling_rate, controller.keeps(sampling_rate)
+    bottom = np.polymul([1.0, -1.0], [1.0, -keeps])
+    proportional = controller.kp * bottom
+    integral = controller.ki * h * np.polymul([0.0, 1.0], [1.0, -keeps])
+    derivative = controller.kd * (1.0 - keeps) / h * np.polymul([1.0, -1.0], [1.0, -1.0])
+    top = proportional + np.concatenate((np.zeros(3 - integral.size), integral)) + derivative
+    return np.vstack((np.concatenate((top, bottom[1:])), controller.sections))
+
+
 def controller_system(controller: Controller, sampling_rate: float) -> tuple[FloatArray, FloatArray, FloatArray, float]:
     """(A, B, C, D) of the same controller from error to voltage."""
     h, keeps = 1.0 / sampling_rate, controller.keeps(sampling_rate)

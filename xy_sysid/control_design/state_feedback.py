@@ -16,7 +16,7 @@ import numpy as np
 import scipy.linalg
 
 from xy_sysid.comparison.physical_model import PhysicalModel
-from xy_sysid.control_design.feedback import ADVICE, COUNT, GAIN_MARGIN, HIGHEST, LINES, PHASE_MARGIN, Margins, holds
+from xy_sysid.control_design.feedback import ADVICE, COUNT, HIGHEST, LINES, USUAL, Asked, Margins
 from xy_sysid.control_design.sampled import Sampled, sampled
 from xy_sysid.control_design.uncertain import samples, undetermined
 from xy_sysid.errors import BadInput
@@ -63,8 +63,8 @@ class StateFeedback:
         return np.asarray(solved[:, :, 0] @ self.c, dtype=np.complex128)
 
 
-def state_feedback(model: PhysicalModel, sampling_rate: float, bandwidth: float | None = None) -> StateFeedback:
-    """The controller of the largest bandwidth, or of ``bandwidth`` Hz, whose margins hold for every sample of the parameters.
+def state_feedback(model: PhysicalModel, sampling_rate: float, bandwidth: float | None = None, asked: Asked = USUAL) -> StateFeedback:
+    """The controller of the largest bandwidth, or of ``bandwidth`` Hz, whose margins (``asked``) hold for every sample of the parameters.
 
     Raises BadInput where gain or pole are not determined by the data, or where no bandwidth has the margins.
     """
@@ -87,7 +87,7 @@ def state_feedback(model: PhysicalModel, sampling_rate: float, bandwidth: float 
         parts = free + np.outer(drive, c), b, c
         nominal = _margins(systems[0], *parts)
         worst = nominal
-        if not holds(nominal):
+        if not asked.met(nominal):
             continue
         found = [_margins(system, *parts) for system in systems]
         worst = Margins(
@@ -97,7 +97,7 @@ def state_feedback(model: PhysicalModel, sampling_rate: float, bandwidth: float 
             crossover=min(item.crossover for item in found),
             stable=all(item.stable for item in found),
         )
-        if holds(worst):
+        if asked.met(worst):
             rejects, settles = _load_step(systems[0], *parts)
             return StateFeedback(
                 free=free,
@@ -114,7 +114,7 @@ def state_feedback(model: PhysicalModel, sampling_rate: float, bandwidth: float 
             )
     said = f"phase margin {worst.phase:.3g} degrees and gain margin {worst.gain:.3g}" if worst.stable else "unstable"
     what = f"{bandwidth:g} Hz" if bandwidth is not None else "any"
-    raise BadInput("bandwidth of the state feedback", f"{what}: {said}", f"at least {PHASE_MARGIN:g} degrees and {GAIN_MARGIN:g}", ADVICE)
+    raise BadInput("bandwidth of the state feedback", f"{what}: {said}", str(asked), ADVICE)
 
 
 def _designed(system: Sampled, bandwidth: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
