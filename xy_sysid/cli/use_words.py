@@ -8,10 +8,12 @@ from typing import Any
 
 from xy_sysid.cli.output import aside, estimate, plain, quantity, say, table
 from xy_sysid.control_design.bandwidth import Cost
+from xy_sysid.control_design.compensation import SIMPLE
 from xy_sysid.control_design.feedback import Feedback
 from xy_sysid.control_design.filters import Swing
 from xy_sysid.control_design.sampled import coefficients
 from xy_sysid.control_design.use import Used
+from xy_sysid.control_design.worth import Tracking
 from xy_sysid.units import bare, motion, moved
 
 TURN = 2.0 * math.pi  # rad
@@ -67,17 +69,16 @@ def show(name: str, used: Used) -> None:
     errors = [
         (
             item.path,
-            *(bare(value, units.output) for value in (item.feedback, item.simple, item.whole, item.compensated, item.worst)),
+            *(bare(value, units.output) for value in (item.feedback, item.simple, item.compensated, item.worst)),
             f"{item.largest:.3g}",
         )
         for item in used.tracking
     ]
     if errors:
-        columns = ("path", "feedback", "+ kS kV kA", "+ every law", "+ compensation", "worst", f"largest {units.input}")
+        columns = ("path", "feedback", "+ kS kV kA", "compensated", "worst", f"largest {units.input}")
         table(f"axis {name}: simulated tracking error, rms, {motion(units.output)[1]}", columns, errors)
     if used.tracking:
-        first = used.tracking[0]
-        say(f"  The compensation undoes {', '.join(first.undone)}{''.join(f', but not {effect} ({why})' for effect, why in first.left)}.")
+        say(f"  {_compensation(used.tracking[0])}")
     for effect, why in used.not_undone:
         say(f"  The feedforward leaves {effect}: {why}.")
     for what, why in used.refused:
@@ -127,6 +128,15 @@ def _cost(item: Cost) -> str:
     takes = [f"{item.phase:.2g} degrees at the crossover"] if abs(item.phase) >= 0.05 else []
     alone = [f"{item.without:.3g} Hz without it"] if math.isfinite(item.without) else []
     return f"{item.part} {' and '.join(takes + alone)}"
+
+
+def _compensation(item: Tracking) -> str:
+    """What is undone, and what is left, along a path."""
+    if item.undone == (SIMPLE,):
+        why = item.left[0][1] if item.left else "there is nothing else to undo"
+        return f"The compensation is kS, kV and kA alone: {why}."
+    left = "".join(f", but not {effect} ({why})" for effect, why in item.left)
+    return f"The compensation undoes {', '.join(item.undone)}{left}."
 
 
 def _mode(mode: Swing) -> str:

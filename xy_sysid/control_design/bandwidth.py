@@ -22,7 +22,7 @@ from xy_sysid.control_design.sampled import sampled
 from xy_sysid.errors import BadInput
 
 PASSED = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4)  # of a resonance: where a low-pass is tried
-UNCERTAIN, HOLD = "uncertain parameters", "sampling and hold"
+UNCERTAIN, HOLD = "uncertainty of the parameters", "sampling and hold"
 
 
 @dataclass(frozen=True, slots=True)

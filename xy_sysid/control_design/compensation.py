@@ -161,7 +161,11 @@ def compensate(models: Sequence[AxisModel], found: Gains, path: SampledPath, con
 
     simple = judged((), path, simple_feedforward(found, path))
     stretched = at_its_bound(models[0])
-    reason = f"{stretched} is at its bound, so that another law acts" if stretched else f"{SIMPLE} alone are better for a sample of the parameters"
+    reason = (
+        f"{stretched} is at its bound, so that another law acts"
+        if stretched
+        else "they are better than the whole feedforward for a sample of the parameters"
+    )
     best, left = simple, tuple((name, reason) for name, _ in models[0].effects)
     for model in (models[0], *others) if not stretched else ():
         whole, gone = _worth_undoing(model, undoing(model), simple)

@@ -16,9 +16,10 @@ import numpy as np
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.comparison.physical_model import PhysicalModel
 from xy_sysid.control_design.closed_loop import NO_LIMIT, Controller, Encoder
-from xy_sysid.control_design.sampled import Sampled, closed_poles, controller_response, noise_to_voltage, sampled
+from xy_sysid.control_design.sampled import Sampled, closed_poles, controller_response, grid, noise_to_voltage, on_grid, sampled
 from xy_sysid.control_design.uncertain import samples, undetermined
 from xy_sysid.errors import BadInput
+from xy_sysid.response.frf import ComplexArray
 from xy_sysid.samples.block import FloatArray
 
 POSITION, INTEGRAL = 4.0, 10.0  # times below the crossover where position loop and integral begin: they cost 14 and 6 degrees there
@@ -27,7 +28,6 @@ PHASE_MARGIN, GAIN_MARGIN = 45.0, 2.0  # degrees, and times: Astrom & Murray, Fe
 MOST_PHASE, MOST_GAIN = 90.0, 100.0  # that may be asked for
 COUNT = 24  # samples of the parameters
 STEPS = 60  # crossovers that are tried
-LINES = 600  # frequencies of a response
 HIGHEST = 0.25  # of the sampling rate, for a crossover
 ADVICE = "Ask for less bandwidth or smaller margins, or sample faster."
 
@@ -130,26 +130,30 @@ def _sign(system: Sampled) -> float:
 
 
 def margins(system: Sampled, controller: Controller) -> Margins:
-    """Of the sampled loop. Source: Astrom & Murray, Feedback Systems, 2nd ed., sec. 10.3."""
-    rate = system.sampling_rate
-    frequency = np.geomspace(2e-4 * rate, 0.499 * rate, LINES)
-    loop = system.response(frequency) * controller_response(controller, frequency, rate)
+    """Of the sampled loop."""
+    loop = on_grid(system) * controller_response(controller, grid(system.sampling_rate), system.sampling_rate)
+    return margins_of(loop, system.sampling_rate, closed_poles(system, controller))
+
+
+def margins_of(loop: ComplexArray, sampling_rate: float, poles: ComplexArray) -> Margins:
+    """Of an open loop at the frequencies of ``grid``; poles: of the closed loop. Source: Astrom & Murray, Feedback Systems, 2nd ed., sec. 10.3."""
+    frequency = grid(sampling_rate)
     size, turn = np.abs(loop), np.unwrap(np.angle(loop))
     crossing = np.flatnonzero((size[:-1] - 1.0) * (size[1:] - 1.0) <= 0.0)
-    phases = [float(np.angle(-loop[k] if abs(size[k] - 1.0) < abs(size[k + 1] - 1.0) else -loop[k + 1], deg=True)) for k in crossing]
+    phases = [float(abs(np.angle(-loop[k] if abs(size[k] - 1.0) < abs(size[k + 1] - 1.0) else -loop[k + 1], deg=True))) for k in crossing]
     odd = np.floor((turn + math.pi) / (2.0 * math.pi))
     passing = np.flatnonzero((odd[:-1] != odd[1:]) & (size[:-1] < 1.0))
-    gains = [1.0 / float(size[k]) for k in passing]
     return Margins(
-        phase=min((abs(item) for item in phases), default=180.0),
-        gain=min(gains, default=math.inf),
+        phase=min(phases, default=180.0),
+        gain=min((1.0 / float(size[k]) for k in passing), default=math.inf),
         sensitivity=float(np.max(1.0 / np.abs(1.0 + loop))),
         crossover=float(frequency[crossing[-1]]) if crossing.size else 0.0,
-        stable=bool(np.max(np.abs(closed_poles(system, controller))) < 1.0),
+        stable=bool(np.max(np.abs(poles)) < 1.0),
     )
 
 
-def _least(found: Sequence[Margins]) -> Margins:
+def least(found: Sequence[Margins]) -> Margins:
+    """The least of each margin, and the largest sensitivity."""
     return Margins(
         phase=min(item.phase for item in found),
         gain=min(item.gain for item in found),
@@ -194,7 +198,7 @@ def feedback(
         if not asked.met(nominal):
             worst = nominal
             continue
-        worst = _least([margins(system, controller) for system in systems])
+        worst = least([margins(system, controller) for system in systems])
         if asked.met(worst):
             return _made(systems, controller, crossover, asked, (nominal, worst), encoder or Encoder())
     said = f"phase margin {worst.phase:.3g} degrees and gain margin {worst.gain:.3g}" if worst.stable else "unstable"
@@ -227,8 +231,8 @@ def _made(
     systems: list[Sampled], controller: Controller, crossover: float, asked: Asked, found: tuple[Margins, Margins], encoder: Encoder
 ) -> Feedback:
     rate = systems[0].sampling_rate
-    frequency = np.geomspace(1e-4 * rate, 0.499 * rate, LINES)
-    loop = systems[0].response(frequency) * controller_response(controller, frequency, rate)
+    frequency = grid(rate)
+    loop = on_grid(systems[0]) * controller_response(controller, frequency, rate)
     low = np.flatnonzero(np.abs(loop / (1.0 + loop)) < math.sqrt(0.5))
     seen = math.hypot(encoder.noise, encoder.count / math.sqrt(12.0))
     worst = found[1]
@@ -239,8 +243,8 @@ def _made(
         asked=asked,
         nominal=found[0],
         worst=worst,
-        bare=_least([margins(system, replace(controller, derivative_time=0.0)) for system in systems]),
-        counted=_least([margins(system, in_milliseconds(controller)) for system in systems]),
+        bare=least([margins(system, replace(controller, derivative_time=0.0)) for system in systems]),
+        counted=least([margins(system, in_milliseconds(controller)) for system in systems]),
         count=len(systems),
         bandwidth=float(frequency[low[0]]) if low.size else 0.5 * rate,
         noise=seen * max(noise_to_voltage(system, controller) for system in systems[:4]),

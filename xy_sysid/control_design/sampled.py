@@ -5,6 +5,7 @@ Source: Astrom & Wittenmark, Computer-Controlled Systems, 3rd ed., Prentice Hall
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,9 +19,11 @@ from xy_sysid.response.frf import ComplexArray
 from xy_sysid.samples.block import FloatArray
 
 EVENLY = 2048  # frequencies of a mean over all of them
+LINES = 600  # frequencies of a response
+KEPT = 256  # sampled models, and responses, that are remembered: those of a design are asked for again and again
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Sampled:
     """x+ = a x + old u[k - whole - 1] + new u[k - whole], y = x[0], in m.
 
@@ -59,6 +62,18 @@ class Sampled:
         return a, b, c
 
 
+def grid(sampling_rate: float) -> FloatArray:
+    """(n,) Hz, frequencies at which a loop is looked at."""
+    return np.geomspace(2e-4 * sampling_rate, 0.499 * sampling_rate, LINES)
+
+
+@functools.lru_cache(maxsize=KEPT)
+def on_grid(system: Sampled) -> ComplexArray:
+    """(n,) its response at the frequencies of ``grid``."""
+    return system.response(grid(system.sampling_rate))
+
+
+@functools.lru_cache(maxsize=KEPT)
 def sampled(model: AxisModel, sampling_rate: float) -> Sampled:
     """Base, resonances, lags and delay of a model; everything else is left out."""
     ready = plant(model, sampling_rate)

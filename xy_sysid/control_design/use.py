@@ -25,7 +25,7 @@ from xy_sysid.control_design.path import Bounds, recorded, s_curve
 from xy_sysid.control_design.state_feedback import StateFeedback, state_feedback
 from xy_sysid.control_design.tables import Correction, friction_table, position_tables
 from xy_sysid.control_design.uncertain import Derived, derive, samples
-from xy_sysid.control_design.worth import WIDER, Predicted, Tracking, clear_below, encoder_of, predicted, tracked
+from xy_sysid.control_design.worth import EDGE, WIDER, Predicted, Tracking, clear_below, encoder_of, predicted, tracked
 from xy_sysid.errors import BadInput
 from xy_sysid.linear.any_model import AnyModel
 from xy_sysid.samples.recording import Recording, Run, one_run
@@ -135,8 +135,9 @@ def use(
             calm = Bounds(CALM * quick.bounds.speed, CALM**2 * quick.bounds.acceleration, CALM**3 * quick.bounds.jerk)
             paths.append(("S-curve over the travel", s_curve(ends, calm, rate)))
         if run is not None and run.sampling_rate == rate:
-            own = run.until(min(run.seconds, LONGEST))
-            paths.append(("the recorded motion", recorded(own.position, rate, FOLLOWED * loop.bandwidth)))
+            edge = max(int(EDGE * len(run)), 1)  # what the low-pass makes of both ends is no motion of the machine
+            whole = recorded(run.position, rate, FOLLOWED * loop.bandwidth)
+            paths.append(("the recorded motion", whole.part(edge, min(len(run) - edge, edge + round(LONGEST * rate)))))
         followed = [tracked(models, found, loop.controller, path, encoder) for path in paths]
     return Used(
         axis=model.axis or (run.axis if run is not None else "x"),
