@@ -75,7 +75,7 @@ def use(
     margins = phase_margin, gain_margin
 
     def of(name: str) -> Used:
-        return logic(found[name], _run(recording, found[name]), controller_rate, limit, bandwidth, travel, margins)
+        return logic(found[name], _run(recording, found[name]), controller_rate, limit, bandwidth, travel, margins=margins)
 
     done, refused = each(tuple(found), of)
     files: dict[str, dict[str, Exported]] = {name: {} for name in done}

@@ -45,13 +45,20 @@ def show(name: str, used: Used) -> None:
     for mode in used.modes:
         say(f"  {_mode(mode)}")
     if used.shaper is not None:
-        said = f"{used.shaper.name} at {used.shaper.frequency:.2f} Hz, damping {used.shaper.damping:.3g}"
-        left = f"leaves {100 * used.shaper.worst:.2g} % of the vibration over its interval"
-        say(f"  Input shaper: {said}; {1e3 * used.shaper.duration:.3g} ms longer, {left}.")
+        rows = []
+        for one in used.shapers:
+            vibration = (f"{100 * share:.2g}" for share in (one.vibration, one.worst))
+            rows.append((f"{one.name}{' (best)' if one is used.shaper else ''}", f"{1e3 * one.duration:.3g}", *vibration))
+        title = f"axis {name}: input shapers at {used.shaper.frequency:.2f} Hz, damping {used.shaper.damping:.3g}"
+        table(title, ("shaper", "ms longer", "vibration left, %", "at worst over the interval, %"), rows)
     for item in (*used.tables, *([used.friction] if used.friction is not None else [])):
         say(f"  Table {item.name}: {item.before:.3g} {item.unit} rms, known to {item.after:.2g}; {item.meaning}.")
     if used.gap is not None:
-        say(f"  Backlash {moved(used.gap.value, units.output)}: {used.gap.meaning}.")
+        low, high = bare(used.gap.low, units.output, 4), moved(used.gap.high, units.output, 4)
+        closed = {effect for effect, _ in used.not_undone}
+        left = any(effect in closed for one in used.tracking for effect, _ in one.left)
+        useless = "; with the feedback above this is predicted not to help along the paths below" if left else ""
+        say(f"  Backlash {moved(used.gap.value, units.output, 4)} ({low} .. {high}): {used.gap.meaning}{useless}.")
     if used.fastest is not None:
         f = used.fastest
         scale, unit = motion(units.output)
@@ -140,13 +147,14 @@ def _compensation(item: Tracking) -> str:
 
 
 def _mode(mode: Swing) -> str:
-    held = f"{mode.held.value:.4g} Hz with the encoder's side held (damping {mode.held_damping:.3g})"
-    return f"Mode: {held}, {mode.free.value:.4g} Hz free ({mode.free_damping:.3g})."
+    held, free = (f"{item.value:.4g} Hz ({item.low:.4g} .. {item.high:.4g})" for item in (mode.held, mode.free))
+    return f"Mode: {held} with the encoder's side held, damping {mode.held_damping:.3g}; {free} free, damping {mode.free_damping:.3g}."
 
 
 def answer(used: Used) -> dict[str, Any]:
     """Everything but the model, which has a file of its own, and the paths."""
-    names = ("sampling_rate", "limit", "limit_from", "travel", "friction", "tables", "gap", "modes", "shaper", "allowed", "predicted", "tracking")
+    designs = ("friction", "tables", "gap", "modes", "shaper", "shapers", "allowed")
+    names = ("sampling_rate", "limit", "limit_from", "travel", *designs, "predicted", "tracking")
     found: dict[str, Any] = {name: getattr(used, name) for name in names}
     found["gains"] = {
         item.name: {"value": item.value, "unit": item.unit, "ci95": [item.low, item.high], "determined": item.determined, "because": item.because}

@@ -47,14 +47,15 @@ def bandwidth_of(model: PhysicalModel, sampling_rate: float, at: float, asked: A
 
     Raises BadInput where no crossover has the margins.
     """
-    best = feedback(model, sampling_rate, asked=asked).nominal.crossover
+    asked = replace(asked, bandwidth=None)
+    best = feedback(model, sampling_rate, asked).nominal.crossover
     own = model.model
     parts: list[tuple[str, AxisModel]] = []
     if own.delay > 0.0:
         parts.append(("delay", replace(own, delay=0.0)))
     for name, values in own.effects:
         effect = own.library[name]
-        if effect.category == "motion" or lag_of(effect, values) is not None:
+        if effect.category == "motion" or lag_of(effect, values) is not None or "share" in effect.names:
             parts.append((name, replace(own, effects=tuple(item for item in own.effects if item[0] != name), per_recording=())))
     whole = _phase(own, sampling_rate, at)
     found = [Cost(HOLD, 180.0 * at / sampling_rate, math.nan)]
@@ -78,7 +79,7 @@ def with_filter(
         highest = 0.45 * sampling_rate
         for tried in (notch(mode, sampling_rate), *(low_pass(min(part * mode.free.value, highest), sampling_rate) for part in PASSED)):
             try:
-                loop = feedback(model, sampling_rate, sections=tried.section[None, :], encoder=encoder, limit=limit, asked=without.asked)
+                loop = feedback(model, sampling_rate, without.asked, tried.section[None, :], encoder, limit)
             except BadInput:
                 continue
             if loop.crossover > (best[1] if best is not None else without).crossover:
@@ -89,7 +90,7 @@ def with_filter(
 def _reached(model: PhysicalModel, sampling_rate: float, asked: Asked) -> float:
     """Hz, the crossover of a loop; NaN where none has the margins."""
     try:
-        return feedback(model, sampling_rate, asked=asked).nominal.crossover
+        return feedback(model, sampling_rate, asked).nominal.crossover
     except BadInput:
         return math.nan
 

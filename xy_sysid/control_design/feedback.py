@@ -45,10 +45,11 @@ class Margins:
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """What a loop has to keep. phase: degrees; gain: times, upwards. Raises BadInput out of range."""
+    """What a loop is asked for. phase: degrees; gain: times, upwards; bandwidth: crossover, Hz (None: the largest). Raises BadInput."""
 
     phase: float = PHASE_MARGIN
     gain: float = GAIN_MARGIN
+    bandwidth: float | None = None
 
     def __post_init__(self) -> None:
         if not 0.0 < self.phase < MOST_PHASE:
@@ -56,12 +57,23 @@ class Asked:
         if not 1.0 < self.gain <= MOST_GAIN:
             raise BadInput("gain margin", f"{self.gain:g}", f"above 1, up to {MOST_GAIN:g} (times, not dB)", "Ask for 2 to 5.")
 
+    def tries(self, sampling_rate: float, steps: int) -> list[float]:
+        """Hz, the bandwidths that are tried, the largest first. Raises BadInput out of range."""
+        if self.bandwidth is None:
+            return [float(item) for item in np.geomspace(HIGHEST * sampling_rate, 1e-4 * sampling_rate, steps)]
+        if not 0.0 < self.bandwidth <= HIGHEST * sampling_rate:
+            raise BadInput("bandwidth", f"{self.bandwidth:g} Hz", f"above 0, up to {HIGHEST * sampling_rate:g} Hz", "Give another.")
+        return [self.bandwidth]
+
+    def refused(self, what: str, worst: Margins) -> BadInput:
+        """What to raise where no bandwidth has the margins; worst: margins of the last one."""
+        said = f"phase margin {worst.phase:.3g} degrees and gain margin {worst.gain:.3g}" if worst.stable else "unstable"
+        given = f"{self.bandwidth:g} Hz" if self.bandwidth is not None else "any"
+        return BadInput(what, f"{given}: {said}", f"at least {self.phase:g} degrees and {self.gain:g}", ADVICE)
+
     def met(self, found: Margins) -> bool:
         """Whether a loop is stable and keeps both."""
         return found.stable and found.phase >= self.phase and found.gain >= self.gain
-
-    def __str__(self) -> str:
-        return f"at least {self.phase:g} degrees and {self.gain:g}"
 
 
 USUAL = Asked()
@@ -166,15 +178,14 @@ def least(found: Sequence[Margins]) -> Margins:
 def feedback(
     model: PhysicalModel,
     sampling_rate: float,
-    bandwidth: float | None = None,
+    asked: Asked = USUAL,
     sections: FloatArray | None = None,
     encoder: Encoder | None = None,
     limit: float = NO_LIMIT,
-    asked: Asked = USUAL,
 ) -> Feedback:
-    """The controller of the largest crossover, or of ``bandwidth`` Hz, whose margins hold for every sample of the parameters.
+    """The controller of the largest crossover, or of that which is asked for, whose margins hold for every sample of the parameters.
 
-    sections: filters that the feedback passes, (k, 5); encoder: whose noise is counted; limit: of the drive, V; asked: the margins
+    sections: filters that the feedback passes, (k, 5); encoder: whose noise is counted; limit: of the drive, V
     Raises BadInput where gain or pole are not determined by the data, or where no bandwidth has the margins.
     """
     doubtful = undetermined(model, ("gain", "pole"))
@@ -184,15 +195,9 @@ def feedback(
         )
     filters = np.zeros((0, 5)) if sections is None else sections
     own = samples(model, COUNT)
-    systems = [sampled(item, sampling_rate) for item in (*own, *_within_a_gap(own[0]))]
-    if bandwidth is not None:
-        if not 0.0 < bandwidth <= HIGHEST * sampling_rate:
-            raise BadInput("bandwidth", f"{bandwidth:g} Hz", f"above 0, up to {HIGHEST * sampling_rate:g} Hz", "Give another.")
-        tries = np.array([2.0 * math.pi * bandwidth])
-    else:
-        tries = 2.0 * math.pi * np.geomspace(HIGHEST * sampling_rate, 1e-4 * sampling_rate, STEPS)
+    systems = [sampled(item, sampling_rate) for item in (*own, *within_a_gap(own[0]))]
     worst = Margins(phase=0.0, gain=0.0, sensitivity=math.inf, crossover=0.0, stable=False)
-    for crossover in tries.tolist():
+    for crossover in (2.0 * math.pi * item for item in asked.tries(sampling_rate, STEPS)):
         controller = shaped(systems[0], crossover, filters, limit)
         nominal = margins(systems[0], controller)
         if not asked.met(nominal):
@@ -201,12 +206,10 @@ def feedback(
         worst = least([margins(system, controller) for system in systems])
         if asked.met(worst):
             return _made(systems, controller, crossover, asked, (nominal, worst), encoder or Encoder())
-    said = f"phase margin {worst.phase:.3g} degrees and gain margin {worst.gain:.3g}" if worst.stable else "unstable"
-    what = f"{bandwidth:g} Hz" if bandwidth is not None else "any"
-    raise BadInput("bandwidth", f"{what}: {said}", str(asked), ADVICE)
+    raise asked.refused("bandwidth", worst)
 
 
-def _within_a_gap(model: AxisModel) -> tuple[AxisModel, ...]:
+def within_a_gap(model: AxisModel) -> tuple[AxisModel, ...]:
     """The motor alone, where an effect says what share of the mass it has: across an open gap the loop meets less mass, and must hold there, too."""
     found = []
     for name, values in model.effects:

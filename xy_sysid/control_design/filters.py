@@ -136,14 +136,23 @@ def notch(mode: Swing, sampling_rate: float) -> LoopFilter:
     warp = w / (2.0 * math.tan(0.5 * w / sampling_rate)) if w < math.pi * sampling_rate * 0.95 else sampling_rate
     b, a = scipy.signal.bilinear(top, bottom, warp)
     section = np.array([b[0], b[1], b[2], a[1], a[2]])
-    return LoopFilter("notch", f, mode.free_damping / width, width, section, sampling_rate, covers=width >= spread)
+    return LoopFilter(
+        kind="notch",
+        frequency=f,
+        depth=mode.free_damping / width,
+        width=width,
+        section=section,
+        sampling_rate=sampling_rate,
+        covers=width >= spread,
+    )
 
 
 def low_pass(frequency: float, sampling_rate: float) -> LoopFilter:
     """A Butterworth low-pass of second order with its cut at a frequency below half the sampling rate, Hz."""
     b, a = scipy.signal.butter(2, frequency, fs=sampling_rate)
     section = np.array([b[0], b[1], b[2], a[1], a[2]])
-    return LoopFilter("low-pass", frequency, math.sqrt(0.5), math.sqrt(0.5), section, sampling_rate)
+    half = math.sqrt(0.5)
+    return LoopFilter(kind="low-pass", frequency=frequency, depth=half, width=half, section=section, sampling_rate=sampling_rate)
 
 
 def shapers(mode: Swing) -> tuple[Shaper, ...]:

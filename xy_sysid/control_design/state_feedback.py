@@ -18,7 +18,7 @@ import numpy as np
 import scipy.linalg
 
 from xy_sysid.comparison.physical_model import PhysicalModel
-from xy_sysid.control_design.feedback import ADVICE, COUNT, HIGHEST, USUAL, Asked, Margins, least, margins_of
+from xy_sysid.control_design.feedback import COUNT, USUAL, Asked, Margins, least, margins_of, within_a_gap
 from xy_sysid.control_design.sampled import Sampled, grid, on_grid, sampled
 from xy_sysid.control_design.uncertain import samples, undetermined
 from xy_sysid.errors import BadInput
@@ -71,8 +71,8 @@ def _response(a: FloatArray, b: FloatArray, c: FloatArray, frequency: FloatArray
     return np.asarray(solved[:, :, 0] @ c, dtype=np.complex128)
 
 
-def state_feedback(model: PhysicalModel, sampling_rate: float, bandwidth: float | None = None, asked: Asked = USUAL) -> StateFeedback:
-    """The controller of the largest bandwidth, or of ``bandwidth`` Hz, whose margins (``asked``) hold for every sample of the parameters.
+def state_feedback(model: PhysicalModel, sampling_rate: float, asked: Asked = USUAL) -> StateFeedback:
+    """The controller of the largest bandwidth, or of that which is asked for, whose margins hold for every sample of the parameters.
 
     Raises BadInput where gain or pole are not determined by the data, or where no bandwidth has the margins.
     """
@@ -81,12 +81,10 @@ def state_feedback(model: PhysicalModel, sampling_rate: float, bandwidth: float 
         raise BadInput(
             " and ".join(doubtful), "known to worse than a factor of two", "numbers that the data determine", "Record a livelier motion first."
         )
-    if bandwidth is not None and not 0.0 < bandwidth <= HIGHEST * sampling_rate:
-        raise BadInput("bandwidth", f"{bandwidth:g} Hz", f"above 0, up to {HIGHEST * sampling_rate:g} Hz", "Give another.")
-    systems = [sampled(item, sampling_rate) for item in samples(model, COUNT)]
-    tries = [bandwidth] if bandwidth is not None else np.geomspace(HIGHEST * sampling_rate, 1e-4 * sampling_rate, STEPS).tolist()
+    drawn = samples(model, COUNT)
+    systems = [sampled(item, sampling_rate) for item in (*drawn, *within_a_gap(drawn[0]))]
     worst = Margins(phase=0.0, gain=0.0, sensitivity=math.inf, crossover=0.0, stable=False)
-    for tried, faster in itertools.product(tries, FASTER):
+    for tried, faster in itertools.product(asked.tries(sampling_rate, STEPS), FASTER):
         wanted = 2.0 * math.pi * tried
         try:
             free, b, c, drive = _designed(systems[0], wanted, faster)
@@ -95,14 +93,11 @@ def state_feedback(model: PhysicalModel, sampling_rate: float, bandwidth: float 
         parts = free + np.outer(drive, c), b, c
         own = _response(*parts, grid(sampling_rate), sampling_rate)
 
-        def margins(system: Sampled, own: ComplexArray = own, parts: tuple[FloatArray, FloatArray, FloatArray] = parts) -> Margins:
-            return margins_of(on_grid(system) * own, sampling_rate, np.linalg.eigvals(closed_loop(system, *parts)))
-
-        nominal = margins(systems[0])
+        nominal = _margins(systems[0], own, *parts)
         worst = nominal
         if not (asked.met(nominal) and nominal.crossover > 0.0):  # a loop that never comes to 1 does nothing
             continue
-        worst = least([margins(system) for system in systems])
+        worst = least([_margins(system, own, *parts) for system in systems])
         if asked.met(worst):
             rejects, settles = _load_step(systems[0], *parts)
             return StateFeedback(
@@ -118,9 +113,7 @@ def state_feedback(model: PhysicalModel, sampling_rate: float, bandwidth: float 
                 rejects=rejects,
                 settles=settles,
             )
-    said = f"phase margin {worst.phase:.3g} degrees and gain margin {worst.gain:.3g}" if worst.stable else "unstable"
-    what = f"{bandwidth:g} Hz" if bandwidth is not None else "any"
-    raise BadInput("bandwidth of the state feedback", f"{what}: {said}", str(asked), ADVICE)
+    raise asked.refused("bandwidth of the state feedback", worst)
 
 
 def _designed(system: Sampled, bandwidth: float, faster: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -164,6 +157,12 @@ def _observer(a: FloatArray, c: FloatArray, forces: FloatArray, noise: float) ->
     """(n,) gains of the steady Kalman predictor."""
     p = scipy.linalg.solve_discrete_are(a.T, c[:, None], forces, np.array([[noise]]))
     return np.asarray((a @ p @ c) / (noise + c @ p @ c))
+
+
+def _margins(system: Sampled, own: ComplexArray, a: FloatArray, b: FloatArray, c: FloatArray) -> Margins:
+    """Of the loop, broken at the voltage; own: the controller's response on the grid."""
+    poles = np.linalg.eigvals(closed_loop(system, a, b, c)).astype(np.complex128)
+    return margins_of(on_grid(system) * own, system.sampling_rate, poles)
 
 
 def closed_loop(system: Sampled, a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:

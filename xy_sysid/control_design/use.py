@@ -14,7 +14,7 @@ from xy_sysid.comparison.physical_model import PhysicalModel
 from xy_sysid.control_design.bandwidth import Bandwidth, bandwidth_of, with_filter
 from xy_sysid.control_design.closed_loop import NO_LIMIT, Encoder
 from xy_sysid.control_design.compensation import Compensation
-from xy_sysid.control_design.feedback import USUAL, Asked, Feedback, feedback
+from xy_sysid.control_design.feedback import GAIN_MARGIN, PHASE_MARGIN, Asked, Feedback, feedback
 from xy_sysid.control_design.filters import LoopFilter, Shaper, Swing, best_shaper, modes, notch, shapers
 from xy_sysid.control_design.gains import Gains, gains
 from xy_sysid.control_design.inverse import not_undone
@@ -45,7 +45,8 @@ class Used:
 
     sampling_rate: Hz of the controller; limit: V of the drive, infinite if nobody knows it; limit_from: who said so
     travel: m, that tables and paths cover; gains, friction, tables, gap: feedforward and corrections (None: the axis has none)
-    feedback, states (state feedback with an observer), modes, notch, shaper, fastest: None where there is nothing to design, or where it was refused
+    feedback, states (state feedback with an observer), modes, notch, shapers (of the lowest mode; shaper: the best), fastest: None or none where
+    there is nothing to design, or where it was refused
     allowed: what limits the bandwidth, and what each part of the axis costs; filter, filtered: the notch or low-pass with which the loop reaches the
     highest crossover, and that loop; None where none reaches more
     predicted: input of the recording before and after, if there is one; tracking: simulated tracking errors
@@ -70,6 +71,7 @@ class Used:
     allowed: Bandwidth | None
     filter: LoopFilter | None
     filtered: Feedback | None
+    shapers: tuple[Shaper, ...]
     shaper: Shaper | None
     fastest: Fastest | None
     predicted: Predicted | None
@@ -92,6 +94,7 @@ def use(
     limit: float | None = None,
     bandwidth: float | None = None,
     travel: tuple[float, float] | None = None,
+    *,
     margins: tuple[float, float] | None = None,
 ) -> Used:
     """Feedforward with intervals, correction tables, feedback with margins, filters, limits, and what they are worth.
@@ -117,10 +120,11 @@ def use(
     encoder = Encoder() if run is None else encoder_of(run)
     refused: list[tuple[str, str]] = []
     found = gains(model)
-    asked = USUAL if margins is None else Asked(*margins)
-    loop = _tried("feedback", lambda: feedback(model, rate, bandwidth, encoder=encoder, limit=drive, asked=asked), refused)
+    asked = Asked(*(margins or (PHASE_MARGIN, GAIN_MARGIN)), bandwidth)
+    loop = _tried("feedback", lambda: feedback(model, rate, asked, encoder=encoder, limit=drive), refused)
     swings = _tried("filters", lambda: modes(model), refused) or ()
     table = None if run is None else _tried("measured table", lambda: measured_table(model, run, WIDER * clear_below(model, run)), refused)
+    every = shapers(swings[0]) if swings else ()
     better = None if loop is None or bandwidth is not None else with_filter(model, rate, swings, loop, encoder, drive)
     models = _tried("worst cases", lambda: samples(model, WORST_OF), refused) or (model.model,)
     centre = 0.5 * (between[0] + between[1])
@@ -151,13 +155,14 @@ def use(
         tables=(*position_tables(model, between), *([] if table is None else [table.correction(model)])),
         gap=_gap(model),
         feedback=loop,
-        states=_tried("state feedback", lambda: state_feedback(model, rate, bandwidth, asked), refused),
+        states=_tried("state feedback", lambda: state_feedback(model, rate, asked), refused),
         modes=swings,
         notch=notch(swings[0], rate) if swings and loop is not None else None,
         allowed=None if loop is None else _tried("bandwidth", lambda: bandwidth_of(model, rate, loop.nominal.crossover, asked), refused),
         filter=None if better is None else better[0],
         filtered=None if better is None else better[1],
-        shaper=best_shaper(shapers(swings[0])) if swings else None,
+        shapers=every,
+        shaper=best_shaper(every) if every else None,
         fastest=quick,
         predicted=None if run is None else _tried("prediction", lambda: predicted(model, found, run, table), refused),
         tracking=tuple(item for item, _ in followed),
