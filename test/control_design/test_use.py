@@ -146,6 +146,10 @@ def test_a_twincat_program_is_parsed_by_blark_with_the_fields_of_fb_ctrl_pid() -
     assert float(fields["fKp"]) == pytest.approx(1e-3 * own.kp) and fields["tTn"] == f"T#{round(1e3 * own.kp / own.ki)}MS"
     assert f"fKV : LREAL := {1e-3 * used.gains['kV'].value:.9E}" in text and "+ fKS * fSign" in text
     assert used.feedback.counted.phase >= 35.0
+    arm = use(known("gravity", units=Units("A", "rad")), rate=1000.0, limit=5.0)
+    (turning,) = export(arm, "twincat").files.values()
+    assert parse_source_code(turning).exception is None and "+ fKCos * COS(fSetPosition - fZero)" in turning
+    assert "no kCos: add" in export(arm, "linuxcnc").note and "no kCos: add" in export(arm, "ros2_control").note
     with pytest.raises(xy.BadInput, match=r"rate of 2000 Hz.*--controller-rate"):
         export(use(known("coulomb_friction"), rate=2000.0), "twincat")
 

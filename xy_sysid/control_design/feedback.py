@@ -220,14 +220,14 @@ def within_a_gap(model: AxisModel) -> tuple[AxisModel, ...]:
 
 
 def in_milliseconds(controller: Controller) -> Controller:
-    """The controller with its integral, derivative and filter times rounded to whole milliseconds, at least one for the first two."""
+    """The controller with its integral, derivative and filter times rounded to whole milliseconds, at least one."""
 
-    def rounded(seconds: float, least: float = 1.0) -> float:
-        return 1e-3 * max(round(1e3 * seconds), least)
+    def rounded(seconds: float) -> float:
+        return 1e-3 * max(round(1e3 * seconds), 1.0)
 
     kp = controller.kp
     ki, kd = kp / rounded(kp / controller.ki), kp * rounded(controller.kd / kp)
-    return replace(controller, ki=ki, kd=kd, derivative_time=rounded(controller.derivative_time, 0.0))
+    return replace(controller, ki=ki, kd=kd, derivative_time=rounded(controller.derivative_time))
 
 
 def _made(

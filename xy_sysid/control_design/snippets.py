@@ -65,7 +65,7 @@ def ros2_control(of: Designed) -> Snippet:
     ]
     note = (
         "feedforward_gain is kV: the controller multiplies the velocity that is asked for by it; "
-        f"kS and kA have no place in it, add them in a controller of your own. {_unfiltered(loop)}"
+        f"kS and kA have no place in it, add them in a controller of your own.{_gravity(of)} {_unfiltered(loop)}"
     )
     return Snippet("ros2_control", "controllers.yaml", "\n".join(lines) + "\n", note)
 
@@ -101,7 +101,9 @@ def linuxcnc(of: Designed) -> Snippet:
     }
     lines = [f"# command in {of.units.input}, position in {length}; run the thread at {loop.sampling_rate:g} Hz"]
     lines += [f"setp pid.{at}.{name} {value:.6g}" for name, value in values.items()]
-    note = f"pid has no kS: add {of.gains.value('kS'):.4g} {of.units.input} with the sign of the commanded velocity. {_unfiltered(loop)}"
+    note = (
+        f"pid has no kS: add {of.gains.value('kS'):.4g} {of.units.input} with the sign of the commanded velocity.{_gravity(of)} {_unfiltered(loop)}"
+    )
     return Snippet("linuxcnc", "axis.hal", "\n".join(lines) + "\n", note)
 
 
@@ -122,7 +124,10 @@ def odrive(of: Designed) -> Snippet:
         f"{at}.controller.config.vel_integrator_gain = {torque}{loop.velocity_integral * TURN:.6g}",
         f"{at}.controller.config.inertia = {torque}{of.gains.value('kA') * TURN:.6g}",
     ]
-    note = "ODrive's loops run at 8 kHz: these gains keep their margins there; its inertia is what kA is here, per turn"
+    note = (
+        "ODrive's loops run at 8 kHz: these gains keep their margins there; its inertia is what kA is here, per turn. "
+        f"It has no kS and kV: add their torque to input_torque.{_gravity(of)}"
+    )
     return Snippet("odrive", "odrivetool", "\n".join(lines) + "\n", note)
 
 
@@ -156,6 +161,7 @@ def twincat(of: Designed) -> Snippet:
         fields += [f"fOutMaxLimit := {own.limit:.9E}", f"fOutMinLimit := {-own.limit:.9E}"]
     kept = [f"    {name} : LREAL := {value:.9E}; (* {unit} *)" for name, value, unit in _feedforward(of, per, length)]
     total = "fbPid.fOut + fKS * fSign + fKV * fSetVelocity + fKA * fSetAcceleration + fKG"
+    total += " + fKCos * COS(fSetPosition - fZero)" if of.gains.value("kCos") else ""
     lines = [
         f"(* Axis {of.axis}: input in {of.units.input}, position in {length}. Call it in a task of {cycle:g} ms. *)",
         f"PROGRAM {_identifier(of.axis)}",
@@ -194,7 +200,14 @@ def _feedforward(of: Designed, per: float, length: str) -> list[tuple[str, float
         ("fKV", of.gains.value("kV") * per, f"{unit}/({length}/s)"),
         ("fKA", of.gains.value("kA") * per, f"{unit}/({length}/s2)"),
         ("fKG", of.gains.value("kG"), unit),
+        *([("fKCos", of.gains.value("kCos"), unit), ("fZero", of.gains.value("zero"), length)] if of.gains.value("kCos") else []),
     ]
+
+
+def _gravity(of: Designed) -> str:
+    """What has to be added for an arm, where the target has no place for it."""
+    size, zero = of.gains.value("kCos"), of.gains.value("zero")
+    return f" It has no kCos: add {size:.4g} {of.units.input} times the cosine of the angle minus {zero:.4g} rad." if size else ""
 
 
 def _identifier(axis: str) -> str:
