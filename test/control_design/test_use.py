@@ -18,6 +18,7 @@ from helpers.known_models import known, unknown
 from helpers.simulated import recorded
 
 import xy_sysid as xy
+from xy_sysid.control_design.compensation import left_words
 from xy_sysid.control_design.exports import export
 from xy_sysid.control_design.use import use
 from xy_sysid.units import Units
@@ -171,6 +172,10 @@ def test_exported_source_undoes_what_is_predicted_to_help() -> None:
         assert told == [0.0, 0.0] and "but not cogging" in made.note
     for item in unsure.tracking:
         assert item.compensated <= 1.001 * item.simple
+    assert (
+        left_words([("a", "it harms"), ("b", "it harms"), ("c", "it is at its bound")])
+        == ", but not a and b (it harms), but not c (it is at its bound)"
+    )
 
 
 def test_margins_that_are_asked_for_are_kept() -> None:

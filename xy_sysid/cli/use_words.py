@@ -8,7 +8,7 @@ from typing import Any
 
 from xy_sysid.cli.output import aside, estimate, plain, quantity, say, table
 from xy_sysid.control_design.bandwidth import Cost
-from xy_sysid.control_design.compensation import SIMPLE
+from xy_sysid.control_design.compensation import SIMPLE, left_words
 from xy_sysid.control_design.feedback import Feedback
 from xy_sysid.control_design.filters import Swing
 from xy_sysid.control_design.sampled import coefficients
@@ -142,8 +142,7 @@ def _compensation(item: Tracking) -> str:
     if item.undone == (SIMPLE,):
         why = item.left[0][1] if item.left else "there is nothing else to undo"
         return f"The compensation is kS, kV and kA alone: {why}."
-    left = "".join(f", but not {effect} ({why})" for effect, why in item.left)
-    return f"The compensation undoes {', '.join(item.undone)}{left}."
+    return f"The compensation undoes {', '.join(item.undone)}{left_words(item.left)}."
 
 
 def _mode(mode: Swing) -> str:

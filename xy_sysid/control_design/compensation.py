@@ -56,6 +56,14 @@ class Compensation:
     inverse: AxisModel | None
 
 
+def left_words(left: Sequence[tuple[str, str]]) -> str:
+    """``, but not A and B (why)`` of laws that are left; empty where none is."""
+    names: dict[str, list[str]] = {}
+    for name, why in left:
+        names.setdefault(why, []).append(name)
+    return "".join(f", but not {' and '.join(own)} ({why})" for why, own in names.items())
+
+
 @dataclass(frozen=True, slots=True)
 class _Tried:
     """A choice of laws: what the encoder has to show, the voltage, and for each sample the error, m rms, and the largest voltage, V.

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from xy_sysid.control_design import fmu, snippets, state_text, to_c, to_matlab, to_python
-from xy_sysid.control_design.compensation import SIMPLE
+from xy_sysid.control_design.compensation import SIMPLE, left_words
 from xy_sysid.control_design.mjcf import mjcf
 from xy_sysid.control_design.program import Program, program
 from xy_sysid.control_design.sdf import sdf
@@ -65,7 +65,7 @@ def _inverse_note(used: Used) -> str:
         return "the feedforward undoes every law of the model; no path was simulated with it"
     if chosen.inverse is None:
         return f"the feedforward undoes every law of the model, but {SIMPLE} alone are predicted to follow a path better: use these"
-    return f"the feedforward undoes {', '.join(chosen.terms)}" + "".join(f", but not {name} ({why})" for name, why in chosen.left)
+    return f"the feedforward undoes {', '.join(chosen.terms)}{left_words(chosen.left)}"
 
 
 def plain_name(axis: str) -> str:
