@@ -21,7 +21,7 @@ from xy_sysid.axis.model import AxisModel
 from xy_sysid.control_design.closed_loop import Controller, Encoder, follow_path, shake
 from xy_sysid.control_design.gains import Gains, simple_feedforward
 from xy_sysid.control_design.inverse import feedforward
-from xy_sysid.control_design.laws import along, force
+from xy_sysid.control_design.laws import along, ask, force, of_category
 from xy_sysid.control_design.limits import RESERVE
 from xy_sysid.control_design.path import Moves, SampledPath, of_position
 from xy_sysid.errors import BadInput
@@ -29,6 +29,7 @@ from xy_sysid.samples.block import FloatArray
 
 ACROSS = 0.02  # s in which the correction by direction crosses a gap: a step of the path would hammer at it
 SLOWED, SLOWINGS = 0.7, 6  # of the speed, again and again, where the drive would reach its limit
+DRY, GONE = "coulomb_friction", 0.01  # the law of friction that is the same at every speed; part of it that is as good as nothing
 RIGID = "base"  # what no model is without: gain, pole and delay
 SIMPLE = "kS kV kA"
 
@@ -113,10 +114,13 @@ def _flank(model: AxisModel, path: SampledPath, rub: float) -> FloatArray:
     return np.asarray(0.5 * (way + np.sign(load * math.copysign(1.0, model.gain) + rub * way)))
 
 
-def alike(model: AxisModel) -> tuple[AxisModel, ...]:
-    """The model written with other effects that are the very same law while it slides, and differ at rest: a sum's parts, and half of each way."""
+def alike(model: AxisModel, sampling_rate: float) -> tuple[AxisModel, ...]:
+    """The model written with other effects that are the very same law while it slides, and differ at rest.
+
+    They are a sum's parts, half of each way, and the friction without a breakaway that is over before a sample shows it; sampling_rate: Hz
+    """
     joined = model.joined()
-    found: list[AxisModel] = [joined]
+    found: list[AxisModel] = [joined, _without_breakaway(model, sampling_rate)]
     for name, values in joined.effects:
         whole = joined.library[name].sum_of
         if whole is None or any(part in dict(joined.effects) for part in whole.parts):
@@ -129,6 +133,18 @@ def alike(model: AxisModel) -> tuple[AxisModel, ...]:
         both = ((name, whole.joined((first, half))), (whole.parts[1], (0.5 * added[0], *added[1:])))
         found += [apart, replace(joined, effects=(*rest, *both), per_recording=())]
     return tuple(item for item in found if item.effects != model.effects)
+
+
+def _without_breakaway(model: AxisModel, sampling_rate: float) -> AxisModel:
+    """The model with Coulomb friction in place of a friction whose breakaway has gone at the speed that it gives the axis within one sample."""
+    for effect, values in of_category(model, "friction"):
+        words = {"direction": 1.0}
+        breakaway, slides = (ask(effect, values, "level", {**words, "v": v}) for v in (0.0, abs(model.gain)))
+        after = abs(model.gain) * model.pole * (breakaway - slides) / sampling_rate
+        if DRY not in dict(model.effects) and after > 0.0 and abs(ask(effect, values, "level", {**words, "v": after}) - slides) < GONE * slides:
+            rest = tuple(item for item in model.effects if item[0] != effect.name)
+            return replace(model, effects=(*rest, (DRY, (slides,))), per_recording=())
+    return model
 
 
 def at_its_bound(model: AxisModel) -> str:
@@ -148,7 +164,7 @@ def compensate(models: Sequence[AxisModel], found: Gains, path: SampledPath, con
 
     models: the model and samples of its parameters (``uncertain.samples``); encoder: with its noise presliding friction creeps while the axis rests
     """
-    others = alike(models[0])
+    others = alike(models[0], path.sampling_rate)
     judges = (*models, *others)
 
     def judged(terms: tuple[str, ...], wanted: SampledPath, voltage: FloatArray, inverse: AxisModel | None = None) -> _Tried:
