@@ -70,6 +70,7 @@ setup(
             "pytest",
             "pytest-xdist",
             "hypothesis",
+            "blark",
             "ruff",
             "proselint",
             "mypy",

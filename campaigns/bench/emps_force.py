@@ -1,7 +1,8 @@
 """python -m campaigns.bench emps_force: the input of the second half of EMPS, predicted from its motion by a model of the first half.
 
 EMPS is a motor, a ball screw and a mass under position control, measured by Janot, Gautier and Brunot (2019); 1 V is 35.15 N. The table is written to
-docs/use.md. Both inputs are compared below a frequency; above, the recorded one is what the controller makes of encoder counts.
+docs/use.md. Both inputs are compared below a frequency; above, the recorded one is what the controller makes of encoder counts. The last column adds
+the force by position that the model leaves in the first half (``control_design.measured_table``).
 """
 
 from __future__ import annotations
@@ -18,12 +19,14 @@ from campaigns.bench.use import PAGE
 from campaigns.faults.shared import DATA
 from xy_sysid.control_design.gains import gains, simple_feedforward
 from xy_sysid.control_design.inverse import feedforward
+from xy_sysid.control_design.measured_table import measured_table
 from xy_sysid.control_design.path import ORDER, recorded
+from xy_sysid.control_design.worth import WIDER, clear_below
 from xy_sysid.diagnosis.of_run import refine
 from xy_sysid.imports import load
 
 BELOW = (10.0, 20.0, 50.0, 100.0)  # Hz
-COLUMNS = ("compared below", "kV and kA", "with kS", "whole feedforward")
+COLUMNS = ("compared below", "kV and kA", "with kS", "whole feedforward", "and the table of the first half")
 SHORT_EFFECTS = ("coulomb_friction", "asymmetric_viscous_friction")  # what the search finds
 
 
@@ -32,13 +35,16 @@ def parts(short: bool) -> list[tuple[str, ...]]:
     run = load(Path(os.environ.get("XY_SYSID_DATA") or DATA) / "emps" / "emps_train.npz").run("x")
     first, second = run.until(0.5 * run.seconds), run.after(len(run) // 2)
     model = refine(first, SHORT_EFFECTS, auto=False).model if short else refine(first).model
+    table = measured_table(model, first, WIDER * clear_below(model, first))
     rows = []
     for below in BELOW:
-        path = recorded(second.position, run.sampling_rate, 4.0 * below)
+        path = recorded(second.position, run.sampling_rate, WIDER * below)
         sos = scipy.signal.butter(ORDER, below, fs=run.sampling_rate, output="sos")
         early = path.ahead(model.model.delay + 0.5 / run.sampling_rate)
         found = gains(model)
-        tries = (simple_feedforward(found, early, False), simple_feedforward(found, early), feedforward(model.model, path).voltage)
+        whole = feedforward(model.model, path).voltage
+        tabled = whole if table is None else whole + table.along(path)
+        tries = (simple_feedforward(found, early, False), simple_feedforward(found, early), whole, tabled)
         edge = len(second) // 50
         wanted, *told = (scipy.signal.sosfiltfilt(sos, voltage)[edge:-edge] for voltage in (second.voltage, *tries))
         left = [float(np.sqrt(np.mean((wanted - one) ** 2) / np.mean(wanted**2))) for one in told]

@@ -102,7 +102,8 @@ def _chosen(of: Sequence[AxisModel], found: Gains, moves: Moves, controller: Con
         path = moves.sampled()
         simple, unknown = simple_feedforward(found, path), float("nan")
         left = tuple((name, str(refused)) for name, _ in of[0].effects)
-        return path, Compensation(path, simple, (f"{SIMPLE}, refused",), left, unknown, unknown, unknown, unknown)
+        errors = (unknown, unknown, unknown)
+        return path, Compensation(path, simple, (f"{SIMPLE}, refused",), left, *errors, largest=unknown, centre=errors, inverse=None)
 
 
 def _within(travel: tuple[float, float], size: float) -> list[float]:

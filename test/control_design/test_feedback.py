@@ -8,7 +8,7 @@ import pytest
 from helpers.known_models import axis, known
 
 from xy_sysid.control_design.closed_loop import Controller, Encoder, follow_path
-from xy_sysid.control_design.feedback import GAIN_MARGIN, PHASE_MARGIN, feedback, margins
+from xy_sysid.control_design.feedback import GAIN_MARGIN, PHASE_MARGIN, Asked, feedback, margins
 from xy_sysid.control_design.path import Bounds, s_curve
 from xy_sysid.control_design.sample_step import simulate_alone
 from xy_sysid.control_design.sampled import closed_poles, controller_response, controller_system, noise_to_voltage, sampled
@@ -67,8 +67,8 @@ def test_every_sample_of_the_parameters_keeps_the_margins() -> None:
 def test_a_bandwidth_that_cannot_be_had_is_refused() -> None:
     """Asked for more than delay and margins allow, it says what the margins would be; no such gains are given."""
     with pytest.raises(BadInput, match=r"bandwidth is 400 Hz: .*Ask for less"):
-        feedback(known(), RATE, 400.0)
-    asked = feedback(known(), RATE, 10.0)
+        feedback(known(), RATE, Asked(bandwidth=400.0))
+    asked = feedback(known(), RATE, Asked(bandwidth=10.0))
     assert asked.nominal.crossover == pytest.approx(10.0, rel=0.02) and asked.worst.phase > PHASE_MARGIN
 
 
@@ -98,7 +98,7 @@ def test_the_same_gains_are_a_pid_and_a_servo_drives_cascade() -> None:
 def test_encoder_noise_makes_as_much_voltage_as_is_said() -> None:
     """The loop at rest under encoder noise: the simulated voltage's rms is the predicted one."""
     model = known()
-    found = feedback(model, RATE, 30.0, encoder=Encoder(noise=1e-6))
+    found = feedback(model, RATE, Asked(bandwidth=30.0), encoder=Encoder(noise=1e-6))
     still = s_curve([0.0, 0.0], Bounds(1.0, 1.0, 1.0), RATE, settle=10.0)
     run = follow_path(model.model, still, found.controller, encoder=Encoder(noise=1e-6), seed=3)
     predicted = 1e-6 * noise_to_voltage(sampled(model.model, RATE), found.controller)
@@ -108,7 +108,7 @@ def test_encoder_noise_makes_as_much_voltage_as_is_said() -> None:
 def test_the_integral_stands_still_while_the_drive_is_at_its_limit() -> None:
     """A step far beyond what the drive can do overshoots little: the integral does not wind up."""
     model = known()
-    found = feedback(model, RATE, 20.0, limit=1.0)
+    found = feedback(model, RATE, Asked(bandwidth=20.0), limit=1.0)
     step = s_curve([0.0, 0.05], Bounds(1e3, 1e6, 1e9), RATE, settle=3.0)
     run = follow_path(model.model, step, found.controller)
     assert np.max(np.abs(run.voltage)) == 1.0 and np.max(run.position) < 1.25 * 0.05

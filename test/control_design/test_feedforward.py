@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from scipy import signal
 from xy_sysid.axis.model import STANDARD, simulate
 from xy_sysid.comparison.physical_model import PhysicalModel
 from xy_sysid.control_design.gains import gains, simple_feedforward
-from xy_sysid.control_design.inverse import feedforward, not_undone
+from xy_sysid.control_design.inverse import ahead_of, feedforward, not_undone
 from xy_sysid.control_design.limits import fastest
 from xy_sysid.control_design.path import Bounds, SampledPath, recorded, s_curve
 from xy_sysid.control_design.sample_step import simulate_alone
@@ -178,3 +179,11 @@ def test_with_an_encoder_on_the_load_there_are_gains_and_no_loops() -> None:
     assert [gain.name for gain in used.gains.items[1:3]] == ["kV", "kA"]
     assert used.feedback is None and used.states is None and used.modes == ()
     assert {what for what, _ in used.refused} >= {"feedback", "state feedback", "filters"}
+
+
+def test_a_lag_is_looked_ahead_of_by_what_its_inverse_leaves() -> None:
+    """A lag far below a sample changes nothing, and one of many samples takes half a sample."""
+    h = 1.0 / RATE
+    for lag, ahead in ((1e-3 * h, 1e-3), (100.0 * h, 0.5), (h, 1.0 - 1.0 / np.expm1(1.0))):
+        model = replace(axis(), effects=(("amplifier_lag", (lag,)),))
+        assert (ahead_of(model, RATE) - ahead_of(axis(), RATE)) / h == pytest.approx(ahead, abs=2e-3)

@@ -10,8 +10,13 @@ from helpers.known_models import known
 from scipy import signal
 
 from xy_sysid.axis.model import STANDARD
-from xy_sysid.control_design.filters import best_shaper, modes, notch, shapers, vibration
+from xy_sysid.control_design.bandwidth import HOLD, UNCERTAIN, bandwidth_of, with_filter
+from xy_sysid.control_design.closed_loop import Controller
+from xy_sysid.control_design.feedback import feedback, margins
+from xy_sysid.control_design.filters import best_shaper, low_pass, modes, notch, shapers, vibration
 from xy_sysid.control_design.path import Bounds, s_curve
+from xy_sysid.control_design.sampled import coefficients, controller_response, sampled
+from xy_sysid.control_design.uncertain import samples
 
 RATE = 2000.0
 
@@ -63,7 +68,7 @@ def test_a_shaped_path_arrives_and_excites_less() -> None:
 def test_a_notch_takes_the_resonance_and_says_what_it_costs() -> None:
     """Its response at the resonance is its depth, 1 far below, and its phase at the crossover is what it says."""
     (mode,) = modes(known("screw_compliance"))
-    made = notch(mode, RATE, 30.0)
+    made = notch(mode, RATE)
 
     def response(f: float) -> complex:
         z = np.exp(2j * np.pi * f / RATE)
@@ -71,4 +76,39 @@ def test_a_notch_takes_the_resonance_and_says_what_it_costs() -> None:
         return complex((b0 + b1 / z + b2 / z**2) / (1 + a1 / z + a2 / z**2))
 
     assert abs(response(made.frequency)) == pytest.approx(made.depth, rel=1e-3) and abs(response(0.1)) == pytest.approx(1.0, abs=1e-3)
-    assert -np.degrees(np.angle(response(30.0))) == pytest.approx(made.phase_cost) and made.phase_cost > 0.0 and made.covers
+    assert -np.degrees(np.angle(response(30.0))) == pytest.approx(made.phase_cost(30.0)) and made.phase_cost(30.0) > 0.0 and made.covers
+
+
+def test_what_limits_the_bandwidth_is_named_with_its_cost() -> None:
+    """Each part's phase at the crossover is that of its own transfer function, and a loop without the part reaches more; nothing else is named."""
+    model = known("base_resonance")
+    loop = feedback(model, RATE)
+    found = bandwidth_of(model, RATE, loop.nominal.crossover)
+    costs = {item.part: item for item in found.costs}
+    assert set(costs) == {"delay", HOLD, "base_resonance", UNCERTAIN} and found.crossover == pytest.approx(loop.nominal.crossover)
+    assert costs["delay"].phase == pytest.approx(360.0 * loop.nominal.crossover * model.model.delay, rel=1e-3)
+    assert costs["delay"].without > 1.2 * found.crossover and costs[UNCERTAIN].without >= found.crossover
+    reached = [item.without for item in found.costs if np.isfinite(item.without)]
+    assert reached == sorted(reached, reverse=True)
+
+
+def test_a_filter_in_the_loop_is_named_only_where_the_loop_reaches_more_with_it() -> None:
+    """A poorly damped resonance near the crossover is worth a filter, for every sample of its frequency; the margins are kept with it."""
+    ringing = known("screw_compliance", spread=0.01, delay=0.01)
+    loop = feedback(ringing, RATE)
+    found = with_filter(ringing, RATE, modes(ringing), loop)
+    assert found is not None
+    own, better = found
+    assert better.crossover > loop.crossover and better.worst.phase >= 45.0 and better.worst.gain >= 2.0
+    for item in samples(ringing, 24):
+        assert margins(sampled(item, RATE), better.controller).gain >= 2.0
+    assert np.array_equal(coefficients(better.controller, RATE)[1], own.section)
+
+
+def test_the_discrete_coefficients_are_the_controller() -> None:
+    """b0 .. a2 of the PID and of the filter behind it have the controller's response at every frequency."""
+    own = Controller(300.0, 2000.0, 5.0, 1e-3, sections=low_pass(200.0, RATE).section[None, :])
+    for f in (3.0, 50.0, 700.0):
+        z = np.exp(2j * np.pi * f / RATE)
+        parts = [(b0 + b1 / z + b2 / z**2) / (1 + a1 / z + a2 / z**2) for b0, b1, b2, a1, a2 in coefficients(own, RATE)]
+        assert np.prod(parts) == pytest.approx(controller_response(own, np.array([f]), RATE)[0], rel=1e-9)

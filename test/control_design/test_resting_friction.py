@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from helpers.known_models import known
+from helpers.known_models import axis, known
 
 from xy_sysid.control_design.closed_loop import Controller, Encoder, follow_path, shake
-from xy_sysid.control_design.compensation import compensate
+from xy_sysid.control_design.compensation import alike, compensate
 from xy_sysid.control_design.gains import gains
 from xy_sysid.control_design.inverse import feedforward
 from xy_sysid.control_design.path import Bounds, SampledPath, s_curve
@@ -60,3 +62,11 @@ def test_the_encoder_follows_from_a_noise_floor() -> None:
     lines = np.abs(np.fft.rfft(velocity)) ** 2
     floor = np.sqrt(2.0 * np.sum(lines[: round(0.35 * velocity.size)])) / velocity.size
     assert encoder_of_floor(float(floor), RATE).noise == pytest.approx(1.5e-7, rel=0.02)
+
+
+def test_a_breakaway_that_no_sample_shows_is_not_relied_upon() -> None:
+    """Stribeck friction whose excess is gone within a sample may as well be Coulomb friction: the compensation has to be good for both."""
+    seen, unseen = (replace(axis(), effects=(("stribeck_friction", (0.2, 0.1, speed)),)) for speed in (5e-3, 1e-6))
+    assert alike(seen, RATE) == ()
+    (other,) = alike(unseen, RATE)
+    assert other.effects == (("coulomb_friction", (0.2,)),)

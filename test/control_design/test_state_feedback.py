@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from helpers.known_models import axis, known
 
+from xy_sysid.control_design.feedback import Asked, feedback, within_a_gap
 from xy_sysid.control_design.sampled import sampled
 from xy_sysid.control_design.state_feedback import StateFeedback, closed_loop, state_feedback
 from xy_sysid.control_design.state_text import source
@@ -55,11 +56,11 @@ def test_a_step_of_load_is_rejected_without_a_lasting_error(rigid: StateFeedback
 
 
 def test_delay_and_resonance_limit_the_bandwidth(rigid: StateFeedback) -> None:
-    """Ten times the delay costs more than a factor of three; a bandwidth beyond that is refused with the margins that it would have."""
+    """Ten times the delay costs two thirds of the crossover; a bandwidth beyond that is refused with the margins that it would have."""
     slow = replace(known(), model=axis(delay=12.9e-3), known=())
-    assert state_feedback(slow, RATE).bandwidth < rigid.bandwidth / 3.0
+    assert state_feedback(slow, RATE).nominal.crossover < rigid.nominal.crossover / 3.0
     with pytest.raises(BadInput, match=r"phase margin|unstable"):
-        state_feedback(slow, RATE, bandwidth=200.0)
+        state_feedback(slow, RATE, Asked(bandwidth=200.0))
 
 
 def test_c_and_python_run_as_the_design_does(rigid: StateFeedback, tmp_path: Path) -> None:
@@ -80,3 +81,22 @@ def test_c_and_python_run_as_the_design_does(rigid: StateFeedback, tmp_path: Pat
         assert python.input(error) == pytest.approx(held[-1], rel=1e-9, abs=1e-12)
         assert compiled(state, ctypes.c_double(error)) == pytest.approx(held[-1], rel=1e-9, abs=1e-12)
     assert max(held) == 2.0 and min(np.abs(held)) < 2.0
+
+
+def test_an_axis_that_coasts_is_held_at_a_bandwidth_of_its_pid() -> None:
+    """With hardly any drag the observer has to be fast for the margins: the bandwidth is that of the margins and not of the drag."""
+    model = known(delay=0.05)
+    coasting = replace(model.model, gain=0.164, pole=2.24, delay=0.0)
+    slow = replace(model, model=coasting, known=())
+    found, pid = state_feedback(slow, 1000.0), feedback(slow, 1000.0)
+    assert found.nominal.crossover > 0.3 * pid.nominal.crossover and found.worst.phase >= 45.0 and found.worst.gain >= 2.0
+    assert found.settles < 1.0
+
+
+def test_a_loop_across_an_open_gap_is_stable_with_the_motor_alone() -> None:
+    """Inside the gap the loop meets the motor's mass only, and keeps its margins there."""
+    model = known("backlash")
+    found = state_feedback(model, RATE)
+    assert found.bandwidth < state_feedback(known(), RATE).bandwidth
+    (motor,) = within_a_gap(model.model)
+    assert np.max(np.abs(np.linalg.eigvals(closed_loop(sampled(motor, RATE), found.a, found.b, found.c)))) < 1.0

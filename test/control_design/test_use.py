@@ -5,17 +5,20 @@ from __future__ import annotations
 import ast
 import configparser
 import re
+import types
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import yaml
+from blark.parse import parse_source_code
 from helpers.cli_tools import cli, refused
 from helpers.known_models import known, unknown
 from helpers.simulated import recorded
 
 import xy_sysid as xy
+from xy_sysid.control_design.compensation import left_words
 from xy_sysid.control_design.exports import export
 from xy_sysid.control_design.use import use
 from xy_sysid.units import Units
@@ -96,7 +99,10 @@ def test_a_ros2_control_snippet_is_yaml_with_the_names_of_pid_controller() -> No
     own = yaml.safe_load(text)["pid_controller"]["ros__parameters"]
     assert own["dof_names"] == ["x"] and used.feedback is not None
     assert own["gains"]["x"]["p"] == pytest.approx(used.feedback.controller.kp, rel=1e-5) and own["gains"]["x"]["u_clamp_min"] == -5.0
-    assert set(own["gains"]["x"]) == {"p", "i", "d", "u_clamp_max", "u_clamp_min", "antiwindup_strategy"}
+    clamps = {"i_clamp_max", "i_clamp_min", "u_clamp_max", "u_clamp_min"}
+    assert set(own["gains"]["x"]) == {"p", "i", "d", *clamps, "antiwindup_strategy", "feedforward_gain"}
+    assert own["gains"]["x"]["feedforward_gain"] == pytest.approx(used.gains["kV"].value, rel=1e-5), "it multiplies the velocity that is asked for"
+    assert set(own) == {"dof_names", "command_interface", "reference_and_state_interfaces", "gains"}
 
 
 def test_a_klipper_snippet_is_a_section_that_its_parser_reads() -> None:
@@ -127,6 +133,60 @@ def test_an_odrive_snippet_is_python_in_turns() -> None:
     assert targets == [f"odrv0.axis0.controller.config.{name}" for name in ("pos_gain", "vel_gain", "vel_integrator_gain", "inertia")]
     with pytest.raises(xy.BadInput, match="ODrive commands a torque"):
         export(use(known()), "odrive")
+
+
+def test_a_twincat_program_is_parsed_by_blark_with_the_fields_of_fb_ctrl_pid() -> None:
+    """Times in whole ms, gains in mm, limits, and kS, kV, kA behind it; a cycle below 1 ms is refused."""
+    used = use(known("coulomb_friction"), rate=1000.0, limit=5.0)
+    (text,) = export(used, "twincat").files.values()
+    assert parse_source_code(text).exception is None
+    fields = dict(re.findall(r"(\w+) := ([^\s,]+),?\n", text))
+    names = {"tCtrlCycleTime", "tTaskCycleTime", "fKp", "tTn", "tTv", "tTd", "fOutMaxLimit", "fOutMinLimit"}
+    assert names <= set(fields) and fields["tCtrlCycleTime"] == "T#1MS" and used.feedback is not None
+    own = used.feedback.controller
+    assert float(fields["fKp"]) == pytest.approx(1e-3 * own.kp) and fields["tTn"] == f"T#{round(1e3 * own.kp / own.ki)}MS"
+    assert f"fKV : LREAL := {1e-3 * used.gains['kV'].value:.9E}" in text and "+ fKS * fSign" in text
+    assert used.feedback.counted.phase >= 35.0
+    arm = use(known("gravity", units=Units("A", "rad")), rate=1000.0, limit=5.0)
+    (turning,) = export(arm, "twincat").files.values()
+    assert parse_source_code(turning).exception is None and "+ fKCos * COS(fSetPosition - fZero)" in turning
+    assert "no kCos: add" in export(arm, "linuxcnc").note and "no kCos: add" in export(arm, "ros2_control").note
+    with pytest.raises(xy.BadInput, match=r"rate of 2000 Hz.*--controller-rate"):
+        export(use(known("coulomb_friction"), rate=2000.0), "twincat")
+
+
+def test_exported_source_undoes_what_is_predicted_to_help() -> None:
+    """The laws that the compensation leaves are left by the exported feedforward, too, and the note names them."""
+    sure, unsure = use(known("cogging"), limit=5.0), use(known("cogging", cogging__phase=40.0, cogging__amplitude=2.0), limit=5.0)
+    assert sure.compensation is not None and sure.compensation.terms == ("base", "cogging")
+    assert "undoes base, cogging" in export(sure, "c").note
+    assert unsure.compensation is not None and "cogging" not in unsure.compensation.terms, "its phase is not known"
+    made = export(unsure, "python")
+    (text,) = made.files.values()
+    module = types.ModuleType("axis")
+    exec(text, vars(module))
+    told = [module.Feedforward().input(place, 0.0, 0.0) for place in (0.0, 0.001)]
+    if unsure.compensation.inverse is None:
+        assert "kS kV kA alone are predicted" in made.note
+    else:
+        assert told == [0.0, 0.0] and "but not cogging" in made.note
+    for item in unsure.tracking:
+        assert item.compensated <= 1.001 * item.simple
+    assert (
+        left_words([("a", "it harms"), ("b", "it harms"), ("c", "it is at its bound")])
+        == ", but not a and b (it harms), but not c (it is at its bound)"
+    )
+
+
+def test_margins_that_are_asked_for_are_kept() -> None:
+    """More phase costs bandwidth; margins out of range are refused with the allowed range."""
+    usual, more = use(known("base_resonance")), use(known("base_resonance"), margins=(55.0, 3.0))
+    assert usual.feedback is not None and more.feedback is not None and more.states is not None
+    assert more.feedback.worst.phase >= 55.0 and more.feedback.worst.gain >= 3.0 and more.feedback.crossover < usual.feedback.crossover
+    assert more.states.worst.phase >= 55.0 and more.states.worst.gain >= 3.0
+    for asked, words in (((95.0, 2.0), "phase margin is 95 degrees"), ((45.0, 0.5), "gain margin is 0.5")):
+        with pytest.raises(xy.BadInput, match=words):
+            use(known(), margins=asked)
 
 
 def test_the_command_tells_gains_and_writes_files(tmp_path: Path, model: xy.PhysicalModel) -> None:

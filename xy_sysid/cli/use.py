@@ -10,19 +10,16 @@ import typer
 
 from xy_sysid.cli import options as o
 from xy_sysid.cli.diagnose import Own
-from xy_sysid.cli.output import aside, emit, estimate, plain, quantity, say, say_refused, table
+from xy_sysid.cli.output import aside, emit, plain, say, say_refused
 from xy_sysid.cli.reading import each, read, reads
-from xy_sysid.units import bare, motion, moved
 
 if TYPE_CHECKING:
     from xy_sysid.comparison.physical_model import PhysicalModel
     from xy_sysid.control_design.exports import Exported
-    from xy_sysid.control_design.filters import Swing
     from xy_sysid.control_design.use import Used
     from xy_sysid.imports.reading import Reading
     from xy_sysid.samples.recording import Recording
 
-TURN = 6.283185307179586  # rad
 Models = Annotated[list[Path], typer.Argument(metavar="MODEL", help="model files of refine --model")]
 On = Annotated[
     list[Path] | None,
@@ -45,6 +42,12 @@ def use(
     bandwidth: Annotated[
         float | None, typer.Option(metavar="HZ", help="crossover frequency of the loop; by default the highest with sufficient margins")
     ] = None,
+    phase_margin: Annotated[
+        float, typer.Option("--phase-margin", metavar="DEG", help="phase margin that the worst sample of the parameters keeps")
+    ] = 45.0,
+    gain_margin: Annotated[
+        float, typer.Option("--gain-margin", metavar="TIMES", help="gain margin that the worst sample of the parameters keeps; 2 is 6 dB")
+    ] = 2.0,
     travel: Annotated[tuple[float, float] | None, typer.Option(metavar="LOW HIGH", help="positions that tables and paths cover, SI")] = None,
     to: Annotated[
         list[str] | None, typer.Option("--to", metavar="TARGET", help="write for this target, or all (may be repeated; see docs/use.md)")
@@ -55,6 +58,7 @@ def use(
     json: o.Json = False,
 ) -> None:
     """Turn a model into numbers for a controller, correction tables, margins and limits, or into files for other programs."""
+    from xy_sysid.cli.use_words import answer, show
     from xy_sysid.control_design.exports import TARGETS, export
     from xy_sysid.control_design.use import use as logic
     from xy_sysid.errors import BadInput
@@ -68,7 +72,12 @@ def use(
             raise unknown_name(name, [*TARGETS, "all"], "--to")
     found = _models(models, effect_file, reading.axes)
     recording = read(on, reading, json) if on else None
-    done, refused = each(tuple(found), lambda name: logic(found[name], _run(recording, found[name]), controller_rate, limit, bandwidth, travel))
+    margins = phase_margin, gain_margin
+
+    def of(name: str) -> Used:
+        return logic(found[name], _run(recording, found[name]), controller_rate, limit, bandwidth, travel, margins=margins)
+
+    done, refused = each(tuple(found), of)
     files: dict[str, dict[str, Exported]] = {name: {} for name in done}
     for name, used in done.items():
         for target in asked:
@@ -82,10 +91,10 @@ def use(
         raise BadInput("--to", f"{', '.join(binary)} without a folder", "--out DIR", "These files are no text.")
     written = _write(out, files, force) if out is not None and asked else []
     if json:
-        emit({"axes": {name: plain(_answer(used)) for name, used in done.items()}, "files": written, "refused": refused})
+        emit({"axes": {name: plain(answer(used)) for name, used in done.items()}, "files": written, "refused": refused})
         return
     for name, used in done.items():
-        _show(name, used)
+        show(name, used)
         for target, item in files[name].items():
             if out is None:
                 for file, text in item.files.items():
@@ -152,108 +161,3 @@ def _write(folder: Path, files: dict[str, dict[str, Exported]], force: bool) -> 
         if missing:
             say(f"{path}: {missing}", aside)
     return [str(path) for path in (*texts, *mats, *archives)]
-
-
-def _show(name: str, used: Used) -> None:
-    units = used.model.units
-    for note in used.notes:
-        say(f"axis {name}: {note}", aside)
-    doubtful = {item.name: item.doubt for item in used.gains.items if used.model.parameters and item.doubt}
-    shown = [
-        (
-            *estimate(item.name, (item.value, item.low, item.high), item.unit),
-            f"NOT DETERMINED: {doubtful[item.name]}" if item.name in doubtful else item.meaning,
-        )
-        for item in used.gains.items
-    ]
-    table(f"axis {name}: feedforward", ("gain", "value", "95 % interval", "unit", "in words"), shown)
-    loop = used.feedback
-    if loop is not None:
-        rows = [
-            ("P-PI: position loop", f"{loop.position_gain:.4g}", "1/s"),
-            ("P-PI: velocity loop", f"{loop.velocity_gain:.4g}", units.of("V/(m/s)")),
-            ("P-PI: integral time", f"{1e3 * loop.integral_time:.4g}", "ms"),
-            ("PID: kp", f"{loop.controller.kp:.4g}", units.of("V/m")),
-            ("PID: ki", f"{loop.controller.ki:.4g}", units.of("V/m") + "/s"),
-            ("PID: kd", f"{loop.controller.kd:.4g}", units.of("V/(m/s)")),
-            ("derivative filter", f"{1e3 * loop.controller.derivative_time:.3g}", "ms"),
-        ]
-        table(f"axis {name}: feedback at {loop.sampling_rate:g} Hz", ("number", "value", "unit"), rows)
-        say(
-            f"  Crossover {loop.nominal.crossover:.3g} Hz. Worst of {loop.count} samples of the intervals: "
-            f"phase margin {loop.worst.phase:.3g} degrees, gain margin {loop.worst.gain:.3g}, sensitivity {loop.worst.sensitivity:.3g}; "
-            f"{loop.allowed}. Encoder noise makes {quantity(loop.noise, units.input, 2)} rms."
-        )
-    if used.states is not None:
-        s = used.states
-        say(
-            f"  State feedback with an observer (--to state_feedback): bandwidth {s.bandwidth / TURN:.3g} Hz, {s.b.size} states. Worst of {s.count} "
-            f"samples: phase margin {s.worst.phase:.3g} degrees, gain margin {s.worst.gain:.3g}. A load of 1 {units.input} moves it by "
-            f"{moved(s.rejects, units.output)} at most, and a tenth of that is left after {1e3 * s.settles:.3g} ms."
-        )
-    for mode in used.modes:
-        say(f"  {_mode(mode)}")
-    if used.shaper is not None:
-        said = f"{used.shaper.name} at {used.shaper.frequency:.2f} Hz, damping {used.shaper.damping:.3g}"
-        left = f"leaves {100 * used.shaper.worst:.2g} % of the vibration over its interval"
-        say(f"  Input shaper: {said}; {1e3 * used.shaper.duration:.3g} ms longer, {left}.")
-    if used.notch is not None:
-        say(f"  A notch at {used.notch.frequency:.4g} Hz changes the phase at the crossover by {-used.notch.phase_cost:+.2g} degrees.")
-    for item in (*used.tables, *([used.friction] if used.friction is not None else [])):
-        say(f"  Table {item.name}: {item.before:.3g} {item.unit} rms, known to {item.after:.2g}; {item.meaning}.")
-    if used.gap is not None:
-        say(f"  Backlash {moved(used.gap.value, units.output)}: {used.gap.meaning}.")
-    if used.fastest is not None:
-        f = used.fastest
-        scale, unit = motion(units.output)
-        speeds = f"{scale * f.bounds.speed:.3g} {unit}/s, {scale * f.bounds.acceleration:.4g} {unit}/s2"
-        kept = f"{100 * f.reserve:.0f} % of {used.limit:.4g} {units.input} kept ({used.limit_from})"
-        say(f"  Fastest S-curve over the travel with {kept}: {speeds}, {f.path.seconds:.3g} s.")
-    if used.predicted is not None:
-        p = used.predicted
-        off = [f"{100 * value / p.voltage:.3g} %" for value in (p.inertia, p.simple, p.whole)]
-        say(
-            f"  The recorded input below {p.below:.3g} Hz, predicted from the recorded motion, is off by {off[0]} with kV and kA alone, "
-            f"{off[1]} with kS, {off[2]} with the whole feedforward."
-        )
-    errors = [
-        (
-            item.path,
-            *(bare(value, units.output) for value in (item.feedback, item.simple, item.whole, item.worst)),
-            f"{item.largest:.3g}",
-        )
-        for item in used.tracking
-    ]
-    if errors:
-        columns = ("path", "feedback", "+ kS kV kA", "+ whole", "worst", f"largest {units.input}")
-        table(f"axis {name}: simulated tracking error, rms, {motion(units.output)[1]}", columns, errors)
-    for effect, why in used.not_undone:
-        say(f"  The feedforward leaves {effect}: {why}.")
-    for what, why in used.refused:
-        say(f"  No {what}: {why}")
-    say()
-
-
-def _mode(mode: Swing) -> str:
-    held = f"{mode.held.value:.4g} Hz with the encoder's side held (damping {mode.held_damping:.3g})"
-    return f"Mode: {held}, {mode.free.value:.4g} Hz free ({mode.free_damping:.3g})."
-
-
-def _answer(used: Used) -> dict[str, Any]:
-    """Everything but the model, which has a file of its own, and the paths."""
-    names = ("sampling_rate", "limit", "limit_from", "travel", "friction", "tables", "gap", "modes", "notch", "shaper", "predicted", "tracking")
-    found: dict[str, Any] = {name: getattr(used, name) for name in names}
-    found["gains"] = {
-        item.name: {"value": item.value, "unit": item.unit, "ci95": [item.low, item.high], "determined": item.determined, "because": item.because}
-        for item in used.gains.items
-    }
-    loop = used.feedback
-    servo = ("position_gain", "velocity_gain", "integral_time")
-    found["feedback"] = None if loop is None else {**plain(loop), **{name: getattr(loop, name) for name in servo}}
-    found["state_feedback"] = plain(used.states) if used.states is not None else None
-    quick = used.fastest
-    found["fastest"] = None if quick is None else {"bounds": quick.bounds, "voltage": quick.voltage, "seconds": quick.path.seconds}
-    found["refused"] = [{"what": what, "reason": why} for what, why in used.refused]
-    found["not_undone"] = [{"effect": name, "reason": why} for name, why in used.not_undone]
-    found["notes"] = used.notes
-    return found

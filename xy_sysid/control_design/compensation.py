@@ -21,7 +21,7 @@ from xy_sysid.axis.model import AxisModel
 from xy_sysid.control_design.closed_loop import Controller, Encoder, follow_path, shake
 from xy_sysid.control_design.gains import Gains, simple_feedforward
 from xy_sysid.control_design.inverse import feedforward
-from xy_sysid.control_design.laws import along, force
+from xy_sysid.control_design.laws import along, ask, force, of_category
 from xy_sysid.control_design.limits import RESERVE
 from xy_sysid.control_design.path import Moves, SampledPath, of_position
 from xy_sysid.errors import BadInput
@@ -29,6 +29,7 @@ from xy_sysid.samples.block import FloatArray
 
 ACROSS = 0.02  # s in which the correction by direction crosses a gap: a step of the path would hammer at it
 SLOWED, SLOWINGS = 0.7, 6  # of the speed, again and again, where the drive would reach its limit
+DRY, GONE = "coulomb_friction", 0.01  # the law of friction that is the same at every speed; part of it that is as good as nothing
 RIGID = "base"  # what no model is without: gain, pole and delay
 SIMPLE = "kS kV kA"
 
@@ -40,7 +41,8 @@ class Compensation:
     path: what the encoder is asked to show; voltage: (n,) V, added to the feedback
     terms: laws that are undone; left: (law, why) of those that are not
     feedback, simple, chosen: tracking error of the worst sample of the parameters, m rms: alone, with kS kV kA, with what was chosen
-    largest: V, that any sample's drive gives
+    centre: the same three of the model itself; largest: V, that any sample's drive gives
+    inverse: the model with the laws that are undone, of which ``voltage`` is the feedforward; None with kS, kV and kA
     """
 
     path: SampledPath
@@ -51,17 +53,31 @@ class Compensation:
     simple: float
     chosen: float
     largest: float
+    centre: tuple[float, float, float]
+    inverse: AxisModel | None
+
+
+def left_words(left: Sequence[tuple[str, str]]) -> str:
+    """``, but not A and B (why)`` of laws that are left; empty where none is."""
+    names: dict[str, list[str]] = {}
+    for name, why in left:
+        names.setdefault(why, []).append(name)
+    return "".join(f", but not {' and '.join(own)} ({why})" for why, own in names.items())
 
 
 @dataclass(frozen=True, slots=True)
 class _Tried:
-    """A choice of laws: what the encoder has to show, the voltage, and for each sample the error, m rms, and the largest voltage, V."""
+    """A choice of laws: what the encoder has to show, the voltage, and for each sample the error, m rms, and the largest voltage, V.
+
+    inverse: the model with these laws; None with kS, kV and kA
+    """
 
     terms: tuple[str, ...]
     path: SampledPath
     voltage: FloatArray
     errors: FloatArray
     largest: float
+    inverse: AxisModel | None = None
 
     def against(self, other: _Tried) -> float:
         """The error of the worst sample over that of another choice."""
@@ -98,10 +114,13 @@ def _flank(model: AxisModel, path: SampledPath, rub: float) -> FloatArray:
     return np.asarray(0.5 * (way + np.sign(load * math.copysign(1.0, model.gain) + rub * way)))
 
 
-def alike(model: AxisModel) -> tuple[AxisModel, ...]:
-    """The model written with other effects that are the very same law while it slides, and differ at rest: a sum's parts, and half of each way."""
+def alike(model: AxisModel, sampling_rate: float) -> tuple[AxisModel, ...]:
+    """The model written with other effects that are the very same law while it slides, and differ at rest.
+
+    They are a sum's parts, half of each way, and the friction without a breakaway that is over before a sample shows it; sampling_rate: Hz
+    """
     joined = model.joined()
-    found: list[AxisModel] = [joined]
+    found: list[AxisModel] = [joined, _without_breakaway(model, sampling_rate)]
     for name, values in joined.effects:
         whole = joined.library[name].sum_of
         if whole is None or any(part in dict(joined.effects) for part in whole.parts):
@@ -114,6 +133,18 @@ def alike(model: AxisModel) -> tuple[AxisModel, ...]:
         both = ((name, whole.joined((first, half))), (whole.parts[1], (0.5 * added[0], *added[1:])))
         found += [apart, replace(joined, effects=(*rest, *both), per_recording=())]
     return tuple(item for item in found if item.effects != model.effects)
+
+
+def _without_breakaway(model: AxisModel, sampling_rate: float) -> AxisModel:
+    """The model with Coulomb friction in place of a friction whose breakaway has gone at the speed that it gives the axis within one sample."""
+    for effect, values in of_category(model, "friction"):
+        words = {"direction": 1.0}
+        breakaway, slides = (ask(effect, values, "level", {**words, "v": v}) for v in (0.0, abs(model.gain)))
+        after = abs(model.gain) * model.pole * (breakaway - slides) / sampling_rate
+        if DRY not in dict(model.effects) and after > 0.0 and abs(ask(effect, values, "level", {**words, "v": after}) - slides) < GONE * slides:
+            rest = tuple(item for item in model.effects if item[0] != effect.name)
+            return replace(model, effects=(*rest, (DRY, (slides,))), per_recording=())
+    return model
 
 
 def at_its_bound(model: AxisModel) -> str:
@@ -133,13 +164,14 @@ def compensate(models: Sequence[AxisModel], found: Gains, path: SampledPath, con
 
     models: the model and samples of its parameters (``uncertain.samples``); encoder: with its noise presliding friction creeps while the axis rests
     """
-    others = alike(models[0])
+    others = alike(models[0], path.sampling_rate)
     judges = (*models, *others)
 
-    def judged(terms: tuple[str, ...], wanted: SampledPath, voltage: FloatArray) -> _Tried:
+    def judged(terms: tuple[str, ...], wanted: SampledPath, voltage: FloatArray, inverse: AxisModel | None = None) -> _Tried:
         runs = [follow_path(model, wanted, controller, voltage, encoder) for model in judges]
         errors = np.array([_rms(path.position - run.carried) for run in runs])
-        return _Tried(terms=terms, path=wanted, voltage=voltage, errors=errors, largest=max(float(np.max(np.abs(run.voltage))) for run in runs))
+        largest = max(float(np.max(np.abs(run.voltage))) for run in runs)
+        return _Tried(terms=terms, path=wanted, voltage=voltage, errors=errors, largest=largest, inverse=inverse)
 
     noise = shake(models[0], float(path.position[0]), path.sampling_rate, controller, encoder or Encoder())
 
@@ -147,13 +179,14 @@ def compensate(models: Sequence[AxisModel], found: Gains, path: SampledPath, con
         def these(terms: tuple[str, ...]) -> _Tried:
             kept = replace(model, effects=tuple(item for item in model.effects if item[0] in terms))
             wanted = asked_of_encoder(model, path, terms)
-            return judged(terms, wanted, feedforward(kept, wanted, noise).voltage)
+            return judged(terms, wanted, feedforward(kept, wanted, noise).voltage, kept)
 
         return these
 
     simple = judged((), path, simple_feedforward(found, path))
     stretched = at_its_bound(models[0])
-    reason = f"{stretched} is at its bound, so that another law acts" if stretched else f"{SIMPLE} alone are better for a sample of the parameters"
+    better = "they are better than the whole feedforward for a sample of the parameters"
+    reason = f"{stretched} is at its bound, so that another law acts" if stretched else better
     best, left = simple, tuple((name, reason) for name, _ in models[0].effects)
     for model in (models[0], *others) if not stretched else ():
         whole, gone = _worth_undoing(model, undoing(model), simple)
@@ -169,6 +202,8 @@ def compensate(models: Sequence[AxisModel], found: Gains, path: SampledPath, con
         simple=float(np.max(simple.errors)),
         chosen=float(np.max(best.errors)),
         largest=best.largest,
+        centre=(float(alone.errors[0]), float(simple.errors[0]), float(best.errors[0])),
+        inverse=best.inverse,
     )
 
 

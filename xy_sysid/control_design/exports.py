@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from xy_sysid.control_design import fmu, snippets, state_text, to_c, to_matlab, to_python
+from xy_sysid.control_design.compensation import SIMPLE, left_words
 from xy_sysid.control_design.mjcf import mjcf
 from xy_sysid.control_design.program import Program, program
 from xy_sysid.control_design.sdf import sdf
@@ -53,7 +54,18 @@ def _program(used: Used) -> tuple[Program, str, str]:
     """The program, a name for it, and a title."""
     effects = ", ".join(used.model.effects) or "rigid"
     title = f"axis {used.axis} ({effects}): {used.model.units.input} to {used.model.units.output} at {used.sampling_rate:g} Hz, by xy_sysid"
-    return program(used.model.model, used.sampling_rate), plain_name(used.axis), title
+    chosen = used.compensation
+    return program(used.model.model, used.sampling_rate, None if chosen is None else chosen.inverse), plain_name(used.axis), title
+
+
+def _inverse_note(used: Used) -> str:
+    """What the exported feedforward undoes, and whether to use it."""
+    chosen = used.compensation
+    if chosen is None:
+        return "the feedforward undoes every law of the model; no path was simulated with it"
+    if chosen.inverse is None:
+        return f"the feedforward undoes every law of the model, but {SIMPLE} alone are predicted to follow a path better: use these"
+    return f"the feedforward undoes {', '.join(chosen.terms)}{left_words(chosen.left)}"
 
 
 def plain_name(axis: str) -> str:
@@ -66,14 +78,18 @@ def c_source(used: Used) -> Exported:
     """Simulation and feedforward in C."""
     of, name, title = _program(used)
     header, text = to_c.source(of, name, title)
-    return Exported({f"{name}.h": header, f"{name}.c": text}, f"C99, no dependencies: {name}_step simulates, {name}_feedforward is the inverse")
+    return Exported(
+        {f"{name}.h": header, f"{name}.c": text},
+        f"C99, no dependencies: {name}_step simulates, {name}_feedforward is the inverse; {_inverse_note(used)}",
+    )
 
 
 def python_source(used: Used) -> Exported:
     """Simulation and feedforward in Python."""
     of, name, title = _program(used)
     return Exported(
-        {f"{name}.py": to_python.source(of, title)}, "no dependencies: Axis().step(u) simulates, Feedforward().input(r, v, a) is the inverse"
+        {f"{name}.py": to_python.source(of, title)},
+        f"no dependencies: Axis().step(u) simulates, Feedforward().input(r, v, a) is the inverse; {_inverse_note(used)}",
     )
 
 
@@ -85,7 +101,7 @@ def matlab_source(used: Used) -> Exported:
     known = {"parameters": values, "rate": used.sampling_rate}
     content = {**known, "ci95": intervals} if intervals else known
     gains = {item.name.replace(" ", "_"): item.value for item in used.gains.items}
-    note = f"load {name}.mat for the numbers; {name}.m is one function for scripts and MATLAB Function blocks"
+    note = f"load {name}.mat for the numbers; {name}.m is one function for scripts and MATLAB Function blocks; {_inverse_note(used)}"
     return Exported({f"{name}.m": to_matlab.source(of, name, title)}, note, mat={f"{name}.mat": {**content, "gains": gains}})
 
 

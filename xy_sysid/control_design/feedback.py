@@ -16,17 +16,18 @@ import numpy as np
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.comparison.physical_model import PhysicalModel
 from xy_sysid.control_design.closed_loop import NO_LIMIT, Controller, Encoder
-from xy_sysid.control_design.sampled import Sampled, closed_poles, controller_response, noise_to_voltage, sampled
+from xy_sysid.control_design.sampled import Sampled, closed_poles, controller_response, grid, noise_to_voltage, on_grid, sampled
 from xy_sysid.control_design.uncertain import samples, undetermined
 from xy_sysid.errors import BadInput
+from xy_sysid.response.frf import ComplexArray
 from xy_sysid.samples.block import FloatArray
 
 POSITION, INTEGRAL = 4.0, 10.0  # times below the crossover where position loop and integral begin: they cost 14 and 6 degrees there
 DERIVATIVE = 8.0  # times above it where the derivative is cut: 7 degrees
 PHASE_MARGIN, GAIN_MARGIN = 45.0, 2.0  # degrees, and times: Astrom & Murray, Feedback Systems, 2nd ed., sec. 10.3 ask for 30 to 60 and 2 to 5
+MOST_PHASE, MOST_GAIN = 90.0, 100.0  # that may be asked for
 COUNT = 24  # samples of the parameters
 STEPS = 60  # crossovers that are tried
-LINES = 600  # frequencies of a response
 HIGHEST = 0.25  # of the sampling rate, for a crossover
 ADVICE = "Ask for less bandwidth or smaller margins, or sample faster."
 
@@ -43,26 +44,64 @@ class Margins:
 
 
 @dataclass(frozen=True, slots=True)
+class Asked:
+    """What a loop is asked for. phase: degrees; gain: times, upwards; bandwidth: crossover, Hz (None: the largest). Raises BadInput."""
+
+    phase: float = PHASE_MARGIN
+    gain: float = GAIN_MARGIN
+    bandwidth: float | None = None
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.phase < MOST_PHASE:
+            raise BadInput("phase margin", f"{self.phase:g} degrees", f"above 0, below {MOST_PHASE:g} degrees", "Ask for 30 to 60 degrees.")
+        if not 1.0 < self.gain <= MOST_GAIN:
+            raise BadInput("gain margin", f"{self.gain:g}", f"above 1, up to {MOST_GAIN:g} (times, not dB)", "Ask for 2 to 5.")
+
+    def tries(self, sampling_rate: float, steps: int) -> list[float]:
+        """Hz, the bandwidths that are tried, the largest first. Raises BadInput out of range."""
+        if self.bandwidth is None:
+            return [float(item) for item in np.geomspace(HIGHEST * sampling_rate, 1e-4 * sampling_rate, steps)]
+        if not 0.0 < self.bandwidth <= HIGHEST * sampling_rate:
+            raise BadInput("bandwidth", f"{self.bandwidth:g} Hz", f"above 0, up to {HIGHEST * sampling_rate:g} Hz", "Give another.")
+        return [self.bandwidth]
+
+    def refused(self, what: str, worst: Margins) -> BadInput:
+        """What to raise where no bandwidth has the margins; worst: margins of the last one."""
+        said = f"phase margin {worst.phase:.3g} degrees and gain margin {worst.gain:.3g}" if worst.stable else "unstable"
+        given = f"{self.bandwidth:g} Hz" if self.bandwidth is not None else "any"
+        return BadInput(what, f"{given}: {said}", f"at least {self.phase:g} degrees and {self.gain:g}", ADVICE)
+
+    def met(self, found: Margins) -> bool:
+        """Whether a loop is stable and keeps both."""
+        return found.stable and found.phase >= self.phase and found.gain >= self.gain
+
+
+USUAL = Asked()
+
+
+@dataclass(frozen=True, slots=True)
 class Feedback:
     """A controller with what it is worth.
 
     controller: as ``closed_loop`` runs it; sampling_rate: Hz; crossover: rad/s asked for
-    nominal, worst: margins of the model, and the least of each over the samples; count: of these
-    bare: the least margins without the filter on the derivative, which some controllers lack
+    asked: margins that were asked for; nominal, worst: those of the model, and the least of each over the samples; count: of these
+    bare, counted: the least margins without the filter on the derivative, which some controllers lack, and with times in whole ms
     bandwidth: Hz, where the closed loop falls below -3 dB
-    noise: V rms that encoder noise and counting make; allowed: what limits the bandwidth, in words
+    noise: V rms that encoder noise and counting make; short: the margin that allows no more bandwidth, ``phase`` or ``gain``
     """
 
     controller: Controller
     sampling_rate: float
     crossover: float
+    asked: Asked
     nominal: Margins
     worst: Margins
     bare: Margins
+    counted: Margins
     count: int
     bandwidth: float
     noise: float
-    allowed: str
+    short: str
 
     @property
     def position_gain(self) -> float:
@@ -103,26 +142,30 @@ def _sign(system: Sampled) -> float:
 
 
 def margins(system: Sampled, controller: Controller) -> Margins:
-    """Of the sampled loop. Source: Astrom & Murray, Feedback Systems, 2nd ed., sec. 10.3."""
-    rate = system.sampling_rate
-    frequency = np.geomspace(2e-4 * rate, 0.499 * rate, LINES)
-    loop = system.response(frequency) * controller_response(controller, frequency, rate)
+    """Of the sampled loop."""
+    loop = on_grid(system) * controller_response(controller, grid(system.sampling_rate), system.sampling_rate)
+    return margins_of(loop, system.sampling_rate, closed_poles(system, controller))
+
+
+def margins_of(loop: ComplexArray, sampling_rate: float, poles: ComplexArray) -> Margins:
+    """Of an open loop at the frequencies of ``grid``; poles: of the closed loop. Source: Astrom & Murray, Feedback Systems, 2nd ed., sec. 10.3."""
+    frequency = grid(sampling_rate)
     size, turn = np.abs(loop), np.unwrap(np.angle(loop))
     crossing = np.flatnonzero((size[:-1] - 1.0) * (size[1:] - 1.0) <= 0.0)
-    phases = [float(np.angle(-loop[k] if abs(size[k] - 1.0) < abs(size[k + 1] - 1.0) else -loop[k + 1], deg=True)) for k in crossing]
+    phases = [float(abs(np.angle(-loop[k] if abs(size[k] - 1.0) < abs(size[k + 1] - 1.0) else -loop[k + 1], deg=True))) for k in crossing]
     odd = np.floor((turn + math.pi) / (2.0 * math.pi))
     passing = np.flatnonzero((odd[:-1] != odd[1:]) & (size[:-1] < 1.0))
-    gains = [1.0 / float(size[k]) for k in passing]
     return Margins(
-        phase=min((abs(item) for item in phases), default=180.0),
-        gain=min(gains, default=math.inf),
+        phase=min(phases, default=180.0),
+        gain=min((1.0 / float(size[k]) for k in passing), default=math.inf),
         sensitivity=float(np.max(1.0 / np.abs(1.0 + loop))),
         crossover=float(frequency[crossing[-1]]) if crossing.size else 0.0,
-        stable=bool(np.max(np.abs(closed_poles(system, controller))) < 1.0),
+        stable=bool(np.max(np.abs(poles)) < 1.0),
     )
 
 
-def _least(found: Sequence[Margins]) -> Margins:
+def least(found: Sequence[Margins]) -> Margins:
+    """The least of each margin, and the largest sensitivity."""
     return Margins(
         phase=min(item.phase for item in found),
         gain=min(item.gain for item in found),
@@ -135,12 +178,12 @@ def _least(found: Sequence[Margins]) -> Margins:
 def feedback(
     model: PhysicalModel,
     sampling_rate: float,
-    bandwidth: float | None = None,
+    asked: Asked = USUAL,
     sections: FloatArray | None = None,
     encoder: Encoder | None = None,
     limit: float = NO_LIMIT,
 ) -> Feedback:
-    """The controller of the largest crossover, or of ``bandwidth`` Hz, whose margins hold for every sample of the parameters.
+    """The controller of the largest crossover, or of that which is asked for, whose margins hold for every sample of the parameters.
 
     sections: filters that the feedback passes, (k, 5); encoder: whose noise is counted; limit: of the drive, V
     Raises BadInput where gain or pole are not determined by the data, or where no bandwidth has the margins.
@@ -152,29 +195,21 @@ def feedback(
         )
     filters = np.zeros((0, 5)) if sections is None else sections
     own = samples(model, COUNT)
-    systems = [sampled(item, sampling_rate) for item in (*own, *_within_a_gap(own[0]))]
-    if bandwidth is not None:
-        if not 0.0 < bandwidth <= HIGHEST * sampling_rate:
-            raise BadInput("bandwidth", f"{bandwidth:g} Hz", f"above 0, up to {HIGHEST * sampling_rate:g} Hz", "Give another.")
-        tries = np.array([2.0 * math.pi * bandwidth])
-    else:
-        tries = 2.0 * math.pi * np.geomspace(HIGHEST * sampling_rate, 1e-4 * sampling_rate, STEPS)
+    systems = [sampled(item, sampling_rate) for item in (*own, *within_a_gap(own[0]))]
     worst = Margins(phase=0.0, gain=0.0, sensitivity=math.inf, crossover=0.0, stable=False)
-    for crossover in tries.tolist():
+    for crossover in (2.0 * math.pi * item for item in asked.tries(sampling_rate, STEPS)):
         controller = shaped(systems[0], crossover, filters, limit)
         nominal = margins(systems[0], controller)
-        if not holds(nominal):
+        if not asked.met(nominal):
             worst = nominal
             continue
-        worst = _least([margins(system, controller) for system in systems])
-        if holds(worst):
-            return _made(systems, controller, crossover, (nominal, worst), encoder or Encoder())
-    said = f"phase margin {worst.phase:.3g} degrees and gain margin {worst.gain:.3g}" if worst.stable else "unstable"
-    what = f"{bandwidth:g} Hz" if bandwidth is not None else "any"
-    raise BadInput("bandwidth", f"{what}: {said}", f"at least {PHASE_MARGIN:g} degrees and {GAIN_MARGIN:g}", ADVICE)
+        worst = least([margins(system, controller) for system in systems])
+        if asked.met(worst):
+            return _made(systems, controller, crossover, asked, (nominal, worst), encoder or Encoder())
+    raise asked.refused("bandwidth", worst)
 
 
-def _within_a_gap(model: AxisModel) -> tuple[AxisModel, ...]:
+def within_a_gap(model: AxisModel) -> tuple[AxisModel, ...]:
     """The motor alone, where an effect says what share of the mass it has: across an open gap the loop meets less mass, and must hold there, too."""
     found = []
     for name, values in model.effects:
@@ -184,34 +219,37 @@ def _within_a_gap(model: AxisModel) -> tuple[AxisModel, ...]:
     return tuple(found)
 
 
-def holds(found: Margins) -> bool:
-    """Enough phase and gain are left."""
-    return found.stable and found.phase >= PHASE_MARGIN and found.gain >= GAIN_MARGIN
+def in_milliseconds(controller: Controller) -> Controller:
+    """The controller with its integral, derivative and filter times rounded to whole milliseconds, at least one."""
+
+    def rounded(seconds: float) -> float:
+        return 1e-3 * max(round(1e3 * seconds), 1.0)
+
+    kp = controller.kp
+    ki, kd = kp / rounded(kp / controller.ki), kp * rounded(controller.kd / kp)
+    return replace(controller, ki=ki, kd=kd, derivative_time=rounded(controller.derivative_time))
 
 
-def _made(systems: list[Sampled], controller: Controller, crossover: float, found: tuple[Margins, Margins], encoder: Encoder) -> Feedback:
+def _made(
+    systems: list[Sampled], controller: Controller, crossover: float, asked: Asked, found: tuple[Margins, Margins], encoder: Encoder
+) -> Feedback:
     rate = systems[0].sampling_rate
-    frequency = np.geomspace(1e-4 * rate, 0.499 * rate, LINES)
-    loop = systems[0].response(frequency) * controller_response(controller, frequency, rate)
+    frequency = grid(rate)
+    loop = on_grid(systems[0]) * controller_response(controller, frequency, rate)
     low = np.flatnonzero(np.abs(loop / (1.0 + loop)) < math.sqrt(0.5))
     seen = math.hypot(encoder.noise, encoder.count / math.sqrt(12.0))
     worst = found[1]
-    short = "phase" if worst.phase / PHASE_MARGIN < worst.gain / GAIN_MARGIN else "gain"
     return Feedback(
         controller=controller,
         sampling_rate=rate,
         crossover=crossover,
+        asked=asked,
         nominal=found[0],
         worst=worst,
-        bare=_least([margins(system, replace(controller, derivative_time=0.0)) for system in systems]),
+        bare=least([margins(system, replace(controller, derivative_time=0.0)) for system in systems]),
+        counted=least([margins(system, in_milliseconds(controller)) for system in systems]),
         count=len(systems),
         bandwidth=float(frequency[low[0]]) if low.size else 0.5 * rate,
         noise=seen * max(noise_to_voltage(system, controller) for system in systems[:4]),
-        allowed=f"the {short} margin is what limits it ({_cost(systems[0], crossover)})",
+        short="phase" if worst.phase / asked.phase < worst.gain / asked.gain else "gain",
     )
-
-
-def _cost(system: Sampled, crossover: float) -> str:
-    """What the delay takes from the phase at the crossover."""
-    late = (system.whole + 0.5) / system.sampling_rate
-    return f"delay and hold take {math.degrees(crossover * late):.2g} degrees at the crossover"

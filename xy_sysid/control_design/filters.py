@@ -37,19 +37,26 @@ class Swing:
 
 
 @dataclass(frozen=True, slots=True)
-class Notch:
-    """A second-order section that takes a resonance out of the loop.
+class LoopFilter:
+    """A second-order section in the loop: a notch that takes a resonance out, or a low-pass.
 
-    frequency: Hz; depth: gain at it, 0 to 1; width: damping ratio of its poles; section: (5,) b0, b1, b2, a1, a2 at the sampling rate
-    phase_cost: degrees at the crossover that it was asked for; covers: whether its -3 dB width holds the interval of the frequency
+    kind: ``notch`` or ``low-pass``; frequency: Hz, of the resonance or the cut; depth: gain at it; width: damping ratio of its poles
+    section: (5,) b0, b1, b2, a1, a2 at the sampling rate, Hz; covers: whether a notch's -3 dB width holds the interval of the frequency
     """
 
+    kind: str
     frequency: float
     depth: float
     width: float
     section: FloatArray
-    phase_cost: float
-    covers: bool
+    sampling_rate: float
+    covers: bool = True
+
+    def phase_cost(self, at: float) -> float:
+        """Degrees that it takes at a frequency, Hz."""
+        z = cmath.exp(2j * math.pi * at / self.sampling_rate)
+        b0, b1, b2, a1, a2 = self.section.tolist()
+        return -math.degrees(cmath.phase((b0 + b1 / z + b2 / z**2) / (1.0 + a1 / z + a2 / z**2)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,8 +122,8 @@ def _pairs(model: AxisModel) -> tuple[list[tuple[float, float]], list[tuple[floa
     return parts[0], parts[1]
 
 
-def notch(mode: Swing, sampling_rate: float, crossover: float) -> Notch:
-    """The notch of a mode's resonance, as deep as the resonance is high and as wide as its interval; crossover: Hz, where its phase is counted.
+def notch(mode: Swing, sampling_rate: float) -> LoopFilter:
+    """The notch of a mode's resonance, as deep as the resonance is high and as wide as its interval.
 
     Its zeros have the damping of the resonance. Source: Franklin, Powell & Emami-Naeini, Feedback Control of Dynamic Systems, 7th ed., sec. 6.7.
     """
@@ -128,16 +135,24 @@ def notch(mode: Swing, sampling_rate: float, crossover: float) -> Notch:
     bottom = [1.0, 2.0 * width * w, w * w]
     warp = w / (2.0 * math.tan(0.5 * w / sampling_rate)) if w < math.pi * sampling_rate * 0.95 else sampling_rate
     b, a = scipy.signal.bilinear(top, bottom, warp)
-    z = cmath.exp(2j * math.pi * crossover / sampling_rate)
-    own = (b[0] + b[1] / z + b[2] / z**2) / (1.0 + a[1] / z + a[2] / z**2)
-    return Notch(
+    section = np.array([b[0], b[1], b[2], a[1], a[2]])
+    return LoopFilter(
+        kind="notch",
         frequency=f,
         depth=mode.free_damping / width,
         width=width,
-        section=np.array([b[0], b[1], b[2], a[1], a[2]]),
-        phase_cost=-math.degrees(cmath.phase(own)),
+        section=section,
+        sampling_rate=sampling_rate,
         covers=width >= spread,
     )
+
+
+def low_pass(frequency: float, sampling_rate: float) -> LoopFilter:
+    """A Butterworth low-pass of second order with its cut at a frequency below half the sampling rate, Hz."""
+    b, a = scipy.signal.butter(2, frequency, fs=sampling_rate)
+    section = np.array([b[0], b[1], b[2], a[1], a[2]])
+    half = math.sqrt(0.5)
+    return LoopFilter(kind="low-pass", frequency=frequency, depth=half, width=half, section=section, sampling_rate=sampling_rate)
 
 
 def shapers(mode: Swing) -> tuple[Shaper, ...]:

@@ -22,7 +22,7 @@ from xy_sysid.effects._contract import arguments
 from xy_sysid.jit import compiled_text
 from xy_sysid.samples.block import FloatArray
 
-HALF = 0.5  # of a sample: by which a held voltage acts late in the mean, and as much again behind each lag
+HALF = 0.5  # of a sample: by which a held voltage acts late in the mean
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,9 +67,13 @@ def feedforward(model: AxisModel, path: SampledPath, shake: float = 0.0) -> Feed
 
 
 def ahead_of(model: AxisModel, sampling_rate: float) -> float:
-    """s by which a path is looked at ahead: delay, half a sample of the hold, and half a sample of each lag's."""
-    lags = sum(lag_of(model.library[name], values) is not None for name, values in model.effects)
-    return model.delay + HALF * (1 + lags) / sampling_rate
+    """s by which a path is looked at ahead: delay, half a sample of the hold, and what the inverse of each lag leaves of its time constant.
+
+    That inverse is total + (total - old) / (exp(h / lag) - 1), which leads by h / (exp(h / lag) - 1) at low frequencies; h: a sample, s.
+    """
+    h = 1.0 / sampling_rate
+    lags = [lag for lag in (lag_of(model.library[name], values) for name, values in model.effects) if lag is not None]
+    return model.delay + HALF * h + sum(lag - h * math.exp(-h / lag) / -math.expm1(-h / lag) for lag in lags if lag > 0.0)
 
 
 def not_undone(model: AxisModel) -> tuple[tuple[str, str], ...]:

@@ -60,6 +60,10 @@ class SampledPath:
         """Length in time."""
         return self.position.size / self.sampling_rate
 
+    def part(self, start: int, end: int) -> SampledPath:
+        """Its samples from ``start`` to before ``end``."""
+        return SampledPath(self.sampling_rate, self.position[start:end], self.speed[start:end], self.acceleration[start:end])
+
     def ahead(self, seconds: float) -> SampledPath:
         """The same path as it will be so much later; it stands at its end."""
         times = np.arange(self.position.size) + seconds * self.sampling_rate

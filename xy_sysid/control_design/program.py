@@ -15,7 +15,7 @@ from typing import Any
 
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.control_design import series
-from xy_sysid.control_design.inverse import guided, parts_of_sample
+from xy_sysid.control_design.inverse import ahead_of, guided, parts_of_sample
 from xy_sysid.control_design.inverse_text import InverseText
 from xy_sysid.control_design.law_text import NUMBERS
 from xy_sysid.control_design.sample_step import SERIES, Plant, plant
@@ -34,7 +34,7 @@ class Program:
     """functions: in the order in which they call one another; step, feedforward: names of the last two, of one sample each
 
     arrays: constants by name; states, room: numbers of the state and of the scratch array; parts: of a sample in the feedforward
-    plant: what it is of
+    plant: what it is of; ahead: s by which the feedforward looks at the path ahead
     """
 
     functions: tuple[ast.FunctionDef, ...]
@@ -43,6 +43,7 @@ class Program:
     room: int
     parts: int
     plant: Plant
+    ahead: float
 
     @property
     def rate(self) -> float:
@@ -50,25 +51,34 @@ class Program:
         return self.plant.sampling_rate
 
 
-def program(model: AxisModel, sampling_rate: float) -> Program:
-    """The model at one rate. Raises BadInput for an effect whose law is written in more than this language has."""
+def program(model: AxisModel, sampling_rate: float, inverse: AxisModel | None = None) -> Program:
+    """The model at one rate. Raises BadInput for an effect whose law is written in more than this language has.
+
+    inverse: the model whose laws the feedforward undoes; the model itself where none is given
+    """
     ready = plant(model, sampling_rate, whole=False)
-    hanging = ready.layout.hanging
-    whole = {name: str(round(ready.number(name))) if name in NAMED else repr(ready.number(name)) for name in NUMBERS}
-    effects = ready.layout.effects
-    texts = [StepText(effects, hanging, model, whole).text("one_sample"), InverseText(effects, hanging, model, whole).text("one_input")]
+    undone = ready if inverse is None else plant(inverse, sampling_rate, whole=False)
+    step = StepText(ready.layout.effects, ready.layout.hanging, model, _numbers(ready)).text("one_sample")
+    back = InverseText(undone.layout.effects, undone.layout.hanging, undone.model, _numbers(undone)).text("one_input")
+    effects = {effect.name: effect for effect in (*ready.layout.effects, *undone.layout.effects)}.values()
     laws = [_function(item, called(effect, name)) for effect in effects if effect.category != "motion" for name, item in effect.functions.items()]
     own = [_function(item, name, {"TERMS": series.TERMS, "ROUNDS": series.ROUNDS}) for name, item in SERIES.items()]
-    last = [_only(ast.parse(text)) for text in texts]
+    last = [_only(ast.parse(text)) for text in (step, back)]
     used = _reached(last, [*laws, *own])
     return Program(
         functions=(*used, *last),
-        arrays={"MOVING": ready.moving, "STILL": ready.still, "GUIDED": guided(ready)},
-        states=ready.rest().size,
-        room=ROOM * ready.order,
-        parts=parts_of_sample(ready),
+        arrays={"MOVING": ready.moving, "STILL": ready.still, "LED": undone.moving, "GUIDED": guided(undone)},
+        states=max(ready.rest().size, undone.rest().size),
+        room=ROOM * max(ready.order, undone.order),
+        parts=parts_of_sample(undone),
         plant=ready,
+        ahead=ahead_of(undone.model, sampling_rate),
     )
+
+
+def _numbers(ready: Plant) -> dict[str, str]:
+    """The numbers of a plant as text."""
+    return {name: str(round(ready.number(name))) if name in NAMED else repr(ready.number(name)) for name in NUMBERS}
 
 
 def _function(item: Callable[..., Any], name: str, known: dict[str, Any] | None = None) -> ast.FunctionDef:

@@ -5,6 +5,7 @@ Source: Astrom & Wittenmark, Computer-Controlled Systems, 3rd ed., Prentice Hall
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,9 +19,11 @@ from xy_sysid.response.frf import ComplexArray
 from xy_sysid.samples.block import FloatArray
 
 EVENLY = 2048  # frequencies of a mean over all of them
+LINES = 600  # frequencies of a response
+KEPT = 256  # sampled models, and responses, that are remembered: those of a design are asked for again and again
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Sampled:
     """x+ = a x + old u[k - whole - 1] + new u[k - whole], y = x[0], in m.
 
@@ -59,6 +62,18 @@ class Sampled:
         return a, b, c
 
 
+def grid(sampling_rate: float) -> FloatArray:
+    """(n,) Hz, frequencies at which a loop is looked at."""
+    return np.geomspace(2e-4 * sampling_rate, 0.499 * sampling_rate, LINES)
+
+
+@functools.lru_cache(maxsize=KEPT)
+def on_grid(system: Sampled) -> ComplexArray:
+    """(n,) its response at the frequencies of ``grid``."""
+    return system.response(grid(system.sampling_rate))
+
+
+@functools.lru_cache(maxsize=KEPT)
 def sampled(model: AxisModel, sampling_rate: float) -> Sampled:
     """Base, resonances, lags and delay of a model; everything else is left out."""
     ready = plant(model, sampling_rate)
@@ -94,6 +109,17 @@ def controller_response(controller: Controller, frequency: FloatArray, sampling_
     for b0, b1, b2, a1, a2 in controller.sections:
         found = found * (b0 + b1 / z + b2 / z**2) / (1.0 + a1 / z + a2 / z**2)
     return np.asarray(found)
+
+
+def coefficients(controller: Controller, sampling_rate: float) -> FloatArray:
+    """(1 + k, 5) b0, b1, b2, a1, a2 of the PID and of each filter behind it: u[n] = b0 e[n] + b1 e[n-1] + b2 e[n-2] - a1 u[n-1] - a2 u[n-2]."""
+    h, keeps = 1.0 / sampling_rate, controller.keeps(sampling_rate)
+    bottom = np.polymul([1.0, -1.0], [1.0, -keeps])
+    proportional = controller.kp * bottom
+    integral = controller.ki * h * np.polymul([0.0, 1.0], [1.0, -keeps])
+    derivative = controller.kd * (1.0 - keeps) / h * np.polymul([1.0, -1.0], [1.0, -1.0])
+    top = proportional + np.concatenate((np.zeros(3 - integral.size), integral)) + derivative
+    return np.vstack((np.concatenate((top, bottom[1:])), controller.sections))
 
 
 def controller_system(controller: Controller, sampling_rate: float) -> tuple[FloatArray, FloatArray, FloatArray, float]:

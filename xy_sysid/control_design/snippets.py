@@ -1,4 +1,4 @@
-"""The numbers in the words and files of controllers that people use: ros2_control, Klipper, LinuxCNC, ODrive. One function a target."""
+"""The numbers in the words and files of controllers that people use: ros2_control, Klipper, LinuxCNC, ODrive, TwinCAT. One function a target."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from xy_sysid.control_design.closed_loop import NO_LIMIT
-from xy_sysid.control_design.feedback import Feedback
+from xy_sysid.control_design.feedback import Feedback, in_milliseconds
 from xy_sysid.control_design.filters import Shaper
 from xy_sysid.control_design.gains import Gains
 from xy_sysid.errors import BadInput
 from xy_sysid.units import Units
 
 TURN = 2.0 * math.pi  # rad
-LEAST_GAIN = 1.7  # margin without a filter on the derivative: less is near the end for a machine that warms up
+LEAST_GAIN, LEAST_PHASE = 1.7, 35.0  # margin without a filter on the derivative: less is near the end for a machine that warms up
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,12 +56,17 @@ def ros2_control(of: Designed) -> Snippet:
         f"        p: {loop.controller.kp:.6g}",
         f"        i: {loop.controller.ki:.6g}",
         f"        d: {loop.controller.kd:.6g}",
+        f"        i_clamp_max: {bound}",
+        f"        i_clamp_min: {low}",
         f"        u_clamp_max: {bound}",
         f"        u_clamp_min: {low}",
         "        antiwindup_strategy: conditional_integration",
-        "    feedforward_gain: 0.0",
+        f"        feedforward_gain: {of.gains.value('kV'):.6g}",
     ]
-    note = f"kS, kV and kA have no place in this controller: add them to the effort in a controller of your own. {_unfiltered(loop)}"
+    note = (
+        "feedforward_gain is kV: the controller multiplies the velocity that is asked for by it; "
+        f"kS and kA have no place in it, add them in a controller of your own.{_gravity(of)} {_unfiltered(loop)}"
+    )
     return Snippet("ros2_control", "controllers.yaml", "\n".join(lines) + "\n", note)
 
 
@@ -96,7 +101,9 @@ def linuxcnc(of: Designed) -> Snippet:
     }
     lines = [f"# command in {of.units.input}, position in {length}; run the thread at {loop.sampling_rate:g} Hz"]
     lines += [f"setp pid.{at}.{name} {value:.6g}" for name, value in values.items()]
-    note = f"pid has no kS: add {of.gains.value('kS'):.4g} {of.units.input} with the sign of the commanded velocity. {_unfiltered(loop)}"
+    note = (
+        f"pid has no kS: add {of.gains.value('kS'):.4g} {of.units.input} with the sign of the commanded velocity.{_gravity(of)} {_unfiltered(loop)}"
+    )
     return Snippet("linuxcnc", "axis.hal", "\n".join(lines) + "\n", note)
 
 
@@ -117,11 +124,103 @@ def odrive(of: Designed) -> Snippet:
         f"{at}.controller.config.vel_integrator_gain = {torque}{loop.velocity_integral * TURN:.6g}",
         f"{at}.controller.config.inertia = {torque}{of.gains.value('kA') * TURN:.6g}",
     ]
-    note = "ODrive's loops run at 8 kHz: these gains keep their margins there; its inertia is what kA is here, per turn"
+    note = (
+        "ODrive's loops run at 8 kHz: these gains keep their margins there; its inertia is what kA is here, per turn. "
+        f"It has no kS and kV: add their torque to input_torque.{_gravity(of)}"
+    )
     return Snippet("odrive", "odrivetool", "\n".join(lines) + "\n", note)
 
 
-TARGETS: dict[str, Callable[[Designed], Snippet]] = {"ros2_control": ros2_control, "klipper": klipper, "linuxcnc": linuxcnc, "odrive": odrive}
+def twincat(of: Designed) -> Snippet:
+    """Structured text with FB_CTRL_PID of Tc2_ControllerToolbox, kS, kV, kA and kG behind it; lengths in mm. Raises BadInput for an uneven cycle.
+
+    The block is kp (1 + 1 / (Tn s) + Tv s / (1 + Td s)) with times in whole milliseconds; the margins are those of the rounded times.
+    """
+    loop = _loop(of, "twincat")
+    cycle = 1e3 / loop.sampling_rate
+    if abs(cycle - round(cycle)) > 1e-9 * cycle or cycle < 1.0:
+        allowed = "a cycle of 1 ms or a multiple of it, which FB_CTRL_PID needs"
+        raise BadInput("twincat", f"a rate of {loop.sampling_rate:g} Hz", allowed, "Choose one with --controller-rate, 1000 for instance.")
+    if not (loop.counted.stable and loop.counted.gain >= LEAST_GAIN and loop.counted.phase >= LEAST_PHASE):
+        given = f"phase margin {loop.counted.phase:.3g} degrees and gain margin {loop.counted.gain:.3g} with times in whole ms"
+        advice = f"Ask for less than {loop.nominal.crossover:.3g} Hz with --bandwidth."
+        raise BadInput("twincat", given, f"at least {LEAST_PHASE:g} degrees and {LEAST_GAIN:g}", advice)
+    per, length = (1e-3, "mm") if of.units.output == "m" else (1.0, of.units.output)
+    own = in_milliseconds(loop.controller)
+    times = {
+        "tCtrlCycleTime": 1e-3 * cycle,
+        "tTaskCycleTime": 1e-3 * cycle,
+        "tTn": own.kp / own.ki,
+        "tTv": own.kd / own.kp,
+        "tTd": own.derivative_time,
+    }
+    fields = [f"{name} := T#{round(1e3 * value)}MS" for name, value in times.items()]
+    fields.append(f"fKp := {own.kp * per:.9E}")
+    limited = own.limit < NO_LIMIT
+    if limited:
+        fields += [f"fOutMaxLimit := {own.limit:.9E}", f"fOutMinLimit := {-own.limit:.9E}"]
+    kept = [f"    {name} : LREAL := {value:.9E}; (* {unit} *)" for name, value, unit in _feedforward(of, per, length)]
+    total = "fbPid.fOut + fKS * fSign + fKV * fSetVelocity + fKA * fSetAcceleration + fKG"
+    total += " + fKCos * COS(fSetPosition - fZero)" if of.gains.value("kCos") else ""
+    lines = [
+        f"(* Axis {of.axis}: input in {of.units.input}, position in {length}. Call it in a task of {cycle:g} ms. *)",
+        f"PROGRAM {_identifier(of.axis)}",
+        "VAR_INPUT",
+        f"    fSetPosition : LREAL; (* {length} *)",
+        f"    fSetVelocity : LREAL; (* {length}/s *)",
+        f"    fSetAcceleration : LREAL; (* {length}/s2 *)",
+        f"    fActPosition : LREAL; (* {length} *)",
+        "END_VAR",
+        "VAR_OUTPUT",
+        f"    fOutput : LREAL; (* {of.units.input} *)",
+        "END_VAR",
+        "VAR",
+        "    fbPid : FB_CTRL_PID;",
+        "    stParams : ST_CTRL_PID_PARAMS := (",
+        *(f"        {field}{',' if field != fields[-1] else ''}" for field in fields),
+        "    );",
+        *kept,
+        "    fSign : LREAL;",
+        "END_VAR",
+        "",
+        "fSign := SEL(fSetVelocity > 0.0, SEL(fSetVelocity < 0.0, 0.0, -1.0), 1.0);",
+        "fbPid(fSetpointValue := fSetPosition, fActualValue := fActPosition, eMode := eCTRL_MODE_ACTIVE, stParams := stParams);",
+        f"fOutput := LIMIT({-own.limit:.9E}, {total}, {own.limit:.9E});" if limited else f"fOutput := {total};",
+        "END_PROGRAM",
+    ]
+    left = f"a phase margin of {loop.counted.phase:.3g} degrees and a gain margin of {loop.counted.gain:.3g} are left"
+    note = f"needs Tc2_ControllerToolbox; its times are whole milliseconds, so {left}; its integral stops at the limit"
+    return Snippet("twincat", "axis.st", "\n".join(lines) + "\n", note)
+
+
+def _feedforward(of: Designed, per: float, length: str) -> list[tuple[str, float, str]]:
+    unit = of.units.input
+    return [
+        ("fKS", of.gains.value("kS"), unit),
+        ("fKV", of.gains.value("kV") * per, f"{unit}/({length}/s)"),
+        ("fKA", of.gains.value("kA") * per, f"{unit}/({length}/s2)"),
+        ("fKG", of.gains.value("kG"), unit),
+        *([("fKCos", of.gains.value("kCos"), unit), ("fZero", of.gains.value("zero"), length)] if of.gains.value("kCos") else []),
+    ]
+
+
+def _gravity(of: Designed) -> str:
+    """What has to be added for an arm, where the target has no place for it."""
+    size, zero = of.gains.value("kCos"), of.gains.value("zero")
+    return f" It has no kCos: add {size:.4g} {of.units.input} times the cosine of the angle minus {zero:.4g} rad." if size else ""
+
+
+def _identifier(axis: str) -> str:
+    return "Axis_" + "".join(letter if letter.isascii() and letter.isalnum() else "_" for letter in axis)
+
+
+TARGETS: dict[str, Callable[[Designed], Snippet]] = {
+    "ros2_control": ros2_control,
+    "klipper": klipper,
+    "linuxcnc": linuxcnc,
+    "odrive": odrive,
+    "twincat": twincat,
+}
 
 
 def _loop(of: Designed, target: str) -> Feedback:

@@ -23,7 +23,7 @@ SPEEDS = 13  # in each direction
 class Correction:
     """What is added to the command, or taken from the encoder, at places or speeds.
 
-    name: ``friction``, ``force``, ``drag``, ``gain`` or ``scale``; at: (n,) places, m, or speeds, m/s
+    name: ``friction``, ``force``, ``drag``, ``gain``, ``scale``, or ``residual`` (measured); at: (n,) places, m, or speeds, m/s
     value, low, high: (n,) with their 95 % intervals
     at_unit, unit: of the axis, SI; meaning: how it is used
     before: rms of the correction; after: rms of half of its 95 % interval, the error that remains

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import math
 
-from xy_sysid.control_design.inverse import ahead_of
 from xy_sysid.control_design.printing import Printer, math_name, range_of
 from xy_sysid.control_design.program import ARRAYS, WHOLE, Program, body_of, independent, names_assigned, returns_of, whole_names
 from xy_sysid.errors import BadInput
@@ -174,7 +173,7 @@ void {name}_reset({name}_state *state);
 double {name}_step({name}_state *state, double input);
 /* the input for this sample; position, speed and acceleration are those of the path {name.upper()}_AHEAD seconds later */
 double {name}_feedforward({name}_state *state, double position, double speed, double acceleration);
-#define {name.upper()}_AHEAD {ahead_of(of.plant.model, of.rate)!r}
+#define {name.upper()}_AHEAD {of.ahead!r}
 
 #endif
 """
@@ -199,7 +198,7 @@ double {name}_step({name}_state *state, double input)
 
 double {name}_feedforward({name}_state *state, double position, double speed, double acceleration)
 {{
-    return one_input(position, speed, acceleration, {1.0 / of.rate!r}, {of.parts}, MOVING, GUIDED, state->s, state->w);
+    return one_input(position, speed, acceleration, {1.0 / of.rate!r}, {of.parts}, LED, GUIDED, state->s, state->w);
 }}
 """
     return header, text

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import math
 
-from xy_sysid.control_design.inverse import ahead_of
 from xy_sysid.control_design.printing import Printer, math_name, range_of
 from xy_sysid.control_design.program import ARRAYS, Program, body_of, returns_of
 
@@ -158,7 +157,7 @@ function [out, state] = {name}(what, varargin)
 % {title}
 %   state = {name}('reset')                      at rest at position 0 ({of.rate:g} samples a second)
 %   [y, state] = {name}('step', state, u)        holds u for a sample; y is what the encoder shows after it
-%   [u, state] = {name}('input', state, r, v, a) the feedforward; r, v, a: of the path {ahead_of(of.plant.model, of.rate):.9g} s later
+%   [u, state] = {name}('input', state, r, v, a) the feedforward; r, v, a: of the path {of.ahead:.9g} s later
 {arrays}
 w = zeros(1, {of.room});
 if strcmp(what, 'reset')
@@ -167,7 +166,7 @@ if strcmp(what, 'reset')
 elseif strcmp(what, 'step')
     [out, state] = one_sample(varargin{{2}}, MOVING, STILL, varargin{{1}}, w);
 else
-    [out, state] = one_input(varargin{{2}}, varargin{{3}}, varargin{{4}}, {1.0 / of.rate!r}, {of.parts}, MOVING, GUIDED, varargin{{1}}, w);
+    [out, state] = one_input(varargin{{2}}, varargin{{3}}, varargin{{4}}, {1.0 / of.rate!r}, {of.parts}, LED, GUIDED, varargin{{1}}, w);
 end
 end
 

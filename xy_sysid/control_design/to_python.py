@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 
-from xy_sysid.control_design.inverse import ahead_of
 from xy_sysid.control_design.program import Program
 
 
@@ -18,7 +17,7 @@ def source(of: Program, title: str) -> str:
 import math
 
 RATE = {of.rate!r}  # Hz: one call a sample
-AHEAD = {ahead_of(of.plant.model, of.rate)!r}  # s by which a path is looked at ahead
+AHEAD = {of.ahead!r}  # s by which a path is looked at ahead
 {arrays}
 
 
@@ -44,5 +43,5 @@ class Feedforward:
 
     def input(self, position, speed, acceleration):
         """The input to be held for this sample."""
-        return one_input(position, speed, acceleration, 1.0 / RATE, {of.parts}, MOVING, GUIDED, self.s, self.w)
+        return one_input(position, speed, acceleration, 1.0 / RATE, {of.parts}, LED, GUIDED, self.s, self.w)
 '''

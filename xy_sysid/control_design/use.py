@@ -11,18 +11,21 @@ import numpy as np
 
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.comparison.physical_model import PhysicalModel
+from xy_sysid.control_design.bandwidth import Bandwidth, bandwidth_of, with_filter
 from xy_sysid.control_design.closed_loop import NO_LIMIT, Encoder
-from xy_sysid.control_design.feedback import Feedback, feedback
-from xy_sysid.control_design.filters import Notch, Shaper, Swing, best_shaper, modes, notch, shapers
+from xy_sysid.control_design.compensation import Compensation
+from xy_sysid.control_design.feedback import GAIN_MARGIN, PHASE_MARGIN, Asked, Feedback, feedback
+from xy_sysid.control_design.filters import LoopFilter, Shaper, Swing, best_shaper, modes, notch, shapers
 from xy_sysid.control_design.gains import Gains, gains
 from xy_sysid.control_design.inverse import not_undone
 from xy_sysid.control_design.laws import largest_voltage
 from xy_sysid.control_design.limits import Fastest, fastest
+from xy_sysid.control_design.measured_table import measured_table
 from xy_sysid.control_design.path import Bounds, recorded, s_curve
 from xy_sysid.control_design.state_feedback import StateFeedback, state_feedback
 from xy_sysid.control_design.tables import Correction, friction_table, position_tables
 from xy_sysid.control_design.uncertain import Derived, derive, samples
-from xy_sysid.control_design.worth import Predicted, Tracking, encoder_of, predicted, tracked
+from xy_sysid.control_design.worth import EDGE, WIDER, Predicted, Tracking, clear_below, encoder_of, predicted, tracked
 from xy_sysid.errors import BadInput
 from xy_sysid.linear.any_model import AnyModel
 from xy_sysid.samples.recording import Recording, Run, one_run
@@ -42,8 +45,12 @@ class Used:
 
     sampling_rate: Hz of the controller; limit: V of the drive, infinite if nobody knows it; limit_from: who said so
     travel: m, that tables and paths cover; gains, friction, tables, gap: feedforward and corrections (None: the axis has none)
-    feedback, states (state feedback with an observer), modes, notch, shaper, fastest: None where there is nothing to design, or where it was refused
+    feedback, states (state feedback with an observer), modes, notch, shapers (of the lowest mode; shaper: the best), fastest: None or none where
+    there is nothing to design, or where it was refused
+    allowed: what limits the bandwidth, and what each part of the axis costs; filter, filtered: the notch or low-pass with which the loop reaches the
+    highest crossover, and that loop; None where none reaches more
     predicted: input of the recording before and after, if there is one; tracking: simulated tracking errors
+    compensation: along the first path of ``tracking``; its laws are those that exported source undoes
     refused: (what, why) of what could not be designed; not_undone: (effect, why) of what the feedforward leaves; notes: to be read first
     """
 
@@ -60,11 +67,16 @@ class Used:
     feedback: Feedback | None
     states: StateFeedback | None
     modes: tuple[Swing, ...]
-    notch: Notch | None
+    notch: LoopFilter | None
+    allowed: Bandwidth | None
+    filter: LoopFilter | None
+    filtered: Feedback | None
+    shapers: tuple[Shaper, ...]
     shaper: Shaper | None
     fastest: Fastest | None
     predicted: Predicted | None
     tracking: tuple[Tracking, ...]
+    compensation: Compensation | None
     refused: tuple[tuple[str, str], ...]
     not_undone: tuple[tuple[str, str], ...]
     notes: tuple[str, ...]
@@ -82,12 +94,15 @@ def use(
     limit: float | None = None,
     bandwidth: float | None = None,
     travel: tuple[float, float] | None = None,
+    *,
+    margins: tuple[float, float] | None = None,
 ) -> Used:
     """Feedforward with intervals, correction tables, feedback with margins, filters, limits, and what they are worth.
 
     model: of ``refine`` or a file; data: a recording of the same machine, for before and after on its own motion, its noise and its limit
     rate: Hz of the controller (the recording's, or 2 kHz); limit: V of the drive (the model's saturation, or the recording's largest voltage)
     bandwidth: Hz, asked of the loop (the largest with the margins by default); travel: m, that tables cover (the recording's)
+    margins: phase margin, degrees, and gain margin, times, that the worst sample of the parameters has to keep (45 and 2)
     Raises BadInput for a transfer function, or values out of range. What cannot be designed safely is in ``refused``.
     """
     if not isinstance(model, PhysicalModel):
@@ -105,24 +120,29 @@ def use(
     encoder = Encoder() if run is None else encoder_of(run)
     refused: list[tuple[str, str]] = []
     found = gains(model)
-    loop = _tried("feedback", lambda: feedback(model, rate, bandwidth, encoder=encoder, limit=drive), refused)
+    asked = Asked(*(margins or (PHASE_MARGIN, GAIN_MARGIN)), bandwidth)
+    loop = _tried("feedback", lambda: feedback(model, rate, asked, encoder=encoder, limit=drive), refused)
     swings = _tried("filters", lambda: modes(model), refused) or ()
+    table = None if run is None else _tried("measured table", lambda: measured_table(model, run, WIDER * clear_below(model, run)), refused)
+    every = shapers(swings[0]) if swings else ()
+    better = None if loop is None or bandwidth is not None else with_filter(model, rate, swings, loop, encoder, drive)
     models = _tried("worst cases", lambda: samples(model, WORST_OF), refused) or (model.model,)
     centre = 0.5 * (between[0] + between[1])
     ends = [centre, between[1], between[0], centre]
     quick = None
     if drive < NO_LIMIT:
         quick = _tried("fastest path", lambda: fastest(models, ends, drive, rate), refused)
-    tracking: list[Tracking] = []
+    followed: list[tuple[Tracking, Compensation]] = []
     if loop is not None:
         paths = []
         if quick is not None:
             calm = Bounds(CALM * quick.bounds.speed, CALM**2 * quick.bounds.acceleration, CALM**3 * quick.bounds.jerk)
             paths.append(("S-curve over the travel", s_curve(ends, calm, rate)))
         if run is not None and run.sampling_rate == rate:
-            own = run.until(min(run.seconds, LONGEST))
-            paths.append(("the recorded motion", recorded(own.position, rate, FOLLOWED * loop.bandwidth)))
-        tracking = [tracked(models, found, loop.controller, path, encoder) for path in paths]
+            edge = max(int(EDGE * len(run)), 1)  # what the low-pass makes of both ends is no motion of the machine
+            whole = recorded(run.position, rate, FOLLOWED * loop.bandwidth)
+            paths.append(("the recorded motion", whole.part(edge, min(len(run) - edge, edge + round(LONGEST * rate)))))
+        followed = [tracked(models, found, loop.controller, path, encoder) for path in paths]
     return Used(
         axis=model.axis or (run.axis if run is not None else "x"),
         model=model,
@@ -132,16 +152,21 @@ def use(
         travel=between,
         gains=found,
         friction=friction_table(model, max(0.5 * min(drive, 4.0) * abs(model.model.gain), 1e-12)),
-        tables=position_tables(model, between),
+        tables=(*position_tables(model, between), *([] if table is None else [table.correction(model)])),
         gap=_gap(model),
         feedback=loop,
-        states=_tried("state feedback", lambda: state_feedback(model, rate, bandwidth), refused),
+        states=_tried("state feedback", lambda: state_feedback(model, rate, asked), refused),
         modes=swings,
-        notch=notch(swings[0], rate, loop.nominal.crossover) if swings and loop is not None else None,
-        shaper=best_shaper(shapers(swings[0])) if swings else None,
+        notch=notch(swings[0], rate) if swings and loop is not None else None,
+        allowed=None if loop is None else _tried("bandwidth", lambda: bandwidth_of(model, rate, loop.nominal.crossover, asked), refused),
+        filter=None if better is None else better[0],
+        filtered=None if better is None else better[1],
+        shapers=every,
+        shaper=best_shaper(every) if every else None,
         fastest=quick,
-        predicted=None if run is None else _tried("prediction", lambda: predicted(model, found, run), refused),
-        tracking=tuple(tracking),
+        predicted=None if run is None else _tried("prediction", lambda: predicted(model, found, run, table), refused),
+        tracking=tuple(item for item, _ in followed),
+        compensation=followed[0][1] if followed else None,
         refused=tuple(refused),
         not_undone=not_undone(model.model),
         notes=_notes(model, run, found),

@@ -12,8 +12,10 @@ import scipy
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.comparison.physical_model import PhysicalModel
 from xy_sysid.control_design.closed_loop import Controller, Encoder, follow_path, shake
+from xy_sysid.control_design.compensation import Compensation, compensate
 from xy_sysid.control_design.gains import Gains, simple_feedforward
 from xy_sysid.control_design.inverse import feedforward
+from xy_sysid.control_design.measured_table import MeasuredTable
 from xy_sysid.control_design.path import ORDER, SampledPath, recorded
 from xy_sysid.greybox.floor import TOP, TOP_SHARE, count_size, encoder_noise
 from xy_sysid.samples.block import FloatArray
@@ -31,6 +33,7 @@ class Predicted:
 
     below: Hz, the part of both that is compared; voltage: rms of what was recorded, V
     rms of the input, V, that a feedforward does not predict. inertia: with kV and kA; simple: with kS and kG too; whole: with every law
+    tabled: with the measured table too, each half by that of the other; None without one
     """
 
     below: float
@@ -38,23 +41,28 @@ class Predicted:
     inertia: float
     simple: float
     whole: float
+    tabled: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Tracking:
-    """Tracking errors, m rms, in the simulation of the refined model under the same feedback.
+    """Tracking errors, m rms, in the simulation of the refined model under the same feedback: of what the axis carries, behind gap and scale error.
 
-    path: in words; feedback, simple, whole: alone, with kS, kV and kA, with the whole feedforward
-    worst: of the whole feedforward over samples of the axis' parameters; largest: V, its largest voltage; limit: V
+    path: in words; feedback, simple, whole, compensated: alone, with kS, kV and kA, with every law undone, with those that are worth undoing
+    worst: of the compensated axis over samples of its parameters; largest: V, the largest voltage of any of them; limit: V
+    undone, left: laws that the compensation undoes, and (law, why) of those that it leaves
     """
 
     path: str
     feedback: float
     simple: float
     whole: float
+    compensated: float
     worst: float
     largest: float
     limit: float
+    undone: tuple[str, ...]
+    left: tuple[tuple[str, str], ...]
 
 
 def encoder_of(run: Run) -> Encoder:
@@ -73,8 +81,8 @@ def encoder_of_floor(noise_floor: float, sampling_rate: float) -> Encoder:
     return Encoder(noise=noise_floor / sampling_rate / math.sqrt(2.0 * (top - math.sin(math.pi * top) / math.pi)))
 
 
-def predicted(model: PhysicalModel, found: Gains, run: Run) -> Predicted:
-    """The voltage of a run from its motion. Raises BadInput where the run is too short."""
+def predicted(model: PhysicalModel, found: Gains, run: Run, table: MeasuredTable | None = None) -> Predicted:
+    """The voltage of a run from its motion; table: of what the model leaves of this run. Raises BadInput where the run is too short."""
     below = clear_below(model, run)
     path = recorded(run.position, run.sampling_rate, WIDER * below)
     sos = scipy.signal.butter(ORDER, below, fs=run.sampling_rate, output="sos")
@@ -85,9 +93,18 @@ def predicted(model: PhysicalModel, found: Gains, run: Run) -> Predicted:
 
     wanted = heard(run.voltage)
     early = path.ahead(model.model.delay + 0.5 / run.sampling_rate)  # each is given the delay: it is their laws that are compared
-    tries = (simple_feedforward(found, early, False), simple_feedforward(found, early), feedforward(model.model, path).voltage)
+    whole = feedforward(model.model, path).voltage
+    tries = [simple_feedforward(found, early, False), simple_feedforward(found, early), whole]
+    tries += [] if table is None else [whole + table.of_other_half(path)]
     left = [float(np.sqrt(np.mean((wanted - heard(voltage)) ** 2))) for voltage in tries]
-    return Predicted(below=below, voltage=float(np.sqrt(np.mean(wanted**2))), inertia=left[0], simple=left[1], whole=left[2])
+    return Predicted(
+        below=below,
+        voltage=float(np.sqrt(np.mean(wanted**2))),
+        inertia=left[0],
+        simple=left[1],
+        whole=left[2],
+        tabled=left[3] if table is not None else None,
+    )
 
 
 def clear_below(model: PhysicalModel, run: Run) -> float:
@@ -98,19 +115,24 @@ def clear_below(model: PhysicalModel, run: Run) -> float:
     return float(np.clip(top, LOWEST * run.sampling_rate, HIGHEST * run.sampling_rate))
 
 
-def tracked(models: Sequence[AxisModel], found: Gains, controller: Controller, path: tuple[str, SampledPath], encoder: Encoder) -> Tracking:
-    """The path followed by the first model with each feedforward, and by the others with the whole one of the first."""
+def tracked(
+    models: Sequence[AxisModel], found: Gains, controller: Controller, path: tuple[str, SampledPath], encoder: Encoder
+) -> tuple[Tracking, Compensation]:
+    """The path followed by the first model with each feedforward, and the compensation; the other models are samples of its parameters."""
     name, wanted = path
+    made = compensate(models, found, wanted, controller, encoder)
     noise = shake(models[0], float(wanted.position[0]), wanted.sampling_rate, controller, encoder)
-    simple, whole = simple_feedforward(found, wanted), feedforward(models[0], wanted, noise).voltage
-    runs = [follow_path(models[0], wanted, controller, extra, encoder) for extra in (None, simple, whole)]
-    others = [follow_path(model, wanted, controller, whole, encoder).rms for model in models[1:]]
-    return Tracking(
+    whole = follow_path(models[0], wanted, controller, feedforward(models[0], wanted, noise).voltage, encoder)
+    told = Tracking(
         path=name,
-        feedback=runs[0].rms,
-        simple=runs[1].rms,
-        whole=runs[2].rms,
-        worst=max([runs[2].rms, *others]),
-        largest=float(np.max(np.abs(runs[2].voltage))),
+        feedback=made.centre[0],
+        simple=made.centre[1],
+        whole=float(np.sqrt(np.mean((wanted.position - whole.carried) ** 2))),
+        compensated=made.centre[2],
+        worst=made.chosen,
+        largest=made.largest,
         limit=controller.limit,
+        undone=made.terms,
+        left=made.left,
     )
+    return told, made

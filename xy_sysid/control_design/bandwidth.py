@@ -1,0 +1,105 @@
+"""What limits the bandwidth of a loop: what each part of the axis costs, and what a filter in the loop gains.
+
+A part is left out and the loop is designed again: the crossover that it then reaches is what the part costs. The same question is asked of a
+notch and of a low-pass: a filter is worth its place where the loop reaches a higher crossover with it, for every sample of the parameters.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from xy_sysid.axis.linear_part import lag_of
+from xy_sysid.axis.model import AxisModel
+from xy_sysid.comparison.physical_model import PhysicalModel
+from xy_sysid.control_design.closed_loop import NO_LIMIT, Encoder
+from xy_sysid.control_design.feedback import USUAL, Asked, Feedback, feedback
+from xy_sysid.control_design.filters import LoopFilter, Swing, low_pass, notch
+from xy_sysid.control_design.sampled import sampled
+from xy_sysid.errors import BadInput
+
+PASSED = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4)  # of a resonance: where a low-pass is tried
+UNCERTAIN, HOLD = "uncertainty of the parameters", "sampling and hold"
+
+
+@dataclass(frozen=True, slots=True)
+class Cost:
+    """A part of the axis. phase: degrees that it takes at the crossover; without: Hz, crossover of a loop without it (NaN: not known)."""
+
+    part: str
+    phase: float
+    without: float
+
+
+@dataclass(frozen=True, slots=True)
+class Bandwidth:
+    """crossover: Hz, the highest with the margins; costs: of each part, that which costs most first."""
+
+    crossover: float
+    costs: tuple[Cost, ...]
+
+
+def bandwidth_of(model: PhysicalModel, sampling_rate: float, at: float, asked: Asked = USUAL) -> Bandwidth:
+    """The highest crossover with the margins, and what each part costs; at: Hz, the crossover at which phases are counted.
+
+    Raises BadInput where no crossover has the margins.
+    """
+    asked = replace(asked, bandwidth=None)
+    best = feedback(model, sampling_rate, asked).nominal.crossover
+    own = model.model
+    parts: list[tuple[str, AxisModel]] = []
+    if own.delay > 0.0:
+        parts.append(("delay", replace(own, delay=0.0)))
+    for name, values in own.effects:
+        effect = own.library[name]
+        if effect.category == "motion" or lag_of(effect, values) is not None or "share" in effect.names:
+            parts.append((name, replace(own, effects=tuple(item for item in own.effects if item[0] != name), per_recording=())))
+    whole = _phase(own, sampling_rate, at)
+    found = [Cost(HOLD, 180.0 * at / sampling_rate, math.nan)]
+    for name, left in parts:
+        kept = tuple(item for item in model.parameters if item.name in left.values() and item.name != name)
+        bare = replace(model, model=left, fit=None, known=kept)
+        found.append(Cost(name, _less(_phase(left, sampling_rate, at), whole), _reached(bare, sampling_rate, asked)))
+    if model.parameters:
+        sure = replace(model, fit=None, known=())
+        found.append(Cost(UNCERTAIN, 0.0, _reached(sure, sampling_rate, asked)))
+    found.sort(key=lambda item: (-item.without if math.isfinite(item.without) else 0.0, -item.phase))
+    return Bandwidth(crossover=best, costs=tuple(found))
+
+
+def with_filter(
+    model: PhysicalModel, sampling_rate: float, modes: Sequence[Swing], without: Feedback, encoder: Encoder | None = None, limit: float = NO_LIMIT
+) -> tuple[LoopFilter, Feedback] | None:
+    """The notch or low-pass with which the loop reaches the highest crossover, and that loop; None if none reaches more than ``without`` one."""
+    best: tuple[LoopFilter, Feedback] | None = None
+    for mode in modes:
+        highest = 0.45 * sampling_rate
+        for tried in (notch(mode, sampling_rate), *(low_pass(min(part * mode.free.value, highest), sampling_rate) for part in PASSED)):
+            try:
+                loop = feedback(model, sampling_rate, without.asked, tried.section[None, :], encoder, limit)
+            except BadInput:
+                continue
+            if loop.crossover > (best[1] if best is not None else without).crossover:
+                best = (tried, loop)
+    return best
+
+
+def _reached(model: PhysicalModel, sampling_rate: float, asked: Asked) -> float:
+    """Hz, the crossover of a loop; NaN where none has the margins."""
+    try:
+        return feedback(model, sampling_rate, asked).nominal.crossover
+    except BadInput:
+        return math.nan
+
+
+def _phase(model: AxisModel, sampling_rate: float, at: float) -> float:
+    """Degrees of the sampled axis at a frequency, Hz."""
+    return float(np.angle(sampled(model, sampling_rate).response(np.array([at]))[0], deg=True))
+
+
+def _less(one: float, other: float) -> float:
+    """The difference of two angles, degrees, within half a turn."""
+    return (one - other + 180.0) % 360.0 - 180.0
