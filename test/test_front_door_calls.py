@@ -83,7 +83,7 @@ def test_a_model_and_a_run_may_come_in_either_order_and_from_files(run: xy.Run, 
         (lambda door: door.fit(3), "response of xy.fit is int 3; allowed: a FrequencyResponse. Call it as xy.fit(response, ...)."),
         (lambda door: door.save(3), "missing a required argument: 'path'; allowed: xy.save(model, path, ...)"),
         (lambda door: door.diagnose([3]), "data of xy.diagnose is list [3]; allowed: a Run, a Recording or a list of a Run or a Recording."),
-        (lambda door: door.plot.ladder("x"), "found of xy.plot.ladder is str 'x'; allowed: a Diagnosis"),
+        (lambda door: door.plot.ladder("x"), "found of xy.plot.ladder is str 'x'; allowed: an Answer"),
         (lambda door: door.simulate("10"), "duration of xy.simulate is str '10'; allowed: a number."),
     ],
 )

@@ -135,7 +135,7 @@ _HOMES = {
     "errors": ("BadInput", "BadRecording", "MissingExtra", "XySysidError"),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
-_PICTURES = {"FrequencyResponse": "bode", "Comparison": "residual", "Diagnosed": "ladder", "Refinement": "ladder"}  # of xy.plot, in a notebook
+_PICTURES = {"FrequencyResponse": "bode", "Comparison": "residual", "Answer": "ladder"}  # of xy.plot, in a notebook
 
 
 def __getattr__(name: str) -> Any:

@@ -14,7 +14,8 @@ from campaigns.blind.cases import FRICTION, Case
 from campaigns.blind.recordings import recorded
 from xy_sim.machine import Machine
 from xy_sysid.axis.model import STANDARD
-from xy_sysid.diagnosis.diagnose import Diagnosis, diagnose
+from xy_sysid.diagnosis.answer import Answer
+from xy_sysid.diagnosis.diagnose import diagnose
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.free_run import EPSILON, fit, prepare
 from xy_sysid.greybox.score_test import bounded
@@ -90,12 +91,12 @@ def run(case: Case, folder: Path | None = None) -> Judged:
     return replace(made, ratio=ratio, errors=errors, inside=inside, change=seen.change, noise=seen.noise, dirt=seen.dirt, kinds=seen.kinds)
 
 
-def names(found: Diagnosis) -> tuple[str, ...]:
+def names(found: Answer) -> tuple[str, ...]:
     """What a diagnosis names as missing."""
     return found.effects if found.verdict == "missing_effect" else ()
 
 
-def outcome(case: Any, found: Diagnosis, seconds: float, *, right: bool, first: bool, stray: bool, phantoms: tuple[str, ...]) -> Judged:
+def outcome(case: Any, found: Answer, seconds: float, *, right: bool, first: bool, stray: bool, phantoms: tuple[str, ...]) -> Judged:
     """A diagnosis that was judged. stray: a name that is not in the truth came first."""
     return Judged(
         case=case,
@@ -140,14 +141,13 @@ def true_values(case: Case, machine: Machine) -> dict[str, float]:
     return values
 
 
-def _measured(case: Case, machine: Machine, fs: float, u: Any, y: Any, found: Diagnosis) -> tuple[float | None, dict[str, float], dict[str, bool]]:
+def _measured(case: Case, machine: Machine, fs: float, u: Any, y: Any, found: Answer) -> tuple[float | None, dict[str, float], dict[str, bool]]:
     values = true_values(case, machine)
     errors: dict[str, float] = {}
     inside: dict[str, bool] = {}
-    ladder = getattr(found, "ladder", None)
-    if ladder is None:
+    if not found.rungs:
         return None, errors, inside
-    final = ladder.final
+    final = found.final
     for key, value in values.items():
         try:
             estimate = final.parameter(key)

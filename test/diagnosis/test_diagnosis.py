@@ -19,9 +19,10 @@ from xy_sim.parts import PARTS
 from xy_sysid.axis.model import STANDARD, Library
 from xy_sysid.cli import run
 from xy_sysid.diagnosis import rungs
-from xy_sysid.diagnosis.diagnose import Diagnosis, diagnose, judged
-from xy_sysid.diagnosis.ladder import Ladder, Rival, Step, is_taken_for
-from xy_sysid.diagnosis.refine import Effort, refine, refine_steps
+from xy_sysid.diagnosis.answer import Answer, Rung, Tried
+from xy_sysid.diagnosis.diagnose import diagnose, judged
+from xy_sysid.diagnosis.refine import Effort, refine
+from xy_sysid.diagnosis.sets import is_taken_for
 from xy_sysid.effects import EFFECTS, Effect
 from xy_sysid.greybox.axis_data import AxisData, prepare
 from xy_sysid.greybox.free_run import GreyboxFit, fit_base, fit_with
@@ -34,17 +35,9 @@ recorded = partial(simulated.recorded, block=100)
 
 
 @cache
-def diagnosed(effect: str, seconds: float = 20.0) -> Diagnosis:
+def diagnosed(effect: str, seconds: float = 20.0) -> Answer:
     """The answer for an axis with these effects."""
     return diagnose(2000.0, *recorded(effect, seconds=seconds).axis("x"))
-
-
-@cache
-def ladder_of(effect: str) -> Ladder:
-    """The search behind it."""
-    found = diagnosed(effect).ladder
-    assert found is not None
-    return found
 
 
 @pytest.mark.parametrize("effect", ["coulomb_friction", "cogging", "dead_zone", "constant_load", "saturation", "lead_error"])
@@ -52,9 +45,8 @@ def test_the_missing_effect_is_named_and_the_error_falls_to_the_floor(effect: st
     """First name right, held-out error within 5 % of the noise, confident; nearly all of the error's power explained, and that is said."""
     found = diagnosed(effect, 30.0)
     assert (found.verdict, found.effects) == ("missing_effect", (effect,))
-    assert found.ladder is not None
-    assert found.ladder.final.held_out_error < 1.05 * found.ladder.final.noise_floor
-    assert found.ladder.steps[0].fit.excess > 0.3
+    assert found.final.held_out_error < 1.05 * found.final.noise_floor
+    assert found.base.excess > 0.3
     assert found.confidence > 0.5
     assert found.explained > 0.9
     assert found.discrepancy < 0.35 * found.noise
@@ -63,7 +55,7 @@ def test_the_missing_effect_is_named_and_the_error_falls_to_the_floor(effect: st
 
 
 @cache
-def two_effects() -> tuple[Diagnosis, int]:
+def two_effects() -> tuple[Answer, int]:
     """The answer for an axis with two effects, and how often the search looked at its clock."""
     ticks = count()
     found = diagnose(2000.0, *recorded("coulomb_friction+cogging", seconds=20.0).axis("x"), clock=partial(next, ticks))
@@ -100,7 +92,7 @@ def test_words_for_people_steer_no_search(effect: str) -> None:
 def test_an_effect_in_the_noise_is_not_named_with_confidence(effect: str) -> None:
     """The base is at the floor; whether or not the right name is said, it is no certainty, and no other name is said."""
     found = diagnose(2000.0, *recorded(effect).axis("x"))
-    assert found.ladder is not None and found.ladder.base.excess < AT_FLOOR
+    assert found.base.excess < AT_FLOOR
     if found.verdict == "nothing_missing":
         assert found.effects == () and found.explained == 0.0
     else:
@@ -108,11 +100,11 @@ def test_an_effect_in_the_noise_is_not_named_with_confidence(effect: str) -> Non
         assert found.confidence < 0.5
 
 
-def nothing_left(data: AxisData) -> Diagnosis:
+def nothing_left(data: AxisData) -> Answer:
     """The verdict where excess and discrepancy are exactly 0."""
     ladder = refine(data)
     base = replace(ladder.base, excess=0.0)
-    return judged(data, replace(ladder, steps=(replace(ladder.steps[0], fit=base),), final=base, effects=(), discrepancy=0.0), STANDARD)
+    return judged(data, replace(ladder, rungs=(Rung.of(base),), best=(), discrepancy=0.0), STANDARD)
 
 
 def test_a_base_without_any_excess_is_no_division_by_zero() -> None:
@@ -243,8 +235,8 @@ def test_a_part_that_rattles_is_no_mode_with_confidence() -> None:
 
 def test_not_in_the_library_is_said_less_surely_the_more_is_left() -> None:
     """An effect may hide in it, or in the noise; and what some set takes away is no longer nowhere."""
-    data, ladder = prepare(2000.0, *recorded("quadratic_drag", seconds=20.0).axis("x")), ladder_of("quadratic_drag")
-    nothing = replace(ladder, effects=(), explained=0.0, helps=0.0)
+    data, ladder = prepare(2000.0, *recorded("quadratic_drag", seconds=20.0).axis("x")), diagnosed("quadratic_drag")
+    nothing = replace(ladder, best=(), explained=0.0, helps=0.0)
     motion = data.layout.rms(data.floor.motion)
     sure = [judged(data, replace(nothing, discrepancy=part * motion), STANDARD).confidence for part in (0.0, 5e-4, 0.03, 0.3)]
     assert 1.0 > sure[0] == sure[1] > sure[2] > sure[3] > 0.0
@@ -254,14 +246,13 @@ def test_not_in_the_library_is_said_less_surely_the_more_is_left() -> None:
 
 def test_what_two_sets_share_is_named_and_what_they_differ_in_is_not() -> None:
     """A tie between a load and cogging beside friction: friction alone is told, and the load as what may be; a rival of friction itself counts."""
-    data, alone = prepare(2000.0, *recorded("coulomb_friction", seconds=20.0).axis("x")), ladder_of("coulomb_friction")
+    data, alone = prepare(2000.0, *recorded("coulomb_friction", seconds=20.0).axis("x")), diagnosed("coulomb_friction")
     both = fit_with(data, alone.final, ["constant_load"])
-    tie = Rival(("coulomb_friction", "cogging"), both, 0.5)
+    tie = Tried(Rung.of(both, ("coulomb_friction", "cogging")), doubt=0.5)
     ladder = replace(
         alone,
-        steps=(*alone.steps, Step(("constant_load",), both)),
-        final=both,
-        effects=("coulomb_friction", "constant_load"),
+        rungs=(*alone.rungs, Rung.of(both, ("constant_load",))),
+        best=("coulomb_friction", "constant_load"),
         rivals=(tie, *alone.rivals),
         sizes={"coulomb_friction": 100.0, "constant_load": 5.0},
     )
@@ -269,10 +260,9 @@ def test_what_two_sets_share_is_named_and_what_they_differ_in_is_not() -> None:
     assert found.effects == ("coulomb_friction",)
     assert found.confidence > 0.9
     assert "constant_load may also be present (below 50 %)" in found.sentence
-    assert found.ladder is not None
-    assert found.ladder.final is alone.final
-    assert tie not in found.ladder.rivals
-    unsure = judged(data, replace(ladder, rivals=(Rival(("cogging",), both, 0.5),)), STANDARD)
+    assert found.final is alone.final
+    assert tie not in found.rivals
+    unsure = judged(data, replace(ladder, rivals=(Tried(Rung.of(both, ("cogging",)), doubt=0.5),)), STANDARD)
     assert unsure.effects == ("coulomb_friction", "constant_load")  # nothing is surer than not: all are told
     assert unsure.confidence < 0.5
 
@@ -284,8 +274,8 @@ def test_a_refused_spring_that_leaves_as_little_as_a_wave_makes_the_wave_unsure(
     assert not is_taken_for(STANDARD, wave, spring)
     assert not is_taken_for(STANDARD, stiff, spring)
     assert not is_taken_for(STANDARD, frozenset({"cogging"}), wave)
-    data, ladder = prepare(2000.0, *recorded("cogging", seconds=20.0).axis("x")), ladder_of("cogging")
-    rival = Rival(("return_spring",), ladder.final, 0.5, "return_spring: it would give way")
+    data, ladder = prepare(2000.0, *recorded("cogging", seconds=20.0).axis("x")), diagnosed("cogging")
+    rival = Tried(Rung.of(ladder.final, ("return_spring",)), doubt=0.5, refused="return_spring: it would give way")
     found = judged(data, replace(ladder, rivals=(rival,)), STANDARD)
     assert found.effects == ("cogging",) and found.confidence <= 0.5
     assert "Runner-up return_spring" in found.sentence and "(refused, return_spring: it would give way)" in found.sentence
@@ -295,14 +285,13 @@ def test_effects_come_in_the_order_of_what_each_would_cost() -> None:
     """By the best set known without it, so that there is an answer where the time left no fit without it, too."""
     data = prepare(2000.0, *recorded("coulomb_friction+cogging", seconds=20.0).axis("x"))
     found, ticks = two_effects()
-    ladders = (found.ladder, refine(data, effort=Effort(budget=0.3 * ticks, clock=partial(next, count()), size=SIZE)))
+    ladders = (found, refine(data, effort=Effort(budget=0.3 * ticks, clock=partial(next, count()), size=SIZE)))
     for ladder in ladders:
-        assert ladder is not None
         assert ladder.effects and set(ladder.effects) == set(ladder.sizes)
-        alone = {item.effect: float(np.sum(item.fit.scores)) for item in ladder.tried if item.fit is not None}
+        alone = {item.name: float(np.sum(item.rung.fit.scores)) for item in ladder.candidates}
         costs = [alone[other] for other in reversed(ladder.effects) if len(ladder.effects) == 2]
         assert costs == sorted(costs, reverse=True) and min(ladder.sizes.values()) > 0.0
-    assert [ladder is not None and ladder.stopped for ladder in ladders] == [False, True]
+    assert [ladder.stopped for ladder in ladders] == [False, True]
 
 
 def test_a_spring_beside_friction_is_not_taken_for_a_pendulum_and_bumps() -> None:
@@ -340,26 +329,20 @@ def test_a_gap_is_asked_for_early_and_once(effect: str, monkeypatch: pytest.Monk
 
     monkeypatch.setattr(one_step, "grown", counted)
     data = prepare(2000.0, *recorded(effect, seconds=20.0).axis("x"))
-    steps, tried = refine_steps(data), []
-    while True:
-        try:
-            tried.append(next(steps).effects)
-        except StopIteration as end:
-            found = end.value
-            break
+    tried: list[frozenset[str]] = []
+    found = refine(data, trying=tried.append)
     assert len(set(asked)) == len(asked) and {beside[0] for beside in asked} == {"backlash"}
     assert ("backlash" in found.effects) == (effect == "backlash")
     if effect == "backlash":
         assert len(asked) == 1
-        assert tried.index(("backlash",)) == len(tried) - 1 <= FEWEST + 1
+        assert tried.index(frozenset({"backlash"})) == len(tried) - 1 <= FEWEST + 1
 
 
 def test_a_gap_of_little_more_than_a_count_is_no_soft_screw() -> None:
     """Free simulations call it a compliance; beyond the noise, the filter that knows the gap leaves half of what it leaves without."""
     found = diagnose(2000.0, *recorded("coulomb_friction=0.03+backlash=1.2e-6", seconds=20.0, counts=5000.0).axis("x"))
     assert set(found.effects) == {"backlash", "coulomb_friction"}
-    assert found.ladder is not None
-    gap, load = (found.ladder.final.parameter(name) for name in ("backlash.gap", "coulomb_friction.coulomb"))
+    gap, load = (found.final.parameter(name) for name in ("backlash.gap", "coulomb_friction.coulomb"))
     assert gap.low < 1.2e-6 < gap.high and 0.9 < gap.value / 1.2e-6 < 1.1
     assert 0.95 < load.value / 0.03 < 1.05
 
@@ -368,7 +351,7 @@ def test_what_acts_beside_a_gap_is_asked_for_though_it_was_known_beside_a_screw_
     """A compliance is the best simulation: the gap is tried with the lag that it hides."""
     found = diagnose(2000.0, *recorded("amplifier_lag=0.002+coulomb_friction=0.02+backlash=2e-6", seconds=20.0, counts=5000.0).axis("x"))
     assert set(found.effects) == {"backlash", "coulomb_friction", "amplifier_lag"}
-    assert found.ladder is not None and found.ladder.final.one_step
+    assert found.final.one_step
 
 
 def test_what_a_simulation_had_taken_a_gap_for_goes() -> None:
@@ -383,5 +366,5 @@ def test_a_gap_beside_a_large_force_is_asked_for_with_that_force() -> None:
     """Cogging that a simulation without the gap has found stands beside it: alone, the gap does not do better than the cogging."""
     found = refine(prepare(2000.0, *recorded("backlash=14e-6+coulomb_friction=0.08+cogging=0.5,per_revolution=4").axis("x")))
     assert set(found.effects) == {"backlash", "coulomb_friction", "cogging"}
-    assert [step.added for step in found.steps][:2] == [None, "cogging"] and found.final.excess == 0.0
-    assert [one.effect for one in found.tried].count("cogging") == 1 and found.tried[0].effect == "backlash"
+    assert [rung.added for rung in found.rungs][:2] == [None, "cogging"] and found.final.excess == 0.0
+    assert [one.name for one in found.candidates].count("cogging") == 1 and found.candidates[0].name == "backlash"

@@ -44,12 +44,11 @@ def test_two_like_inertias_are_a_shaft_that_gives_and_the_sentence_says_what_els
     assert found.effects == ("screw_compliance",), found.sentence
     assert 0.6 < found.confidence < 0.98
     assert "A motor encoder cannot distinguish screw_compliance from base_resonance" in found.sentence
-    assert found.ladder is not None
-    model = found.ladder.final.model
+    model = found.final.model
     zero, split = dict(model.effects)["screw_compliance"][1::-1]
     assert (zero, zero * (1.0 + split)) == pytest.approx((54.0, 54.0 * 2.0**0.5), rel=0.02)
-    assert found.ladder.final.parameter("screw_compliance.frequency").value == zero
-    assert {rung.added for rung in found.ladder.steps} == {None, "screw_compliance"}
+    assert found.final.parameter("screw_compliance.frequency").value == zero
+    assert {rung.added for rung in found.rungs} == {None, "screw_compliance"}
 
 
 def two_inertias() -> tuple[np.ndarray, np.ndarray]:

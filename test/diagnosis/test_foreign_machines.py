@@ -9,7 +9,8 @@ import pytest
 from helpers.foreign import Joint, across_gap, driven
 
 from xy_sysid.axis.model import STANDARD
-from xy_sysid.diagnosis.diagnose import Diagnosis, diagnose
+from xy_sysid.diagnosis.answer import Answer
+from xy_sysid.diagnosis.diagnose import diagnose
 from xy_sysid.effects import EFFECTS
 
 SLIDE = Joint(fs=1000.0, seconds=40.0, count=1e-6, mass=0.1, drag=10.0, shake=1.0, band=(0.5, 60.0))
@@ -40,15 +41,14 @@ ROBOT = Joint(
 )
 
 
-def of(joint: Joint, seed: int = 1) -> Diagnosis:
+def of(joint: Joint, seed: int = 1) -> Answer:
     """The answer for a machine."""
     return diagnose(joint.fs, *driven(joint, seed))
 
 
-def values(found: Diagnosis) -> dict[str, tuple[float, ...]]:
+def values(found: Answer) -> dict[str, tuple[float, ...]]:
     """Of each effect of the last model."""
-    assert found.ladder is not None
-    return dict(found.ladder.final.model.effects)
+    return dict(found.final.model.effects)
 
 
 @pytest.mark.parametrize("seed", [1, 2])

@@ -23,7 +23,7 @@ def test_a_search_goes_on_from_a_mode_that_was_given(mode: str, data: AxisData) 
     """The mode keeps its name and its place; the friction is found beside it."""
     found = refine(data, given=[mode], effort=Effort(most=1))
     assert found.effects == (mode, "coulomb_friction")
-    assert [step.added for step in found.steps] == [None, *found.effects]
+    assert [rung.added for rung in found.rungs] == [None, *found.effects]
 
 
 @pytest.mark.parametrize("mode", MODES)

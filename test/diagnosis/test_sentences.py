@@ -12,9 +12,9 @@ from helpers.simulated import recorded
 
 from xy_sysid.axis.model import STANDARD
 from xy_sysid.cli.refine import _words, verdict
-from xy_sysid.diagnosis.diagnose import Diagnosis, judged
-from xy_sysid.diagnosis.findings import findings
-from xy_sysid.diagnosis.ladder import Candidate, Ladder
+from xy_sysid.diagnosis import words
+from xy_sysid.diagnosis.answer import Answer, Rung, Tried
+from xy_sysid.diagnosis.diagnose import judged
 from xy_sysid.diagnosis.refine import Effort, refine
 from xy_sysid.greybox.axis_data import AxisData, prepare
 from xy_sysid.page.document_words import candidate_rows
@@ -28,12 +28,12 @@ def data() -> AxisData:
 
 
 @pytest.fixture(scope="module")
-def ladder(data: AxisData) -> Ladder:
+def ladder(data: AxisData) -> Answer:
     """The rigid model alone, which fails: nothing was searched."""
     return refine(data, effort=Effort(most=0))
 
 
-def noisier(data: AxisData, ladder: Ladder) -> tuple[AxisData, Ladder]:
+def noisier(data: AxisData, ladder: Answer) -> tuple[AxisData, Answer]:
     """The same axis, where the encoder is taken for noisier at high frequency than it is, as after few coarse counts."""
     noise = data.floor.noise.copy()
     noise[-3:] *= 1e6
@@ -42,7 +42,7 @@ def noisier(data: AxisData, ladder: Ladder) -> tuple[AxisData, Ladder]:
     return louder, replace(ladder, noise=louder.noise, discrepancy=left)
 
 
-def test_what_is_not_in_the_library_is_never_nothing_of_the_motion(data: AxisData, ladder: Ladder) -> None:
+def test_what_is_not_in_the_library_is_never_nothing_of_the_motion(data: AxisData, ladder: Answer) -> None:
     """Noise of one band does not hide what another has: the error beyond it is part of the error that is told, and not 0 %."""
     louder, same = noisier(data, ladder)
     assert same.noise > same.base.held_out_error and same.discrepancy == 0.0
@@ -57,30 +57,30 @@ def test_what_is_not_in_the_library_is_never_nothing_of_the_motion(data: AxisDat
         assert "noise alone" not in found.sentence
 
 
-def with_a_refused_candidate(data: AxisData, ladder: Ladder) -> Diagnosis:
+def with_a_refused_candidate(data: AxisData, ladder: Answer) -> Answer:
     """One effect leaves next to nothing, and is refused."""
-    tried = Candidate("cogging", 1.0, replace(ladder.base, held_out_error=0.01 * ladder.base.held_out_error), explained=0.991)
-    return judged(data, replace(ladder, tried=(tried,), refused=((("cogging",), "cogging: amplitude is at its bound"),)), STANDARD)
+    rung = Rung.of(replace(ladder.base, held_out_error=0.01 * ladder.base.held_out_error), ("cogging",))
+    tried = Tried(rung, explained=0.991, refused="cogging: amplitude is at its bound")
+    return judged(data, replace(ladder, candidates=(tried,)), STANDARD)
 
 
-def test_an_effect_that_leaves_little_and_is_refused_says_so_where_it_stands(data: AxisData, ladder: Ladder) -> None:
+def test_an_effect_that_leaves_little_and_is_refused_says_so_where_it_stands(data: AxisData, ladder: Answer) -> None:
     """In the evidence of the page, of the report and of the JSON document; one that is not refused has no such word."""
     found = with_a_refused_candidate(data, ladder)
     assert found.sentence.startswith("Not in the library: no effect explains")
-    (told,) = findings(found, STANDARD).candidates
-    assert "99.1 %" in told.evidence and "refused (cogging: amplitude is at its bound)" in told.evidence
-    plain = replace(found, refused=())
-    assert "refused" not in findings(plain, STANDARD).candidates[0].evidence
-    story = Story("x", 2000.0, 8.0, 1e-3, data.units, None, (), findings(found, STANDARD))
+    (told,) = found.candidates
+    evidence = words.evidence(found, told)
+    assert "99.1 %" in evidence and "refused (cogging: amplitude is at its bound)" in evidence
+    assert "refused" not in words.evidence(found, replace(told, refused=""))
+    story = Story("x", 2000.0, 8.0, 1e-3, data.units, diagnosis=found.plain())
     assert "refused" in candidate_rows(document(story))[0].evidence
 
 
-def test_refine_does_not_say_that_nothing_helps_beside_a_falling_error(ladder: Ladder) -> None:
+def test_refine_does_not_say_that_nothing_helps_beside_a_falling_error(ladder: Answer) -> None:
     """If an effect explains a tenth of the error, the sentence gives the effect and the tenth. If no effect was found, it says that none helps."""
     assert verdict(ladder) == "not_in_library" and _words(ladder) == "No effect of the library reduces the error."
-    falling = replace(
-        ladder, effects=("cogging",), final=replace(ladder.base, held_out_error=0.95 * ladder.base.held_out_error), explained=0.1, discrepancy=1e-3
-    )
+    less = Rung.of(replace(ladder.base, held_out_error=0.95 * ladder.base.held_out_error), ("cogging",))
+    falling = replace(ladder, best=("cogging",), rungs=(*ladder.rungs, less), explained=0.1, discrepancy=1e-3)
     assert verdict(falling) == "not_in_library"
     assert _words(falling) == "cogging explains only 10 % of the error's power; the residual error beyond the noise is 1 mm/s."
 
@@ -89,7 +89,7 @@ def test_nothing_missing_is_told_with_the_floor_of_the_ladder(data: AxisData) ->
     """The number beside the error is the one that page, report and refine call the noise floor."""
     clean = prepare(2000.0, *recorded("", seconds=8.0).axis("x"))
     found = judged(clean, refine(clean, effort=Effort(most=0)), STANDARD)
-    assert found.verdict == "nothing_missing" and found.ladder is not None
+    assert found.verdict == "nothing_missing"
     (told,) = re.findall(r"at the noise floor \(([\d.]+) mm/s\)", found.sentence)
-    assert float(told) == pytest.approx(1e3 * found.ladder.base.noise_floor, rel=5e-3)
+    assert float(told) == pytest.approx(1e3 * found.base.noise_floor, rel=5e-3)
     assert np.isfinite(found.confidence)

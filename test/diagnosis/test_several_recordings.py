@@ -30,8 +30,8 @@ def test_each_recording_has_its_own_load(loads: tuple[float, ...]) -> None:
     """Also where the first carries nothing, and where the mean is none; friction and mass are those of all."""
     found = xy.diagnose(recorded(*loads))
     assert set(found.effects) == {"constant_load", "coulomb_friction"}, found.sentence
-    assert found.confidence > 0.9 and found.ladder is not None
-    fit = found.ladder.final
+    assert found.confidence > 0.9
+    fit = found.final
     load = fit.parameter("constant_load.load")
     assert [one.value for one in load.recordings] == pytest.approx(loads, abs=2e-3)
     assert all(one.low <= true <= one.high for one, true in zip(load.recordings, loads, strict=True))
@@ -57,7 +57,7 @@ def test_a_model_says_what_each_recording_carried(tmp_path: Path, capsys: pytest
     back = xy.load_model(tmp_path / "model.yaml")
     assert isinstance(back, xy.PhysicalModel)
     assert dict(back.model.effects)["constant_load"] == pytest.approx((0.2,), abs=2e-3)
-    parameter_table(found.steps[-1].fit)
+    parameter_table(found.rungs[-1].parameters)
     assert "in recording 2" in capsys.readouterr().out
 
 

@@ -25,7 +25,7 @@ def test_short_recordings_together_name_the_friction(parts: list[Recording]) -> 
     """Fewer samples each than a fit takes alone; together they tell it and its size."""
     found = xy.diagnose(parts)
     assert found.effects == ("coulomb_friction",), found.sentence
-    assert found.ladder is not None and found.ladder.final.parameter("coulomb_friction.coulomb").value == pytest.approx(0.5, rel=0.05)
+    assert found.final.parameter("coulomb_friction.coulomb").value == pytest.approx(0.5, rel=0.05)
     assert xy.diagnose(parts[0]).verdict == "not_enough_data"
 
 

@@ -62,9 +62,8 @@ def test_the_same_axis_in_other_units_misses_the_same_effect(effect: str) -> Non
     here, there = diagnose(2000.0, voltage, position), diagnose(2000.0, drive * voltage, length * position)
     assert here.effects == there.effects == (effect,)
     assert there.confidence == pytest.approx(here.confidence, abs=0.02)
-    assert here.ladder is not None and there.ladder is not None
     own = Similarity(length=length, time=1.0, voltage=drive)
     units = {f"{effect}.{item.name}": item.unit for item in EFFECTS[effect].parameters}
     for key, unit in (("gain", "m/s/V"), ("pole", "rad/s"), *list(units.items())[:1]):
-        one, other = here.ladder.final.parameter(key).value, there.ladder.final.parameter(key).value
+        one, other = here.final.parameter(key).value, there.final.parameter(key).value
         assert other == pytest.approx(one * own.factor(unit), rel=0.02), key

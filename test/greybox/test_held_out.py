@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from helpers.simulated import recorded
 
-from xy_sysid.diagnosis.diagnose import diagnose, diagnose_all
+from xy_sysid.diagnosis.diagnose import diagnose
+from xy_sysid.diagnosis.of_run import diagnose as diagnose_runs
 from xy_sysid.greybox.axis_data import SHIFTS, AxisData, _blocks, prepare, prepare_all
 from xy_sysid.greybox.floor import Bands, Windows
 from xy_sysid.samples.block import FloatArray
@@ -81,13 +82,12 @@ def test_noise_that_does_not_follow_the_input_is_not_judged() -> None:
 
 def test_two_recordings_of_one_machine_are_one_question() -> None:
     """Another excitation of the same axis beside the first: the same name, fitted to both, and the parameter is known better."""
-    pair = [recorded("coulomb_friction", seconds=12.0, seed=seed).axis("x") for seed in (21, 21)]
-    both, one = diagnose_all(2000.0, pair), diagnose(2000.0, *pair[0])
+    pair = [recorded("coulomb_friction", seconds=12.0, seed=seed).run("x") for seed in (21, 21)]
+    both, one = diagnose_runs(pair), diagnose_runs(pair[0])
     assert (both.verdict, both.effects) == ("missing_effect", ("coulomb_friction",))
-    assert both.ladder is not None and one.ladder is not None
-    widths = [(found.high - found.low) for found in (item.ladder.final.parameter("coulomb_friction.coulomb") for item in (both, one) if item.ladder)]
+    widths = [(found.high - found.low) for found in (item.final.parameter("coulomb_friction.coulomb") for item in (both, one))]
     assert widths[0] < widths[1]
-    assert both.ladder.final.parameter("coulomb_friction.coulomb").value == pytest.approx(0.2, rel=0.01)
+    assert both.final.parameter("coulomb_friction.coulomb").value == pytest.approx(0.2, rel=0.01)
 
 
 def test_the_first_stage_is_short_where_windows_are_long(monkeypatch: pytest.MonkeyPatch) -> None:

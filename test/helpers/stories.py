@@ -5,8 +5,10 @@ from __future__ import annotations
 from functools import cache
 
 from helpers.simulated import recorded
+from xy_sysid.axis.model import STANDARD
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import Run
+from xy_sysid.story.acts import Job, perform
 from xy_sysid.story.story import Story, tell
 
 RATE = 2000.0
@@ -21,3 +23,9 @@ def data() -> tuple[FloatArray, FloatArray]:
 @cache
 def told() -> Story:
     return tell(Run("x", RATE, *data()))
+
+
+def with_effects(story: Story, run: Run, *effects: str) -> Story:
+    """A story whose model is to have exactly these effects, as the nodes ask for them."""
+    job = Job(act="effects", run=run, story=story, effects=effects, tolerance=story.tolerance)
+    return [made for _, made in perform(job, STANDARD) if made is not None][-1]

@@ -93,9 +93,9 @@ def test_no_model_makes_its_own_error_cheap(hanging: AxisData) -> None:
     """A model that hardly answers is not better than one which follows the motion: what the joint is made of is found, at its size."""
     found = diagnose_prepared(hanging)
     assert set(found.effects) == {"gravity", "coulomb_friction"}
-    assert found.ladder is not None
-    assert found.ladder.final.parameter("gravity.amplitude").value == pytest.approx(3.5, rel=0.02)
-    assert found.ladder.final.parameter("coulomb_friction.coulomb").value == pytest.approx(0.7, rel=0.02)
+    assert found.final is not None
+    assert found.final.parameter("gravity.amplitude").value == pytest.approx(3.5, rel=0.02)
+    assert found.final.parameter("coulomb_friction.coulomb").value == pytest.approx(0.7, rel=0.02)
 
 
 @pytest.mark.parametrize(

@@ -10,9 +10,9 @@ from helpers.simulated import recorded
 
 from xy_sim.machine import Machine
 from xy_sysid.axis.model import STANDARD
-from xy_sysid.diagnosis.ladder import contains
 from xy_sysid.diagnosis.refine import Effort, refine
 from xy_sysid.diagnosis.rungs import with_one_more
+from xy_sysid.diagnosis.sets import contains
 from xy_sysid.excitation.lockstep import drive
 from xy_sysid.greybox.axis_data import AxisData, prepare
 from xy_sysid.greybox.free_run import fit, fit_base

@@ -105,7 +105,7 @@ def test_requests_are_done_one_after_the_other_and_answered() -> None:
     diagnoser.have("x", ())
     assert play(diagnoser)[-1] == "x without coulomb_friction"
     diagnoser.reset_model()
-    assert len(diagnoser.stories["x"].steps) == 1 and diagnoser.stories["x"].diagnosis is not None
+    assert len(diagnoser.stories["x"].rungs) == 1 and diagnoser.stories["x"].diagnosis is not None
 
 
 def test_once_a_resonance_is_in_the_model_the_next_effects_are_found() -> None:

@@ -11,10 +11,11 @@ import pytest
 from helpers.browser_tools import Server, Tab, browser, needs_browser
 from helpers.ros_tools import HAS_ROS, World, needs_ros, world_in
 from helpers.simulated import recorded
+from helpers.stories import with_effects
 
 from xy_sysid.control_design.follower import KINDS
 from xy_sysid.story.document import document
-from xy_sysid.story.story import begin, with_effects
+from xy_sysid.story.story import begin
 
 if HAS_ROS:
     from std_msgs.msg import String
@@ -37,7 +38,7 @@ DRIVEN = {"axes": "[x]", "lockstep": True, "speed": 4.0}
 def story() -> str:
     """The story of such an axis, identified from another recording of it."""
     run = recorded("x:coulomb_friction=0.3", seconds=12.0).run("x")
-    return json.dumps(document(with_effects(begin(run), run, ["coulomb_friction"])))
+    return json.dumps(document(with_effects(begin(run), run, "coulomb_friction")))
 
 
 class Scene:

@@ -10,7 +10,8 @@ import pytest
 from helpers.real_data import data
 
 from xy_sysid.axis.model import STANDARD
-from xy_sysid.diagnosis.diagnose import Diagnosis, diagnose
+from xy_sysid.diagnosis.answer import Answer
+from xy_sysid.diagnosis.diagnose import diagnose
 from xy_sysid.greybox.axis_data import prepare
 from xy_sysid.greybox.free_run import fit_base, fit_with, fitted_score
 from xy_sysid.greybox.open_loop import open_loop, settled
@@ -23,7 +24,7 @@ FORCE = 35.15065  # N/V of EMPS
 
 
 @cache
-def found(path: str) -> tuple[Diagnosis, float]:
+def found(path: str) -> tuple[Answer, float]:
     """The answer for the only axis with the usual budget, and the sampling rate, Hz."""
     recording = load(data(path))
     return diagnose(recording.sampling_rate, *recording.axis(recording.axes[0]), clock=time.process_time), recording.sampling_rate
@@ -33,9 +34,8 @@ def found(path: str) -> tuple[Diagnosis, float]:
 def test_no_mode_is_named_above_what_the_sampling_can_see(path: str) -> None:
     """0.8 of Nyquist, in any set that could have been best; what was fitted above is refused, in words."""
     item, rate = found(path)
-    assert item.ladder is not None
     highest = 0.4 * rate
-    for names, fit in ((item.effects, item.ladder.final), *((rival.effects, rival.fit) for rival in item.ladder.rivals)):
+    for names, fit in ((item.effects, item.final), *((rival.effects, rival.rung.fit) for rival in item.rivals)):
         for name in names:
             mode = STANDARD[name].mode_frequency
             if mode:
@@ -57,10 +57,9 @@ def test_emps_has_coulomb_friction_and_drag_that_differs_between_directions() ->
 def test_emps_is_refined_without_being_told() -> None:
     """Dry friction and its direction dependence; at least 95 % of the held-out error power gone, the published mass; no false end."""
     item, rate = found(EMPS)
-    assert item.ladder is not None
     families = ("coulomb_friction", "asymmetric_friction", "stribeck_friction", "presliding_hysteresis")
     assert set(families) & set(item.effects) and "asymmetric_viscous_friction" in item.effects
-    base, final = item.ladder.steps[0].fit, item.ladder.final
+    base, final = item.base, item.final
     assert (final.held_out_error / base.held_out_error) ** 2 < 0.05
     voltage, position = load(data(EMPS)).axis("x")
     alone = settled(prepare(rate, voltage, position), final)
@@ -92,7 +91,7 @@ def test_each_half_of_emps_says_what_the_whole_says_and_their_intervals_overlap(
     for half in halves:
         assert {"coulomb_friction", "asymmetric_friction"} & set(half.effects), half.sentence
         assert half.explained > 0.8
-    first, second = (half.ladder.final for half in halves if half.ladder is not None)
+    first, second = (half.final for half in halves)
     both = {item.name for item in first.parameters} & {item.name for item in second.parameters}
     apart = [item.name for item in first.parameters if item.name in both and not _overlap(item, second.parameter(item.name))]
     assert len(apart) < len(both)

@@ -24,7 +24,7 @@ def with_steps(count: int, diagnosed: bool = True) -> dict[str, Any]:
     from dataclasses import replace
 
     story: Story = told()
-    return document(replace(story, steps=story.steps[:count], diagnosis=story.diagnosis if diagnosed else None))
+    return document(replace(story, rungs=story.rungs[:count], pictures=story.pictures[:count], diagnosis=story.diagnosis if diagnosed else None))
 
 
 def test_the_headline_goes_from_missing_over_adding_to_explained() -> None:

@@ -9,21 +9,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.simulated import recorded
-from helpers.stories import RATE, data, told
+from helpers.stories import RATE, data, told, with_effects
 
 from xy_sysid.axis.linear_part import linear_part, nonlinear
 from xy_sysid.axis.model import STANDARD, AxisModel
 from xy_sysid.errors import BadInput
 from xy_sysid.samples.recording import Run
 from xy_sysid.story.document import document
-from xy_sysid.story.story import HELPS_NO_MORE, added, auto, begin, diagnosed, next_best, removed, tell, with_effects
+from xy_sysid.story.story import HELPS_NO_MORE, added, auto, begin, diagnosed, next_best, removed, tell
 
 
 def test_the_error_falls_from_the_base_to_the_floor() -> None:
     """Base, diagnosis, the named effect added: the newest error is at the floor, and says so."""
     story = told()
-    assert [step.rung.added for step in story.steps] == [None, "coulomb_friction"]
-    first, last = story.steps[0].rung, story.steps[-1].rung
+    assert [rung.added for rung in story.rungs] == [None, "coulomb_friction"]
+    first, last = story.rungs[0], story.rungs[-1]
     assert last.held_out_error < 1.05 * last.noise_floor < 0.2 * first.held_out_error
     assert last.explained and not first.explained
     assert story.diagnosis is not None and story.diagnosis.effect == "coulomb_friction"
@@ -82,13 +82,13 @@ def test_the_pictures_show_where_the_base_fails_and_that_it_no_longer_does() -> 
 
 
 def test_effects_come_and_go_by_name() -> None:
-    """One step each; with_effects takes out what is not wanted and keeps the order; next_best and auto find by themselves."""
+    """One step each; what is not wanted is taken out first; next_best and auto find by themselves."""
     run = Run("x", RATE, *data())
     story = begin(run)
-    wrong = with_effects(story, run, ["cogging"])
-    assert [step.rung.label for step in wrong.steps] == ["rigid, with delay", "with cogging"]
-    right = with_effects(wrong, run, ["coulomb_friction"])
-    assert [step.rung.label for step in right.steps[2:]] == ["without cogging", "with coulomb_friction"]
+    wrong = with_effects(story, run, "cogging")
+    assert [rung.label for rung in wrong.rungs] == ["rigid, with delay", "with cogging"]
+    right = with_effects(wrong, run, "coulomb_friction")
+    assert [rung.label for rung in right.rungs[2:]] == ["without cogging", "with coulomb_friction"]
     assert right.effects == ("coulomb_friction",) and right.now is not None and right.now.explained
     assert next_best(story, run).effects == ("coulomb_friction",)
     done = auto(story, run)
@@ -102,7 +102,7 @@ def test_what_the_diagnosis_has_searched_is_not_searched_again(monkeypatch: pyte
     run = Run("x", RATE, *data())
     story = diagnosed(begin(run), run)
     assert story.diagnosis is not None
-    story = replace(story, diagnosis=replace(story.diagnosis, ladder=story.diagnosis.ladder[:1]))
+    story = replace(story, diagnosis=replace(story.diagnosis, rungs=story.diagnosis.rungs[:1]))
     monkeypatch.setattr("xy_sysid.story.story.refine", None)
     assert next_best(story, run).note == HELPS_NO_MORE
 
@@ -111,7 +111,7 @@ def test_a_relative_replaces_its_own() -> None:
     """Two laws of the same dry friction are not added to each other."""
     story = added(told(), Run("x", RATE, *data()), "stribeck_friction")
     assert story.effects == ("stribeck_friction",)
-    assert story.steps[-1].rung.label == "stribeck_friction instead of coulomb_friction"
+    assert story.rungs[-1].label == "stribeck_friction instead of coulomb_friction"
 
 
 @pytest.mark.parametrize(
@@ -126,13 +126,13 @@ def test_a_wrong_name_is_refused_in_one_line(name: str, words: str) -> None:
 def test_backlash_is_told_one_sample_ahead() -> None:
     """What free simulation cannot judge: the label says so, and the pictures are those of the prediction."""
     story = tell(recorded("x:backlash", seconds=20.0).run("x"))
-    last = story.steps[-1]
-    assert (last.rung.added, last.rung.explained) == ("backlash", True)
-    assert story.steps[0].pictures.failing and not last.pictures.failing  # explained is not drawn as failing
-    assert "one sample ahead" in last.rung.label
-    assert len(last.pictures.failing) < len(story.steps[0].pictures.failing)
-    error = np.std(last.pictures.zoom_velocity - (story.measured.zoom_velocity if story.measured else 0.0))
-    assert error < 2.0 * last.rung.held_out_error
+    last, (first, *_, drawn) = story.rungs[-1], story.pictures
+    assert (last.added, last.explained) == ("backlash", True)
+    assert first.failing and not drawn.failing  # explained is not drawn as failing
+    assert "one sample ahead" in last.label
+    assert len(drawn.failing) < len(first.failing)
+    error = np.std(drawn.zoom_velocity - (story.measured.zoom_velocity if story.measured else 0.0))
+    assert error < 2.0 * last.held_out_error
 
 
 def test_without_enough_data_the_story_says_what_lacks() -> None:
@@ -164,7 +164,7 @@ def test_every_noise_floor_of_a_story_is_of_its_own_tolerance() -> None:
     run = Run("x", RATE, *data())
     story = next_best(diagnosed(begin(run, tolerance=0.02), run), run)
     assert story.diagnosis is not None
-    rungs = [*story.diagnosis.ladder, *(step.rung for step in story.steps)]
+    rungs = [*story.diagnosis.rungs, *story.rungs]
     (floor,) = {rung.noise_floor for rung in rungs}
     assert floor > 2.0 * story.diagnosis.noise
     assert document(story)["error"]["noise_floor"] == floor

@@ -17,9 +17,8 @@ from xy_sysid.units import motion
 
 if TYPE_CHECKING:
     from xy_sysid.axis.mechanics import Transmission
-    from xy_sysid.axis.model import Library
-    from xy_sysid.diagnosis.diagnose import Diagnosis
-    from xy_sysid.greybox.free_run import GreyboxFit
+    from xy_sysid.diagnosis.answer import Answer, Rung
+    from xy_sysid.greybox.parameters import Estimate
     from xy_sysid.imports.reading import Reading
 
 Own = Annotated[list[Path] | None, typer.Option("--effect-file", metavar="FILE", help="a Python file with an effect of your own (may be repeated)")]
@@ -37,7 +36,7 @@ def diagnose(
 ) -> None:
     """Name the physical effect that the rigid model of each axis misses, with evidence, or report that no known effect explains the error."""
     from xy_sysid.axis.mechanics import drive_from
-    from xy_sysid.diagnosis.findings import answer, findings
+    from xy_sysid.diagnosis.as_json import answer_document
     from xy_sysid.diagnosis.of_run import diagnose as logic
     from xy_sysid.files.effects import library
 
@@ -51,52 +50,47 @@ def diagnose(
     found, refused = each(names, lambda name: logic(runs_of(recordings, name), known, limit, time.process_time), "diagnosing ")
     seconds = time.perf_counter() - begun
     if json:
-        answers: dict[str, Any] = {name: answer(findings(item, known)) | _mechanics(item, drive) for name, item in found.items()}
+        answers: dict[str, Any] = {name: answer_document(item) | _mechanics(item, drive) for name, item in found.items()}
         answers |= {name: {"verdict": "not_enough_data", "effect": None, "confidence": 1.0, "sentence": text} for name, text in refused.items()}
         emit({"axes": answers, "seconds": seconds, "notes": [note for one in recordings for note in one.notes]})
         return
     for name, item in found.items():
-        _show(name, item, known, drive)
+        _show(name, item, drive)
     say_refused(refused)
 
 
-def _mechanics(item: Diagnosis, drive: Transmission) -> dict[str, Any]:
-    figures = item.ladder.final.parameters if item.ladder is not None else ()
-    return {"mechanics": mechanics_document(figures, item.units, drive)}
+def _mechanics(item: Answer, drive: Transmission) -> dict[str, Any]:
+    return {"mechanics": mechanics_document(item.rungs[-1].parameters if item.rungs else (), item.units, drive)}
 
 
-def _show(name: str, item: Diagnosis, known: Library, drive: Transmission) -> None:
-    from xy_sysid.diagnosis.findings import findings
-
+def _show(name: str, item: Answer, drive: Transmission) -> None:
     sure = "above 0.99" if item.confidence > 0.99 else f"{item.confidence:.2f}"
     say(f"axis {name}: {item.sentence.rstrip()} Confidence {sure}.")
     if item.where is not None and item.where.places:
         places = "; ".join(place.sentence for place in item.where.places[:3])
         say(f"  The rigid model fails: {places}.")
-    if item.ladder is not None and item.verdict != "nothing_missing":
-        told = {one.effect: one.share for one in findings(item, known).candidates}
-        tried = [(c, c.fit) for c in item.candidates if c.fit is not None]
-        tried.sort(key=lambda pair: (float(f"{pair[1].held_out_error:.2g}"), pair[0].effect not in item.effects))  # by what each leaves
-        parts = ["-" if fit.one_step else f"{100 * told.get(c.effect, 0.0):.3g} %" for c, fit in tried]  # of another error, one sample ahead
-        names = [f"{c.effect} (refused)" if item.why_refused(c.effect) else c.effect for c, _ in tried]
-        rows = [(*error_cells(name, fit), part) for name, (_, fit), part in zip(names, tried, parts, strict=True)]
+    if item.rungs and item.verdict != "nothing_missing":
+        rows = []
+        for one in sorted(item.candidates, key=lambda one: (float(f"{one.rung.held_out_error:.2g}"), one.name not in item.effects)):
+            part = "-" if one.rung.one_step else f"{100 * one.explained:.3g} %"  # of another error, one sample ahead
+            rows.append((*error_cells(f"{one.name} (refused)" if one.refused else one.name, one.rung), part))
         if rows:
             table("alone, least left first", ("effect", f"held-out error {motion(item.units.judged)[1]}", "times floor", "share of error"), rows)
-        parameter_table(item.ladder.final)
-        mechanics_table(item.ladder.final.parameters, item.units, drive)
+        parameter_table(item.rungs[-1].parameters)
+        mechanics_table(item.rungs[-1].parameters, item.units, drive)
     say(f"  Next experiment: {item.next_experiment}\n")
 
 
-def error_cells(name: str, fit: GreyboxFit) -> tuple[str, str, str]:
+def error_cells(name: str, rung: Rung) -> tuple[str, str, str]:
     """Name, held-out error and what that is over the noise floor; where free simulation cannot judge, the name says what was judged."""
-    label = f"{name} (error one sample ahead)" if fit.one_step else name
-    return label, f"{motion(fit.units.judged)[0] * fit.held_out_error:.4g}", f"{fit.held_out_error / max(fit.noise_floor, 1e-300):.2f}"
+    label = f"{name} (error one sample ahead)" if rung.one_step else name
+    return label, f"{motion(rung.units.judged)[0] * rung.held_out_error:.4g}", f"{rung.held_out_error / max(rung.noise_floor, 1e-300):.2f}"
 
 
-def parameter_table(fit: GreyboxFit) -> None:
-    """Parameters of a fit, as people read them."""
+def parameter_table(parameters: tuple[Estimate, ...]) -> None:
+    """Parameters as people read them."""
     rows = []
-    for p in fit.parameters:
+    for p in parameters:
         rows.append(estimate(p.name, (p.value, p.low, p.high), p.unit))
         rows += [estimate(f"  in recording {k}", (one.value, one.low, one.high), one.unit) for k, one in enumerate(p.recordings, 1)]
     table("", ("parameter", "value", "95 % interval", "unit"), rows)

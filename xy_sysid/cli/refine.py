@@ -19,7 +19,7 @@ from xy_sysid.files.provenance import provenance
 from xy_sysid.units import bare, motion, moved
 
 if TYPE_CHECKING:
-    from xy_sysid.diagnosis.ladder import Ladder
+    from xy_sysid.diagnosis.answer import Answer
     from xy_sysid.greybox.open_loop import OpenLoop
     from xy_sysid.imports.reading import Reading
 
@@ -48,6 +48,7 @@ def refine(
 ) -> None:
     """Add physical effects to the rigid model, fit all parameters again after each, and print the falling error."""
     from xy_sysid.axis.mechanics import drive_from
+    from xy_sysid.diagnosis.answer import Rung
     from xy_sysid.diagnosis.of_run import refined
     from xy_sysid.diagnosis.refine import Effort
     from xy_sysid.errors import BadInput
@@ -71,73 +72,71 @@ def refine(
     drive = drive_from(kt, gear, recording.units)
     alone: dict[str, OpenLoop] = {}
 
-    def work(name: str) -> Ladder:
+    def work(name: str) -> Answer:
         runs = runs_of(recordings, name)
         run, effort = runs[0], Effort(MOST_EFFECTS if auto else 0, math.inf if budget is None else budget, time.process_time)
-        found = refined(runs, tuple(add or ()), known, effort, tolerance).ladder
+        found = refined(runs, tuple(add or ()), known, effort, tolerance)
         if not found.final.one_step and len(runs) == 1:  # free simulation says nothing about those
             if simulate_alone:
                 data = prepare(run.sampling_rate, run.voltage, run.position, tolerance, run.units)
-                found = replace(found, final=settled(data, found.final))
+                found = replace(found, settled=Rung.of(settled(data, found.final)))
             alone[name] = open_loop(run.sampling_rate, run.position, found.final.simulated, found.final.model.pole)
         return found
 
     found, refused = each(names, work, "refining ")
     origin = provenance(named(recs), recording)
     if model is not None:
-        write_axis_models(model, {name: ladder.final for name, ladder in found.items()}, origin)
+        write_axis_models(model, {name: item.final for name, item in found.items()}, origin)
     if mat is not None:
-        write_axis_mat(mat, {name: ladder.final for name, ladder in found.items()})
+        write_axis_mat(mat, {name: item.final for name, item in found.items()})
     if json:
         answers: dict[str, Any] = {
-            name: _answer(ladder)
+            name: _answer(item)
             | _alone(alone.get(name), recording.output_unit)
-            | {"mechanics": mechanics_document(ladder.final.parameters, recording.units, drive)}
-            for name, ladder in found.items()
+            | {"mechanics": mechanics_document(item.final.parameters, recording.units, drive)}
+            for name, item in found.items()
         }
         emit({"recording": origin, "axes": answers, "refused": refused})
         return
     scale, unit = motion(recording.units.judged)
-    for name, ladder in found.items():
-        rows = [
-            (label, f"{scale * step.fit.training_error:.4g}", held_out, over)
-            for step in ladder.steps
-            for label, held_out, over in [error_cells(step.added or "rigid, with delay", step.fit)]
-        ]
-        floor = scale * ladder.final.noise_floor
+    for name, item in found.items():
+        rows = []
+        for rung in item:
+            label, held_out, over = error_cells(rung.added or "rigid, with delay", rung)
+            rows.append((label, f"{scale * rung.training_error:.4g}", held_out, over))
+        floor = scale * item.final.noise_floor
         table(f"axis {name}: {unit}, floor {floor:.4g}", ("added", "training error", "held-out error", "times floor"), rows)
-        say(f"  {_words(ladder)}")
-        parameter_table(ladder.final)
-        mechanics_table(ladder.final.parameters, recording.units, drive)
+        say(f"  {_words(item)}")
+        parameter_table(item.final.parameters)
+        mechanics_table(item.final.parameters, recording.units, drive)
         if name in alone:
             say(f"  {_alone_in_words(alone[name], recording.output_unit)}")
         say()
     say_refused(refused)
 
 
-def verdict(ladder: Ladder) -> str:
+def verdict(found: Answer) -> str:
     """The contract's word."""
     from xy_sysid.hypotheses.criteria import AT_FLOOR
     from xy_sysid.story.standing import nearer
 
-    if ladder.final.excess < AT_FLOOR:
+    if found.final.excess < AT_FLOOR:
         return "explained"
-    first, last = ((fit.excess, fit.held_out_error) for fit in (ladder.steps[0].fit, ladder.final))
-    return "partly" if ladder.effects and nearer(first, last) else "not_in_library"
+    first, last = ((fit.excess, fit.held_out_error) for fit in (found.base, found.final))
+    return "partly" if found.effects and nearer(first, last) else "not_in_library"
 
 
-def _words(ladder: Ladder) -> str:
-    names = ", ".join(ladder.effects) or "nothing"
-    explain = "explain" if len(ladder.effects) > 1 else "explains"
-    left = f"the residual error beyond the noise is {moved(ladder.discrepancy, ladder.final.units.judged)}"
-    said = {
-        "explained": f"Explained by the rigid model and {names}: the held-out error is at the noise floor.",
-        "partly": f"{names} {explain} {100 * ladder.explained:.3g} % of the error's power; {left}.",
-        "not_in_library": f"{names} {explain} only {100 * ladder.explained:.3g} % of the error's power; {left}."
-        if ladder.effects
-        else "No effect of the library reduces the error.",
-    }[verdict(ladder)]
-    return f"{said} The search was stopped at its time limit." if ladder.stopped else said
+def _words(found: Answer) -> str:
+    names, word = ", ".join(found.effects) or "nothing", verdict(found)
+    if word == "explained":
+        said = f"Explained by the rigid model and {names}: the held-out error is at the noise floor."
+    elif found.effects:
+        explain = f"{'explain' if len(found.effects) > 1 else 'explains'}{'' if word == 'partly' else ' only'}"
+        said = f"{names} {explain} {100 * found.explained:.3g} % of the error's power; "
+        said += f"the residual error beyond the noise is {moved(found.discrepancy, found.units.judged)}."
+    else:
+        said = "No effect of the library reduces the error."
+    return f"{said} The search was stopped at its time limit." if found.stopped else said
 
 
 def _alone_in_words(found: OpenLoop, unit: str) -> str:
@@ -151,28 +150,18 @@ def _alone(found: OpenLoop | None, unit: str) -> dict[str, Any]:
     return {"open_loop": {"rms": found.rms, "worst": found.worst, "share": found.share, "unit": unit}}
 
 
-def _answer(ladder: Ladder) -> dict[str, Any]:
-    from xy_sysid.diagnosis.findings import parameters
+def _answer(found: Answer) -> dict[str, Any]:
+    from xy_sysid.diagnosis.as_json import parameters, rung_document, stopped_and_refused
 
-    rungs = [
-        {
-            "added": step.added,
-            "train_error": step.fit.training_error,
-            "held_out_error": step.fit.held_out_error,
-            "noise_floor": step.fit.noise_floor,
-            "excess": step.fit.excess,
-        }
-        for step in ladder.steps
-    ]
+    keys = ("added", "train_error", "held_out_error", "noise_floor", "excess")
     return {
-        "ladder": rungs,
-        "unit": ladder.final.units.judged,
-        "verdict": verdict(ladder),
-        "effects": ladder.effects,
-        "explained": ladder.explained,
-        "noise": ladder.noise,
-        "discrepancy": ladder.discrepancy,
-        "stopped": "budget" if ladder.stopped else None,
-        "refused": [{"effect": " and ".join(names), "reason": reason} for names, reason in ladder.refused],
-        "model": {"parameters": parameters(ladder.final.parameters)},
+        "ladder": [{key: document[key] for key in keys} for document in map(rung_document, found)],
+        "unit": found.units.judged,
+        "verdict": verdict(found),
+        "effects": found.effects,
+        "explained": found.explained,
+        "noise": found.noise,
+        "discrepancy": found.discrepancy,
+        **stopped_and_refused(found),
+        "model": {"parameters": parameters(found.final.parameters)},
     }

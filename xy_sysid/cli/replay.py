@@ -13,7 +13,6 @@ from xy_sysid.cli.diagnose import Own
 from xy_sysid.cli.output import aside, emit, estimates, progress, say, table
 
 if TYPE_CHECKING:
-    from xy_sysid.diagnosis.findings import Rung
     from xy_sysid.live.fitter import Update
     from xy_sysid.samples.joint_fields import JointOutput
     from xy_sysid.units import Units
@@ -159,13 +158,9 @@ def replay(
     for name, story in stories.items():
         say(words(story))
         scale, unit = motion(story.units.judged)
-        rows = [(step.rung.label, *(f"{scale * value:.4g}" for value in errors(step.rung))) for step in story.steps]
+        errors = ((rung.label, rung.training_error, rung.held_out_error, rung.noise_floor) for rung in story.rungs)
+        rows = [(label, *(f"{scale * value:.4g}" for value in row)) for label, *row in errors]
         table(f"axis {name}: {unit}", ("step", "training error", "held-out error", "noise floor"), rows)
-
-
-def errors(rung: Rung) -> tuple[float, float, float]:
-    """On the data of the fit, on the rest, and the least possible, m/s."""
-    return rung.train_error, rung.held_out_error, rung.noise_floor
 
 
 def _alarm(name: str, part: Any) -> str:

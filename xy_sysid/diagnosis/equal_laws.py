@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from xy_sysid.axis.model import AxisModel, Library
-from xy_sysid.diagnosis.ladder import Ladder, Rival, Step
+from xy_sysid.diagnosis.answer import Answer, Rung, Tried
 from xy_sysid.effects import Effect
 from xy_sysid.effects._contract import USUAL_WITHIN
 from xy_sysid.greybox.free_run import GreyboxFit
@@ -41,16 +41,16 @@ def _depth(effect: Effect, values: Sequence[float]) -> float:
     return -0.5 * sum((math.log(value / typical) / math.log(USUAL_WITHIN)) ** 2 for typical, value in pairs)
 
 
-def likely_names(ladder: Ladder, kept: Sequence[str] = ()) -> Ladder:
-    """The ladder with the likelier name for each effect of its last model that has equals, but for those that somebody gave."""
-    library = ladder.final.model.library
+def likely_names(found: Answer, kept: Sequence[str] = ()) -> Answer:
+    """The answer with the likelier name for each effect of its last model that has equals, but for those that somebody gave."""
+    library = found.final.model.library
     names: dict[str, str] = {}
-    for name, values in ladder.final.model.effects:
+    for name, values in found.final.model.effects:
         others = [other.name for other in equals(library, name)]
         likely = max(others, key=lambda other: likelihood(library, other, values)) if len(others) > 1 else name
         if likely != name and name not in kept:
             names |= {name: likely, likely: name}
-    return _renamed(ladder, names) if names else ladder
+    return _renamed(found, names) if names else found
 
 
 def is_the_same(library: Library, one: tuple[frozenset[str], GreyboxFit], other: tuple[frozenset[str], GreyboxFit], least: float) -> bool:
@@ -59,29 +59,29 @@ def is_the_same(library: Library, one: tuple[frozenset[str], GreyboxFit], other:
     return laws[0] == laws[1] and abs(one[1].excess - other[1].excess) < least
 
 
-def _renamed(ladder: Ladder, names: Mapping[str, str]) -> Ladder:
+def _renamed(found: Answer, names: Mapping[str, str]) -> Answer:
     """Names of effects replaced by others of the same law, wherever they stand."""
 
     def word(name: str) -> str:
         return names.get(name, name)
 
-    def fit(found: GreyboxFit) -> GreyboxFit:
-        parameters = (replace(item, name=".".join((word(item.name.partition(".")[0]), *item.name.split(".")[1:]))) for item in found.parameters)
-        return replace(found, model=_model(found.model, names), parameters=tuple(parameters))
+    def rung(item: Rung) -> Rung:
+        parameters = (replace(one, name=".".join((word(one.name.partition(".")[0]), *one.name.split(".")[1:]))) for one in item.parameters)
+        return Rung.of(replace(item.fit, model=_model(item.fit.model, names), parameters=tuple(parameters)), tuple(map(word, item.came)))
 
-    def rival(item: Rival) -> Rival:
-        return Rival(tuple(map(word, item.effects)), fit(item.fit), item.doubt, item.refused)
+    def tried(item: Tried) -> Tried:
+        return replace(item, rung=rung(item.rung))
 
     return replace(
-        ladder,
-        steps=tuple(Step(tuple(map(word, step.names)), fit(step.fit)) for step in ladder.steps),
-        final=fit(ladder.final),
-        effects=tuple(map(word, ladder.effects)),
-        tried=tuple(replace(item, effect=word(item.effect), fit=item.fit and fit(item.fit)) for item in ladder.tried),
-        rivals=tuple(map(rival, ladder.rivals)),
-        kept_out=ladder.kept_out and rival(ladder.kept_out),
-        sizes={word(name): size for name, size in ladder.sizes.items()},
-        refused=tuple((tuple(map(word, effects)), why) for effects, why in ladder.refused),
+        found,
+        rungs=tuple(map(rung, found.rungs)),
+        best=tuple(map(word, found.best)),
+        settled=found.settled and rung(found.settled),
+        candidates=tuple(map(tried, found.candidates)),
+        rivals=tuple(map(tried, found.rivals)),
+        kept_out=found.kept_out and tried(found.kept_out),
+        sizes={word(name): size for name, size in found.sizes.items()},
+        refused=tuple((tuple(map(word, effects)), why) for effects, why in found.refused),
     )
 
 

@@ -9,9 +9,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from xy_sysid.axis.model import Library
-from xy_sysid.diagnosis.ladder import Ladder
+from xy_sysid.diagnosis.answer import Answer
 from xy_sysid.diagnosis.refine import Effort
-from xy_sysid.diagnosis.rungs import Given, ladder_of_search
+from xy_sysid.diagnosis.rungs import answer_of_search, rungs_of
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import best_start, fit, screened
 from xy_sysid.hypotheses import starts
@@ -20,8 +20,8 @@ from xy_sysid.hypotheses.one_step import OneStepTrials
 from xy_sysid.hypotheses.pool import Pool
 
 
-def settled(data: AxisData, library: Library, names: tuple[str, ...], effort: Effort) -> Ladder | None:
-    """The ladder of a known set, or of a simpler one that does as well; None where the search has to be made.
+def settled(data: AxisData, library: Library, names: tuple[str, ...], effort: Effort) -> Answer | None:
+    """The answer of a known set, or of a simpler one that does as well; None where the search has to be made.
 
     names: effects in any order; those that the library does not have make no set
     Effects that are judged one sample ahead are tried together with the others, as in a search that has found the others.
@@ -33,9 +33,9 @@ def settled(data: AxisData, library: Library, names: tuple[str, ...], effort: Ef
     def late() -> bool:
         return effort.now() > until or data.work.done > enough
 
-    fixed = Given.of(data, library, ())
+    base = rungs_of(data, library)
     pool = Pool(data, library, worth=effort.size, most=effort.most, late=late)
-    pool.begin(fixed.steps[-1].fit)
+    pool.begin(base[0].fit)
     trials = OneStepTrials(pool)
     _fitted(pool, tuple(name for name in names if library[name].one_step is None))
     for _ in pool.simplified():
@@ -46,7 +46,7 @@ def settled(data: AxisData, library: Library, names: tuple[str, ...], effort: Ef
             pass
     if late() or (trials.found is None and pool.best.fit.excess >= AT_FLOOR):
         return None
-    return replace(ladder_of_search(pool, fixed, trials.found), tried_first=names)
+    return replace(answer_of_search(pool, base, trials.found), tried_first=names)
 
 
 def _fitted(pool: Pool, names: tuple[str, ...]) -> None:

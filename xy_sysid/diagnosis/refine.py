@@ -8,26 +8,19 @@ axis ends the search, and otherwise at the end.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import chain
 
 from xy_sysid.axis.model import STANDARD, Library
-from xy_sysid.diagnosis.ladder import Ladder
-from xy_sysid.diagnosis.rungs import Given, ladder_of_given, ladder_of_search
+from xy_sysid.diagnosis.answer import Answer
+from xy_sysid.diagnosis.rungs import answer_of_rungs, answer_of_search, rungs_of
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit, joined
 from xy_sysid.hypotheses.criteria import AT_FLOOR, MOST_EFFECTS, WORK, WORK_EACH, WORTH
 from xy_sysid.hypotheses.one_step import OneStepTrials
 from xy_sysid.hypotheses.pool import Pool
 from xy_sysid.jit import spent_compiling
-
-
-@dataclass(frozen=True, slots=True)
-class Trying:
-    """A set of effects that is about to be fitted."""
-
-    effects: tuple[str, ...]
 
 
 def never() -> float:
@@ -55,54 +48,47 @@ class Effort:
         return self.clock() - spent_compiling()
 
 
-def refine(data: AxisData, library: Library = STANDARD, given: Iterable[str] = (), effort: Effort | None = None) -> Ladder:
-    """Add effects until nothing promises more; ``given`` are added first, in their order, unasked. See ``refine_steps``."""
-    steps = refine_steps(data, library, given, effort)
-    while True:
-        try:
-            next(steps)
-        except StopIteration as end:
-            ladder: Ladder = end.value
-            return ladder
-
-
-def refine_steps(
-    data: AxisData, library: Library = STANDARD, given: Iterable[str] = (), effort: Effort | None = None
-) -> Generator[Trying, None, Ladder]:
-    """The same, step by step: yields what is being tried, returns what it came to."""
+def refine(
+    data: AxisData,
+    library: Library = STANDARD,
+    given: Iterable[str] = (),
+    effort: Effort | None = None,
+    trying: Callable[[frozenset[str]], None] = lambda names: None,
+) -> Answer:
+    """Add effects until nothing promises more. given: are added first, in their order, unasked; trying: is told each set before it is fitted."""
     kept, effort = tuple(given), effort or Effort()
-    fixed = Given.of(data, library, kept)
-    if fixed.steps[-1].fit.one_step or effort.most == 0:
-        return ladder_of_given(data, fixed)
+    rungs = rungs_of(data, library, kept)
+    if rungs[-1].one_step or effort.most == 0:
+        return answer_of_rungs(data, rungs)
     until, enough = effort.now() + effort.budget, data.work.done + WORK + WORK_EACH * data.velocity.size
 
     def late() -> bool:
         return effort.now() > until or (effort.budget == math.inf and data.work.done > enough)
 
     pool = Pool(data, library, frozenset(kept), worth=effort.size, most=effort.most, late=late)
-    pool.begin(fixed.steps[-1].fit)
+    pool.begin(rungs[-1].fit)
     trials = OneStepTrials(pool)
-    yield from _sets(pool, None if kept else trials)
-    return ladder_of_search(pool, fixed, trials.found)
+    _search(pool, None if kept else trials, trying)
+    return answer_of_search(pool, rungs, trials.found)
 
 
-def _sets(pool: Pool, trials: OneStepTrials | None) -> Iterator[Trying]:
+def _search(pool: Pool, trials: OneStepTrials | None, trying: Callable[[frozenset[str]], None]) -> None:
     """Search, simplify, and search again from what is simpler, until neither changes the best set."""
     before = None
     while pool.best is not before and not pool.late():
         before = pool.best
         for names in pool.search():
-            yield Trying(tuple(sorted(names)))
+            trying(names)
             if trials is not None and trials.due():
                 for tried in trials.tried(last=False):
-                    yield Trying(tuple(sorted(tried)))
+                    trying(tried)
                 if trials.found is not None:
                     return
         for names in chain(pool.suspected(), pool.simplified()):
-            yield Trying(tuple(sorted(names)))
+            trying(names)
     if trials is not None and pool.best.fit.excess >= AT_FLOOR:
         for tried in trials.tried(last=True):
-            yield Trying(tuple(sorted(tried)))
+            trying(tried)
 
 
 def settle(data: AxisData, now: GreyboxFit) -> GreyboxFit:

@@ -1,14 +1,15 @@
-"""From the fits of a search to its ladder: one rung for each effect, rivals, sizes, and what no effect explains."""
+"""From the fits of a search to its answer: one rung for each effect, rivals, sizes, and what no effect explains."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from xy_sysid.axis.model import Library
+from xy_sysid.diagnosis.answer import Answer, Rung, Tried
 from xy_sysid.diagnosis.equal_laws import is_the_same, likely_names
-from xy_sysid.diagnosis.ladder import Candidate, Ladder, Rival, Step, contains, is_taken_for, part_explained
+from xy_sysid.diagnosis.sets import contains, is_taken_for, part_explained
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit, best_start, fit, fit_base, joined, screened
 from xy_sysid.greybox.one_step import follower, one_step_fit
@@ -20,20 +21,12 @@ from xy_sysid.hypotheses.one_step import Filtered
 from xy_sysid.hypotheses.pool import Node, Pool, alike
 
 
-@dataclass(frozen=True, slots=True)
-class Given:
-    """Effects that were given, and their rungs."""
-
-    names: tuple[str, ...]
-    steps: tuple[Step, ...]
-
-    @staticmethod
-    def of(data: AxisData, library: Library, names: tuple[str, ...]) -> Given:
-        """Each fitted after those before it."""
-        steps = [Step((), fit_base(data, library))]
-        for name in names:
-            steps.append(Step((name,), with_one_more(data, library, steps[-1].fit, name)))
-        return Given(names, tuple(steps))
+def rungs_of(data: AxisData, library: Library, names: Sequence[str] = ()) -> tuple[Rung, ...]:
+    """The rigid base, then each of these effects, unasked, fitted after those before it."""
+    rungs = [Rung.of(fit_base(data, library))]
+    for name in names:
+        rungs.append(Rung.of(with_one_more(data, library, rungs[-1].fit, name), (name,)))
+    return tuple(rungs)
 
 
 def with_one_more(data: AxisData, library: Library, now: GreyboxFit, name: str) -> GreyboxFit:
@@ -50,35 +43,35 @@ def with_one_more(data: AxisData, library: Library, now: GreyboxFit, name: str) 
     return fit(data, best_start(data, starts.added(data, now, model, effect, traced)))
 
 
-def ladder_of_given(data: AxisData, given: Given) -> Ladder:
-    """The ladder of these effects alone: nothing is searched."""
-    final = given.steps[-1].fit
+def answer_of_rungs(data: AxisData, rungs: tuple[Rung, ...]) -> Answer:
+    """The answer of these rungs alone: nothing is searched."""
+    final = rungs[-1].fit
     noise = final.noise_floor if final.one_step else data.noise
-    return Ladder(
-        steps=given.steps,
-        final=final,
-        effects=tuple(name for name, _ in final.model.effects),
-        explained=part_explained(data, given.steps[0].fit, final),
+    return Answer(
+        rungs=rungs,
+        best=rungs[-1].effects,
+        explained=part_explained(data, rungs[0].fit, final),
         noise=noise,
         discrepancy=math.sqrt(max(final.held_out_error**2 - noise**2, 0.0)),
+        units=data.units,
     )
 
 
-def ladder_of_search(pool: Pool, given: Given, filtered: Filtered | None) -> Ladder:
-    """The ladder of the best set, or of what one-step prediction found instead."""
-    data, library, node, base = pool.data, pool.library, pool.answer, given.steps[0].fit
+def answer_of_search(pool: Pool, given: tuple[Rung, ...], filtered: Filtered | None) -> Answer:
+    """The answer of the best set, or of what one-step prediction found instead. given: the base, and effects that were given."""
+    data, library, node, base, kept = pool.data, pool.library, pool.answer, given[0].fit, [name for rung in given for name in rung.came]
     alone = (item for item in pool.nodes.values() if len(item.effects) == 1)
-    tried = [Candidate(next(iter(item.effects)), item.promised, item.fit, part_explained(data, base, item.fit)) for item in alone]
-    tried.sort(key=lambda item: item.fit.held_out_error if item.fit else math.inf)
+    tried = [_tried(pool, base, item) for item in alone]
+    tried.sort(key=lambda item: item.rung.held_out_error)
     refused = tuple((tuple(sorted(item.effects)), item.refused) for item in pool.nodes.values() if item.refused)
     if filtered is not None:
-        return _of_one_step(pool, base, filtered, tried, refused)
+        return _of_one_step(pool, given[0], filtered, tried, refused)
     final = joined(data, node.fit, pool.late)
     own = {name: pool.without(node, name) for name in sorted(node.effects - pool.kept)}
     names = tuple(name for name, _ in final.model.effects)
     parts = {name: [own[part] for part in _parts(library, name) if part in own] for name in names}
     ordered = _ordered(library, {name: max((force for _, force in each), default=0.0) for name, each in parts.items()})
-    ordered = (*given.names, *(name for name in ordered if name not in given.names))
+    ordered = (*kept, *(name for name in ordered if name not in kept))
     others = [
         item
         for item in pool.nodes.values()
@@ -90,24 +83,30 @@ def ladder_of_search(pool: Pool, given: Given, filtered: Filtered | None) -> Lad
     others.sort(key=lambda item: (-_doubt(node, item), item.brief.excess))
     for item in others[:1]:
         pool.finished(item, shown=True)
-    rivals = [Rival(tuple(sorted(item.effects)), item.fit, _doubt(node, item), item.refused) for item in others]
+    rivals = tuple(_tried(pool, base, item, _doubt(node, item)) for item in others)
     whole = [item for item in pool.nodes.values() if item.whole and not item.refused]
-    ladder = Ladder(
-        steps=(*given.steps, *_rungs(pool, given, ordered, final)),
-        final=final,
-        effects=ordered,
-        tried=tuple(tried),
-        rivals=tuple(rivals),
+    rungs = (*given, *_rungs(pool, given, ordered, final))
+    found = Answer(
+        rungs=rungs,
+        best=ordered,
+        settled=None if rungs[-1].fit is final else Rung.of(final),
+        candidates=tuple(tried),
+        rivals=rivals,
         sizes={name: min(size for size, _ in each) for name, each in parts.items() if each},
         helps=max((part_explained(data, base, item.fit) for item in whole), default=0.0),
-        kept_out=_kept_out(pool, node),
+        kept_out=_kept_out(pool, base, node),
         refused=refused,
         explained=part_explained(data, base, final),
         noise=data.noise,
         discrepancy=math.sqrt(max(final.held_out_error**2 - data.noise**2, 0.0)),
         stopped=pool.late(),
+        units=data.units,
     )
-    return likely_names(ladder, given.names)
+    return likely_names(found, kept)
+
+
+def _tried(pool: Pool, base: GreyboxFit, node: Node, doubt: float = 0.0) -> Tried:
+    return Tried(Rung.of(node.fit, sorted(node.effects)), part_explained(pool.data, base, node.fit), doubt, node.refused)
 
 
 def _doubt(node: Node, other: Node) -> float:
@@ -119,29 +118,28 @@ def _doubt(node: Node, other: Node) -> float:
 
 def _of_one_step(
     pool: Pool,
-    base: GreyboxFit,
+    base: Rung,
     filtered: Filtered,
-    tried: Sequence[Candidate],
+    tried: Sequence[Tried],
     refused: tuple[tuple[tuple[str, ...], str], ...],
-) -> Ladder:
-    data, node, rungs, bar = pool.data, pool.answer, filtered.rungs, filtered.bar
-    last = rungs[-1][1]
-    names = tuple(name for name, _ in last.model.effects)
+) -> Answer:
+    data, node, bar, rungs = pool.data, pool.answer, filtered.bar, [Rung.of(fit, (name,)) for name, fit in filtered.rungs]
+    last = rungs[-1]
     noise = min(max(data.encoder * data.sampling_rate, last.noise_floor), last.held_out_error)  # what is predicted is no noise
     left, before = (error**2 - noise**2 for error in (last.held_out_error, bar))
     doubt = 0.5 * (last.held_out_error / bar) ** (2.0 / TELLS)
-    return Ladder(
-        steps=(Step((), base), *(Step((name,), fit) for name, fit in rungs)),
-        final=last,
-        effects=names,
-        tried=(next(Candidate(name, 0.0, fit) for name, fit in rungs if fit.one_step), *tried),
-        rivals=(Rival(tuple(sorted(node.effects)), node.fit, doubt),) if node.effects else (),
-        sizes=dict.fromkeys(names, filtered.size),
+    return Answer(
+        rungs=(base, *rungs),
+        best=last.effects,
+        candidates=(next(Tried(rung) for rung in rungs if rung.one_step), *tried),
+        rivals=(_tried(pool, base.fit, node, doubt),) if node.effects else (),
+        sizes=dict.fromkeys(last.effects, filtered.size),
         refused=refused,
         explained=1.0 - left / before,
         noise=noise,
         discrepancy=math.sqrt(left),
         stopped=pool.late(),
+        units=data.units,
     )
 
 
@@ -152,11 +150,11 @@ def _ordered(library: Library, sizes: Mapping[str, float]) -> tuple[str, ...]:
     return tuple(dict.fromkeys((*alike, *order)))
 
 
-def _kept_out(pool: Pool, node: Node) -> Rival | None:
+def _kept_out(pool: Pool, base: GreyboxFit, node: Node) -> Tried | None:
     """The refused set that would leave least, if that is clearly less than the best leaves."""
     nodes = [item for item in pool.nodes.values() if item.refused and item.whole and gain(item.fit, node.fit).is_sure]
     best = max(nodes, key=lambda item: gain(item.fit, node.fit).nats, default=None)
-    return None if best is None else Rival(tuple(sorted(best.effects)), best.fit, 0.5, best.refused)
+    return None if best is None else _tried(pool, base, best, 0.5)
 
 
 def _parts(library: Library, name: str) -> tuple[str, ...]:
@@ -165,14 +163,14 @@ def _parts(library: Library, name: str) -> tuple[str, ...]:
     return (name,) if whole is None else (name, *whole.parts)
 
 
-def _rungs(pool: Pool, given: Given, names: tuple[str, ...], final: GreyboxFit) -> list[Step]:
+def _rungs(pool: Pool, given: tuple[Rung, ...], names: tuple[str, ...], final: GreyboxFit) -> list[Rung]:
     """One rung for each effect, the largest first; of two orders that are known, one in which each rung lowers the held-out error.
 
     An effect that lowers it in no order comes with the next one, in one rung.
     """
-    steps: list[Step] = []
-    now = shown = given.steps[-1].fit
-    left, together = [name for name in names if name not in given.names], []
+    rungs: list[Rung] = []
+    now = shown = given[-1].fit
+    left, together = list(names[sum(len(rung.came) for rung in given) :]), []
     while left:
         fits = {name: found for name in left if (found := _with(pool, now, name, final, name == left[0])) is not None}
         lower = [name for name, found in fits.items() if found.held_out_error < shown.held_out_error or found is final]
@@ -181,9 +179,9 @@ def _rungs(pool: Pool, given: Given, names: tuple[str, ...], final: GreyboxFit) 
         left.remove(name)
         together.append(name)
         if name in lower:
-            steps.append(Step(tuple(together), now))
+            rungs.append(Rung.of(now, together))
             shown, together = now, []
-    return steps
+    return rungs
 
 
 def _with(pool: Pool, now: GreyboxFit, name: str, final: GreyboxFit, asked: bool) -> GreyboxFit | None:

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from xy_sysid.axis.model import AxisModel
-from xy_sysid.diagnosis.ladder import contains
+from xy_sysid.diagnosis.sets import contains
 from xy_sysid.experiment_design.beliefs import Belief
 from xy_sysid.experiment_design.criteria import JUDGED, ODDS, ROUNDS, SURE
 from xy_sysid.experiment_design.prediction import Recorded, expected_error, predicted, slopes

@@ -11,9 +11,8 @@ from threadpoolctl import threadpool_limits
 
 from xy_sysid.axis.forward import move
 from xy_sysid.axis.model import STANDARD, Library
+from xy_sysid.diagnosis.answer import Answer
 from xy_sysid.diagnosis.equal_laws import equals
-from xy_sysid.diagnosis.ladder import Ladder
-from xy_sysid.diagnosis.of_run import Diagnosed
 from xy_sysid.errors import BadInput
 from xy_sysid.experiment_design.beliefs import Belief, Evidence, believed
 from xy_sysid.experiment_design.criteria import COARSE, DRAWN
@@ -60,7 +59,7 @@ class NextExperiment:
 
 
 def next_experiment(
-    found: Diagnosed,
+    found: Answer,
     limits: MachineLimits | None = None,
     between: Sequence[Sequence[str]] = (),
     library: Library = STANDARD,
@@ -76,7 +75,7 @@ def next_experiment(
     data = _data(found, tolerance)
     limits = _limits(found, limits)
     axis, rate = found.runs[0].axis, data.sampling_rate
-    sets = [tuple(each) for each in between] or possible(data, library, ladder_of(found))
+    sets = [tuple(each) for each in between] or possible(data, library, found)
     with threadpool_limits(1, "blas"):
         now = standing(data, library, sets)
         beliefs = beliefs_of(data, library, now, limits.travel)
@@ -88,7 +87,7 @@ def next_experiment(
     return answered(axis, rate, made, library)
 
 
-def sharpen(found: Diagnosed, parameter: str, width: float, limits: MachineLimits | None = None, tolerance: float = EPSILON) -> NextExperiment:
+def sharpen(found: Answer, parameter: str, width: float, limits: MachineLimits | None = None, tolerance: float = EPSILON) -> NextExperiment:
     """The experiment that makes a parameter of the diagnosed model known as well as asked for in the least time.
 
     parameter: ``gain``, ``pole`` or ``effect.parameter``; width: half of the 95 % interval, as a part of the value (0.02: 2 %)
@@ -99,7 +98,7 @@ def sharpen(found: Diagnosed, parameter: str, width: float, limits: MachineLimit
     data = _data(found, tolerance)
     limits = _limits(found, limits)
     with threadpool_limits(1, "blas"):
-        final = ladder_of(found).final
+        final = found.final
         best = sharpest(data, final, limits, Precision(parameter, width))
         beliefs = [believed(Evidence(data, limits.travel), final, DRAWN)] if best.experiment is not None else []
     to = f"{100.0 * best.width:.2g} %"
@@ -124,22 +123,21 @@ def sharpen(found: Diagnosed, parameter: str, width: float, limits: MachineLimit
     )
 
 
-def _data(found: Diagnosed, tolerance: float) -> AxisData:
-    ladder_of(found)
+def _data(found: Answer, tolerance: float) -> AxisData:
+    check_enough(found)
     runs = found.runs
     return prepare_all(runs[0].sampling_rate, [(run.voltage, run.position) for run in runs], tolerance, runs[0].units)
 
 
-def _limits(found: Diagnosed, limits: MachineLimits | None) -> MachineLimits:
+def _limits(found: Answer, limits: MachineLimits | None) -> MachineLimits:
     """Those that were given, in the units of the recordings; without, what the recordings show."""
     return as_recorded(found.runs) if limits is None else replace(limits, units=found.runs[-1].units)
 
 
-def ladder_of(found: Diagnosed) -> Ladder:
-    """The ladder of a diagnosis; raises BadInput for one of too little data."""
-    if found.ladder is None or not found.runs:
+def check_enough(found: Answer) -> None:
+    """Raises BadInput for a diagnosis of too little data."""
+    if not found.rungs or not found.runs:
         raise BadInput("diagnosis", found.verdict, "one of data that suffice", "Record for longer, or ask for a first experiment (--for nothing).")
-    return found.ladder
 
 
 def answered(axis: str, rate: float, made: Design, library: Library) -> NextExperiment:

@@ -9,9 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from xy_sysid.axis.model import AxisModel, Library
+from xy_sysid.diagnosis.answer import Answer
 from xy_sysid.diagnosis.equal_laws import equals
-from xy_sysid.diagnosis.ladder import Ladder, contains
-from xy_sysid.diagnosis.rungs import Given
+from xy_sysid.diagnosis.rungs import rungs_of
+from xy_sysid.diagnosis.sets import contains
 from xy_sysid.effects._contract import BEGUN
 from xy_sysid.errors import BadInput
 from xy_sysid.experiment_design.beliefs import Belief, Evidence, believed, hidden
@@ -111,7 +112,7 @@ def _doubt(found: Gain, price: float) -> float:
 
 
 def _fitted(data: AxisData, library: Library, names: Sequence[str], known: AxisModel | None) -> GreyboxFit:
-    found = Given.of(data, library, tuple(names)).steps[-1].fit
+    found = rungs_of(data, library, names)[-1].fit
     if known is None:
         return found
     other = fit(data, known)
@@ -167,13 +168,13 @@ def _gives_way(library: Library, name: str, other: str) -> bool:
     return bool(library[name].family) and library[name].family == library[other].family
 
 
-def possible(data: AxisData, library: Library, ladder: Ladder, most: int = 4) -> list[tuple[str, ...]]:
+def possible(data: AxisData, library: Library, found: Answer, most: int = 4) -> list[tuple[str, ...]]:
     """The set that was named, then those that may be true instead: rivals that predict nearly as well, and look-alikes.
 
     Where nothing was named: the simplest laws that may hide in the noise.
     """
-    named = ladder.effects
-    rivals = [item.effects for item in ladder.rivals if item.doubt >= DOUBTFUL and not item.refused]
+    named = found.best
+    rivals = [item.effects for item in found.rivals if item.doubt >= DOUBTFUL and not item.refused]
     alike = [
         tuple(sorted({*named} - {name} | {other}))
         for name in named
@@ -182,8 +183,8 @@ def possible(data: AxisData, library: Library, ladder: Ladder, most: int = 4) ->
     ]
     simplest = sorted(library.acting, key=lambda other: len(other.parameters))
     hiding = [(other.name,) for other in simplest if not named and _may_be(data, library, other.name)]
-    found = dict.fromkeys(tuple(each) for each in (named, *rivals, *alike, *hiding) if all(library[name].simulable for name in each))
-    return list(found)[: 1 + most]
+    sets = dict.fromkeys(tuple(each) for each in (named, *rivals, *alike, *hiding) if all(library[name].simulable for name in each))
+    return list(sets)[: 1 + most]
 
 
 def look_alikes(library: Library, name: str) -> list[str]:

@@ -17,7 +17,7 @@ from xy_sysid.experiment_design.design import design
 from xy_sysid.experiment_design.experiment import Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
 from xy_sysid.experiment_design.loop import Budget, Decision, Ending, NextChoice, Question, after, decide
-from xy_sysid.experiment_design.of_run import NextExperiment, Tell, answered, ladder_of
+from xy_sysid.experiment_design.of_run import NextExperiment, Tell, answered, check_enough
 from xy_sysid.experiment_design.prediction import Setting
 from xy_sysid.experiment_design.rivals import names_of, possible
 from xy_sysid.greybox.axis_data import EPSILON, prepare_all
@@ -70,7 +70,7 @@ def step(plan: WalkPlan, runs: Sequence[Run], before: WalkStep | None = None, te
     Raises BadInput if the recordings do not suffice for a diagnosis, or if the last one ends outside the travel.
     """
     found = diagnose(list(runs), plan.library, tolerance=plan.tolerance)
-    ladder = ladder_of(found)
+    check_enough(found)
     rate, signals, units = runs[0].sampling_rate, [(run.voltage, run.position) for run in runs], runs[0].units
     limits = replace(plan.limits, start=float(runs[-1].position[-1]), units=units)
 
@@ -79,7 +79,7 @@ def step(plan: WalkPlan, runs: Sequence[Run], before: WalkStep | None = None, te
         return NextChoice(made.best.experiment if made.best is not None and made.helps else None, made)
 
     with threadpool_limits(1, "blas"):
-        sets = plan.sets or possible(prepare_all(rate, signals, plan.tolerance, units), plan.library, ladder)
+        sets = plan.sets or possible(prepare_all(rate, signals, plan.tolerance, units), plan.library, found)
         question = Question(sampling_rate=rate, recordings=signals, sets=sets, library=plan.library, tolerance=plan.tolerance, units=units)
         decision = decide(question, (), limits, choose, before.decision.standing if before is not None else None, plan.budget.draws)
         experiments = before.experiments + 1 if before is not None else 0

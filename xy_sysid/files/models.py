@@ -13,7 +13,7 @@ from xy_sysid.axis.linear_part import linear_part, nonlinear
 from xy_sysid.axis.model import STANDARD, AxisModel, Library
 from xy_sysid.bags.atomic import whole, write_text
 from xy_sysid.comparison.physical_model import PhysicalModel
-from xy_sysid.diagnosis.findings import parameters
+from xy_sysid.diagnosis.as_json import parameters
 from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.files.linear_models import FORMAT, Quoting, fitted_to, linear_axis, model_file, read_saved
 from xy_sysid.files.seal import sealed

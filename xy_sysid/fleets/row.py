@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from xy_sysid.axis.model import STANDARD, Library
-from xy_sysid.diagnosis.diagnose import Diagnosis
+from xy_sysid.diagnosis.answer import Answer, Rung
 from xy_sysid.diagnosis.of_run import diagnose, refined, runs_together
 from xy_sysid.diagnosis.refine import Effort, never
 from xy_sysid.errors import BadInput
@@ -21,7 +21,6 @@ from xy_sysid.fitting.of_run import fit_response, frf
 from xy_sysid.fitting.structure import structure_from
 from xy_sysid.fitting.verdicts import Validation, validate
 from xy_sysid.fleets.columns import ROOTS, column_of
-from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.response.frf import FrequencyResponse
 from xy_sysid.samples.moves import several_moves
 from xy_sysid.samples.recording import Recording, Run
@@ -136,27 +135,27 @@ def _diagnosis(recording: Recording, run: Run, plan: Plan) -> Row:
         "noise": found.noise,
         "discrepancy": found.discrepancy,
     }
-    if found.ladder is None:  # not enough data
+    if not found.rungs:  # not enough data
         return row | {"noise": None, "discrepancy": None, "explained": None}
-    named = found.ladder.final if found.effects else found.ladder.base
-    row |= _of_fit(named) | {"rigid_error": found.ladder.base.held_out_error, "tried_first": _listed(found.ladder.tried_first)}
+    named = found.rungs[-1] if found.effects else found.rungs[0]
+    row |= _of_rung(named) | {"rigid_error": found.rungs[0].held_out_error, "tried_first": _listed(found.tried_first)}
     return row | _followed(runs, plan, found) if plan.follow else row
 
 
-def _followed(runs: tuple[Run, ...], plan: Plan, found: Diagnosis) -> Row:
+def _followed(runs: tuple[Run, ...], plan: Plan, found: Answer) -> Row:
     """The parameters of a fit with the effects that are named and those that are followed; nothing new where all of these are named."""
     more = tuple(name for name in plan.follow if name not in found.effects)
-    return _of_fit(refined(runs, (*found.effects, *more), plan.library, Effort(0)).ladder.final) if more else {}
+    return _of_rung(refined(runs, (*found.effects, *more), plan.library, Effort(0)).rungs[-1]) if more else {}
 
 
-def _of_fit(fitted: GreyboxFit) -> Row:
+def _of_rung(rung: Rung) -> Row:
     row: Row = {
-        "model": _listed(name for name, _ in fitted.model.effects),
-        "held_out_error": fitted.held_out_error,
-        "noise_floor": fitted.noise_floor,
-        "one_step": fitted.one_step,
+        "model": _listed(rung.effects),
+        "held_out_error": rung.held_out_error,
+        "noise_floor": rung.noise_floor,
+        "one_step": rung.one_step,
     }
-    for item in fitted.parameters:
+    for item in rung.parameters:
         row |= _interval(column_of(item.name), item.value, item.low, item.high)
     return row
 

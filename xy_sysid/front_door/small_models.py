@@ -9,7 +9,8 @@ from typing import Any
 from xy_sysid.axis.mechanics import Figure, drive_from
 from xy_sysid.axis.mechanics import mechanics as mechanical
 from xy_sysid.comparison.physical_model import PhysicalModel
-from xy_sysid.diagnosis.of_run import Data, Diagnosed, Refinement, runs_together
+from xy_sysid.diagnosis.answer import Answer
+from xy_sysid.diagnosis.of_run import Data, runs_together
 from xy_sysid.errors import BadInput
 from xy_sysid.fitting.two_axes import coupling_in
 from xy_sysid.response.coupling import Coupling
@@ -104,7 +105,7 @@ def coupling(data: Recording, combine: str = "", **settings: Any) -> Coupling:
     return coupling_in(data, build(IdentifierSettings, settings, "coupling"), combine)
 
 
-def mechanics(found: FirstOrder | PhysicalModel | Diagnosed | Refinement, kt: float | None = None, gear: str = "") -> Table:
+def mechanics(found: FirstOrder | PhysicalModel | Answer, kt: float | None = None, gear: str = "") -> Table:
     """Inertia or mass, damping and friction in SI, at the joint or table and at the motor, with the names of MuJoCo and URDF.
 
     found: of ``steps``, ``refine`` or ``diagnose``, or a model; kt: torque constant of a current as input, N m/A
@@ -121,14 +122,13 @@ def mechanics(found: FirstOrder | PhysicalModel | Diagnosed | Refinement, kt: fl
     return Table(columns, tuple(rows))
 
 
-def _figures(found: FirstOrder | PhysicalModel | Diagnosed | Refinement) -> tuple[tuple[Figure, ...], Units]:
+def _figures(found: FirstOrder | PhysicalModel | Answer) -> tuple[tuple[Figure, ...], Units]:
     """Parameters with intervals, and their units."""
     if isinstance(found, FirstOrder):
         return found.quantities, found.units
-    if isinstance(found, Diagnosed):
-        return found.ladder.final.parameters if found.ladder is not None else (), found.units
-    model = found.model if isinstance(found, Refinement) else found
-    return model.parameters, model.units
+    if isinstance(found, Answer):
+        return found.rungs[-1].parameters if found.rungs else (), found.units
+    return found.parameters, found.units
 
 
 def _fields(found: FirstOrder | Servo) -> dict[str, Any]:

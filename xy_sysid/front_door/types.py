@@ -61,7 +61,7 @@ def in_words(wanted: Any) -> str:
         return "a dictionary"
     if parts and isinstance(kind, type) and issubclass(kind, collections.abc.Iterable):
         return f"a list of {in_words(parts[0])}"
-    return f"a {name}"
+    return f"{'an' if name[0] in 'AEIOU' else 'a'} {name}"
 
 
 def _items(value: object) -> tuple[object, ...]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from xy_sysid.axis.model import Library
 from xy_sysid.errors import BadInput
@@ -32,7 +32,7 @@ BEGINS: dict[Act, str] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class Reply:
     """What became of a request: its number, whether it was done, and a sentence for each axis."""
 
     request: int
@@ -60,7 +60,7 @@ class Diagnoser:
         self.doing = ""
         self._settings = settings
         self._queue: deque[_Request] = deque()
-        self._answers: list[Answer] = []
+        self._answers: list[Reply] = []
         self._data: dict[str, Run] = {}
         self._ends: dict[str, tuple[Newest, float]] = {}  # hearing, and s heard there, when an axis' samples were taken
         self.under_way = ""  # the axis that the worker works for
@@ -120,7 +120,7 @@ class Diagnoser:
             raise BadInput("reset_model", f"while axis {busy[0]} is worked for", "an axis that nothing is done for", "Call cancel first.")
         for axis in chosen:
             if axis in self.stories:
-                self.stories[axis] = replace(self.stories[axis], steps=self.stories[axis].steps[:1], note="")
+                self.stories[axis] = self.stories[axis].only_base()
             self.effects[axis] = ()
 
     def doings(self) -> dict[str, str]:
@@ -146,12 +146,12 @@ class Diagnoser:
         while self._queue and not self.under_way:
             request = self._queue[0]
             if not request.axes:
-                self._answers.append(Answer(request.number, request.done, " ".join(request.told)))
+                self._answers.append(Reply(request.number, request.done, " ".join(request.told)))
                 self._queue.popleft()
                 continue
             axis = request.axes.popleft()
             story = self.stories.get(axis)
-            if request.act in ANEW or axis not in self._data or story is None or not story.steps:
+            if request.act in ANEW or axis not in self._data or story is None or not story.rungs:
                 lacking, story = self.hearing.lacking(), None
                 if lacking:
                     self._lacks(request, axis, lacking)
@@ -193,7 +193,7 @@ class Diagnoser:
             request.done = False
             request.told.append(f"axis {axis}: {problem}")
         else:
-            request.done &= bool(story.steps)
+            request.done &= bool(story.rungs)
             request.told.append(sentence(story))
 
     def cancel(self, axes: Iterable[str] | None = None) -> str:
@@ -209,14 +209,14 @@ class Diagnoser:
             if len(kept) < len(request.axes) or (running and place == 0):
                 request.axes, request.done, request.whole = kept, False, ()
                 if not kept and not (place == 0 and self.under_way):
-                    self._answers.append(Answer(request.number, False, "cancelled"))
+                    self._answers.append(Reply(request.number, False, "cancelled"))
                     self._queue.remove(request)
         for axis, story in self.stories.items():
             if axis in chosen:
                 self.effects[axis] = story.effects
         return f"cancelled {given_up[0]}" if given_up else "nothing was running"
 
-    def answers(self) -> list[Answer]:
+    def answers(self) -> list[Reply]:
         """The requests that have ended since the last call."""
         found, self._answers = self._answers, []
         return found
@@ -224,7 +224,7 @@ class Diagnoser:
     def _lacks(self, request: _Request, axis: str, lacking: str) -> None:
         rate = self.hearing.sampling_rate or 0.0
         told = unheard(axis, rate, self.hearing.seconds, lacking, self._settings.tolerance, self._settings.units)
-        if axis not in self.stories or not self.stories[axis].steps:
+        if axis not in self.stories or not self.stories[axis].rungs:
             self.stories[axis] = told
         request.done = False
         request.told.append(sentence(told))

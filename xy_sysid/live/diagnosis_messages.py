@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from xy_sysid.diagnosis import words
 from xy_sysid.live.plain_messages import OK, STALE, WARN, ArrayMessage, StatusMessage, topic_of
 from xy_sysid.story.acts import sentence
 from xy_sysid.story.story import Story
@@ -13,9 +14,9 @@ LADDER_COLUMNS = ("step", "train_error", "held_out_error", "noise_floor")
 
 def ladder_message(story: Story) -> ArrayMessage:
     """``error_ladder/<axis>``: one row per step, the output's unit over s."""
-    rungs = [step.rung for step in story.steps]
-    rows = np.array([(k, rung.train_error, rung.held_out_error, rung.noise_floor) for k, rung in enumerate(rungs)], dtype=np.float64)
-    return ArrayMessage(topic_of("error_ladder", story.axis), ("step", ",".join(LADDER_COLUMNS)), (len(rungs), len(LADDER_COLUMNS)), rows.ravel())
+    rows = np.array([(k, rung.training_error, rung.held_out_error, rung.noise_floor) for k, rung in enumerate(story.rungs)], dtype=np.float64)
+    size = (len(story.rungs), len(LADDER_COLUMNS))
+    return ArrayMessage(topic_of("error_ladder", story.axis), ("step", ",".join(LADDER_COLUMNS)), size, rows.ravel())
 
 
 def diagnosis_status(story: Story) -> StatusMessage:
@@ -32,9 +33,9 @@ def diagnosis_status(story: Story) -> StatusMessage:
     if now is not None:
         speed = story.units.judged
         values |= {
-            f"error of the rigid model ({speed})": f"{story.steps[0].rung.held_out_error:.6g}",
+            f"error of the rigid model ({speed})": f"{story.rungs[0].held_out_error:.6g}",
             f"error now ({speed})": f"{now.held_out_error:.6g}",
-            f"training error now ({speed})": f"{now.train_error:.6g}",
+            f"training error now ({speed})": f"{now.training_error:.6g}",
             f"noise floor ({speed})": f"{now.noise_floor:.6g}",
             "effects in the model": ", ".join(now.effects),
             "explained": str(now.explained).lower(),
@@ -43,10 +44,10 @@ def diagnosis_status(story: Story) -> StatusMessage:
             values[f"{item.name} ({item.unit or '1'})"] = f"{item.value:.9g}"
             values[f"{item.name} 95 % low"], values[f"{item.name} 95 % high"] = f"{item.low:.9g}", f"{item.high:.9g}"
     if found is not None:
-        values |= {f"candidate {k}": f"{one.effect}: {one.evidence}" for k, one in enumerate(found.candidates, start=1)}
-        values |= {"runner-up": found.runner_up[1]} if found.runner_up else {}
+        values |= {f"candidate {k}": f"{one.name}: {words.evidence(found, one)}" for k, one in enumerate(found.candidates, start=1)}
+        values |= {"runner-up": lost} if (lost := words.runner_up(found)) else {}
         values |= {f"look-alike {one.effect}": one.sentence for one in found.look_alikes}
-        values |= {f"fails {k}": place.sentence for k, place in enumerate(found.where[:5], start=1)}
+        values |= {f"fails {k}": place.sentence for k, place in enumerate(found.where.places[:5] if found.where else (), start=1)}
         values["next experiment"] = found.next_experiment
     well = (now is not None and now.explained) or (found is not None and found.verdict == "nothing_missing")
     level = OK if well else STALE if found is not None and found.verdict == "not_enough_data" else WARN

@@ -123,7 +123,7 @@ def told(recording: Recording, axis: str, wanted: Wanted, tell: Tell = lambda st
     run = recording.run(axis).until(LONGEST)
     tell(STAGES[1])
     story = begin(run, library)
-    if story.steps:
+    if story.rungs:
         tell(STAGES[2])
         story = diagnosed(story, run, library, never if wanted.budget == math.inf else time.process_time, wanted.budget)
         tell(STAGES[3])

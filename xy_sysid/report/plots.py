@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import plotly.graph_objects as go
 
 from xy_sysid.comparison.of_run import held
 from xy_sysid.comparison.where_it_fails import Comparison, compare_velocity
-from xy_sysid.diagnosis.diagnose import Diagnosis
-from xy_sysid.diagnosis.findings import rung
-from xy_sysid.diagnosis.ladder import Ladder
-from xy_sysid.diagnosis.of_run import Refinement
+from xy_sysid.diagnosis.answer import Answer
+from xy_sysid.diagnosis.as_json import rung_document
 from xy_sysid.errors import BadInput
 from xy_sysid.fitting.check_on_data import through_window
 from xy_sysid.fitting.of_run import LinearModel
@@ -27,8 +23,6 @@ from xy_sysid.response.coupling import Coupling
 from xy_sysid.response.frf import FrequencyResponse
 from xy_sysid.samples.recording import Recording, Run, one_run
 from xy_sysid.settings import IdentifierSettings
-from xy_sysid.story.document import rung_document
-from xy_sysid.units import USUAL
 
 COLOURS = ("#d1495b", "#2e8b57", "#7b5ea7", "#c77d0a", "#00798c")
 DASHES = ("dash", "solid", "dot", "dashdot", "longdash")
@@ -71,9 +65,10 @@ def coupling(found: Coupling) -> go.Figure:
     return coupling_figure(found)
 
 
-def ladder(found: Diagnosis | Refinement | Ladder) -> go.Figure:
-    """The errors of all steps as a falling staircase: training, held-out, and the noise floor."""
-    return story_progress.ladder(_document(found))
+def ladder(found: Answer) -> go.Figure:
+    """The errors of all steps as a falling staircase, of ``diagnose`` or ``refine``: training, held-out, and the noise floor."""
+    units = {"input": found.units.input, "output": found.units.output, "judged": found.units.judged}
+    return story_progress.ladder({"ladder": [rung_document(rung) for rung in found.rungs], "sentence": found.sentence, "units": units})
 
 
 def residual(data: Run | Recording | Comparison, *models: AnyModel) -> go.Figure:
@@ -98,19 +93,3 @@ def residual(data: Run | Recording | Comparison, *models: AnyModel) -> go.Figure
     figure.update_xaxes(title_text="frequency (Hz)", type="log", row=1, col=1)
     figure.update_yaxes(title_text="error over the noise floor", type="log", row=1, col=1)
     return figure
-
-
-def _document(found: Diagnosis | Refinement | Ladder) -> dict[str, Any]:
-    """The part of a story that the ladder is drawn from."""
-    rungs = found if isinstance(found, Ladder) else found.ladder
-    units = USUAL
-    if isinstance(found, Refinement):
-        units = found.model.units
-    elif isinstance(found, Diagnosis):
-        units = found.units
-    steps = rungs.steps if rungs is not None else ()
-    return {
-        "ladder": [rung_document(rung(step.fit, step.added)) for step in steps],
-        "sentence": found.sentence if isinstance(found, Diagnosis) else "",
-        "units": {"input": units.input, "output": units.output, "judged": units.judged},
-    }

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from xy_sysid.axis.model import Library
-from xy_sysid.diagnosis.findings import Findings
+from xy_sysid.diagnosis.diagnose import not_enough
 from xy_sysid.diagnosis.refine import never
 from xy_sysid.hypotheses.criteria import MOST_EFFECTS
 from xy_sysid.samples.recording import Run
@@ -43,7 +43,7 @@ def perform(job: Job, library: Library, clock: Callable[[], float] = never) -> I
         yield "fitting the rigid model", None
         story = begin(run, library, job.tolerance)
         yield "the rigid model is fitted", story
-    if not story.steps or job.act == "begin":
+    if not story.rungs or job.act == "begin":
         return
     if job.act not in ("renew", "effects") and story.diagnosis is None:
         yield "looking for what is missing", None
@@ -61,9 +61,9 @@ def perform(job: Job, library: Library, clock: Callable[[], float] = never) -> I
         return
     for _ in range(MOST_EFFECTS if job.act == "auto" else 1):
         yield "looking for the next effect", None
-        before, story = len(story.steps), next_best(story, run, library)
-        yield story.note or story.steps[-1].rung.label, story
-        if len(story.steps) == before:
+        before, story = len(story.rungs), next_best(story, run, library)
+        yield story.note or story.rungs[-1].label, story
+        if len(story.rungs) == before:
             break
     if job.act == "auto" and len(story.effects) > 1:
         yield "taking out what is not needed", None
@@ -73,21 +73,8 @@ def perform(job: Job, library: Library, clock: Callable[[], float] = never) -> I
 
 def unheard(axis: str, sampling_rate: float, seconds: float, lacking: str, tolerance: float, units: Units) -> Story:
     """The story of an axis of which too little was heard to begin."""
-    told = Findings(
-        verdict="not_enough_data",
-        effects=(),
-        confidence=1.0,
-        tolerance=tolerance,
-        sentence=f"Not enough data: {lacking}",
-        where=(),
-        candidates=(),
-        runner_up=None,
-        look_alikes=(),
-        ladder=(),
-        next_experiment=lacking,
-        units=units,
-    )
-    return Story(axis=axis, sampling_rate=sampling_rate, seconds=seconds, tolerance=tolerance, units=units, measured=None, steps=(), diagnosis=told)
+    told = not_enough(lacking, units)
+    return Story(axis=axis, sampling_rate=sampling_rate, seconds=seconds, tolerance=tolerance, units=units, diagnosis=told)
 
 
 def sentence(story: Story) -> str:

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 
 from xy_sysid.comparison.residual_correlation import ResidualCorrelation
-from xy_sysid.diagnosis.findings import Rung, answer, parameters, place
+from xy_sysid.diagnosis.as_json import answer_document, parameters, place, rung_document
 from xy_sysid.linear.transfer_function import Mode, TransferFunction
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.story.pictures import Binned, Measured, Pictures
-from xy_sysid.story.story import Story, StoryStep
+from xy_sysid.story.story import Story
 
 FORMAT = "xy_sysid story 1"
 DIGITS = 5
@@ -29,10 +29,10 @@ UNKNOWN: dict[str, Any] = {
 
 def document(story: Story) -> dict[str, Any]:
     """The whole story of one axis in JSON's own types."""
-    now = story.now
-    base = story.steps[0].rung if story.steps else None
-    told = UNKNOWN if story.diagnosis is None else answer(story.diagnosis)
-    drawn = len(story.steps) - DRAWN
+    base, now, drawn = story.rungs[0] if story.rungs else None, story.now, len(story.rungs) - DRAWN
+    told = UNKNOWN if story.diagnosis is None else answer_document(story.diagnosis)
+    ladder = [rung_document(rung) for rung in story.rungs]
+    shown = [_pictures(item, story.sampling_rate) if k == 0 or k >= drawn else None for k, item in enumerate(story.pictures)]
     made: dict[str, Any] = {
         "format": FORMAT,
         "axis": story.axis,
@@ -49,43 +49,22 @@ def document(story: Story) -> dict[str, Any]:
         },
         "explained": now.explained if now else False,
         "note": story.note,
-        "ladder": [rung_document(step.rung) for step in story.steps],
+        "ladder": ladder,
         "model": _model(story) if now else None,
         "measured": _measured(story.measured) if story.measured else None,
-        "steps": [step_document(step, story.sampling_rate, with_pictures=k == 0 or k >= drawn) for k, step in enumerate(story.steps)],
+        "steps": [{**row, "pictures": item} for row, item in zip(ladder, shown, strict=True)],
     }
     return {name: _plain(value) for name, value in made.items()}
 
 
-def rung_document(item: Rung) -> dict[str, Any]:
-    """One rung of the ladder."""
-    return {
-        "label": item.label,
-        "added": item.added,
-        "removed": item.removed,
-        "effects": list(item.effects),
-        "train_error": item.train_error,
-        "held_out_error": item.held_out_error,
-        "noise_floor": item.noise_floor,
-        "excess": item.excess,
-        "explained": item.explained,
-        "parameters": parameters(item.parameters),
-    }
-
-
-def step_document(step: StoryStep, sampling_rate: float, with_pictures: bool = True) -> dict[str, Any]:
-    """A rung with its pictures."""
-    return {**rung_document(step.rung), "pictures": _pictures(step.pictures, sampling_rate) if with_pictures else None}
-
-
 def _model(story: Story) -> dict[str, Any]:
-    last = story.steps[-1]
+    last = story.rungs[-1]
     return {
-        "effects": list(last.rung.effects),
-        "parameters": parameters(last.rung.parameters),
-        "linear": _linear(last.pictures.linear),
-        "held_out_error": last.rung.held_out_error,
-        "noise_floor": last.rung.noise_floor,
+        "effects": list(last.effects),
+        "parameters": parameters(last.parameters),
+        "linear": _linear(story.pictures[-1].linear),
+        "held_out_error": last.held_out_error,
+        "noise_floor": last.noise_floor,
     }
 
 

@@ -7,15 +7,15 @@ another process, and written as a document (``document``).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
 from xy_sysid.axis.model import STANDARD, AxisModel, Library, simulate
+from xy_sysid.diagnosis.answer import Answer, Rung
 from xy_sysid.diagnosis.diagnose import not_enough
-from xy_sysid.diagnosis.findings import Findings, Rung, findings, rung
 from xy_sysid.diagnosis.of_run import diagnose
 from xy_sysid.diagnosis.refine import Effort, never, refine, settle
 from xy_sysid.diagnosis.rungs import with_one_more
@@ -33,18 +33,10 @@ HELPS_NO_MORE = "No effect of the library helps any further."
 
 
 @dataclass(frozen=True, slots=True)
-class StoryStep:
-    """One fit and its pictures."""
-
-    rung: Rung
-    pictures: Pictures
-
-
-@dataclass(frozen=True, slots=True)
 class Story:
     """One axis' story.
 
-    steps: the fits so far, the rigid base first; empty if the data do not suffice (``diagnosis`` then says what lacks)
+    rungs: the fits so far, the rigid base first; empty if the data do not suffice (``diagnosis`` then says what lacks); pictures: of each
     diagnosis: what is missing in the base, None before it was asked; tolerance: of the signal, in the noise floor
     note: what the last act could not do; empty if it did
     """
@@ -54,46 +46,42 @@ class Story:
     seconds: float
     tolerance: float
     units: Units
-    measured: Measured | None
-    steps: tuple[StoryStep, ...]
-    diagnosis: Findings | None = None
+    measured: Measured | None = None
+    rungs: tuple[Rung, ...] = ()
+    pictures: tuple[Pictures, ...] = ()
+    diagnosis: Answer | None = None
     note: str = ""
 
     @property
     def now(self) -> Rung | None:
         """The newest fit."""
-        return self.steps[-1].rung if self.steps else None
+        return self.rungs[-1] if self.rungs else None
 
     @property
     def effects(self) -> tuple[str, ...]:
         """Names of the effects in the model."""
         return self.now.effects if self.now is not None else ()
 
+    def only_base(self) -> Story:
+        """Back at the rigid base; the diagnosis stays."""
+        return replace(self, rungs=self.rungs[:1], pictures=self.pictures[:1], note="")
+
 
 def begin(run: Run, library: Library = STANDARD, tolerance: float = EPSILON) -> Story:
     """The rigid base, fitted to gap-free samples; without steps, but with a diagnosis, if the data do not suffice."""
     voltage, position, sampling_rate = run.signals
-    empty = Story(
-        axis=run.axis,
-        sampling_rate=sampling_rate,
-        seconds=run.seconds,
-        tolerance=tolerance,
-        units=run.units,
-        measured=None,
-        steps=(),
-    )
+    story = Story(axis=run.axis, sampling_rate=sampling_rate, seconds=run.seconds, tolerance=tolerance, units=run.units)
     missing = lacking(sampling_rate, [(voltage, position)], run.units)
     if missing:
-        return replace(empty, diagnosis=findings(not_enough(missing, run.units), library))
-    data = prepare(sampling_rate, voltage, position, tolerance, run.units)
+        return replace(story, diagnosis=not_enough(missing, run.units))
+    data = _data(story, run)
     base = fit_base(data, library)
-    shown = measured(data, base)
-    return replace(empty, measured=shown, steps=(StoryStep(rung(base), pictures(data, base, shown)),))
+    return _grown(replace(story, measured=measured(data, base)), data, base)
 
 
 def diagnosed(story: Story, run: Run, library: Library = STANDARD, clock: Callable[[], float] = never, budget: float = math.inf) -> Story:
     """With the answer to: which effect is missing in the rigid base? The model stays what it is. budget, clock: see ``diagnosis.of_run``."""
-    return replace(story, diagnosis=findings(diagnose(run, library, budget, clock, tolerance=story.tolerance), library), note="")
+    return replace(story, diagnosis=diagnose(run, library, budget, clock, tolerance=story.tolerance).plain(), note="")
 
 
 def added(story: Story, run: Run, name: str, library: Library = STANDARD) -> Story:
@@ -104,42 +92,25 @@ def added(story: Story, run: Run, name: str, library: Library = STANDARD) -> Sto
     allowed(name, library)
     if name in story.effects:
         raise BadInput("effect", repr(name), "one that is not in the model yet", f"It has {', '.join(story.effects)}.")
-    data = prepare(run.sampling_rate, run.voltage, run.position, story.tolerance, run.units)
+    data = _data(story, run)
     planned = _planned(story)
     if planned is not None and planned.added == name:
-        return _shown(story, data, planned, library)
+        return _shown(story, data, planned, _fit_of(story, data, library, planned))
     now = _fit_of(story, data, library)
     relative = next((own for own in story.effects if library[own].family and library[own].family == library[name].family), None)
     before = now if relative is None else fit(data, now.model.without(relative))
     found = with_one_more(data, library, before, name)
     if not np.isfinite(found.excess):
         return replace(story, note=f"{name} could not be fitted to these data.")
-    return _grown(story, data, found, name, relative)
+    return _grown(story, data, found, (name,), () if relative is None else (relative,))
 
 
 def removed(story: Story, run: Run, name: str, library: Library = STANDARD) -> Story:
     """Without one effect, the rest refitted; raises BadInput if it is not in the model."""
     if name not in story.effects:
         raise BadInput("effect", repr(name), ", ".join(story.effects) or "none, the model is the rigid base", "Choose one that is in the model.")
-    data = prepare(run.sampling_rate, run.voltage, run.position, story.tolerance, run.units)
-    return _grown(story, data, fit(data, _model(story, library).without(name)), None, name)
-
-
-def with_effects(story: Story, run: Run, names: Iterable[str], library: Library = STANDARD) -> Story:
-    """With exactly these effects: what is not among them goes, what is new comes, one step each.
-
-    Raises BadInput for a name that is unknown or in every model, before anything is fitted.
-    """
-    wanted = tuple(dict.fromkeys(names))
-    for name in wanted:
-        allowed(name, library)
-    for name in story.effects:
-        if name not in wanted:
-            story = removed(story, run, name, library)
-    for name in wanted:
-        if name not in story.effects:
-            story = added(story, run, name, library)
-    return story
+    data = _data(story, run)
+    return _grown(story, data, fit(data, _model(story.rungs[-1], library).without(name)), went=(name,))
 
 
 def next_best(story: Story, run: Run, library: Library = STANDARD) -> Story:
@@ -151,24 +122,20 @@ def next_best(story: Story, run: Run, library: Library = STANDARD) -> Story:
         return replace(story, note="Nothing is left to explain: the held-out error is at the noise floor.")
     if planned is None and _searched(story):
         return replace(story, note=HELPS_NO_MORE)
-    data = prepare(run.sampling_rate, run.voltage, run.position, story.tolerance, run.units)
+    data = _data(story, run)
     if planned is not None:
-        return _shown(story, data, planned, library)
+        return _shown(story, data, planned, _fit_of(story, data, library, planned))
     found = refine(data, library, story.effects, Effort(most=MOST_EFFECTS - len(story.effects)))
-    new = [step for step in found.steps if not set(step.names) <= {*story.effects}]
-    if not new:
-        return replace(story, note=HELPS_NO_MORE)
-    return _grown(story, data, new[0].fit, new[0].added, None)
+    new = [rung for rung in found.rungs if not {*rung.came} <= {*story.effects}]
+    return _grown(story, data, new[0].fit, new[0].came) if new else replace(story, note=HELPS_NO_MORE)
 
 
 def auto(story: Story, run: Run, library: Library = STANDARD) -> Story:
     """Add the next best until the floor is reached or nothing helps, then take out what is no longer needed."""
     while len(story.effects) < MOST_EFFECTS:
-        grown = next_best(story, run, library)
-        if len(grown.steps) == len(story.steps):
-            story = grown
+        before, story = len(story.rungs), next_best(story, run, library)
+        if len(story.rungs) == before:
             break
-        story = grown
     return pruned(story, run, library)
 
 
@@ -176,17 +143,17 @@ def pruned(story: Story, run: Run, library: Library = STANDARD) -> Story:
     """Without the effects that are no longer needed, and with simpler relatives that do as well; the same story if all stay."""
     if len(story.effects) < 2:
         return story
-    data = prepare(run.sampling_rate, run.voltage, run.position, story.tolerance, run.units)
+    data = _data(story, run)
     found = settle(data, _fit_of(story, data, library))
     gone = [name for name in story.effects if name not in found.model]
     new = [name for name, _ in found.model.effects if name not in story.effects]
-    return _grown(story, data, found, " and ".join(new) or None, " and ".join(gone)) if gone else story
+    return _grown(story, data, found, new, gone) if gone else story
 
 
 def tell(run: Run, library: Library = STANDARD) -> Story:
     """The whole story of one axis: base, diagnosis, and every effect that it needs."""
     story = begin(run, library)
-    return auto(diagnosed(story, run, library), run, library) if story.steps else story
+    return auto(diagnosed(story, run, library), run, library) if story.rungs else story
 
 
 def allowed(name: str, library: Library = STANDARD) -> None:
@@ -198,61 +165,58 @@ def allowed(name: str, library: Library = STANDARD) -> None:
         raise unknown_name(name, names, "effect")
 
 
+def _data(story: Story, run: Run) -> AxisData:
+    return prepare(run.sampling_rate, run.voltage, run.position, story.tolerance, run.units)
+
+
 def _planned(story: Story) -> Rung | None:
     """What the diagnosis has fitted already as the next step from here."""
-    rungs = story.diagnosis.ladder if story.diagnosis is not None else ()
-    return next((after for here, after in pairwise(rungs) if after.added is not None and _stands_on(story, here)), None)
+    rungs = story.diagnosis.rungs if story.diagnosis is not None else ()
+    return next((after for here, after in pairwise(rungs) if after.came and _stands_on(story, here)), None)
 
 
 def _searched(story: Story) -> bool:
     """The diagnosis has tried everything from here, and no more helped: to search once more would say the same."""
-    rungs = story.diagnosis.ladder if story.diagnosis is not None else ()
+    rungs = story.diagnosis.rungs if story.diagnosis is not None else ()
     return bool(rungs) and _stands_on(story, rungs[-1])
 
 
 def _stands_on(story: Story, here: Rung) -> bool:
-    return here.effects == story.effects and here.values == story.steps[-1].rung.values
+    return story.now is not None and here.values == story.now.values
 
 
-def _shown(story: Story, data: AxisData, step: Rung, library: Library) -> Story:
-    """The story with a step whose fit is known."""
-    again = _simulated(data, step, story.steps[0].rung if story.steps else step, library)
-    shown = story.measured or measured(data, again)
-    return replace(story, measured=shown, steps=(*story.steps, StoryStep(step, pictures(data, again, shown))), note="")
+def _grown(story: Story, data: AxisData, found: GreyboxFit, came: Sequence[str] = (), went: Sequence[str] = ()) -> Story:
+    """The story with one more fit."""
+    return _shown(story, data, Rung.of(found, came, went).plain(), found)
 
 
-def _grown(story: Story, data: AxisData, found: GreyboxFit, name: str | None, gone: str | None) -> Story:
+def _shown(story: Story, data: AxisData, rung: Rung, found: GreyboxFit) -> Story:
+    """The story with one more rung, and the pictures of its fit."""
     assert story.measured is not None
-    step = StoryStep(rung(found, name, gone), pictures(data, found, story.measured))
-    return replace(story, steps=(*story.steps, step), note="")
+    return replace(story, rungs=(*story.rungs, rung), pictures=(*story.pictures, pictures(data, found, story.measured)), note="")
 
 
-def _model(story: Story, library: Library) -> AxisModel:
-    assert story.now is not None
-    return AxisModel(gain=story.now.gain, delay=story.now.delay, pole=story.now.pole, effects=story.now.values, library=library)
+def _model(rung: Rung, library: Library) -> AxisModel:
+    return AxisModel(gain=rung.gain, delay=rung.delay, pole=rung.pole, effects=rung.values, library=library)
 
 
-def _fit_of(story: Story, data: AxisData, library: Library) -> GreyboxFit:
-    assert story.now is not None
-    return _simulated(data, story.now, story.steps[0].rung, library)
-
-
-def _simulated(data: AxisData, step: Rung, base: Rung, library: Library) -> GreyboxFit:
-    """The fit of a step again: by one simulation, or as it was made where free simulation cannot judge it."""
-    model = AxisModel(gain=step.gain, delay=step.delay, pole=step.pole, effects=step.values, library=library)
+def _fit_of(story: Story, data: AxisData, library: Library, rung: Rung | None = None) -> GreyboxFit:
+    """The fit of a rung again, of the newest without one: by one simulation, or as it was made where free simulation cannot judge it."""
+    rung = rung or story.rungs[-1]
+    model = _model(rung, library)
     alone = follower(model)
     if alone is not None:
-        rigid = _simulated(data, base, base, library)
-        others = tuple((name, values) for name, values in step.values if name != alone.name)
+        rigid = _fit_of(story, data, library, story.rungs[0])
+        others = tuple((name, values) for name, values in rung.values if name != alone.name)
         return one_step_fit(data, replace(rigid, model=replace(rigid.model, effects=others)), alone)
     simulated = simulate(model, data.sampling_rate, data.voltage, data.position)
     return GreyboxFit(
         model=model,
-        parameters=step.parameters,
-        training_error=step.train_error,
-        held_out_error=step.held_out_error,
-        noise_floor=step.noise_floor,
-        excess=step.excess,
+        parameters=rung.parameters,
+        training_error=rung.training_error,
+        held_out_error=rung.held_out_error,
+        noise_floor=rung.noise_floor,
+        excess=rung.excess,
         scores=np.zeros(data.held.begins.size),
         forced=0.0,
         force=0.0,
