@@ -19,10 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from campaigns.bench.recordings import markdown
+from xy_sysid.fleets.alike import learned
 from xy_sysid.fleets.causes import causes
-from xy_sysid.fleets.change import Series, evidence, learned, statistic, usual
+from xy_sysid.fleets.change import evidence, statistic
 from xy_sysid.fleets.history import MONTH, Axis, History
 from xy_sysid.fleets.trends import AXIS_MONTHS, of_axes
+from xy_sysid.fleets.wander import Series, usual
 from xy_sysid.response.frf import Z95
 from xy_sysid.samples.block import FloatArray
 
@@ -120,7 +122,7 @@ def false_alarms(groups: int, seed: int, weeks: int = WEEKS) -> tuple[int, float
 def delays(what: Wander, before: int, times: int, seed: int) -> tuple[list[float], list[float]]:
     """Recordings from a step of 10 % until it is declared, by the trend and by the CUSUM; infinite where it is not in ten."""
     series = [_series(what, np.random.default_rng([seed, 1, k]), before) for k in range(GROUP)]
-    weights = learned(evidence(one)[0] for one in series)
+    weights = learned([evidence(one)[0] for one in series])
     level = np.log(AXIS_MONTHS * MONTH / 7.0 * len(PARAMETERS))
     limit = cusum_limit(what, seed)
     ours, plain = [], []
@@ -184,7 +186,7 @@ def screws(times: int, seed: int) -> list[tuple[str, ...]]:
     lines = []
     a_month = MONTH * 24.0 / 35.0
     level = np.log(AXIS_MONTHS * a_month)
-    known = learned(evidence(_series(FRICTION, np.random.default_rng([seed, 6, k]), 30))[0] for k in range(GROUP))
+    known = learned([evidence(_series(FRICTION, np.random.default_rng([seed, 6, k]), 30))[0] for k in range(GROUP)])
     for fall, scatter in SCREWS:
         still = Wander(column="torque", value=1.0, own=0.0, load=scatter, weather=0.0, season=0.0)
         limits = [cusum_limit(what, seed, weeks=30, a_month=a_month, tests=1) for what in (FRICTION, still)]
@@ -204,7 +206,7 @@ def screws(times: int, seed: int) -> list[tuple[str, ...]]:
 def screw_alarms(axes: int, seed: int) -> tuple[int, float]:
     """False alarms and axis-months of unchanged axes that are recorded as the screws are, by the same weights and the same limit."""
     a_month = MONTH * 24.0 / 35.0
-    known = learned(evidence(_series(FRICTION, np.random.default_rng([seed, 6, k]), 30))[0] for k in range(GROUP))
+    known = learned([evidence(_series(FRICTION, np.random.default_rng([seed, 6, k]), 30))[0] for k in range(GROUP)])
     alarms = 0
     for k in range(axes):
         seen = evidence(_series(FRICTION, np.random.default_rng([seed, 7, k]), 30))[0]

@@ -18,11 +18,13 @@ import xy_sysid as xy
 from campaigns.bench.trend import PARAMETERS, axis, cusum, delays, until
 from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.fleets import presence
+from xy_sysid.fleets.alike import learned
 from xy_sysid.fleets.causes import causes
-from xy_sysid.fleets.change import Series, changes, evidence, learned, statistic, usual
+from xy_sysid.fleets.change import changes, evidence, statistic
 from xy_sysid.fleets.columns_doc import document
 from xy_sysid.fleets.history import Axis
 from xy_sysid.fleets.trends import of_axes
+from xy_sysid.fleets.wander import Series, usual
 from xy_sysid.fleets.words import sentence
 
 LEVEL = 10.0  # log of the statistic, as for a weekly recording with seven parameters
