@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import logsumexp
 
-from xy_sysid.fleets.wander import SIZES, Series, grid, usual, whitened
+from xy_sysid.fleets.wander import SIZES, Series, Whitened, grid, usual, whitened
 from xy_sysid.samples.block import FloatArray
 
 DURATIONS = (0.0, 5.0, 20.0, 80.0)  # of a change, usual distances between recordings
@@ -82,18 +82,14 @@ def evidence(series: Series) -> tuple[Evidence, Series]:
 def _evidence(series: Series) -> tuple[Evidence, tuple[int, ...]]:
     """The evidence, and the numbers of recordings that were surely off."""
     n, changed, every = series.value.size, _first_change(series), grid()
-    shapes = _shapes(series.time)
-    begun = np.argmax(shapes != 0.0, axis=0)
-    chance = np.where(np.arange(changed) < n, ODD, ODD**2)[:, None]
+    shapes = hypotheses(series.time)
     none, odd, change = (np.full((len(every), n), -np.inf) for _ in range(3))
     off = np.full((changed, n), -np.inf)
     for row, wander in enumerate(every):
         parts = whitened(series, wander, shapes)
         none[row] = parts.none
-        ratios = parts.ratios(begun)
-        each = chance * ratios[:changed]
+        each, change[row] = weighed(parts, shapes)
         odd[row] = np.log1p(each.sum(axis=0))
-        change[row, 1:] = np.log(ratios[changed:, 1:].sum(axis=0) / len(DURATIONS))
         with np.errstate(divide="ignore"):  # of what has not begun
             off = np.logaddexp(off, usual()[row] + parts.none + np.log(each))
     prior = usual()[:, None] + none
@@ -102,6 +98,20 @@ def _evidence(series: Series) -> tuple[Evidence, tuple[int, ...]]:
     share[np.arange(n, changed), np.arange(1, n)] = 0.0
     sure = [int(place) for place in np.flatnonzero(share.max(axis=1) > SURE)]
     return Evidence(none, odd, change), tuple(sorted({k for place in sure for k in ((place,) if place < n else (place - n, place - n + 1))}))
+
+
+def weighed(parts: Whitened, shapes: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """What a series says for one wander: (2 n - 1, n) likelihood ratios of one recording or two that are off, times their probability; and (n,) log
+    of the sum of the ratios of all changes.
+
+    shapes: of ``hypotheses``, of which parts has the whitened ones
+    """
+    n = shapes.shape[0]
+    ratios = parts.ratios(np.argmax(shapes != 0.0, axis=0))
+    chance = np.where(np.arange(2 * n - 1) < n, ODD, ODD**2)[:, None]
+    change = np.full(n, -np.inf)
+    change[1:] = np.log(ratios[2 * n - 1 :, 1:].sum(axis=0) / len(DURATIONS))
+    return chance * ratios[: 2 * n - 1], change
 
 
 def statistic(found: Evidence, weights: FloatArray) -> FloatArray:
@@ -160,7 +170,7 @@ def _moved(change: Change, by: int, declared: int) -> Change:
 def _located(series: Series, weights: FloatArray) -> Change:
     """When the one change of a series was, and by how much."""
     n, first = series.value.size, _first_change(series)
-    shapes = _shapes(series.time)
+    shapes = hypotheses(series.time)
     log, mean, power = [], [], []
     for weight, wander in zip(weights, grid(), strict=True):
         parts = whitened(series, wander, shapes[:, first:])
@@ -193,7 +203,7 @@ def _first_change(series: Series) -> int:
     return 2 * series.value.size - 1
 
 
-def _shapes(time: FloatArray) -> FloatArray:
+def hypotheses(time: FloatArray) -> FloatArray:
     """(n, 2 n - 1 + (n - 1) durations): a recording that is off, two in a row, and each change, by duration and by the recording after which it
     begins."""
     changed = [_shape(time, after, duration) for duration in DURATIONS for after in range(time.size - 1)]

@@ -115,14 +115,20 @@ def _ratios(one: FloatArray, value: FloatArray, shapes: FloatArray, begun: NDArr
 
 
 def whitened(series: Series, wander: Wander, shapes: FloatArray) -> Whitened:
-    """The series and shapes (n, k) for one wander.
+    """The series and shapes (n, k) for one wander."""
+    distance = np.abs(series.time[:, None] - series.time[None, :])
+    slow = wander.slow * np.exp(-distance / wander.length)
+    own = np.diag(wander.spread**2 * (1.0 - wander.slow) + series.sigma**2 + EXACT**2)
+    return divided(series.value, wander.spread**2 * slow + own, shapes)
+
+
+def divided(series: FloatArray, covariance: FloatArray, shapes: FloatArray) -> Whitened:
+    """A series (n,) and shapes (n, k) for one covariance (n, n).
 
     The Cholesky factor of the first recordings is the corner of that of all, so that running sums give the answers after each.
     """
-    distance = np.abs(series.time[:, None] - series.time[None, :])
-    slow = wander.slow * np.exp(-distance / wander.length)
-    factor = np.linalg.cholesky(wander.spread**2 * slow + np.diag(wander.spread**2 * (1.0 - wander.slow) + series.sigma**2 + EXACT**2))
-    columns = np.column_stack((np.ones_like(series.value), series.value - series.value[0], shapes))
+    factor = np.linalg.cholesky(covariance)
+    columns = np.column_stack((np.ones_like(series), series - series[0], shapes))
     white = solve_triangular(factor, columns, lower=True, check_finite=False)
     one, value = np.ascontiguousarray(white[:, 0]), np.ascontiguousarray(white[:, 1])
     ones, values, both = (np.cumsum(part) for part in (one * one, value * value, one * value))
