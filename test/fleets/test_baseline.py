@@ -20,9 +20,9 @@ from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.fleets.baseline import AGREEING, Baseline, compare
 from xy_sysid.fleets.baseline_words import status
 from xy_sysid.fleets.causes import causes
-from xy_sysid.fleets.change import Series
 from xy_sysid.fleets.commissioned import of_axis_models, of_transfer_functions
 from xy_sysid.fleets.history import MONTH
+from xy_sysid.fleets.wander import Series
 from xy_sysid.greybox.parameters import Estimate
 from xy_sysid.live.plain_messages import OK, WARN, StatusMessage
 from xy_sysid.samples.recording import Recording

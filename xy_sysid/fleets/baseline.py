@@ -21,9 +21,10 @@ import numpy as np
 from scipy.special import logsumexp
 
 from xy_sysid.fleets.causes import Cause, Causes
-from xy_sysid.fleets.change import SPREADS, USUAL, Series, evidence, grid
+from xy_sysid.fleets.change import evidence
 from xy_sysid.fleets.columns import column_of
 from xy_sysid.fleets.history import BEGIN, MONTH, History
+from xy_sysid.fleets.wander import SPREADS, USUAL, Series, grid
 from xy_sysid.greybox.parameters import Estimate
 from xy_sysid.response.frf import Z95
 from xy_sysid.samples.block import FloatArray

@@ -17,58 +17,19 @@ sample size of certain sequential tests, Ann. Statist. 3 (1975); Shin, Ramdas & 
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
 from scipy.special import logsumexp
 
+from xy_sysid.fleets.wander import SIZES, Series, Whitened, grid, usual, whitened
 from xy_sysid.samples.block import FloatArray
 
-SPREADS = np.geomspace(3e-4, 0.3, 14)  # tau, part of the level
-SLOW = ((0.0, 1.0), *((part, length) for part in (0.3, 0.7, 1.0) for length in (3.0, 12.0)))  # part of tau^2, and length, of what is slow
 DURATIONS = (0.0, 5.0, 20.0, 80.0)  # of a change, usual distances between recordings
-SIZES = (0.01, 0.04, 0.16, 0.64)  # standard deviation of a change, part of the level
 ODD = 0.01  # probability that a recording is off; that the next one is off, too, is as probable again
 SURE = 0.99  # probability from which a recording counts as off once and for all
 UNLIMITED = 1.0  # standard error, part of the level, of what is off
-USUAL = 0.03  # spread between recordings of an unchanged axis: scatter of the friction torque of ball screws, the most lively parameter
-FEW = 0.1  # alike machines that these weights count as, when they are learned from many
-CERTAIN = 600.0  # log of a likelihood ratio beyond which it is all the same
-EXACT = 1e-5  # part of the level: no estimate is more exact
 LONGEST = 200  # recordings that are looked at together; of longer series the older half is let go
-
-
-@dataclass(frozen=True, slots=True)
-class Series:
-    """One parameter of one axis over time, as parts of its level.
-
-    time: (n,) usual distances between recordings, increasing; value, sigma: (n,) estimate and standard error
-    """
-
-    time: FloatArray
-    value: FloatArray
-    sigma: FloatArray
-
-    def after(self, place: int) -> Series:
-        """From that recording on."""
-        return Series(self.time[place:], self.value[place:], self.sigma[place:])
-
-    def until(self, place: int) -> Series:
-        """Before that recording."""
-        return Series(self.time[:place], self.value[:place], self.sigma[:place])
-
-
-@dataclass(frozen=True, slots=True)
-class Wander:
-    """spread: tau, part of the level; slow: part of tau^2 that is correlated from one recording to the next, over ``length`` usual distances."""
-
-    spread: float
-    slow: float
-    length: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,19 +64,6 @@ class Change:
     statistic: float
 
 
-@functools.cache
-def grid() -> tuple[Wander, ...]:
-    """Every wander that is weighed."""
-    return tuple(Wander(float(spread), part, length) for part, length in SLOW for spread in SPREADS)
-
-
-@functools.cache
-def usual() -> FloatArray:
-    """(g,) log weights of the grid when nothing else is known: half a normal distribution of the spread, and all else alike."""
-    log = np.array([-0.5 * (one.spread / USUAL) ** 2 for one in grid()])
-    return np.asarray(log - logsumexp(log))
-
-
 def evidence(series: Series) -> tuple[Evidence, Series]:
     """The evidence of a series of up to LONGEST recordings, and the series without the recordings that were surely off: their error is unlimited.
 
@@ -134,18 +82,14 @@ def evidence(series: Series) -> tuple[Evidence, Series]:
 def _evidence(series: Series) -> tuple[Evidence, tuple[int, ...]]:
     """The evidence, and the numbers of recordings that were surely off."""
     n, changed, every = series.value.size, _first_change(series), grid()
-    shapes = _shapes(series.time)
-    begun = np.cumsum(shapes != 0.0, axis=0).T > 0
-    chance = np.where(np.arange(changed) < n, ODD, ODD**2)[:, None]
+    shapes = hypotheses(series.time)
     none, odd, change = (np.full((len(every), n), -np.inf) for _ in range(3))
     off = np.full((changed, n), -np.inf)
     for row, wander in enumerate(every):
-        parts = _whitened(series, wander, shapes)
+        parts = whitened(series, wander, shapes)
         none[row] = parts.none
-        ratios = parts.ratios(begun)
-        each = chance * ratios[:changed]
+        each, change[row] = weighed(parts, shapes)
         odd[row] = np.log1p(each.sum(axis=0))
-        change[row, 1:] = np.log(ratios[changed:, 1:].sum(axis=0) / len(DURATIONS))
         with np.errstate(divide="ignore"):  # of what has not begun
             off = np.logaddexp(off, usual()[row] + parts.none + np.log(each))
     prior = usual()[:, None] + none
@@ -156,25 +100,29 @@ def _evidence(series: Series) -> tuple[Evidence, tuple[int, ...]]:
     return Evidence(none, odd, change), tuple(sorted({k for place in sure for k in ((place,) if place < n else (place - n, place - n + 1))}))
 
 
+def weighed(parts: Whitened, shapes: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """What a series says for one wander: (2 n - 1, n) likelihood ratios of one recording or two that are off, times their probability; and (n,) log
+    of the sum of the ratios of all changes.
+
+    shapes: of ``hypotheses``, of which parts has the whitened ones
+    """
+    n = shapes.shape[0]
+    ratios = parts.ratios(np.argmax(shapes != 0.0, axis=0))
+    chance = np.where(np.arange(2 * n - 1) < n, ODD, ODD**2)[:, None]
+    change = np.full(n, -np.inf)
+    change[1:] = np.log(ratios[2 * n - 1 :, 1:].sum(axis=0) / len(DURATIONS))
+    return chance * ratios[: 2 * n - 1], change
+
+
 def statistic(found: Evidence, weights: FloatArray) -> FloatArray:
     """(n,) log of Shiryaev and Roberts' statistic after each recording."""
     none = weights[:, None] + found.none
     return np.asarray(logsumexp(none + found.change, axis=0) - logsumexp(none + found.odd, axis=0))
 
 
-def learned(every: Iterable[Evidence], rounds: int = 5) -> FloatArray:
-    """(g,) log weights of the grid from many series of alike machines: each has a say, whether or not it changed."""
-    totals = [np.logaddexp(one.none + one.odd, one.none + one.change)[:, -1] for one in every if one.none.shape[1] > 2]
-    weights = usual()
-    for _ in range(rounds if totals else 0):
-        shares = sum((np.exp(weights + total - logsumexp(weights + total)) for total in totals), FEW * np.exp(usual()))
-        weights = np.log(shares / shares.sum())
-    return np.asarray(weights)
-
-
 def spread(series: Series, weights: FloatArray) -> tuple[float, FloatArray]:
     """Standard deviation of the wander of a series without a change, and (g,) how likely each wander of the grid is."""
-    none = np.array([_whitened(series, wander, np.zeros((series.value.size, 0))).none[-1] for wander in grid()])
+    none = np.array([whitened(series, wander, np.zeros((series.value.size, 0))).none[-1] for wander in grid()])
     share = np.exp(weights + none - logsumexp(weights + none))
     return float(np.sqrt(sum(part * wander.spread**2 for part, wander in zip(share, grid(), strict=True)))), share
 
@@ -222,12 +170,12 @@ def _moved(change: Change, by: int, declared: int) -> Change:
 def _located(series: Series, weights: FloatArray) -> Change:
     """When the one change of a series was, and by how much."""
     n, first = series.value.size, _first_change(series)
-    shapes = _shapes(series.time)
+    shapes = hypotheses(series.time)
     log, mean, power = [], [], []
     for weight, wander in zip(weights, grid(), strict=True):
-        parts = _whitened(series, wander, shapes)
+        parts = whitened(series, wander, shapes[:, first:])
+        information, score = parts.sizes()
         for size in SIZES:
-            information, score = parts.information[first:, -1], parts.score[first:, -1]
             shrunk = size**2 / (1.0 + size**2 * information)
             log.append(weight + parts.none[-1] - 0.5 * np.log1p(size**2 * information) + 0.5 * shrunk * score**2)
             mean.append(shrunk * score)
@@ -250,49 +198,12 @@ def _located(series: Series, weights: FloatArray) -> Change:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class _Whitened:
-    """none: (n,) log likelihood without a change; information, score: (shapes, n) of the size of each shape after each recording."""
-
-    none: FloatArray
-    information: FloatArray
-    score: FloatArray
-
-    def ratios(self, begun: NDArray[np.bool_]) -> FloatArray:
-        """(shapes, n) likelihood ratio of each shape, mean over sizes, 0 before it has begun."""
-        total = np.zeros_like(self.score)
-        for size in SIZES:
-            told = 1.0 + size**2 * self.information
-            total += np.exp(np.minimum(0.5 * size**2 * self.score**2 / told, CERTAIN)) / np.sqrt(told)
-        return np.where(begun, total / len(SIZES), 0.0)
-
-
-def _whitened(series: Series, wander: Wander, shapes: FloatArray) -> _Whitened:
-    """What each shape (n, k) explains after each recording, for one wander.
-
-    The Cholesky factor of the first recordings is the corner of that of all, so that running sums give the answers after each.
-    """
-    distance = np.abs(series.time[:, None] - series.time[None, :])
-    slow = wander.slow * np.exp(-distance / wander.length)
-    factor = np.linalg.cholesky(wander.spread**2 * slow + np.diag(wander.spread**2 * (1.0 - wander.slow) + series.sigma**2 + EXACT**2))
-    columns = np.column_stack((np.ones_like(series.value), series.value - series.value[0], shapes))
-    white = solve_triangular(factor, columns, lower=True, check_finite=False)
-    one, value, shape = white[:, :1], white[:, 1:2], white[:, 2:]
-    ones, values, both = (np.cumsum(part, axis=0) for part in (one * one, value * value, one * value))
-    across, along = np.cumsum(one * shape, axis=0), np.cumsum(value * shape, axis=0)
-    information = np.maximum(np.cumsum(shape * shape, axis=0) - across**2 / ones, 0.0)
-    score = along - across * both / ones
-    logs = np.cumsum(np.log(np.diag(factor)))
-    none = -logs - 0.5 * (np.log(ones) + values - both**2 / ones)[:, 0]
-    return _Whitened(none, information.T, score.T)
-
-
 def _first_change(series: Series) -> int:
     """Number of the first change among the shapes."""
     return 2 * series.value.size - 1
 
 
-def _shapes(time: FloatArray) -> FloatArray:
+def hypotheses(time: FloatArray) -> FloatArray:
     """(n, 2 n - 1 + (n - 1) durations): a recording that is off, two in a row, and each change, by duration and by the recording after which it
     begins."""
     changed = [_shape(time, after, duration) for duration in DURATIONS for after in range(time.size - 1)]

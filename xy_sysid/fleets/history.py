@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from xy_sysid.fleets.change import Series
+from xy_sysid.fleets.wander import Series
 from xy_sysid.response.frf import Z95
 from xy_sysid.samples.block import FloatArray
 

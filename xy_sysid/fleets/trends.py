@@ -12,12 +12,14 @@ import numpy as np
 
 from xy_sysid.errors import BadInput
 from xy_sysid.fleets import presence
+from xy_sysid.fleets.alike import learned_for_each
 from xy_sysid.fleets.causes import Cause, Causes, Direction, causes
-from xy_sysid.fleets.change import LONGEST, Change, Evidence, Series, changes, evidence, learned, spread
+from xy_sysid.fleets.change import LONGEST, Change, Evidence, changes, evidence, spread
 from xy_sysid.fleets.columns import column_of, columns
 from xy_sysid.fleets.history import DAY, FEWEST, Axis, History, axes
 from xy_sysid.fleets.row import Row
 from xy_sysid.fleets.table import read
+from xy_sysid.fleets.wander import Series
 from xy_sysid.response.frf import Z95
 from xy_sysid.samples.block import FloatArray
 
@@ -155,16 +157,18 @@ def of_axes(every: Sequence[Axis], known: Causes, axis_months: float = AXIS_MONT
         for history in one.histories:
             every_evidence[number, history.column] = evidence(_newest(history))
             tell(len(every_evidence) / count)
-    weights = {
-        name: learned(item for (_, column), (item, _) in every_evidence.items() if column == name) for name in {key[1] for key in every_evidence}
-    }
+    weights: dict[tuple[int, str], FloatArray] = {}
+    for name in dict.fromkeys(column for _, column in every_evidence):
+        alike = {key: item for key, (item, _) in every_evidence.items() if key[1] == name}
+        weights |= zip(alike, learned_for_each(list(alike.values())), strict=True)
     effects = {effect for one in every for effect in one.named}
     seen = [one.named.get(effect, np.zeros(len(one.dates), dtype=np.bool_)) for one in every for effect in effects]
     often = presence.learned(seen)
     trends: list[Trend] = []
     events: list[Event] = []
     for number, one in enumerate(every):
-        own = [_trend(one, history, weights[history.column], every_evidence[number, history.column], axis_months) for history in one.histories]
+        keys = [((number, history.column), history) for history in one.histories]
+        own = [_trend(one, history, weights[key], every_evidence[key], axis_months) for key, history in keys]
         trends += own
         events += _events(one, [*(moved for item in own for moved in item.moved), *_named(one, often, axis_months)], known)
     pooled = sum(bool(one.histories) for one in every) > 1
