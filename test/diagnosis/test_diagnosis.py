@@ -288,9 +288,9 @@ def test_effects_come_in_the_order_of_what_each_would_cost() -> None:
     ladders = (found, refine(data, effort=Effort(budget=0.3 * ticks, clock=partial(next, count()), size=SIZE)))
     for ladder in ladders:
         assert ladder.effects and set(ladder.effects) == set(ladder.sizes)
-        alone = {item.name: float(np.sum(item.rung.fit.scores)) for item in ladder.candidates}
-        costs = [alone[other] for other in reversed(ladder.effects) if len(ladder.effects) == 2]
-        assert costs == sorted(costs, reverse=True) and min(ladder.sizes.values()) > 0.0
+        assert min(ladder.sizes.values()) > 0.0
+        first, *others = ladder.effects  # the largest, or dry friction that is almost as large
+        assert STANDARD[first].is_dry or all(ladder.sizes[first] >= ladder.sizes[other] for other in others)
     assert [ladder.stopped for ladder in ladders] == [False, True]
 
 

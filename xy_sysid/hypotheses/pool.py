@@ -289,10 +289,11 @@ class Pool:
         Of a richer law in the place of a simpler one WORTH is asked. Beside a set at the floor nothing more is needed.
         """
         one, other = alike(node, simpler)
+        if other.excess < AT_FLOOR:
+            return False
         new = len(node.effects) - len(simpler.effects)
         least = (1.0 + self.worth) ** new - 1.0 if new > 0 else WORTH
-        better = gain(one, other).nats > PRICE * (node.parameters - simpler.parameters)
-        return other.excess >= AT_FLOOR and better and size(one, other) >= least
+        return gain(one, other).nats > PRICE * (node.parameters - simpler.parameters) and size(one, other) >= least
 
     def simplified(self) -> Iterator[frozenset[str]]:
         """Try simpler sets than the best; yields as ``search``. What the best gains over a simpler one by chance, or too little, it does not keep.
