@@ -163,6 +163,15 @@ def test_a_minute_of_data_is_simulated_in_milliseconds() -> None:
     assert min(took) < 0.1
 
 
+@pytest.mark.parametrize("effect", [effect.name for effect in STANDARD.acting if effect.simulable])
+def test_a_trial_without_gain_is_no_error(effect: str) -> None:
+    """A step of a fit may end at a gain of zero exactly: what laws divide by it is no number, and no error."""
+    voltage = np.random.default_rng(1).normal(size=600)
+    values = tuple(item.high if not item.positive and math.isfinite(item.high) else item.typical for item in STANDARD[effect].parameters)
+    model = AxisModel(0.0, 1e-3, 200.0, ((effect, values),))
+    assert np.all(np.isnan(simulate(model, 2000.0, voltage, np.zeros(voltage.size))))
+
+
 def test_a_model_that_cannot_be_is_refused() -> None:
     """The error names the value and what is allowed."""
     with pytest.raises(BadInput, match=r"delay is -0\.001"):

@@ -90,7 +90,7 @@ def test_the_linear_guide_shows_its_mode_its_spring_and_its_friction(tmp_path: A
     assert 0.01 < value(found, "coulomb_friction.coulomb") < 0.05
     assert power_gone(found) > 0.9
     seen = cli("validate", data("lsb250/lsb250_exp2.npz"), model, "--json").json["axes"]["x"]
-    assert seen["simulation"]["nrmse"] == pytest.approx(43, abs=5)
+    assert seen["simulation"]["nrmse"] == pytest.approx(48, abs=5)
 
 
 def test_a_servo_with_a_pendulum_carries_its_weight() -> None:

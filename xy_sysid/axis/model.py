@@ -184,7 +184,7 @@ def simulator(
     """A function from parameters to the simulated velocity (n - 1,), m/s, for many runs on the same data, several at once too.
 
     Its arguments are a row: gain, delay, pole, then each active effect's parameters, in the order of ``active``; and the speed at the
-    first sample, m/s, which is none if it is not given (see ``start_of``).
+    first sample, m/s, which is none if it is not given (see ``start_of``). Without a gain, by which laws divide, the motion is no number.
     voltage, position: (n,) V and m; the voltage of sample k is held to k + 1; fine: Hz, sub-steps for what heeds speed
     """
     if voltage.shape != position.shape or voltage.ndim != 1 or voltage.size < 2:
@@ -202,6 +202,8 @@ def simulator(
     def run(parameters: FloatArray, start: float = 0.0) -> FloatArray:
         row = ones.copy()
         row[where] = parameters
+        if row[0] == 0.0:
+            return np.full(u.size, np.nan)
         on = np.zeros(len(names), dtype=np.uint8)
         for place, size in sizes:
             on[place] = row[size] != 0.0
