@@ -47,7 +47,15 @@ def test_without_limits_an_experiment_stays_within_what_was_recorded() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "words"), [("voltage", 0.0, "voltage"), ("seconds", -1.0, "seconds"), ("margin", 1.0, "margin"), ("start", 0.2, "travel")]
+    ("name", "value", "words"),
+    [
+        ("voltage", 0.0, "voltage"),
+        ("voltage", 6398.0, "voltage is 6398 V; allowed: up to 1000 V"),
+        ("seconds", -1.0, "seconds"),
+        ("margin", 1.0, "margin"),
+        ("start", 0.2, "travel"),
+        ("travel", (-0.1, 77_570.0), "travel is .* allowed: within"),
+    ],
 )
 def test_limits_that_make_no_sense_are_refused(name: str, value: Any, words: str) -> None:
     """One line that names the value."""
@@ -65,6 +73,12 @@ def test_no_proposal_asks_for_more_than_the_voltage() -> None:
         drive = item.drive(RATE, 4.0, 0.0)
         assert item.excitation.limit == 3.0
         assert float(np.max(np.abs(drive.voltage))) < 3.0 * 1.1, item.words  # Gaussian noise has a tail, which the drive clips
+
+
+def test_every_proposal_is_one_that_the_excitation_takes() -> None:
+    """Its settings have bounds of their own, which a large limit of the voltage or a short travel would pass."""
+    for limits in (MachineLimits(voltage=1000.0, travel=(-0.1, 0.1)), MachineLimits(voltage=900.0, travel=(-1e-5, 1e-5))):
+        assert all(item.excitation.rms <= 100.0 for item in proposals(limits, RATE))
 
 
 def test_no_proposal_pulls_harder_than_the_excitation_allows() -> None:

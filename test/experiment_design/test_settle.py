@@ -8,6 +8,7 @@ import pytest
 from campaigns.bench.settle import table
 from campaigns.bench.settle_pairs import PAIRS, carry_out, first_recording, left_limits, limits, machine
 from xy_sysid.axis.model import STANDARD
+from xy_sysid.diagnosis.answer import Answer
 from xy_sysid.errors import BadInput
 from xy_sysid.experiment_design.beliefs import Evidence, believed
 from xy_sysid.experiment_design.criteria import ODDS
@@ -16,9 +17,10 @@ from xy_sysid.experiment_design.experiment import Experiment
 from xy_sysid.experiment_design.loop import Budget, NextChoice, Question, Signals, settle
 from xy_sysid.experiment_design.precision import Precision, sharpest
 from xy_sysid.experiment_design.prediction import Setting, recorded
-from xy_sysid.experiment_design.rivals import standing
+from xy_sysid.experiment_design.rivals import possible, standing
 from xy_sysid.greybox.axis_data import AxisData, prepare_all
 from xy_sysid.greybox.free_run import fit
+from xy_sysid.hypotheses.moves import is_twice
 from xy_sysid.settings import AxisExcitation
 
 LAG = next(pair for pair in PAIRS if "amplifier_lag" in pair.sets[1])
@@ -83,6 +85,18 @@ def test_probability_follows_from_the_evidence_and_needs_seconds() -> None:
     needed = seconds_needed([[one]], 1000.0)
     assert settled([[one]], needed) == pytest.approx(0.95, abs=1e-6)
     assert seconds_needed([[one]], 0.5 * needed) == np.inf
+
+
+def test_a_set_with_one_law_twice_is_refused(data: AxisData) -> None:
+    """Coulomb friction is a part of friction that differs between the directions."""
+    with pytest.raises(BadInput, match="each law once"):
+        standing(data, STANDARD, [("coulomb_friction", "asymmetric_friction")])
+
+
+def test_no_set_that_may_be_true_has_a_law_twice(data: AxisData) -> None:
+    """A load beside friction looks like friction that differs between the directions, which takes the place of both."""
+    sets = possible(data, STANDARD, Answer(rungs=(), best=("constant_load", "coulomb_friction")))
+    assert len(sets) > 1 and not any(is_twice(STANDARD, each) for each in sets)
 
 
 def test_an_effect_that_no_simulation_follows_is_refused(data: AxisData) -> None:

@@ -12,6 +12,7 @@ from xy_sysid.axis.forward import Motion
 from xy_sysid.errors import BadInput
 from xy_sysid.experiment_design.criteria import MARGIN
 from xy_sysid.samples.recording import Run
+from xy_sysid.settings import AxisExcitation
 from xy_sysid.units import USUAL, Units, readable
 
 SECONDS = 60.0  # s of motion for one experiment at most
@@ -43,6 +44,13 @@ class MachineLimits:
         for name in ("voltage", "rms", "speed", "acceleration", "seconds", "centring"):
             if not getattr(self, name) > 0.0:
                 raise BadInput(f"limit of {name}", getattr(self, name), "above 0", "Give what the machine may do.")
+        most, farthest = (_most(name) for name in ("limit", "travel_max"))
+        if self.voltage > most:
+            unit = self.units.input
+            raise BadInput("limit of voltage", f"{self.voltage:.4g} {unit}", f"up to {most:g} {unit}", "Give less, or the input in a larger unit.")
+        if max(map(abs, self.travel)) > farthest:
+            allowed = f"within {self.span((-farthest, farthest))}"
+            raise BadInput("travel", self.span(self.travel), allowed, "Give ends that lie nearer, or positions in a larger unit.")
         if not 0.0 <= self.margin < 1.0:
             raise BadInput("margin", self.margin, "0 to below 1", "Give the part of each limit that is kept free.")
         if not self.travel[0] < self.start < self.travel[1]:
@@ -96,3 +104,8 @@ def as_recorded(runs: Sequence[Run]) -> MachineLimits:
 
 def _peak(values: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> float:
     return float(np.max(np.abs(values), initial=0.0))
+
+
+def _most(name: str) -> float:
+    """The largest value that the excitation takes for a setting of an axis."""
+    return float(next(bound.le for bound in AxisExcitation.model_fields[name].metadata if hasattr(bound, "le")))

@@ -90,7 +90,15 @@ def _experiment(limits: MachineLimits, sampling_rate: float, told: dict[str, Any
     if "high" in told and told.get("kind") != "off":
         told["high"] = min(told["high"], 0.45 * sampling_rate)
         told["low"] = min(told.get("low", 0.1), 0.5 * told["high"])
-    return Experiment(AxisExcitation(**told))
+    return Experiment(AxisExcitation(**{name: _within(name, value) for name, value in told.items()}))
+
+
+def _within(name: str, value: Any) -> Any:
+    """A setting's value, moved into what it may be."""
+    for bound in AxisExcitation.model_fields[name].metadata if isinstance(value, float) else ():
+        value = max(value, getattr(bound, "ge", value))
+        value = min(value, getattr(bound, "le", value))
+    return value
 
 
 def _centring(limits: MachineLimits) -> float:

@@ -21,6 +21,7 @@ from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit, fit
 from xy_sysid.hypotheses.compare import Gain, gain
 from xy_sysid.hypotheses.criteria import CHANCE, DOUBTFUL, OVERLAP, PRICE
+from xy_sysid.hypotheses.moves import is_twice
 
 
 @dataclass(frozen=True)
@@ -53,11 +54,14 @@ def standing(data: AxisData, library: Library, sets: Sequence[Sequence[str]], kn
 
 
 def check(library: Library, sets: Iterable[Sequence[str]]) -> None:
-    """Raises BadInput for an effect that is unknown, in every model already, or that no free simulation predicts."""
+    """Raises BadInput for an effect that is unknown, in every model already, that no free simulation predicts, or whose law is in the set twice."""
     for name in (name for each in sets for name in each):
         if not library[name].simulable or library[name].category == "base":
             act = "It is judged one sample ahead; see its experiment in xy-sysid effects." if not library[name].simulable else "Leave it out."
             raise BadInput("effect", name, "effects that free simulation can predict", act)
+    for each in sets:
+        if is_twice(library, each):
+            raise BadInput("set of effects", " and ".join(each), "each law once", "Leave one of a family out: it is the other with more parameters.")
 
 
 def _of_one_law(library: Library, names: Sequence[tuple[str, ...]], fits: Sequence[GreyboxFit]) -> tuple[GreyboxFit, ...]:
@@ -184,7 +188,7 @@ def possible(data: AxisData, library: Library, found: Answer, most: int = 4) -> 
     simplest = sorted(library.acting, key=lambda other: len(other.parameters))
     hiding = [(other.name,) for other in simplest if not named and _may_be(data, library, other.name)]
     sets = dict.fromkeys(tuple(each) for each in (named, *rivals, *alike, *hiding) if all(library[name].simulable for name in each))
-    return list(sets)[: 1 + most]
+    return [each for each in sets if not is_twice(library, each)][: 1 + most]
 
 
 def look_alikes(library: Library, name: str) -> list[str]:
