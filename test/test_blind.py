@@ -160,7 +160,7 @@ def test_it_is_known_how_much_of_the_motion_is_due_to_what() -> None:
 
 def verdict(*effects: str, confidence: float = 1.0, kind: str = "missing_effect") -> SimpleNamespace:
     """What a diagnosis says, without its evidence."""
-    return SimpleNamespace(verdict=kind, effects=effects, confidence=confidence, ladder=None)
+    return SimpleNamespace(verdict=kind, effects=effects, confidence=confidence, rungs=())
 
 
 @pytest.mark.parametrize(

@@ -96,7 +96,6 @@ RECORDINGS = (
 )
 NO_RECORDINGS = ("README.md",)
 COMMANDS = ("columns", "fit", "compare", "diagnose", "refine", "report")
-MORE = ("frf", "steps", "servo", "coupling", "next")  # in the campaign alone
 LITTLE, BRIEF = ("--set", "length=512"), ("--budget", "0.3")
 RIGID = ("--set", "numerator_order=0", "--set", "denominator_order=2")  # fit chooses the orders, and the report of the same data need not again
 SHORT = {"fit": LITTLE, "compare": LITTLE, "report": (*LITTLE, *RIGID, *BRIEF), "diagnose": BRIEF, "refine": BRIEF}
@@ -149,4 +148,4 @@ def attack(name: str) -> Attack:
     return Attack(f"{name} of each recording", run, len(RECORDINGS), 0, "an answer or one line")
 
 
-ATTACKS = tuple(attack(name) for name in (*COMMANDS, *MORE))
+ATTACKS = tuple(attack(name) for name in COMMANDS)

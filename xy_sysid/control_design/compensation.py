@@ -29,7 +29,7 @@ from xy_sysid.samples.block import FloatArray
 
 ACROSS = 0.02  # s in which the correction by direction crosses a gap: a step of the path would hammer at it
 SLOWED, SLOWINGS = 0.7, 6  # of the speed, again and again, where the drive would reach its limit
-DRY, GONE = "coulomb_friction", 0.01  # the law of friction that is the same at every speed; part of it that is as good as nothing
+GONE = 0.01  # part of a friction that is as good as nothing
 RIGID = "base"  # what no model is without: gain, pole and delay
 SIMPLE = "kS kV kA"
 
@@ -139,11 +139,13 @@ def _without_breakaway(model: AxisModel, sampling_rate: float) -> AxisModel:
     """The model with Coulomb friction in place of a friction whose breakaway has gone at the speed that it gives the axis within one sample."""
     for effect, values in of_category(model, "friction"):
         words = {"direction": 1.0}
+        level_alone = [other.name for other in model.library.acting if other.is_dry and other.family == effect.family and len(other.parameters) == 1]
         breakaway, slides = (ask(effect, values, "level", {**words, "v": v}) for v in (0.0, abs(model.gain)))
         after = abs(model.gain) * model.pole * (breakaway - slides) / sampling_rate
-        if DRY not in dict(model.effects) and after > 0.0 and abs(ask(effect, values, "level", {**words, "v": after}) - slides) < GONE * slides:
+        is_gone = after > 0.0 and abs(ask(effect, values, "level", {**words, "v": after}) - slides) < GONE * slides
+        if level_alone and level_alone[0] not in model and is_gone:
             rest = tuple(item for item in model.effects if item[0] != effect.name)
-            return replace(model, effects=(*rest, (DRY, (slides,))), per_recording=())
+            return replace(model, effects=(*rest, (level_alone[0], (slides,))), per_recording=())
     return model
 
 

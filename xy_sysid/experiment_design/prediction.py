@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,12 +24,14 @@ class Setting:
     """What an experiment is seen through.
 
     layout: windows and bands; encoder: m; epsilon: part of the motion to which laws are trusted; recorded: s of each recording at hand
+    response: (bands,) |G|^2 of the machine to a force, as recorded (``greybox.floor``); None where nothing is recorded yet
     """
 
     layout: Bands
     encoder: float
     epsilon: float
     recorded: tuple[float, ...] = ()
+    response: FloatArray | None = None
 
     @staticmethod
     def of(data: AxisData) -> Setting:
@@ -37,7 +39,9 @@ class Setting:
         recorded = tuple(size / data.sampling_rate for size in data.counts(early=False))
         longest = max(LOOKED, *recorded)
         layout = bands(data.sampling_rate, int(longest * data.sampling_rate / WINDOWS))
-        return Setting(layout, data.floor.encoder, data.floor.epsilon, recorded)
+        known, asked = (np.log(0.5 * (each.edges()[1:] + each.edges()[:-1])) for each in (data.layout, layout))
+        response = np.exp(np.interp(asked, known, np.log(np.maximum(data.floor.response, 1e-300))))
+        return Setting(layout, data.floor.encoder, data.floor.epsilon, recorded, np.asarray(response))
 
     def shortest(self) -> float:
         """s of an experiment that holds windows which judge it, when it is compared together with the recordings at hand.
@@ -83,6 +87,7 @@ def seen(setting: Setting, motion: Motion) -> Recorded:
     first = min(round(RAMP * rate), max(velocity.size - length, 0))
     windows = Windows(setting.layout, np.arange(first, max(velocity.size - length, first) + 1, max(length // 2, 1), dtype=np.int64))
     least = floor(windows, velocity, setting.encoder, setting.epsilon, motion.voltage[:-1])
+    least = least if setting.response is None else replace(least, response=setting.response)
     steady = (windows.end - first) / rate
     return Recorded(
         motion=motion,

@@ -107,7 +107,7 @@ class Pool:
         """A set with its fit, in the place of a worse one of the same set; a fit on all data gives way to another one only."""
         parameters, known = count(self.library, effects - self.kept), self.nodes.get(effects)
         leads = leads or (known is not None and known.leads)
-        node = Node(effects, parameters, brief, found, refused=self._refusal(effects, found), leads=leads, promised=promised)
+        node = Node(effects, parameters, brief, found, refused=self._refusal(effects, found), large=leads, leads=leads, promised=promised)
         lower = known is None or brief.excess < known.brief.excess - PRICE / self.scale
         if known is not None and not node.whole and not (lower and (not known.whole or self.finished(node).whole)):
             return known
@@ -313,7 +313,8 @@ class Pool:
                     break
             if simpler is None:
                 return
-            best.leads, simpler.leads = False, True
+            best.large = best.leads = False
+            simpler.large = simpler.leads = True
 
     def _simpler(self, best: Node) -> Iterator[tuple[frozenset[str], Callable[[], Sequence[AxisModel]]]]:
         """Sets without an effect, or with a simpler relative in its place, and where their fits begin."""
