@@ -41,7 +41,7 @@ class Setting:
         layout = bands(data.sampling_rate, int(longest * data.sampling_rate / WINDOWS))
         known, asked = (np.log(0.5 * (each.edges()[1:] + each.edges()[:-1])) for each in (data.layout, layout))
         response = np.exp(np.interp(asked, known, np.log(np.maximum(data.floor.response, 1e-300))))
-        return Setting(layout, data.floor.encoder, data.floor.epsilon, recorded, np.asarray(response))
+        return Setting(layout=layout, encoder=data.floor.encoder, epsilon=data.floor.epsilon, recorded=recorded, response=np.asarray(response))
 
     def shortest(self) -> float:
         """s of an experiment that holds windows which judge it, when it is compared together with the recordings at hand.
