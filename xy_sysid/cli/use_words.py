@@ -138,7 +138,7 @@ def _cost(item: Cost) -> str:
 
 
 def _compensation(item: Tracking) -> str:
-    """What is undone, and what is left, along a path."""
+    """The effects that are compensated along a path, and those that are not."""
     if item.undone == (SIMPLE,):
         why = item.left[0][1] if item.left else "there is nothing else to undo"
         return f"The compensation is kS, kV and kA alone: {why}."

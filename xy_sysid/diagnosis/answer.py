@@ -162,8 +162,8 @@ class Answer:
     best:     effects of the last rung, that which explains most first
     settled:  the last model where it was fitted once more: to the whole record, or with one law for several effects that were given
     candidates: single effects on the base, least error first; rivals: other sets, best first
-    sizes:    what each effect explains over what is left unexplained, as powers
-    helps:    part (0..1) of the base's error power beyond the noise that the best of all sets takes away, be it named or not
+    sizes:    of each effect: error power that it explains, divided by the power that remains
+    helps:    the largest part (0..1) of the base's error power beyond the noise that any set explains, named or not
     kept_out: the refused set that would leave least, if that is less than what the last rung leaves
     refused:  (effects, why they explain nothing); explained: part (0..1) of the base's error power beyond the noise that is gone
     noise, discrepancy: of the held-out error, m/s rms: what the encoder adds, and what no effect explains

@@ -92,7 +92,7 @@ def runner_up(found: Answer) -> str:
 
 
 def look_alikes(found: Answer, library: Library) -> tuple[LookAlike, ...]:
-    """What the first of the named effects can be taken for, and whether these data tell it apart."""
+    """Effects that can be mistaken for the first named effect, and whether these data distinguish them."""
     rungs, unit = {item.name: item.rung for item in found.candidates}, found.units.judged
     name = found.effect
     if name is None or name not in rungs:
@@ -149,7 +149,7 @@ def _left(data: AxisData, found: Answer) -> str:
 
 
 def _mostly(data: AxisData, fit: GreyboxFit) -> str:
-    """Where in frequency most of what is left lies."""
+    """The frequencies that hold most of the remaining error, in words."""
     power = data.layout.lines * _beyond_noise(data, fit)
     if not float(power.sum()) > 0.0:
         return ""

@@ -175,7 +175,7 @@ class Pool:
 
     @property
     def _likeliest(self) -> Node:
-        """The set with the least score of those that are worth their effects, be it by chance or not: with one more it may be sure."""
+        """The set with the lowest score of those whose gain is large enough, even if it may be chance. One more effect may make it sure."""
         return min((node for node in self.nodes.values() if node.large and node.whole and not node.refused), key=self.score)
 
     def _best_refused(self) -> Node | None:
