@@ -33,12 +33,18 @@ def test_kill_9_of_the_excitation_is_what_the_drive_makes_of_it(world: World, wa
     positions, statuses = world.blocks("position"), world.statuses()
     world.start(MACHINE, {"machine": "rigid.yaml", "realtime": True, "watchdog": watchdog})
     process = world.start(EXCITATION, PUSH)
-    activate(world)
+
+    def has_two_listeners() -> bool:
+        return any(value.key == "listeners" and value.value == "2" for status in statuses for value in status.values)
 
     def place() -> float:
         return float(positions[-1].values[-1, 0]) if positions else 0.0
 
+    assert world.transition("excitation", "configure") and world.until(has_two_listeners)
+    assert world.transition("excitation", "activate")
+
     assert world.until(lambda: place() > 0.005, 20.0)
+    assert place() < 0.1  # the travel limit has not braked yet, so what is held is the push
     process.send(signal.SIGKILL)
     heard, then = len(positions), world.node.get_clock().now().nanoseconds * 1e-9
     if watchdog > 0:
