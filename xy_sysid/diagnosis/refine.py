@@ -79,14 +79,14 @@ def _search(pool: Pool, trials: OneStepTrials | None, trying: Callable[[frozense
         before = pool.best
         for names in pool.search():
             trying(names)
-            if trials is not None and trials.due():
+            if trials is not None and trials.due(last=False):
                 for tried in trials.tried(last=False):
                     trying(tried)
                 if trials.found is not None:
                     return
         for names in chain(pool.suspected(), pool.simplified()):
             trying(names)
-    if trials is not None and pool.best.fit.excess >= AT_FLOOR:
+    if trials is not None and trials.due(last=True):
         for tried in trials.tried(last=True):
             trying(tried)
 

@@ -58,11 +58,11 @@ class OneStepTrials:
         one = len(self.pool.data.starts) == 1
         return tuple(effect.name for effect in self.pool.library.acting if effect.one_step is not None and one)
 
-    def due(self) -> bool:
-        """After the first simulations, once, where the best explains less than it leaves."""
+    def due(self, last: bool) -> bool:
+        """The best set leaves more than it explains: asked once after the first simulations, and when the search has ended (last)."""
         best = self.pool.best
         left = best.fit.excess >= AT_FLOOR and not self._explains(best)
-        return bool(self.names) and not self.asked and len(self.pool.nodes) > FEWEST and left
+        return bool(self.names) and left and (last or (not self.asked and len(self.pool.nodes) > FEWEST))
 
     def tried(self, last: bool) -> Iterator[frozenset[str]]:
         """Try each beside what a filter can have of the best set, and beside nothing; last: also with what it hides.
@@ -73,7 +73,7 @@ class OneStepTrials:
         self.asked.add(best.effects)
         for name in self.names:
             for node in self._begins(best):
-                for hidden in (False, True) if last and not self._explains(best) else (False,):
+                for hidden in (False, True) if last else (False,):
                     if self.found is not None or self.pool.late():
                         return
                     yield node.effects | {name}
