@@ -316,7 +316,7 @@ def run(case: Foreign) -> Judged:
     seconds = time.process_time() - begun
     named = judge.names(found)
     first = bool(named) and named[0] in case.there
-    every = all({name, *ALSO.get(name, ())} & set(named) for name in case.truth)
+    every = all({name, *ALSO.get(name, ())} & {*named, *judge.laws(named)} for name in case.truth)
     right = (first and every) if case.truth else found.verdict == "nothing_missing"
     phantoms = tuple(name for name in named if name not in case.there)
     return judge.outcome(case, found, seconds, right=right, first=first, stray=bool(named) and not first, phantoms=phantoms)

@@ -80,12 +80,12 @@ def run(case: Case, folder: Path | None = None) -> Judged:
     elif not case.truth:
         right = found.verdict == "nothing_missing" or (case.dirt > 0.0 and found.verdict == "not_in_library")
     elif one:
-        right = _laws(named) == _laws(case.truth)
+        right = laws(named) == laws(case.truth)
     else:
-        right = _laws(case.truth) <= _laws(named)
-    first = bool(named) and (named[0] in case.truth or (right and _laws(named[:1]) <= _laws(case.truth)))
-    phantoms = tuple(name for name in named if not _laws((name,)) <= _there(machine))
-    stray = bool(named) and not first and not (case.nuisance and _laws(named[:1]) <= _there(machine))
+        right = laws(case.truth) <= laws(named)
+    first = bool(named) and (named[0] in case.truth or (right and laws(named[:1]) <= laws(case.truth)))
+    phantoms = tuple(name for name in named if not laws((name,)) <= _there(machine))
+    stray = bool(named) and not first and not (case.nuisance and laws(named[:1]) <= _there(machine))
     ratio, errors, inside = _measured(case, machine, recording.rate, u, y, found) if right and one and case.known else (None, {}, {})
     made = outcome(case, found, seconds, right=right, first=first, stray=stray, phantoms=phantoms)
     return replace(made, ratio=ratio, errors=errors, inside=inside, change=seen.change, noise=seen.noise, dirt=seen.dirt, kinds=seen.kinds)
@@ -111,7 +111,7 @@ def outcome(case: Any, found: Answer, seconds: float, *, right: bool, first: boo
     )
 
 
-def _laws(names: tuple[str, ...]) -> set[str]:
+def laws(names: tuple[str, ...]) -> set[str]:
     """Names, with those that are the sum of others taken apart: no data can tell these from the others together."""
     sums = {name: whole.parts for name in names if name in STANDARD.effects and (whole := STANDARD[name].sum_of)}
     return {part for name in names for part in sums.get(name, (name,))}
@@ -120,7 +120,7 @@ def _laws(names: tuple[str, ...]) -> set[str]:
 def _there(machine: Machine) -> set[str]:
     """Laws of every part of the machine; whatever dry friction slides with its constant level."""
     parts = set(machine.spec.axes[0].parts)
-    return _laws(tuple(parts)) | parts | ({FRICTION[0]} if parts & set(FRICTION) else set())
+    return laws(tuple(parts)) | parts | ({FRICTION[0]} if parts & set(FRICTION) else set())
 
 
 def true_values(case: Case, machine: Machine) -> dict[str, float]:

@@ -17,7 +17,7 @@ from xy_sysid.diagnosis.answer import Answer
 from xy_sysid.diagnosis.rungs import answer_of_rungs, answer_of_search, rungs_of
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit, joined
-from xy_sysid.hypotheses.criteria import AT_FLOOR, MOST_EFFECTS, WORK, WORK_EACH, WORTH
+from xy_sysid.hypotheses.criteria import MOST_EFFECTS, WORK, WORK_EACH, WORTH
 from xy_sysid.hypotheses.one_step import OneStepTrials
 from xy_sysid.hypotheses.pool import Pool
 from xy_sysid.jit import spent_compiling
