@@ -20,7 +20,7 @@ from xy_sysid.greybox.axis_data import EPSILON, AxisData, loosened, prepare, pre
 from xy_sysid.greybox.forces import force_of, friction_of, pushing, rubbing
 from xy_sysid.greybox.least_squares import Scale, Schedule, Solution, Target, solve
 from xy_sysid.greybox.objective import Objective
-from xy_sysid.greybox.parameters import Estimate, Problem, estimates, model_of, problem
+from xy_sysid.greybox.parameters import Estimate, FitProblem, estimates, model_of, problem
 from xy_sysid.greybox.score_test import Screen, Trace, bounded, screen
 from xy_sysid.greybox.start_inverse import CUTOFFS, inverse_starts, rigid_starts
 from xy_sysid.greybox.start_rigid import base_start
@@ -315,7 +315,7 @@ def joined(data: AxisData, found: GreyboxFit, late: Callable[[], bool] = in_time
     return one if float(np.sum(one.scores)) < float(np.sum(found.scores)) + 1.0 else found
 
 
-def sub_steps(data: AxisData, task: Problem, finest: float) -> float:
+def sub_steps(data: AxisData, task: FitProblem, finest: float) -> float:
     """Hz: the longest sub-steps, a sample or halves of it, with which a model moves as with half as long.
 
     As it does: but for a tenth of what it leaves or nobody can tell, by amplitude in the mean over the excited bands.

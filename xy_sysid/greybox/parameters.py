@@ -41,7 +41,7 @@ def parameter_table(parameters: tuple[Estimate, ...]) -> Table:
 
 
 @dataclass(frozen=True, slots=True)
-class Problem:
+class FitProblem:
     """What is fitted, to the first stage or to the whole.
 
     early: to the first stage; at: sub-steps, Hz -> simulation of a row of parameters; row: the model's; scale: how each may move
@@ -54,7 +54,7 @@ class Problem:
     scale: Scale
 
 
-def problem(data: AxisData, model: AxisModel, early: bool) -> Problem:
+def problem(data: AxisData, model: AxisModel, early: bool) -> FitProblem:
     """The model as a problem for a solver."""
     names, own = [name for name, _ in model.effects], _own(model)
     items = [item for name in names for item in model.library[name].on(data.similar)]
@@ -93,7 +93,7 @@ def problem(data: AxisData, model: AxisModel, early: bool) -> Problem:
         np.array([False, False, True, *(item.positive for item in items), *np.zeros(free.size, dtype=np.bool_)]),
         np.array([abs(model.gain) or 1.0, 20.0 / data.sampling_rate, 1.0, *unit, *unit_later]),
     )
-    return Problem(early, at, np.concatenate((first, later.ravel())), scale)
+    return FitProblem(early, at, np.concatenate((first, later.ravel())), scale)
 
 
 def model_of(data: AxisData, start: AxisModel, values: FloatArray) -> AxisModel:

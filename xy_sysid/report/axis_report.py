@@ -105,7 +105,8 @@ def axis_report(recording: Recording, axis: str, wanted: Wanted, tell: Tell = la
         except BadInput as refusal:
             problem = str(refusal)
         studied, verdicts = fits.result()
-    return AxisReport(studied, verdicts, story, float("nan") if story is None else _speed(recording, axis), problem, note)
+    speed = float("nan") if story is None else _speed(recording, axis)
+    return AxisReport(study=studied, verdicts=verdicts, story=story, speed=speed, problem=problem, note=note)
 
 
 def _studied(recording: Recording, axis: str, settings: IdentifierSettings, period: int | None) -> tuple[AxisStudy, Validation | None]:
