@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,7 @@ from xy_sim.machine import Machine
 from xy_sysid.axis.model import STANDARD, AxisModel, Library, simulate
 from xy_sysid.effects import EFFECTS, Effect
 from xy_sysid.effects._contract import Beside, Limits
-from xy_sysid.effects.backlash import contact
+from xy_sysid.effects.backlash import contact, starts
 from xy_sysid.effects.backlash.filter_source import NAMES
 from xy_sysid.effects.backlash.innovations import Innovations, View
 from xy_sysid.errors import BadInput
@@ -86,6 +86,18 @@ def test_a_contact_that_is_stiff_and_damped_does_not_run_away_in_coarse_steps() 
     inner = fit.start((base.model.gain, base.model.delay, base.model.pole), (20e-6, 0.75, 3900.0, 1.0, 100.0, 0.4, 0.0, 0.0), (0.1,))
     coarse, fine = (fit.size(inner, View(8000, cuts=cuts)) for cuts in (3, 24))
     assert coarse == pytest.approx(fine, rel=0.02)
+
+
+def test_starts_that_are_tried_on_all_cores_find_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Bit for bit, and with as many runs, as one after the other; an amplifier's dead zone is taken out for each by numbers of its own."""
+    data, base = machine("backlash=20e-6", "dead_zone=0.05")
+    found = []
+    for cores in (1, 3):
+        monkeypatch.setattr(starts, "cores", partial(int, cores))
+        found.append(followed(data, base, GAP, [("dead_zone", (0.05,))])[1])
+    one, three = found
+    assert (one.base, one.values, one.beside, one.runs) == (three.base, three.values, three.beside, three.runs)
+    np.testing.assert_array_equal(one.innovation, three.innovation)
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ import pytest
 from xy_sysid.axis.model import FINE, AxisModel, simulate
 from xy_sysid.greybox.axis_data import AxisData, prepare
 from xy_sysid.greybox.free_run import sub_steps
+from xy_sysid.greybox.parameters import problem
 from xy_sysid.samples.block import FloatArray
 
 RATE = 500.0
@@ -24,12 +25,17 @@ def driven(noise: float, model: AxisModel = RUBBED) -> AxisData:
     return prepare(RATE, u, x + noise * rng.standard_normal(u.size))
 
 
+def steps(data: AxisData, model: AxisModel, early: bool, finest: float) -> float:
+    """Hz."""
+    return sub_steps(data, problem(data, model, early), finest)
+
+
 def test_a_law_that_bends_takes_short_steps_where_it_is_all_that_moves_the_axis() -> None:
-    assert sub_steps(driven(1e-9), RUBBED, True, FINE) > RATE
+    assert steps(driven(1e-9), RUBBED, True, FINE) > RATE
 
 
 def test_a_noisy_reading_takes_longer_ones() -> None:
-    rates = [sub_steps(driven(noise), RUBBED, True, FINE) for noise in (1e-9, 1e-6, 1e-4)]
+    rates = [steps(driven(noise), RUBBED, True, FINE) for noise in (1e-9, 1e-6, 1e-4)]
     assert rates == sorted(rates, reverse=True)
     assert rates[-1] == RATE
 
@@ -37,17 +43,17 @@ def test_a_noisy_reading_takes_longer_ones() -> None:
 @pytest.mark.parametrize("early", [True, False])
 def test_a_model_that_leaves_much_takes_one_step_a_sample(early: bool) -> None:
     """Its law is wrong by more than steps of a sample could make it."""
-    assert sub_steps(driven(1e-9), AxisModel(0.05, 1.3e-3, 30.0).with_effect("stribeck_friction", (0.3, 0.2, 5e-3)), early, FINE) == RATE
+    assert steps(driven(1e-9), AxisModel(0.05, 1.3e-3, 30.0).with_effect("stribeck_friction", (0.3, 0.2, 5e-3)), early, FINE) == RATE
 
 
 def test_friction_whose_stops_are_found_exactly_takes_one_step_a_sample() -> None:
     model = AxisModel(0.1, 1.3e-3, 30.0).with_effect("coulomb_friction", (0.3,))
-    assert sub_steps(driven(1e-9, model), model, True, FINE) == RATE
+    assert steps(driven(1e-9, model), model, True, FINE) == RATE
 
 
 def test_steps_are_never_shorter_than_what_is_asked_for() -> None:
-    assert sub_steps(driven(1e-9), RUBBED, True, 800.0) == 800.0
-    assert sub_steps(driven(1e-9), RUBBED, True, 200.0) == 200.0
+    assert steps(driven(1e-9), RUBBED, True, 800.0) == 800.0
+    assert steps(driven(1e-9), RUBBED, True, 200.0) == 200.0
 
 
 def test_a_model_that_runs_away_ends_the_question_without_a_warning() -> None:
@@ -56,5 +62,5 @@ def test_a_model_that_runs_away_ends_the_question_without_a_warning() -> None:
     data = driven(1e-9)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert sub_steps(data, away, True, FINE) == RATE
+        assert steps(data, away, True, FINE) == RATE
     assert np.max(np.abs(simulate(away, RATE, data.voltage, data.position))) > 1e160  # the square of it is no number

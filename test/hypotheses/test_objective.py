@@ -108,10 +108,11 @@ def test_a_fit_never_ends_worse_than_it_starts(data: AxisData, effects: tuple[tu
     """By the objective, from right and from wrong starts."""
     for gain, pole in ((0.1, 250.0), (0.02, 20.0)):
         model = AxisModel(gain, 1e-3, pole, effects)
-        run, values, scale = problem(data, model, True, 2000.0)
+        task = problem(data, model, True)
+        run = task.at(2000.0)
         target = Target(data.begun(data.velocity), data.brief, data.floor)
-        _, before = target.spectrum(target.measured - target.windows.spectrum(run(values)))
-        assert solve(run, target, scale, values, schedule).score <= before
+        _, before = target.spectrum(target.measured - target.windows.spectrum(run(task.row)))
+        assert solve(run, target, task.scale, task.row, schedule).score <= before
 
 
 def test_a_fit_stays_at_the_answer(data: AxisData) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import pickle
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,8 +14,11 @@ from helpers.stories import RATE, data, told, with_effects
 
 from xy_sysid.axis.linear_part import linear_part, nonlinear
 from xy_sysid.axis.model import STANDARD, AxisModel
+from xy_sysid.diagnosis import rungs
 from xy_sysid.errors import BadInput
+from xy_sysid.greybox.free_run import GreyboxFit, fit_base
 from xy_sysid.samples.recording import Run
+from xy_sysid.story import story as story_of_axis
 from xy_sysid.story.document import document
 from xy_sysid.story.story import HELPS_NO_MORE, added, auto, begin, diagnosed, next_best, removed, tell
 
@@ -27,6 +31,22 @@ def test_the_error_falls_from_the_base_to_the_floor() -> None:
     assert last.held_out_error < 1.05 * last.noise_floor < 0.2 * first.held_out_error
     assert last.explained and not first.explained
     assert story.diagnosis is not None and story.diagnosis.effect == "coulomb_friction"
+
+
+def test_a_whole_story_fits_its_base_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The rigid model from which the diagnosis begins is the one that the story shows."""
+    fitted: list[GreyboxFit] = []
+
+    def counted(*given: Any) -> GreyboxFit:
+        fitted.append(fit_base(*given))
+        return fitted[-1]
+
+    for place in (rungs, story_of_axis):
+        monkeypatch.setattr(place, "fit_base", counted)
+    told = tell(Run("x", RATE, *recorded("", seconds=6.0).axis("x")))
+    assert told.rungs and len(fitted) == 1
+    assert told.diagnosis is not None and told.diagnosis.rungs[0].values == told.rungs[0].values
+    assert told.diagnosis.rungs[0].gain == told.rungs[0].gain
 
 
 def test_a_story_can_be_sent_to_another_process() -> None:

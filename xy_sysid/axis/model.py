@@ -217,7 +217,7 @@ def simulator(
 def undoer(
     library: Library, active: Iterable[str], sampling_rate: float, voltage: FloatArray, position: FloatArray
 ) -> Callable[[FloatArray, int], tuple[FloatArray, FloatArray, FloatArray, float]]:
-    """A function that takes effects (of ``undoable``) out of the first samples of a recording.
+    """A function that takes effects (of ``undoable``) out of the first samples of a recording, for several threads at once.
 
     Its arguments are a row as of ``simulator``, and n; it returns the voltage behind the amplifier (n,), V, the position before
     resonances and the scale's errors (n + 1,), m, the forces against the drive (2, n), at the motor and on the table, V, and how
@@ -227,13 +227,14 @@ def undoer(
     library = library.looped(chosen)
     members = [effect for effect in library.acting if undoable(effect)]
     places, names = slots(members), [effect.name for effect in members]
-    row, on = np.ones(len(places)), np.zeros(len(names), dtype=np.uint8)
+    ones, on = np.ones(len(places)), np.zeros(len(names), dtype=np.uint8)
     on[[names.index(effect.name) for effect in chosen]] = 1
     where = np.array([places[name] for name in (*BASE, *(f"{effect.name}.{key}" for effect in chosen for key in effect.names))])
     u, x = np.ascontiguousarray(voltage, dtype=np.float64), np.ascontiguousarray(position, dtype=np.float64)
     kernel = library.undoing
 
     def undo(parameters: FloatArray, samples: int) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+        row = ones.copy()
         row[where] = parameters
         held, place, against = np.empty(samples), np.empty(samples + 1), np.empty((2, samples))
         through = kernel(u[:samples], x[: samples + 1], row, on, float(sampling_rate), held, place, against)

@@ -63,7 +63,8 @@ def compare(
     if before is not None:
         pairs, refused = each(names, lambda name: better(recording.run(name), models[0][name], models[1][name]))
         if json:
-            emit({"before": str(before), "after": str(after), "axes": {name: _paired(item) for name, item in pairs.items()}, "refused": refused})
+            answers = {name: _paired(item) for name, item in pairs.items()}
+            emit({"before": str(before), "after": str(after), "axes": answers, "refused": refused, "notes": recording.notes})
             return
         for name, pair in pairs.items():
             for held in models:

@@ -12,7 +12,7 @@ import typer
 from xy_sysid.cli import options as o
 from xy_sysid.cli.mechanics import Gear, Kt, mechanics_document, mechanics_table
 from xy_sysid.cli.output import emit, estimate, say, say_refused, table
-from xy_sysid.cli.reading import chosen, each, read_each, reads, runs_of
+from xy_sysid.cli.reading import chosen, each, notes_of, read_each, reads, runs_of
 from xy_sysid.units import motion
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def diagnose(
     if json:
         answers: dict[str, Any] = {name: answer_document(item) | _mechanics(item, drive) for name, item in found.items()}
         answers |= {name: {"verdict": "not_enough_data", "effect": None, "confidence": 1.0, "sentence": text} for name, text in refused.items()}
-        emit({"axes": answers, "seconds": seconds, "notes": [note for one in recordings for note in one.notes]})
+        emit({"axes": answers, "seconds": seconds, "notes": notes_of(recordings)})
         return
     for name, item in found.items():
         _show(name, item, drive)

@@ -63,7 +63,7 @@ def figures(
         found, refused = each(names, work)
         written = {name: _write(out, name, drawers.drawn(name)) for name in found}
     if json:
-        emit({"folder": str(out), "files": written, "refused": refused})
+        emit({"folder": str(out), "files": written, "refused": refused, "notes": recording.notes})
         return
     for name, story in found.items():
         say(f"axis {name}: {headline(story)}. {len(written[name])} files.")

@@ -14,7 +14,7 @@ import typer
 from xy_sysid.cli import options as o
 from xy_sysid.cli.diagnose import Own
 from xy_sysid.cli.output import emit, progress, say
-from xy_sysid.cli.reading import chosen, read_each, reads, runs_of
+from xy_sysid.cli.reading import chosen, notes_of, read_each, reads, runs_of
 from xy_sysid.errors import BadInput
 from xy_sysid.units import Units, readable
 
@@ -93,7 +93,7 @@ def next_(
     asked = partial(_asked, voltage=voltage, travel=travel, speed=speed, acceleration=acceleration)
     if precision == NOTHING:
         unknown = _first(reading, run_file, asked, rms, seconds)
-        _answered(unknown, output, json)
+        _answered(unknown, output, json, [])
         return
     if not recs:
         raise BadInput("REC", "missing", "recordings, or --for nothing", "Give a recording of the axis.")
@@ -120,7 +120,7 @@ def next_(
         say(f"axis {names[0]}: {found.sentence.rstrip()}")
     if trajectory is not None:
         _write_trajectory(answer, runs, known, trajectory)
-    _answered(answer, output, json)
+    _answered(answer, output, json, notes_of(recordings))
 
 
 def _write_trajectory(answer: NextExperiment, runs: tuple[Run, ...], known: Library, to: Path) -> None:
@@ -150,14 +150,15 @@ def _replayed(folder: Path, effect_file: list[Path] | None, json: bool) -> int:
     return 0 if all(same) else 1
 
 
-def _answered(answer: NextExperiment, output: Path | None, json: bool) -> None:
-    """Write the file, and say what was found."""
+def _answered(answer: NextExperiment, output: Path | None, json: bool, notes: list[str]) -> None:
+    """Write the file, and say what was found. notes: of the recordings."""
     from xy_sysid.files.experiment import document, write_experiment
 
     if output is not None and answer.experiment is not None:
         write_experiment(output, answer)
     if json:
-        emit({"axis": answer.axis, "sentence": answer.sentence, **_plain(answer), "file": document(answer) if answer.experiment else None})
+        file = document(answer) if answer.experiment else None
+        emit({"axis": answer.axis, "sentence": answer.sentence, **_plain(answer), "file": file, "notes": notes})
         return
     _show(answer, output)
 

@@ -91,7 +91,7 @@ def reads(command: Command) -> Command:
 
 
 def read_each(paths: Sequence[Path], reading: Reading, quiet: bool) -> tuple[Recording, ...]:
-    """The recordings; their notes go to stderr unless ``quiet``."""
+    """The recordings; their notes go to stderr unless ``quiet``: then the document has them."""
     from xy_sysid.imports.several import read_all
     from xy_sysid.jit import tell_compiling
 
@@ -101,9 +101,8 @@ def read_each(paths: Sequence[Path], reading: Reading, quiet: bool) -> tuple[Rec
         task = bar.add_task(f"reading {', '.join(path.name for path in paths)}", total=1.0)
         found = read_all(paths, reading, lambda part: bar.update(task, completed=part))
     if not quiet:
-        for recording in found:
-            for note in recording.notes:
-                aside.print(f"note: {note}")
+        for note in notes_of(found):
+            aside.print(f"note: {note}")
     return found
 
 
@@ -112,6 +111,11 @@ def read(paths: Sequence[Path], reading: Reading, quiet: bool) -> Recording:
     from xy_sysid.imports.several import joined
 
     return joined(read_each(paths, reading, quiet))
+
+
+def notes_of(recordings: Sequence[Recording]) -> list[str]:
+    """What was noted as they were read."""
+    return [note for recording in recordings for note in recording.notes]
 
 
 def measured_responses(paths: Sequence[Path], reading: Reading) -> dict[str, FrequencyResponse] | None:

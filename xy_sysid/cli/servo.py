@@ -8,7 +8,7 @@ import typer
 
 from xy_sysid.cli import options as o
 from xy_sysid.cli.output import emit, estimate, say, say_refused, table
-from xy_sysid.cli.reading import chosen, each, read_each, reads, stretches_of
+from xy_sysid.cli.reading import chosen, each, notes_of, read_each, reads, stretches_of
 
 if TYPE_CHECKING:
     from xy_sysid.imports.reading import Reading
@@ -40,7 +40,7 @@ def servo(recs: o.Recs, reading: Reading, inertia: Inertia = None, json: o.Json 
                 "recordings": item.recordings,
                 "sentences": servo_words(item, inertia),
             }
-        emit({"axes": answers | {name: {"problem": text} for name, text in refused.items()}})
+        emit({"axes": answers | {name: {"problem": text} for name, text in refused.items()}, "notes": notes_of(recordings)})
         return
     for name, item in found.items():
         first, *rest = servo_words(item, inertia)

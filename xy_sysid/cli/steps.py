@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from xy_sysid.cli import options as o
 from xy_sysid.cli.mechanics import Gear, Kt, mechanics_document, mechanics_table
 from xy_sysid.cli.output import emit, estimate, say, say_refused, table
-from xy_sysid.cli.reading import chosen, each, read_each, reads, stretches_of
+from xy_sysid.cli.reading import chosen, each, notes_of, read_each, reads, stretches_of
 
 if TYPE_CHECKING:
     from xy_sysid.imports.reading import Reading
@@ -35,7 +35,7 @@ def steps(recs: o.Recs, reading: Reading, kt: Kt = None, gear: Gear = "", json: 
             }
             for name, item in found.items()
         }
-        emit({"axes": answers | {name: {"problem": text} for name, text in refused.items()}})
+        emit({"axes": answers | {name: {"problem": text} for name, text in refused.items()}, "notes": notes_of(recordings)})
         return
     for name, item in found.items():
         first, *rest = first_order_words(item)

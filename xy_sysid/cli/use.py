@@ -91,7 +91,8 @@ def use(
         raise BadInput("--to", f"{', '.join(binary)} without a folder", "--out DIR", "These files are no text.")
     written = _write(out, files, force) if out is not None and asked else []
     if json:
-        emit({"axes": {name: plain(answer(used)) for name, used in done.items()}, "files": written, "refused": refused})
+        answers = {name: plain(answer(used)) for name, used in done.items()}
+        emit({"axes": answers, "files": written, "refused": refused, "notes": () if recording is None else recording.notes})
         return
     for name, used in done.items():
         show(name, used)

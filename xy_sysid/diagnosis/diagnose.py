@@ -15,10 +15,10 @@ from xy_sysid.diagnosis.first_set import settled
 from xy_sysid.diagnosis.refine import Effort, never, refine
 from xy_sysid.diagnosis.sets import contains, part_explained
 from xy_sysid.errors import BadInput
-from xy_sysid.greybox.axis_data import AxisData, prepare
+from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.hypotheses.criteria import AT_FLOOR, SIZE
-from xy_sysid.hypotheses.enough_data import lacking
+from xy_sysid.hypotheses.enough_data import prepared
 from xy_sysid.hypotheses.input_noise import input_noise
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import USUAL, Units
@@ -35,8 +35,8 @@ def diagnose(
     clock: Callable[[], float] = never,
 ) -> Answer:
     """Diagnose one axis from gap-free samples (n,), V and m. budget: see ``refine``."""
-    missing = lacking(sampling_rate, [(voltage, position)])
-    return not_enough(missing) if missing else diagnose_prepared(prepare(sampling_rate, voltage, position), library, budget, clock)
+    data = prepared(sampling_rate, [(voltage, position)])
+    return not_enough(data) if isinstance(data, str) else diagnose_prepared(data, library, budget, clock)
 
 
 def diagnose_prepared(

@@ -14,10 +14,9 @@ from xy_sysid.diagnosis.answer import Answer
 from xy_sysid.diagnosis.refine import Effort, never
 from xy_sysid.diagnosis.refine import refine as search
 from xy_sysid.errors import BadInput
-from xy_sysid.greybox.axis_data import prepare_all
 from xy_sysid.greybox.free_run import EPSILON
 from xy_sysid.hypotheses.criteria import MOST_EFFECTS
-from xy_sysid.hypotheses.enough_data import lacking
+from xy_sysid.hypotheses.enough_data import prepared
 from xy_sysid.samples.recording import Recording, Run, one_run
 from xy_sysid.units import over
 
@@ -45,12 +44,9 @@ def diagnose(
     """
     runs = runs_together(data)
     rate, signals, units = runs[0].sampling_rate, [(run.voltage, run.position) for run in runs], runs[0].units
-    missing = lacking(rate, signals, units)
     with threadpool_limits(1, "blas"):  # as in commands and nodes
-        if missing:
-            found = one.not_enough(missing, units)
-        else:
-            found = one.diagnose_prepared(prepare_all(rate, signals, tolerance, units), library, budget, clock, first)
+        ready = prepared(rate, signals, tolerance, units)
+        found = one.not_enough(ready, units) if isinstance(ready, str) else one.diagnose_prepared(ready, library, budget, clock, first)
     return _about(runs, found)
 
 
@@ -78,11 +74,10 @@ def refined(data: Data, names: tuple[str, ...], library: Library, effort: Effort
             raise BadInput("add", name, "an effect that is not in every model already", "Leave it out.")
     rate, signals, units = runs[0].sampling_rate, [(run.voltage, run.position) for run in runs], runs[0].units
     with threadpool_limits(1, "blas"):
-        prepared = prepare_all(rate, signals, tolerance, units)
-        missing = lacking(rate, signals, units)
-        if missing:
-            raise BadInput(f"data of axis {runs[0].axis}", "not enough", "what a model can be fitted to and judged by", missing)
-        return _about(runs, search(prepared, library, names, effort))
+        ready = prepared(rate, signals, tolerance, units)
+        if isinstance(ready, str):
+            raise BadInput(f"data of axis {runs[0].axis}", "not enough", "what a model can be fitted to and judged by", ready)
+        return _about(runs, search(ready, library, names, effort))
 
 
 def _about(runs: tuple[Run, ...], found: Answer) -> Answer:

@@ -82,8 +82,8 @@ class Evidence:
 
     def error(self, model: AxisModel) -> NDArray[np.complex128]:
         """(windows, lines) of a model."""
-        run, values, _ = problem(self.data, model, False, MIDDLING)
-        return np.asarray(self.measured - self.windows.spectrum(run(values)))
+        task = problem(self.data, model, False)
+        return np.asarray(self.measured - self.windows.spectrum(task.at(MIDDLING)(task.row)))
 
     def nats(self, model: AxisModel, error: NDArray[np.complex128] | None = None) -> float:
         """Above an error that is the floor alone; infinite for a model that runs away."""
@@ -236,9 +236,9 @@ def _settled(evidence: Evidence, model: AxisModel, fixed: set[str]) -> AxisModel
 
 
 def _scale(data: AxisData, model: AxisModel) -> Scale:
-    _, values, scale = problem(data, model, False, MIDDLING)
-    size = model.row.size
-    return Scale(scale.low[:size], scale.high[:size], scale.positive[:size], scale.unit[:size]) if values.size > size else scale
+    task = problem(data, model, False)
+    scale, size = task.scale, model.row.size
+    return Scale(scale.low[:size], scale.high[:size], scale.positive[:size], scale.unit[:size]) if task.row.size > size else scale
 
 
 def _root(precision: FloatArray) -> FloatArray:

@@ -20,7 +20,7 @@ from xy_sysid.greybox.axis_data import EPSILON, AxisData, loosened, prepare, pre
 from xy_sysid.greybox.forces import force_of, friction_of, pushing, rubbing
 from xy_sysid.greybox.least_squares import Scale, Schedule, Solution, Target, solve
 from xy_sysid.greybox.objective import Objective
-from xy_sysid.greybox.parameters import Estimate, estimates, model_of, problem
+from xy_sysid.greybox.parameters import Estimate, FitProblem, estimates, model_of, problem
 from xy_sysid.greybox.score_test import Screen, Trace, bounded, screen
 from xy_sysid.greybox.start_inverse import CUTOFFS, inverse_starts, rigid_starts
 from xy_sysid.greybox.start_rigid import base_start
@@ -229,7 +229,8 @@ def best_start(data: AxisData, candidates: list[AxisModel]) -> AxisModel:
 
 def first_excess(data: AxisData, model: AxisModel) -> float:
     """Score over the first stage's data, without a fit."""
-    run, values, _ = problem(data, model, True, COARSE)
+    task = problem(data, model, True)
+    run, values = task.at(COARSE), task.row
     power = data.layout.power(data.brief.spectrum(data.begun(data.velocity) - run(values)))
     power = np.where(np.isfinite(power), power, np.inf)
     return Objective.of(data.floor).of_power(power)
@@ -244,7 +245,8 @@ def screened(data: AxisData, fitted: GreyboxFit, effects: Iterable[Effect], scen
     """The score test of effects on what a fit leaves, alone and together; scene: of the first stage's data (None), or of all."""
     scene = scene or scene_of(data, fitted)
     early = scene.velocity.size == data.first
-    run, values, scale = problem(data, fitted.model, early, COARSE)
+    task = problem(data, fitted.model, early)
+    run, values, scale = task.at(COARSE), task.row, task.scale
     inner = scale.inner(values)
     here, nuisance = run(values), []
     for k in range(values.size):
@@ -279,15 +281,16 @@ def _scene(data: AxisData, model: AxisModel, error: FloatArray, part: Callable[[
 
 def fit(data: AxisData, start: AxisModel, brief: bool = False, hopeless: float = np.inf, late: Callable[[], bool] = in_time) -> GreyboxFit:
     """All parameters of a model, from where it is; brief, hopeless: see ``fit_with``; late: then the best so far is taken."""
-    rate = sub_steps(data, start, True, COARSE)
-    run, values, scale = problem(data, start, True, rate)
+    task = problem(data, start, True)
+    rate = sub_steps(data, task, COARSE)
+    run, scale = task.at(rate), task.scale
     target = Target(data.begun(data.velocity), data.brief, data.floor)
-    found = solve(run, target, scale, values, replace(FIRST_LOOK, late=late))
+    found = solve(run, target, scale, task.row, replace(FIRST_LOOK, late=late))
     if not (late() or (brief and found.score > hopeless)):
         nearer = solve(run, target, scale, found.values, replace(NEARER, late=late), found)
-        finer = sub_steps(data, model_of(data, start, nearer.values), True, MIDDLING)
+        finer = sub_steps(data, problem(data, model_of(data, start, nearer.values), True), MIDDLING)
         if finer != rate:
-            run, _, _ = problem(data, start, True, finer)
+            run = task.at(finer)
         more = solve(run, target, scale, nearer.values, replace(FINER, late=late), nearer)
         found = replace(more, runs=found.runs + nearer.runs + more.runs)
     if not brief:
@@ -297,10 +300,10 @@ def fit(data: AxisData, start: AxisModel, brief: bool = False, hopeless: float =
 
 def finish(data: AxisData, start: AxisModel, runs: int = 0, late: Callable[[], bool] = in_time) -> GreyboxFit:
     """The second stage alone, on all windows that are not held out, from a model that is nearly there."""
-    run, values, scale = problem(data, start, False, sub_steps(data, start, False, FINE))
-    target = Target(data.velocity, data.fitted, data.floor)
-    found = solve(run, target, scale, values, replace(LONG, late=late))
-    return _result(data, start, scale, replace(found, runs=runs + found.runs))
+    task = problem(data, start, False)
+    run = task.at(sub_steps(data, task, FINE))
+    found = solve(run, Target(data.velocity, data.fitted, data.floor), task.scale, task.row, replace(LONG, late=late))
+    return _result(data, start, task.scale, replace(found, runs=runs + found.runs))
 
 
 def joined(data: AxisData, found: GreyboxFit, late: Callable[[], bool] = in_time) -> GreyboxFit:
@@ -312,21 +315,22 @@ def joined(data: AxisData, found: GreyboxFit, late: Callable[[], bool] = in_time
     return one if float(np.sum(one.scores)) < float(np.sum(found.scores)) + 1.0 else found
 
 
-def sub_steps(data: AxisData, model: AxisModel, early: bool, finest: float) -> float:
+def sub_steps(data: AxisData, task: FitProblem, finest: float) -> float:
     """Hz: the longest sub-steps, a sample or halves of it, with which a model moves as with half as long.
 
     As it does: but for a tenth of what it leaves or nobody can tell, by amplitude in the mean over the excited bands.
     """
-    windows, measured = (data.brief, data.begun(data.velocity)) if early else (data.fitted, data.velocity)
+    rate = min(data.sampling_rate, finest)
+    if rate == finest:
+        return rate
+    windows, measured = (data.brief, data.begun(data.velocity)) if task.early else (data.fitted, data.velocity)
 
     def moved(rate: float) -> FloatArray:
-        run, values, _ = problem(data, model, early, rate)
-        return run(values)
+        return task.at(rate)(task.row)
 
     def power(signal: FloatArray) -> FloatArray:
         return data.layout.power(windows.spectrum(signal))[data.floor.excited]
 
-    rate = min(data.sampling_rate, finest)
     now, least = moved(rate), data.floor.power[data.floor.excited]
     while rate < finest:
         finer = min(2.0 * rate, finest)
@@ -341,8 +345,8 @@ def sub_steps(data: AxisData, model: AxisModel, early: bool, finest: float) -> f
 
 def _result(data: AxisData, start: AxisModel, scale: Scale, found: Solution, brief: bool = False) -> GreyboxFit:
     model = model_of(data, start, found.values)
-    run, values, _ = problem(data, model, brief, MIDDLING if brief else FINE)
-    simulated = run(values)
+    task = problem(data, model, brief)
+    simulated = task.at(MIDDLING if brief else FINE)(task.row)
     error = (data.begun(data.velocity) if brief else data.velocity) - simulated
     fitted, judging = (data.brief, data.first_windows()) if brief else (data.fitted, data.held)
     held = data.layout.powers(judging.spectrum(error))

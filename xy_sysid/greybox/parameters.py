@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
-from xy_sysid.axis.model import FINE, AxisModel, simulator, start_of
+from xy_sysid.axis.model import AxisModel, simulator, start_of
 from xy_sysid.effects import Parameter
 from xy_sysid.greybox.axis_data import AxisData
-from xy_sysid.greybox.least_squares import Scale, Solution
+from xy_sysid.greybox.least_squares import Predictor, Scale, Solution
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.tables import Table
 
@@ -39,36 +40,52 @@ def parameter_table(parameters: tuple[Estimate, ...]) -> Table:
     return Table(("parameter", "value", "from", "to", "unit"), tuple((item.name, item.value, item.low, item.high, item.unit) for item in parameters))
 
 
-def problem(data: AxisData, model: AxisModel, early: bool, fine: float = FINE) -> tuple[Callable[[FloatArray], FloatArray], FloatArray, Scale]:
-    """Simulation of the first stage or of the whole in sub-steps of ``fine`` Hz, the model's parameters as a row, and how each may move.
+@dataclass(frozen=True, slots=True)
+class FitProblem:
+    """What is fitted, to the first stage or to the whole.
 
+    early: to the first stage; at: sub-steps, Hz -> simulation of a row of parameters; row: the model's; scale: how each may move
     The row is as of ``simulator`` for the first recording; behind it is what those after it differ by in what each has for itself.
     """
+
+    early: bool
+    at: Callable[[float], Predictor]
+    row: FloatArray
+    scale: Scale
+
+
+def problem(data: AxisData, model: AxisModel, early: bool) -> FitProblem:
+    """The model as a problem for a solver."""
     names, own = [name for name, _ in model.effects], _own(model)
-    runs = []
     items = [item for name in names for item in model.library[name].on(data.similar)]
     places = np.array(own, dtype=np.int64)
     known = all(len(values) == len(data.runs) for _, values in model.per_recording)  # else it comes from other recordings
     models = [model.in_recording(k) if known else model for k in range(len(data.runs))]
     each = np.array([one.row for one in models])
-    starts: list[float] = []
-    for one, run, count in zip(models, data.runs, data.counts(early), strict=True):
-        u, y = (signal[run.start : run.start + count + 1] for signal in (data.voltage, data.position))
-        starts.append(start_of(one, data.sampling_rate, u, y, BEGINS))
-        runs.append(simulator(model.library, names, data.sampling_rate, u, y, fine))
+    spans = [slice(run.start, run.start + count + 1) for run, count in zip(data.runs, data.counts(early), strict=True)]
+    signals = [(data.voltage[span], data.position[span]) for span in spans]
     first, later = each[0], each[1:, places] - each[0, places]
-    cost = sum(data.counts(early)) * (max(fine / data.sampling_rate, 1.0) if names else 1.0)
     size = first.size
 
-    def simulated(values: FloatArray) -> FloatArray:
-        rows = np.repeat(values[None, :size], len(runs), axis=0)
-        rows[1:, places] += values[size:].reshape(later.shape)
-        data.work.add(cost)
-        parts = [one(row, speed) for one, row, speed in zip(runs, rows, starts, strict=True)]
-        return parts[0] if len(parts) == 1 else np.concatenate(parts)
+    @cache
+    def starts() -> list[float]:
+        return [start_of(one, data.sampling_rate, *its, BEGINS) for one, its in zip(models, signals, strict=True)]
+
+    def at(fine: float) -> Predictor:
+        runs = [simulator(model.library, names, data.sampling_rate, *its, fine) for its in signals]
+        speeds, cost = starts(), sum(data.counts(early)) * (max(fine / data.sampling_rate, 1.0) if names else 1.0)
+
+        def simulated(values: FloatArray) -> FloatArray:
+            rows = np.repeat(values[None, :size], len(runs), axis=0)
+            rows[1:, places] += values[size:].reshape(later.shape)
+            data.work.add(cost)
+            parts = [one(row, speed) for one, row, speed in zip(runs, rows, speeds, strict=True)]
+            return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+        return simulated
 
     unit = [max(unit_of(item), abs(value)) for item, value in zip(items, first[3:].tolist(), strict=True)]
-    unit_later = np.tile([unit[place - 3] for place in own], len(runs) - 1)
+    unit_later = np.tile([unit[place - 3] for place in own], len(models) - 1)
     free = np.full(later.size, np.inf)
     scale = Scale(
         np.array([-np.inf, 0.0, 1e-2, *(item.low for item in items), *-free]),
@@ -76,7 +93,7 @@ def problem(data: AxisData, model: AxisModel, early: bool, fine: float = FINE) -
         np.array([False, False, True, *(item.positive for item in items), *np.zeros(free.size, dtype=np.bool_)]),
         np.array([abs(model.gain) or 1.0, 20.0 / data.sampling_rate, 1.0, *unit, *unit_later]),
     )
-    return simulated, np.concatenate((first, later.ravel())), scale
+    return FitProblem(early, at, np.concatenate((first, later.ravel())), scale)
 
 
 def model_of(data: AxisData, start: AxisModel, values: FloatArray) -> AxisModel:

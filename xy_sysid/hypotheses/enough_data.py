@@ -9,7 +9,7 @@ import numpy as np
 import scipy
 
 from xy_sysid.errors import BadInput
-from xy_sysid.greybox.axis_data import AxisData, prepare_all
+from xy_sysid.greybox.axis_data import EPSILON, AxisData, prepare_all
 from xy_sysid.hypotheses.criteria import CHANCE, FEWEST, STILL
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import USUAL, Units
@@ -17,13 +17,21 @@ from xy_sysid.units import USUAL, Units
 
 def lacking(sampling_rate: float, recordings: Sequence[tuple[FloatArray, FloatArray]], units: Units = USUAL) -> str:
     """What is missing in the data, in words; empty if they will do."""
+    found = prepared(sampling_rate, recordings, units=units)
+    return found if isinstance(found, str) else ""
+
+
+def prepared(
+    sampling_rate: float, recordings: Sequence[tuple[FloatArray, FloatArray]], epsilon: float = EPSILON, units: Units = USUAL
+) -> AxisData | str:
+    """The data ready to be fitted (see ``prepare_all``), or what is missing in them, in words."""
     voltage, position = _one_after_the_other(recordings)
     if float(voltage.std()) == 0.0:
         return "the input does not move; excite the axis."
     if float(position.std()) == 0.0:
         return "the output does not move; excite more, or check the encoder."
     try:
-        data = prepare_all(sampling_rate, recordings, units=units)
+        data = prepare_all(sampling_rate, recordings, epsilon, units)
     except BadInput as problem:
         return str(problem)
     if data.held is data.fitted:
@@ -46,7 +54,7 @@ def lacking(sampling_rate: float, recordings: Sequence[tuple[FloatArray, FloatAr
     excited = int(data.floor.excited.sum())
     if excited < FEWEST:
         return f"only {excited} bands of frequency are excited; use noise or a multisine over the whole band."
-    return ""
+    return data
 
 
 def _one_after_the_other(recordings: Sequence[tuple[FloatArray, FloatArray]]) -> tuple[FloatArray, FloatArray]:

@@ -22,7 +22,7 @@ from xy_sysid.imports.limits import MOST_COLUMNS, fits
 from xy_sysid.imports.reading import Reading
 from xy_sysid.imports.sheet import Column, Sheet
 from xy_sysid.imports.sheet_table import in_seconds, same_unit, scaled
-from xy_sysid.imports.table import ONE_UNIT, Table, axis_names, places_of
+from xy_sysid.imports.table import ONE_UNIT, Table, as_they_stand, axis_names, places_of
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import Recording
 
@@ -154,10 +154,10 @@ def _time(
         said = next((f"{name} ({value})" for name, value in arrays.items() if _plain(name) in RATES), "fs")
         raise BadRecording(path, f"neither a time column nor a usable {said}", "Add t in seconds or fs in Hz, or give --rate.")
     if reading.rate is not None:
-        if time is not None:
-            notes.append(f"the samples are taken as they stand, {reading.rate:g} Hz; the time {name!r} is not used")
+        notes += as_they_stand(reading.rate, None if time is None else name)
         return None, reading.rate
     if time is None:
+        notes += as_they_stand(fs, None)
         return None, fs
     return in_seconds(path, time * (reading.scale("time") or 1.0), reading.unit("time") or _unit(arrays, TIME_UNITS, "s"), notes), fs
 

@@ -16,7 +16,7 @@ from xy_sysid.imports.own_times import on_one_clock
 from xy_sysid.imports.reading import Reading
 from xy_sysid.imports.roles import Found, Roles, assigned
 from xy_sysid.imports.sheet import Column, Sheet, spoken
-from xy_sysid.imports.table import ONE_UNIT, Table, places_of
+from xy_sysid.imports.table import ONE_UNIT, Table, as_they_stand, places_of
 from xy_sysid.samples.block import FloatArray
 
 EPOCHS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"))  # a clock that reads more than this counts no seconds since 1970
@@ -83,12 +83,12 @@ def same_unit(reading: Reading, unit: Unit, output: Unit, notes: list[str]) -> b
 def _time(sheet: Sheet, roles: Roles, reading: Reading, notes: list[str]) -> tuple[FloatArray | None, float | None]:
     """Instants in s, or None with the rate."""
     if reading.rate is not None:
-        if roles.time is not None:
-            notes.append(f"the samples are taken as they stand, {reading.rate:g} Hz; the time {roles.time.name!r} is not used")
+        notes += as_they_stand(reading.rate, None if roles.time is None else roles.time.name)
         return None, reading.rate
     if roles.time is None:
         if sheet.fs is None and roles.seq is None:
             raise BadRecording(sheet.path, f"no time {sheet.kind}; {sheet.names()}", "Name it with --map time=..., or give --rate in Hz.")
+        notes += as_they_stand(sheet.fs, None)
         return None, sheet.fs
     values, unit = roles.time.values, reading.unit("time") or roles.time.unit
     if roles.time.words:

@@ -72,7 +72,7 @@ class _Rows:
 def recording(path: Path, table: Table, reading: Reading, notes: list[str]) -> Recording:
     """Check, number and cut; raises BadRecording or BadInput."""
     _same_length(path, table)
-    time = _time(path, table, notes)
+    time = _time(path, table)
     columns = _whole(path, table, places_of(table.axes, reading.axes), notes)
     rows = _unwrapped(table, _finite(path, table, columns, time, notes), notes)
     first = float(rows.time[0])
@@ -102,13 +102,19 @@ def _same_length(path: Path, table: Table) -> None:
         raise BadRecording(path, "lengths differ: " + ", ".join(f"{name} {count}" for name, count in lengths.items()), "Give one row per sample.")
 
 
-def _time(path: Path, table: Table, notes: list[str]) -> FloatArray:
-    """(n,) s of all rows."""
+def as_they_stand(rate: float | None, unused: str | None) -> list[str]:
+    """The note on samples whose instants are not read. rate: Hz, None if it is not known; unused: name of a time that is there."""
+    if unused is not None:
+        return [f"the samples are taken as they stand, {rate:g} Hz; the time {unused!r} is not used"]
+    return [] if rate is None else [f"there is no time; fs = {rate:g} Hz is taken"]
+
+
+def _time(path: Path, table: Table) -> FloatArray:
+    """(n,) s of all rows; from the rate where no time is read."""
     if table.time is not None:
         return table.time
     if table.fs is None or not (np.isfinite(table.fs) and table.fs > 0):
         raise BadRecording(path, f"neither a time column nor a usable fs ({table.fs})", "Add t in seconds or fs in Hz, or give --rate.")
-    notes.append(f"there is no time; fs = {table.fs:g} Hz is taken")
     return np.asarray((np.arange(len(table.input)) if table.seq is None else table.seq) / table.fs)
 
 

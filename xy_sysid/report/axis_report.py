@@ -27,11 +27,11 @@ from xy_sysid.report.study import AxisStudy, study_axis
 from xy_sysid.samples.recording import Recording
 from xy_sysid.settings import IdentifierSettings
 from xy_sysid.story.document import document
-from xy_sysid.story.story import auto, begin, diagnosed
+from xy_sysid.story.story import tell as whole_story
 
 HELD_OUT = 1.0 / 3.0  # of the recording, as in every story
 LONGEST = 600.0  # s of which the story is told: more would teach it nothing and take memory (2 MB a second at 2 kHz)
-STAGES = ("response and fits", "rigid model", "diagnosis", "refinement")
+STAGES = ("response and fits", "diagnosis")
 
 Tell = Callable[[str], None]
 
@@ -86,18 +86,27 @@ def axis_reports(
 
 
 def axis_report(recording: Recording, axis: str, wanted: Wanted, tell: Tell = lambda stage: None) -> AxisReport:
-    """All that can be said about one axis; what cannot is said in words. tell: called with each of STAGES as it begins."""
-    tell(STAGES[0])
-    studied, verdicts = _studied(recording, axis, wanted.settings, wanted.period)
+    """All that can be said about one axis; what cannot is said in words. tell: called with each of STAGES as it begins.
+
+    The fits are made while the story is told: each leaves the interpreter to the other most of the time.
+    """
     note = ""
     run = recording.run(axis) if len(recording) else None
     if run is not None and len(run) > round(LONGEST * run.sampling_rate):
         note = f"The diagnosis uses the first {LONGEST:g} s of the longest stretch, of {run.seconds:.4g} s."
-    try:
-        story = told(recording, axis, wanted, tell)
-    except BadInput as problem:
-        return AxisReport(study=studied, verdicts=verdicts, story=None, speed=float("nan"), problem=str(problem), note=note)
-    return AxisReport(studied, verdicts, story, _speed(recording, axis), note=note)
+    tell(STAGES[0])
+    with ThreadPoolExecutor(1) as beside:
+        fits = beside.submit(_studied, recording, axis, wanted.settings, wanted.period)
+        if wanted.budget < math.inf:
+            fits.result()  # their processor time is none of the diagnosis
+        story, problem = None, ""
+        try:
+            story = told(recording, axis, wanted, tell)
+        except BadInput as refusal:
+            problem = str(refusal)
+        studied, verdicts = fits.result()
+    speed = float("nan") if story is None else _speed(recording, axis)
+    return AxisReport(study=studied, verdicts=verdicts, story=story, speed=speed, problem=problem, note=note)
 
 
 def _studied(recording: Recording, axis: str, settings: IdentifierSettings, period: int | None) -> tuple[AxisStudy, Validation | None]:
@@ -119,16 +128,9 @@ def _studied(recording: Recording, axis: str, settings: IdentifierSettings, peri
 
 def told(recording: Recording, axis: str, wanted: Wanted, tell: Tell = lambda stage: None) -> Mapping[str, Any]:
     """The document of the whole story of an axis, of at most LONGEST. Raises BadInput for samples that cannot be judged."""
-    library = wanted.library
-    run = recording.run(axis).until(LONGEST)
     tell(STAGES[1])
-    story = begin(run, library)
-    if story.rungs:
-        tell(STAGES[2])
-        story = diagnosed(story, run, library, never if wanted.budget == math.inf else time.process_time, wanted.budget)
-        tell(STAGES[3])
-        story = auto(story, run, library)
-    return document(story)
+    clock = never if wanted.budget == math.inf else time.process_time
+    return document(whole_story(recording.run(axis).until(LONGEST), wanted.library, clock, wanted.budget))
 
 
 def _speed(recording: Recording, axis: str) -> float:

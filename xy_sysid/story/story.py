@@ -23,7 +23,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.greybox.free_run import EPSILON, AxisData, GreyboxFit, fit, fit_base, prepare
 from xy_sysid.greybox.one_step import follower, one_step_fit
 from xy_sysid.hypotheses.criteria import MOST_EFFECTS
-from xy_sysid.hypotheses.enough_data import lacking
+from xy_sysid.hypotheses.enough_data import prepared
 from xy_sysid.samples.recording import Run
 from xy_sysid.settings import unknown_name
 from xy_sysid.story.pictures import Measured, Pictures, measured, pictures
@@ -69,14 +69,11 @@ class Story:
 
 def begin(run: Run, library: Library = STANDARD, tolerance: float = EPSILON) -> Story:
     """The rigid base, fitted to gap-free samples; without steps, but with a diagnosis, if the data do not suffice."""
-    voltage, position, sampling_rate = run.signals
-    story = Story(axis=run.axis, sampling_rate=sampling_rate, seconds=run.seconds, tolerance=tolerance, units=run.units)
-    missing = lacking(sampling_rate, [(voltage, position)], run.units)
-    if missing:
-        return replace(story, diagnosis=not_enough(missing, run.units))
-    data = _data(story, run)
-    base = fit_base(data, library)
-    return _grown(replace(story, measured=measured(data, base)), data, base)
+    data = prepared(run.sampling_rate, [(run.voltage, run.position)], tolerance, run.units)
+    story = _none(run, tolerance)
+    if isinstance(data, str):
+        return replace(story, diagnosis=not_enough(data, run.units))
+    return _based(story, data, fit_base(data, library))
 
 
 def diagnosed(story: Story, run: Run, library: Library = STANDARD, clock: Callable[[], float] = never, budget: float = math.inf) -> Story:
@@ -150,10 +147,11 @@ def pruned(story: Story, run: Run, library: Library = STANDARD) -> Story:
     return _grown(story, data, found, new, gone) if gone else story
 
 
-def tell(run: Run, library: Library = STANDARD) -> Story:
-    """The whole story of one axis: base, diagnosis, and every effect that it needs."""
-    story = begin(run, library)
-    return auto(diagnosed(story, run, library), run, library) if story.rungs else story
+def tell(run: Run, library: Library = STANDARD, clock: Callable[[], float] = never, budget: float = math.inf) -> Story:
+    """The whole story of one axis: base, diagnosis, and every effect that it needs; the base is that of the diagnosis. budget, clock: as there."""
+    found = diagnose(run, library, budget, clock)
+    story = replace(_none(run, EPSILON), diagnosis=found.plain())
+    return auto(_based(story, _data(story, run), found.base), run, library) if found.rungs else story
 
 
 def allowed(name: str, library: Library = STANDARD) -> None:
@@ -163,6 +161,16 @@ def allowed(name: str, library: Library = STANDARD) -> None:
         raise BadInput("effect", repr(name), ", ".join(names), "This one is part of every model; leave it out.")
     if name not in names:
         raise unknown_name(name, names, "effect")
+
+
+def _none(run: Run, tolerance: float) -> Story:
+    """A story before its first fit."""
+    return Story(axis=run.axis, sampling_rate=run.sampling_rate, seconds=run.seconds, tolerance=tolerance, units=run.units)
+
+
+def _based(story: Story, data: AxisData, base: GreyboxFit) -> Story:
+    """The story with its first fit."""
+    return _grown(replace(story, measured=measured(data, base)), data, base)
 
 
 def _data(story: Story, run: Run) -> AxisData:

@@ -57,7 +57,8 @@ class Innovations:
     """
 
     def __init__(self, sampling_rate: float, base: tuple[float, float, float], noise: float, beside: Beside, laws: tuple[Effect, ...]) -> None:
-        self.fs, self.noise, self.beside, self.laws, self.count = sampling_rate, noise, beside, laws, [0]
+        self.fs, self.noise, self.beside, self.laws = sampling_rate, noise, beside, laws
+        self._ran: list[None] = []  # one for each run of the filter, whichever thread it is in
         self.filter = filter_with(laws)
         rows = [row for effect in laws for row in _rows_of(effect)]
         self.friction = slice(len(NAMES), len(NAMES) + len(rows))
@@ -88,7 +89,7 @@ class Innovations:
     @property
     def runs(self) -> int:
         """How often the filter ran."""
-        return self.count[0]
+        return len(self._ran)
 
     def inner(self, numbers: FloatArray) -> FloatArray:
         """Coordinates of numbers."""
@@ -164,7 +165,7 @@ class Innovations:
 
     def run(self, numbers: FloatArray, view: View, sloped: bool) -> tuple[FloatArray, FloatArray]:
         """(n,) innovations over the noise, and (n, coordinates) their derivatives, or (0, 0)."""
-        self.count[0] += 1
+        self._ran.append(None)
         n = view.samples
         voltage, position, against, through = self._undone(numbers, n)
         column = np.zeros(0, dtype=np.int64)
