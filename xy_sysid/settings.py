@@ -30,7 +30,7 @@ def knob(default: Any, meaning: str, unit: str = "", **limits: Any) -> Any:
 class Settings(BaseModel):
     """A group of settings that nobody changes in place; an unknown name is an error."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
 
 # what people type for a kind of signal

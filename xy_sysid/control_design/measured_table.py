@@ -11,8 +11,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse
-import scipy.sparse.linalg
+import scipy
 
 from xy_sysid.comparison.physical_model import PhysicalModel
 from xy_sysid.control_design.inverse import feedforward

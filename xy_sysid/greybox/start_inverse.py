@@ -15,7 +15,6 @@ from functools import lru_cache
 import numpy as np
 import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import minimum_filter1d
 
 from xy_sysid.effects import Effect, Scene
 from xy_sysid.samples.block import FloatArray
@@ -60,7 +59,7 @@ def inverse_starts(
         slow, acceleration, velocity, voltage = _motion(scene, samples, cutoff)
         rows = slow.inside()
         if effect.is_dry or rubs:
-            moving = minimum_filter1d(np.abs(velocity), 2 * int(0.5 * slow.rate / cutoff) + 1) > REST * float(np.std(velocity))
+            moving = scipy.ndimage.minimum_filter1d(np.abs(velocity), 2 * int(0.5 * slow.rate / cutoff) + 1) > REST * float(np.std(velocity))
             rows = rows & moving if float(np.mean(moving)) > FEW else rows
         beside = [slow(force) for force in seen_forces]
         known = np.array([acceleration, velocity, *beside])[:, rows]
@@ -88,7 +87,7 @@ def rigid_starts(scene: Scene) -> list[tuple[float, float]]:
     for cutoff in cutoffs(scene.sampling_rate):
         slow, acceleration, velocity, voltage = _motion(scene, samples, cutoff)
         rows = slow.inside()
-        moving = minimum_filter1d(np.abs(velocity), 2 * int(0.5 * slow.rate / cutoff) + 1) > REST * float(np.std(velocity))
+        moving = scipy.ndimage.minimum_filter1d(np.abs(velocity), 2 * int(0.5 * slow.rate / cutoff) + 1) > REST * float(np.std(velocity))
         rows = rows & moving if float(np.mean(moving)) > FEW else rows
         known = [acceleration, velocity, slow(ones), slow(direction)]
         for count in (2, 3, 4):
