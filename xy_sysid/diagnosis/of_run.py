@@ -61,7 +61,7 @@ def refine(
     """Add effects, fit everything together, and see the error on held-out data fall: a step for the rigid base and one for each effect.
 
     add:  effects to add first, in this order, unasked; auto: go on until nothing promises more; the rest as for ``diagnose``
-    Raises BadInput for too little data, or for a name that is unknown or in every model.
+    Raises BadInput for too little data, or for a name that is unknown, in every model, or given twice.
     """
     return refined(data, (add,) if isinstance(add, str) else tuple(add), library, Effort(MOST_EFFECTS if auto else 0, budget, clock))
 
@@ -72,6 +72,8 @@ def refined(data: Data, names: tuple[str, ...], library: Library, effort: Effort
     for name in names:
         if library[name].category == "base":
             raise BadInput("add", name, "an effect that is not in every model already", "Leave it out.")
+        if names.count(name) > 1:
+            raise BadInput("add", f"{name} {names.count(name)} times", "each effect once", "Leave the others out.")
     rate, signals, units = runs[0].sampling_rate, [(run.voltage, run.position) for run in runs], runs[0].units
     with threadpool_limits(1, "blas"):
         ready = prepared(rate, signals, tolerance, units)

@@ -54,12 +54,18 @@ def standing(data: AxisData, library: Library, sets: Sequence[Sequence[str]], kn
 
 
 def check(library: Library, sets: Iterable[Sequence[str]]) -> None:
-    """Raises BadInput for an effect that is unknown, in every model already, that no free simulation predicts, or whose law is in the set twice."""
+    """Raises BadInput for an effect that is unknown, in every model already, that no free simulation predicts, or whose law is in the set twice,
+    and for a set that is there twice."""
+    sets = [tuple(each) for each in sets]
     for name in (name for each in sets for name in each):
         if not library[name].simulable or library[name].category == "base":
             act = "It is judged one sample ahead; see its experiment in xy-sysid effects." if not library[name].simulable else "Leave it out."
             raise BadInput("effect", name, "effects that free simulation can predict", act)
     for each in sets:
+        if len({*each}) < len(each):
+            raise BadInput("set of effects", " and ".join(each), "each effect once", "Leave one out.")
+        if sum({*each} == {*other} for other in sets) > 1:
+            raise BadInput("sets of effects", f"{' and '.join(each) or 'rigid'} twice", "sets that differ", "Leave one out, or give another.")
         if is_twice(library, each):
             raise BadInput("set of effects", " and ".join(each), "each law once", "Leave one of a family out: it is the other with more parameters.")
 
