@@ -11,6 +11,7 @@ import importlib.abc
 import importlib.util
 import inspect
 from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from types import CodeType, ModuleType
 from typing import Any, ParamSpec, TypeVar, cast
 
@@ -18,6 +19,7 @@ import numba
 from numba.core import event
 
 P = ParamSpec("P")
+Q = TypeVar("Q")
 R = TypeVar("R")
 
 
@@ -71,6 +73,12 @@ def inlined(function: Callable[P, R]) -> Callable[P, R]:
 def cores() -> int:
     """How many threads may calculate at once: those that this process may use, or the environment's NUMBA_NUM_THREADS."""
     return int(vars(numba.config)["NUMBA_NUM_THREADS"])  # its module of settings declares none of them
+
+
+def on_all_cores(work: Callable[[Q], R], items: Iterable[Q]) -> list[R]:
+    """What the work makes of each, several at a time: for work in compiled code, which leaves the interpreter to others."""
+    with ThreadPoolExecutor(cores()) as pool:
+        return list((pool.map if cores() > 1 else map)(work, items))
 
 
 class TextLoader(importlib.abc.InspectLoader):

@@ -12,10 +12,11 @@ from scipy.signal import lfilter
 
 from xy_sim.effect_text import with_effects
 from xy_sim.machine import Machine
+from xy_sysid import jit
 from xy_sysid.axis.model import STANDARD, AxisModel, Library, simulate
 from xy_sysid.effects import EFFECTS, Effect
 from xy_sysid.effects._contract import Beside, Limits
-from xy_sysid.effects.backlash import contact, starts
+from xy_sysid.effects.backlash import contact
 from xy_sysid.effects.backlash.filter_source import NAMES
 from xy_sysid.effects.backlash.innovations import Innovations, View
 from xy_sysid.errors import BadInput
@@ -93,7 +94,7 @@ def test_starts_that_are_tried_on_all_cores_find_the_same(monkeypatch: pytest.Mo
     data, base = machine("backlash=20e-6", "dead_zone=0.05")
     found = []
     for cores in (1, 3):
-        monkeypatch.setattr(starts, "cores", partial(int, cores))
+        monkeypatch.setattr(jit, "cores", partial(int, cores))
         found.append(followed(data, base, GAP, [("dead_zone", (0.05,))])[1])
     one, three = found
     assert (one.base, one.values, one.beside, one.runs) == (three.base, three.values, three.beside, three.runs)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from xy_sysid.greybox.parameters import Estimate, FitProblem, estimates, model_o
 from xy_sysid.greybox.score_test import Screen, Trace, bounded, screen
 from xy_sysid.greybox.start_inverse import CUTOFFS, inverse_starts, rigid_starts
 from xy_sysid.greybox.start_rigid import base_start
+from xy_sysid.jit import on_all_cores
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import USUAL, Units
 
@@ -224,7 +226,10 @@ def _sized(model: AxisModel, name: str, times: float) -> tuple[float, ...]:
 
 def best_start(data: AxisData, candidates: list[AxisModel]) -> AxisModel:
     """The candidate with the least score on the first stage's data, without a fit."""
-    return candidates[0] if len(candidates) == 1 else min(candidates, key=lambda candidate: first_excess(data, candidate))
+    if len(candidates) == 1:
+        return candidates[0]
+    scores = on_all_cores(partial(first_excess, data), candidates)
+    return candidates[scores.index(min(scores))]
 
 
 def first_excess(data: AxisData, model: AxisModel) -> float:
@@ -248,11 +253,8 @@ def screened(data: AxisData, fitted: GreyboxFit, effects: Iterable[Effect], scen
     task = problem(data, fitted.model, early)
     run, values, scale = task.at(COARSE), task.row, task.scale
     inner = scale.inner(values)
-    here, nuisance = run(values), []
-    for k in range(values.size):
-        moved = inner.copy()
-        moved[k] += 1e-4
-        nuisance.append(run(scale.outer(moved)) - here)
+    here = run(values)
+    nuisance = on_all_cores(lambda step: run(scale.outer(inner + step)) - here, 1e-4 * np.eye(values.size))
     return screen(effects, scene, np.array(nuisance), data.brief if early else data.fitted, data.floor)
 
 

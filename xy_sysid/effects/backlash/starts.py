@@ -6,8 +6,6 @@ forgets within a few milliseconds, so that its valleys are wide; a thousand runs
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from itertools import product
 
@@ -16,7 +14,7 @@ import numpy as np
 from xy_sysid.effects._contract import OneStepTask
 from xy_sysid.effects.backlash.filter_source import NAMES
 from xy_sysid.effects.backlash.innovations import Innovations, View
-from xy_sysid.jit import cores
+from xy_sysid.jit import on_all_cores
 from xy_sysid.samples.block import FloatArray
 
 FIRST = View(samples=4000, looseness=5.0, cuts=4, turn=0.7)
@@ -52,7 +50,7 @@ def searched(fit: Innovations, task: OneStepTask) -> FloatArray:
 
 def _best(fit: Innovations, starts: list[FloatArray], view: View, apart: dict[str, float], most: int) -> list[FloatArray]:
     """Those that cost least, each unlike the others, best first."""
-    errors = _each(lambda start: fit.seen(start, view), starts)
+    errors = on_all_cores(lambda start: fit.seen(start, view), starts)
     scale = min(fit.scale(error) for error in errors)
     costs = [fit.cost(error, scale) for error in errors]
     places, widths = [NAMES.index(name) for name in apart], np.array(list(apart.values()))
@@ -71,15 +69,9 @@ def _raced(fit: Innovations, starts: list[FloatArray], view: View) -> FloatArray
     scale = min(fit.scale(fit.seen(start, view)) for start in starts)
     every = np.arange(starts[0].size)
     for steps, left in RACE:
-        moved = _each(partial(fit.solved, free=every, view=view, most=steps, enough=ENOUGH, scale=scale), starts)
+        moved = on_all_cores(partial(fit.solved, free=every, view=view, most=steps, enough=ENOUGH, scale=scale), starts)
         starts = sorted(moved, key=lambda start: fit.cost(fit.seen(start, view), scale))[:left]
     return starts[0]
-
-
-def _each(work: Callable[[FloatArray], FloatArray], starts: list[FloatArray]) -> list[FloatArray]:
-    """The same for every start, on all cores, as the filter leaves the interpreter to others."""
-    with ThreadPoolExecutor(cores()) as pool:
-        return list((pool.map if cores() > 1 else map)(work, starts))
 
 
 def _gaps(noise: float, swing: float) -> list[float]:
