@@ -77,8 +77,10 @@ def cores() -> int:
 
 def on_all_cores(work: Callable[[Q], R], items: Iterable[Q]) -> list[R]:
     """What the work makes of each, several at a time: for work in compiled code, which leaves the interpreter to others."""
+    if cores() == 1:
+        return list(map(work, items))
     with ThreadPoolExecutor(cores()) as pool:
-        return list((pool.map if cores() > 1 else map)(work, items))
+        return list(pool.map(work, items))
 
 
 class TextLoader(importlib.abc.InspectLoader):

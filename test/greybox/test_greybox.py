@@ -13,10 +13,10 @@ from scipy.signal import butter, sosfilt
 from xy_sim.effect_text import with_effects
 from xy_sim.machine import Machine
 from xy_sim.parts import PARTS
+from xy_sysid import jit
 from xy_sysid.axis.model import STANDARD, AxisModel, simulate
 from xy_sysid.errors import BadInput
 from xy_sysid.excitation.lockstep import drive
-from xy_sysid.greybox import least_squares
 from xy_sysid.greybox.floor import bands, count_size, encoder_noise
 from xy_sysid.greybox.free_run import AxisData, GreyboxFit, fit_base, fit_with, look, prepare
 from xy_sysid.greybox.one_step import one_step_fit
@@ -182,7 +182,7 @@ def test_a_fit_is_the_same_on_one_core_and_on_three(monkeypatch: pytest.MonkeyPa
     _, data = own("presliding_hysteresis", 8.0)
     fits = []
     for cores in (1, 3):
-        monkeypatch.setattr(least_squares, "cores", functools.partial(int, cores))
+        monkeypatch.setattr(jit, "cores", functools.partial(int, cores))
         fits.append(fit_with(data, fit_base(data), ["presliding_hysteresis"]))
     assert fits[0].model == fits[1].model and fits[0].runs == fits[1].runs
     assert np.array_equal(fits[0].error, fits[1].error)

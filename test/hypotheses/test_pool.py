@@ -181,3 +181,14 @@ def test_what_pulls_back_with_the_sine_of_an_angle_is_a_weight_and_no_wave() -> 
     assert pool.best.effects == {"gravity"}
     assert contains(STANDARD, frozenset({"cogging"}), frozenset({"gravity"}))
     assert not contains(STANDARD, frozenset({"gravity"}), frozenset({"cogging"}))
+
+
+def test_no_gap_is_looked_for_where_friction_explains_most_of_the_error() -> None:
+    """Though noise on the input leaves more than the floor: the answer is the friction, and no set with a gap is tried."""
+    voltage, position = recorded("coulomb_friction", seconds=20.0).axis("x")
+    noisy = voltage + 0.05 * float(np.std(voltage)) * np.random.default_rng(4).normal(size=voltage.size)
+    tried: list[frozenset[str]] = []
+    found = refine(prepare(2000.0, noisy, position), trying=tried.append)
+    assert found.effects == ("coulomb_friction",)
+    assert found.final is not None and found.final.excess > AT_FLOOR
+    assert tried and not any("backlash" in names for names in tried)

@@ -10,7 +10,6 @@ updated with what the step did (Broyden 1965).
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -20,7 +19,7 @@ from numpy.typing import NDArray
 from xy_sysid.effects._contract import in_time
 from xy_sysid.greybox.floor import Bands, Floor, Windows, tolerance
 from xy_sysid.greybox.objective import Objective
-from xy_sysid.jit import cores
+from xy_sysid.jit import on_all_cores
 from xy_sysid.samples.block import FloatArray
 
 TRUSTED = 0.25  # a step whose fall differs by less than this part from the one expected needs no new derivatives; with 0.75 long valleys take longer
@@ -143,7 +142,7 @@ def solve(
         return np.asarray(measured - windows.spectrum(run(scale.outer(inner))))
 
     def slopes(inner: FloatArray, error: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """New ones; on all cores, as a simulation leaves the interpreter to others."""
+        """New ones."""
         nonlocal runs
         runs += inner.size
 
@@ -153,65 +152,63 @@ def solve(
             moved[k] += step
             return np.asarray((left(moved) - error) / step)
 
-        return np.array(list(each(slope, range(inner.size))))
+        return np.array(on_all_cores(slope, range(inner.size)))
 
-    with ThreadPoolExecutor(min(start.size, cores())) as pool:
-        each = pool.map if cores() > 1 else map
-        inner = scale.inner(start)
-        if known is not None and known.run is run:
-            error = known.error
-        else:
-            error, runs = left(inner), runs + 1
-        size = inner.size
-        normal, cost, converged = np.eye(size), np.inf, False
-        change = slopes(inner, error) if known is None else known.change
-        exact = known is None
-        expected, score = target.spectrum(error)
-        weight = _weight(target, expected)
-        for _ in range(schedule.rounds):
-            before = inner, error, change, exact
-            cost = _cost(error * weight)
-            damping, converged, fresh = 1e-3, False, False
-            for _ in range(schedule.steps):
-                if not fresh:
-                    with np.errstate(over="ignore", invalid="ignore"):  # of a model that runs away
-                        columns = (change * weight).reshape(size, -1).view(np.float64)
-                        normal, slope = columns @ columns.T, columns @ (error * weight).ravel().view(np.float64)
-                    fresh = True
-                if schedule.late() or not (np.all(np.isfinite(normal)) and np.any(normal)):  # a model that runs away, or stands
-                    break
-                diagonal = np.maximum(np.diag(normal), 1e-12 * float(np.max(np.diag(normal))) + 1e-300)
-                move = _move(normal + damping * np.diag(diagonal), slope, scale, scale.outer(inner))
-                move *= min(1.0, 2.0 / float(np.max(np.abs(move)) + 1e-300))
-                trial = scale.inner(scale.outer(inner + move))
-                found, runs = left(trial), runs + 1
-                new = _cost(found * weight)
-                if np.isfinite(new) and new < cost:
-                    fall, gone = (cost - new) / cost, trial - inner
-                    hoped = -float(2.0 * slope @ gone + gone @ normal @ gone)
-                    if abs((cost - new) - hoped) < TRUSTED * hoped:
-                        change, exact = _updated(change, gone, diagonal, found - error), False
-                    else:
-                        change, exact = slopes(trial, found), True
-                    inner, error, cost, fresh = trial, found, new, False
-                    damping = max(damping * 0.2, 1e-9)
-                    if fall < schedule.enough:
-                        converged = True
-                        break
-                elif not exact:
-                    change, exact, fresh = slopes(inner, error), True, False
+    inner = scale.inner(start)
+    if known is not None and known.run is run:
+        error = known.error
+    else:
+        error, runs = left(inner), runs + 1
+    size = inner.size
+    normal, cost, converged = np.eye(size), np.inf, False
+    change = slopes(inner, error) if known is None else known.change
+    exact = known is None
+    expected, score = target.spectrum(error)
+    weight = _weight(target, expected)
+    for _ in range(schedule.rounds):
+        before = inner, error, change, exact
+        cost = _cost(error * weight)
+        damping, converged, fresh = 1e-3, False, False
+        for _ in range(schedule.steps):
+            if not fresh:
+                with np.errstate(over="ignore", invalid="ignore"):  # of a model that runs away
+                    columns = (change * weight).reshape(size, -1).view(np.float64)
+                    normal, slope = columns @ columns.T, columns @ (error * weight).ravel().view(np.float64)
+                fresh = True
+            if schedule.late() or not (np.all(np.isfinite(normal)) and np.any(normal)):  # a model that runs away, or stands
+                break
+            diagonal = np.maximum(np.diag(normal), 1e-12 * float(np.max(np.diag(normal))) + 1e-300)
+            move = _move(normal + damping * np.diag(diagonal), slope, scale, scale.outer(inner))
+            move *= min(1.0, 2.0 / float(np.max(np.abs(move)) + 1e-300))
+            trial = scale.inner(scale.outer(inner + move))
+            found, runs = left(trial), runs + 1
+            new = _cost(found * weight)
+            if np.isfinite(new) and new < cost:
+                fall, gone = (cost - new) / cost, trial - inner
+                hoped = -float(2.0 * slope @ gone + gone @ normal @ gone)
+                if abs((cost - new) - hoped) < TRUSTED * hoped:
+                    change, exact = _updated(change, gone, diagonal, found - error), False
                 else:
-                    damping *= 10.0
-                    if damping > 1e6:
-                        converged = True
-                        break
-            expected, now = target.spectrum(error)
-            if not now < score:
-                inner, error, change, exact = before
-                break
-            gained, score, weight = score - now, now, _weight(target, expected)
-            if gained < schedule.settled:
-                break
+                    change, exact = slopes(trial, found), True
+                inner, error, cost, fresh = trial, found, new, False
+                damping = max(damping * 0.2, 1e-9)
+                if fall < schedule.enough:
+                    converged = True
+                    break
+            elif not exact:
+                change, exact, fresh = slopes(inner, error), True, False
+            else:
+                damping *= 10.0
+                if damping > 1e6:
+                    converged = True
+                    break
+        expected, now = target.spectrum(error)
+        if not now < score:
+            inner, error, change, exact = before
+            break
+        gained, score, weight = score - now, now, _weight(target, expected)
+        if gained < schedule.settled:
+            break
     return Solution(
         values=scale.outer(inner),
         cost=cost,
