@@ -25,9 +25,9 @@ LIMITS = RUN["excitation"]["x"]
 
 
 def start(world: World, executable: str, **more: Any) -> NodeProcess:
-    """A node as the run file sets it, with a watchdog and a horizon for busy test machines."""
+    """A node as the run file sets it, with a watchdog and a horizon for busy test machines; a longer one makes messages that take longer than a cycle to read."""
     arguments = more.pop("arguments", ())
-    told = {**RUN[executable], **({"watchdog": 3.0, "horizon": 3.0} if executable == "excitation" else {})}
+    told = {**RUN[executable], **({"watchdog": 3.0, "horizon": 1.0} if executable == "excitation" else {})}
     axis = {f"x.{name}": value for name, value in told.pop("x", {}).items()}
     written = {name: f'"{value}"' if isinstance(value, str) else value for name, value in {**told, **axis, **more}.items()}
     return world.start(f"xy_sysid.nodes.{executable}", written, arguments=arguments)

@@ -7,7 +7,6 @@ divided by the power density of the error they are the terms of a likelihood (Wh
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 
@@ -147,24 +146,6 @@ class Floor:
     lines: FloatArray
     response: FloatArray
 
-    def rest(self, reference: FloatArray) -> Callable[[FloatArray], float]:
-        """power (bands,) of an error -> that beyond the noise, over the same of a reference (bands,); never below what laws are trusted to.
-
-        Bands count by how far the reference's rest, taken as flat, stands out of the noise: what nobody can see does not decide.
-        """
-        flat = float(np.sum(self.lines * self.motion) / np.sum(self.lines))
-        least = max(self.epsilon**2 * flat, 1e-300)
-        level = least
-        weight = self.lines / (self.noise + level)
-        for _ in range(50):
-            weight = self.lines / (self.noise + level)
-            new = max(float(np.sum(weight * (reference - self.noise)) / np.sum(weight)), least)
-            if abs(new - level) < 1e-3 * level:
-                break
-            level = new
-        whole, share = level * float(np.sum(weight)), least / level
-        return lambda power: max(float(np.sum(weight * (power - self.noise))) / whole, share)
-
 
 def encoder_noise(sampling_rate: float, position: FloatArray, sensed: Sensed = "position", driven_by: FloatArray | None = None) -> float:
     """rms of the sensor's white noise: from the quietest band below Nyquist, not below what counting alone makes.
@@ -294,17 +275,3 @@ def tolerance(layout: Bands, error: ComplexArray, least: Floor) -> FloatArray:
     it every band does, wide or narrow.
     """
     return np.asarray(least.power + layout.lines * np.maximum(layout.power(error) - least.power, 0.0))
-
-
-def excess(power: FloatArray, least: Floor) -> float:
-    """nats by which the power of an error (bands,) is above the floor: half the mean over the excited bands, half as a whole; 0 is nothing left.
-
-    Bands alone would count a machine's slow motion, where its largest error may be, as one among many; the whole alone would not see a
-    small error in a quiet band.
-    """
-    used = least.excited if bool(np.any(least.excited)) else np.ones_like(least.excited)
-    lowest = np.maximum(least.power, 1e-300)
-    with np.errstate(over="ignore"):  # of a model that runs away
-        bands = np.maximum(np.log(np.maximum(power / lowest, 1e-12)), 0.0)
-    whole = float(np.log(max(float(np.sum((least.lines * power)[used]) / np.sum((least.lines * lowest)[used])), 1.0)))
-    return 0.5 * (float(np.mean(bands[used])) + whole)

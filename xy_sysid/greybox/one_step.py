@@ -21,7 +21,6 @@ from xy_sysid.greybox.floor import count_size
 from xy_sysid.greybox.free_run import AxisData, GreyboxFit
 from xy_sysid.greybox.parameters import Z95, Estimate, unit_of
 from xy_sysid.greybox.score_test import bounded
-from xy_sysid.samples.block import FloatArray
 
 AT_NOISE = 3.5  # held-out innovation over the encoder's noise up to which an effect explains the axis
 BETTER = 2.0  # innovation without the effect over that with it, at least
@@ -106,35 +105,6 @@ def beside(model: AxisModel, effect: Effect) -> tuple[DryFriction, tuple[tuple[s
 def follower(model: AxisModel) -> Effect | None:
     """The effect of a model that only one-step prediction can judge, if there is one."""
     return next((model.library[name] for name, _ in model.effects if model.library[name].one_step is not None), None)
-
-
-def change_without(data: AxisData, model: AxisModel, name: str) -> float:
-    """Mean square of what the innovations over the noise would change by, were one effect of a model absent and all else as it is."""
-    effect = follower(model)
-    assert effect is not None
-    least = (effect.parameters[0].low, *dict(model.effects)[effect.name][1:])
-    nothing = model.with_effect(name, least) if name == effect.name else model.without(name)
-    return float(np.mean((_innovation(data, nothing, effect) - _innovation(data, model, effect)) ** 2))
-
-
-def _innovation(data: AxisData, model: AxisModel, effect: Effect) -> FloatArray:
-    """(n,) innovations over the noise of a model as it is."""
-    assert effect.one_step is not None
-    dry, others = beside(model, effect)
-    values = dict(model.effects)[effect.name]
-    found = Followed(
-        base=(model.gain, model.delay, model.pole),
-        values=values,
-        base_spread=(0.0, 0.0, 0.0),
-        spread=(0.0,) * len(values),
-        dry=dry,
-        beside=((), ()),
-        innovation=np.empty(0),
-        without=np.empty(0),
-        noise=noise_of(data),
-        runs=0,
-    )
-    return effect.one_step.innovation(data.sampling_rate, found, as_beside(data, model.library, others), data.position.size - 1)
 
 
 def noise_of(data: AxisData) -> float:
