@@ -69,7 +69,8 @@ def test_two_joints_of_any_name_go_through_every_node_the_page_and_the_bag(world
             if newest(statuses, "excitation").get("state") == "stopped":
                 halted.append("while it was diagnosed")
                 statuses.clear()
-                assert world.transition("excitation", "activate"), drive.output()
+                again = world.transition("excitation", "activate")
+                assert again or world.state("excitation") == "active", drive.output()  # the status was one of before
 
         def all_there() -> bool:
             monitor.spin(0.01)

@@ -25,7 +25,10 @@ LIMITS = RUN["excitation"]["x"]
 
 
 def start(world: World, executable: str, **more: Any) -> NodeProcess:
-    """A node as the run file sets it, with a watchdog and a horizon for busy test machines; a longer one makes messages that take longer than a cycle to read."""
+    """A node as the run file sets it, with a watchdog and a horizon for busy test machines.
+
+    A longer horizon makes messages that take longer than a cycle of the controller to read.
+    """
     arguments = more.pop("arguments", ())
     told = {**RUN[executable], **({"watchdog": 3.0, "horizon": 1.0} if executable == "excitation" else {})}
     axis = {f"x.{name}": value for name, value in told.pop("x", {}).items()}
