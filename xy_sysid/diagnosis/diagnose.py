@@ -63,7 +63,7 @@ def not_enough(missing: str, units: Units = USUAL) -> Answer:
 
 def judged(data: AxisData, found: Answer, library: Library) -> Answer:
     """The verdict on a search that has ended."""
-    every, (found, sure) = found.best, _surest(data, found)
+    every, with_all, (found, sure) = found.best, _confidence(found, found.best), _told(data, found)
     motion = max(data.layout.rms(data.floor.motion), 1e-300)
     left = found.discrepancy / motion
     found, base, names = replace(found, tolerance=left), found.base, found.best
@@ -72,7 +72,7 @@ def judged(data: AxisData, found: Answer, library: Library) -> Answer:
     if names and (found.explained >= 1.0 - found.explained or found.final.excess < AT_FLOOR):
         verdict: Kind = "missing_effect"
         confidence, experiment = sure, words.experiment(names[0], library)
-        sentence = words.missing(data, found, every[len(names) :])
+        sentence = words.missing(data, found, every[len(names) :], with_all)
     elif base.excess < AT_FLOOR or (noise := input_noise(data, base)) is not None:
         verdict, names, experiment = "nothing_missing", (), "None is needed."
         found, trust = replace(found, explained=0.0, kept_out=None), 1.0 - max(base.excess, 0.0)
@@ -100,27 +100,40 @@ def judged(data: AxisData, found: Answer, library: Library) -> Answer:
     return replace(found, look_alikes=words.look_alikes(found, library))
 
 
-def _surest(data: AxisData, found: Answer) -> tuple[Answer, float]:
-    """The rungs down to where each of the effects is surer than not, and the confidence in all of these together.
+def _told(data: AxisData, found: Answer) -> tuple[Answer, float]:
+    """The rungs down to that whose names tell most, and the confidence in all of these: the logarithm by which the held-out error falls, times
+    that confidence.
 
-    Where two sets do the same, what they share is sure, and what they differ in is not. If nothing is surer than not, all are told.
+    So a second effect is named where it explains much or is sure, and dirt that explains little and is unsure does not make the first one unsure.
     """
-    together = found.final.one_step  # judged one sample ahead, as one: a rung may have brought two of them
-    for count in range(len(found.best), len(found.best) - 1 if together else 0, -1):
-        names = found.best[:count]
-        place = next((place for place, rung in enumerate(found.rungs) if {*rung.effects} == {*names}), None)
-        if place is None or min(_confidence(found, (name,)) for name in names) < 0.5:
+    whole = found, _confidence(found, found.best)
+    if not found.best or found.final.one_step:  # judged one sample ahead, as one: a rung may have brought two of them
+        return whole
+    base, most, told = found.base, 0.0, whole
+    for place, rung in enumerate(found.rungs):
+        names = found.best[: len(rung.effects)]
+        if not names or {*rung.effects} != {*names} or part_explained(data, base, rung.fit) < 0.5:
             continue
-        fit, every, sure = found.rungs[place].fit, names == found.best, _confidence(found, names)
-        explained = found.explained if every else part_explained(data, found.base, fit)
-        if explained < 0.5:
-            continue
-        if not every:
-            rivals = tuple(rival for rival in found.rivals if not contains(fit.model.library, frozenset(rival.effects), frozenset(names)))
-            left = math.sqrt(max(fit.held_out_error**2 - data.noise**2, 0.0))
-            found = replace(found, rungs=found.rungs[: place + 1], best=names, settled=None, rivals=rivals, explained=explained, discrepancy=left)
-        return found, sure
-    return found, _confidence(found, found.best)
+        sure = _confidence(found, names)
+        tells = sure * math.log(base.held_out_error / max(rung.held_out_error, 1e-300))
+        if tells > most:
+            most, told = tells, (whole[0] if names == found.best else _down_to(data, found, place), sure)
+    return told
+
+
+def _down_to(data: AxisData, found: Answer, place: int) -> Answer:
+    """The answer without what came after one of its rungs."""
+    fit = found.rungs[place].fit
+    names = found.best[: len(fit.model.effects)]
+    return replace(
+        found,
+        rungs=found.rungs[: place + 1],
+        best=names,
+        settled=None,
+        rivals=tuple(rival for rival in found.rivals if not contains(fit.model.library, frozenset(rival.effects), frozenset(names))),
+        explained=part_explained(data, found.base, fit),
+        discrepancy=math.sqrt(max(fit.held_out_error**2 - data.noise**2, 0.0)),
+    )
 
 
 def _confidence(found: Answer, names: tuple[str, ...]) -> float:

@@ -16,13 +16,13 @@ from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import bare, moved
 
 
-def missing(data: AxisData, found: Answer, unsure: Sequence[str]) -> str:
-    """These effects are missing. unsure: effects that may be missing, too."""
+def missing(data: AxisData, found: Answer, unsure: Sequence[str], with_all: float) -> str:
+    """These effects are missing. unsure: effects that may be missing, too; with_all: the confidence if they are named as well."""
     names, final, unit = found.best, found.final, data.units.judged
     said = f"Missing: {listed(names)}. {'They explain' if len(names) > 1 else 'It explains'} {percent(found.explained)} of the error's power"
     said += f" ({bare(found.base.held_out_error, unit)} -> {moved(final.held_out_error, unit)}). {_left(data, found)}"
     if unsure:
-        said += f" {listed(unsure)} may also be present ({'below' if len(unsure) == 1 else 'each below'} 50 %)."
+        said += f" {listed(unsure)} may also be present; with {'it' if len(unsure) == 1 else 'them'} the confidence is {with_all:.2f}."
     said += _also_called(final, names)
     if found.rivals:
         rival = found.rivals[0]
