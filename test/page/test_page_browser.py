@@ -254,6 +254,7 @@ def test_a_link_opens_the_same_view_and_a_reload_keeps_it(usual: Tab, tab: Calla
     other.until(shown, 30, "another view after a reload")
     assert other.page.url == f"{server.address}?{wanted}" and other.page.evaluate("document.body.classList.contains('body--dark')")
     other.page.get_by_role("button", name="close recording").nth(1).click()
+    other.until(lambda: other.page.locator(".panel").count() == 1, 30, "the recording is not closed")
     one.until(lambda: "plain.npz" not in one.page.url and "effects=y:coulomb_friction" in one.page.url, 10, "the other tab keeps an old address")
     first.locator("[data-act=reset]").click()
     other.until(lambda: "effects" not in other.page.url, 30, "an effect that was taken out is still in the address")
