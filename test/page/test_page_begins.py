@@ -37,15 +37,10 @@ class Frames:
     said: list[tuple[float, str, str]] = field(default_factory=list)
     begun: float = field(default_factory=time.monotonic)
     first: dict[str, tuple[float, float]] = field(default_factory=dict)
-    loaded: float = 0.0
 
     def look(self) -> None:
-        """One frame. A page that loads again, as it does after its connection was lost, is looked at as a new one, from its panel on."""
-        now, loaded = time.monotonic() - self.begun, float(self.tab.page.evaluate("performance.timeOrigin"))
-        if loaded != self.loaded:
-            self.first.clear()
-            self.tab.until(lambda: self.tab.page.locator(".panel").count() == 1 and self.tab.places(), 30)
-            self.loaded = loaded
+        """One frame."""
+        now = time.monotonic() - self.begun
         self.said.append((now, self.tab.headline(), self.tab.verdict()))
         self.over += [f"{now:.1f} s: {pair}" for pair in self.tab.over_each_other()]
         for name, (left, top) in self.tab.places().items():

@@ -9,7 +9,7 @@ from dataclasses import replace
 from xy_sysid.axis.model import STANDARD, Library
 from xy_sysid.comparison.where_it_fails import Comparison, compare_velocity
 from xy_sysid.diagnosis import words
-from xy_sysid.diagnosis.answer import Answer, Kind
+from xy_sysid.diagnosis.answer import Answer, Kind, Rung
 from xy_sysid.diagnosis.equal_laws import likelihood
 from xy_sysid.diagnosis.first_set import settled
 from xy_sysid.diagnosis.refine import Effort, never, refine
@@ -106,25 +106,24 @@ def _told(data: AxisData, found: Answer) -> tuple[Answer, float]:
 
     So a second effect is named where it explains much or is sure, and dirt that explains little and is unsure does not make the first one unsure.
     """
-    whole = found, _confidence(found, found.best)
-    if not found.best or found.final.one_step:  # judged one sample ahead, as one: a rung may have brought two of them
-        return whole
-    base, most, told = found.base, 0.0, whole
-    for place, rung in enumerate(found.rungs):
-        names = found.best[: len(rung.effects)]
-        if not names or {*rung.effects} != {*names} or part_explained(data, base, rung.fit) < 0.5:
-            continue
-        sure = _confidence(found, names)
-        tells = sure * math.log(base.held_out_error / max(rung.held_out_error, 1e-300))
-        if tells > most:
-            most, told = tells, (whole[0] if names == found.best else _down_to(data, found, place), sure)
-    return told
+    if found.final.one_step:  # judged one sample ahead, as one: a rung may have brought two of them
+        return found, _confidence(found, found.best)
+
+    def tells(rung: Rung) -> float:
+        return _confidence(found, rung.effects) * math.log(found.base.held_out_error / max(rung.held_out_error, 1e-300))
+
+    enough = [rung for rung in found.rungs[1:] if part_explained(data, found.base, rung.fit) >= 0.5]
+    most = max(enough, key=tells, default=None)
+    if most is None or most is found.rungs[-1]:
+        return found, _confidence(found, found.best)
+    told = _down_to(data, found, found.rungs.index(most))
+    return told, _confidence(found, told.best)
 
 
 def _down_to(data: AxisData, found: Answer, place: int) -> Answer:
     """The answer without what came after one of its rungs."""
     fit = found.rungs[place].fit
-    names = found.best[: len(fit.model.effects)]
+    names = tuple(name for name in found.best if name in fit.model)
     return replace(
         found,
         rungs=found.rungs[: place + 1],

@@ -78,6 +78,7 @@ class ExcitationNode(Overridable, LifecycleNode):
         self._until: float | None = None  # when the last block sent is over
         self._loud = False  # the last block published was not all zeros
         self._complaint = ""
+        self._stop_told = ""  # whose STOP was said to be on
         self._unnamed = 0.0  # s since which another one is there without a name
         self._refused = ""  # why the last transition was refused
         self._refusals, self._recent = 0, Recent()
@@ -213,7 +214,8 @@ class ExcitationNode(Overridable, LifecycleNode):
             if self._stop.held and self._drive is not None and not self.has_stopped():
                 with self._hold:
                     self._drive.obey_stop()
-            self.get_logger().warning(self._stop.why() if self._stop.held else "STOP is released: activate is allowed again")
+            if not self._stop.held:
+                self.get_logger().warning("STOP is released: activate is allowed again")
             self._report()
             return self._stop.held
         return False
@@ -517,8 +519,12 @@ class ExcitationNode(Overridable, LifecycleNode):
                 values[f"{axis}.clipped"] = f"{report.clipped[number]:.0f}"
                 values[f"{axis}.braked"] = f"{report.braked[number]:.0f}"
         refused = self._recent.goes_on("refused", self._refusals, time.monotonic())
-        if self._stop.held or (refused and (drive is None or drive.state != "active")):
-            message, level = self._stop.why() if self._stop.held else self._refused, max(level, 1)
+        stop = self._stop.why() if self._stop.held else ""
+        if stop and stop != self._stop_told:  # again when the name of its sender is found, which may come after the message
+            self.get_logger().warning(stop)
+        self._stop_told = stop
+        if stop or (refused and (drive is None or drive.state != "active")):
+            message, level = stop or self._refused, max(level, 1)
         values["input unit"], values["output unit"] = self._knobs.settings.units
         values["stop"] = "on" if self._stop.held else "off"
         values["stop held by"] = ", ".join(self._stop.holders)

@@ -41,6 +41,7 @@ class TogetherCard:
                 self._chosen = ui.select({}, multiple=True, value=[], label="what is drawn").props('outlined dense use-chips data-part="together"')
                 self._models = ui.toggle(dict(MODELS), value="newest").props('dense no-caps aria-label="models that are drawn"')
             self._plot = Plot(READING, "in_one_picture")
+        self._card.set_visibility(False)  # until it is known that there are two
 
     async def refresh(self, sources: list[Source]) -> None:
         """Draw again what has changed."""
