@@ -112,8 +112,7 @@ def _told(data: AxisData, found: Answer) -> tuple[Answer, float]:
     def tells(rung: Rung) -> float:
         return _confidence(found, rung.effects) * math.log(found.base.held_out_error / max(rung.held_out_error, 1e-300))
 
-    enough = [rung for rung in found.rungs[1:] if part_explained(data, found.base, rung.fit) >= 0.5]
-    most = max(enough, key=tells, default=None)
+    most = max(found.rungs[1:], key=tells, default=None)
     if most is None or most is found.rungs[-1]:
         return found, _confidence(found, found.best)
     told = _down_to(data, found, found.rungs.index(most))
