@@ -29,8 +29,8 @@ def files(folder: Path) -> tuple[Path, Path]:
     machine.write_text(yaml.safe_dump({**joint, "axes": {"pan": joint["axes"]["x"], "joint-2": joint["axes"]["x"]}}))
     drives = {"axes": AXES, "output": "commands", "unit": "rad", "joint_topic": "/joint_states", "controller_joints": ["pan", "joint-2"]}
     nodes = {
-        "excitation": {**drives, "rate": 200.0, "watchdog": 5.0, **{axis: {**JOINT, "high": 60.0} for axis in AXES}},
-        "identifier": {**HEARS, **UNITS, "axes": AXES, "length": 256, "band_high": 60.0, "numerator_order": 0, "denominator_order": 2},
+        "excitation": {**drives, "rate": 100.0, "watchdog": 5.0, **{axis: {**JOINT, "high": 30.0} for axis in AXES}},
+        "identifier": {**HEARS, **UNITS, "axes": AXES, "length": 128, "band_high": 30.0, "numerator_order": 0, "denominator_order": 2},
         "diagnoser": {**HEARS, **UNITS, "axes": AXES[::-1], "minimum": 4.0, "tolerance": 0.01, "effects": {axis: [""] for axis in AXES}},
         "recorder": {"output": str(folder / "bag"), "topics": ["/joint_states", "frf/.*", "metrics"]},
     }
@@ -50,7 +50,7 @@ def test_two_joints_of_any_name_go_through_every_node_the_page_and_the_bag(world
     machine, parameters = files(world.folder)
     statuses, told = world.statuses(), world.statuses("diagnosis")
     given = ["--params-file", str(parameters)]
-    control = {"joints": '["pan", "joint-2"]', "machine": str(machine), "update_rate": 200.0, "effects": '["coulomb_friction"]'}
+    control = {"joints": '["pan", "joint-2"]', "machine": str(machine), "update_rate": 100.0, "effects": '["coulomb_friction"]'}
     world.start("xy_sim.controller_node", control)
     for module in ("identifier", "diagnoser", "recorder"):
         world.start(f"xy_sysid.nodes.{module}", arguments=given)

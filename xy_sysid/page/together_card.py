@@ -64,12 +64,12 @@ class TogetherCard:
 
 
 def choices(sources: list[Source]) -> list[Choice]:
-    """Every axis of every source that has a response."""
+    """Every axis of every source that has a response; of what is live, with its first model: till then what lies above grows."""
     found = []
     for source in sources:
         for axis in source.axes():
             stamp, document = source.stamp(axis), source.document(axis)  # the stamp first: see StoryCard
-            if document is not None and document["measured"] is not None:
+            if document is not None and document["measured"] is not None and (document["steps"] or not source.live):
                 title = "live" if source.live else source.title
                 found.append(Choice(f"{source.key}/{axis}", f"{title}, {axis}", document, stamp))
     return found
