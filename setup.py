@@ -68,6 +68,7 @@ setup(
             "playwright",
             "pypdfium2",
             "pytest",
+            "pytest-timeout",
             "pytest-xdist",
             "hypothesis",
             "blark",
