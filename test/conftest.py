@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import faulthandler
 import os
 import signal
 from collections.abc import Iterator
@@ -9,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from _pytest.faulthandler import fault_handler_stderr_fd_key
 
 if TYPE_CHECKING:
     from helpers.ros_tools import World
@@ -56,9 +58,10 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 @pytest.fixture
-def world(tmp_path: Path) -> Iterator[World]:
+def world(tmp_path: Path, pytestconfig: pytest.Config) -> Iterator[World]:
     """A ROS domain of its own, in which every process ends with the test."""
     from helpers.ros_tools import world_in
 
     with world_in(tmp_path) as made:
+        faulthandler.enable(pytestconfig.stash[fault_handler_stderr_fd_key])  # rclpy's executor has turned it to what is captured, and lost
         yield made

@@ -122,6 +122,7 @@ class Tab:
 
     def __init__(self, made: Any, address: str, width: int = 1400, mode: str = "light") -> None:
         self.context = made.new_context(viewport={"width": width, "height": 900}, color_scheme=mode)
+        self.context.set_default_timeout(PATIENCE * 30_000)
         self.page = self.context.new_page()
         self.errors: list[str] = []
         self.asked: list[str] = []

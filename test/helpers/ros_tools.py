@@ -246,6 +246,7 @@ class World:
         """End everything that was started."""
         for process in self.processes:
             process.end()
+        self._executor.shutdown()  # it calls what the node has, and must not outlive it
         self.node.destroy_node()
         self.context.try_shutdown()
 

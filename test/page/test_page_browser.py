@@ -206,16 +206,16 @@ def test_a_reload_in_the_middle_loses_nothing_and_a_fit_can_be_left(usual: Tab) 
 def test_wrong_use_is_answered_in_a_sentence(usual: Tab) -> None:
     """Nothing chosen to add: the page says what is allowed."""
     one = ready(usual)
-    one.press("add")
-    one.until(lambda: "effect: name is ''" in one.notices() and "coulomb_friction" in one.notices(), 10)
+    one.press_until("add", lambda: "effect: name is ''" in one.notices() and "coulomb_friction" in one.notices(), 10)
 
 
 def test_recordings_stand_side_by_side_and_a_lost_one_says_so(usual: Tab, server: Server) -> None:
     """Opened from the list of the folder; when its process dies, the page says that it is closed, and the other goes on."""
     one = ready(usual)
     before = set(server.children())
-    one.page.get_by_role("button", name="Open a recording").click()
-    one.page.get_by_role("combobox", name="recording").click()
+    chosen = one.page.get_by_role("combobox", name="recording")
+    one.click_until(one.page.get_by_role("button", name="Open a recording"), chosen.is_visible)
+    chosen.click()
     one.page.get_by_role("option", name="plain.npz").click()
     one.page.get_by_role("button", name="Open", exact=True).click()
     second = one.page.locator(".panel").nth(1)
@@ -227,8 +227,7 @@ def test_recordings_stand_side_by_side_and_a_lost_one_says_so(usual: Tab, server
     os.kill(worker, signal.SIGKILL)
     one.until(lambda: "Closed: its process has ended" in str(second.text_content()) and "plain.npz is closed" in one.notices(), 10)
     assert one.page.locator("[data-act=diagnose]").first.is_enabled()
-    second.get_by_role("button", name="close recording").click()
-    one.until(lambda: one.page.locator(".panel").count() == 1)
+    one.click_until(second.get_by_role("button", name="close recording"), lambda: one.page.locator(".panel").count() == 1)
 
 
 def test_a_link_opens_the_same_view_and_a_reload_keeps_it(usual: Tab, tab: Callable[..., Tab], server: Server) -> None:
@@ -253,19 +252,20 @@ def test_a_link_opens_the_same_view_and_a_reload_keeps_it(usual: Tab, tab: Calla
     other.page.reload()
     other.until(shown, 30, "another view after a reload")
     assert other.page.url == f"{server.address}?{wanted}" and other.page.evaluate("document.body.classList.contains('body--dark')")
-    other.page.get_by_role("button", name="close recording").nth(1).click()
-    other.until(lambda: other.page.locator(".panel").count() == 1, 30, "the recording is not closed")
+    close = other.page.get_by_role("button", name="close recording").nth(1)
+    other.click_until(close, lambda: other.page.locator(".panel").count() == 1, 30, "the recording is not closed")
     one.until(lambda: "plain.npz" not in one.page.url and "effects=y:coulomb_friction" in one.page.url, 10, "the other tab keeps an old address")
-    first.locator("[data-act=reset]").click()
-    other.until(lambda: "effects" not in other.page.url, 30, "an effect that was taken out is still in the address")
+    reset = first.locator("[data-act=reset]")
+    other.click_until(reset, lambda: "effects" not in other.page.url, 30, "an effect that was taken out is still in the address")
     assert other.errors == []
 
 
 def test_columns_without_names_that_tell_are_chosen_by_clicks_and_two_recordings_stand_in_one_picture(usual: Tab) -> None:
     """A table with columns A, B, C, in mm: listed with its numbers, opened as chosen; then both recordings in one picture."""
     one = ready(usual)
-    one.page.get_by_role("button", name="Open a recording").click()
-    one.page.get_by_role("combobox", name="recording").click()
+    chosen = one.page.get_by_role("combobox", name="recording")
+    one.click_until(one.page.get_by_role("button", name="Open a recording"), chosen.is_visible)
+    chosen.click()
     one.page.get_by_role("option", name="export.csv").click()
     one.page.get_by_role("button", name="Columns ...").click()
     dialog = one.page.locator("[data-part=columns]")
@@ -287,8 +287,7 @@ def test_columns_without_names_that_tell_are_chosen_by_clicks_and_two_recordings
     one.until(lambda: all(len(curve) > 50 for curve in one.curves("Responses of", *names)), 20)
     dry, plain = one.curves("Responses of", "dry.npz, x", "export.csv, x")
     assert abs(np.nanmedian(np.array(plain, dtype=float)) - np.nanmedian(np.array(dry, dtype=float))) < 12  # dB: both in mm/V
-    second.get_by_role("button", name="close recording").click()
-    one.until(lambda: one.page.locator(".panel").count() == 1)
+    one.click_until(second.get_by_role("button", name="close recording"), lambda: one.page.locator(".panel").count() == 1)
 
 
 def answer(url: str, method: str = "GET", **headers: str) -> tuple[int, str]:
@@ -336,8 +335,7 @@ def test_from_another_machine_a_token_is_needed(chromium: Any, folder: Path) -> 
         assert "token" not in one.page.url
         assert all("httpOnly" in json.dumps(cookie) and cookie["httpOnly"] for cookie in one.context.cookies() if "token" in cookie["name"])
         assert not one.page.get_by_text("No recording is open").is_visible()
-        one.page.get_by_role("button", name="close recording").click()
-        one.until(lambda: one.page.get_by_text("No recording is open").is_visible(), 10)
+        one.click_until(one.page.get_by_role("button", name="close recording"), one.page.get_by_text("No recording is open").is_visible, 10)
         one.close()
     finally:
         assert made.end() == 130

@@ -59,8 +59,9 @@ def test_the_page_answers_what_the_commands_answer(tmp_path: Path) -> None:
             answer = page.locator("[data-part=answer]").first
             tab.click_until(page.locator("[data-ask=steps]").first, lambda: "time_constant" in (answer.text_content() or ""), 60.0, "no answer")
             tab.until(lambda: "numerator" in (page.locator("[data-part=responses]").last.text_content() or ""), 60.0, "no fit of the response")
-            page.get_by_role("button", name="Open a recording").first.click()
-            page.get_by_role("combobox", name="recording").click()
+            chosen = page.get_by_role("combobox", name="recording")
+            tab.click_until(page.get_by_role("button", name="Open a recording").first, chosen.is_visible)
+            chosen.click()
             page.get_by_role("option", name="u.csv", exact=True).click()
             page.get_by_role("button", name="Columns ...").click()
             page.locator("[data-pick=other]").last.click()
