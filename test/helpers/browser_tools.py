@@ -224,7 +224,7 @@ class Tab:
                 return True
             if not clicked or time.monotonic() > clicked[-1] + 20.0:
                 with contextlib.suppress(Late):  # it is being loaded again just now, or at work
-                    what.click(timeout=5000)
+                    what.click(timeout=PATIENCE * 5000)
                     clicked.append(time.monotonic())
             return False
 

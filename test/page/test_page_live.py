@@ -49,9 +49,8 @@ class Scene:
             self.lifecycle("not configured")
             self.tab.press("configure")
         self.lifecycle("nothing moves before Activate")
-        self.tab.until(self.tab.page.locator("[data-act=activate]").is_enabled)
-        self.tab.press("activate")
-        self.lifecycle("driving")
+        lifecycle = self.tab.page.locator("[data-part=lifecycle]")  # a guard may take a stall for a fault: again
+        self.tab.press_until("activate", lambda: "driving" in str(lifecycle.text_content()), 30.0, "driving")
 
     def nodes(self) -> str:
         """What the page says of the nodes."""
