@@ -218,3 +218,14 @@ def test_trajectories_are_positions_for_a_controller(more: dict[str, Any]) -> No
     given = {**settings().model_dump(), **more}
     with pytest.raises(BadInput, match="interface"):
         build(ExcitationSettings, given)
+
+
+def test_a_joint_state_that_comes_while_this_computer_has_stood_still_is_no_fault_of_the_clock() -> None:
+    """Its stamp is that of now; what lags is the count of commands, which were due and are not sent yet."""
+    one = robot()
+    one.go(100)
+    stalled = round(0.1 * RATE)
+    at = np.array([one.drive.seq - 1.0 + stalled])
+    state = Block(("x",), at, at / RATE, np.array([[one.place]]))
+    assert not one.drive.see(state) and "stamped 0.1 s after it comes" in one.drive.unusable
+    assert one.drive.see(state, overdue=stalled)

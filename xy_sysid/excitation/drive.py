@@ -142,12 +142,14 @@ class Drive:
         check_loop(settings)
         self._use(settings)
 
-    def see(self, block: Block) -> bool:
+    def see(self, block: Block, overdue: int = 0) -> bool:
         """Take note of positions, (n, axes) in m; False if they are not usable, and ``unusable`` says why.
+
+        overdue: samples that this computer, which stood still, has not sent yet though their time has come
 
         A motion that the voltage cannot have caused, or that it should have, stops the drive.
         """
-        why = self._why_unusable(block)
+        why = self._why_unusable(block, overdue)
         if why:
             self._unusable, self._why = self._unusable + 1, why
             return False
@@ -182,7 +184,7 @@ class Drive:
         """What was wrong with the last position that was not usable."""
         return self._why
 
-    def _why_unusable(self, block: Block) -> str:
+    def _why_unusable(self, block: Block, overdue: int) -> str:
         if len(block) == 0:
             return "an empty block"
         missing = [axis for axis in self.axes if axis not in block.axes]
@@ -198,7 +200,7 @@ class Drive:
             return f"counter {seq:.0f}, which does not go on"
         if block.time[-1] < self._seen_time:
             return f"stamped {self._seen_time - block.time[-1]:.3g} s before the one before it"
-        old = (self.seq - 1 - seq) / self.settings.rate
+        old = (self.seq + overdue - 1 - seq) / self.settings.rate
         if old > (self.settings.watchdog * max(self.settings.speed, 1.0) + FURTHEST) and not self.settings.lockstep:
             if self.settings.output == "commands":
                 return f"{old:.3g} s old by its stamp: is it stamped in ROS time, by a clock that agrees with this one?"

@@ -29,6 +29,7 @@ class EncoderNoise:
         self.variance = np.zeros(axes)  # m^2 of one reading
         self._readings = 0
         self._last = np.empty((0, axes))
+        self.still = np.zeros(axes)  # m by which two readings differ at most while the axis rests
 
     def saw(self, values: FloatArray) -> None:
         """Consecutive positions, (n, axes) in m."""
@@ -42,10 +43,9 @@ class EncoderNoise:
             share = min(1.0, len(bent) / self._readings)
             self.variance += share * (np.mean(bent * bent, axis=0) / THIRD - self.variance)
         self._last = rows[-3:]
+        self.still = self._resting()
 
-    @property
-    def still(self) -> FloatArray:
-        """(axes,) m by which two readings differ at most while the axis rests."""
+    def _resting(self) -> FloatArray:
         squares = WORTH * self._readings
         if not squares:
             return np.full(len(self.count), np.inf if len(self._last) > 1 else 0.0)  # nobody knows yet

@@ -35,9 +35,9 @@ class TrajectoryDrive(Drive):
         self._until = 0  # sample from which on the controller brakes, as it was told last
         self._last_word = False  # the controller was told to brake
 
-    def see(self, block: Block) -> bool:
+    def see(self, block: Block, overdue: int = 0) -> bool:
         """See ``Drive``; where the joint stands first is where the motion begins and comes back to."""
-        usable = super().see(block)
+        usable = super().see(block, overdue)
         if usable and self._plan is None and self._start is not None and self.state == "active":
             axes = list(self.settings.axes.values())
             reach = np.array([0.0 if motion is None else axis.limit for axis, motion in zip(axes, self._motions, strict=True)])
@@ -58,9 +58,9 @@ class TrajectoryDrive(Drive):
             self._plan, self._first = MotionPlan(self._motions, self._start, self.settings.rate, limits), self.seq + self._lead
         return usable
 
-    def _why_unusable(self, block: Block) -> str:
-        why = super()._why_unusable(block)
-        late = 0.0 if why else (self.seq - 1 - float(block.seq[-1])) / self.settings.rate
+    def _why_unusable(self, block: Block, overdue: int) -> str:
+        why = super()._why_unusable(block, overdue)
+        late = 0.0 if why else (self.seq + overdue - 1 - float(block.seq[-1])) / self.settings.rate
         if -LEAD <= late <= BEHIND:
             return why
         return why or (

@@ -103,6 +103,8 @@ class TravelGuard:
         up, down = np.maximum(outward.max(axis=0), 0.0), np.minimum(outward.min(axis=0), 0.0)
         upper = np.clip((place + up * ahead - self.high + self.zone) / self.zone, 0.0, 1.0)
         lower = np.clip((self.low + self.zone - place - down * ahead) / self.zone, 0.0, 1.0)
+        if not (upper.any() or lower.any()):
+            return driven
         above = place - self.low > self.high - place
         places, asked = np.array([seen.position for seen in self._speeds]), np.minimum(self.push, np.abs(driven))
         push_down = np.where(place - places.min(axis=0) > self._still, self.push, asked)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from itertools import combinations
 
 from xy_sysid.axis.model import AxisModel, Library
@@ -72,7 +72,7 @@ def moves(data: AxisData, library: Library, now: GreyboxFit, brief: GreyboxFit, 
             related = bool(effect.family) and effect.family == library[name].family
             suspected = name in effect.suspects and (data.units.output == "rad" or not effect.angular)
             if related or suspected:
-                starts = partial(swapped, data, now, name, effect, traced)
+                starts = cache(partial(swapped, data, now, name, effect, traced))  # asked for their promise, and again to be fitted
                 rest = model.without(name)
                 begun = starts() if suspected else other_starts(data, now, rest, effect.name, scene, TOLD) if early and is_read(rest) else ()
                 more = len(effect.parameters) - len(library[name].parameters)

@@ -370,7 +370,9 @@ class ExcitationNode(Overridable, LifecycleNode):
             if drive is None or self._beat is None or self._epoch is None:
                 return
             seq = (stamp - self._epoch) * drive.settings.rate
-            if not drive.see(Block(drive.axes, np.array([seq]), np.array([stamp]), values[None, :])):
+            now = self.get_clock().now().nanoseconds * 1e-9
+            overdue = max(int((now - self._epoch) * drive.settings.rate) + 1 - drive.seq, 0)
+            if not drive.see(Block(drive.axes, np.array([seq]), np.array([stamp]), values[None, :]), overdue):
                 self._complain(f"joint states: not usable ({drive.unusable})")
 
     def _on_beat(self, skipped: int) -> None:
