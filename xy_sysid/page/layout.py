@@ -11,7 +11,7 @@ from xy_sysid.page.files_dialog import open_dialog
 from xy_sysid.page.orders import Source
 from xy_sysid.page.panel import Panel, name_in_address
 from xy_sysid.page.session import Session
-from xy_sysid.page.together_card import TogetherCard
+from xy_sysid.page.together_card import TogetherCard, choices
 from xy_sysid.page.trend_card import TrendCard
 from xy_sysid.page.units_choice import UnitsChoice
 from xy_sysid.units import shown_in
@@ -71,12 +71,13 @@ class Page:
         self._empty.set_visibility(not sources)
         self._units.refresh(sources)
         self._tell(sources)
+        compared = choices(sources)
         for panel in list(self._panels.values()):
             if not self._client.is_deleted:  # the browser may go while something is drawn
                 await panel.refresh()
         if not self._client.is_deleted:
             self._keep_address()
-            await self._together.refresh(sources)
+            await self._together.refresh(compared)
 
     def _keep_address(self) -> None:
         """The address of the browser names what is shown, so that a reload or a link shows it again."""
