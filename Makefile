@@ -7,7 +7,8 @@ JOBS ?= 3
 VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
-PYTEST = $(BIN)/python -m pytest -n $(JOBS) --dist loadfile --max-worker-restart 0 # xdist 3.8 waits for ever after it has replaced one
+# xdist 3.8 waits for ever after it has replaced a worker that crashed
+PYTEST = $(BIN)/python -m pytest -n $(JOBS) --dist loadfile --max-worker-restart 0
 PIP := $(BIN)/python -m pip --disable-pip-version-check -qq install --no-compile -c constraints.txt
 LAWS = OPENBLAS_NUM_THREADS=1 $(BIN)/python -c "import xy_sysid as xy; run = xy.simulate(10, hidden=7, seed=1).run('x'); xy.fit(run); xy.diagnose(run); \
   xy.use(xy.PhysicalModel(xy.AxisModel(0.1, 1e-3, 200.0)), limit=5.0)"

@@ -68,7 +68,6 @@ setup(
             "playwright",
             "pypdfium2",
             "pytest",
-            "pytest-timeout",
             "pytest-xdist",
             "hypothesis",
             "blark",

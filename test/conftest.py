@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import faulthandler
 import os
 import signal
 from collections.abc import Iterator
@@ -50,6 +49,14 @@ COMPUTING = (  # files that compute, the longest first
 LONG = [name for pair in zip(LIVE, COMPUTING, strict=True) for name in pair]
 
 
+@pytest.hookimpl(trylast=True)
+def pytest_configure(config: pytest.Config) -> None:
+    """What a crash prints is seen, also after rclpy has turned it to what pytest captures."""
+    from helpers import ros_tools
+
+    ros_tools.CRASHES = config.stash[fault_handler_stderr_fd_key]
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Long files first, one that waits and one that computes in turn; with several workers xdist puts files with many tests before them."""
     root = Path(__file__).parent
@@ -58,10 +65,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 @pytest.fixture
-def world(tmp_path: Path, pytestconfig: pytest.Config) -> Iterator[World]:
+def world(tmp_path: Path) -> Iterator[World]:
     """A ROS domain of its own, in which every process ends with the test."""
     from helpers.ros_tools import world_in
 
     with world_in(tmp_path) as made:
-        faulthandler.enable(pytestconfig.stash[fault_handler_stderr_fd_key])  # rclpy's executor has turned it to what is captured, and lost
         yield made

@@ -36,7 +36,7 @@ def judged(*truth: str, seconds: float = SHORT) -> Judged:
     return run(Case("test", truth, 1, "development", seconds=seconds))
 
 
-@pytest.mark.parametrize("name", ["gain_drift", "amplifier_lag"])
+@pytest.mark.parametrize("name", ["coulomb_friction", "dead_zone", "gain_drift", "cogging", "amplifier_lag"])
 def test_a_hidden_effect_is_named(name: str) -> None:
     """Alone, first, with confidence, and its held-out error is that of a fit that began at the truth."""
     found = judged(name)
@@ -104,7 +104,8 @@ def test_draws_of_the_exact_sets_are_those_of_earlier_campaigns() -> None:
     assert [case.truth for case in sets("reporting")["two effects"]][:3] == OLD_PAIRS
 
 
-@pytest.mark.parametrize(("amount", "number"), [(0.002, 0), (0.01, 1), (0.03, 2), (0.03, 3)])
+@pytest.mark.parametrize("amount", [0.002, 0.01, 0.03])
+@pytest.mark.parametrize("number", [0, 1, 2, 3])
 def test_dirt_changes_the_motion_by_what_was_asked_for(amount: float, number: int) -> None:
     """Within a tenth, on the axis without the effect, at its own fine steps and with the voltage that the case drives it with."""
     case = Case("test dirt", ("coulomb_friction",), number, "development", seconds=6.0, dirt=amount)

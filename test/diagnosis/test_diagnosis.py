@@ -79,11 +79,12 @@ def test_what_was_found_comes_first_and_what_is_left_is_said() -> None:
     assert "What is left: " in found.sentence and "of the motion, beyond the encoder's noise of " in found.sentence
 
 
-def test_words_for_people_steer_no_search() -> None:
+@pytest.mark.parametrize("effect", ["coulomb_friction", "backlash"])
+def test_words_for_people_steer_no_search(effect: str) -> None:
     """A library whose effects look like nothing finds the same, with the same confidence and in the same words."""
-    u, y = recorded("coulomb_friction", seconds=20.0).axis("x")
-    found, told = diagnosed("coulomb_friction"), diagnose(2000.0, u, y, Library([replace(item, look_alikes=()) for item in EFFECTS.values()]))
-    assert (found.verdict, found.effects) == ("missing_effect", ("coulomb_friction",))
+    u, y = recorded(effect, seconds=20.0).axis("x")
+    found, told = diagnosed(effect), diagnose(2000.0, u, y, Library([replace(item, look_alikes=()) for item in EFFECTS.values()]))
+    assert (found.verdict, found.effects) == ("missing_effect", (effect,))
     assert (told.verdict, told.effects, told.confidence, told.sentence) == (found.verdict, found.effects, found.confidence, found.sentence)
 
 

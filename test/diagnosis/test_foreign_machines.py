@@ -120,7 +120,9 @@ def test_a_spring_beside_friction_that_breaks_away_is_not_one_that_stiffens() ->
     assert set(found.effects) == {"return_spring", "stribeck_friction"}, found.sentence
 
 
-@pytest.mark.parametrize(("gap", "table", "coulomb"), [(1e-4, 0.1, 0.0), (3e-5, 0.1, 0.15), (3e-4, 0.03, 0.15), (3e-4, 0.3, 0.0)])
+@pytest.mark.parametrize(
+    ("gap", "table", "coulomb"), [(1e-4, 0.1, 0.0), (1e-4, 0.1, 0.15), (3e-5, 0.1, 0.15), (3e-4, 0.03, 0.15), (3e-4, 0.1, 0.15), (3e-4, 0.3, 0.0)]
+)
 def test_a_gap_before_a_table_that_drags_is_found(gap: float, table: float, coulomb: float) -> None:
     """Half of the drag is the table's, as guides are; the base has taken the delay for something else. Light tables and heavy ones."""
     found = diagnose(2000.0, *across_gap(gap, table, coulomb, 1))
@@ -128,7 +130,9 @@ def test_a_gap_before_a_table_that_drags_is_found(gap: float, table: float, coul
     assert values(found)["backlash"][0] == pytest.approx(gap, rel=0.1)
 
 
-@pytest.mark.parametrize(("gap", "table", "coulomb", "lag", "load"), [(3e-4, 0.05, 0.1, 2e-3, 0.05), (3e-4, 0.1, 0.0, 3e-3, 0.1)])
+@pytest.mark.parametrize(
+    ("gap", "table", "coulomb", "lag", "load"), [(1e-4, 0.1, 0.15, 2e-3, 0.0), (3e-4, 0.05, 0.1, 2e-3, 0.05), (3e-4, 0.1, 0.0, 3e-3, 0.1)]
+)
 def test_what_a_gap_hides_is_found_with_it(gap: float, table: float, coulomb: float, lag: float, load: float) -> None:
     """An amplifier that lags leaves no trace before a gap, and without it no filter follows the motor; a load pulls on the table."""
     found = diagnose(2000.0, *across_gap(gap, table, coulomb, 1, lag=lag, load=load))

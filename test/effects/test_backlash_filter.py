@@ -200,7 +200,7 @@ def test_a_gap_that_cannot_come_near_the_best_without_it_is_given_up_soon() -> N
     assert not followed(data, base, GAP, limits=Limits(bar=bar))[1].given_up
 
 
-@pytest.mark.parametrize(("idle", "times", "given_up"), [(0.0, 100.0, False), (0.9, 0.5, True)])
+@pytest.mark.parametrize(("idle", "times", "given_up"), [(0.0, 100.0, False), (0.0, 0.5, True), (0.9, 0.5, True), (0.9, 100.0, False)])
 def test_what_beats_the_bar_where_nobody_fitted_goes_on_even_if_the_filter_does_as_well_without_a_gap(
     idle: float, times: float, given_up: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -53,7 +53,7 @@ def test_every_parameter_of_the_library_has_a_unit_that_is_understood() -> None:
             assert other.typical == pytest.approx(item.typical * large.factor(item.unit))
 
 
-@pytest.mark.parametrize("effect", ["presliding_hysteresis", "backlash"])
+@pytest.mark.parametrize("effect", ["coulomb_friction", "stribeck_friction", "presliding_hysteresis", "backlash"])
 def test_the_same_axis_in_other_units_misses_the_same_effect(effect: str) -> None:
     """Driven by hundreds of newtons, read in degrees: the name, its confidence, and each number in its own unit."""
     recording = recorded(effect, seconds=20.0)

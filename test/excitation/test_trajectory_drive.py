@@ -221,11 +221,15 @@ def test_trajectories_are_positions_for_a_controller(more: dict[str, Any]) -> No
 
 
 def test_a_joint_state_that_comes_while_this_computer_has_stood_still_is_no_fault_of_the_clock() -> None:
-    """Its stamp is that of now; what lags is the count of commands, which were due and are not sent yet."""
+    """What lags is the count of commands, which were due and are not sent yet: states of any time since then are usable, and none of later."""
     one = robot()
     one.go(100)
-    stalled = round(0.1 * RATE)
-    at = np.array([one.drive.seq - 1.0 + stalled])
-    state = Block(("x",), at, at / RATE, np.array([[one.place]]))
-    assert not one.drive.see(state) and "stamped 0.1 s after it comes" in one.drive.unusable
-    assert one.drive.see(state, overdue=stalled)
+    stalled = round(0.2 * RATE)
+
+    def seen(after: int, overdue: int) -> bool:
+        at = np.array([one.drive.seq - 1.0 + after])
+        return one.drive.see(Block(("x",), at, at / RATE, np.array([[one.place]])), overdue)
+
+    assert not seen(stalled, 0) and "stamped 0.2 s after it comes" in one.drive.unusable
+    assert seen(1, stalled) and seen(stalled, stalled)  # one that has waited to be read, and one that came just now
+    assert not seen(2 * stalled, stalled) and "stamped 0.2 s after it comes" in one.drive.unusable

@@ -96,7 +96,7 @@ def test_the_simulated_table_wired_backwards_is_stopped_as_the_docs_promise(rms:
     assert stopped and round(longest, 3) <= seconds and furthest <= way
 
 
-@pytest.mark.parametrize("rms", [0.1, 0.5, 2.0, 5.0])
+@pytest.mark.parametrize("rms", [0.1, 0.2, 0.5, 1.0, 2.0, 5.0])
 @pytest.mark.parametrize(
     "wrong",
     [{}, {"lag": 0.1}, {"delay": 0.02}, {"friction": 0.3, "gain": 0.2}, {"noise": 5e-6}, {"count": 1e-5}, {"load": -0.05}],
@@ -130,17 +130,19 @@ RIGHT: dict[str, dict[str, float]] = {
 @pytest.mark.parametrize("rms", [0.1, 0.5, 2.0])
 @pytest.mark.parametrize("right", RIGHT)
 def test_a_right_axis_is_never_called_backwards(right: str, rms: float) -> None:
-    """Friction, slow poles, delays, noise, coarse encoders and loads: the sign is never blamed."""
-    drive, _ = driven(Axis(**RIGHT[right]), AxisExcitation(rms=rms, seed=1, **LONG), 4.0)
-    assert "sign" not in drive.reason and "wires" not in drive.reason, drive.reason
+    """Friction, slow poles, delays, noise, coarse encoders and loads, several seeds: the sign is never blamed."""
+    for seed in (1, 2):
+        drive, _ = driven(Axis(**RIGHT[right]), AxisExcitation(rms=rms, seed=seed, **LONG), 4.0)
+        assert "sign" not in drive.reason and "wires" not in drive.reason, drive.reason
 
 
 @pytest.mark.parametrize("kind", ["multisine", "sweep", "stepped_sine", "prbs", "step", "impulse", "off"])
-@pytest.mark.parametrize(("delay", "rms"), [(0.0, 2.0), (0.03, 0.3), (0.03, 2.0)])
-def test_no_kind_of_signal_makes_a_right_axis_look_backwards(kind: str, delay: float, rms: float) -> None:
+@pytest.mark.parametrize("delay", [0.0, 0.03])
+def test_no_kind_of_signal_makes_a_right_axis_look_backwards(kind: str, delay: float) -> None:
     """Where a delay is half a period, plus moves it to minus: that says nothing of the wiring."""
-    drive, _ = driven(Axis(delay=delay), AxisExcitation(kind=kind, rms=rms, low=0.5, **LONG), 6.0)
-    assert "sign" not in drive.reason and "wires" not in drive.reason, drive.reason
+    for rms in (0.3, 2.0):
+        drive, _ = driven(Axis(delay=delay), AxisExcitation(kind=kind, rms=rms, low=0.5, **LONG), 6.0)
+        assert "sign" not in drive.reason and "wires" not in drive.reason, drive.reason
 
 
 def test_an_axis_that_vibrates_under_a_weak_centring_is_not_called_backwards() -> None:

@@ -5,6 +5,7 @@ Import from a test module that starts with ``pytestmark = needs_ros``.
 
 from __future__ import annotations
 
+import faulthandler
 import importlib.util
 import itertools
 import os
@@ -33,6 +34,7 @@ WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
 WORKERS = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
 
 SHARED = Path("/dev/shm")
+CRASHES = 2  # file descriptor to which a crash is told; of the whole run, once that is known
 
 _count = itertools.count()
 
@@ -119,6 +121,7 @@ class World:
         rclpy.init(context=self.context, domain_id=self.domain, signal_handler_options=SignalHandlerOptions.NO)
         self.node: Any = rclpy.create_node("test", namespace="/xy", context=self.context)
         self._executor = EventsExecutor(context=self.context)
+        faulthandler.enable(CRASHES)  # the executor has told Python to write to stderr, which is captured
         self._executor.add_node(self.node)
         self._clients: dict[str, Any] = {}
         self.processes: list[NodeProcess] = []

@@ -50,9 +50,7 @@ def feed(joints: JointCounter, times: FloatArray, *sinks: Identifier | Newest) -
                 sink.feed(kind, given)
 
 
-@pytest.mark.parametrize(
-    ("rate", "change"), [*itertools.product(RATES[:2], CHANGES), *((rate, change) for rate in RATES[2:] for change in CHANGES[::5])]
-)
+@pytest.mark.parametrize(("rate", "change"), [*itertools.product(RATES[:-1], CHANGES), *((RATES[-1], change) for change in CHANGES[::5])])
 def test_another_rate_of_joint_states_is_followed_within_ten_seconds(rate: float, change: float) -> None:
     """From half to double, from 2 % on: both live listeners know the rate, and lose nothing after that."""
     joints, identifier, newest = (

@@ -37,7 +37,8 @@ class Scene:
 
     def lifecycle(self, words: str, seconds: float = 15.0) -> None:
         """Wait until the page says so of the excitation."""
-        self.tab.until(lambda: words in str(self.tab.page.locator("[data-part=lifecycle]").text_content()), seconds, words)
+        said = self.tab.page.locator("[data-part=lifecycle]")
+        self.tab.until(lambda: words in str(said.text_content()), seconds, lambda: f"{words!r} is not said, but {said.text_content()!r}")
 
     def drive(self) -> None:
         """Configure and Activate by clicks, if it does not drive already."""
@@ -49,8 +50,9 @@ class Scene:
             self.lifecycle("not configured")
             self.tab.press("configure")
         self.lifecycle("nothing moves before Activate")
-        lifecycle = self.tab.page.locator("[data-part=lifecycle]")  # a guard may take a stall for a fault: again
-        self.tab.press_until("activate", lambda: "driving" in str(lifecycle.text_content()), 30.0, "driving")
+        self.tab.until(self.tab.page.locator("[data-act=activate]").is_enabled)
+        self.tab.press("activate")
+        self.lifecycle("driving")
 
     def nodes(self) -> str:
         """What the page says of the nodes."""

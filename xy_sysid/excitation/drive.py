@@ -145,7 +145,7 @@ class Drive:
     def see(self, block: Block, overdue: int = 0) -> bool:
         """Take note of positions, (n, axes) in m; False if they are not usable, and ``unusable`` says why.
 
-        overdue: samples that this computer, which stood still, has not sent yet though their time has come
+        overdue: samples that were due and are not sent yet, as this computer stood still; a position may be of any time since then
 
         A motion that the voltage cannot have caused, or that it should have, stops the drive.
         """
@@ -200,15 +200,15 @@ class Drive:
             return f"counter {seq:.0f}, which does not go on"
         if block.time[-1] < self._seen_time:
             return f"stamped {self._seen_time - block.time[-1]:.3g} s before the one before it"
-        old = (self.seq + overdue - 1 - seq) / self.settings.rate
+        old, ahead = (self.seq - 1 - seq) / self.settings.rate, (seq + 1 - self.seq - overdue) / self.settings.rate
         if old > (self.settings.watchdog * max(self.settings.speed, 1.0) + FURTHEST) and not self.settings.lockstep:
             if self.settings.output == "commands":
                 return f"{old:.3g} s old by its stamp: is it stamped in ROS time, by a clock that agrees with this one?"
             return f"{old:.3g} s old by its counter, which must be that of the voltage"
-        if -old > AHEAD:
+        if ahead > AHEAD:
             if self.settings.output == "commands":
-                return f"stamped {-old:.3g} s ahead: is it stamped in ROS time, by a clock that agrees with this one?"
-            return f"{-old:.3g} s ahead of the voltage by its counter: the machine does not follow this voltage yet, or numbers by itself"
+                return f"stamped {ahead:.3g} s ahead: is it stamped in ROS time, by a clock that agrees with this one?"
+            return f"{ahead:.3g} s ahead of the voltage by its counter: the machine does not follow this voltage yet, or numbers by itself"
         return ""
 
     def _speed(self, values: FloatArray, seq: FloatArray) -> FloatArray:

@@ -60,11 +60,15 @@ class TrajectoryDrive(Drive):
 
     def _why_unusable(self, block: Block, overdue: int) -> str:
         why = super()._why_unusable(block, overdue)
-        late = 0.0 if why else (self.seq + overdue - 1 - float(block.seq[-1])) / self.settings.rate
-        if -LEAD <= late <= BEHIND:
+        if why:
             return why
-        return why or (
-            f"stamped {abs(late):.3g} s {'before' if late > 0.0 else 'after'} it comes: where trajectories are sent, the robot's clock may be "
+        late = (self.seq - 1 - float(block.seq[-1])) / self.settings.rate
+        early = -late - overdue / self.settings.rate
+        if late <= BEHIND and early <= LEAD:
+            return ""
+        when = "before" if late > BEHIND else "after"
+        return (
+            f"stamped {max(late, early):.3g} s {when} it comes: where trajectories are sent, the robot's clock may be "
             f"{LEAD:g} s ahead of this computer's and {BEHIND:g} s behind it (chrony, PTP)"
         )
 

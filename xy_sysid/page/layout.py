@@ -71,7 +71,7 @@ class Page:
         self._empty.set_visibility(not sources)
         self._units.refresh(sources)
         self._tell(sources)
-        compared = choices(sources)
+        compared = choices(sources)  # before the panels are drawn: what they do not show yet would push this card down later
         for panel in list(self._panels.values()):
             if not self._client.is_deleted:  # the browser may go while something is drawn
                 await panel.refresh()

@@ -44,7 +44,7 @@ class TogetherCard:
         self._card.set_visibility(False)  # until it is known that there are two
 
     async def refresh(self, found: list[Choice]) -> None:
-        """Draw again what has changed. found: what there is to compare, of before the panels above were drawn, as one that grows later pushes it."""
+        """Draw again what has changed. found: what can be drawn."""
         self._card.set_visibility(len(found) > 1)
         if len(found) < 2:
             return
