@@ -250,7 +250,7 @@ def test_a_link_opens_the_same_view_and_a_reload_keeps_it(usual: Tab, tab: Calla
     assert " um/s" in str(first.locator("[data-part=headline]").text_content()) and "um/s" in str(first.locator(".facts").text_content())
     assert other.page.url == f"{server.address}?{wanted}"
     other.page.reload()
-    other.until(shown, 30, "another view after a reload")
+    other.until(lambda: shown() and other.page.locator(".panel").count() == 2, 30, "another view after a reload")
     assert other.page.url == f"{server.address}?{wanted}" and other.page.evaluate("document.body.classList.contains('body--dark')")
     close = other.page.get_by_role("button", name="close recording").nth(1)
     other.click_until(close, lambda: other.page.locator(".panel").count() == 1, 30, "the recording is not closed")
