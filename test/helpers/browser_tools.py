@@ -159,6 +159,12 @@ class Tab:
         found = self.page.locator("[data-part=headline]")
         return str(found.first.text_content()) if found.count() else ""
 
+    def said(self) -> tuple[str, str] | None:
+        """Headline and sentence of the first story, both of one moment; None while the page has no story, as when it is loaded again."""
+        script = """() => ["headline", "verdict"].map(part => document.querySelector(`[data-part=${part}]`)?.textContent ?? null)"""
+        headline, sentence = self.page.evaluate(script)
+        return None if headline is None or sentence is None else (str(headline), str(sentence))
+
     def fact(self, label: str) -> str:
         """The text of a number."""
         found = self.page.locator(f".fact[aria-label='{label}'] .value")

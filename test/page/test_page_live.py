@@ -245,7 +245,7 @@ def test_stop_really_makes_the_excitation_inactive(scene: Scene, way: str) -> No
         lifecycle = str(tab.page.locator("[data-part=lifecycle]").text_content())
         return "nothing moves before Activate" in lifecycle and any("stopped: the excitation is" in words for words in heard)
 
-    tab.until(stopped, 15)
+    tab.until(stopped, 15, lambda: f"{tab.page.locator('[data-part=lifecycle]').text_content()!r}, {set(heard)}")
     assert world.state("excitation") == "inactive" and scene.silent()
     tab.until(lambda: tab.page.get_by_role("button", name="Release STOP and activate").is_enabled(), 15, "what Activate does with STOP is not said")
     assert "no activate" not in scene.nodes()

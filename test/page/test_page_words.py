@@ -20,7 +20,8 @@ from xy_sysid.page.document_words import look_alike_lines, model_effects, verdic
 from xy_sysid.page.downloads import plain_name
 from xy_sysid.page.facts import coherence_fact, dropped_words, facts, polynomial, seconds_text, transfer_function_html
 from xy_sysid.page.live_figures import failing, failing_words, response_figure, tracking_figure
-from xy_sysid.page.session import Session
+from xy_sysid.page.notices import BAD_STAYS, BEFORE, GOOD_STAYS, SHOWN, Notices
+from xy_sysid.page.session import Message, Session
 from xy_sysid.page.settings_form import changes, limits
 from xy_sysid.page.shelf import Shelf
 from xy_sysid.page.topics_state import LOST, TopicsState, columns, thinned
@@ -260,6 +261,20 @@ def test_what_was_said_a_moment_ago_is_one_message(tmp_path: Path) -> None:
     for words in ("stopped: the voltage is zero", "stopped: the voltage is zero", "recorded a bag"):
         session.say(words, True)
     assert [message.words for message in session.messages] == ["stopped: the voltage is zero", "recorded a bag"]
+
+
+def test_a_message_stays_from_when_the_page_could_first_show_it() -> None:
+    """A page at work for a minute, or loaded again, has missed nothing; what is older than that is not shown; the newest few at a time."""
+    stopped, refused = Message(1, "12:00:00", 100.0, "stopped", True), Message(2, "12:00:00", 100.0, "refused", False)
+    notices = Notices(90.0)
+    assert notices.shown([], 99.0) == []
+    assert notices.shown([stopped, refused], 160.0) == [stopped, refused]
+    assert notices.shown([stopped, refused], 160.0 + GOOD_STAYS + 0.1) == [refused]
+    assert notices.shown([stopped, refused], 160.0 + BAD_STAYS + 0.1) == []
+    assert Notices(100.0 + BEFORE).shown([stopped], 101.0 + BEFORE) == [stopped]
+    assert Notices(100.1 + BEFORE).shown([stopped], 101.0 + BEFORE) == []
+    many = [Message(number, "12:00:00", 100.0, "stopped", True) for number in range(SHOWN + 3)]
+    assert Notices(100.0).shown(many, 101.0) == many[3:]
 
 
 def test_a_picture_is_never_kept_under_a_stamp_that_is_newer_than_its_story() -> None:

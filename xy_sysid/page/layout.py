@@ -8,6 +8,7 @@ from nicegui import ui
 
 from xy_sysid.page.address import PageView, query_of
 from xy_sysid.page.files_dialog import open_dialog
+from xy_sysid.page.notices import Notices
 from xy_sysid.page.orders import Source
 from xy_sysid.page.panel import Panel, name_in_address
 from xy_sysid.page.session import Session
@@ -17,9 +18,7 @@ from xy_sysid.page.units_choice import UnitsChoice
 from xy_sysid.units import shown_in
 
 EVERY = 0.4  # s between two looks for what is new
-SHOWN = 4  # messages on the page at a time
 THEMES, DARK = ("", "light", "dark"), (None, False, True)  # in the address, and for the page
-GOOD_STAYS, BAD_STAYS = 8.0, 60.0  # s that a message stays
 
 
 def build(session: Session, view: PageView) -> None:
@@ -35,6 +34,7 @@ class Page:
         self._session, self._client = session, ui.context.client
         self._wanted, self._query = view, ""
         self._panels: dict[str, Panel] = {}
+        self._messages = Notices(time.monotonic())
         self._told: list[int] = []
         self._alarms: list[str] = []
         self._bar()
@@ -116,13 +116,13 @@ class Page:
             with self._alarm:
                 for words in alarms:
                     ui.label(f"Alarm: {words}").classes("notice")
-        fresh = [message for message in list(session.messages) if time.monotonic() - message.at < (GOOD_STAYS if message.good else BAD_STAYS)]
-        numbers = [message.number for message in fresh[-SHOWN:]]
+        shown = self._messages.shown(list(session.messages), time.monotonic())
+        numbers = [message.number for message in shown]
         if numbers != self._told:
             self._told = numbers
             self._notices.clear()
             with self._notices:
-                for message in fresh[-SHOWN:]:
+                for message in shown:
                     ui.label(f"{message.clock}  {message.words}").classes("notice good" if message.good else "notice warn")
 
 

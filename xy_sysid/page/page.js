@@ -1,8 +1,9 @@
-// STOP goes by a plain request, so that it works even when the page's own connection is broken.
+// STOP goes by a plain request, so that it works even when the page's own connection is broken; it is sent although the page is being loaded
+// again meanwhile (keepalive).
 window.xyStop = async () => {
   const gone = document.getElementById("gone");
   try {
-    const answer = await fetch("/stop", { method: "POST", headers: { "X-Requested-With": "xy_sysid" } });
+    const answer = await fetch("/stop", { method: "POST", keepalive: true, headers: { "X-Requested-With": "xy_sysid" } });
     if (!answer.ok) throw new Error(String(answer.status));
     const said = await answer.json();
     gone.textContent = said.asked && !said.stopped ? "STOP: " + said.words : "";
