@@ -73,6 +73,8 @@ def test_a_benchmark_that_is_asked_for_by_name_runs(name: str, monkeypatch: pyte
     monkeypatch.setattr("sys.argv", ["bench", "--short", name])
     if name in ("peers", "diagnoses"):
         data("hsm150/hsm_pos_0.06_1.npz")
+    if name == "next_part":
+        data("gap_foreign/gap_linear_37um.npz")
     if name == "emps_force":
         data("emps/emps_train.npz")
     pages = [ROOT / "docs" / name for name in ("benchmarks.md", "real-machines.md", "use.md")]

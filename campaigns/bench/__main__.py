@@ -3,7 +3,7 @@
 h1, frf, fit, replay, bags, live and intervals run without a name. Only by name:
     long_bag (a day of data, gigabytes on disk), axis_model, settle, settle_limits, settle_precision,
     use (a path after a minute of identification: half an hour), fleet (a year of 20 machines), trend
-    real_fits, peers, diagnoses, emps_force: of the recordings of real machines in $XY_SYSID_DATA
+    real_fits, peers, diagnoses, emps_force, next_part: of the recordings of real machines in $XY_SYSID_DATA
 peers and diagnoses write their tables to docs/real-machines.md, use and emps_force to docs/use.md.
 --short: a little of each, as the tests run it; nothing is written.
 """
@@ -32,6 +32,7 @@ SCRIPTS = (
     "settle_precision",
     "use",
     "emps_force",
+    "next_part",
     "fleet",
     "fleet_scale",
     "trend",

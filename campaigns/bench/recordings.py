@@ -13,7 +13,7 @@ from campaigns.faults.shared import DATA, RECORDINGS, Shared
 from xy_sysid.cli import options as o
 from xy_sysid.cli.reading import read_each, reads, runs_of
 from xy_sysid.errors import BadInput, BadRecording
-from xy_sysid.samples.recording import Recording, Run
+from xy_sysid.samples.recording import Run
 
 if TYPE_CHECKING:
     from xy_sysid.imports.reading import Reading
@@ -38,18 +38,24 @@ def rows(short: bool) -> tuple[Shared, ...]:
     return tuple(row for row in RECORDINGS if (DATA / row.path).exists() and (not short or row.path in SHORT))
 
 
-def axes(row: Shared) -> Iterator[Axis]:
-    """Every axis of a recording, read with the options of its row."""
-    read: list[Recording] = []
+def asked(row: Shared) -> tuple[list[Path], Reading]:
+    """The path of a recording, and how a command reads it with the options of its row. Raises BadInput for options that mean nothing."""
+    found: list[tuple[list[Path], Reading]] = []
     app = typer.Typer()
 
     @app.command()
     @reads
-    def load(recs: o.Recs, reading: Reading) -> None:
-        read.extend(read_each(recs, reading, quiet=True))
+    def read(recs: o.Recs, reading: Reading) -> None:
+        found.append((recs, reading))
 
+    app([str(DATA / row.path), *row.options], standalone_mode=False)
+    return found[0]
+
+
+def axes(row: Shared) -> Iterator[Axis]:
+    """Every axis of a recording, read with the options of its row."""
     try:
-        app([str(DATA / row.path), *row.options], standalone_mode=False)
+        read = read_each(*asked(row), quiet=True)
     except (BadInput, BadRecording) as refusal:
         yield Axis(row.path, (), str(refusal).replace(f"{DATA}/", "").removeprefix(f"{row.path}: "))
         return

@@ -25,7 +25,7 @@ from xy_sysid.fleets.columns_doc import document
 from xy_sysid.fleets.history import Axis
 from xy_sysid.fleets.trends import of_axes
 from xy_sysid.fleets.wander import Series, usual
-from xy_sysid.fleets.words import sentence
+from xy_sysid.fleets.words import sentence, summary
 
 LEVEL = 10.0  # log of the statistic, as for a weekly recording with seven parameters
 
@@ -203,7 +203,7 @@ def test_the_page_shows_every_parameter_and_opens_offline(table: Path, tmp_path:
 
 
 def test_one_long_recording_is_a_trend_of_its_parts(tmp_path: Path) -> None:
-    """--every: the gain of a recording of 4 s rises after 2 s; no clock tells the date, so times are from the start."""
+    """--every: the gain of a recording of 4 s rises after 2 s; no clock tells the date, so times are from the start, on the page, too."""
 
     def risen(content: Any) -> Any:
         steps = np.diff(content["y"], prepend=0.0)
@@ -213,7 +213,30 @@ def test_one_long_recording_is_a_trend_of_its_parts(tmp_path: Path) -> None:
     (gain,) = (one for one in cli("trend", path, "--every", "1s", "--json").json["parameters"] if one["parameter"] == "gain")
     assert gain["values"] == pytest.approx([1e-3, 1e-3, 1.3e-3, 1.3e-3], rel=0.05)
     assert [date[14:19] for date in gain["dates"]] == ["00:00", "00:01", "00:02", "00:03"]
+    page = tmp_path / "page.html"
+    assert "long.npz: 1 axis, 4 recordings, 3 s." in cli("trend", path, "--every", "1s", "-o", page).out
+    assert "min after the start" in page.read_text(encoding="utf-8") and "1970" not in page.read_text(encoding="utf-8")
     assert "a time of 1 s or more" in refused("trend", path, "--every", "soon")
+
+
+@pytest.mark.parametrize(
+    ("months", "words"), [(0.3, "9.13 days"), (0.02, "14.6 hours"), (1e-3, "43.8 minutes"), (1e-5, "26.3 s"), (12.0, "12 axis-months")]
+)
+def test_how_long_was_looked_at_is_told_in_a_unit_that_people_read(months: float, words: str) -> None:
+    """A day of parts of one recording is no fraction of a month."""
+    one = axis(0, 3, 6)
+    months_of_it = one.months
+    stretched = tuple(one.dates[0] + (date - one.dates[0]) * months / months_of_it for date in one.dates)
+    found = of_axes([replace(one, dates=stretched)], causes())
+    assert summary(found) == f"1 axis, 6 recordings, {words}"
+
+
+@pytest.mark.filterwarnings("error")
+def test_an_interval_that_knows_nothing_has_no_end() -> None:
+    """A value whose error is a million times its size: no overflow is warned of."""
+    one = axis(0, 3, 6).histories[0]
+    found = of_axes([replace(axis(0, 3, 6), histories=(replace(one, low=one.value - 1e6 * one.value, high=one.value + 1e6 * one.value),))], causes())
+    assert np.all(np.isinf(found.trends[0].high)) and np.all(np.isfinite(found.trends[0].history.value))
 
 
 def test_what_is_no_table_is_refused(tmp_path: Path, table: Path) -> None:

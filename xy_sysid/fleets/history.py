@@ -51,8 +51,9 @@ class History:
         return Series(steps(self.dates), np.log(value) if self.logarithmic else value / self.level, np.nan_to_num(sigma))
 
     def plain(self, part: Any) -> Any:
-        """Values in the unit, of parts of the level."""
-        return np.exp(part) if self.logarithmic else part * self.level
+        """Values in the unit, of parts of the level; infinite where that is too large for a number, as an end of an interval that knows nothing."""
+        with np.errstate(over="ignore"):
+            return np.exp(part) if self.logarithmic else part * self.level
 
     def changed(self, value: float, part: float) -> float:
         """A value after a change by so much of the level."""

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from datetime import datetime
 
-from xy_sysid.fleets.history import BEGIN, Axis
+from xy_sysid.fleets.history import BEGIN, MONTH, Axis
 from xy_sysid.fleets.trends import Event, Moved, Trend, Trends
 from xy_sysid.units import Units, readable
 
@@ -56,10 +57,25 @@ def chance(one: Moved) -> str:
 def summary(trends: Trends) -> str:
     """How much was looked at."""
     dated = [axis for axis in trends.axes if axis.histories]
-    months = sum(axis.months for axis in dated)
     out = sum(axis.left_out for axis in trends.axes)
-    text = f"{len(dated)} axes, {sum(len(axis.dates) for axis in dated)} recordings, {months:.3g} axis-months"
+    axes = "1 axis" if len(dated) == 1 else f"{len(dated)} axes"
+    text = f"{axes}, {sum(len(axis.dates) for axis in dated)} recordings, {_lasted(sum(axis.months for axis in dated))}"
     return text + (f"; {out} rows without a date or an answer are left out" if out else "")
+
+
+def _lasted(months: float) -> str:
+    """Of all axes together, in the largest of the units in which it is more than one."""
+    for unit, size in (("axis-months", 1.0), ("days", MONTH), ("hours", 24.0 * MONTH), ("minutes", 1440.0 * MONTH)):
+        if months * size >= 1.0:
+            return f"{months * size:.3g} {unit}"
+    return f"{86400.0 * MONTH * months:.3g} s"
+
+
+def clocked(dates: Sequence[datetime]) -> tuple[list[datetime] | list[float], str]:
+    """The dates as they are drawn, and what the axis says: min after the start where no clock tells the date."""
+    if dates and dates[0].year == BEGIN.year:
+        return [(date - BEGIN).total_seconds() / 60.0 for date in dates], "min after the start"
+    return list(dates), ""
 
 
 def widest(trends: Trends) -> list[tuple[str, float, float]]:

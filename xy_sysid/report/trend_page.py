@@ -9,7 +9,7 @@ import plotly.graph_objects as go
 
 from xy_sysid.fleets.history import Axis
 from xy_sysid.fleets.trends import Event, Trend, Trends
-from xy_sysid.fleets.words import chance, day, sentence, summary, told, widest
+from xy_sysid.fleets.words import chance, clocked, day, sentence, summary, told, widest
 from xy_sysid.report.cover import Cover
 from xy_sysid.report.parts import plain, rows
 from xy_sysid.report.sheet import Drawing, block, listing, paragraph, section, table_html, whole
@@ -23,7 +23,7 @@ ABOUT = (
     "axis that does not change, which is learned from all axes of the table. The vertical line is the first recording after a change, the "
     "shaded part the 95 % interval of that date."
 )
-OVER = "The same parameter of all axes, over its median before any change, in per cent. Coloured: the axes on which it changed."
+OVER = "The same parameter of all axes, over its median before any change, in per cent. Coloured: the axes on which it changed, or the only axis."
 
 
 def trend_page(found: Trends, title: str) -> str:
@@ -68,16 +68,20 @@ def axis_figure(trends: Sequence[Trend], axis: Axis) -> go.Figure:
         scale, unit = readable(Units(*axis.units).of(history.unit))
         value, low, high = scale * history.value, scale * one.low, scale * one.high
         error = {"type": "data", "symmetric": False, "array": high - value, "arrayminus": value - low, "thickness": 1.2, "width": 3}
+        times, _ = clocked(history.dates)
         figure.add_scatter(
-            x=list(history.dates), y=value, error_y=error, mode="markers", marker={"color": BEFORE, "size": 7}, name="95 % with spread",
+            x=times, y=value, error_y=error, mode="markers", marker={"color": BEFORE, "size": 7}, name="95 % with spread",
             legendgroup="all", showlegend=row == 1, row=row, col=1,
         )  # fmt: skip
         for change in one.moved:
-            figure.add_vrect(x0=change.earliest, x1=change.latest, fillcolor=fade(AFTER, 0.15), line_width=0, row=row, col=1)
-            figure.add_vline(x=change.since, line={"color": AFTER, "width": 1.5}, row=row, col=1)
+            (first, last, since), _ = clocked((change.earliest, change.latest, change.since))
+            figure.add_vrect(x0=first, x1=last, fillcolor=fade(AFTER, 0.15), line_width=0, row=row, col=1)
+            figure.add_vline(x=since, line={"color": AFTER, "width": 1.5}, row=row, col=1)
         figure.update_yaxes(
             title_text=plain(f"{history.column}<br>({unit})" if unit else history.column).replace("&lt;br&gt;", "<br>"), row=row, col=1
         )
+    if trends:
+        figure.update_xaxes(title_text=clocked(trends[0].history.dates)[1], row=len(trends), col=1)
     return figure
 
 
@@ -90,11 +94,14 @@ def overview_figure(trends: Sequence[Trend], column: str = "") -> go.Figure:
         quiet = [value for date, value in zip(history.dates, history.value, strict=True) if not one.moved or date < one.moved[0].since]
         part = 100.0 * (history.value / float(np.median(quiet or history.value)) - 1.0)
         name = plain(f"{one.machine} {one.axis}")
-        colour = axis_colour(coloured) if one.moved else METHODS["measured"]
-        coloured += bool(one.moved)
+        strong = bool(one.moved) or len(trends) == 1
+        colour = axis_colour(coloured) if strong else fade(METHODS["measured"], 0.5)
+        coloured += strong
+        times, title = clocked(history.dates)
         figure.add_scatter(
-            x=list(history.dates), y=part, mode="lines+markers" if one.moved else "lines", name=name, showlegend=bool(one.moved),
-            line={"color": colour if one.moved else fade(colour, 0.5), "width": 2.0 if one.moved else 1.0},
+            x=times, y=part, mode="lines+markers" if strong else "lines", name=name, showlegend=strong and len(trends) > 1,
+            line={"color": colour, "width": 2.0 if strong else 1.0},
         )  # fmt: skip
+        figure.update_xaxes(title_text=title)
     figure.update_yaxes(title_text=plain(f"{column} (%)" if column else "change (%)"))
     return figure
