@@ -16,7 +16,7 @@ from campaigns.faults.attack import Attack, Found, answered, at_most, command
 
 WORDS = (
     "Every file of the recordings of other people's machines, with the options that it needs, through the commands that read one; "
-    "an answer or one line. The options are in `campaigns/faults/shared.py`."
+    "an answer or one line. The options are in `campaigns/faults/shared.py`; `next` and `figures` search for 10 s of processor time at most."
 )
 LONGEST = 600.0  # s for one command on a whole recording
 DATA = Path(os.environ.get("XY_SYSID_DATA") or Path(__file__).parents[3] / "shared" / "data")
@@ -96,9 +96,16 @@ RECORDINGS = (
 )
 NO_RECORDINGS = ("README.md",)
 COMMANDS = ("columns", "fit", "compare", "diagnose", "refine", "report")
+MORE = ("frf", "steps", "servo", "coupling", "next", "figures", "fleet")  # which the tests leave to this campaign: they take minutes
+SEARCHED = ("--budget", "10")  # the search of next and figures is that of diagnose, whose row has all of it
 LITTLE, BRIEF = ("--set", "length=512"), ("--budget", "0.3")
 RIGID = ("--set", "numerator_order=0", "--set", "denominator_order=2")  # fit chooses the orders, and the report of the same data need not again
-SHORT = {"fit": LITTLE, "compare": LITTLE, "report": (*LITTLE, *RIGID, *BRIEF), "diagnose": BRIEF, "refine": BRIEF}
+SHORT = {
+    **dict.fromkeys(("frf", "fit", "coupling", "compare"), LITTLE),
+    **dict.fromkeys(("diagnose", "refine", "next"), BRIEF),
+    "figures": (*BRIEF, "--kind", "csv"),
+    "report": (*LITTLE, *RIGID, *BRIEF),
+}
 
 
 def unnamed(folder: Path = DATA) -> list[str]:
@@ -110,10 +117,15 @@ def unnamed(folder: Path = DATA) -> list[str]:
 
 def words(name: str, row: Shared, folder: Path, short: bool) -> list[str]:
     """A command on a recording; folder: for what it writes."""
-    found = [name, str(DATA / row.path)]
+    found = [name, *(["--one"] if name == "fleet" else []), str(DATA / row.path)]
     if name == "columns":
         return found
-    own = {"refine": ["--auto"], "report": ["-o", str(folder / "report.html"), "--force"]}.get(name, [])
+    own = {
+        "refine": ["--auto"],
+        "next": ["-o", str(folder / "next.yaml"), "--force", *SEARCHED],
+        "figures": ["-o", str(folder / "figures"), "--force", *SEARCHED],
+        "report": ["-o", str(folder / "report.html"), "--force"],
+    }.get(name, [])
     return [*found, *own, *row.options, *(row.part if short else ()), *(SHORT.get(name, ()) if short else ())]
 
 
@@ -148,4 +160,4 @@ def attack(name: str) -> Attack:
     return Attack(f"{name} of each recording", run, len(RECORDINGS), 0, "an answer or one line")
 
 
-ATTACKS = tuple(attack(name) for name in COMMANDS)
+ATTACKS = tuple(attack(name) for name in (*COMMANDS, *MORE))
