@@ -55,6 +55,14 @@ def test_a_gradual_change_has_its_beginning_and_duration() -> None:
     assert found.duration == 20.0 and abs(found.after - 20) <= 3 and found.size == pytest.approx(0.3, abs=0.05)
 
 
+def test_a_change_that_goes_on_is_told_until_now() -> None:
+    """Wear that would take 80 recordings is seen for 25: its size is what has changed with the last of them, and that is known."""
+    values = scattered(45)
+    values[20:] += 0.6 * np.arange(25) / 80.0
+    (found,) = changes(series(values), usual(), LEVEL)
+    assert found.duration == 80.0 and abs(found.size - 0.6 * 24 / 80) < 3.0 * found.sigma < 0.09
+
+
 def test_two_changes_are_two() -> None:
     """What follows a change is compared with what came after it."""
     values = scattered(50)
@@ -141,6 +149,18 @@ def worn(*, friction: float = 1.0, gain: float = 1.0, backlash: bool = False) ->
         factor = np.where(late, factors.get(history.column, 1.0), 1.0)
         histories.append(replace(history, value=history.value * factor, low=history.low * factor, high=history.high * factor))
     return replace(one, histories=tuple(histories), named={"backlash": late} if backlash else {})
+
+
+def test_no_change_takes_longer_than_it_was_seen() -> None:
+    """The same in a table: it is told over the days until the last recording, with the value of that day."""
+    one = axis(0, 3, 45)
+    each = one.histories[0]
+    risen = np.where(np.arange(45) < 20, 1.0, 1.0 + 0.6 * (np.arange(45) - 20) / 80.0)
+    worn = replace(each, value=each.value * risen, low=each.low * risen, high=each.high * risen)
+    (trend,) = of_axes([replace(one, histories=(worn,))], causes()).trends
+    (moved,) = trend.moved
+    assert moved.duration <= (one.dates[-1] - moved.since).days + 7
+    assert moved.after == pytest.approx(worn.value[-1], rel=0.03) and moved.sigmas > 4.0
 
 
 def test_joint_changes_point_to_a_cause() -> None:

@@ -50,7 +50,8 @@ class Change:
     """A change of a series.
 
     after:    number of the last recording before it; first, last: 95 % interval of that number
-    duration: recordings' distances that it took; size, sigma: part of the level, and its standard deviation
+    duration: recordings' distances that it takes
+    size, sigma: part of the level by which it has changed with the last recording, and its standard deviation
     declared: number of the recording with which it was certain enough; statistic: log of Shiryaev and Roberts' then and with all recordings
     """
 
@@ -159,7 +160,7 @@ def _passed(found: Evidence, weights: FloatArray, threshold: float) -> int | Non
 
 def _without(series: Series, change: Change) -> Series:
     shape = _shape(series.time, change.after, change.duration)
-    return Series(series.time, series.value - change.size * shape, series.sigma)
+    return Series(series.time, series.value - change.size * shape / shape[-1], series.sigma)
 
 
 def _moved(change: Change, by: int, declared: int) -> Change:
@@ -168,9 +169,10 @@ def _moved(change: Change, by: int, declared: int) -> Change:
 
 
 def _located(series: Series, weights: FloatArray) -> Change:
-    """When the one change of a series was, and by how much."""
+    """When the one change of a series was, and by how much until now: what a change that goes on will be in the end, nobody knows."""
     n, first = series.value.size, _first_change(series)
     shapes = hypotheses(series.time)
+    now = shapes[-1, first:]
     log, mean, power = [], [], []
     for weight, wander in zip(weights, grid(), strict=True):
         parts = whitened(series, wander, shapes[:, first:])
@@ -178,8 +180,8 @@ def _located(series: Series, weights: FloatArray) -> Change:
         for size in SIZES:
             shrunk = size**2 / (1.0 + size**2 * information)
             log.append(weight + parts.none[-1] - 0.5 * np.log1p(size**2 * information) + 0.5 * shrunk * score**2)
-            mean.append(shrunk * score)
-            power.append(shrunk)
+            mean.append(now * shrunk * score)
+            power.append(now**2 * shrunk)
     share = np.exp(np.array(log) - logsumexp(log))
     size = float(np.sum(share * np.array(mean)))
     variance = float(np.sum(share * (np.array(power) + np.square(mean)))) - size**2

@@ -35,7 +35,7 @@ class Moved:
     part:  after over before, minus 1; sigmas: size over its standard error; NaN for an effect
     since: date of the first recording with it; earliest, latest: 95 % interval of that; declared: date from which it was certain enough
     one_in: axis-months in which chance alone gives such evidence once
-    duration: days that the change took
+    duration: days that the change took, until the last recording at most
     """
 
     column: str
@@ -241,7 +241,7 @@ def _moved(history: History, item: Change, level: float, axis_months: float, mea
         latest=dates[item.last + 1],
         declared=dates[item.declared],
         one_in=axis_months * math.exp(min(item.statistic - level, 300.0)),
-        duration=float(item.duration * usual),
+        duration=min(float(item.duration * usual), (dates[-1] - dates[item.after]).total_seconds() / DAY),
     )
 
 
