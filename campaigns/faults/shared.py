@@ -16,7 +16,7 @@ from campaigns.faults.attack import Attack, Found, answered, at_most, command
 
 WORDS = (
     "Every file of the recordings of other people's machines, with the options that it needs, through the commands that read one; "
-    "an answer or one line. The options are in `campaigns/faults/shared.py`; `next` searches for 10 s of processor time at most."
+    "an answer or one line. The options are in `campaigns/faults/shared.py`."
 )
 LONGEST = 600.0  # s for one command on a whole recording
 DATA = Path(os.environ.get("XY_SYSID_DATA") or Path(__file__).parents[3] / "shared" / "data")
@@ -96,13 +96,12 @@ RECORDINGS = (
 )
 NO_RECORDINGS = ("README.md",)
 COMMANDS = ("columns", "fit", "compare", "diagnose", "refine", "report")
-MORE = ("frf", "steps", "servo", "coupling")  # which the tests leave to this campaign
-SEARCHED = ("--budget", "10")  # the search of next is that of diagnose, whose row has all of it
+MORE = ("frf", "steps", "servo", "coupling", "fleet")  # which the tests leave to this campaign
 LITTLE, BRIEF = ("--set", "length=512"), ("--budget", "0.3")
 RIGID = ("--set", "numerator_order=0", "--set", "denominator_order=2")  # fit chooses the orders, and the report of the same data need not again
 SHORT = {
     **dict.fromkeys(("frf", "fit", "coupling", "compare"), LITTLE),
-    **dict.fromkeys(("diagnose", "refine", "next"), BRIEF),
+    **dict.fromkeys(("diagnose", "refine"), BRIEF),
     "report": (*LITTLE, *RIGID, *BRIEF),
 }
 
@@ -121,7 +120,6 @@ def words(name: str, row: Shared, folder: Path, short: bool) -> list[str]:
         return found
     own = {
         "refine": ["--auto"],
-        "next": ["-o", str(folder / "next.yaml"), "--force", *SEARCHED],
         "report": ["-o", str(folder / "report.html"), "--force"],
     }.get(name, [])
     return [*found, *own, *row.options, *(row.part if short else ()), *(SHORT.get(name, ()) if short else ())]
