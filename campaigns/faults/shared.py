@@ -118,10 +118,7 @@ def words(name: str, row: Shared, folder: Path, short: bool) -> list[str]:
     found = [name, *(["--one"] if name == "fleet" else []), str(DATA / row.path)]
     if name == "columns":
         return found
-    own = {
-        "refine": ["--auto"],
-        "report": ["-o", str(folder / "report.html"), "--force"],
-    }.get(name, [])
+    own = {"refine": ["--auto"], "report": ["-o", str(folder / "report.html"), "--force"]}.get(name, [])
     return [*found, *own, *row.options, *(row.part if short else ()), *(SHORT.get(name, ()) if short else ())]
 
 

@@ -50,8 +50,8 @@ class Change:
     """A change of a series.
 
     after:    number of the last recording before it; first, last: 95 % interval of that number
-    duration: recordings' distances that it takes
-    size, sigma: part of the level by which it has changed with the last recording, and its standard deviation
+    duration, size, sigma: recordings' distances that it took, part of the level, and its standard deviation; of a change that goes on until the last
+        of the recordings that it explains alone
     declared: number of the recording with which it was certain enough; statistic: log of Shiryaev and Roberts' then and with all recordings
     """
 
@@ -141,7 +141,7 @@ def changes(series: Series, weights: FloatArray, threshold: float, known: Eviden
         if declared is not None:
             change = _located(part, weights)
             if _passed(evidence(_without(part, change))[0], weights, threshold) is not None:  # there is more than one
-                change = _located(part.until(declared + 1), weights)
+                change = _alone(part, declared, weights, threshold)
             found.append(_moved(change, start, start + declared))
             ended = int(np.searchsorted(part.time, part.time[change.after] + change.duration))
             start += max(ended, change.after + 1)  # what follows is compared with what came after the change
@@ -150,6 +150,18 @@ def changes(series: Series, weights: FloatArray, threshold: float, known: Eviden
         else:
             break
     return tuple(found)
+
+
+def _alone(series: Series, declared: int, weights: FloatArray, threshold: float) -> Change:
+    """The first change of a series that has more, from as many recordings as it explains alone."""
+    change, more = _located(series.until(declared + 1), weights), 1
+    while declared + 1 + more < series.value.size:
+        part = series.until(declared + 1 + more)
+        longer = _located(part, weights)
+        if _passed(evidence(_without(part, longer))[0], weights, threshold) is not None:
+            break
+        change, more = longer, 2 * more
+    return change
 
 
 def _passed(found: Evidence, weights: FloatArray, threshold: float) -> int | None:
@@ -192,7 +204,7 @@ def _located(series: Series, weights: FloatArray) -> Change:
         after=after,
         first=int(np.searchsorted(total, 0.025)),
         last=min(int(np.searchsorted(total, 0.975)), n - 2),
-        duration=DURATIONS[int(np.argmax(each[:, after]))],
+        duration=min(DURATIONS[int(np.argmax(each[:, after]))], float(series.time[-1] - series.time[after])),
         size=size,
         sigma=float(np.sqrt(max(variance, 0.0))),
         declared=n - 1,

@@ -59,11 +59,12 @@ class Progress:
             parts.append(f"{self.rate:.3g} an hour on {self.workers} process{'es' if self.workers != 1 else ''}")
         rest = self.remaining()
         if rest is not None and self.done < self.total:
-            parts.append(f"{_time(rest[0])} to {_time(rest[1])} left")
+            parts.append(f"{lasting(rest[0])} to {lasting(rest[1])} left")
         return ", ".join(parts)
 
 
-def _time(seconds: float) -> str:
+def lasting(seconds: float) -> str:
+    """A time in the largest unit of which it has two, as people read it."""
     for size, name in ((86400.0, "d"), (3600.0, "h"), (60.0, "min")):
         if seconds >= 2.0 * size:
             return f"{seconds / size:.0f} {name}"

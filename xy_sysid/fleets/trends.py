@@ -241,7 +241,7 @@ def _moved(history: History, item: Change, level: float, axis_months: float, mea
         latest=dates[item.last + 1],
         declared=dates[item.declared],
         one_in=axis_months * math.exp(min(item.statistic - level, 300.0)),
-        duration=min(float(item.duration * usual), (dates[-1] - dates[item.after]).total_seconds() / DAY),
+        duration=float(item.duration * usual),
     )
 
 

@@ -6,7 +6,8 @@ import math
 from collections.abc import Sequence
 from datetime import datetime
 
-from xy_sysid.fleets.history import BEGIN, MONTH, Axis
+from xy_sysid.fleets.estimate import lasting
+from xy_sysid.fleets.history import BEGIN, DAY, MONTH, Axis
 from xy_sysid.fleets.trends import Event, Moved, Trend, Trends
 from xy_sysid.units import Units, readable
 
@@ -43,10 +44,14 @@ def told(one: Moved, axis: Axis) -> str:
 
 def day(date: datetime) -> str:
     """3 March 2026, with the time of day where there is one; the time since the start where no clock tells the date."""
-    if date.year == BEGIN.year:
+    if _has_no_clock(date):
         return f"{(date - BEGIN).total_seconds() / 60.0:.4g} min after the start"
     text = f"{date.day} {date:%B %Y}"
     return text if (date.hour, date.minute, date.second) == (0, 0, 0) else f"{text} {date:%H:%M}"
+
+
+def _has_no_clock(date: datetime) -> bool:
+    return date.year == BEGIN.year
 
 
 def chance(one: Moved) -> str:
@@ -58,22 +63,16 @@ def summary(trends: Trends) -> str:
     """How much was looked at."""
     dated = [axis for axis in trends.axes if axis.histories]
     out = sum(axis.left_out for axis in trends.axes)
+    months = sum(axis.months for axis in dated)
+    seen = f"{months:.3g} axis-months" if months >= 1.0 else lasting(DAY * MONTH * months)
     axes = "1 axis" if len(dated) == 1 else f"{len(dated)} axes"
-    text = f"{axes}, {sum(len(axis.dates) for axis in dated)} recordings, {_lasted(sum(axis.months for axis in dated))}"
+    text = f"{axes}, {sum(len(axis.dates) for axis in dated)} recordings, {seen}"
     return text + (f"; {out} rows without a date or an answer are left out" if out else "")
-
-
-def _lasted(months: float) -> str:
-    """Of all axes together, in the largest of the units in which it is more than one."""
-    for unit, size in (("axis-months", 1.0), ("days", MONTH), ("hours", 24.0 * MONTH), ("minutes", 1440.0 * MONTH)):
-        if months * size >= 1.0:
-            return f"{months * size:.3g} {unit}"
-    return f"{86400.0 * MONTH * months:.3g} s"
 
 
 def clocked(dates: Sequence[datetime]) -> tuple[list[datetime] | list[float], str]:
     """The dates as they are drawn, and what the axis says: min after the start where no clock tells the date."""
-    if dates and dates[0].year == BEGIN.year:
+    if dates and _has_no_clock(dates[0]):
         return [(date - BEGIN).total_seconds() / 60.0 for date in dates], "min after the start"
     return list(dates), ""
 
