@@ -85,9 +85,9 @@ def address(tmp_path: Path, chromium: Any) -> Iterator[str]:
 
 
 def test_the_demo_begins_without_a_jump_and_says_what_is_awaited(address: str, chromium: Any) -> None:
-    """Every quarter of a second until the rigid model is drawn, and a while on: no two words lie on each other, each card stays where it was
-    first seen, on a wide screen and on a narrow one. It is said what is awaited, never to press what is disabled, and the verdict comes soon
-    after the data that it needs."""
+    """Every quarter of a second until the rigid model is drawn and the coupling is told, and a while on: no two words lie on each other, each
+    card stays where it was first seen, on a wide screen and on a narrow one. It is said what is awaited, never to press what is disabled, and
+    the verdict comes soon after the data that it needs."""
     tabs = [Tab(chromium, address, width) for width in (1400, 400)]
     tabs[0].until(lambda: all(tab.page.locator(".panel").count() == 1 and tab.places() for tab in tabs), 30)
     seen = [Frames(tab) for tab in tabs]
@@ -98,6 +98,8 @@ def test_the_demo_begins_without_a_jump_and_says_what_is_awaited(address: str, c
         return all(tab.headline().startswith("Something is missing: ") and tab.over_floor() > 4 and tab.ladder() for tab in tabs)
 
     tabs[0].until(drawn, 60, "no verdict on the rigid model")
+    coupling = [tab.page.locator("[data-part=coupling]") for tab in tabs]
+    tabs[0].until(lambda: drawn() and all("x and y" in str(words.text_content()) for words in coupling), 60, "no verdict on the coupling")
     for _ in range(12):
         drawn()
     for frames in seen:

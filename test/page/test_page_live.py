@@ -128,17 +128,21 @@ def test_the_failing_picture_comes_by_itself_and_every_number_follows_the_story(
     """
     tab = scene.tab
     scene.drive()
-    tab.page.get_by_role("button", name="axis y").click()
-    tab.until(lambda: tab.headline().startswith("Something is missing: ") and tab.over_floor() > 4, 40, "no failing picture")
+    missing = "Something is missing: "
+    axes = {axis: tab.page.get_by_role("button", name=f"axis {axis}") for axis in "xy"}
+
+    def shown(axis: str) -> bool:
+        return axes[axis].get_attribute("aria-pressed") == "true"
+
+    tab.click_until(axes["y"], lambda: shown("y") and tab.headline().startswith(missing) and tab.over_floor() > 4, 40, "no failing picture")
     tab.page.wait_for_timeout(2500)  # some more of the travel
     tab.press_until("diagnose", lambda: "Missing: coulomb friction" in tab.verdict() and tab.filled() == ["Add coulomb friction"], 90)
     tab.until(lambda: tab.headline().startswith("Something is missing: ") and len(tab.ladder()) == 1, 40, "the headline is stale")
     assert tab.ladder()[0] > 4
-    tab.page.get_by_role("button", name="axis x").click()
-    tab.until(lambda: tab.headline().startswith("Something is missing: ") and tab.filled() == ["Diagnose"], 40, "x was diagnosed with y")
+    told = "x was diagnosed with y"
+    tab.click_until(axes["x"], lambda: shown("x") and tab.headline().startswith(missing) and tab.filled() == ["Diagnose"], 40, told)
     assert "Missing:" not in tab.verdict() and tab.page.locator("[data-act=diagnose]").is_enabled()
-    tab.page.get_by_role("button", name="axis y").click()
-    tab.until(lambda: "Missing: coulomb friction" in tab.verdict(), 40, "axis y is not shown")
+    tab.click_until(axes["y"], lambda: shown("y") and "Missing: coulomb friction" in tab.verdict(), 40, "axis y is not shown")
     tab.press_until("named", lambda: tab.headline().startswith("Explained: ") and tab.over_floor() < 2 and len(tab.ladder()) == 2, 60)
     tab.until(lambda: at_noise(tab.fact("worst place")), 40, lambda: f"the tiles are stale: {tab.fact('worst place')}")
     assert tab.ladder()[1] < 1.2 and "at the noise floor" in tab.verdict() and tab.fact("held-out error").startswith("0.3")

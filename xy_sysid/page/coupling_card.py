@@ -29,12 +29,13 @@ class CouplingCard:
         self._found: dict[str, Any] = {}
         self._count = 0
         self._working = False
-        with ui.element("section").classes("card coupling").props('aria-label="two axes at once"') as self._card:
+        kind = "card coupling live" if source.live else "card coupling"
+        with ui.element("section").classes(kind).props('aria-label="two axes at once"') as self._card:
             ui.html("<h2>Two axes at once</h2>", sanitize=False)
             self._words = ui.label("").classes("soft").props("role=status aria-live=polite data-part=coupling")
             with ui.element("div").classes("buttons") as self._buttons:
                 heeded(ui.button("Test the coupling", on_click=self._ask).props("outline dense no-caps data-act=coupling"))
-            self._plot = Plot(CAPTION, "coupling", 300)
+            self._plot = Plot(CAPTION, "coupling", 320)
 
     async def refresh(self) -> None:
         """Draw again what has changed."""
@@ -42,10 +43,10 @@ class CouplingCard:
         axes = source.axes()
         if source.live:
             self._hear(axes)
-        self._card.set_visibility(len(axes) >= TWO and (bool(self._found) or not source.live))
+        self._card.set_visibility(len(axes) >= TWO)
         self._buttons.set_visibility(not source.live)
         self._words.set_text(self._found.get("sentence", "Does the drive of one axis move the other, too? Needs both axes driven at once."))
-        self._plot.root.set_visibility(bool(self._found))
+        self._plot.root.set_visibility(source.live or bool(self._found))  # of the machine its place is kept: the verdict comes by itself
         if self._found:
             edges, least, most = (np.asarray(self._found[name], dtype=np.float64) for name in ("band_edges", "coupling", "at_most"))
             await self._plot.show(self._session, ("coupling", source.key, self._count), bands_figure, self._found["axes"], edges, least, most)

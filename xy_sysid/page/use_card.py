@@ -42,9 +42,8 @@ class UseCard:
     def refresh(self) -> None:
         """Show what is now."""
         documents = self._documents()
-        self._card.set_visibility(bool(documents))
         for button in (self._numbers, self._files):
-            button.set_enabled(not self._working)
+            button.set_enabled(bool(documents) and not self._working)
         there = self._source.live and FOLLOWER in self._session.heard.present
         self._path.set_visibility(there)
         if there:
