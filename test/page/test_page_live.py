@@ -132,7 +132,7 @@ def test_the_failing_picture_comes_by_itself_and_every_number_follows_the_story(
     axes = {axis: tab.page.get_by_role("button", name=f"axis {axis}") for axis in "xy"}
 
     def shown(axis: str) -> bool:
-        return axes[axis].get_attribute("aria-pressed") == "true"
+        return bool(axes[axis].get_attribute("aria-pressed") == "true")
 
     tab.click_until(axes["y"], lambda: shown("y") and tab.headline().startswith(missing) and tab.over_floor() > 4, 40, "no failing picture")
     tab.page.wait_for_timeout(2500)  # some more of the travel
@@ -278,6 +278,16 @@ def test_the_stop_of_another_is_overridden_with_its_name_seen(scene: Scene) -> N
     override = tab.page.locator("[data-act=override]")
     tab.click_until(activate, override.is_visible, why="the dialog does not open")
     assert "STOP is on from: test" in str(tab.page.locator(".card", has=override).text_content())
+    for _ in range(2):  # opened and cancelled, and again: nothing is overridden by that
+        tab.page.get_by_role("button", name="Cancel").last.click()
+        tab.until(lambda: override.count() == 0, 15, "the dialog stays")
+        tab.click_until(activate, override.is_visible, why="the dialog does not open")
+    statuses = scene.world.statuses()
+
+    def still_held() -> bool:
+        return sum({"stop": "on", "stop held by": "test"}.items() <= {pair.key: pair.value for pair in one.values}.items() for one in statuses) > 3
+
+    assert scene.world.until(still_held, 10.0)
     override.click()
     tab.until(lambda: activate.text_content() == "Activate", 15, "STOP is not overridden")
     scene.drive()

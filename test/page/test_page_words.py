@@ -290,10 +290,11 @@ def test_a_picture_is_never_kept_under_a_stamp_that_is_newer_than_its_story() ->
 
 
 def test_a_stop_of_somebody_else_is_named_and_the_pages_own_is_not() -> None:
-    """Activate releases the page's own STOP by itself; whoever else holds it is told, also a page that has gone."""
-    heard = TopicsState()
+    """Activate releases the page's own STOP by itself; whoever else holds it is told, also another page and one that has gone."""
+    heard = TopicsState(own_stop="page_stop_here_1")
     assert heard.stopped_by_others() == ""
-    for held, others in (("", ""), ("page_stop", ""), ("guard, page_stop", "guard"), ("page_stop (gone)", "page_stop (gone)")):
+    other, gone = "page_stop_there_1", "page_stop_here_0 (gone)"
+    for held, others in (("", ""), ("page_stop_here_1", ""), ("guard, page_stop_here_1", "guard"), (other, other), (gone, gone)):
         heard.status(StatusMessage("excitation", 1, "", (("stop held by", held),)), 0.0)
         assert heard.stopped_by_others() == others
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 
 from nicegui import run, ui
 
@@ -151,18 +152,27 @@ class Control:
         will_move.ask(self._session, words, "Activate", "sure", lambda: self._go("activate"))
 
     def _ask_override(self, held: str) -> None:
-        """The excitation is asked twice: when the dialog opens, for the names, and when the user has seen them."""
+        """The excitation is asked twice once the user has seen the names: it names whom a second call would override, and then overrides them."""
         session = self._session
 
-        def release() -> None:
+        def ask(then: Callable[[bool, str], None]) -> None:
             if session.link is not None:
-                session.link.trigger("excitation/release_stop", lambda done, words: session.say(words or "the excitation did not answer", done))
+                session.link.trigger("excitation/release_stop", then)
+
+        def told(done: bool, words: str) -> None:
+            session.say(words or "the excitation did not answer", done)
+
+        def named(done: bool, words: str) -> None:
+            now = session.heard.stopped_by_others()
+            if done or not words or now == held:
+                told(done, words) if done or not words else ask(told)
+            else:
+                session.say(f"STOP is now held by {now or 'nobody else'}, no longer by {held}: nothing was overridden")
 
         def sure() -> None:
             dialog.close()
-            release()
+            ask(named)
 
-        release()
         with ui.dialog() as dialog, ui.element("div").classes("card"):
             ui.html("<h2>Another user holds STOP</h2>", sanitize=False)
             ui.label(f"STOP is on from: {held}. Look at the machine and ask the holder before you override it. Then press Activate.")

@@ -7,7 +7,10 @@ and is published from the thread that asks for it, and every order goes to the n
 from __future__ import annotations
 
 import math
+import os
 import queue
+import re
+import socket
 import threading
 import time
 from collections.abc import Callable
@@ -32,7 +35,8 @@ from xy_sysid.nodes.convert import array_from_ros
 from xy_sysid.nodes.wall import Wall
 from xy_sysid.page.topics_state import COUPLING, TopicsState
 
-WATCHERS = ("page", "page_stop", "demo", "settle")  # nodes of the page and of commands, which come and go
+WATCHERS = ("page", "demo", "settle")  # nodes of the page and of commands, which come and go
+STOPS = "page_stop"  # how the nodes by which pages publish STOP begin
 LOOK = 0.5  # s between two looks at the graph and the lifecycle
 PATIENCE = 5.0  # s for an answer of a node
 AGAIN = 2  # times that parameters are asked for or set once more without an answer
@@ -88,6 +92,7 @@ class Link:
         self._orders: queue.SimpleQueue[Callable[[_Line], None]] = queue.SimpleQueue()
         self._ended = threading.Event()
         self._wire = _StopWire(namespace)
+        heard.own_stop = self._wire.name
         self._line = _Line(heard, namespace, self._orders, say)
         self._watch = threading.Thread(target=self._look_after, name="page link watch", daemon=True)
         self._watch.start()
@@ -168,12 +173,16 @@ class Link:
 
 
 class _StopWire:
-    """The topic of STOP: a node that only publishes, needs no thread, and shares nothing with the link that may die."""
+    """The topic of STOP: a node that only publishes, needs no thread, and shares nothing with the link that may die.
+
+    name: of this server alone, so that the STOP of another page is never taken for its own.
+    """
 
     def __init__(self, namespace: str) -> None:
         self._context = Context()
         rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
-        self._node: Any = rclpy.create_node("page_stop", namespace=namespace, context=self._context)
+        self.name = f"{STOPS}_{re.sub('[^A-Za-z0-9]', '_', socket.gethostname())}_{os.getpid()}"
+        self._node: Any = rclpy.create_node(self.name, namespace=namespace, context=self._context)
         self._topic = self._node.create_publisher(Bool, STOP_TOPIC, LATCHED_QOS)
 
     def put(self, on: bool) -> None:
@@ -332,9 +341,8 @@ class _Line:
     def _look(self) -> None:
         """Who is there, which axes they publish, and how the excitation is."""
         space = self._node.get_namespace()
-        names = {
-            name for name, where in self._node.get_node_names_and_namespaces() if where == space and name not in WATCHERS and not name.startswith("_")
-        }
+        found = self._node.get_node_names_and_namespaces()
+        names = {name for name, where in found if where == space and name not in WATCHERS and not name.startswith(("_", STOPS))}
         self.heard.graph(names, time.monotonic())
         for topic, _ in self._node.get_topic_names_and_types():
             kind, _, axis = topic.removeprefix(f"{space}/").partition("/")

@@ -50,7 +50,7 @@ class NodeState:
 class TopicsState:
     """The newest of everything; ``version`` grows with each message of its kind, so that a page knows when to draw again.
 
-    One thread writes and others read: whoever walks through a table copies it first.
+    One thread writes and others read: whoever walks through a table copies it first. own_stop: the name under which this server publishes STOP.
     """
 
     arrays: dict[str, ArrayMessage] = field(default_factory=dict)
@@ -62,6 +62,7 @@ class TopicsState:
     lifecycle: str = ""
     doings: dict[str, tuple[str, float]] = field(default_factory=dict)
     version: dict[str, int] = field(default_factory=dict)
+    own_stop: str = ""
 
     def axes(self) -> tuple[str, ...]:
         """Axes of which something was heard, in the order of their names."""
@@ -177,9 +178,9 @@ class TopicsState:
         return self.values("excitation").get("state") in ("active", "stopping")
 
     def stopped_by_others(self) -> str:
-        """Who holds STOP, apart from the page that Activate releases; empty if nobody."""
+        """Who holds STOP, apart from this page's server, whose STOP Activate releases; empty if nobody."""
         holders = [name for name in self.values("excitation").get("stop held by", "").split(", ") if name]
-        return ", ".join(name for name in holders if name != "page_stop")
+        return ", ".join(name for name in holders if name != self.own_stop)
 
     def at_rest_since(self, begun: float) -> bool:
         """Whether the excitation itself has said after that time that it does not drive."""
