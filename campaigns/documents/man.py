@@ -14,9 +14,10 @@ from xy_sysid.cli.app import app
 PAGE = Path(__file__).parents[2] / "docs" / "xy-sysid.1"
 EXIT = {
     "0": "The command gave its answer.",
-    "1": "A check failed, for example a model that does not predict the recording.",
+    "1": "A check failed, for example a model that does not predict the recording; or a node has died.",
     "2": "Wrong use or invalid input. One line on standard error says what to change.",
     "130": "Ended by Ctrl-C.",
+    "143": "Ended by SIGTERM.",
 }
 
 

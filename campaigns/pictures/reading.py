@@ -16,7 +16,7 @@ The page and the report show these pictures. All examples come from the simulate
   hides an error.
 - **Held-out** data are parts of the recording, spread over it, that no fit has seen. For backlash it is the last third, because its filter must run
   without interruption.
-- The **noise floor** is the error that a perfect model would still have: the encoder noise.
+- The **noise floor** is the smallest error that the data can show: encoder noise, together with a tolerated part of the motion (0.1 %).
 
 ## The ladder
 

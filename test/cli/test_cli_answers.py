@@ -48,6 +48,12 @@ def model(paper: Path) -> Path:
     return path
 
 
+def test_a_search_by_itself_goes_on_after_a_resonance_that_was_given(paper: Path) -> None:
+    """Its first effect is the given one; the table has no other."""
+    said = cli("refine", paper, "-a", "x", "--add", "base_resonance", "--auto", "--span", "0:15")
+    assert said.code == 0 and said.err == "" and "base_resonance" in said.out
+
+
 def test_the_program_says_which_version_it_is() -> None:
     said = cli("--version")
     assert (said.code, said.out.strip(), said.err) == (0, f"xy-sysid {xy.__version__}", "")

@@ -142,6 +142,12 @@ def test_pictures_are_replaced_with_force_only_and_an_axis_leads_into_no_other_f
     assert len(before) > 1 and "add --force to replace it" in refused(*given)
     assert cli(*given, "--force").code == 0
     assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+    picture, other = next(out.glob("axis_*.csv")), tmp_path / "precious"
+    picture.unlink()
+    picture.symlink_to(other)
+    for left in set(out.glob("axis_*.csv")) - {picture}:
+        left.unlink()
+    assert str(other) in refused(*given) and not other.exists()
 
 
 def test_what_goes_into_a_pipe_replaces_nothing(rec: Path) -> None:

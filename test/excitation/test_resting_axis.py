@@ -54,6 +54,24 @@ def test_no_guard_applies_more_than_was_asked(driven: str, rms: float, start: fl
     assert drive.state == "active", drive.reason
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("rms", [0.1, 1.0])
+def test_an_axis_that_moves_inward_through_the_brake_zone_gets_no_more_than_was_asked(side: float, rms: float) -> None:
+    """From 18 mm before the end towards the middle, with noise of ten counts: what pushes inward is as asked, what pushes outward is made less."""
+    axis = AxisExcitation(centring=0.0, limit=10.0, travel_min=-0.1, travel_max=0.1, brake=0.04, brake_voltage=5.0, low=20.0, rms=rms)
+    drive, wanted, random = Drive(ExcitationSettings(axes={"x": axis}, ramp=0.0)), signal(axis, RATE), np.random.default_rng(4)
+    drive.start()
+    for k in range(300):
+        drive.tick(k * ROWS / RATE)
+        seq = np.arange(k * ROWS, (k + 1) * ROWS, dtype=np.float64)
+        drive.see(Block(("x",), seq, seq / RATE, flickering(side * (0.082 - 0.02 * seq / RATE)[:, None], 5e-6, random)))
+        voltage, asked = drive.next(ROWS).values[:, 0], wanted.next(ROWS)
+        inward = side * asked <= 0.0
+        np.testing.assert_allclose(voltage[inward], asked[inward], rtol=1e-12)
+        assert (np.abs(voltage) <= np.abs(asked) * (1 + 1e-12)).all()
+    assert drive.state == "active", drive.reason
+
+
 def test_an_axis_that_coasts_outward_is_braked_though_nothing_is_asked() -> None:
     """Motion beyond the noise, towards an end at 0 V: the guard brakes with what it has."""
     axis = AxisExcitation(kind="off", centring=0.0, travel_min=-0.1, travel_max=0.1, brake=0.04, brake_voltage=2.0)

@@ -42,32 +42,37 @@ def heard(joints: JointCounter, times: FloatArray) -> Iterator[Block]:
             yield block
 
 
-def feed(joints: JointCounter, times: FloatArray, *sinks: Identifier | Newest) -> None:
-    for block in heard(joints, times):
+def feed(joints: JointCounter, times: FloatArray, *sinks: Identifier | Newest) -> list[Block]:
+    """What was given to who listens: of each sample each quantity by itself."""
+    blocks = list(heard(joints, times))
+    for block in blocks:
         for place, kind in enumerate(QUANTITIES[::-1]):
             given = Block(("x",), block.seq, block.time, block.values[:, place : place + 1])
             for sink in sinks:
                 sink.feed(kind, given)
+    return blocks
 
 
 @pytest.mark.parametrize(("rate", "change"), [*itertools.product(RATES[:-1], CHANGES), *((RATES[-1], change) for change in CHANGES[::5])])
 def test_another_rate_of_joint_states_is_followed_within_ten_seconds(rate: float, change: float) -> None:
-    """From half to double, from 2 % on: both live listeners know the rate, and lose nothing after that."""
+    """From half to double, from 2 % on: the counter begins anew, then both live listeners read the rate from 250 samples, and lose nothing more."""
     joints, identifier, newest = (
         JointCounter(("x",), with_voltage=False),
         Identifier(IdentifierSettings(length=64), ("x",)),
         Newest(("x",), 60.0, 3.0, 0.5),
     )
-    read = SOON + 250.0 / rate / change  # s; the rate is read anew from 200 samples
+    read = SOON + 250.0 / rate / change  # s
     first, second = stamps(rate, 13.0, 100.0), stamps(rate * change, read + 2.0, 115.0)
-    feed(joints, first, identifier, newest)
+    before = feed(joints, first, identifier, newest)
     assert identifier.sampling_rate == pytest.approx(rate, rel=2e-3)
     soon = second < 115.0 + read
-    feed(joints, second[soon], identifier, newest)
+    after = feed(joints, second[soon], identifier, newest)
+    noticed = next(block for last, block in itertools.pairwise((before[-1], *after)) if block.seq[0] <= last.seq[0])
+    assert noticed.time[0] < 115.0 + SOON
     assert identifier.sampling_rate == pytest.approx(rate * change, rel=2e-3)
-    before = sum(identifier.faults.values())
+    lost = sum(identifier.faults.values())
     feed(joints, second[~soon], identifier, newest)
-    assert sum(identifier.faults.values()) == before
+    assert sum(identifier.faults.values()) == lost
     assert newest.sampling_rate == pytest.approx(rate * change, rel=2e-3)
     assert newest.lacking() == ""
 

@@ -43,6 +43,7 @@ def test_an_error_of_the_conductor_stops_the_drive_and_is_one_line(tmp_path: Pat
             break
     assert code == 1 and "Traceback" not in said, said
     assert len([line for line in said.splitlines() if "ZeroDivisionError: float division by zero" in line]) == 1, said
+    assert blocks or place == "Conductor._on_statuses"  # before anything was driven
     assert not blocks or not blocks[-1].values.any()
 
 

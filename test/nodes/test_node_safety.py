@@ -128,6 +128,8 @@ def test_two_excitations_never_drive_one_machine(world: World) -> None:
     second.send(signal.SIGTERM)
     assert second.wait() == 0
     assert world.until(lambda: world.transition("excitation", "activate"), 10.0)
+    ended = len(statuses)  # nothing of the refusal stays
+    assert world.until(lambda: any(status.name == "excitation" and status.level == b"\x00" for status in statuses[ended:]), 10.0)
 
 
 def test_an_encoder_that_freezes_is_told_and_ends_at_zero_volts(world: World) -> None:

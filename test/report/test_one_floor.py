@@ -40,6 +40,8 @@ def test_every_picture_averages_to_the_number_of_the_headline(story: dict[str, A
     for kind in ("speed", "position", "time"):
         bins = np.array(story["steps"][0]["pictures"]["residual"][kind]["error_over_floor"])
         assert np.sqrt(np.mean(bins**2)) == pytest.approx(ratio, rel=0.05), kind
+    lines = story["steps"][0]["pictures"]["residual"]["frequency"]["error_over_floor"]
+    assert max(lines) > ratio  # the worst band is at least the whole
 
 
 def test_tiles_and_compare_have_the_floor_of_the_ladder(story: dict[str, Any], run: Run) -> None:

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from xy_sysid.cli import options as o
-from xy_sysid.cli.output import say
+from xy_sysid.cli.output import emit, say
 
 
 def trajectory(
@@ -25,6 +25,7 @@ def trajectory(
     rate: Annotated[float, typer.Option(min=1.0, max=2000.0, help="points a second")] = 100.0,
     seed: int = 1,
     force: o.Force = False,
+    json: o.Json = False,
 ) -> None:
     """Write the largest excitation within limits of position, speed and acceleration as a trajectory, for a robot that accepts only trajectories."""
     from xy_sysid.bags.atomic import write_text
@@ -39,6 +40,18 @@ def trajectory(
     write_text(out, as_yaml(made, joint))
     write_text(reference, as_csv(made))
     most = max(abs(made.position - start)), max(abs(made.speed)), max(abs(made.acceleration))
+    if json:
+        names = ("position", "speed", "acceleration")
+        emit(
+            {
+                "files": [str(out), str(reference)],
+                "points": made.time.size,
+                "seconds": made.time[-1],
+                "limited_by": made.limited_by,
+                "largest": dict(zip(names, most, strict=True)),
+            }
+        )
+        return
     say(
         f"{made.time.size} points over {made.time[-1]:g} s; the limit of {made.limited_by} decides. "
         f"Largest motion {most[0]:.3g}, speed {most[1]:.3g}, acceleration {most[2]:.3g}."
