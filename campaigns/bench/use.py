@@ -172,7 +172,7 @@ def table(found: Sequence[Outcome], seconds: float = SECONDS) -> Table:
     )
     told = f"{len(found)} axes with hidden effects, {seconds:g} s of identification each; tracking errors, um rms (urad of a hinge)."
     columns = ("axis", "hidden", "found", "undone", *KINDS)
-    return Table(title="A path after a minute of identification", text=told, columns=columns, rows=tuple(rows), checks=checks)
+    return Table(title="Each axis, and the errors on its path", text=told, columns=columns, rows=tuple(rows), checks=checks)
 
 
 def main(short: bool = False) -> None:

@@ -13,10 +13,10 @@ HEAD = """# Faults
 Made by `make faults` (`python -m campaigns.faults`): attacks with fixed seeds on what drives a machine, keeps data or answers a network.
 `python -m campaigns.faults --short` is the short campaign that `make test` runs.
 
-What may come of an attack: **full** (everything is right), **part-and-said** (the rest is right, and what is missing is said),
+Acceptable outcomes: **full** (everything is right), **part-and-said** (the rest is right, and what is missing is said),
 **one line** (refused in one clear line), **zero volts** (the machine stands within the bound), **no sum** (a number changed in a
-format that has no check sum: [files](files.md#damaged-and-hostile-files) says so). Everything else is a hole, and ends the
-campaign with exit code 1. Seconds are the longest of all tries.
+format without checksum: [files](files.md#damaged-and-hostile-files) says so). Any other outcome is a fault, and the campaign ends
+with exit code 1. Seconds are the longest of all tries.
 """
 FACTS = "Run on "
 

@@ -45,31 +45,34 @@ def report(
 
     The browser prints it with page numbers.
     """
-    from xy_sysid.bags.atomic import write_text
-    from xy_sysid.files.effects import library
-    from xy_sysid.fleets.naming import date_of
-    from xy_sysid.report.axis_report import STAGES, Wanted
-    from xy_sysid.report.cover import Cover
-    from xy_sysid.report.story_words import status
-    from xy_sysid.report.written import Asked, written_report
+    from xy_sysid.processes.helper import Helper
 
     settings = o.settings_from(params, set_)
     samples = o.period_from(period)
     o.output_file("--out", out, force)
-    if recorded:
-        date_of(recorded)
-    known = library(effect_file or [])
-    recording = read(recs, reading, json)
-    names = chosen(recording, reading.axes)
-    with progress() as bar:
-        tasks = {name: bar.add_task(f"axis {name}", total=len(STAGES)) for name in names}
+    with Helper("xy_sysid.report.axis_report") as helper:
+        from xy_sysid.bags.atomic import write_text
+        from xy_sysid.files.effects import library
+        from xy_sysid.fleets.naming import date_of
+        from xy_sysid.report.axis_report import STAGES, Wanted
+        from xy_sysid.report.cover import Cover
+        from xy_sysid.report.story_words import status
+        from xy_sysid.report.written import Asked, written_report
 
-        def tell(name: str, stage: str) -> None:
-            bar.update(tasks[name], description=f"axis {name}: {stage}", completed=STAGES.index(stage))
-
-        wanted = Wanted(settings, samples, known, math.inf if budget is None else budget)
+        if recorded:
+            date_of(recorded)
+        wanted = Wanted(settings, samples, library(effect_file or []), math.inf if budget is None else budget)
         cover = Cover(title=title, machine=machine, author=author, recorded=recorded)
-        made = written_report(recording, Asked(paths=tuple(recs), axes=names, cover=cover, wanted=wanted, tell=tell))
+        recording = read(recs, reading, json)
+        names = chosen(recording, reading.axes)
+        with progress() as bar:
+            tasks = {name: bar.add_task(f"axis {name}", total=len(STAGES)) for name in names}
+
+            def tell(name: str, stage: str) -> None:
+                bar.update(tasks[name], description=f"axis {name}: {stage}", completed=STAGES.index(stage))
+
+            asked = Asked(paths=tuple(recs), axes=names, cover=cover, wanted=wanted, tell=tell, begin=helper.begin)
+            made = written_report(recording, asked)
     write_text(out, made.page)
     if json:
         head: dict[str, Any] = {"title": made.cover.title, "machine": made.cover.machine, "author": made.cover.author, "date": made.cover.recorded}

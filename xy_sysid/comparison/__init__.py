@@ -1,6 +1,6 @@
 """A model against data that no fit saw.
 
-noise_floor:     the error that a perfect model would still show
+noise_floor:     the smallest error that the data can show
 where_it_fails:  by frequency, speed, direction, position, amplitude and time
 which_is_better: two models on the same windows, in pairs
 physical_model:  an axis with effects as a model to be judged

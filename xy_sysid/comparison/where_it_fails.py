@@ -3,7 +3,7 @@
 By frequency, speed, direction of motion, position (once or repeating), amplitude of the input, and time: each place with its
 size in multiples of the noise floor.
 
-The noise floor is the least error that a model can be known to have: the encoder's noise, together with the part of the motion to which
+The noise floor is the smallest error that the data can show: the encoder's noise, together with the part of the motion to which
 laws are trusted (EPSILON). It is the floor by which a fit is judged. The error over the floor is one number for the whole recording; the
 error in bins of speed, position, amplitude and time is scaled so that its mean power is the square of that number.
 """

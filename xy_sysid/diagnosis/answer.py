@@ -30,7 +30,7 @@ class Rung:
     came, went: effects that were added and removed with it; none of either for the rigid base
     gain, delay, pole, values: the model, and the values of each effect, SI; parameters: the same with 95 % intervals
     training_error, held_out_error: rms, m/s, of the data of the fit, and of data that no fit saw
-    noise_floor: rms, m/s: the least error that a model can be known to have; excess: 0 is at the floor
+    noise_floor: rms, m/s: the smallest error that the data can show; excess: 0 is at the floor
     one_step: judged by its prediction of the next sample, as no free simulation can tell
     made: the model with its fit; None in another process
     """

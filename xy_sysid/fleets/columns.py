@@ -49,7 +49,7 @@ _RESPONSE = (
     Column("frf_coherence", "number", "", "median coherence of the band, 0 to 1"),
     Column("tf_numerator", "text", "", "coefficients of the transfer function's numerator in s, highest power first"),
     Column("tf_denominator", "text", "", "the same of the denominator"),
-    Column("tf_trustworthy", "truth", "", "the data determine it, and noise nearly explains what it leaves"),
+    Column("tf_trustworthy", "truth", "", "the data determine it, and noise nearly explains its residual error"),
     Column("tf_relative_error", "number", "", "rms of the error over the magnitude, line by line"),
     Column("tf_misfit", "number", "", "factor by which the intervals of noise alone are too narrow; it is in the intervals below"),
 )
@@ -61,7 +61,7 @@ _DIAGNOSIS = (
     Column("explained", "number", "", "part of the rigid model's error power beyond the noise that the effects explain, 0 to 1"),
     Column("rigid_error", "number", "m/s", "held-out error of the rigid model, rms"),
     Column("held_out_error", "number", "m/s", "held-out error of the model below, rms", trended=True),
-    Column("noise_floor", "number", "m/s", "least error that a model can be known to have, rms"),
+    Column("noise_floor", "number", "m/s", "smallest error that the data can show: encoder noise and a tolerated part of the motion, rms"),
     Column("noise", "number", "m/s", "what the encoder adds to the error, rms", trended=True),
     Column("discrepancy", "number", "m/s", "what no effect explains, rms"),
     Column("model", "text", "", "effects of the model whose parameters follow: those that are named, and those that the fleet follows"),

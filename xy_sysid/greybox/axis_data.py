@@ -87,7 +87,7 @@ class AxisData:
 
     @property
     def noise_floor(self) -> float:
-        """The least error that a model can be known to have: of encoder noise and of the part of the motion that a model may leave, m/s rms."""
+        """The smallest error that the data can show: of encoder noise and of the part of the motion that a model may leave, m/s rms."""
         return self.layout.rms(self.floor.power)
 
     @property

@@ -6,11 +6,9 @@ the story's models see two thirds that are spread over it.
 
 from __future__ import annotations
 
-import functools
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -21,7 +19,6 @@ from xy_sysid.diagnosis.refine import never
 from xy_sysid.errors import BadInput
 from xy_sysid.fitting.of_recording import judged, split
 from xy_sysid.fitting.verdicts import Validation, validate
-from xy_sysid.jit import cores
 from xy_sysid.report.signals import excitation, motion
 from xy_sysid.report.study import AxisStudy, study_axis
 from xy_sysid.samples.recording import Recording
@@ -31,9 +28,11 @@ from xy_sysid.story.story import tell as whole_story
 
 HELD_OUT = 1.0 / 3.0  # of the recording, as in every story
 LONGEST = 600.0  # s of which the story is told: more would teach it nothing and take memory (2 MB a second at 2 kHz)
+MOST_SENT = 1 << 27  # bytes of positions of a recording that another process gets a copy of
 STAGES = ("response and fits", "diagnosis")
 
-Tell = Callable[[str], None]
+Tell = Callable[[str, str], None]
+Begin = Callable[..., Callable[[], Any]]  # begins a function of this module with its arguments, and gives what waits for the result
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,43 +67,39 @@ class Wanted:
     budget: float = math.inf
 
 
+def later(function: Callable[..., Any], *arguments: Any) -> Callable[[], Any]:
+    """Begin nothing: the result is made when it is asked for."""
+    return lambda: function(*arguments)
+
+
 def axis_reports(
-    recording: Recording, axes: Sequence[str], wanted: Wanted, tell: Callable[[str, str], None] = lambda axis, stage: None
+    recording: Recording, axes: Sequence[str], wanted: Wanted, tell: Tell = lambda axis, stage: None, begin: Begin = later
 ) -> dict[str, AxisReport]:
-    """All that can be said about each of these axes, by name; several at a time, as simulations leave the interpreter to others.
+    """All that can be said about each of these axes, by name.
 
-    tell: called with an axis and each of STAGES as it begins, from other threads
+    tell: called with an axis and each of STAGES as it begins; begin: makes the fits of all axes while the stories are told, if it can
     """
-    several = min(len(axes), cores())
-    each = replace(wanted, budget=several * wanted.budget)  # the clock counts all threads
-    pool = ThreadPoolExecutor(several)
-    try:
-        made = pool.map(lambda axis: axis_report(recording, axis, each, functools.partial(tell, axis)), axes)
-        return dict(zip(axes, made, strict=True))
-    finally:
-        pool.shutdown(wait=False, cancel_futures=True)
+    begin = begin if recording.position.nbytes < MOST_SENT else later
+    fits = {}
+    for axis in axes:
+        tell(axis, STAGES[0])
+        fits[axis] = begin(_studied, recording.of_axes((axis,)), axis, wanted.settings, wanted.period)
+    return {axis: _report(recording, axis, wanted, tell, fits[axis]) for axis in axes}
 
 
-def axis_report(recording: Recording, axis: str, wanted: Wanted, tell: Tell = lambda stage: None) -> AxisReport:
-    """All that can be said about one axis; what cannot is said in words. tell: called with each of STAGES as it begins.
-
-    The fits are made while the story is told: each leaves the interpreter to the other most of the time.
-    """
+def _report(recording: Recording, axis: str, wanted: Wanted, tell: Tell, fits: Callable[[], Any]) -> AxisReport:
+    """All that can be said about one axis; what cannot is said in words."""
     note = ""
     run = recording.run(axis) if len(recording) else None
     if run is not None and len(run) > round(LONGEST * run.sampling_rate):
         note = f"The diagnosis uses the first {LONGEST:g} s of the longest stretch, of {run.seconds:.4g} s."
-    tell(STAGES[0])
-    with ThreadPoolExecutor(1) as beside:
-        fits = beside.submit(_studied, recording, axis, wanted.settings, wanted.period)
-        if wanted.budget < math.inf:
-            fits.result()  # their processor time is none of the diagnosis
-        story, problem = None, ""
-        try:
-            story = told(recording, axis, wanted, tell)
-        except BadInput as refusal:
-            problem = str(refusal)
-        studied, verdicts = fits.result()
+    story, problem = None, ""
+    tell(axis, STAGES[1])
+    try:
+        story = told(recording, axis, wanted)
+    except BadInput as refusal:
+        problem = str(refusal)
+    studied, verdicts = fits()
     speed = float("nan") if story is None else _speed(recording, axis)
     return AxisReport(study=studied, verdicts=verdicts, story=story, speed=speed, problem=problem, note=note)
 
@@ -126,9 +121,8 @@ def _studied(recording: Recording, axis: str, settings: IdentifierSettings, peri
         return AxisStudy(axis=axis, excitation=drive, motion=moved, estimate=None, fits={}, pair=None, change=None, problem=problem), None
 
 
-def told(recording: Recording, axis: str, wanted: Wanted, tell: Tell = lambda stage: None) -> Mapping[str, Any]:
+def told(recording: Recording, axis: str, wanted: Wanted) -> Mapping[str, Any]:
     """The document of the whole story of an axis, of at most LONGEST. Raises BadInput for samples that cannot be judged."""
-    tell(STAGES[1])
     clock = never if wanted.budget == math.inf else time.process_time
     return document(whole_story(recording.run(axis).until(LONGEST), wanted.library, clock, wanted.budget))
 

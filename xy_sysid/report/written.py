@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from datetime import UTC, date, datetime
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.files.provenance import provenance
 from xy_sysid.files.unasked import free
 from xy_sysid.fitting.two_axes import coupling_in
-from xy_sysid.report.axis_report import AxisReport, Wanted, axis_reports
+from xy_sysid.report.axis_report import AxisReport, Begin, Tell, Wanted, axis_reports, later
 from xy_sysid.report.cover import Cover, cover_of
 from xy_sysid.report.report_page import Recorded, report_page
 from xy_sysid.response.coupling import Coupling
@@ -38,20 +38,24 @@ class Written:
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """A report that is asked for. paths: of the recording; axes: to report on; cover: what was said; command: how it was asked for."""
+    """A report that is asked for.
+
+    paths: of the recording; axes: to report on; cover: what was said; command: how it was asked for; begin: see ``axis_reports``
+    """
 
     paths: tuple[Path, ...]
     axes: tuple[str, ...]
     cover: Cover
     wanted: Wanted
     command: str = ""
-    tell: Callable[[str, str], None] = field(default=lambda axis, stage: None)
+    tell: Tell = field(default=lambda axis, stage: None)
+    begin: Begin = later
 
 
 def written_report(recording: Recording, asked: Asked) -> Written:
     """The whole page. Raises BadInput for a date that is none, before any work is done."""
     cover = cover_of(recording, asked.cover, asked.paths, datetime.now(UTC).astimezone().date())
-    made = axis_reports(recording, asked.axes, asked.wanted, asked.tell)
+    made = axis_reports(recording, asked.axes, asked.wanted, asked.tell, asked.begin)
     source = ", ".join(str(path) for path in asked.paths) or recording.source
     origin = provenance(source, recording) | ({"command": asked.command} if asked.command else {})
     coupling, why = coupled(recording, asked.axes, asked.wanted.settings)
@@ -98,10 +102,8 @@ def coupled(recording: Recording, names: tuple[str, ...], settings: IdentifierSe
     """What the first two of the axes do to each other, and notes; without an answer a note says why."""
     if len(names) < 2:
         return None, ()
-    columns = [recording.axes.index(name) for name in names[:2]]
-    two = replace(recording, axes=names[:2], voltage=recording.voltage[:, columns], position=recording.position[:, columns], reference=None)
     try:
-        return coupling_in(two, settings), ()
+        return coupling_in(recording.of_axes(names[:2]), settings), ()
     except BadInput as problem:
         return None, (f"Coupling of {names[0]} and {names[1]} was not judged: {problem}",)
 

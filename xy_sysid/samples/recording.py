@@ -148,6 +148,12 @@ class Recording:
         """Of input and output."""
         return OF[self.measured](self.input_unit, self.output_unit)
 
+    def of_axes(self, axes: Sequence[str]) -> Recording:
+        """The same of some of its axes, in this order."""
+        places = [self.axes.index(axis) for axis in axes]
+        reference = None if self.reference is None else self.reference[:, places]
+        return replace(self, axes=tuple(axes), voltage=self.voltage[:, places], position=self.position[:, places], reference=reference)
+
     @classmethod
     def from_arrays(
         cls, sampling_rate: float, voltage: Any, position: Any, axes: Sequence[str] = (), units: tuple[str, str] = ("V", "m")
