@@ -88,8 +88,18 @@ def test_an_axis_that_cannot_be_fitted_keeps_what_is_known_of_it() -> None:
         ("/data/mill-07/2026-03-03.csv", "", Name("mill-07", "", datetime(2026, 3, 3, tzinfo=UTC))),
         ("/data/mill-07/rosbag2_2026_03_03-14_30_05", "", Name("mill-07", "", datetime(2026, 3, 3, 14, 30, 5, tzinfo=UTC))),
         ("/data/mill-07/run_12.csv", "", Name("mill-07")),
-        ("/data/mill-07/z/20260303T1430_a.csv", "{machine}/{axis}/{date}*", Name("mill-07", "z", datetime(2026, 3, 3, 14, 30, tzinfo=UTC))),
-        ("/data/2026-03-03/old/m7.npz", "{date}/*/{machine}.npz", Name("m7", "", datetime(2026, 3, 3, tzinfo=UTC))),
+        ("/data/mill-07/SN00012345_run1.csv", "", Name("mill-07")),
+        ("/data/mill-07/10002026_2026-03-03.csv", "", Name("mill-07", "", datetime(2026, 3, 3, tzinfo=UTC))),
+        ("/data/mill-07/rosbag2_1970_01_01-00_05_12", "", Name("mill-07")),
+        ("/data/mill-07/2026-03-03T14-30-05+0200.csv", "", Name("mill-07", "", datetime(2026, 3, 3, 12, 30, 5, tzinfo=UTC))),
+        ("/data/mill-07/2026-03-03T14:30:05-05:00.csv", "", Name("mill-07", "", datetime(2026, 3, 3, 19, 30, 5, tzinfo=UTC))),
+        ("/data/mill-07/2026-03-03-14:30.csv", "", Name("mill-07", "", datetime(2026, 3, 3, 14, 30, tzinfo=UTC))),
+        (
+            "/data/mill-07/z/20260303T1430_a.csv",
+            "{machine}/{axis}/{date}*",
+            Name("mill-07", "z", datetime(2026, 3, 3, 14, 30, tzinfo=UTC), said=True),
+        ),
+        ("/data/2026-03-03/old/m7.npz", "{date}/*/{machine}.npz", Name("m7", "", datetime(2026, 3, 3, tzinfo=UTC), said=True)),
     ],
 )
 def test_machine_axis_and_date_come_from_the_path(path: str, pattern: str, name: Name) -> None:
@@ -105,7 +115,9 @@ def test_a_small_file_names_what_the_path_does_not_tell(tmp_path: Path) -> None:
     )
     names = names_from(file)
     assert names.follow == ["coulomb_friction"] and names.recordings["old/a.csv"] == Named(machine="mill-01", date="2025-11-02")
-    assert name_of(Path("/x/old/a.csv"), names) == Name("mill-01", "", datetime(2025, 11, 2, tzinfo=UTC))
+    assert name_of(Path("/x/old/a.csv"), names) == Name("mill-01", "", datetime(2025, 11, 2, tzinfo=UTC), said=True)
+    with pytest.raises(BadInput, match="a year from 2000 to 2099"):
+        name_of(Path("/x/mill/2206-03-03.csv"), names)
     with pytest.raises(BadInput, match="ends with"):
         name_of(Path("/x/old/b.csv"), names)
 

@@ -5,7 +5,8 @@ A task whose process dies is tried once more at the end, alone, so that no other
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import itertools
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -78,29 +79,26 @@ def processes(client: Client) -> int:
 def results(client: Client, tasks: Sequence[Task]) -> Iterator[tuple[Done, float]]:
     """What came of each task, in the order in which they end, and the s that it took; never more than a few of them wait at the scheduler."""
     waiting, doubtful = iter(tasks), list[Task]()
-    ahead = AHEAD * processes(client)
-    yield from _window(client, waiting, ahead, doubtful)
+    yield from _window(client, waiting, lambda: AHEAD * processes(client), doubtful)
     blamed = list[Task]()
-    yield from _window(client, iter(doubtful), 1, blamed)
+    yield from _window(client, iter(doubtful), lambda: 1, blamed)
     for task in blamed:
         yield Done(task.path, (failed(task.path, "worker", DIED),)), 0.0
 
 
-def _window(client: Client, waiting: Iterator[Task], ahead: int, died: list[Task]) -> Iterator[tuple[Done, float]]:
-    """The results of tasks of which so many are at the scheduler; those whose process died are put aside."""
+def _window(client: Client, waiting: Iterator[Task], ahead: Callable[[], int], died: list[Task]) -> Iterator[tuple[Done, float]]:
+    """The results of tasks of which so many are at the scheduler, more when a cluster grows; those whose process died are put aside."""
     distributed = dask()
     running: dict[Any, Task] = {}
     ended = distributed.as_completed()
 
-    def more() -> None:
-        for task in waiting:
+    def fill() -> None:
+        for task in itertools.islice(waiting, max(ahead() - len(running), 0)):
             future = client.submit(timed, task, pure=False)
             running[future] = task
             ended.add(future)
-            return
 
-    for _ in range(ahead):
-        more()
+    fill()
     while running:
         future = next(ended)
         task = running.pop(future)
@@ -113,7 +111,7 @@ def _window(client: Client, waiting: Iterator[Task], ahead: int, died: list[Task
             text = f"{type(error).__name__}: {error}. This is a fault of xy_sysid; please report it."
             yield Done(task.path, (failed(task.path, "worker", " ".join(text.split())),)), 0.0
         future.release()
-        more()
+        fill()
 
 
 def timed(task: Task) -> tuple[Done, float]:

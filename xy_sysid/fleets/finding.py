@@ -14,14 +14,14 @@ METADATA = "metadata.yaml"
 
 
 def recordings(paths: Iterable[Path | str], besides: Path | None = None) -> tuple[Path, ...]:
-    """Every recording once, in the order of their paths.
+    """Every recording once, in the order of their absolute paths.
 
     paths: recordings; folders, which are searched for bags and for files whose ending is one of ``ENDINGS``; or patterns like data/*/2026*.csv
     besides: a folder that is not searched (the table itself)
     Raises BadInput for a path that is not there, or where there is no recording.
     """
     found: dict[Path, None] = {}
-    given = [Path(path) for path in paths]
+    given = [Path(path).absolute() for path in paths]
     for path in given:
         matches = [path] if path.exists() else _matching(path)
         if not matches:

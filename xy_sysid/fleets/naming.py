@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -13,9 +14,10 @@ from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.samples.recording import Recording
 from xy_sysid.settings import Settings, build, knob
 
-DATE = r"(?<!\d)\d{4}[-_.]?\d\d[-_.]?\d\d(?:[T_ -]?\d\d[-_:]?\d\d(?:[-_:]?\d\d)?)?Z?(?!\d)"
+ZONE = r"(?:Z|[+-]\d\d:\d\d|\+\d{4})"
+DATE = rf"(?<!\d)\d{{4}}[-_.]?\d\d[-_.]?\d\d(?:[T_ -]?\d\d[-_:]?\d\d(?:[-_:]?\d\d)?{ZONE}?)?(?!\d)"
 PARTS = {"{machine}": r"(?P<machine>[^/]+?)", "{axis}": r"(?P<axis>[^/]+?)", "{date}": f"(?P<date>{DATE})", "*": "[^/]*"}
-FIRST = datetime(2000, 1, 1, tzinfo=UTC)  # no clock of a recording was right before; one that counts from its start is not a date
+FIRST, LAST = datetime(2000, 1, 1, tzinfo=UTC), datetime(2100, 1, 1, tzinfo=UTC)  # a clock that counts from its start, or number, is no date
 EXAMPLE = "{machine}/{date}*.csv"
 
 
@@ -37,11 +39,20 @@ class Names(Settings):
 
 @dataclass(frozen=True, slots=True)
 class Name:
-    """What a recording is called. axis: of a file that holds one, empty where the file's own names stand; date: UTC, None if nobody knows."""
+    """What a recording is called.
+
+    axis: of a file that holds one, empty where the file's own names stand; date: UTC, None if nobody knows
+    said: the machine was named by a list or a pattern; else it is the folder, and what the recording itself says is better
+    """
 
     machine: str
     axis: str = ""
     date: datetime | None = None
+    said: bool = False
+
+    def of(self, recording: Recording) -> str:
+        """The machine of a recording that has been read."""
+        return self.machine if self.said else recording.machine or self.machine
 
 
 def names_from(path: Path) -> Names:
@@ -62,14 +73,14 @@ def _dated(value: Any) -> Any:
 
 
 def name_of(path: Path, names: Names) -> Name:
-    """The name that a list or the path gives; without a pattern the folder is the machine, and a date in the file's name its date.
+    """The name that a list or the path gives; without a pattern the folder is the machine, and the first date in the file's name its date.
 
-    Raises BadInput where the path does not fit the pattern, or a date is none.
+    Raises BadInput where the path does not fit the pattern, or what is said to be a date is none.
     """
     whole = path.absolute().as_posix()
     said = next((one for end, one in names.recordings.items() if whole == end or whole.endswith(f"/{end}")), None)
     if said is not None and said.machine:
-        return Name(said.machine, said.axis, date_of(said.date) if said.date else None)
+        return Name(said.machine, said.axis, _said_date(said.date), said=True)
     if names.pattern:
         found = compiled(names.pattern).search(whole)
         if found is None:
@@ -77,13 +88,29 @@ def name_of(path: Path, names: Names) -> Name:
                 "path", str(path), f"one that ends with {names.pattern}", "Change the pattern, or name the recording in the file of names."
             )
         parts = found.groupdict()
+        machine, axis, date = parts.get("machine") or "", parts.get("axis") or "", _said_date(parts.get("date") or "")
     else:
-        dates = re.search(DATE, path.name)
-        parts = {"machine": path.absolute().parent.name, "date": dates.group() if dates else None}
-    machine, axis, date = parts.get("machine") or path.absolute().parent.name, parts.get("axis") or "", parts.get("date")
+        machine, axis, date = "", "", _date_in(path.name)
     if said is not None:
-        axis, date = said.axis or axis, said.date or date
-    return Name(machine, axis, date_of(date) if date else None)
+        axis, date = said.axis or axis, _said_date(said.date) or date
+    return Name(machine or path.absolute().parent.name, axis, date, said=bool(machine))
+
+
+def _said_date(text: str) -> datetime | None:
+    """A date that somebody means to be one; None where there is none. Raises BadInput."""
+    found = date_of(text) if text else None
+    if found is not None and not FIRST <= found < LAST:
+        raise BadInput("date", repr(text), f"a year from {FIRST.year} to {LAST.year - 1}", "Correct it, or leave it out.")
+    return found
+
+
+def _date_in(name: str) -> datetime | None:
+    """The first date in the name of a file; other numbers are none."""
+    for found in re.finditer(f"(?=({DATE}))", name):
+        with suppress(BadInput):
+            if FIRST <= (date := date_of(found.group(1))) < LAST:
+                return date
+    return None
 
 
 def compiled(pattern: str) -> re.Pattern[str]:
@@ -98,10 +125,13 @@ def compiled(pattern: str) -> re.Pattern[str]:
 
 def date_of(text: str) -> datetime:
     """A date, in UTC where it names no zone. Raises BadInput."""
-    digits = re.sub(r"[^\d]", "", text)
+    zone = re.search(rf"{ZONE}$", text)
+    local = re.sub(r"[^\d]", "", text[: zone.start()] if zone else text)
+    digits, name = (local, zone.group().replace("Z", "+00:00")) if zone and len(local) in (12, 14) else (re.sub(r"[^\d]", "", text), "+00:00")
     try:
         if re.fullmatch(DATE, text) and len(digits) in (8, 12, 14):
-            return datetime.strptime(digits, "%Y%m%d%H%M%S"[: {8: 6, 12: 10, 14: 12}[len(digits)]]).replace(tzinfo=UTC)
+            form = "%Y%m%d%H%M%S"[: {8: 6, 12: 10, 14: 12}[len(digits)]]
+            return datetime.strptime(f"{digits} {name}", f"{form} %z").astimezone(UTC)
         found = datetime.fromisoformat(text)
     except ValueError:
         raise BadInput("date", repr(text), "a day and a time of day", "Write for example 2026-03-03 or 2026-03-03T14:30:00.") from None
@@ -111,4 +141,4 @@ def date_of(text: str) -> datetime:
 def date_within(recording: Recording) -> datetime | None:
     """When the first sample was taken, if its clock tells the date."""
     first = float(recording.time[0]) if len(recording) else 0.0
-    return datetime.fromtimestamp(first, UTC) if first > FIRST.timestamp() else None
+    return datetime.fromtimestamp(first, UTC) if FIRST.timestamp() < first < LAST.timestamp() else None

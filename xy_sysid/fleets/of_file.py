@@ -78,8 +78,9 @@ def rows_of_file(task: Task) -> Done:
         except (BadRecording, BadInput) as problem:
             return Done(task.path, (failed(task.path, "reading", str(problem)) | {"date": name.date} | origin,))
         seconds = process_time() - begun
-        origin |= {"date": name.date or date_within(recording), "seconds_reading": seconds}
-        plan = Plan(follow=follow, first=task.first, library=known, clock=process_time)
+        origin |= {"machine": name.of(recording), "date": name.date or date_within(recording), "seconds_reading": seconds}
+        first = tuple((recording.axes[0] if axis == name.axis else axis, effects) for axis, effects in task.first)
+        plan = Plan(follow=follow, first=first, library=known, clock=process_time)
         rows = [row_of(recording, axis, plan) for axis in recording.axes]
     return Done(task.path, tuple(row | ({"axis": name.axis} if name.axis else {}) | origin for row in rows))
 

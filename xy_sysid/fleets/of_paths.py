@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from time import perf_counter
 from typing import TYPE_CHECKING
 
@@ -38,8 +39,9 @@ class Analysis:
     effect_files: tuple[str, ...] = ()
 
     def task(self, path: Path) -> Task:
-        """One recording to be analysed."""
-        return Task(path=str(path), names=self.names, reading=self.reading, effect_files=self.effect_files)
+        """One recording to be analysed, by whatever process: its paths are absolute."""
+        own = tuple(str(Path(file).expanduser().absolute()) for file in self.effect_files)
+        return Task(path=str(path.absolute()), names=self.names, reading=self.reading, effect_files=own)
 
     def check(self) -> None:
         """Raises BadInput, before any work is done, for names of effects or a pattern that mean nothing."""
@@ -53,7 +55,7 @@ class Analysis:
 
 def fleet(
     paths: Paths,
-    table: Path | str,
+    table: Path | str | None = None,
     client: Client | None = None,
     *,
     pattern: str = "",
@@ -62,15 +64,17 @@ def fleet(
 ) -> pyarrow.Table:
     """Fit and diagnose every recording, and give the table of all results: one row for each axis of each recording.
 
-    paths:   recordings, folders or patterns; table: a folder. What it has already is not done again
+    paths:   recordings, folders or patterns; table: a folder. What it has already is not done again. Without one nothing is kept
     client:  of a dask cluster; without one, processes of this machine: ``workers``, or one for each core
     pattern: of the end of a path, which tells machine, axis and date: "{machine}/{date}*.csv"
     follow:  effects whose parameters are estimated in every recording
     Raises BadInput or BadRecording for what cannot be done at all; a recording that cannot be read is a row with its problem.
     """
     names = Names(pattern=pattern, follow=[follow] if isinstance(follow, str) else list(follow))
-    run(paths, Path(table), Analysis(names=names), client or Cluster(workers=workers))
-    return read(Path(table))
+    with TemporaryDirectory() as kept_for_now:
+        folder = Path(kept_for_now if table is None else table)
+        run(paths, folder, Analysis(names=names), client or Cluster(workers=workers))
+        return read(folder)
 
 
 def run(paths: Paths, folder: Path, how: Analysis, where: Cluster | Client, tell: Callable[[Progress], None] = lambda _: None) -> Progress:

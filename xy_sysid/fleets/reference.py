@@ -54,8 +54,11 @@ class References:
         self._undated: list[Task] = []
         self._asked: dict[str, _Machine] = {}
         self._by_key: dict[str, list[Row]] = {}
+        self._folders: dict[str, str] = {}
         for task in tasks:
             name = _name(task)
+            if name is not None and not name.said:
+                self._folders[str(Path(task.path).parent)] = name.machine
             if name is None or name.date is None:
                 self._undated.append(task)
             else:
@@ -69,7 +72,9 @@ class References:
         given = {key: {place for place, _ in machine.given} for key, machine in self._machines.items()}
         for row in table:
             self._by_key.setdefault(row["key"], []).append(row)
-            for key in {(row["machine"], ""), (row["machine"], row["axis"])} & given.keys() if row["date"] is not None else ():
+            # a recording in a folder may have said another machine
+            machine = self._folders.get(str(Path(str(row["source"])).parent)) or str(row["machine"])
+            for key in {(machine, ""), (machine, str(row["axis"]))} & given.keys() if row["date"] is not None else ():
                 place = row["date"], Path(row["source"]).name
                 if place not in given[key]:
                     self._machines[key].earlier.setdefault(place, []).append(row)

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     import pyarrow
 
 ENDING = ".parquet"
+ORDER = ["machine", "axis", "date", "source"]
+KNOWS = ("source", "file_sha256", "date")  # what makes a recording the same one
 NAMED = re.compile(r"[^\w.-]+")
 
 
@@ -54,8 +56,12 @@ def _told(item: Column) -> dict[str, str]:
 
 
 def as_table(rows: Iterable[Row], library: Library = STANDARD) -> pyarrow.Table:
-    """The rows in the table's order."""
-    return arrow().Table.from_pylist(sorted(rows, key=_place), schema=schema(library))
+    """The rows in the table's order; what the library does not know, as parameters of another run's own effects, stands in the last columns."""
+    pa, known = arrow(), schema(library)
+    ordered = sorted(rows, key=_place)
+    others = dict.fromkeys(name for row in ordered for name in row if name not in known.names)
+    more = [pa.field(name, pa.infer_type([row.get(name) for row in ordered])) for name in others]
+    return pa.Table.from_pylist(ordered, schema=pa.schema([*known, *more]))
 
 
 def _place(row: Row) -> tuple[str, str, bool, datetime | None, str]:
@@ -75,37 +81,90 @@ def read(folder: Path, names: Sequence[str] | None = None) -> pyarrow.Table:
     Raises BadRecording for what is no table of a fleet.
     """
     pa = arrow()
+    files = _files(folder)
+    if not files:
+        raise BadRecording(folder, "no Parquet files in it", "Make the table first: xy-sysid fleet PATH -o TABLE.")
+    parts = [_of_file(file) for file in files]
     try:
-        files = [folder] if folder.is_file() else sorted(folder.glob(f"*{ENDING}"))
-        if not files:
-            raise BadRecording(folder, "no Parquet files in it", "Make the table first: xy-sysid fleet PATH -o TABLE.")
-        for file in files:
-            regular_file(file)
-        parts = [pa.parquet.read_table(file, partitioning=None) for file in files]
-    except (OSError, pa.ArrowInvalid) as error:
-        raise BadRecording(folder, f"cannot be read as Parquet ({str(error).splitlines()[0]})", "Make the table again with xy-sysid fleet.") from None
-    found = pa.concat_tables(parts, promote_options="default")
+        found = pa.concat_tables(parts, promote_options="default")
+    except pa.ArrowException as error:
+        raise BadRecording(folder, f"its files do not fit together ({_first_line(error)})", "Give a table that xy-sysid fleet made.") from None
     missing = [name for name in names or ("machine", "axis", "date") if name not in found.column_names]
     if missing:
         raise BadRecording(folder, f"no column {missing[0]!r}", "Give a table that xy-sysid fleet made.")
     return found.select(list(names)) if names is not None else found
 
 
-def rows_in(path: Path) -> list[Row]:
-    """The rows of one machine's file; none where there is no file."""
-    return arrow().parquet.read_table(path, partitioning=None).to_pylist() if path.is_file() else []
+def _files(folder: Path) -> list[Path]:
+    """The Parquet files of a table. Raises BadRecording where it cannot be listed, or one is no file."""
+    try:
+        files = [folder] if folder.is_file() else sorted(folder.glob(f"*{ENDING}"))
+    except OSError as error:
+        raise BadRecording(folder, f"cannot be read ({error.strerror or error})", "Check the path and the permissions.") from None
+    for file in files:
+        regular_file(file)
+    return files
+
+
+def _of_file(file: Path) -> pyarrow.Table:
+    """A machine's file. Raises BadRecording."""
+    pa = arrow()
+    try:
+        return pa.parquet.read_table(file, partitioning=None)
+    except (OSError, pa.ArrowException) as error:
+        act = "Remove it, and run xy-sysid fleet again."
+        raise BadRecording(file, f"cannot be read as Parquet ({_first_line(error)})", act) from None
+
+
+def _first_line(error: Exception) -> str:
+    return (str(error).splitlines() or [type(error).__name__])[0]
 
 
 def merged(folder: Path, rows: Iterable[Row], library: Library = STANDARD) -> None:
-    """Put rows into the table. A recording replaces what is there of the same source, or of the same content and name."""
+    """Put rows into the table.
+
+    A recording replaces what is there of the same source, whatever the machine was called then, and what is there of the same content and name under
+    another source. What the new rows do not know stays as it is, with its columns.
+    """
     new: dict[str, list[Row]] = {}
     for row in rows:
         new.setdefault(row["machine"], []).append(row)
-    for machine, own in new.items():
-        sources, keys = {row["source"] for row in own}, {row["key"] for row in own if row["key"]}
-        path = folder / file_name(machine)
-        kept = [row for row in rows_in(path) if row["source"] not in sources and row["key"] not in keys]
-        write(as_table([*kept, *_each_once(own)], library), path)
+    sources = {row["source"] for own in new.values() for row in own}
+    places = {folder / file_name(machine): own for machine, own in new.items()}
+    for path in sorted({*_files(folder), *places}):
+        own = _each_once(places.get(path, []))
+        copies = {(row["file_sha256"], row.get("date")) for row in own if row.get("file_sha256")}
+        if path.is_file():
+            there = _of_file(path)
+            if set(KNOWS) - {*there.column_names}:
+                raise BadRecording(path, f"not all of the columns {', '.join(KNOWS)}", "Remove it, or choose another folder for the table.")
+            found = (there[name].to_pylist() for name in KNOWS)
+            stays = [source not in sources and (content, date) not in copies for source, content, date in zip(*found, strict=True)]
+            if all(stays) and not own:
+                continue
+            if not any(stays) and not own:
+                path.unlink()
+                continue
+            write(_together(there.filter(stays), as_table(own, library)), path)
+        else:
+            write(as_table(own, library), path)
+
+
+def _together(old: pyarrow.Table, new: pyarrow.Table) -> pyarrow.Table:
+    """Rows of two tables in the table's order: columns of the newer one, then those that only the older one has, as far as anything is in them."""
+    pa = arrow()
+    others = [field for field in old.schema if field.name not in new.schema.names and old[field.name].null_count < len(old)]
+    whole = pa.schema([*new.schema, *others])
+    both = pa.concat_tables([_with(old, whole), _with(new, whole)])
+    places = [_place(row) for row in both.select(ORDER).to_pylist()]
+    return both.take(sorted(range(len(places)), key=places.__getitem__)).combine_chunks()
+
+
+def _with(table: pyarrow.Table, whole: pyarrow.Schema) -> pyarrow.Table:
+    """The table with these columns; what it has not is empty."""
+    pa = arrow()
+    arrays = [table[one.name].cast(one.type) if one.name in table.column_names else pa.nulls(len(table), one.type) for one in whole]
+    return pa.Table.from_arrays(arrays, schema=whole)
 
 
 def _each_once(rows: Sequence[Row]) -> list[Row]:
