@@ -12,10 +12,12 @@ from helpers.table_making import csv_of
 from scipy import signal
 
 from xy_sysid.errors import BadInput
+from xy_sysid.fitting.two_axes import coupling_in
 from xy_sysid.response.coupling import Coupling, coupling
 from xy_sysid.response.windows import WindowShape
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import Recording
+from xy_sysid.settings import IdentifierSettings
 
 RATE, SHAPE, BAND = 500.0, WindowShape.of("hann", 512, 0.5), (2.0, 100.0)
 
@@ -95,6 +97,34 @@ def test_inputs_that_are_alike_are_refused() -> None:
     """One signal on both axes tells no cross response."""
     with pytest.raises(BadInput, match="alike"):
         of(machine(0.0, alike=True))
+
+
+def multisine(seed: int, rows: int, period: int = 4096) -> FloatArray:
+    """All lines to 300 Hz at 1 kHz, with phases of their own, again and again."""
+    spectrum = np.zeros(period // 2 + 1, dtype=np.complex128)
+    spectrum[1:1228] = np.exp(2j * np.pi * np.random.default_rng(seed).random(1227))
+    one: FloatArray = np.fft.irfft(spectrum)
+    return np.tile(one / one.std(), rows // period + 1)[:rows]
+
+
+def driven(u: FloatArray, cross: float) -> FloatArray:
+    """Position of two axes with a lag, each moved a little by the other's drive."""
+    own = signal.lfilter(*signal.butter(1, 0.05), u, axis=0)
+    return np.asarray(np.cumsum(own + cross * own[:, ::-1], axis=0) / 1000.0 + 1e-6 * np.random.default_rng(5).standard_normal(u.shape))
+
+
+@pytest.mark.parametrize("negated", [False, True])
+@pytest.mark.parametrize("cross", [0.0, 0.05])
+def test_two_multisines_tell_the_coupling(cross: float, negated: bool) -> None:
+    """One realisation, in windows shorter than its period; or a second one in which one axis is negated: orthogonal multisines."""
+    rows = 60_000
+    u = np.column_stack((multisine(1, rows), multisine(2, rows)))
+    parts = [u, u * (1.0, -1.0)] if negated else [u]
+    seq = np.concatenate([np.arange(rows) + k * (rows + 100) for k in range(len(parts))])
+    recording = Recording(1000.0, ("x", "y"), seq, seq / 1000.0, np.concatenate(parts), np.concatenate([driven(part, cross) for part in parts]))
+    found = coupling_in(recording, IdentifierSettings())
+    assert found.coupled == (cross > 0.0) and float(np.max(found.at_most)) < 0.1
+    assert not cross or float(np.median(found.coupling)) == pytest.approx(cross, rel=0.3)
 
 
 def test_the_command_answers(tmp_path: Path) -> None:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from xy_sysid.response.coupling import LONGER, SUFFICES, Coupling, coupling
+from xy_sysid.response.period import find_period
 from xy_sysid.response.windows import WindowShape
+from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import Recording
 from xy_sysid.settings import IdentifierSettings
 
@@ -19,16 +22,23 @@ def coupling_in(recording: Recording, settings: IdentifierSettings, combine: str
     """The coupling. combine: see ``coupling``; raises BadInput as it does.
 
     Windows are the longest power of two of which SIDE_BY_SIDE fit, LONGEST at most, unless the settings say otherwise: bands average lines
-    here, so the longer a window is, the less the response of the own axis leaks into the coupling.
+    here, so the longer a window is, the less the response of the own axis leaks into the coupling. Of inputs that repeat themselves only one period
+    counts: the others tell the two axes apart no further.
     """
     length = settings.length
     if length == USUAL:
-        runs = [max(run.stop - run.start - 1, 0) for run in recording.runs()]
+        runs = [_distinct(recording.voltage[run, :2]) for run in recording.runs()]
         length = min(1 << max(sum(runs) // SIDE_BY_SIDE, SHORTEST).bit_length() - 1, LONGEST)
         while length > SHORTEST and sum(run // length for run in runs) < SIDE_BY_SIDE:
             length //= 2
     found = coupling(recording, WindowShape.of(settings.window, length, settings.overlap), (settings.band_low, settings.band_high), combine)
     return replace(found, needed=_needed(found, LONGEST / length)) if length < LONGEST and settings.length == USUAL else found
+
+
+def _distinct(inputs: FloatArray) -> int:
+    """How many samples of two inputs (n, 2) come before they repeat themselves."""
+    periods = [find_period(one) or len(inputs) for one in inputs.T]
+    return max(min(math.lcm(*periods), len(inputs)) - 1, 0)
 
 
 def _needed(found: Coupling, longer: float) -> float:

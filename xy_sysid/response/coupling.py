@@ -171,7 +171,8 @@ def coupling_of(
         raise BadInput("recording", told, f"{FEWEST:g} and more", "Record longer.")
     alike = float(np.median(np.abs(suu[used, 0, 1]) ** 2 / (power[used, 0] * power[used, 1])))
     if alike > ALIKE:
-        raise BadInput("inputs of the two axes", f"alike (coherence {alike:.2f})", f"less than {ALIKE}", "Give each axis a signal of its own (seed).")
+        act = "Give each axis a signal of its own (seed); with multisines, add a second recording in which one of them is negated."
+        raise BadInput("inputs of the two axes", f"alike (coherence {alike:.2f})", f"less than {ALIKE}", act)
     inverse = np.linalg.inv(suu[used])
     response = np.einsum("kij,kjl->kil", syu[used], inverse)
     left = np.real(np.einsum("kii->ki", syy[used] - np.einsum("kij,klj->kil", response, syu[used].conj())))
