@@ -173,6 +173,18 @@ def test_no_change_takes_longer_than_it_was_seen() -> None:
     assert moved.after == pytest.approx(worn.value[-1], rel=0.03) and moved.sigmas > 4.0
 
 
+def test_a_gradual_change_is_gradual_however_many_recordings_have_one_date() -> None:
+    """Three recordings on each Monday: the usual distance is a week in the duration, as it is in the test itself."""
+    one = axis(0, 3, 45)
+    dates = tuple(one.dates[3 * (k // 3)] for k in range(45))
+    each = one.histories[0]
+    risen = 1.0 + 0.3 * np.clip((np.arange(45) // 3 - 7) / 5.0, 0.0, 1.0)
+    worn = replace(each, dates=dates, value=each.value * risen, low=each.low * risen, high=each.high * risen)
+    (trend,) = of_axes([replace(one, dates=dates, histories=(worn,))], causes()).trends
+    (moved,) = trend.moved
+    assert moved.duration == 5.0 * 21.0
+
+
 def test_joint_changes_point_to_a_cause() -> None:
     """Friction and backlash up: the nut. Gain down, and with it friction in volts up: the amplifier."""
     (nut,) = of_axes([worn(friction=1.4, backlash=True), *(axis(k, 5, 18) for k in range(1, 3))], causes()).events

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
@@ -141,9 +141,12 @@ def _number(row: Mapping[str, Any], name: str) -> float:
     return np.nan if value is None else float(value)
 
 
-def steps(dates: Iterable[datetime]) -> FloatArray:
-    """(n,) times in usual distances between recordings: in the median of those that are not 0."""
-    seconds = np.array([date.timestamp() for date in dates])
-    between = np.diff(seconds)
-    usual = float(np.median(between[between > 0.0])) if np.any(between > 0.0) else 1.0
-    return np.asarray((seconds - seconds[0]) / usual)
+def steps(dates: Sequence[datetime]) -> FloatArray:
+    """(n,) times in usual distances between recordings."""
+    return np.array([(date - dates[0]).total_seconds() for date in dates]) / usual_distance(dates)
+
+
+def usual_distance(dates: Sequence[datetime]) -> float:
+    """The median distance between recordings of different dates, s."""
+    between = np.diff([date.timestamp() for date in dates])
+    return float(np.median(between[between > 0.0])) if np.any(between > 0.0) else 1.0

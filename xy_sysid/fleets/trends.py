@@ -16,7 +16,7 @@ from xy_sysid.fleets.alike import learned_for_each
 from xy_sysid.fleets.causes import Cause, Causes, Direction, causes
 from xy_sysid.fleets.change import LONGEST, Change, Evidence, changes, evidence, spread
 from xy_sysid.fleets.columns import column_of, columns
-from xy_sysid.fleets.history import DAY, FEWEST, Axis, History, axes
+from xy_sysid.fleets.history import DAY, FEWEST, Axis, History, axes, usual_distance
 from xy_sysid.fleets.row import Row
 from xy_sysid.fleets.table import read
 from xy_sysid.fleets.wander import Series
@@ -225,7 +225,6 @@ def _moved(history: History, item: Change, level: float, axis_months: float, mea
     before = float(history.plain(mean))
     ends = sorted(history.changed(before, item.size + side * Z95 * item.sigma) for side in (-1.0, 1.0))
     after, dates = history.changed(before, item.size), history.dates
-    usual = np.median(np.diff([date.timestamp() for date in dates])) / DAY
     return Moved(
         column=history.column,
         unit=history.unit,
@@ -241,7 +240,7 @@ def _moved(history: History, item: Change, level: float, axis_months: float, mea
         latest=dates[item.last + 1],
         declared=dates[item.declared],
         one_in=axis_months * math.exp(min(item.statistic - level, 300.0)),
-        duration=float(item.duration * usual),
+        duration=item.duration * usual_distance(dates) / DAY,
     )
 
 
