@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from helpers import ROOT
 from helpers.cli_tools import cli, npz, refused
-from helpers.fleet_tables import gain_falls
+from helpers.fleet_tables import gain_falls, recorded, scattered_gains
 from helpers.html_pages import parsed
 
 import xy_sysid as xy
@@ -23,9 +23,10 @@ from xy_sysid.fleets.causes import causes
 from xy_sysid.fleets.change import changes, evidence, statistic
 from xy_sysid.fleets.columns_doc import document
 from xy_sysid.fleets.history import Axis
-from xy_sysid.fleets.trends import of_axes
+from xy_sysid.fleets.table import merged
+from xy_sysid.fleets.trends import of_axes, of_rows
 from xy_sysid.fleets.wander import Series, usual
-from xy_sysid.fleets.words import sentence, summary
+from xy_sysid.fleets.words import gaps, sentence, summary
 
 LEVEL = 10.0  # log of the statistic, as for a weekly recording with seven parameters
 
@@ -193,6 +194,19 @@ def test_joint_changes_point_to_a_cause() -> None:
     assert "coulomb_friction_coulomb rose from 0.1" in text and "since 31 March 2025" in text and "backlash is named in 100 %" in text, text
     (drive,) = of_axes([worn(friction=1.0 / 0.85, gain=0.85), *(axis(k, 5, 18) for k in range(1, 3))], causes()).events
     assert drive.cause is not None and drive.cause.cause == "the amplifier or its supply"
+
+
+def test_recordings_in_other_units_are_not_compared(tmp_path: Path) -> None:
+    """An axis that is recorded in V first and in A from May on: no gain fell, and how many recordings are left out is told."""
+    unit, factor = ("V",) * 8 + ("A",) * 6, (1.0,) * 8 + (0.3,) * 6
+    amperes = [recorded("mill-00", k, gain * factor[k], input_unit=unit[k]) for k, gain in enumerate(scattered_gains(0))]
+    volts = [recorded("mill-01", k, gain) for k, gain in enumerate(scattered_gains(1))]
+    found = of_rows([*amperes, *volts])
+    assert found.events == () and found.axes[0].units == ("A", "m") and len(found.axes[0].dates) == 6
+    assert gaps(found) == ["Recordings left out, since the newest of their axis has other units: 8 (mill-00 x: 8)."]
+    merged(tmp_path, [*amperes, *volts])
+    assert gaps(found)[0] in cli("trend", tmp_path).out
+    assert [one["other_units"] for one in cli("trend", tmp_path, "--json").json["axes"]] == [8, 0]
 
 
 def test_the_page_of_the_fleet_lists_every_column() -> None:

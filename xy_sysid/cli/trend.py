@@ -39,7 +39,7 @@ def trend(
     from xy_sysid.fleets.parts import rows_of_parts, seconds
     from xy_sysid.fleets.trends import of_rows
     from xy_sysid.fleets.trends import trend as logic
-    from xy_sysid.fleets.words import sentence, summary, widest
+    from xy_sysid.fleets.words import gaps, sentence, summary, widest
 
     o.output_file("--out", out, force)
     with progress() as bar:
@@ -61,6 +61,8 @@ def trend(
         return
     axes = {(one.machine, one.axis): one for one in found.axes}
     say(f"{folder}: {summary(found)}.")
+    for text in gaps(found):
+        say(text)
     for event in found.events:
         say(f"- {sentence(event, axes[event.machine, event.axis])}")
     if not found.events:
@@ -75,7 +77,14 @@ def answer(found: Trends) -> dict[str, Any]:
     """The JSON document."""
     return {
         "axes": [
-            {"machine": one.machine, "axis": one.axis, "recordings": len(one.dates), "months": one.months, "left_out": one.left_out}
+            {
+                "machine": one.machine,
+                "axis": one.axis,
+                "recordings": len(one.dates),
+                "months": one.months,
+                "left_out": one.left_out,
+                "other_units": one.other_units,
+            }
             for one in found.axes
         ],
         "events": [_event(one) for one in found.events],

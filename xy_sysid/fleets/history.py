@@ -64,8 +64,9 @@ class History:
 class Axis:
     """All that the table tells of one axis over time.
 
-    dates: (n,) of its recordings; histories: of every parameter with enough values; named: effect -> (n,) whether it was named
-    left_out: recordings without a date, or without an answer
+    units: of input and output, of its last recording with an answer; dates: (n,) of its recordings in these units
+    histories: of every parameter with enough values; named: effect -> (n,) whether it was named
+    left_out: recordings without a date, or without an answer; other_units: with an answer in other units, left out, too
     """
 
     machine: str
@@ -75,6 +76,7 @@ class Axis:
     histories: tuple[History, ...]
     named: Mapping[str, NDArray[np.bool_]]
     left_out: int
+    other_units: int = 0
 
     @property
     def months(self) -> float:
@@ -98,18 +100,24 @@ def axes(rows: Sequence[Mapping[str, Any]], units: Mapping[str, str]) -> tuple[A
 def _axis(machine: str, axis: str, rows: Sequence[Mapping[str, Any]], units: Mapping[str, str]) -> Axis:
     answered = (row for row in rows if row.get("date") is not None and row.get("verdict") not in (None, "not_enough_data"))
     dated = sorted(answered, key=lambda row: row["date"])
-    histories = (_history(column, unit, dated) for column, unit in units.items())
-    effects = sorted({name for row in dated for name in _names(row)})
-    last = rows[-1]
+    own = _units(dated[-1] if dated else {})
+    alike = [row for row in dated if _units(row) == own]
+    histories = (_history(column, unit, alike) for column, unit in units.items())
+    effects = sorted({name for row in alike for name in _names(row)})
     return Axis(
         machine=machine,
         axis=axis,
-        units=(last.get("input_unit") or "V", last.get("output_unit") or "m"),
-        dates=tuple(row["date"] for row in dated),
+        units=own,
+        dates=tuple(row["date"] for row in alike),
         histories=tuple(one for one in histories if one is not None),
-        named={name: np.array([name in _names(row) for row in dated]) for name in effects} if len(dated) >= FEWEST else {},
+        named={name: np.array([name in _names(row) for row in alike]) for name in effects} if len(alike) >= FEWEST else {},
         left_out=len(rows) - len(dated),
+        other_units=len(dated) - len(alike),
     )
+
+
+def _units(row: Mapping[str, Any]) -> tuple[str, str]:
+    return row.get("input_unit") or "V", row.get("output_unit") or "m"
 
 
 def _names(row: Mapping[str, Any]) -> list[str]:

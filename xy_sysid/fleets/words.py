@@ -70,6 +70,18 @@ def summary(trends: Trends) -> str:
     return text + (f"; {out} rows without a date or an answer are left out" if out else "")
 
 
+def gaps(trends: Trends) -> list[str]:
+    """What the table cannot tell, one sentence for each reason; none where nothing is missing."""
+    axes = [(f"{one.machine} {one.axis}", one) for one in trends.axes]
+    counted = (("Recordings left out, since the newest of their axis has other units", [(name, one.other_units) for name, one in axes]),)
+    return [_gap(what, [(name, count) for name, count in each if count]) for what, each in counted if any(count for _, count in each)]
+
+
+def _gap(what: str, each: Sequence[tuple[str, int]]) -> str:
+    named = ", ".join(f"{name}: {count}" for name, count in each[:MOST])
+    return f"{what}: {sum(count for _, count in each)} ({named}{_more(len(each) - MOST)})."
+
+
 def clocked(dates: Sequence[datetime]) -> tuple[list[datetime] | list[float], str]:
     """The dates as they are drawn, and what the axis says: min after the start where no clock tells the date."""
     if dates and _has_no_clock(dates[0]):

@@ -66,10 +66,10 @@ class TrendCard:
             await self._tell(self._found)
 
     async def _tell(self, trends: Trends) -> None:
-        from xy_sysid.fleets.words import sentence, summary
+        from xy_sysid.fleets.words import gaps, sentence, summary
 
         axes = {key(one): one for one in trends.axes if one.histories}
-        self._summary.set_text(f"{self._name}: {summary(trends)}.")
+        self._summary.set_text(" ".join((f"{self._name}: {summary(trends)}.", *gaps(trends))))
         self._events.clear()
         with self._events:
             for text in [sentence(event, axes[f"{event.machine} {event.axis}"]) for event in trends.events] or ["Nothing changed."]:
