@@ -299,4 +299,13 @@ def test_what_is_no_table_is_refused(tmp_path: Path, table: Path) -> None:
     with pytest.raises(BadRecording):
         xy.trend(tmp_path / "nowhere")
     with pytest.raises(BadInput, match="an axis with 4 of them"):
-        xy.trend(table, machines=["mill-99"])
+        of_rows([recorded("mill-00", k, 0.1) for k in range(3)])
+    assert "machine is mill-99; allowed: one of mill-00, mill-01, mill-02." in refused("trend", table, "--machine", "mill-99")
+
+
+def test_one_machine_has_the_trend_that_it_has_among_all(table: Path) -> None:
+    """--machine selects what is told, and not what the wander is learned from."""
+    (one,) = xy.trend(table, machines=["mill-01"]).trends
+    every = xy.trend(table)
+    assert (one.spread, one.moved) == (every.of("mill-01", "x", "gain").spread, every.of("mill-01", "x", "gain").moved)
+    assert xy.trend(table, machines=["mill-00"]).events == () and len(every.events) == 1

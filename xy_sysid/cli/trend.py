@@ -46,7 +46,7 @@ def trend(
         task = bar.add_task("comparing recordings", total=1.0)
         if every:
             parts = rows_of_parts(folder, seconds(every), Analysis(reading=reading), lambda number: bar.update(task, description=f"part {number}"))
-            found = of_rows(parts, (), causes, axis_months)
+            found = of_rows(parts, (), causes, axis_months, machines=machine or ())
         else:
             found = logic(
                 folder, machines=machine or (), own_causes=causes, axis_months=axis_months, tell=lambda part: bar.update(task, completed=part)

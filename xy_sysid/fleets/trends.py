@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 
@@ -23,6 +23,7 @@ from xy_sysid.fleets.wander import Series
 from xy_sysid.response.frf import Z95
 from xy_sysid.samples.block import FloatArray
 
+NAMED = 20  # that a refusal lists, at most
 AXIS_MONTHS = 1000.0  # in which an axis that does not change raises one false alarm, at most
 
 
@@ -104,8 +105,21 @@ class Trends:
         for one in self.trends:
             if (one.machine, one.axis, one.history.column) == (machine, axis, column):
                 return one
-        known = ", ".join(f"{one.machine} {one.axis} {one.history.column}" for one in self.trends[:20])
+        known = _listed([f"{one.machine} {one.axis} {one.history.column}" for one in self.trends])
         raise BadInput("trend", f"{machine} {axis} {column}", f"one of {known}", "Choose one of these.")
+
+    def of_machines(self, wanted: Collection[str]) -> Trends:
+        """Only of these machines, with all that was learned from the others."""
+        return replace(
+            self,
+            axes=tuple(one for one in self.axes if one.machine in wanted),
+            trends=tuple(one for one in self.trends if one.machine in wanted),
+            events=tuple(one for one in self.events if one.machine in wanted),
+        )
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(names[:NAMED]) + (f" and {len(names) - NAMED} more" if len(names) > NAMED else "")
 
 
 def trend(
@@ -118,15 +132,14 @@ def trend(
 ) -> Trends:
     """What changed in the recordings of a fleet's table.
 
-    table:  the folder that ``fleet`` made; machines: only these; own_causes: a YAML file that adds to the table of causes
+    table:  the folder that ``fleet`` made; machines: only their trends; own_causes: a YAML file that adds to the table of causes
     axis_months: of an axis that does not change, in which one false alarm is allowed; tell: hears the part that is done
     The spread between recordings is learned for each parameter from all axes of the table together, and is in every interval.
-    Raises BadRecording for what is no table, BadInput where no axis has four recordings with a date and an answer.
+    Raises BadRecording for what is no table, BadInput for a machine that is not in it, or where no axis has four recordings with a date and an
+    answer.
     """
-    wanted = set(machines)
     found = read(Path(table))
-    rows = [row for row in found.to_pylist() if not wanted or row["machine"] in wanted]
-    return of_rows(rows, found.column_names, own_causes, axis_months, tell)
+    return of_rows(found.to_pylist(), found.column_names, own_causes, axis_months, tell, machines)
 
 
 def of_rows(
@@ -135,18 +148,23 @@ def of_rows(
     own_causes: Path | None = None,
     axis_months: float = AXIS_MONTHS,
     tell: Callable[[float], None] = lambda _: None,
+    machines: Iterable[str] = (),
 ) -> Trends:
     """The same of rows that are in no table. names: of columns, where there are parameters of effects of a user's own."""
     if not axis_months > 0.0:
         raise BadInput("axis_months", axis_months, "above 0", "Usual is 1000.")
+    present = sorted({row["machine"] for row in rows})
+    wanted = set(machines) or set(present)
+    if not wanted <= set(present):
+        raise BadInput("machine", ", ".join(sorted(wanted - set(present))), f"one of {_listed(present)}", "Choose one of these.")
     known = {item.name: item for item in columns()}
     followed = {name: item.unit for name, item in known.items() if item.trended}
     followed |= {name: "" for end in names if (name := end.removesuffix("_low")) != end and name not in known}
     every = axes(rows, followed)
-    if not any(one.histories for one in every):
+    if not any(one.histories for one in every if one.machine in wanted):
         allowed = f"an axis with {FEWEST} of them that have a date and an answer"
         raise BadInput("recordings in the table", f"{len(rows)} rows", allowed, "Record more often, or name their dates (xy-sysid fleet --names).")
-    return of_axes(every, causes(own_causes), axis_months, tell)
+    return of_axes(every, causes(own_causes), axis_months, tell).of_machines(wanted)
 
 
 def of_axes(every: Sequence[Axis], known: Causes, axis_months: float = AXIS_MONTHS, tell: Callable[[float], None] = lambda _: None) -> Trends:
