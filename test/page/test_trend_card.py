@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -62,3 +63,31 @@ def test_only_folders_of_the_shelf_that_are_tables_can_be_opened(folder: Path) -
     assert find(shelf, "table") == folder.resolve() / "table"
     with pytest.raises(BadInput, match="one of the list"):
         find(shelf, "../elsewhere")
+
+
+def test_a_folder_that_cannot_be_read_has_no_table(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """lost+found on a disk of its own belongs to root: the page opens, with all other tables."""
+    closed, scan = folder / "lost+found", os.scandir
+    closed.mkdir()
+
+    def scanned(path: Any) -> Any:
+        if Path(path).name == closed.name:
+            raise PermissionError(13, "Permission denied", str(path))
+        return scan(path)
+
+    monkeypatch.setattr(os, "scandir", scanned)
+    monkeypatch.setattr(os, "listdir", lambda path: [entry.name for entry in scanned(path)])
+    assert tables(Shelf(folder)) == ["table"]
+    closed.rmdir()
+
+
+def test_no_recording_is_asked_for_its_status(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Names tell which folders are tables: thousands of recordings on a share would keep the page waiting."""
+    status = Path.stat
+
+    def asked(path: Path, **how: Any) -> Any:
+        assert path.suffix != ".parquet", path
+        return status(path, **how)
+
+    monkeypatch.setattr(Path, "stat", asked)
+    assert tables(Shelf(folder)) == ["table"]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -132,15 +133,22 @@ def trends_of(trends: Trends, name: str) -> Sequence[Trend]:
 
 def tables(shelf: Shelf) -> list[str]:
     """Folders below the shelf that hold Parquet files only, as a fleet's table does, and the shelf itself as '.'."""
-    folders = [shelf.folder, *(path for deep in range(1, DEEP + 1) for path in sorted(shelf.folder.glob("/".join("*" * deep))) if path.is_dir())]
-    return [str(folder.relative_to(shelf.folder)) for folder in folders if not folder.is_symlink() and _is_table(folder)]
+    return sorted(str(folder.relative_to(shelf.folder)) for folder in _tables(shelf.folder, DEEP))
 
 
-def _is_table(folder: Path) -> bool:
-    if folder.name.startswith("."):
-        return False
-    kinds = {path.suffix for path in folder.iterdir() if path.is_file() and not path.name.startswith(".")}
-    return kinds == {".parquet"}
+def _tables(folder: Path, deep: int) -> Iterator[Path]:
+    """By names and kinds alone: no file is asked for more."""
+    try:
+        with os.scandir(folder) as entries:
+            seen = [entry for entry in entries if not entry.name.startswith(".")]
+    except OSError:
+        return
+    folders = [entry.name for entry in seen if entry.is_dir(follow_symlinks=False)]
+    files = {entry.name for entry in seen} - set(folders)
+    if files and all(name.endswith(".parquet") for name in files):
+        yield folder
+    for name in folders if deep else ():
+        yield from _tables(folder / name, deep - 1)
 
 
 def find(shelf: Shelf, name: str) -> Path:
