@@ -223,6 +223,24 @@ def test_users_add_causes_of_their_own(tmp_path: Path) -> None:
     own.write_text("causes:\n  - {cause: the blue hose, when: [hose down]}\n", encoding="utf-8")
     with pytest.raises(BadInput, match="hose down"):
         causes(own)
+    own.write_text("causes:\n  - {cause: the blue hose}\n", encoding="utf-8")
+    with pytest.raises(BadInput, match="when of 'the blue hose' is empty; allowed: one change or more"):
+        causes(own)
+
+
+def test_a_quantity_of_a_user_comes_before_those_of_the_package(tmp_path: Path) -> None:
+    """A column that both name measures the quantity of the user."""
+    own = tmp_path / "causes.yaml"
+    text = "quantities: {rail drag: [coulomb_friction_coulomb]}\ncauses:\n  - {cause: a dry rail, when: [rail drag up]}\n"
+    own.write_text(text, encoding="utf-8")
+    found = causes(own).likeliest([("coulomb_friction_coulomb", "up")])
+    assert found is not None and found.cause == "a dry rail"
+
+
+def test_causes_are_read_before_the_long_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file that is not there is refused before a part of the recording is analysed."""
+    monkeypatch.setattr("xy_sysid.fleets.parts.row_of", lambda *_: pytest.fail("a part was analysed"))
+    assert "nowhere.yaml" in refused("trend", npz(tmp_path / "long.npz", rows=4_000), "--every", "1s", "--causes", tmp_path / "nowhere.yaml")
 
 
 @pytest.fixture(scope="module")

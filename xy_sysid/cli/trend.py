@@ -35,6 +35,7 @@ def trend(
     json: o.Json = False,
 ) -> None:
     """Find changes of every parameter of every axis over time: since when, by how much, how certain, and the likely cause."""
+    from xy_sysid.fleets.causes import causes as causes_of
     from xy_sysid.fleets.of_paths import Analysis
     from xy_sysid.fleets.parts import rows_of_parts, seconds
     from xy_sysid.fleets.trends import of_rows
@@ -45,8 +46,9 @@ def trend(
     with progress() as bar:
         task = bar.add_task("comparing recordings", total=1.0)
         if every:
+            known = causes_of(causes)
             parts = rows_of_parts(folder, seconds(every), Analysis(reading=reading), lambda number: bar.update(task, description=f"part {number}"))
-            found = of_rows(parts, (), causes, axis_months, machines=machine or ())
+            found = of_rows(parts, (), known, axis_months, machines=machine or ())
         else:
             found = logic(
                 folder, machines=machine or (), own_causes=causes, axis_months=axis_months, tell=lambda part: bar.update(task, completed=part)

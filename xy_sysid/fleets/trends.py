@@ -138,33 +138,36 @@ def trend(
     Raises BadRecording for what is no table, BadInput for a machine that is not in it, or where no axis has four recordings with a date and an
     answer.
     """
-    found = read(Path(table))
-    return of_rows(found.to_pylist(), found.column_names, own_causes, axis_months, tell, machines)
+    known, found = causes(own_causes), read(Path(table))
+    return of_rows(found.to_pylist(), found.column_names, known, axis_months, tell, machines)
 
 
 def of_rows(
     rows: Sequence[Row],
     names: Iterable[str] = (),
-    own_causes: Path | None = None,
+    known: Causes | None = None,
     axis_months: float = AXIS_MONTHS,
     tell: Callable[[float], None] = lambda _: None,
     machines: Iterable[str] = (),
 ) -> Trends:
-    """The same of rows that are in no table. names: of columns, where there are parameters of effects of a user's own."""
+    """The same of rows that are in no table.
+
+    names: of columns, where there are parameters of effects of a user's own; known: causes, where they are not those of the package
+    """
     if not axis_months > 0.0:
         raise BadInput("axis_months", axis_months, "above 0", "Usual is 1000.")
     present = sorted({row["machine"] for row in rows})
     wanted = set(machines) or set(present)
     if not wanted <= set(present):
         raise BadInput("machine", ", ".join(sorted(wanted - set(present))), f"one of {_listed(present)}", "Choose one of these.")
-    known = {item.name: item for item in columns()}
-    followed = {name: item.unit for name, item in known.items() if item.trended}
-    followed |= {name: "" for end in names if (name := end.removesuffix("_low")) != end and name not in known}
+    ours = {item.name: item for item in columns()}
+    followed = {name: item.unit for name, item in ours.items() if item.trended}
+    followed |= {name: "" for end in names if (name := end.removesuffix("_low")) != end and name not in ours}
     every = axes(rows, followed)
     if not any(one.histories for one in every if one.machine in wanted):
         allowed = f"an axis with {FEWEST} of them that have a date and an answer"
         raise BadInput("recordings in the table", f"{len(rows)} rows", allowed, "Record more often, or name their dates (xy-sysid fleet --names).")
-    return of_axes(every, causes(own_causes), axis_months, tell).of_machines(wanted)
+    return of_axes(every, known or causes(), axis_months, tell).of_machines(wanted)
 
 
 def of_axes(every: Sequence[Axis], known: Causes, axis_months: float = AXIS_MONTHS, tell: Callable[[float], None] = lambda _: None) -> Trends:
