@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from helpers import ROOT
 from helpers.cli_tools import cli, npz, refused
-from helpers.fleet_tables import gain_falls, recorded, scattered_gains
+from helpers.fleet_tables import gain_falls, recorded, scattered_gains, unread
 from helpers.html_pages import parsed
 
 import xy_sysid as xy
@@ -209,6 +209,38 @@ def test_recordings_in_other_units_are_not_compared(tmp_path: Path) -> None:
     assert [one["other_units"] for one in cli("trend", tmp_path, "--json").json["axes"]] == [8, 0]
 
 
+@pytest.fixture(scope="module")
+def gone(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Nothing changed on mill-00. The files of mill-01 cannot be read from May on, mill-02 has no answer then, and mill-03 is new."""
+    folder = tmp_path_factory.mktemp("gone")
+    gains = scattered_gains(0)
+    rows = [recorded("mill-00", k, gain) for k, gain in enumerate(gains)]
+    rows += [recorded("mill-01", k, gains[k]) if k < 9 else unread("mill-01", k) for k in range(14)]
+    rows += [recorded("mill-02", k, gains[k], **({} if k < 12 else {"verdict": "not_enough_data"})) for k in range(14)]
+    rows += [unread("mill-00", 3), *(recorded("mill-03", k, gains[k]) for k in range(3))]
+    merged(folder, rows)
+    return folder
+
+
+MISSING = (
+    "Recordings that could not be read: 6 (mill-00: 1, mill-01 with its newest: 5).",
+    "Axes whose newest recordings have no answer: 1 (mill-02 x: 2).",
+    "Axes that are not compared, since fewer than 4 recordings have a date and an answer: 1 (mill-03 x: 3).",
+)
+
+
+def test_what_the_table_cannot_tell_is_told(gone: Path, tmp_path: Path) -> None:
+    """Nothing changed, in what could be read: the command, its JSON and the page say what that was not."""
+    said = cli("trend", gone, "-o", tmp_path / "page.html").out
+    assert "Nothing changed." in said and all(text in said for text in MISSING), said
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert all(text in page for text in MISSING)
+    found = cli("trend", gone, "--json").json
+    assert [tuple(one.values()) for one in found["unread"]] == [("mill-00", 1, False), ("mill-01", 5, True)]
+    assert [(one["newest_without_answer"], one["compared"]) for one in found["axes"]] == [(0, True), (0, True), (2, True), (0, False)]
+    assert gaps(xy.trend(gone, machines=["mill-01"])) == ["Recordings that could not be read: 5 (mill-01 with its newest: 5)."]
+
+
 def test_the_page_of_the_fleet_lists_every_column() -> None:
     """python -m xy_sysid.fleets.columns_doc --write"""
     assert document() in (ROOT / "docs" / "fleet.md").read_text(encoding="utf-8")
@@ -316,8 +348,8 @@ def test_what_is_no_table_is_refused(tmp_path: Path, table: Path) -> None:
     assert "xy-sysid fleet PATH -o TABLE" in refused("trend", tmp_path)
     with pytest.raises(BadRecording):
         xy.trend(tmp_path / "nowhere")
-    with pytest.raises(BadInput, match="an axis with 4 of them"):
-        of_rows([recorded("mill-00", k, 0.1) for k in range(3)])
+    with pytest.raises(BadInput, match="4 rows, 1 of which could not be read; allowed: an axis with 4 of them"):
+        of_rows([unread("mill-00", 3), *(recorded("mill-00", k, 0.1) for k in range(3))])
     assert "machine is mill-99; allowed: one of mill-00, mill-01, mill-02." in refused("trend", table, "--machine", "mill-99")
 
 

@@ -45,6 +45,7 @@ def test_a_table_is_opened_and_its_change_is_told_as_by_the_command(server: Serv
         tab.until(lambda: events.count() == 1, 60.0)
         said = str(events.first.text_content())
         assert f"- {said}" in cli("trend", folder / "table").out
+        assert "Recordings that could not be read: 1 (mill-00: 1)." in str(tab.page.locator("[data-part=summary]:visible").text_content())
         tab.until(lambda: drawn(tab, "gain of mill-01 x over time") and drawn(tab, "gain of all axes over time"), 30.0)
         assert tab.wide() <= width
         assert tab.errors == []

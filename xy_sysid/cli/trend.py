@@ -77,6 +77,8 @@ def trend(
 
 def answer(found: Trends) -> dict[str, Any]:
     """The JSON document."""
+    from xy_sysid.fleets.history import FEWEST
+
     return {
         "axes": [
             {
@@ -86,9 +88,12 @@ def answer(found: Trends) -> dict[str, Any]:
                 "months": one.months,
                 "left_out": one.left_out,
                 "other_units": one.other_units,
+                "newest_without_answer": one.silent,
+                "compared": len(one.dates) >= FEWEST,
             }
             for one in found.axes
         ],
+        "unread": [{"machine": one.machine, "recordings": one.recordings, "newest": one.newest} for one in found.unread],
         "events": [_event(one) for one in found.events],
         "parameters": [_trend(one) for one in found.trends],
     }

@@ -67,6 +67,7 @@ class Axis:
     units: of input and output, of its last recording with an answer; dates: (n,) of its recordings in these units
     histories: of every parameter with enough values; named: effect -> (n,) whether it was named
     left_out: recordings without a date, or without an answer; other_units: with an answer in other units, left out, too
+    silent: its newest recordings, none of which has an answer
     """
 
     machine: str
@@ -77,6 +78,7 @@ class Axis:
     named: Mapping[str, NDArray[np.bool_]]
     left_out: int
     other_units: int = 0
+    silent: int = 0
 
     @property
     def months(self) -> float:
@@ -89,6 +91,26 @@ class Axis:
         return len(self.histories) + len(self.named)
 
 
+@dataclass(frozen=True, slots=True)
+class Unread:
+    """Recordings of a machine that could not be read. newest: none that was read is as new as the last of them."""
+
+    machine: str
+    recordings: int
+    newest: bool
+
+
+def unread(rows: Sequence[Mapping[str, Any]]) -> tuple[Unread, ...]:
+    """Every machine with recordings that could not be read: their rows name no axis."""
+    found = []
+    for machine in sorted({row["machine"] for row in rows if not row["axis"]}):
+        own = [row for row in rows if row["machine"] == machine]
+        last = max((row["date"] for row in own if row.get("date") is not None), default=None)
+        newest = last is not None and not any(row["axis"] and row.get("date") == last for row in own)
+        found.append(Unread(machine, sum(not row["axis"] for row in own), newest))
+    return tuple(found)
+
+
 def axes(rows: Sequence[Mapping[str, Any]], units: Mapping[str, str]) -> tuple[Axis, ...]:
     """Every axis of every machine in the rows of a table; units: of the columns that are followed."""
     parts: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
@@ -98,8 +120,8 @@ def axes(rows: Sequence[Mapping[str, Any]], units: Mapping[str, str]) -> tuple[A
 
 
 def _axis(machine: str, axis: str, rows: Sequence[Mapping[str, Any]], units: Mapping[str, str]) -> Axis:
-    answered = (row for row in rows if row.get("date") is not None and row.get("verdict") not in (None, "not_enough_data"))
-    dated = sorted(answered, key=lambda row: row["date"])
+    every = sorted((row for row in rows if row.get("date") is not None), key=lambda row: row["date"])
+    dated = [row for row in every if row.get("verdict") not in (None, "not_enough_data")]
     own = _units(dated[-1] if dated else {})
     alike = [row for row in dated if _units(row) == own]
     histories = (_history(column, unit, alike) for column, unit in units.items())
@@ -113,6 +135,7 @@ def _axis(machine: str, axis: str, rows: Sequence[Mapping[str, Any]], units: Map
         named={name: np.array([name in _names(row) for row in alike]) for name in effects} if len(alike) >= FEWEST else {},
         left_out=len(rows) - len(dated),
         other_units=len(dated) - len(alike),
+        silent=sum(not dated or row["date"] > dated[-1]["date"] for row in every),
     )
 
 

@@ -16,7 +16,7 @@ from xy_sysid.fleets.alike import learned_for_each
 from xy_sysid.fleets.causes import Cause, Causes, Direction, causes
 from xy_sysid.fleets.change import LONGEST, Change, Evidence, changes, evidence, spread
 from xy_sysid.fleets.columns import column_of, columns
-from xy_sysid.fleets.history import DAY, FEWEST, Axis, History, axes, usual_distance
+from xy_sysid.fleets.history import DAY, FEWEST, Axis, History, Unread, axes, unread, usual_distance
 from xy_sysid.fleets.row import Row
 from xy_sysid.fleets.table import read
 from xy_sysid.fleets.wander import Series
@@ -93,12 +93,13 @@ class Trend:
 @dataclass(frozen=True, slots=True)
 class Trends:
     """All of a table. axes: with their dates; trends: of every parameter; events: changes, the latest last; pooled: the spread was learned from
-    several axes together"""
+    several axes together; unread: recordings of which nothing is known"""
 
     axes: tuple[Axis, ...]
     trends: tuple[Trend, ...]
     events: tuple[Event, ...]
     pooled: bool
+    unread: tuple[Unread, ...] = ()
 
     def of(self, machine: str, axis: str, column: str) -> Trend:
         """One trend; raises BadInput if there is none."""
@@ -115,6 +116,7 @@ class Trends:
             axes=tuple(one for one in self.axes if one.machine in wanted),
             trends=tuple(one for one in self.trends if one.machine in wanted),
             events=tuple(one for one in self.events if one.machine in wanted),
+            unread=tuple(one for one in self.unread if one.machine in wanted),
         )
 
 
@@ -166,8 +168,9 @@ def of_rows(
     every = axes(rows, followed)
     if not any(one.histories for one in every if one.machine in wanted):
         allowed = f"an axis with {FEWEST} of them that have a date and an answer"
-        raise BadInput("recordings in the table", f"{len(rows)} rows", allowed, "Record more often, or name their dates (xy-sysid fleet --names).")
-    return of_axes(every, known or causes(), axis_months, tell).of_machines(wanted)
+        given = f"{len(rows)} rows, {sum(one.recordings for one in unread(rows))} of which could not be read"
+        raise BadInput("recordings in the table", given, allowed, "Record more often, or name their dates (xy-sysid fleet --names).")
+    return replace(of_axes(every, known or causes(), axis_months, tell), unread=unread(rows)).of_machines(wanted)
 
 
 def of_axes(every: Sequence[Axis], known: Causes, axis_months: float = AXIS_MONTHS, tell: Callable[[float], None] = lambda _: None) -> Trends:

@@ -69,16 +69,17 @@ class TrendCard:
     async def _tell(self, trends: Trends) -> None:
         from xy_sysid.fleets.words import gaps, sentence, summary
 
-        axes = {key(one): one for one in trends.axes if one.histories}
+        axes = {key(one): one for one in trends.axes}
         self._summary.set_text(" ".join((f"{self._name}: {summary(trends)}.", *gaps(trends))))
         self._events.clear()
         with self._events:
             for text in [sentence(event, axes[f"{event.machine} {event.axis}"]) for event in trends.events] or ["Nothing changed."]:
                 with ui.element("li"):
                     ui.label(text)
-        first = f"{trends.events[0].machine} {trends.events[0].axis}" if trends.events else next(iter(axes))
+        drawn = [name for name, one in axes.items() if one.histories]
+        first = next((name for one in trends.events if (name := f"{one.machine} {one.axis}") in drawn), drawn[0])
         self._show(True)
-        self._axis.set_options(list(axes), value=None)
+        self._axis.set_options(drawn, value=None)
         self._axis.set_value(first)
 
     def _show(self, answered: bool) -> None:
