@@ -293,6 +293,7 @@ def test_the_command_names_the_change(table: Path) -> None:
     (event,) = found["events"]
     (change,) = event["changes"]
     assert change["parameter"] == "gain" and change["part"] == pytest.approx(-0.1, abs=0.01) and change["once_in_axis_months"] > 1000.0
+    assert f"- {event['sentence']}" in said.out and change["sentence"].removesuffix(".") in event["sentence"] and change["duration_days"] == 0.0
     assert len(found["parameters"]) == 3 and found["parameters"][0]["spread_between_recordings"] < 0.01
 
 

@@ -12,6 +12,7 @@ from xy_sysid.cli.output import emit, plain, progress, say, table
 from xy_sysid.cli.reading import reads
 
 if TYPE_CHECKING:
+    from xy_sysid.fleets.history import Axis
     from xy_sysid.fleets.trends import Event, Moved, Trend, Trends
     from xy_sysid.imports.reading import Reading
 
@@ -79,6 +80,7 @@ def answer(found: Trends) -> dict[str, Any]:
     """The JSON document."""
     from xy_sysid.fleets.history import FEWEST
 
+    axes = {(one.machine, one.axis): one for one in found.axes}
     return {
         "axes": [
             {
@@ -94,20 +96,33 @@ def answer(found: Trends) -> dict[str, Any]:
             for one in found.axes
         ],
         "unread": [{"machine": one.machine, "recordings": one.recordings, "newest": one.newest} for one in found.unread],
-        "events": [_event(one) for one in found.events],
+        "events": [_event(one, axes[one.machine, one.axis]) for one in found.events],
         "parameters": [_trend(one) for one in found.trends],
     }
 
 
-def _event(one: Event) -> dict[str, Any]:
+def _event(one: Event, axis: Axis) -> dict[str, Any]:
+    from xy_sysid.fleets.words import sentence
+
     cause = None if one.cause is None else {"cause": one.cause.cause, "check": one.cause.check}
-    return {"machine": one.machine, "axis": one.axis, "since": str(one.since), "cause": cause, "changes": [_moved(each) for each in one.moved]}
+    changes = [_moved(each, axis) for each in one.moved]
+    return {
+        "machine": one.machine,
+        "axis": one.axis,
+        "since": str(one.since),
+        "sentence": sentence(one, axis),
+        "cause": cause,
+        "changes": changes,
+    }
 
 
-def _moved(one: Moved) -> dict[str, Any]:
+def _moved(one: Moved, axis: Axis) -> dict[str, Any]:
+    from xy_sysid.fleets.words import told
+
     dates = {name: str(getattr(one, name)) for name in ("since", "earliest", "latest", "declared")}
     numbers = {"before": one.before, "after": one.after, "ci95": [one.low, one.high], "part": one.part, "sigmas": one.sigmas}
-    return {"parameter": one.column, "unit": one.unit, "direction": one.direction, **numbers, **dates, "once_in_axis_months": one.one_in}
+    how = {"duration_days": one.duration, "once_in_axis_months": one.one_in, "sentence": f"{told(one, axis)}."}
+    return {"parameter": one.column, "unit": one.unit, "direction": one.direction, **numbers, **dates, **how}
 
 
 def _trend(one: Trend) -> dict[str, Any]:
