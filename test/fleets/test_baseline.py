@@ -25,7 +25,9 @@ from xy_sysid.fleets.history import MONTH
 from xy_sysid.fleets.wander import Series
 from xy_sysid.greybox.parameters import Estimate
 from xy_sysid.live.plain_messages import OK, WARN, StatusMessage
+from xy_sysid.nodes.since_commissioning import SinceCommissioning
 from xy_sysid.samples.recording import Recording
+from xy_sysid.settings import DiagnoserSettings, IdentifierSettings
 
 IDENTIFIER, DIAGNOSER = "xy_sysid.nodes.identifier", "xy_sysid.nodes.diagnoser"
 
@@ -110,6 +112,13 @@ def test_files_of_other_kinds_are_refused_in_one_line(tmp_path: Path) -> None:
         of_transfer_functions(physical)
     with pytest.raises(BadRecording, match="refine --model"):
         of_axis_models(linear, STANDARD)
+
+
+def test_a_table_without_a_baseline_is_not_read(tmp_path: Path) -> None:
+    """Its trend takes long, and nothing would be compared with it: neither node reads a table that is not there."""
+    nowhere = str(tmp_path / "nowhere")
+    assert SinceCommissioning.of_identifier(IdentifierSettings(baseline_table=nowhere), ("x",)).statuses() == []
+    assert SinceCommissioning.of_diagnoser(DiagnoserSettings(baseline_table=nowhere), ("x",), STANDARD).statuses() == []
 
 
 def moving(count: int, gain: float = 0.1) -> tuple[Any, Any]:

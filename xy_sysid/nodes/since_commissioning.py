@@ -30,7 +30,7 @@ class SinceCommissioning:
 
     def __init__(self, known: Mapping[str, tuple[Estimate, ...]], table: str, column: Column, models: Mapping[str, TransferFunction]) -> None:
         self.models = models
-        self._known, self._column, self._spreads = known, column, _spreads(table)
+        self._known, self._column, self._spreads = known, column, _spreads(table) if known else {}
         self.forget()
 
     @classmethod
