@@ -15,7 +15,7 @@ from helpers.fleet_tables import gain_falls, recorded, scattered_gains, unread
 from helpers.html_pages import parsed
 
 import xy_sysid as xy
-from campaigns.bench.trend import FRICTION, PARAMETERS, axis, cusum, delays, limits, until
+from campaigns.bench.trend import FRICTION, PARAMETERS, axis, delays, limits, until
 from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.fleets import presence
 from xy_sysid.fleets.alike import learned
@@ -136,10 +136,9 @@ def test_unchanged_axes_raise_no_alarm_and_the_next_recording_is_inside() -> Non
 
 
 def test_a_change_of_ten_per_cent_is_found_within_three_recordings() -> None:
-    """Of the gain, with two other axes and half a year behind it; a CUSUM with as few false alarms is later or blind."""
-    ours, plain = delays(PARAMETERS[0], before=26, times=2, seed=77)
-    assert max(ours) <= 3.0 and min(plain) >= 1.0
-    assert cusum(scattered(30)).max() > 0.0
+    """Of the gain, with the wander of 20 other axes and half a year behind it; a CUSUM with as few false alarms is later or blind."""
+    ours, plain = delays(PARAMETERS[0], before=26, times=4, seed=77)
+    assert max(ours) <= 3.0 < min(plain) < np.inf
 
 
 def test_no_test_with_so_few_false_alarms_finds_every_step_of_ten_per_cent_in_friction() -> None:
