@@ -25,7 +25,9 @@ from xy_sysid.fleets.history import MONTH
 from xy_sysid.fleets.wander import Series
 from xy_sysid.greybox.parameters import Estimate
 from xy_sysid.live.plain_messages import OK, WARN, StatusMessage
+from xy_sysid.nodes.since_commissioning import SinceCommissioning
 from xy_sysid.samples.recording import Recording
+from xy_sysid.settings import DiagnoserSettings, IdentifierSettings
 
 IDENTIFIER, DIAGNOSER = "xy_sysid.nodes.identifier", "xy_sysid.nodes.diagnoser"
 
@@ -68,13 +70,41 @@ def test_a_table_that_says_how_little_recordings_differ_finds_smaller_changes() 
     assert told.level == WARN and "gain fell from 100 to 95 mm/s/V (-5 %). Likely cause: the amplifier or its supply." in told.message
 
 
+def test_a_parameter_in_another_unit_is_not_compared() -> None:
+    """A gain per ampere is no smaller or larger than one per volt: the status says so, and judges the others."""
+    baseline = Baseline(KNOWN, {})
+    for k in range(AGREEING):
+        baseline.hear([estimate("gain", 0.3, "m/s/A"), KNOWN[1]], k, k + 1)
+    told = status("x", baseline, causes(), 1000.0)
+    assert told.level == WARN and [item.name for item in baseline.compared(1000.0)] == ["coulomb_friction.coulomb"]
+    assert told.message == (
+        "axis x: every parameter that is compared is within its interval since commissioning; "
+        "gain is not compared, since its unit was m/s/V at commissioning and is m/s/A"
+    )
+
+
+def test_a_model_with_other_effects_than_at_commissioning_is_named() -> None:
+    """Gain and pole of a model without friction are not those of one with it; and backlash that is found again and again is news in itself."""
+    baseline = Baseline(KNOWN, {}, effects=STANDARD.effects)
+    gap = estimate("backlash.gap", 1e-5, "m")
+    for k, today in enumerate(([*KNOWN], [*KNOWN, gap], [KNOWN[0], gap], [KNOWN[0], gap])):
+        baseline.hear(today, k, k + 1)
+    told = status("x", baseline, causes(), 1000.0)
+    assert told.message.endswith(
+        "; today's model has other effects than that of commissioning, on which gain and pole depend: "
+        "with backlash (3 of 3 estimates), without coulomb_friction (2 of 3 estimates)"
+    )
+    baseline.hear(KNOWN, 4, 5)
+    assert status("x", baseline, causes(), 1000.0).message == "axis x: every parameter is within its interval since commissioning"
+
+
 def test_one_or_two_stretches_that_are_off_are_no_change() -> None:
     """As in a trend: the third one in a row declares it."""
     assert [heard(1.0, 2.0, times).level for times in range(4)] == [OK, OK, OK, WARN]
     assert heard(1.0, 2.0, 2).message == "axis x: 2 of 3 estimates that are compared with commissioning"
     baseline = Baseline(KNOWN, {})
     for k, part in enumerate((1.0, 2.0, 2.0, 1.0, 1.0)):
-        baseline.hear([estimate("gain", 0.1 * part)], k, k + 1)
+        baseline.hear([estimate("gain", 0.1 * part, "m/s/V")], k, k + 1)
         assert status("x", baseline, causes(), 1000.0).level != WARN
 
 
@@ -82,9 +112,9 @@ def test_stretches_with_common_samples_do_not_count_twice() -> None:
     """What overlaps is left out; another fit of the same stretch takes its place."""
     baseline = Baseline(KNOWN, {})
     for begin in (0.0, 5.0, 9.0):
-        baseline.hear([estimate("gain", 0.2)], begin, begin + 10.0)
+        baseline.hear([estimate("gain", 0.2, "m/s/V")], begin, begin + 10.0)
     assert baseline.stretches == 1
-    baseline.hear([estimate("gain", 0.1)], 0.0, 10.0)
+    baseline.hear([estimate("gain", 0.1, "m/s/V")], 0.0, 10.0)
     (one,) = baseline.compared(1000.0)
     assert one.now == 0.1 and baseline.stretches == 1
 
@@ -110,6 +140,13 @@ def test_files_of_other_kinds_are_refused_in_one_line(tmp_path: Path) -> None:
         of_transfer_functions(physical)
     with pytest.raises(BadRecording, match="refine --model"):
         of_axis_models(linear, STANDARD)
+
+
+def test_a_table_without_a_baseline_is_not_read(tmp_path: Path) -> None:
+    """Its trend takes long, and nothing would be compared with it: neither node reads a table that is not there."""
+    nowhere = str(tmp_path / "nowhere")
+    assert SinceCommissioning.of_identifier(IdentifierSettings(baseline_table=nowhere), ("x",)).statuses() == []
+    assert SinceCommissioning.of_diagnoser(DiagnoserSettings(baseline_table=nowhere), ("x",), STANDARD).statuses() == []
 
 
 def moving(count: int, gain: float = 0.1) -> tuple[Any, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -44,6 +45,7 @@ def test_a_table_is_opened_and_its_change_is_told_as_by_the_command(server: Serv
         tab.until(lambda: events.count() == 1, 60.0)
         said = str(events.first.text_content())
         assert f"- {said}" in cli("trend", folder / "table").out
+        assert "Recordings that could not be read: 1 (mill-00: 1)." in str(tab.page.locator("[data-part=summary]:visible").text_content())
         tab.until(lambda: drawn(tab, "gain of mill-01 x over time") and drawn(tab, "gain of all axes over time"), 30.0)
         assert tab.wide() <= width
         assert tab.errors == []
@@ -62,3 +64,31 @@ def test_only_folders_of_the_shelf_that_are_tables_can_be_opened(folder: Path) -
     assert find(shelf, "table") == folder.resolve() / "table"
     with pytest.raises(BadInput, match="one of the list"):
         find(shelf, "../elsewhere")
+
+
+def test_a_folder_that_cannot_be_read_has_no_table(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """lost+found on a disk of its own belongs to root: the page opens, with all other tables."""
+    closed, scan = folder / "lost+found", os.scandir
+    closed.mkdir()
+
+    def scanned(path: Any) -> Any:
+        if Path(path).name == closed.name:
+            raise PermissionError(13, "Permission denied", str(path))
+        return scan(path)
+
+    monkeypatch.setattr(os, "scandir", scanned)
+    monkeypatch.setattr(os, "listdir", lambda path: [entry.name for entry in scanned(path)])
+    assert tables(Shelf(folder)) == ["table"]
+    closed.rmdir()
+
+
+def test_no_recording_is_asked_for_its_status(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Names tell which folders are tables: thousands of recordings on a share would keep the page waiting."""
+    status = Path.stat
+
+    def asked(path: Path, **how: Any) -> Any:
+        assert path.suffix != ".parquet", path
+        return status(path, **how)
+
+    monkeypatch.setattr(Path, "stat", asked)
+    assert tables(Shelf(folder)) == ["table"]

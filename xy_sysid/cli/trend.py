@@ -12,6 +12,7 @@ from xy_sysid.cli.output import emit, plain, progress, say, table
 from xy_sysid.cli.reading import reads
 
 if TYPE_CHECKING:
+    from xy_sysid.fleets.history import Axis
     from xy_sysid.fleets.trends import Event, Moved, Trend, Trends
     from xy_sysid.imports.reading import Reading
 
@@ -35,18 +36,20 @@ def trend(
     json: o.Json = False,
 ) -> None:
     """Find changes of every parameter of every axis over time: since when, by how much, how certain, and the likely cause."""
+    from xy_sysid.fleets.causes import causes as causes_of
     from xy_sysid.fleets.of_paths import Analysis
     from xy_sysid.fleets.parts import rows_of_parts, seconds
     from xy_sysid.fleets.trends import of_rows
     from xy_sysid.fleets.trends import trend as logic
-    from xy_sysid.fleets.words import sentence, summary, widest
+    from xy_sysid.fleets.words import gaps, sentence, summary, widest
 
     o.output_file("--out", out, force)
     with progress() as bar:
         task = bar.add_task("comparing recordings", total=1.0)
         if every:
+            known = causes_of(causes)
             parts = rows_of_parts(folder, seconds(every), Analysis(reading=reading), lambda number: bar.update(task, description=f"part {number}"))
-            found = of_rows(parts, (), causes, axis_months)
+            found = of_rows(parts, (), known, axis_months, machines=machine or ())
         else:
             found = logic(
                 folder, machines=machine or (), own_causes=causes, axis_months=axis_months, tell=lambda part: bar.update(task, completed=part)
@@ -61,6 +64,8 @@ def trend(
         return
     axes = {(one.machine, one.axis): one for one in found.axes}
     say(f"{folder}: {summary(found)}.")
+    for text in gaps(found):
+        say(text)
     for event in found.events:
         say(f"- {sentence(event, axes[event.machine, event.axis])}")
     if not found.events:
@@ -73,25 +78,51 @@ def trend(
 
 def answer(found: Trends) -> dict[str, Any]:
     """The JSON document."""
+    from xy_sysid.fleets.history import FEWEST
+
+    axes = {(one.machine, one.axis): one for one in found.axes}
     return {
         "axes": [
-            {"machine": one.machine, "axis": one.axis, "recordings": len(one.dates), "months": one.months, "left_out": one.left_out}
+            {
+                "machine": one.machine,
+                "axis": one.axis,
+                "recordings": len(one.dates),
+                "months": one.months,
+                "left_out": one.left_out,
+                "other_units": one.other_units,
+                "newest_without_answer": one.silent,
+                "compared": len(one.dates) >= FEWEST,
+            }
             for one in found.axes
         ],
-        "events": [_event(one) for one in found.events],
+        "unread": [{"machine": one.machine, "recordings": one.recordings, "newest": one.newest} for one in found.unread],
+        "events": [_event(one, axes[one.machine, one.axis]) for one in found.events],
         "parameters": [_trend(one) for one in found.trends],
     }
 
 
-def _event(one: Event) -> dict[str, Any]:
+def _event(one: Event, axis: Axis) -> dict[str, Any]:
+    from xy_sysid.fleets.words import sentence
+
     cause = None if one.cause is None else {"cause": one.cause.cause, "check": one.cause.check}
-    return {"machine": one.machine, "axis": one.axis, "since": str(one.since), "cause": cause, "changes": [_moved(each) for each in one.moved]}
+    changes = [_moved(each, axis) for each in one.moved]
+    return {
+        "machine": one.machine,
+        "axis": one.axis,
+        "since": str(one.since),
+        "sentence": sentence(one, axis),
+        "cause": cause,
+        "changes": changes,
+    }
 
 
-def _moved(one: Moved) -> dict[str, Any]:
+def _moved(one: Moved, axis: Axis) -> dict[str, Any]:
+    from xy_sysid.fleets.words import told
+
     dates = {name: str(getattr(one, name)) for name in ("since", "earliest", "latest", "declared")}
     numbers = {"before": one.before, "after": one.after, "ci95": [one.low, one.high], "part": one.part, "sigmas": one.sigmas}
-    return {"parameter": one.column, "unit": one.unit, "direction": one.direction, **numbers, **dates, "once_in_axis_months": one.one_in}
+    how = {"duration_days": one.duration, "once_in_axis_months": one.one_in, "sentence": f"{told(one, axis)}."}
+    return {"parameter": one.column, "unit": one.unit, "direction": one.direction, **numbers, **dates, **how}
 
 
 def _trend(one: Trend) -> dict[str, Any]:

@@ -12,8 +12,8 @@ common sample say so one after another.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass, field
 from datetime import timedelta
 from functools import cache
 
@@ -55,16 +55,32 @@ class Compared:
     one_in: float
 
 
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """What a stretch of data says.
+
+    parameters: name -> estimate, and log of the test's statistic; effects: of its model; units: name -> unit, where it is not that of commissioning
+    """
+
+    parameters: Mapping[str, tuple[Estimate, float]] = field(default_factory=dict)
+    effects: frozenset[str] = frozenset()
+    units: Mapping[str, str] = field(default_factory=dict)
+
+
 class Baseline:
     """The estimates of an axis at commissioning, and what is heard of it since.
 
     known: estimates at commissioning; spreads: between recordings, by column of the fleet's table, part of the value; column: of a parameter's name
+    effects: names of effects that models may have, where the models of different stretches may differ
     """
 
-    def __init__(self, known: Iterable[Estimate], spreads: Mapping[str, float], column: Callable[[str], str] = column_of) -> None:
-        self._known = {item.name: item for item in known if finite(item)}
-        self._spreads, self._column = spreads, column
-        self._heard: list[dict[str, tuple[Estimate, float]]] = []
+    def __init__(
+        self, known: Iterable[Estimate], spreads: Mapping[str, float], column: Callable[[str], str] = column_of, effects: Collection[str] = ()
+    ) -> None:
+        every = {item.name: item for item in known}
+        self._library, self._spreads, self._column = effects, spreads, column
+        self._known, self._effects = {name: item for name, item in every.items() if finite(item)}, self._effects_of(every)
+        self._heard: list[Stretch] = []
         self._newest = (-math.inf, -math.inf)
 
     def hear(self, estimates: Iterable[Estimate], begin: float, end: float) -> None:
@@ -75,15 +91,43 @@ class Baseline:
         again = (begin, end) == self._newest
         if begin < self._newest[1] and not again:
             return
-        found = {item.name: (item, self._statistic(item)) for item in estimates if item.name in self._known and finite(item)}
-        self._heard = [*(self._heard[:-1] if again else self._heard[1 - AGREEING :]), found]
+        every = {item.name: item for item in estimates}
+        shared = [item for item in every.values() if item.name in self._known and finite(item)]
+        units = {item.name: item.unit for item in shared if item.unit != self._known[item.name].unit}
+        found = {item.name: (item, self._statistic(item)) for item in shared if item.name not in units}
+        self._heard = [*(self._heard[:-1] if again else self._heard[1 - AGREEING :]), Stretch(found, self._effects_of(every), units)]
         self._newest = (begin, end)
 
     def compared(self, axis_months: float) -> tuple[Compared, ...]:
         """Every parameter that the baseline and the newest stretch have."""
-        newest = self._heard[-1] if self._heard else {}
+        newest = self._newest_stretch.parameters
         level = math.log(axis_months * A_MONTH * max(len(newest), 1))
         return tuple(self._compared(item, level, axis_months) for item, _ in newest.values())
+
+    @property
+    def other_units(self) -> Mapping[str, tuple[str, str]]:
+        """By name the units, at commissioning and in the newest stretch, of parameters that are not compared, since these are not the same."""
+        return {name: (self._known[name].unit, unit) for name, unit in self._newest_stretch.units.items()}
+
+    @property
+    def other_effects(self) -> Mapping[str, int]:
+        """Effects that the model of the newest stretch has and that of commissioning lacks, or the reverse: in how many stretches one after another.
+
+        The number is negative for an effect that the model of today lacks.
+        """
+        found = {}
+        for effect in sorted(self._newest_stretch.effects ^ self._effects if self._heard else ()):
+            there = effect in self._newest_stretch.effects
+            same = [(effect in one.effects) == there for one in reversed(self._heard)]
+            found[effect] = (1 if there else -1) * (same.index(False) if False in same else len(same))
+        return found
+
+    @property
+    def _newest_stretch(self) -> Stretch:
+        return self._heard[-1] if self._heard else Stretch()
+
+    def _effects_of(self, names: Iterable[str]) -> frozenset[str]:
+        return frozenset(name.partition(".")[0] for name in names) & frozenset(self._library)
 
     @property
     def stretches(self) -> int:
@@ -114,7 +158,7 @@ class Baseline:
         history = self._history(before, item)
         width = Z95 * math.sqrt(2.0 * self._spread(item.name) ** 2 + float(np.sum(history.series.sigma**2)))
         low, high = sorted(history.changed(before.value, side * width) for side in (-1.0, 1.0))
-        every = [heard[item.name][1] if item.name in heard else -math.inf for heard in self._heard]
+        every = [heard.parameters[item.name][1] if item.name in heard.parameters else -math.inf for heard in self._heard]
         least = min(every) if len(every) == AGREEING else -math.inf
         return Compared(
             name=item.name, unit=item.unit, before=before.value, now=item.value, low=low, high=high,

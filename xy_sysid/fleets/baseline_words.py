@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from xy_sysid.fleets.baseline import AGREEING, Baseline, Compared
 from xy_sysid.fleets.causes import Causes
@@ -13,23 +13,35 @@ ONCE = 1e9  # axis-months beyond which the number itself says nothing more
 
 
 def status(axis: str, baseline: Baseline, known: Causes, axis_months: float) -> StatusMessage:
-    """``baseline <axis>``: WARN where a parameter has left its interval, else OK; before enough is heard it says so.
+    """``baseline <axis>``: WARN where a parameter has left its interval or is not compared, else OK; before enough is heard it says so.
 
     axis_months: of an unchanged axis, in which one false alarm is allowed
     """
     every = baseline.compared(axis_months)
-    values = tuple(pair for item in every for pair in _values(item))
     left = [item for item in every if item.left]
+    level, ending = WARN if left or baseline.other_units else OK, ""
     if left:
         cause = baseline.cause(every, known)
-        likely = f" Likely cause: {cause.cause}. {cause.check}".rstrip() if cause is not None else ""
-        return StatusMessage(f"baseline {axis}", WARN, f"axis {axis}: since commissioning {told(left)}.{likely}", values)
-    if baseline.stretches < AGREEING:
-        text = f"axis {axis}: {baseline.stretches} of {AGREEING} estimates that are compared with commissioning"
-        return StatusMessage(f"baseline {axis}", OK, text, values)
-    if not every:
-        return StatusMessage(f"baseline {axis}", WARN, f"axis {axis}: no parameter of the baseline is estimated", values)
-    return StatusMessage(f"baseline {axis}", OK, f"axis {axis}: every parameter is within its interval since commissioning", values)
+        ending = f". Likely cause: {cause.cause}. {cause.check}".rstrip() if cause is not None else "."
+        text = f"since commissioning {told(left)}"
+    elif baseline.stretches < AGREEING:
+        text = f"{baseline.stretches} of {AGREEING} estimates that are compared with commissioning"
+    elif not every:
+        level, text = WARN, "no parameter of the baseline is estimated"
+    else:
+        text = f"every parameter {'that is compared ' if baseline.other_units else ''}is within its interval since commissioning"
+    values = tuple(pair for item in every for pair in _values(item))
+    return StatusMessage(f"baseline {axis}", level, f"axis {axis}: {'; '.join((text, *_unlike(baseline)))}{ending}", values)
+
+
+def _unlike(baseline: Baseline) -> Iterator[str]:
+    """Why parameters of today are not those of commissioning."""
+    for name, (before, now) in baseline.other_units.items():
+        yield f"{name} is not compared, since its unit was {before or '1'} at commissioning and is {now or '1'}"
+    other = baseline.other_effects
+    if other:
+        each = ", ".join(f"{'with' if count > 0 else 'without'} {effect} ({abs(count)} of {AGREEING} estimates)" for effect, count in other.items())
+        yield f"today's model has other effects than that of commissioning, on which gain and pole depend: {each}"
 
 
 def told(left: Sequence[Compared]) -> str:

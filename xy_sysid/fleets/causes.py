@@ -49,8 +49,11 @@ def causes(own: Path | None = None) -> Causes:
     if own is None:
         return ours
     theirs = _read(own)
-    both = Causes(quantities={**ours.quantities, **theirs.quantities}, causes=[*theirs.causes, *ours.causes])
+    quantities = {**theirs.quantities, **ours.quantities, **theirs.quantities}  # theirs are tried first, and theirs hold
+    both = Causes(quantities=quantities, causes=[*theirs.causes, *ours.causes])
     for one in theirs.causes:
+        if not one.when:
+            raise BadInput(f"{own}: when of {one.cause!r}", "empty", "one change or more", "Write the change that points to it, such as gain down.")
         for change in (*one.when, *one.also):
             name, _, direction = change.rpartition(" ")
             if name not in both.quantities or direction not in DIRECTIONS:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
@@ -64,8 +64,10 @@ class History:
 class Axis:
     """All that the table tells of one axis over time.
 
-    dates: (n,) of its recordings; histories: of every parameter with enough values; named: effect -> (n,) whether it was named
-    left_out: recordings without a date, or without an answer
+    units: of input and output, of its last recording with an answer; dates: (n,) of its recordings in these units
+    histories: of every parameter with enough values; named: effect -> (n,) whether it was named
+    left_out: recordings without a date, or without an answer; other_units: with an answer in other units, left out, too
+    silent: its newest recordings, none of which has an answer
     """
 
     machine: str
@@ -75,6 +77,8 @@ class Axis:
     histories: tuple[History, ...]
     named: Mapping[str, NDArray[np.bool_]]
     left_out: int
+    other_units: int = 0
+    silent: int = 0
 
     @property
     def months(self) -> float:
@@ -87,6 +91,26 @@ class Axis:
         return len(self.histories) + len(self.named)
 
 
+@dataclass(frozen=True, slots=True)
+class Unread:
+    """Recordings of a machine that could not be read. newest: none that was read is as new as the last of them."""
+
+    machine: str
+    recordings: int
+    newest: bool
+
+
+def unread(rows: Sequence[Mapping[str, Any]]) -> tuple[Unread, ...]:
+    """Every machine with recordings that could not be read: their rows name no axis."""
+    found = []
+    for machine in sorted({row["machine"] for row in rows if not row["axis"]}):
+        own = [row for row in rows if row["machine"] == machine]
+        last = max((row["date"] for row in own if row.get("date") is not None), default=None)
+        newest = last is not None and not any(row["axis"] and row.get("date") == last for row in own)
+        found.append(Unread(machine, sum(not row["axis"] for row in own), newest))
+    return tuple(found)
+
+
 def axes(rows: Sequence[Mapping[str, Any]], units: Mapping[str, str]) -> tuple[Axis, ...]:
     """Every axis of every machine in the rows of a table; units: of the columns that are followed."""
     parts: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
@@ -96,20 +120,27 @@ def axes(rows: Sequence[Mapping[str, Any]], units: Mapping[str, str]) -> tuple[A
 
 
 def _axis(machine: str, axis: str, rows: Sequence[Mapping[str, Any]], units: Mapping[str, str]) -> Axis:
-    answered = (row for row in rows if row.get("date") is not None and row.get("verdict") not in (None, "not_enough_data"))
-    dated = sorted(answered, key=lambda row: row["date"])
-    histories = (_history(column, unit, dated) for column, unit in units.items())
-    effects = sorted({name for row in dated for name in _names(row)})
-    last = rows[-1]
+    every = sorted((row for row in rows if row.get("date") is not None), key=lambda row: row["date"])
+    dated = [row for row in every if row.get("verdict") not in (None, "not_enough_data")]
+    own = _units(dated[-1] if dated else {})
+    alike = [row for row in dated if _units(row) == own]
+    histories = (_history(column, unit, alike) for column, unit in units.items())
+    effects = sorted({name for row in alike for name in _names(row)})
     return Axis(
         machine=machine,
         axis=axis,
-        units=(last.get("input_unit") or "V", last.get("output_unit") or "m"),
-        dates=tuple(row["date"] for row in dated),
+        units=own,
+        dates=tuple(row["date"] for row in alike),
         histories=tuple(one for one in histories if one is not None),
-        named={name: np.array([name in _names(row) for row in dated]) for name in effects} if len(dated) >= FEWEST else {},
+        named={name: np.array([name in _names(row) for row in alike]) for name in effects} if len(alike) >= FEWEST else {},
         left_out=len(rows) - len(dated),
+        other_units=len(dated) - len(alike),
+        silent=sum(not dated or row["date"] > dated[-1]["date"] for row in every),
     )
+
+
+def _units(row: Mapping[str, Any]) -> tuple[str, str]:
+    return row.get("input_unit") or "V", row.get("output_unit") or "m"
 
 
 def _names(row: Mapping[str, Any]) -> list[str]:
@@ -141,9 +172,12 @@ def _number(row: Mapping[str, Any], name: str) -> float:
     return np.nan if value is None else float(value)
 
 
-def steps(dates: Iterable[datetime]) -> FloatArray:
-    """(n,) times in usual distances between recordings: in the median of those that are not 0."""
-    seconds = np.array([date.timestamp() for date in dates])
-    between = np.diff(seconds)
-    usual = float(np.median(between[between > 0.0])) if np.any(between > 0.0) else 1.0
-    return np.asarray((seconds - seconds[0]) / usual)
+def steps(dates: Sequence[datetime]) -> FloatArray:
+    """(n,) times in usual distances between recordings."""
+    return np.array([(date - dates[0]).total_seconds() for date in dates]) / usual_distance(dates)
+
+
+def usual_distance(dates: Sequence[datetime]) -> float:
+    """The median distance between recordings of different dates, s."""
+    between = np.diff([date.timestamp() for date in dates])
+    return float(np.median(between[between > 0.0])) if np.any(between > 0.0) else 1.0

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 
@@ -16,13 +16,14 @@ from xy_sysid.fleets.alike import learned_for_each
 from xy_sysid.fleets.causes import Cause, Causes, Direction, causes
 from xy_sysid.fleets.change import LONGEST, Change, Evidence, changes, evidence, spread
 from xy_sysid.fleets.columns import column_of, columns
-from xy_sysid.fleets.history import DAY, FEWEST, Axis, History, axes
+from xy_sysid.fleets.history import DAY, FEWEST, Axis, History, Unread, axes, unread, usual_distance
 from xy_sysid.fleets.row import Row
 from xy_sysid.fleets.table import read
 from xy_sysid.fleets.wander import Series
 from xy_sysid.response.frf import Z95
 from xy_sysid.samples.block import FloatArray
 
+NAMED = 20  # that a refusal lists, at most
 AXIS_MONTHS = 1000.0  # in which an axis that does not change raises one false alarm, at most
 
 
@@ -92,20 +93,35 @@ class Trend:
 @dataclass(frozen=True, slots=True)
 class Trends:
     """All of a table. axes: with their dates; trends: of every parameter; events: changes, the latest last; pooled: the spread was learned from
-    several axes together"""
+    several axes together; unread: recordings of which nothing is known"""
 
     axes: tuple[Axis, ...]
     trends: tuple[Trend, ...]
     events: tuple[Event, ...]
     pooled: bool
+    unread: tuple[Unread, ...] = ()
 
     def of(self, machine: str, axis: str, column: str) -> Trend:
         """One trend; raises BadInput if there is none."""
         for one in self.trends:
             if (one.machine, one.axis, one.history.column) == (machine, axis, column):
                 return one
-        known = ", ".join(f"{one.machine} {one.axis} {one.history.column}" for one in self.trends[:20])
+        known = _listed([f"{one.machine} {one.axis} {one.history.column}" for one in self.trends])
         raise BadInput("trend", f"{machine} {axis} {column}", f"one of {known}", "Choose one of these.")
+
+    def of_machines(self, wanted: Collection[str]) -> Trends:
+        """Only of these machines, with all that was learned from the others."""
+        return replace(
+            self,
+            axes=tuple(one for one in self.axes if one.machine in wanted),
+            trends=tuple(one for one in self.trends if one.machine in wanted),
+            events=tuple(one for one in self.events if one.machine in wanted),
+            unread=tuple(one for one in self.unread if one.machine in wanted),
+        )
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(names[:NAMED]) + (f" and {len(names) - NAMED} more" if len(names) > NAMED else "")
 
 
 def trend(
@@ -118,35 +134,43 @@ def trend(
 ) -> Trends:
     """What changed in the recordings of a fleet's table.
 
-    table:  the folder that ``fleet`` made; machines: only these; own_causes: a YAML file that adds to the table of causes
+    table:  the folder that ``fleet`` made; machines: only their trends; own_causes: a YAML file that adds to the table of causes
     axis_months: of an axis that does not change, in which one false alarm is allowed; tell: hears the part that is done
     The spread between recordings is learned for each parameter from all axes of the table together, and is in every interval.
-    Raises BadRecording for what is no table, BadInput where no axis has four recordings with a date and an answer.
+    Raises BadRecording for what is no table, BadInput for a machine that is not in it, or where no axis has four recordings with a date and an
+    answer.
     """
-    wanted = set(machines)
-    found = read(Path(table))
-    rows = [row for row in found.to_pylist() if not wanted or row["machine"] in wanted]
-    return of_rows(rows, found.column_names, own_causes, axis_months, tell)
+    known, found = causes(own_causes), read(Path(table))
+    return of_rows(found.to_pylist(), found.column_names, known, axis_months, tell, machines)
 
 
 def of_rows(
     rows: Sequence[Row],
     names: Iterable[str] = (),
-    own_causes: Path | None = None,
+    known: Causes | None = None,
     axis_months: float = AXIS_MONTHS,
     tell: Callable[[float], None] = lambda _: None,
+    machines: Iterable[str] = (),
 ) -> Trends:
-    """The same of rows that are in no table. names: of columns, where there are parameters of effects of a user's own."""
+    """The same of rows that are in no table.
+
+    names: of columns, where there are parameters of effects of a user's own; known: causes, where they are not those of the package
+    """
     if not axis_months > 0.0:
         raise BadInput("axis_months", axis_months, "above 0", "Usual is 1000.")
-    known = {item.name: item for item in columns()}
-    followed = {name: item.unit for name, item in known.items() if item.trended}
-    followed |= {name: "" for end in names if (name := end.removesuffix("_low")) != end and name not in known}
+    present = sorted({row["machine"] for row in rows})
+    wanted = set(machines) or set(present)
+    if not wanted <= set(present):
+        raise BadInput("machine", ", ".join(sorted(wanted - set(present))), f"one of {_listed(present)}", "Choose one of these.")
+    ours = {item.name: item for item in columns()}
+    followed = {name: item.unit for name, item in ours.items() if item.trended}
+    followed |= {name: "" for end in names if (name := end.removesuffix("_low")) != end and name not in ours}
     every = axes(rows, followed)
-    if not any(one.histories for one in every):
+    if not any(one.histories for one in every if one.machine in wanted):
         allowed = f"an axis with {FEWEST} of them that have a date and an answer"
-        raise BadInput("recordings in the table", f"{len(rows)} rows", allowed, "Record more often, or name their dates (xy-sysid fleet --names).")
-    return of_axes(every, causes(own_causes), axis_months, tell)
+        given = f"{len(rows)} rows, {sum(one.recordings for one in unread(rows))} of which could not be read"
+        raise BadInput("recordings in the table", given, allowed, "Record more often, or name their dates (xy-sysid fleet --names).")
+    return replace(of_axes(every, known or causes(), axis_months, tell), unread=unread(rows)).of_machines(wanted)
 
 
 def of_axes(every: Sequence[Axis], known: Causes, axis_months: float = AXIS_MONTHS, tell: Callable[[float], None] = lambda _: None) -> Trends:
@@ -225,7 +249,6 @@ def _moved(history: History, item: Change, level: float, axis_months: float, mea
     before = float(history.plain(mean))
     ends = sorted(history.changed(before, item.size + side * Z95 * item.sigma) for side in (-1.0, 1.0))
     after, dates = history.changed(before, item.size), history.dates
-    usual = np.median(np.diff([date.timestamp() for date in dates])) / DAY
     return Moved(
         column=history.column,
         unit=history.unit,
@@ -241,7 +264,7 @@ def _moved(history: History, item: Change, level: float, axis_months: float, mea
         latest=dates[item.last + 1],
         declared=dates[item.declared],
         one_in=axis_months * math.exp(min(item.statistic - level, 300.0)),
-        duration=float(item.duration * usual),
+        duration=item.duration * usual_distance(dates) / DAY,
     )
 
 

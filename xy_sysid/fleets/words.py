@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from datetime import datetime
 
 from xy_sysid.fleets.estimate import lasting
-from xy_sysid.fleets.history import BEGIN, DAY, MONTH, Axis
+from xy_sysid.fleets.history import BEGIN, DAY, FEWEST, MONTH, Axis
 from xy_sysid.fleets.trends import Event, Moved, Trend, Trends
 from xy_sysid.units import Units, readable
 
@@ -61,13 +61,33 @@ def chance(one: Moved) -> str:
 
 def summary(trends: Trends) -> str:
     """How much was looked at."""
-    dated = [axis for axis in trends.axes if axis.histories]
+    dated = [axis for axis in trends.axes if len(axis.dates) >= FEWEST]
     out = sum(axis.left_out for axis in trends.axes)
     months = sum(axis.months for axis in dated)
     seen = f"{months:.3g} axis-months" if months >= 1.0 else lasting(DAY * MONTH * months)
     axes = "1 axis" if len(dated) == 1 else f"{len(dated)} axes"
     text = f"{axes}, {sum(len(axis.dates) for axis in dated)} recordings, {seen}"
     return text + (f"; {out} rows without a date or an answer are left out" if out else "")
+
+
+def gaps(trends: Trends) -> list[str]:
+    """What the table cannot tell, one sentence for each reason; none where nothing is missing."""
+    axes = [(f"{one.machine} {one.axis}", one) for one in trends.axes]
+    lost = [(f"{one.machine} with its newest" if one.newest else one.machine, one.recordings) for one in trends.unread]
+    silent = [(name, one.silent) for name, one in axes if one.silent]
+    short = [(name, len(one.dates)) for name, one in axes if len(one.dates) < FEWEST]
+    other = [(name, one.other_units) for name, one in axes if one.other_units]
+    counted = (
+        ("Recordings that could not be read", sum(count for _, count in lost), lost),
+        ("Axes whose newest recordings have no answer", len(silent), silent),
+        (f"Axes that are not compared, since fewer than {FEWEST} recordings have a date and an answer", len(short), short),
+        ("Recordings left out, since the newest of their axis has other units", sum(count for _, count in other), other),
+    )
+    return [f"{what}: {total} ({_each(each)})." for what, total, each in counted if each]
+
+
+def _each(named: Sequence[tuple[str, int]]) -> str:
+    return ", ".join(f"{name}: {count}" for name, count in named[:MOST]) + _more(len(named) - MOST)
 
 
 def clocked(dates: Sequence[datetime]) -> tuple[list[datetime] | list[float], str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -25,12 +25,19 @@ Column = Callable[[str], str]
 class SinceCommissioning:
     """The baselines of the axes that a model file has; nothing at all without a file, and what compares is not even imported then.
 
-    models: its transfer functions, by axis
+    models: its transfer functions, by axis; effects: names of those that models may have
     """
 
-    def __init__(self, known: Mapping[str, tuple[Estimate, ...]], table: str, column: Column, models: Mapping[str, TransferFunction]) -> None:
-        self.models = models
-        self._known, self._column, self._spreads = known, column, _spreads(table)
+    def __init__(
+        self,
+        known: Mapping[str, tuple[Estimate, ...]],
+        table: str,
+        column: Column,
+        models: Mapping[str, TransferFunction],
+        effects: Collection[str] = (),
+    ) -> None:
+        self.models, self._effects = models, effects
+        self._known, self._column, self._spreads = known, column, _spreads(table) if known else {}
         self.forget()
 
     @classmethod
@@ -55,7 +62,7 @@ class SinceCommissioning:
 
         known = of_axis_models(Path(settings.baseline).expanduser(), library)
         _same(settings.baseline, known, axes)
-        return cls(known, settings.baseline_table, column_of, {})
+        return cls(known, settings.baseline_table, column_of, {}, library.effects)
 
     def forget(self) -> None:
         """Nothing was heard yet."""
@@ -63,7 +70,7 @@ class SinceCommissioning:
         if self._known:
             from xy_sysid.fleets.baseline import Baseline
 
-            self._baselines = {axis: Baseline(known, self._spreads, self._column) for axis, known in self._known.items()}
+            self._baselines = {axis: Baseline(known, self._spreads, self._column, self._effects) for axis, known in self._known.items()}
 
     def hear(self, axis: str, estimates: Iterable[Estimate | Interval], begin: float, end: float) -> None:
         """The estimates of a stretch of data of an axis; see ``Baseline.hear``."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -66,18 +67,19 @@ class TrendCard:
             await self._tell(self._found)
 
     async def _tell(self, trends: Trends) -> None:
-        from xy_sysid.fleets.words import sentence, summary
+        from xy_sysid.fleets.words import gaps, sentence, summary
 
-        axes = {key(one): one for one in trends.axes if one.histories}
-        self._summary.set_text(f"{self._name}: {summary(trends)}.")
+        axes = {key(one): one for one in trends.axes}
+        self._summary.set_text(" ".join((f"{self._name}: {summary(trends)}.", *gaps(trends))))
         self._events.clear()
         with self._events:
             for text in [sentence(event, axes[f"{event.machine} {event.axis}"]) for event in trends.events] or ["Nothing changed."]:
                 with ui.element("li"):
                     ui.label(text)
-        first = f"{trends.events[0].machine} {trends.events[0].axis}" if trends.events else next(iter(axes))
+        drawn = [name for name, one in axes.items() if one.histories]
+        first = next((name for one in trends.events if (name := f"{one.machine} {one.axis}") in drawn), drawn[0])
         self._show(True)
-        self._axis.set_options(list(axes), value=None)
+        self._axis.set_options(drawn, value=None)
         self._axis.set_value(first)
 
     def _show(self, answered: bool) -> None:
@@ -132,15 +134,22 @@ def trends_of(trends: Trends, name: str) -> Sequence[Trend]:
 
 def tables(shelf: Shelf) -> list[str]:
     """Folders below the shelf that hold Parquet files only, as a fleet's table does, and the shelf itself as '.'."""
-    folders = [shelf.folder, *(path for deep in range(1, DEEP + 1) for path in sorted(shelf.folder.glob("/".join("*" * deep))) if path.is_dir())]
-    return [str(folder.relative_to(shelf.folder)) for folder in folders if not folder.is_symlink() and _is_table(folder)]
+    return sorted(str(folder.relative_to(shelf.folder)) for folder in _tables(shelf.folder, DEEP))
 
 
-def _is_table(folder: Path) -> bool:
-    if folder.name.startswith("."):
-        return False
-    kinds = {path.suffix for path in folder.iterdir() if path.is_file() and not path.name.startswith(".")}
-    return kinds == {".parquet"}
+def _tables(folder: Path, deep: int) -> Iterator[Path]:
+    """By names and kinds alone: no file is asked for more."""
+    try:
+        with os.scandir(folder) as entries:
+            seen = [entry for entry in entries if not entry.name.startswith(".")]
+    except OSError:
+        return
+    folders = [entry.name for entry in seen if entry.is_dir(follow_symlinks=False)]
+    files = {entry.name for entry in seen} - set(folders)
+    if files and all(name.endswith(".parquet") for name in files):
+        yield folder
+    for name in folders if deep else ():
+        yield from _tables(folder / name, deep - 1)
 
 
 def find(shelf: Shelf, name: str) -> Path:

@@ -9,7 +9,7 @@ import plotly.graph_objects as go
 
 from xy_sysid.fleets.history import Axis
 from xy_sysid.fleets.trends import Event, Trend, Trends
-from xy_sysid.fleets.words import chance, clocked, day, sentence, summary, told, widest
+from xy_sysid.fleets.words import chance, clocked, day, gaps, sentence, summary, told, widest
 from xy_sysid.report.cover import Cover
 from xy_sysid.report.parts import plain, rows
 from xy_sysid.report.sheet import Drawing, block, listing, paragraph, section, table_html, whole
@@ -51,7 +51,8 @@ def trend_page(found: Trends, title: str) -> str:
     table = Table("", ("parameter", "between recordings, %", "within one recording, %"), tuple(spreads))
     parts.append(block("spread", "Spread between recordings", words, table_html(table)))
     head = [sentence(one, axes[one.machine, one.axis]) for one in found.events] or ["Nothing changed."]
-    return whole(Cover(f"Trend of {title}"), f"<h1>Trend of {plain(title)}</h1>{paragraph(f'{summary(found)}.')}{listing(head)}", parts, drawings)
+    about = "".join(paragraph(text) for text in (f"{summary(found)}.", *gaps(found)))
+    return whole(Cover(f"Trend of {title}"), f"<h1>Trend of {plain(title)}</h1>{about}{listing(head)}", parts, drawings)
 
 
 def _drawn(found: Trends, event: Event) -> list[Trend]:
