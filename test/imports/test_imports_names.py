@@ -273,6 +273,14 @@ def test_clocks_since_1970_are_understood(tmp_path: Path, unit: str) -> None:
         ("ft", "m", 0.3048, "position", False),
         ("counts", "counts", 1.0, "position", False),
         ("rpm", "rad/s", 2 * np.pi / 60, "velocity", False),
+        *((spelling, "rad/s", 2 * np.pi / 60, "velocity", False) for spelling in ("r/min", "U/min", "1/min", "min-1", "min^-1", "min⁻¹", "rev/min")),
+        ("krpm", "rad/s", 2000 * np.pi / 60, "velocity", False),
+        *((spelling, "rad/s", np.pi / 180, "velocity", False) for spelling in ("dps", "deg/s", "°/sec", "deg s^-1", "deg·s⁻¹")),
+        ("mm s⁻²", "m/s^2", 1e-3, "acceleration", False),
+        ("Nmm", "N m", 1e-3, "torque", False),
+        ("N-m", "N m", 1.0, "torque", False),
+        ("Arms", "A", 1.0, "current", False),
+        ("‰", "FS", 1e-3, "command", False),
         ("mm/s", "m/s", 1e-3, "velocity", False),
         ("m/s²", "m/s^2", 1.0, "acceleration", False),
         ("N·m", "N m", 1.0, "torque", False),
@@ -300,6 +308,14 @@ def test_units_that_are_guessed_or_unknown_are_said(tmp_path: Path) -> None:
     assert load(csv_of(tmp_path, {"time[min]": T / 60, "u": U, "y": Y})).sampling_rate == pytest.approx(RATE)
     with pytest.raises(BadRecording, match="'V' of the time is none of time"):
         load(csv_of(tmp_path, {"time[V]": T, "u": U, "y": Y}))
+
+
+def test_a_velocity_in_a_unit_that_is_not_known_is_no_position(tmp_path: Path) -> None:
+    """The name means a velocity: one line says what to give, and with that the file is read."""
+    path = csv_of(tmp_path, {"time": T, "u": U, "speed [knots]": Y})
+    with pytest.raises(BadRecording, match=r"the unit 'knots' of the velocity 'speed' is not known\. .* --unit output=rpm"):
+        load(path)
+    assert load(path, units={"output": "rpm"}).measured == "velocity"
 
 
 @pytest.mark.parametrize("kind", ["npz", "mat"])

@@ -126,6 +126,10 @@ def _values(sheet: Sheet, role: str, columns: Found, axes: tuple[str, ...], read
         if column.words:
             raise BadRecording(sheet.path, f"the {sheet.kind} {column.name!r} holds words ({column.words[0][:20]!r})", "Choose one of numbers.")
         text = reading.unit(role, axis) or column.unit or _usual(column, role)
+        known = meaning(column.name, "")
+        if role == "output" and known is not None and known.quantity in MOTIONS[1:] and unit_of(text).quantity == "unknown":
+            problem = f"the unit {text!r} of the {known.quantity} {column.name!r} is not known"
+            raise BadRecording(sheet.path, problem, "Give one that is, for example --unit output=rpm.")
         scale = reading.scale(role, axis)
         told: list[str] = []
         values, text = scaled(column.values, text, scale, f"the {role} of {axis}", told)
