@@ -7,6 +7,7 @@ magnitude is in dB, the phase does: of a minimum-phase system it is 90 degrees f
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ import numpy as np
 
 from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.imports import csv
+from xy_sysid.imports.foreign_units import unit_of
 from xy_sysid.imports.reading import Reading
 from xy_sysid.imports.sheet import Column, Sheet, spoken
 from xy_sysid.response.frf import FrequencyResponse
@@ -32,7 +34,8 @@ NAMES: Mapping[str, str] = {
     "coherence": "coherence coh gamma",
     "sigma": "sigma std deviation uncertainty",
 }
-RADIAN = ("rad/s", "1/s", "rad/sec")  # units of an angular frequency
+RADIANS, DEGREES = {"rad", "rads", "radian", "radians"}, {"deg", "degree", "degrees"}
+HERTZ = {"hz": 1.0, "khz": 1e3, "MHz": 1e6, "mhz": 1e-3}
 TURN = 2 * np.pi
 JUMP = 0.5  # rad; a phase whose usual step from line to line is more, once turns are taken off, is no smooth one
 EXAMPLE = "Name them with --map frequency=1,magnitude=2,phase=3, or real= and imag= (see xy-sysid columns FILE)."
@@ -134,33 +137,39 @@ def _response(columns: Mapping[str, Column], rows: Any, axis: str, reading: Read
 
 
 def _hertz(column: Column, values: FloatArray, reading: Reading, notes: list[str]) -> FloatArray:
-    said = reading.units.get("frequency") or column.unit
-    angular = said.replace(" ", "") in RADIAN if said else spoken(column.name)[0] in ("omega", "w")
+    last = re.split(r"[\W_]+", column.name)[-1]
+    said = reading.units.get("frequency") or column.unit or (last if last.lower() in HERTZ else "")
+    words = spoken(said or column.name)
+    angular = bool(RADIANS & set(words)) or said == "1/s" or (not said and words[0] in ("omega", "w"))
+    scale = 1.0 / TURN if angular else HERTZ.get(said, HERTZ.get(said.lower())) if said else 1.0
+    if scale is None:
+        raise _unknown("frequency", said, "Hz, kHz, MHz or rad/s")
     notes.append(f"frequencies are in {'rad/s' if angular else 'Hz'}{'' if said else ', as nothing else is said'}")
-    scale = {"khz": 1e3, "mhz": 1e6 if said == "MHz" else 1e-3}.get((said or "").lower(), 1.0)
-    return values / TURN if angular else values * scale
+    return values * scale
 
 
 def _radians(column: Column, values: FloatArray, reading: Reading, notes: list[str]) -> FloatArray:
     """Phases in rad. A header of rad is not believed where the phase would leap by turns from line to line."""
     told = reading.units.get("phase", "")
-    words = {*spoken(column.name), *spoken(column.unit)}
-    degrees = bool(words & {"deg", "degree", "degrees"}) or "°" in column.name + column.unit
-    radians = bool(words & {"rad", "radian", "radians"})
+    said = told or column.unit
+    words = {*spoken(said), *(() if told else spoken(column.name))}
+    degrees, radians = bool(words & DEGREES) or "°" in (said or column.name), bool(words & RADIANS)
+    if not degrees and not radians and (told or unit_of(said).quantity != "unknown"):  # brackets may hold a remark: Phase (B-A)
+        raise _unknown("phase", said, "deg or rad")
     finite = values[np.isfinite(values)]
     within = float(np.max(np.abs(finite), initial=0.0)) <= TURN
     smooth = float(np.median(np.abs(np.angle(np.exp(1j * np.diff(finite)))))) < JUMP if finite.size > 1 else True
-    if told:
-        degrees = told.lower() in ("deg", "degree", "degrees", "°")
-        why = ""
-    elif radians and not within and not smooth:
+    why = ""
+    if not told and radians and not within and not smooth:
         degrees, why = True, ": the header says rad, and in rad the phase would leap by turns from line to line (--unit phase=rad overrides)"
     elif not degrees and not radians:
         degrees, why = not within, ", by their size"
-    else:
-        why = ""
     notes.append(f"phases are in {'degrees' if degrees else 'radians'}{why}")
     return np.deg2rad(values) if degrees else values
+
+
+def _unknown(what: str, said: str, allowed: str) -> BadInput:
+    return BadInput(f"the unit of the {what}", repr(said), allowed, f"Give it with --unit {what}={allowed.split()[0].rstrip(',')}.")
 
 
 def _linear(column: Column, lines: tuple[FloatArray, FloatArray, FloatArray], reading: Reading, notes: list[str]) -> FloatArray:
