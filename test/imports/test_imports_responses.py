@@ -76,6 +76,15 @@ def test_a_response_in_a_unit_that_is_not_known_is_refused(tmp_path: Path, head:
     assert np.allclose(xy.frf_from(path, units={what: unit}).frequency, F)
 
 
+@pytest.mark.parametrize(("name", "linear"), [("|H| [m/N]", True), ("Mag [m/s^2/V]", True), ("Gain (dB)", False), ("mag_dB", False)])
+def test_a_unit_of_the_magnitude_says_whether_it_is_in_decibels(tmp_path: Path, name: str, linear: bool) -> None:
+    """However well the other way would fit the phase; no number is negative here."""
+    decibels = 20 * np.log10(abs(H))
+    size = decibels - decibels.min() + 1.0 if linear else abs(H)
+    found = xy.frf_from(written(tmp_path / "frf.csv", f"freq,{name},Phase (deg)", (F, size, np.rad2deg(PHASE))))
+    assert np.allclose(abs(found.response), size if linear else 10 ** (size / 20))
+
+
 def test_a_response_from_a_file_is_fitted_and_exported(tmp_path: Path) -> None:
     """Resonance, delay and orders come back with intervals from the scatter of the lines; the model file reloads."""
     path = written(tmp_path / "frf.csv", "Frequency (Hz);Gain (dB);Phase (deg)", (F, 20 * np.log10(abs(H)), np.rad2deg(PHASE)), ";")

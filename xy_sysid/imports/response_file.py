@@ -35,6 +35,8 @@ NAMES: Mapping[str, str] = {
     "sigma": "sigma std deviation uncertainty",
 }
 RADIANS, DEGREES = {"rad", "rads", "radian", "radians"}, {"deg", "degree", "degrees"}
+UNITS = re.compile(r"[^\W\d_]+|[%°]")  # of m/s^2/V they are m, s and V
+DECIBEL = re.compile(r"(?i)(?<![a-z])db(?![a-z])")
 HERTZ = {"hz": 1.0, "khz": 1e3, "MHz": 1e6, "mhz": 1e-3}
 TURN = 2 * np.pi
 JUMP = 0.5  # rad; a phase whose usual step from line to line is more, once turns are taken off, is no smooth one
@@ -175,11 +177,13 @@ def _unknown(what: str, said: str, allowed: str) -> BadInput:
 def _linear(column: Column, lines: tuple[FloatArray, FloatArray, FloatArray], reading: Reading, notes: list[str]) -> FloatArray:
     """Magnitudes as they are, from dB where they are in dB. lines: frequency Hz, magnitude, phase rad."""
     frequency, values, phase = lines
-    told, words = reading.units.get("magnitude", ""), {*spoken(column.name), *spoken(column.unit)}
-    if told or "db" in words:
+    told, units = reading.units.get("magnitude", ""), UNITS.findall(column.unit)
+    if told or DECIBEL.search(f"{column.name} {column.unit}"):
         decibels, why = (told.lower() == "db" if told else True), ""
     elif bool(np.any(values[np.isfinite(values)] < 0)):
         decibels, why = True, ", as some are negative"
+    elif units and all(unit_of(one).quantity != "unknown" for one in units):
+        decibels, why = False, f", in {column.unit}"
     else:
         decibels, why = _slope_says_decibels(frequency, values, phase), ", as their slope fits the phase then"
     notes.append(f"magnitudes are {'in dB' if decibels else 'linear'}{why}")
