@@ -85,6 +85,15 @@ def test_a_unit_of_the_magnitude_says_whether_it_is_in_decibels(tmp_path: Path, 
     assert np.allclose(abs(found.response), size if linear else 10 ** (size / 20))
 
 
+def test_keywords_say_of_a_file_what_it_does_not_say(tmp_path: Path) -> None:
+    """The averages behind a column of coherence; a name that is not known is refused."""
+    path = written(tmp_path / "frf.csv", "f_Hz,real,imag,coherence", (F, H.real, H.imag, np.full(F.size, 0.9)))
+    found = xy.frf_from(path, averages=11, sampling_rate=2000.0)
+    assert np.allclose(found.sigma, np.abs(H) * np.sqrt(0.1 / 0.9 / 10)) and found.sampling_rate == 2000.0
+    with pytest.raises(xy.BadInput, match="averages"):
+        xy.frf_from(path, avarages=11)
+
+
 def test_a_response_from_a_file_is_fitted_and_exported(tmp_path: Path) -> None:
     """Resonance, delay and orders come back with intervals from the scatter of the lines; the model file reloads."""
     path = written(tmp_path / "frf.csv", "Frequency (Hz);Gain (dB);Phase (deg)", (F, 20 * np.log10(abs(H)), np.rad2deg(PHASE)), ";")

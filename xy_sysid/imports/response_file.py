@@ -48,14 +48,17 @@ def sheet(path: Path) -> Sheet:
     return csv.sheet(path)
 
 
-def responses(path: Path, sheet: Sheet, reading: Reading) -> dict[str, FrequencyResponse]:
-    """The response of each axis: of one, x, if the file names none. Raises BadRecording or BadInput that say what is missing."""
+def responses(path: Path, sheet: Sheet, reading: Reading, known: Mapping[str, Any] | None = None) -> dict[str, FrequencyResponse]:
+    """The response of each axis: of one, x, if the file names none. known: fields of ``Known`` that the file does not say.
+
+    Raises BadRecording or BadInput that say what is missing.
+    """
     columns = {role: column for role in NAMES if (column := column_of(sheet, role, reading)) is not None}
     _complete(path, sheet, columns)
     axes = next((column for column in sheet.columns if column.words and spoken(column.name) == ("axis",)), None)
     words = np.array(axes.words if axes is not None else ["x"] * len(columns["frequency"].values))
     names = dict.fromkeys(words.tolist())
-    found = {name: _response(columns, words == name, name, reading) for name in names}
+    found = {name: _response(columns, words == name, name, reading, known or {}) for name in names}
     return found if reading.axes is None else {name: found[name] for name in _chosen(reading.axes, found)}
 
 
@@ -73,14 +76,14 @@ def frf_from(
     source:   a file, or (m,) frequencies in Hz with ``response``, (m,) complex
     axis:     its name, of a file of several the one to take; units: {"input": "V", "output": "rad"}, of a file also {"phase": "deg"}
     columns:  of a file, as ``--map`` says them: {"frequency": "1", "magnitude": "2", "phase": "3"}
-    known:    of arrays: sigma, (m,) standard deviation of the complex error; coherence, (m,), with its averages; sampling_rate, Hz
+    known:    sigma, (m,) standard deviation of the complex error; coherence, (m,), with its averages; sampling_rate, Hz
     What was understood is in ``origin.notes``. Raises BadInput or BadRecording.
     """
+    names = [field.name for field in dataclasses.fields(Known)]
+    for name in known:
+        if name not in names:
+            raise unknown_name(name, names, "frf_from")
     if not isinstance(source, str | Path):
-        names = [field.name for field in dataclasses.fields(Known)]
-        for name in known:
-            if name not in names:
-                raise unknown_name(name, names, "frf_from")
         told = units or {}
         return given_response(source, response, Known(**known), (told.get("input", "in"), told.get("output", "out")), Origin(axis=axis or ""))
     from xy_sysid.imports.registry import format_of, sheet_of
@@ -90,7 +93,7 @@ def frf_from(
         content = sheet_of(path, format_of(path))
     except OSError as error:
         raise BadRecording(path, f"cannot be read ({error.strerror or error})", "Check the path and the permissions.") from None
-    found = responses(path, content, Reading(columns=columns or {}, units=units or {}, axes=None if axis is None else (axis,)))
+    found = responses(path, content, Reading(columns=columns or {}, units=units or {}, axes=None if axis is None else (axis,)), known)
     if len(found) > 1:
         raise BadInput("frequency response", f"of {len(found)} axes", "one axis", f"Choose one with axis=: {', '.join(found)}.")
     return next(iter(found.values()))
@@ -122,7 +125,7 @@ def _chosen(axes: Any, found: Mapping[str, FrequencyResponse]) -> list[str]:
     return list(axes)
 
 
-def _response(columns: Mapping[str, Column], rows: Any, axis: str, reading: Reading) -> FrequencyResponse:
+def _response(columns: Mapping[str, Column], rows: Any, axis: str, reading: Reading, given: Mapping[str, Any]) -> FrequencyResponse:
     values = {role: column.values[rows] for role, column in columns.items()}
     notes: list[str] = []
     frequency = _hertz(columns["frequency"], values["frequency"], reading, notes)
@@ -133,7 +136,7 @@ def _response(columns: Mapping[str, Column], rows: Any, axis: str, reading: Read
         phase = _radians(columns["phase"], values["phase"], reading, notes)
         size = _linear(columns["magnitude"], (frequency, values["magnitude"], phase), reading, notes)
         response = size * np.exp(1j * phase)
-    known = Known(sigma=values.get("sigma"), coherence=values.get("coherence"), sampling_rate=reading.rate)
+    known = dataclasses.replace(Known(sigma=values.get("sigma"), coherence=values.get("coherence"), sampling_rate=reading.rate), **given)
     units = reading.unit("input", axis) or "in", reading.unit("output", axis) or "out"
     return given_response(frequency, response, known, units, Origin(axis=axis, notes=tuple(notes)))
 
