@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.io
 from helpers.cli_tools import cli, refused
 from helpers.real_data import data
 from helpers.table_making import RATE, T, U, Y
@@ -158,6 +160,39 @@ def test_input_and_output_in_two_files_are_joined_by_row_or_by_time(tmp_path: Pa
     by_time = load(one, columns={"input": "u.csv:motor", "output": "y.csv:angle"}, units={"output": "rad"})
     assert by_time.sampling_rate == RATE and np.array_equal(by_time.voltage[:, 0], U) and np.array_equal(by_time.position[:, 0], Y)
     assert any("joined by their times" in note for note in by_time.notes)
+
+
+@pytest.mark.parametrize(
+    "stamp",
+    [
+        lambda t: f"{1.8e18 + np.rint(1e9 * t):.0f}",
+        lambda t: f"{1.8e15 + np.rint(1e6 * t):.0f}",
+        lambda t: f"{1.8e12 + np.rint(1e3 * t):.0f}",
+        lambda t: f"{1.8e9 + t:.3f}",
+        lambda t: f"2026-03-01T12:00:{t:06.3f}",
+        lambda t: f"12:00:{t:06.3f}",
+    ],
+    ids=["ns", "us", "ms", "s", "date", "clock"],
+)
+def test_stamps_of_any_kind_join_two_files(tmp_path: Path, stamp: Callable[[float], str]) -> None:
+    """They count from one origin: a file that begins 5 samples later is not moved to the beginning of the other."""
+    for name, values, rows in (("u", U, slice(None)), ("y", Y, slice(5, None))):
+        lines = [f"{stamp(t)},{value!r}" for t, value in zip(T[rows].tolist(), values[rows].tolist(), strict=True)]
+        (tmp_path / f"{name}.csv").write_text("\n".join([f"time,{name}", *lines, ""]))
+    found = load(tmp_path / "u.csv", columns={"input": "u.csv:u", "output": "y.csv:y"})
+    assert found.sampling_rate == pytest.approx(RATE, rel=1e-3) and len(found) == len(T) - 5
+    assert np.array_equal(found.voltage[:, 0], U[5:]) and np.array_equal(found.position[:, 0], Y[5:])
+
+
+@pytest.mark.parametrize("kind", ["npz", "mat"])
+def test_arrays_may_have_stamps_since_1970(tmp_path: Path, kind: str) -> None:
+    """Of ns, as in a table; a note says so."""
+    content = {"t": np.rint(1.8e18 + 1e9 * T), "u": U, "y": Y}
+    path = tmp_path / f"a.{kind}"
+    np.savez(path, allow_pickle=False, **content) if kind == "npz" else scipy.io.savemat(path, content)
+    found = load(path)
+    assert found.sampling_rate == pytest.approx(RATE, rel=1e-3)
+    assert any("taken as ns since 1970" in note for note in found.notes)
 
 
 def test_both_files_may_be_given_as_recordings(tmp_path: Path) -> None:
