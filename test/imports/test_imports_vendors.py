@@ -184,6 +184,16 @@ def test_stamps_of_any_kind_join_two_files(tmp_path: Path, stamp: Callable[[floa
     assert np.array_equal(found.voltage[:, 0], U[5:]) and np.array_equal(found.position[:, 0], Y[5:])
 
 
+def test_a_time_that_was_said_is_the_clock_of_its_file(tmp_path: Path) -> None:
+    """The other file's is found by its name, and the two are joined by their times."""
+    twice = np.arange(2 * len(T)) / (2 * RATE)
+    for path, name, t, values in (("u.csv", "clk,motor", twice, np.repeat(U, 2)), ("y.csv", "time,angle", T, Y)):
+        np.savetxt(tmp_path / path, np.column_stack((t, values)), delimiter=",", header=name, comments="")
+    found = load(tmp_path / "u.csv", columns={"time": "u.csv:clk", "input": "u.csv:motor", "output": "y.csv:angle"})
+    assert found.sampling_rate == RATE and np.array_equal(found.voltage[:, 0], U) and np.array_equal(found.position[:, 0], Y)
+    assert any("joined by their times" in note for note in found.notes)
+
+
 @pytest.mark.parametrize("kind", ["npz", "mat"])
 def test_arrays_may_have_stamps_since_1970(tmp_path: Path, kind: str) -> None:
     """Of ns, as in a table; a note says so."""

@@ -29,8 +29,13 @@ def of_several_files(path: Path, reading: Reading, notes: list[str]) -> tuple[Sh
     sheets = {file: sheet_of(file, format_of(file)) for file in dict.fromkeys([path, *(file for file, _ in named.values())]) if _is_table(file)}
     chosen = {what: named.get(what, (path, column)) for what, column in reading.columns.items()}
     used = dict.fromkeys(file for file, _ in chosen.values())
-    by_row = "time" in reading.columns or reading.rate is not None
-    clocks = None if by_row else _on_one_clock({file: _stamps(sheets[file], reading) for file in used})
+    time = chosen.get("time")
+    joined = dict.fromkeys(file for what, (file, _) in chosen.items() if what != "time")
+    by_row = reading.rate is not None or (time is not None and (time[0] not in joined or len(joined) < 2))
+    said = {time[0]: time[1]} if time is not None else {}
+    clocks = None if by_row else _on_one_clock({file: _stamps(sheets[file], said.get(file, ""), reading) for file in joined})
+    if clocks is not None:
+        chosen.pop("time", None)
     columns = [
         replace(sheets[file].find(name), name=f"{what} in {file.name}", clock=None if clocks is None else clocks[file])
         for what, (file, name) in chosen.items()
@@ -69,8 +74,10 @@ def _is_table(path: Path) -> bool:
     return format_of(path) is not BAG
 
 
-def _stamps(sheet: Sheet, reading: Reading) -> Stamps | None:
-    """The instants of a file that has a column for them."""
+def _stamps(sheet: Sheet, time: str, reading: Reading) -> Stamps | None:
+    """The instants of a file that has a column for them, or whose column ``time`` they are said to be."""
+    if time:
+        return stamps(sheet.path, sheet.find(time), reading, [])
     for column in sheet.columns:
         known = meaning(column.name, column.unit)
         if known is not None and known.role == "time" and (column.words or np.all(np.isfinite(column.values))):
