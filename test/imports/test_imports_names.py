@@ -243,6 +243,25 @@ def test_titles_and_a_row_of_units(tmp_path: Path) -> None:
     assert_the_axis(load(path))
 
 
+def test_columns_whose_names_are_there_twice_are_chosen_by_number(tmp_path: Path) -> None:
+    """The error says so."""
+    path = csv_of(tmp_path, {"time": T, "u": U, "y": Y, "u2": 0.0 * U, "y2": 0.0 * Y})
+    path.write_text(path.read_text().replace("u2,y2", "u,y"))
+    with pytest.raises(BadRecording, match=r"'u' is there twice.*choose columns by number with --map"):
+        load(path)
+    assert_the_axis(load(path, columns={"input": "2", "output": "3"}))
+    assert_the_axis(load(path, columns={"time": "1", "x.input": "2", "x.output": "3"}))
+
+
+def test_of_several_times_one_is_taken_and_none_is_an_axis(tmp_path: Path) -> None:
+    """A note says which; the times of voltage and position are no voltage and position of an axis called time."""
+    recording = load(csv_of(tmp_path, {"Time": T, "Timestamp": 2.0 * T, "u": U, "y": Y}))
+    assert_the_axis(recording)
+    assert any("'Time' is taken as the time, not 'Timestamp'; choose with --map" in note for note in recording.notes)
+    own = {"t": T, "time_voltage": T, "time_position": T, "x_voltage": U, "x_position": Y}
+    assert load(csv_of(tmp_path, own)).axes == ("x",)
+
+
 def test_what_may_be_either_is_asked(tmp_path: Path) -> None:
     """Two columns for one role: both are named, and the option that chooses; of voltage and current the voltage is taken, and said."""
     path = csv_of(tmp_path, {"time": T, "torque left motor": U, "torque motor left": U, "left position": Y})

@@ -102,6 +102,11 @@ def by_unit(name: str, unit: str) -> str:
     return SYMBOLS.get(name, "") if quantity == "unknown" else "input" if quantity in DRIVES else "output" if quantity in MOTIONS else ""
 
 
+def tells_time(name: str) -> bool:
+    """Whether a word of a name means the time; a single letter does not."""
+    return any(word in TIME.split() and word not in LETTERS for word in spoken(name))
+
+
 def _words(name: str) -> list[str]:
     """Small, numbers apart; i_q, the current that turns a motor, is one."""
     return [piece for word in spoken(QUADRATURE.sub("iq", name)) for piece in _pieces(word)]
