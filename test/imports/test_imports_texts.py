@@ -54,6 +54,13 @@ def test_a_table_is_found_below_what_stands_above_it(tmp_path: Path, above: str,
     assert any("are no columns" in note for note in recording.notes) == (above.count("\n") > 2)
 
 
+def test_a_row_of_units_may_hold_one_that_is_not_known(tmp_path: Path) -> None:
+    """It stays the row below the names."""
+    recording = load(written(tmp_path, "time;voltage;position\ns;V;furlong\n", ";"))
+    assert_read(recording)
+    assert recording.output_unit == "furlong"
+
+
 def test_what_numpy_writes_is_read(tmp_path: Path) -> None:
     """savetxt: blanks, and the names in a remark or nowhere."""
     table = np.column_stack((T, U, Y))

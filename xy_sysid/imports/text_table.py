@@ -158,9 +158,10 @@ def _with_units(names: Names, rows: Rows, separator: str) -> tuple[Names, Rows]:
 
 
 def _are_units(cells: Sequence[str], separator: str) -> bool:
-    """Whether a row names units, and nothing else."""
+    """Whether a row names units: more than half of its cells are known ones, and none is a number."""
     texts = [cell.strip(BRACKETS) for cell in cells if cell]
-    return bool(texts) and not any(is_number(text, separator) or unit_of(text).quantity == "unknown" for text in texts)
+    known = sum(unit_of(text).quantity != "unknown" for text in texts)
+    return 2 * known > len(texts) and not any(is_number(text, separator) for text in texts)
 
 
 def _trimmed(cells: list[str]) -> list[str]:
