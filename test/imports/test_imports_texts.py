@@ -61,6 +61,15 @@ def test_a_row_of_units_may_hold_one_that_is_not_known(tmp_path: Path) -> None:
     assert recording.output_unit == "furlong"
 
 
+@pytest.mark.parametrize("sign", ["#", "%", "//"])
+def test_remarks_above_the_table_are_left_out(tmp_path: Path, sign: str) -> None:
+    """However they begin; the last of them may hold the names, and a row of units that begins with % is none."""
+    for above in (f"{sign} bench 7, axis x, by hand\ntime,voltage,position\n", f"{sign} made by hand\n{sign} time,voltage,position\n"):
+        assert_read(load(written(tmp_path, above)))
+    columns = load(written(tmp_path, "torque,time,angle\n%,s,rad\n"), columns={"input": "torque", "output": "angle"}, rate=RATE)
+    assert columns.input_unit == "FS"
+
+
 def test_what_numpy_writes_is_read(tmp_path: Path) -> None:
     """savetxt: blanks, and the names in a remark or nowhere."""
     table = np.column_stack((T, U, Y))
