@@ -70,6 +70,20 @@ def test_remarks_above_the_table_are_left_out(tmp_path: Path, sign: str) -> None
     assert columns.input_unit == "FS"
 
 
+@pytest.mark.parametrize("below", ["Mean;3;2\nStd;0.1;0.2\n", "End of file", "***End***\n"])
+def test_rows_below_the_table_that_are_no_data_are_left_out(tmp_path: Path, below: str) -> None:
+    """A note says which; a word inside a row of data is still an error."""
+    file = written(tmp_path, "time;voltage;position\n", ";")
+    table = file.read_text("utf-8")
+    file.write_text(table + below, "utf-8")
+    recording = load(file)
+    assert_read(recording)
+    assert any(f"are no data ({below.splitlines()[0]!r}); they are left out" in note for note in recording.notes)
+    file.write_text(table + f"3.5;broken;2\n{below}", "utf-8")
+    with pytest.raises(BadRecording, match="'broken' is not a number"):
+        load(file)
+
+
 def test_what_numpy_writes_is_read(tmp_path: Path) -> None:
     """savetxt: blanks, and the names in a remark or nowhere."""
     table = np.column_stack((T, U, Y))
