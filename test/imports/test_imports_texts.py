@@ -62,10 +62,12 @@ def test_a_row_of_units_may_hold_one_that_is_not_known(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("sign", ["#", "%", "//"])
-def test_remarks_above_the_table_are_left_out(tmp_path: Path, sign: str) -> None:
-    """However they begin; the last of them may hold the names, and a row of units that begins with % is none."""
-    for above in (f"{sign} bench 7, axis x, by hand\ntime,voltage,position\n", f"{sign} made by hand\n{sign} time,voltage,position\n"):
-        assert_read(load(written(tmp_path, above)))
+def test_remarks_in_a_table_are_left_out(tmp_path: Path, sign: str) -> None:
+    """However they begin; one above the table may hold the names. A row of units that begins with % is none."""
+    assert_read(load(written(tmp_path, f"{sign} made by hand, on bench 7\n{sign} time voltage position\n", " ")))
+    file = written(tmp_path, "time,voltage,position\n")
+    file.write_text(file.read_text("utf-8").replace("\n0.002,", f"\n{sign} the door was opened here\n0.002,"), "utf-8")
+    assert_read(load(file))
     columns = load(written(tmp_path, "torque,time,angle\n%,s,rad\n"), columns={"input": "torque", "output": "angle"}, rate=RATE)
     assert columns.input_unit == "FS"
 
