@@ -72,6 +72,14 @@ def test_headers_in_any_case_and_spelling(tmp_path: Path, time: str, voltage: st
         ("torque_nm", "input", "", "Nm"),
         ("effort_Nm", "input", "", "Nm"),
         ("joint1_effort", "input", "joint1", ""),
+        ("Zeitstempel", "time", "", ""),
+        ("Uhrzeit", "time", "", ""),
+        ("Sollposition", "reference", "", ""),
+        ("Drehzahlsollwert", "reference", "", ""),
+        ("Istposition", "output", "", ""),
+        ("Posición", "output", "", ""),
+        ("Stellgröße", "input", "", ""),
+        ("Torque [Nm] (filtered)", "input", "", "Nm"),
     ],
 )
 def test_what_a_name_says(name: str, role: str, axis: str, unit: str) -> None:
