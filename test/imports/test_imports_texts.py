@@ -102,16 +102,35 @@ def test_what_numpy_writes_is_read(tmp_path: Path) -> None:
         lambda t: f"{1e3 * t:.1f}ms",
         lambda t: f"10:{int(t // 60) + 7:02d}:{t % 60:06.3f}",
         lambda t: f"{int(t // 60)}:{t % 60:06.3f}",
+        lambda t: f"10:00:{int(t):02d}:{round(1e3 * t) % 1000:03d}",
+        lambda t: f"10:00:{int(t):02d}:{round(1e3 * t) % 1000}",
         lambda t: f"23.11.2026 10:00:{t:06.3f}",
         lambda t: f"11/23/2026 1:00:{t:06.3f} PM",
         lambda t: f"{'24' if t >= 0.1 else '23'}.11.2026 {'00:00' if t >= 0.1 else '23:59'}:{(t + 59.9) % 60:06.3f}",
         lambda t: f"{'12' if t >= 0.1 else '11'}:{'00' if t >= 0.1 else '59'}:{(t + 59.9) % 60:06.3f} {'AM' if t >= 0.1 else 'PM'}",
     ],
-    ids=["seconds", "milliseconds", "clock", "minutes", "date", "afternoon", "midnight by date", "midnight by clock"],
+    ids=[
+        "seconds",
+        "milliseconds",
+        "clock",
+        "minutes",
+        "colon before ms",
+        "ms without zeros",
+        "date",
+        "afternoon",
+        "midnight by date",
+        "midnight by clock",
+    ],
 )
 def test_times_in_words_are_understood(tmp_path: Path, time: Callable[[float], object]) -> None:
     """With a unit, as a clock reads, after a date of any fashion, past midnight."""
     assert_read(load(written(tmp_path, "Time,voltage,position\n", time=time)))
+
+
+def test_a_clock_outside_of_this_century_counts_no_time_since_1970(tmp_path: Path) -> None:
+    """The year 2127 in us is none; such numbers are seconds, as nothing else is said."""
+    far = load(written(tmp_path, "time,voltage,position\n", time=lambda t: f"{5e15 + round(1e6 * t):.0f}"))
+    assert far.sampling_rate == pytest.approx(1e-6 * RATE) and not any("since 1970" in note for note in far.notes)
 
 
 def test_words_that_are_no_time_are_named(tmp_path: Path) -> None:

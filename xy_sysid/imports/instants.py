@@ -17,9 +17,12 @@ from xy_sysid.imports.reading import Reading
 from xy_sysid.imports.sheet import Column
 from xy_sysid.samples.block import FloatArray
 
-CLOCK = re.compile(r"(?P<day>.*?\D)??(?:(?P<hours>\d+):)?(?P<minutes>\d+):(?P<seconds>\d+(?:[.,]\d+)?)\s*(?P<half>[AaPp][Mm])?")
+CLOCK = re.compile(
+    r"(?P<day>.*?[^\d:])??(?:(?P<hours>\d+):)?(?P<minutes>\d+):(?P<seconds>[0-5]?\d(?:[.,]\d+)?)(?::(?P<millis>\d{1,3}))?\s*(?P<half>[AaPp][Mm])?"
+)
 WITH_UNIT = re.compile(r"(?P<number>[-+]?[\d.,]+(?:[eE][-+]?\d+)?)\s*(?P<unit>[A-Za-zµμ]+)")
-EPOCHS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"))  # a clock that reads more than this counts no seconds since 1970
+FROM, UNTIL = 978307200.0, 4133980800.0  # s since 1970 of the years 2001 to 2100: a clock that reads such a time counts from then
+EXACT = 1e17  # numbers that are larger are instants of ns, which a double of seconds since 1970 does not hold
 BEGIN = datetime(1970, 1, 1, tzinfo=UTC)
 DAY = 86400.0
 ACT = "Give seconds, times like 12:00:00.001, or dates like 2026-03-01T12:00:00.001."
@@ -52,13 +55,13 @@ def stamps(path: Path, column: Column, reading: Reading, notes: list[str]) -> St
     unit = reading.unit("time") or column.unit or (known.unit if known is not None else "")
     largest = float(np.max(np.abs(column.values[np.isfinite(column.values)]), initial=0.0))
     if not unit:
-        unit = next((name for least, name in EPOCHS if largest > least), "s")
+        unit = next((name for name in ("ns", "us", "ms") if FROM <= largest * unit_of(name).scale < UNTIL), "s")
         if unit != "s":
             notes.append(f"the time {column.name!r} reads {largest:.4g}: it is taken as {unit} since 1970")
     _, found = to_si(column.values, unit, "time", notes)
     if found.quantity != "time":
         raise BadRecording(path, f"the unit {unit!r} of the time is none of time", "Give s, ms, us, ns, min or h with --unit time=...")
-    return Stamps(column.values, found.scale * (reading.scale("time") or 1.0), far=largest > EPOCHS[0][0])
+    return Stamps(column.values, found.scale * (reading.scale("time") or 1.0), far=largest > EXACT)
 
 
 def _of_words(path: Path, column: Column) -> tuple[FloatArray, str]:
@@ -102,6 +105,7 @@ def _clock(words: Sequence[str]) -> FloatArray:
         if parts["half"]:
             hours = hours % 12 + 12 * (parts["half"].lower() == "pm")
         found[k] = days * DAY + hours * 3600.0 + int(parts["minutes"]) * 60.0 + float(parts["seconds"].replace(",", "."))
+        found[k] += 1e-3 * float(parts["millis"] or 0)
         if k and ((parts["day"] or "") != before or found[k] < found[k - 1] - DAY / 2):
             days += 1
             found[k] += DAY
