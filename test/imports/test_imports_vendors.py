@@ -143,6 +143,21 @@ def test_arrays_of_a_json_log_are_found_by_their_path(tmp_path: Path) -> None:
         load(path)
 
 
+@pytest.mark.parametrize(
+    ("ending", "text", "says"),
+    [
+        ("json", f'{{"t": [1, {10**400}], "u": [1, 2]}}', "a whole number that is too large"),
+        ("csv", "Sampling time interval(ms),1\nTime,Analog 1,Analog 2\nms,Torque (%)\n0,1,2\n1,2,3\n", "row 2 names 3 signals, and row 3 2"),
+    ],
+)
+def test_a_damaged_export_is_refused_in_one_line(tmp_path: Path, ending: str, text: str, says: str) -> None:
+    """JSON with a number that no double holds; a Mitsubishi graph whose two rows of names differ in width."""
+    path = tmp_path / f"a.{ending}"
+    path.write_text(text, "utf-8")
+    with pytest.raises(BadRecording, match=says):
+        load(path)
+
+
 def test_input_and_output_in_two_files_are_joined_by_row_or_by_time(tmp_path: Path) -> None:
     """FILE:COLUMN names them; which way was taken is said; files of other lengths without a time are refused."""
     one, other = tmp_path / "u.csv", tmp_path / "y.csv"
