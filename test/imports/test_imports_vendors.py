@@ -158,6 +158,14 @@ def test_a_damaged_export_is_refused_in_one_line(tmp_path: Path, ending: str, te
         load(path)
 
 
+def test_a_twincat_scope_export_with_a_long_head_is_known(tmp_path: Path) -> None:
+    """The comments of many symbols may fill more than the first 4096 bytes."""
+    path = scope(tmp_path, comma=False)
+    head, found, rest = path.read_text("utf-8").partition("SymbolComment\t")
+    path.write_text(f"{head}{found}{'the current of a drive ' * 1000}{rest}", "utf-8")
+    assert load(path).input_unit == "V"
+
+
 def test_input_and_output_in_two_files_are_joined_by_row_or_by_time(tmp_path: Path) -> None:
     """FILE:COLUMN names them; which way was taken is said; files of other lengths without a time are refused."""
     one, other = tmp_path / "u.csv", tmp_path / "y.csv"
