@@ -72,6 +72,14 @@ def test_headers_in_any_case_and_spelling(tmp_path: Path, time: str, voltage: st
         ("torque_nm", "input", "", "Nm"),
         ("effort_Nm", "input", "", "Nm"),
         ("joint1_effort", "input", "joint1", ""),
+        ("Zeitstempel", "time", "", ""),
+        ("Uhrzeit", "time", "", ""),
+        ("Sollposition", "reference", "", ""),
+        ("Drehzahlsollwert", "reference", "", ""),
+        ("Istposition", "output", "", ""),
+        ("Posición", "output", "", ""),
+        ("Stellgröße", "input", "", ""),
+        ("Torque [Nm] (filtered)", "input", "", "Nm"),
     ],
 )
 def test_what_a_name_says(name: str, role: str, axis: str, unit: str) -> None:
@@ -243,6 +251,25 @@ def test_titles_and_a_row_of_units(tmp_path: Path) -> None:
     assert_the_axis(load(path))
 
 
+def test_columns_whose_names_are_there_twice_are_chosen_by_number(tmp_path: Path) -> None:
+    """The error says so."""
+    path = csv_of(tmp_path, {"time": T, "u": U, "y": Y, "u2": 0.0 * U, "y2": 0.0 * Y})
+    path.write_text(path.read_text().replace("u2,y2", "u,y"))
+    with pytest.raises(BadRecording, match=r"'u' is there twice.*choose columns by number with --map"):
+        load(path)
+    assert_the_axis(load(path, columns={"input": "2", "output": "3"}))
+    assert_the_axis(load(path, columns={"time": "1", "x.input": "2", "x.output": "3"}))
+
+
+def test_of_several_times_one_is_taken_and_none_is_an_axis(tmp_path: Path) -> None:
+    """A note says which; the times of voltage and position are no voltage and position of an axis called time."""
+    recording = load(csv_of(tmp_path, {"Time": T, "Timestamp": 2.0 * T, "u": U, "y": Y}))
+    assert_the_axis(recording)
+    assert any("'Time' is taken as the time, not 'Timestamp'; choose with --map" in note for note in recording.notes)
+    own = {"t": T, "time_voltage": T, "time_position": T, "x_voltage": U, "x_position": Y}
+    assert load(csv_of(tmp_path, own)).axes == ("x",)
+
+
 def test_what_may_be_either_is_asked(tmp_path: Path) -> None:
     """Two columns for one role: both are named, and the option that chooses; of voltage and current the voltage is taken, and said."""
     path = csv_of(tmp_path, {"time": T, "torque left motor": U, "torque motor left": U, "left position": Y})
@@ -273,6 +300,14 @@ def test_clocks_since_1970_are_understood(tmp_path: Path, unit: str) -> None:
         ("ft", "m", 0.3048, "position", False),
         ("counts", "counts", 1.0, "position", False),
         ("rpm", "rad/s", 2 * np.pi / 60, "velocity", False),
+        *((spelling, "rad/s", 2 * np.pi / 60, "velocity", False) for spelling in ("r/min", "U/min", "1/min", "min-1", "min^-1", "min⁻¹", "rev/min")),
+        ("krpm", "rad/s", 2000 * np.pi / 60, "velocity", False),
+        *((spelling, "rad/s", np.pi / 180, "velocity", False) for spelling in ("dps", "deg/s", "°/sec", "deg s^-1", "deg·s⁻¹")),
+        ("mm s⁻²", "m/s^2", 1e-3, "acceleration", False),
+        ("Nmm", "N m", 1e-3, "torque", False),
+        ("N-m", "N m", 1.0, "torque", False),
+        ("Arms", "A", 1.0, "current", False),
+        ("‰", "FS", 1e-3, "command", False),
         ("mm/s", "m/s", 1e-3, "velocity", False),
         ("m/s²", "m/s^2", 1.0, "acceleration", False),
         ("N·m", "N m", 1.0, "torque", False),
@@ -300,6 +335,14 @@ def test_units_that_are_guessed_or_unknown_are_said(tmp_path: Path) -> None:
     assert load(csv_of(tmp_path, {"time[min]": T / 60, "u": U, "y": Y})).sampling_rate == pytest.approx(RATE)
     with pytest.raises(BadRecording, match="'V' of the time is none of time"):
         load(csv_of(tmp_path, {"time[V]": T, "u": U, "y": Y}))
+
+
+def test_a_velocity_in_a_unit_that_is_not_known_is_no_position(tmp_path: Path) -> None:
+    """The name means a velocity: one line says what to give, and with that the file is read."""
+    path = csv_of(tmp_path, {"time": T, "u": U, "speed [knots]": Y})
+    with pytest.raises(BadRecording, match=r"the unit 'knots' of the velocity 'speed' is not known\. .* --unit output=rpm"):
+        load(path)
+    assert load(path, units={"output": "rpm"}).measured == "velocity"
 
 
 @pytest.mark.parametrize("kind", ["npz", "mat"])

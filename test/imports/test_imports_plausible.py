@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from pathlib import Path
 from typing import Any
@@ -65,6 +66,34 @@ def test_an_angle_that_wraps_is_unwrapped_and_that_is_said(tmp_path: Path) -> No
     assert f"leaps by a whole turn {turns} times" in said and "unwrapped" in said
     assert np.allclose(np.diff(found.position[:, 0]), np.diff(angle), atol=1e-9)
     assert not any("wraps" in note for note in load(csv_of(tmp_path, {"time": T, "x_voltage": U, "x_position[rad]": angle})).notes)
+
+
+def test_a_reference_is_unwrapped_by_itself(tmp_path: Path) -> None:
+    """It leaps a few samples before the output does; one that never leaps stays as it is."""
+    angle = 30.0 * T - np.pi
+    for reference, wrapped in ((angle + 0.1, True), (angle + 0.1, False)):
+        columns = {"time": T, "u": U, "y[rad]": np.angle(np.exp(1j * angle)), "r[rad]": np.angle(np.exp(1j * reference)) if wrapped else reference}
+        found = load(csv_of(tmp_path, columns))
+        assert found.reference is not None
+        np.testing.assert_allclose(found.reference - found.position, 0.1, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "turn", "says"),
+    [
+        ("y[counts]", 65536, "leaps by 65536 .* as a counter that wraps: unwrap it first"),
+        ("y[counts]", 4096, "leaps by 4096 .* as a counter that wraps: unwrap it first"),
+        ("y", 360, "leaps by 360 .* as an angle that wraps: give --unit output=deg"),
+    ],
+)
+def test_counts_and_degrees_that_wrap_are_said(tmp_path: Path, name: str, turn: int, says: str) -> None:
+    """By which leap, and how often; the same numbers without leaps say nothing, nor does an axis that moves rarely and fast."""
+    counts = np.rint(5.3 * turn * T / T[-1])
+    (said,) = [note for note in load(csv_of(tmp_path, {"time": T, "u": U, name: counts % turn})).notes if "wraps" in note]
+    assert re.search(says, said) and " 5 times" in said
+    fast = np.cumsum(np.where(np.arange(len(T)) % 300 < 20, float(turn), 0.0))
+    for same in (counts, fast):
+        assert not any("wraps" in note for note in load(csv_of(tmp_path, {"time": T, "u": U, name: same})).notes)
 
 
 @pytest.mark.parametrize(

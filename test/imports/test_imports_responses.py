@@ -50,6 +50,9 @@ def written(path: Path, head: str, columns: tuple[np.ndarray, ...], separator: s
         ("freq,mag,phase", (F, abs(H) * 1e-3, np.angle(H)), ("in Hz", "linear, as their slope", "in radians, by their size")),
         ("Frequency (Hz),Gain (dB),Phase (rad)", (F, 20 * np.log10(abs(H)), np.rad2deg(PHASE)), ("the header says rad", "in dB")),
         ("f_Hz,real,imag", (F, H.real, H.imag), ("real and imaginary",)),
+        ("freq_rad_s,real,imag", (2 * np.pi * F, H.real, H.imag), ("in rad/s",)),
+        ("Frequency [Rad/s],real,imag", (2 * np.pi * F, H.real, H.imag), ("in rad/s",)),
+        ("freq_kHz,real,imag", (1e-3 * F, H.real, H.imag), ("in Hz",)),
     ],
 )
 def test_hertz_decibels_and_degrees_are_detected_and_said(tmp_path: Path, head: str, columns: tuple[np.ndarray, ...], says: tuple[str, ...]) -> None:
@@ -59,6 +62,36 @@ def test_hertz_decibels_and_degrees_are_detected_and_said(tmp_path: Path, head: 
     assert np.allclose(found.frequency, F) and np.allclose(ratio, ratio[0], rtol=1e-6)
     for text in says:
         assert any(text in note for note in found.origin.notes), found.origin.notes
+
+
+@pytest.mark.parametrize(
+    ("head", "what", "unit"),
+    [("Frequency [furlong],|H|,Phase [deg]", "frequency", "Hz"), ("Frequency [Hz],|H|,Phase [mrad]", "phase", "deg")],
+)
+def test_a_response_in_a_unit_that_is_not_known_is_refused(tmp_path: Path, head: str, what: str, unit: str) -> None:
+    """One line says what is allowed and how to give it; then the file is read."""
+    path = written(tmp_path / "frf.csv", head, (F, abs(H), np.rad2deg(PHASE)))
+    with pytest.raises(xy.BadInput, match=f"the unit of the {what} is .*; allowed: {unit}.* Give it with --unit {what}={unit}"):
+        xy.frf_from(path)
+    assert np.allclose(xy.frf_from(path, units={what: unit}).frequency, F)
+
+
+@pytest.mark.parametrize(("name", "linear"), [("|H| [m/N]", True), ("Mag [m/s^2/V]", True), ("Gain (dB)", False), ("mag_dB", False)])
+def test_a_unit_of_the_magnitude_says_whether_it_is_in_decibels(tmp_path: Path, name: str, linear: bool) -> None:
+    """However well the other way would fit the phase; no number is negative here."""
+    decibels = 20 * np.log10(abs(H))
+    size = decibels - decibels.min() + 1.0 if linear else abs(H)
+    found = xy.frf_from(written(tmp_path / "frf.csv", f"freq,{name},Phase (deg)", (F, size, np.rad2deg(PHASE))))
+    assert np.allclose(abs(found.response), size if linear else 10 ** (size / 20))
+
+
+def test_keywords_say_of_a_file_what_it_does_not_say(tmp_path: Path) -> None:
+    """The averages behind a column of coherence; a name that is not known is refused."""
+    path = written(tmp_path / "frf.csv", "f_Hz,real,imag,coherence", (F, H.real, H.imag, np.full(F.size, 0.9)))
+    found = xy.frf_from(path, averages=11, sampling_rate=2000.0)
+    assert np.allclose(found.sigma, np.abs(H) * np.sqrt(0.1 / 0.9 / 10)) and found.sampling_rate == 2000.0
+    with pytest.raises(xy.BadInput, match="averages"):
+        xy.frf_from(path, avarages=11)
 
 
 def test_a_response_from_a_file_is_fitted_and_exported(tmp_path: Path) -> None:

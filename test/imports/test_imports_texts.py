@@ -54,6 +54,38 @@ def test_a_table_is_found_below_what_stands_above_it(tmp_path: Path, above: str,
     assert any("are no columns" in note for note in recording.notes) == (above.count("\n") > 2)
 
 
+def test_a_row_of_units_may_hold_one_that_is_not_known(tmp_path: Path) -> None:
+    """It stays the row below the names."""
+    recording = load(written(tmp_path, "time;voltage;position\ns;V;furlong\n", ";"))
+    assert_read(recording)
+    assert recording.output_unit == "furlong"
+
+
+@pytest.mark.parametrize("sign", ["#", "%", "//"])
+def test_remarks_in_a_table_are_left_out(tmp_path: Path, sign: str) -> None:
+    """However they begin; one above the table may hold the names. A row of units that begins with % is none."""
+    assert_read(load(written(tmp_path, f"{sign} made by hand, on bench 7\n{sign} time voltage position\n", " ")))
+    file = written(tmp_path, "time,voltage,position\n")
+    file.write_text(file.read_text("utf-8").replace("\n0.002,", f"\n{sign} the door was opened here\n0.002,"), "utf-8")
+    assert_read(load(file))
+    columns = load(written(tmp_path, "torque,time,angle\n%,s,rad\n"), columns={"input": "torque", "output": "angle"}, rate=RATE)
+    assert columns.input_unit == "FS"
+
+
+@pytest.mark.parametrize("below", ["Mean;3;2\nStd;0.1;0.2\n", "End of file", "***End***\n"])
+def test_rows_below_the_table_that_are_no_data_are_left_out(tmp_path: Path, below: str) -> None:
+    """A note says which; a word inside a row of data is still an error."""
+    file = written(tmp_path, "time;voltage;position\n", ";")
+    table = file.read_text("utf-8")
+    file.write_text(table + below, "utf-8")
+    recording = load(file)
+    assert_read(recording)
+    assert any(f"are no data ({below.splitlines()[0]!r}); they are left out" in note for note in recording.notes)
+    file.write_text(table + f"3.5;broken;2\n{below}", "utf-8")
+    with pytest.raises(BadRecording, match="'broken' is not a number"):
+        load(file)
+
+
 def test_what_numpy_writes_is_read(tmp_path: Path) -> None:
     """savetxt: blanks, and the names in a remark or nowhere."""
     table = np.column_stack((T, U, Y))
@@ -70,16 +102,35 @@ def test_what_numpy_writes_is_read(tmp_path: Path) -> None:
         lambda t: f"{1e3 * t:.1f}ms",
         lambda t: f"10:{int(t // 60) + 7:02d}:{t % 60:06.3f}",
         lambda t: f"{int(t // 60)}:{t % 60:06.3f}",
+        lambda t: f"10:00:{int(t):02d}:{round(1e3 * t) % 1000:03d}",
+        lambda t: f"10:00:{int(t):02d}:{round(1e3 * t) % 1000}",
         lambda t: f"23.11.2026 10:00:{t:06.3f}",
         lambda t: f"11/23/2026 1:00:{t:06.3f} PM",
         lambda t: f"{'24' if t >= 0.1 else '23'}.11.2026 {'00:00' if t >= 0.1 else '23:59'}:{(t + 59.9) % 60:06.3f}",
         lambda t: f"{'12' if t >= 0.1 else '11'}:{'00' if t >= 0.1 else '59'}:{(t + 59.9) % 60:06.3f} {'AM' if t >= 0.1 else 'PM'}",
     ],
-    ids=["seconds", "milliseconds", "clock", "minutes", "date", "afternoon", "midnight by date", "midnight by clock"],
+    ids=[
+        "seconds",
+        "milliseconds",
+        "clock",
+        "minutes",
+        "colon before ms",
+        "ms without zeros",
+        "date",
+        "afternoon",
+        "midnight by date",
+        "midnight by clock",
+    ],
 )
 def test_times_in_words_are_understood(tmp_path: Path, time: Callable[[float], object]) -> None:
     """With a unit, as a clock reads, after a date of any fashion, past midnight."""
     assert_read(load(written(tmp_path, "Time,voltage,position\n", time=time)))
+
+
+def test_a_clock_outside_of_this_century_counts_no_time_since_1970(tmp_path: Path) -> None:
+    """The year 2127 in us is none; such numbers are seconds, as nothing else is said."""
+    far = load(written(tmp_path, "time,voltage,position\n", time=lambda t: f"{5e15 + round(1e6 * t):.0f}"))
+    assert far.sampling_rate == pytest.approx(1e-6 * RATE) and not any("since 1970" in note for note in far.notes)
 
 
 def test_words_that_are_no_time_are_named(tmp_path: Path) -> None:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.io
 from helpers.cli_tools import cli, refused
 from helpers.real_data import data
 from helpers.table_making import RATE, T, U, Y
@@ -141,6 +143,29 @@ def test_arrays_of_a_json_log_are_found_by_their_path(tmp_path: Path) -> None:
         load(path)
 
 
+@pytest.mark.parametrize(
+    ("ending", "text", "says"),
+    [
+        ("json", f'{{"t": [1, {10**400}], "u": [1, 2]}}', "a whole number that is too large"),
+        ("csv", "Sampling time interval(ms),1\nTime,Analog 1,Analog 2\nms,Torque (%)\n0,1,2\n1,2,3\n", "row 2 names 3 signals, and row 3 2"),
+    ],
+)
+def test_a_damaged_export_is_refused_in_one_line(tmp_path: Path, ending: str, text: str, says: str) -> None:
+    """JSON with a number that no double holds; a Mitsubishi graph whose two rows of names differ in width."""
+    path = tmp_path / f"a.{ending}"
+    path.write_text(text, "utf-8")
+    with pytest.raises(BadRecording, match=says):
+        load(path)
+
+
+def test_a_twincat_scope_export_with_a_long_head_is_known(tmp_path: Path) -> None:
+    """The comments of many symbols may fill more than the first 4096 bytes."""
+    path = scope(tmp_path, comma=False)
+    head, found, rest = path.read_text("utf-8").partition("SymbolComment\t")
+    path.write_text(f"{head}{found}{'the current of a drive ' * 1000}{rest}", "utf-8")
+    assert load(path).input_unit == "V"
+
+
 def test_input_and_output_in_two_files_are_joined_by_row_or_by_time(tmp_path: Path) -> None:
     """FILE:COLUMN names them; which way was taken is said; files of other lengths without a time are refused."""
     one, other = tmp_path / "u.csv", tmp_path / "y.csv"
@@ -158,6 +183,49 @@ def test_input_and_output_in_two_files_are_joined_by_row_or_by_time(tmp_path: Pa
     by_time = load(one, columns={"input": "u.csv:motor", "output": "y.csv:angle"}, units={"output": "rad"})
     assert by_time.sampling_rate == RATE and np.array_equal(by_time.voltage[:, 0], U) and np.array_equal(by_time.position[:, 0], Y)
     assert any("joined by their times" in note for note in by_time.notes)
+
+
+@pytest.mark.parametrize(
+    "stamp",
+    [
+        lambda t: f"{1.8e18 + np.rint(1e9 * t):.0f}",
+        lambda t: f"{1.8e15 + np.rint(1e6 * t):.0f}",
+        lambda t: f"{1.8e12 + np.rint(1e3 * t):.0f}",
+        lambda t: f"{1.8e9 + t:.3f}",
+        lambda t: f"2026-03-01T12:00:{t:06.3f}",
+        lambda t: f"12:00:{t:06.3f}",
+    ],
+    ids=["ns", "us", "ms", "s", "date", "clock"],
+)
+def test_stamps_of_any_kind_join_two_files(tmp_path: Path, stamp: Callable[[float], str]) -> None:
+    """They count from one origin: a file that begins 5 samples later is not moved to the beginning of the other."""
+    for name, values, rows in (("u", U, slice(None)), ("y", Y, slice(5, None))):
+        lines = [f"{stamp(t)},{value!r}" for t, value in zip(T[rows].tolist(), values[rows].tolist(), strict=True)]
+        (tmp_path / f"{name}.csv").write_text("\n".join([f"time,{name}", *lines, ""]))
+    found = load(tmp_path / "u.csv", columns={"input": "u.csv:u", "output": "y.csv:y"})
+    assert found.sampling_rate == pytest.approx(RATE, rel=1e-3) and len(found) == len(T) - 5
+    assert np.array_equal(found.voltage[:, 0], U[5:]) and np.array_equal(found.position[:, 0], Y[5:])
+
+
+def test_a_time_that_was_said_is_the_clock_of_its_file(tmp_path: Path) -> None:
+    """The other file's is found by its name, and the two are joined by their times."""
+    twice = np.arange(2 * len(T)) / (2 * RATE)
+    for path, name, t, values in (("u.csv", "clk,motor", twice, np.repeat(U, 2)), ("y.csv", "time,angle", T, Y)):
+        np.savetxt(tmp_path / path, np.column_stack((t, values)), delimiter=",", header=name, comments="")
+    found = load(tmp_path / "u.csv", columns={"time": "u.csv:clk", "input": "u.csv:motor", "output": "y.csv:angle"})
+    assert found.sampling_rate == RATE and np.array_equal(found.voltage[:, 0], U) and np.array_equal(found.position[:, 0], Y)
+    assert any("joined by their times" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("kind", ["npz", "mat"])
+def test_arrays_may_have_stamps_since_1970(tmp_path: Path, kind: str) -> None:
+    """Of ns, as in a table; a note says so."""
+    content = {"t": np.rint(1.8e18 + 1e9 * T), "u": U, "y": Y}
+    path = tmp_path / f"a.{kind}"
+    np.savez(path, allow_pickle=False, **content) if kind == "npz" else scipy.io.savemat(path, content)
+    found = load(path)
+    assert found.sampling_rate == pytest.approx(RATE, rel=1e-3)
+    assert any("taken as ns since 1970" in note for note in found.notes)
 
 
 def test_both_files_may_be_given_as_recordings(tmp_path: Path) -> None:

@@ -17,11 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xy_sysid.errors import BadRecording
+from xy_sysid.imports import instants
 from xy_sysid.imports.foreign_units import MOTIONS, Unit, to_si
 from xy_sysid.imports.limits import MOST_COLUMNS, fits
 from xy_sysid.imports.reading import Reading
 from xy_sysid.imports.sheet import Column, Sheet
-from xy_sysid.imports.sheet_table import in_seconds, same_unit, scaled
+from xy_sysid.imports.sheet_table import same_unit, scaled
 from xy_sysid.imports.table import ONE_UNIT, Table, as_they_stand, axis_names, places_of
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import Recording
@@ -159,7 +160,7 @@ def _time(
     if time is None:
         notes += as_they_stand(fs, None)
         return None, fs
-    return in_seconds(path, time * (reading.scale("time") or 1.0), reading.unit("time") or _unit(arrays, TIME_UNITS, "s"), notes), fs
+    return instants.stamps(path, Column(name or "time", _unit(arrays, TIME_UNITS, ""), time), reading, notes).seconds(), fs
 
 
 def _si(side: tuple[str, FloatArray, str], path: Path, axes: tuple[str, ...], reading: Reading, notes: list[str]) -> tuple[FloatArray, Unit]:

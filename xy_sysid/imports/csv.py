@@ -36,7 +36,9 @@ def sheet(path: Path) -> Sheet:
     found = text_table(text, notes)
     if not found.names:
         raise BadRecording(path, "the file holds no rows", EXAMPLE)
-    rows = found.rows if text.endswith(("\n", "\r")) else _whole(found.rows, found.separator, len(found.names), notes)
+    rows = _without_words(found.rows, found.separator, notes)
+    if rows[-1:] == found.rows[-1:] and not text.endswith(("\n", "\r")):
+        rows = _whole(rows, found.separator, len(found.names), notes)
     columns, bad = _columns(path, rows, found.separator, found.names)
     return Sheet(path=path, columns=stamped(columns) if found.stamped else columns, notes=tuple(notes), bad=bad)
 
@@ -69,6 +71,21 @@ def _raw(path: Path) -> bytes:
             open_line = int(lengths[-1]) - 1
             parts.append(part)
     return b"".join(parts)
+
+
+def _without_words(rows: Rows, separator: str, notes: list[str]) -> Rows:
+    """The rows without the last ones that begin with a word where the first begins with a number: means, or the end of the file."""
+
+    def begins(row: tuple[int, str]) -> str:
+        return cells_of(row[1], separator)[0]
+
+    end = len(rows)
+    if rows and is_number(begins(rows[0]), separator):
+        while (first := begins(rows[end - 1])).lower() not in MISSING and not is_number(first, separator):
+            end -= 1
+    if end < len(rows):
+        notes.append(f"row {rows[end][0]} to {rows[-1][0]} are no data ({rows[end][1][:40]!r}); they are left out")
+    return rows[:end]
 
 
 def _whole(rows: Rows, separator: str, width: int, notes: list[str]) -> Rows:

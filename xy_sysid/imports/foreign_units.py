@@ -31,6 +31,7 @@ def _spellings(quantity: Quantity, name: str, scales: dict[str, float]) -> dict[
     return {spelling: Unit(name, scale, quantity) for spellings, scale in scales.items() for spelling in spellings.split()}
 
 
+TURN = 2 * np.pi
 LENGTHS = {"m meter metre meters metres": 1.0, "cm": 1e-2, "mm millimeter millimetre millimeters millimetres": 1e-3, "um micron microns": 1e-6}
 LENGTHS |= {"nm": 1e-9, "in inch inches": 0.0254, "ft foot feet": 0.3048, "km": 1e3}
 ANGLES = {
@@ -38,7 +39,7 @@ ANGLES = {
     "mrad": 1e-3,
     "urad": 1e-6,
     "deg degree degrees °": np.pi / 180,
-    "rev turn turns revolution revolutions": 2 * np.pi,
+    "rev turn turns revolution revolutions": TURN,
 }
 TIMES = {"s sec secs second seconds": 1.0, "ms msec millis millisecond milliseconds": 1e-3, "us usec micros microsecond microseconds": 1e-6}
 TIMES |= {"ns nsec nanos nanosecond nanoseconds": 1e-9, "min minute minutes": 60.0, "h hour hours": 3600.0}
@@ -47,11 +48,11 @@ POSITIONS = _spellings("position", "m", LENGTHS) | _spellings("position", "rad",
 KNOWN: dict[str, Unit] = {
     **_spellings("time", "s", TIMES),
     **_spellings("voltage", "V", {"V volt volts": 1.0, "mV": 1e-3, "kV": 1e3, "uV": 1e-6}),
-    **_spellings("current", "A", {"A amp amps ampere amperes": 1.0, "mA": 1e-3, "uA": 1e-6}),
+    **_spellings("current", "A", {"A amp amps ampere amperes Arms": 1.0, "mA": 1e-3, "uA": 1e-6}),
     **_spellings("force", "N", {"N newton newtons": 1.0, "mN": 1e-3, "kN": 1e3, "lbf": 4.4482216152605}),
-    **_spellings("torque", "N m", {"Nm": 1.0, "mNm": 1e-3, "Ncm": 1e-2, "kNm": 1e3}),
-    **_spellings("command", FULL_SCALE, {"FS 1 - pu norm normalised normalized duty": 1.0, "% percent": 0.01}),
-    **_spellings("velocity", "rad/s", {"rpm rev/min 1/min min^-1": 2 * np.pi / 60, "rps": 2 * np.pi}),
+    **_spellings("torque", "N m", {"Nm": 1.0, "mNm Nmm": 1e-3, "Ncm": 1e-2, "kNm": 1e3}),
+    **_spellings("command", FULL_SCALE, {"FS 1 - pu norm normalised normalized duty": 1.0, "% percent": 0.01, "‰ permille": 1e-3}),
+    **_spellings("velocity", "rad/s", {"rpm r/min U/min 1/min /min": TURN / 60, "krpm": TURN / 0.06, "rps r/s U/s": TURN, "dps": TURN / 360}),
     **_spellings("velocity", "m/s", {"mps": 1.0, "km/h kph": 1 / 3.6}),
     **_spellings("acceleration", "m/s^2", {"g": 9.80665}),
     **POSITIONS,
@@ -59,13 +60,15 @@ KNOWN: dict[str, Unit] = {
 FOLDED: dict[str, list[str]] = {}
 for _spelling in KNOWN:
     FOLDED.setdefault(_spelling.casefold(), []).append(_spelling)
+INVERSE = re.compile(r"[\s·*.]*(?<![A-Za-z])(?P<time>s|sec|min)\^?-(?P<power>[12])$")  # rad s^-1, min-1
 PER_TIME = re.compile(r"^(?P<of>.+?)/(?P<time>[a-zA-Z]+?)(?P<twice>\^?2|\*\*2|/s)?$")
 
 
 def unit_of(text: str) -> Unit:
     """What a unit means; "unknown" for one that is not in the table, which is carried as it is."""
-    plain = text.strip().replace("µ", "u").replace("μ", "u").replace("²", "^2")
-    key = re.sub(r"\s+|(?<=[A-Za-z])[·*.](?=[A-Za-z])", "", plain)
+    plain = text.strip().replace("µ", "u").replace("μ", "u").replace("²", "^2").replace("⁻", "^-").replace("¹", "1").replace("^-^", "^-")
+    plain = INVERSE.sub(lambda found: f"/{found['time']}{'^2' if found['power'] == '2' else ''}", plain)
+    key = re.sub(r"\s+|(?<=[A-Za-z])[·*.-](?=[A-Za-z])", "", plain)
     if key in KNOWN:
         return KNOWN[key]
     rate = PER_TIME.match(key)

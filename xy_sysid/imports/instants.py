@@ -1,30 +1,74 @@
-"""Instants that are written in words: dates, times of the day, and times with their unit."""
+"""A column that holds instants --> seconds: numbers in a unit or since 1970, dates, times of the day, and times with their unit."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from datetime import UTC, datetime
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
 
 from xy_sysid.errors import BadRecording
-from xy_sysid.imports.foreign_units import unit_of
+from xy_sysid.imports.foreign_units import to_si, unit_of
+from xy_sysid.imports.names import meaning
+from xy_sysid.imports.reading import Reading
 from xy_sysid.imports.sheet import Column
 from xy_sysid.samples.block import FloatArray
 
-CLOCK = re.compile(r"(?P<day>.*?\D)??(?:(?P<hours>\d+):)?(?P<minutes>\d+):(?P<seconds>\d+(?:[.,]\d+)?)\s*(?P<half>[AaPp][Mm])?")
+CLOCK = re.compile(
+    r"(?P<day>.*?[^\d:])??(?:(?P<hours>\d+):)?(?P<minutes>\d+):(?P<seconds>[0-5]?\d(?:[.,]\d+)?)(?::(?P<millis>\d{1,3}))?\s*(?P<half>[AaPp][Mm])?"
+)
 WITH_UNIT = re.compile(r"(?P<number>[-+]?[\d.,]+(?:[eE][-+]?\d+)?)\s*(?P<unit>[A-Za-zµμ]+)")
+FROM, UNTIL = 978307200.0, 4133980800.0  # s since 1970 of the years 2001 to 2100: a clock that reads such a time counts from then
+EXACT = 1e17  # numbers that are larger are instants of ns, which a double of seconds since 1970 does not hold
+BEGIN = datetime(1970, 1, 1, tzinfo=UTC)
 DAY = 86400.0
 ACT = "Give seconds, times like 12:00:00.001, or dates like 2026-03-01T12:00:00.001."
 
 
-def seconds(path: Path, column: Column) -> FloatArray:
-    """(n,) s from the first on; raises BadRecording that says which is none."""
-    for way in (_dates, _clock, _with_units):
+@dataclass(frozen=True, slots=True)
+class Stamps:
+    """Instants as they were written: values (n,) in a unit of ``scale`` s; far: they count from so long ago that doubles of seconds lose them."""
+
+    values: FloatArray
+    scale: float
+    far: bool
+
+    def after(self, other: Stamps) -> FloatArray:
+        """(n,) s after the first instant of the other."""
+        first = other.values[np.isfinite(other.values)][:1]
+        return np.asarray((self.values - (first[0] if first.size else 0.0) * (other.scale / self.scale)) * self.scale)
+
+    def seconds(self) -> FloatArray:
+        """(n,) s, from the first on if they count from long ago."""
+        return self.after(self) if self.far else self.values * self.scale
+
+
+def stamps(path: Path, column: Column, reading: Reading, notes: list[str]) -> Stamps:
+    """The instants of a column, by the unit that was given, its own, that of its name, or its size. Raises BadRecording for what is no time."""
+    if column.words:
+        values, unit = _of_words(path, column)
+        return Stamps(values, unit_of(unit).scale, far=True)
+    known = meaning(column.name, "")
+    unit = reading.unit("time") or column.unit or (known.unit if known is not None else "")
+    largest = float(np.max(np.abs(column.values[np.isfinite(column.values)]), initial=0.0))
+    if not unit:
+        unit = next((name for name in ("ns", "us", "ms") if FROM <= largest * unit_of(name).scale < UNTIL), "s")
+        if unit != "s":
+            notes.append(f"the time {column.name!r} reads {largest:.4g}: it is taken as {unit} since 1970")
+    _, found = to_si(column.values, unit, "time", notes)
+    if found.quantity != "time":
+        raise BadRecording(path, f"the unit {unit!r} of the time is none of time", "Give s, ms, us, ns, min or h with --unit time=...")
+    return Stamps(column.values, found.scale * (reading.scale("time") or 1.0), far=largest > EXACT)
+
+
+def _of_words(path: Path, column: Column) -> tuple[FloatArray, str]:
+    """Numbers (n,) and their unit; raises BadRecording that says which word is none."""
+    for way, unit in WAYS:
         try:
-            return way(column.words)
+            return way(column.words), unit
         except ValueError:
             continue
     number, text = next((k, text) for k, text in enumerate(column.words, 1) if not _told(text))
@@ -33,7 +77,7 @@ def seconds(path: Path, column: Column) -> FloatArray:
 
 def _told(text: str) -> bool:
     """By the first of the ways that it can be."""
-    for way in (_dates, _clock, _with_units):
+    for way, _ in WAYS:
         try:
             way([text])
         except ValueError:
@@ -43,13 +87,14 @@ def _told(text: str) -> bool:
 
 
 def _dates(words: Sequence[str]) -> FloatArray:
+    """Microseconds since 1970, which a double holds exactly."""
     found = [datetime.fromisoformat(text) for text in words]
     aware = [one if one.tzinfo else one.replace(tzinfo=UTC) for one in found]
-    return np.array([(one - aware[0]).total_seconds() for one in aware])
+    return np.array([(one - BEGIN) // timedelta(microseconds=1) for one in aware], np.float64)
 
 
 def _clock(words: Sequence[str]) -> FloatArray:
-    """Hours, minutes and seconds after any date: another date, or a clock that goes back by half a day and more, is the next day."""
+    """Seconds since midnight, of hours, minutes and seconds after a date: another date, or a clock that goes back by half a day, is the next day."""
     found = np.empty(len(words))
     days, before = 0, ""
     for k, text in enumerate(words):
@@ -60,11 +105,12 @@ def _clock(words: Sequence[str]) -> FloatArray:
         if parts["half"]:
             hours = hours % 12 + 12 * (parts["half"].lower() == "pm")
         found[k] = days * DAY + hours * 3600.0 + int(parts["minutes"]) * 60.0 + float(parts["seconds"].replace(",", "."))
+        found[k] += 1e-3 * float(parts["millis"] or 0)
         if k and ((parts["day"] or "") != before or found[k] < found[k - 1] - DAY / 2):
             days += 1
             found[k] += DAY
         before = parts["day"] or ""
-    return np.asarray(found - found[0])
+    return found
 
 
 def _with_units(words: Sequence[str]) -> FloatArray:
@@ -76,4 +122,7 @@ def _with_units(words: Sequence[str]) -> FloatArray:
         if parts is None or unit is None or unit.quantity != "time":
             raise ValueError(text)
         found.append(float(parts["number"].replace(",", ".")) * unit.scale)
-    return np.asarray(np.array(found) - found[0])
+    return np.array(found)
+
+
+WAYS: tuple[tuple[Callable[[Sequence[str]], FloatArray], str], ...] = ((_dates, "us"), (_clock, "s"), (_with_units, "s"))

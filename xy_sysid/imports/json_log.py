@@ -32,10 +32,13 @@ def sheet(path: Path) -> Sheet:
     except (ValueError, RecursionError) as error:
         raise BadRecording(path, f"not readable as JSON ({str(error)[:100]})", COPY) from None
     columns: list[Column] = []
-    for name, values, starts in _columns("", document, 0):
-        if len(columns) >= MOST_COLUMNS:
-            raise BadRecording(path, f"more than {MOST_COLUMNS} arrays", "Store the signals alone.")
-        columns.append(Column(name, "", values, starts=starts))
+    try:
+        for name, values, starts in _columns("", document, 0):
+            if len(columns) >= MOST_COLUMNS:
+                raise BadRecording(path, f"more than {MOST_COLUMNS} arrays", "Store the signals alone.")
+            columns.append(Column(name, "", values, starts=starts))
+    except OverflowError:
+        raise BadRecording(path, "a whole number that is too large for a sample", "Store the signals alone, as numbers up to 1e308.") from None
     scalars = {key: np.asarray(value) for key, value in document.items() if _is_number(value)} if isinstance(document, dict) else {}
     return Sheet(path=path, columns=tuple(columns), kind="array", fs=rate_of(scalars))
 

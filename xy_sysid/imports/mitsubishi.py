@@ -24,6 +24,9 @@ def sheet(path: Path) -> Sheet:
     if place is None or place + 1 >= len(lines):
         raise BadRecording(path, "an MR Configurator graph without a row of signals", "Export it again as CSV.")
     kinds, names = (lines[at].split(",") for at in (place, place + 1))
+    if len(kinds) != len(names):
+        problem = f"row {place + 1} names {len(kinds)} signals, and row {place + 2} {len(names)}"
+        raise BadRecording(path, problem, "Export it again as CSV.")
     found = csv.table_of(path, [(f"{at}", "") for at in range(len(names))], lines[place + 2 :], place + 3)
     columns = [Column("time", names[0], found[0].values)]
     for kind, name, column in zip(kinds[1:], names[1:], found[1:], strict=True):

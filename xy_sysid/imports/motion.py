@@ -6,19 +6,40 @@ import dataclasses
 
 import numpy as np
 
+from xy_sysid.imports.foreign_units import COUNTS
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.integral import detrended, integral
 from xy_sysid.samples.recording import Recording
 
 TURN, NEARLY = 2 * np.pi, 0.5  # rad; a step that is a turn within so much, where others are smaller than that, is an angle that wraps
+FEWEST = 8  # bits of the shortest counter that is told from small steps
 LOOK = 200_000  # samples from which the usual step is taken
 
 
-def wraps(angle: FloatArray) -> int:
-    """How often an angle (n,), rad, leaps by a whole turn from one sample to the next, as one that is kept within a turn."""
-    steps = np.abs(np.diff(angle))
+def wraps(values: FloatArray, turn: float = TURN) -> int:
+    """How often values (n,) leap by a whole turn from one sample to the next, as an angle (rad) that is kept within a turn."""
+    steps, nearly = np.abs(np.diff(values)), NEARLY * turn / TURN
     usual = float(np.quantile(steps[:LOOK], 0.9)) if steps.size else 0.0
-    return int(np.sum(np.abs(steps - TURN) < NEARLY)) if usual < NEARLY else 0
+    return int(np.sum(np.abs(steps - turn) < nearly)) if usual < nearly else 0
+
+
+def unwrapped(reference: FloatArray, position: FloatArray) -> FloatArray:
+    """A reference (n,), rad, that goes on where it leaps by a turn, beginning within half a turn of the position (n,); as it is if it never leaps."""
+    if not wraps(reference):
+        return reference
+    whole = np.unwrap(reference)
+    return np.asarray(whole - TURN * np.rint((whole[0] - position[0]) / TURN))
+
+
+def leaps(values: FloatArray, unit: str) -> str:
+    """What values (n,) that are no angle look like which wraps: a counter of 2^k counts, or degrees that are taken as m. Nothing otherwise."""
+    largest = float(np.max(np.abs(np.diff(values)), initial=0.0))
+    turn = 2.0 ** np.rint(np.log2(largest)) if unit == COUNTS and largest > 0 else 360.0 if unit == "m" else 0.0
+    count = wraps(values, turn) if turn >= 2**FEWEST and np.ptp(values) <= turn else 0  # a counter that wraps never leaves its range
+    if not count:
+        return ""
+    act = "give --unit output=deg if it is one of degrees" if unit == "m" else "unwrap it first"
+    return f"the output leaps by {turn:g} {count} times, as {'an angle' if unit == 'm' else 'a counter'} that wraps: {act}"
 
 
 def as_position(recording: Recording) -> Recording:

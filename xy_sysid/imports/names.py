@@ -6,6 +6,7 @@ Only the words in the tables below are known; whoever calls things otherwise say
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Container
 from dataclasses import dataclass
 
@@ -13,10 +14,10 @@ from xy_sysid.imports.foreign_units import DRIVES, FOLDED, KNOWN, MOTIONS, POSIT
 from xy_sysid.imports.sheet import spoken
 
 HEADER = re.compile(r"^\s*(?P<name>.*?)\s*(?:[\[\(]\s*(?P<unit>[^\]\)]*?)\s*[\]\)])?\s*$")
-TIME = "time t zeit timestamp stamp tijd temps tiempo tempo clock elapsed seconds"
+TIME = "time t zeit zeitstempel uhrzeit timestamp stamp tijd temps tiempo tempo clock elapsed seconds"
 INPUTS: tuple[tuple[Quantity, str], ...] = (
     ("voltage", "voltage volt volts spannung spanning u uin vin"),
-    ("command", "input inp command cmd control ctrl duty pwm drive stellgrösse stellgroesse"),
+    ("command", "input inp command cmd control ctrl duty pwm drive stellgrosse stellgroesse"),
     ("current", "current curr amps iq strom stroom"),
     ("torque", "torque moment drehmoment tau"),
     ("force", "force kraft kracht"),
@@ -37,6 +38,7 @@ FILLERS = (
 ANGLES = "angle winkel hoek theta phi omega drehzahl"
 LETTERS = ("t", "u", "y", "r", "q")  # roles of one letter give way to a word: y_position is of the axis y
 QUADRATURE = re.compile(r"(?<![a-zA-Z])[iI]_[qQ](?![a-zA-Z])")
+SOLL = re.compile(r"(?i)soll(wert)?")
 SYMBOLS = {"V": "input", "F": "input", "I": "input", "i": "input", "x": "output"}  # of physics: a role where nothing else has it
 RATE = re.compile(r"[\s_.\-](?P<of>(?!in[_/])[a-zA-Z]+)[_/]s(?P<twice>\^?2)?$")  # mm_s, deg/s, rad_s2; time_in_s is none
 LONG = 5  # letters from which a word counts inside a longer one: motorvoltage
@@ -58,11 +60,16 @@ class Meaning:
 
 
 def header(cell: str) -> tuple[str, str]:
-    """Name and unit of a header like ``x_position[mm]``; brackets around a mere number belong to the name."""
+    """Name and unit of a header like ``x_position[mm]``; brackets around a mere number, or a remark after a unit, belong to the name."""
     found = HEADER.match(cell)
     if found is None or not found["unit"] or (found["unit"].isdigit() and found["unit"] != "1"):
         return cell.strip(), ""
-    return found["name"].strip(), found["unit"]
+    name, unit = found["name"].strip(), found["unit"]
+    if unit_of(unit).quantity == "unknown":
+        inner, before = header(name)
+        if unit_of(before).quantity != "unknown" and before != "1":
+            return f"{inner} ({unit})", before
+    return name, unit
 
 
 def meaning(name: str, unit: str) -> Meaning | None:
@@ -102,9 +109,14 @@ def by_unit(name: str, unit: str) -> str:
     return SYMBOLS.get(name, "") if quantity == "unknown" else "input" if quantity in DRIVES else "output" if quantity in MOTIONS else ""
 
 
+def tells_time(name: str) -> bool:
+    """Whether a word of a name means the time; a single letter does not."""
+    return any(word in TIME.split() and word not in LETTERS for word in spoken(name))
+
+
 def _words(name: str) -> list[str]:
-    """Small, numbers apart; i_q, the current that turns a motor, is one."""
-    return [piece for word in spoken(QUADRATURE.sub("iq", name)) for piece in _pieces(word)]
+    """Small, numbers apart, and soll, what is asked for, apart; i_q, the current that turns a motor, is one."""
+    return [piece for word in spoken(SOLL.sub(r" \g<0> ", QUADRATURE.sub("iq", name))) for piece in _pieces(word)]
 
 
 def _pieces(word: str) -> list[str]:
@@ -114,7 +126,8 @@ def _pieces(word: str) -> list[str]:
 
 
 def _hits(word: str) -> list[tuple[str, Quantity, int]]:
-    """(role, quantity, rank) that a word may stand for."""
+    """(role, quantity, rank) that a word may stand for, with accents or without."""
+    word = "".join(sign for sign in unicodedata.normalize("NFKD", word) if not unicodedata.combining(sign))
     if word in TIME.split():
         return [("time", "time", 0)]
     if word in REFERENCE.split():

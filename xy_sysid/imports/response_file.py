@@ -7,6 +7,7 @@ magnitude is in dB, the phase does: of a minimum-phase system it is 90 degrees f
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ import numpy as np
 
 from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.imports import csv
+from xy_sysid.imports.foreign_units import unit_of
 from xy_sysid.imports.reading import Reading
 from xy_sysid.imports.sheet import Column, Sheet, spoken
 from xy_sysid.response.frf import FrequencyResponse
@@ -32,7 +34,10 @@ NAMES: Mapping[str, str] = {
     "coherence": "coherence coh gamma",
     "sigma": "sigma std deviation uncertainty",
 }
-RADIAN = ("rad/s", "1/s", "rad/sec")  # units of an angular frequency
+RADIANS, DEGREES = {"rad", "rads", "radian", "radians"}, {"deg", "degree", "degrees"}
+UNITS = re.compile(r"[^\W\d_]+|[%°]")  # of m/s^2/V they are m, s and V
+DECIBEL = re.compile(r"(?i)(?<![a-z])db(?![a-z])")
+HERTZ = {"hz": 1.0, "khz": 1e3, "MHz": 1e6, "mhz": 1e-3}
 TURN = 2 * np.pi
 JUMP = 0.5  # rad; a phase whose usual step from line to line is more, once turns are taken off, is no smooth one
 EXAMPLE = "Name them with --map frequency=1,magnitude=2,phase=3, or real= and imag= (see xy-sysid columns FILE)."
@@ -43,14 +48,17 @@ def sheet(path: Path) -> Sheet:
     return csv.sheet(path)
 
 
-def responses(path: Path, sheet: Sheet, reading: Reading) -> dict[str, FrequencyResponse]:
-    """The response of each axis: of one, x, if the file names none. Raises BadRecording or BadInput that say what is missing."""
+def responses(path: Path, sheet: Sheet, reading: Reading, known: Mapping[str, Any] | None = None) -> dict[str, FrequencyResponse]:
+    """The response of each axis: of one, x, if the file names none. known: fields of ``Known`` that the file does not say.
+
+    Raises BadRecording or BadInput that say what is missing.
+    """
     columns = {role: column for role in NAMES if (column := column_of(sheet, role, reading)) is not None}
     _complete(path, sheet, columns)
     axes = next((column for column in sheet.columns if column.words and spoken(column.name) == ("axis",)), None)
     words = np.array(axes.words if axes is not None else ["x"] * len(columns["frequency"].values))
     names = dict.fromkeys(words.tolist())
-    found = {name: _response(columns, words == name, name, reading) for name in names}
+    found = {name: _response(columns, words == name, name, reading, known or {}) for name in names}
     return found if reading.axes is None else {name: found[name] for name in _chosen(reading.axes, found)}
 
 
@@ -68,14 +76,14 @@ def frf_from(
     source:   a file, or (m,) frequencies in Hz with ``response``, (m,) complex
     axis:     its name, of a file of several the one to take; units: {"input": "V", "output": "rad"}, of a file also {"phase": "deg"}
     columns:  of a file, as ``--map`` says them: {"frequency": "1", "magnitude": "2", "phase": "3"}
-    known:    of arrays: sigma, (m,) standard deviation of the complex error; coherence, (m,), with its averages; sampling_rate, Hz
+    known:    sigma, (m,) standard deviation of the complex error; coherence, (m,), with its averages; sampling_rate, Hz
     What was understood is in ``origin.notes``. Raises BadInput or BadRecording.
     """
+    names = [field.name for field in dataclasses.fields(Known)]
+    for name in known:
+        if name not in names:
+            raise unknown_name(name, names, "frf_from")
     if not isinstance(source, str | Path):
-        names = [field.name for field in dataclasses.fields(Known)]
-        for name in known:
-            if name not in names:
-                raise unknown_name(name, names, "frf_from")
         told = units or {}
         return given_response(source, response, Known(**known), (told.get("input", "in"), told.get("output", "out")), Origin(axis=axis or ""))
     from xy_sysid.imports.registry import format_of, sheet_of
@@ -85,7 +93,7 @@ def frf_from(
         content = sheet_of(path, format_of(path))
     except OSError as error:
         raise BadRecording(path, f"cannot be read ({error.strerror or error})", "Check the path and the permissions.") from None
-    found = responses(path, content, Reading(columns=columns or {}, units=units or {}, axes=None if axis is None else (axis,)))
+    found = responses(path, content, Reading(columns=columns or {}, units=units or {}, axes=None if axis is None else (axis,)), known)
     if len(found) > 1:
         raise BadInput("frequency response", f"of {len(found)} axes", "one axis", f"Choose one with axis=: {', '.join(found)}.")
     return next(iter(found.values()))
@@ -117,7 +125,7 @@ def _chosen(axes: Any, found: Mapping[str, FrequencyResponse]) -> list[str]:
     return list(axes)
 
 
-def _response(columns: Mapping[str, Column], rows: Any, axis: str, reading: Reading) -> FrequencyResponse:
+def _response(columns: Mapping[str, Column], rows: Any, axis: str, reading: Reading, given: Mapping[str, Any]) -> FrequencyResponse:
     values = {role: column.values[rows] for role, column in columns.items()}
     notes: list[str] = []
     frequency = _hertz(columns["frequency"], values["frequency"], reading, notes)
@@ -128,49 +136,57 @@ def _response(columns: Mapping[str, Column], rows: Any, axis: str, reading: Read
         phase = _radians(columns["phase"], values["phase"], reading, notes)
         size = _linear(columns["magnitude"], (frequency, values["magnitude"], phase), reading, notes)
         response = size * np.exp(1j * phase)
-    known = Known(sigma=values.get("sigma"), coherence=values.get("coherence"), sampling_rate=reading.rate)
+    known = dataclasses.replace(Known(sigma=values.get("sigma"), coherence=values.get("coherence"), sampling_rate=reading.rate), **given)
     units = reading.unit("input", axis) or "in", reading.unit("output", axis) or "out"
     return given_response(frequency, response, known, units, Origin(axis=axis, notes=tuple(notes)))
 
 
 def _hertz(column: Column, values: FloatArray, reading: Reading, notes: list[str]) -> FloatArray:
-    said = reading.units.get("frequency") or column.unit
-    angular = said.replace(" ", "") in RADIAN if said else spoken(column.name)[0] in ("omega", "w")
+    last = re.split(r"[\W_]+", column.name)[-1]
+    said = reading.units.get("frequency") or column.unit or (last if last.lower() in HERTZ else "")
+    words = spoken(said or column.name)
+    angular = bool(RADIANS & set(words)) or said == "1/s" or (not said and words[0] in ("omega", "w"))
+    scale = 1.0 / TURN if angular else HERTZ.get(said, HERTZ.get(said.lower())) if said else 1.0
+    if scale is None:
+        raise _unknown("frequency", said, "Hz, kHz, MHz or rad/s")
     notes.append(f"frequencies are in {'rad/s' if angular else 'Hz'}{'' if said else ', as nothing else is said'}")
-    scale = {"khz": 1e3, "mhz": 1e6 if said == "MHz" else 1e-3}.get((said or "").lower(), 1.0)
-    return values / TURN if angular else values * scale
+    return values * scale
 
 
 def _radians(column: Column, values: FloatArray, reading: Reading, notes: list[str]) -> FloatArray:
     """Phases in rad. A header of rad is not believed where the phase would leap by turns from line to line."""
     told = reading.units.get("phase", "")
-    words = {*spoken(column.name), *spoken(column.unit)}
-    degrees = bool(words & {"deg", "degree", "degrees"}) or "°" in column.name + column.unit
-    radians = bool(words & {"rad", "radian", "radians"})
+    said = told or column.unit
+    words = {*spoken(said), *(() if told else spoken(column.name))}
+    degrees, radians = bool(words & DEGREES) or "°" in (said or column.name), bool(words & RADIANS)
+    if not degrees and not radians and (told or unit_of(said).quantity != "unknown"):  # brackets may hold a remark: Phase (B-A)
+        raise _unknown("phase", said, "deg or rad")
     finite = values[np.isfinite(values)]
     within = float(np.max(np.abs(finite), initial=0.0)) <= TURN
     smooth = float(np.median(np.abs(np.angle(np.exp(1j * np.diff(finite)))))) < JUMP if finite.size > 1 else True
-    if told:
-        degrees = told.lower() in ("deg", "degree", "degrees", "°")
-        why = ""
-    elif radians and not within and not smooth:
+    why = ""
+    if not told and radians and not within and not smooth:
         degrees, why = True, ": the header says rad, and in rad the phase would leap by turns from line to line (--unit phase=rad overrides)"
     elif not degrees and not radians:
         degrees, why = not within, ", by their size"
-    else:
-        why = ""
     notes.append(f"phases are in {'degrees' if degrees else 'radians'}{why}")
     return np.deg2rad(values) if degrees else values
+
+
+def _unknown(what: str, said: str, allowed: str) -> BadInput:
+    return BadInput(f"the unit of the {what}", repr(said), allowed, f"Give it with --unit {what}={allowed.split()[0].rstrip(',')}.")
 
 
 def _linear(column: Column, lines: tuple[FloatArray, FloatArray, FloatArray], reading: Reading, notes: list[str]) -> FloatArray:
     """Magnitudes as they are, from dB where they are in dB. lines: frequency Hz, magnitude, phase rad."""
     frequency, values, phase = lines
-    told, words = reading.units.get("magnitude", ""), {*spoken(column.name), *spoken(column.unit)}
-    if told or "db" in words:
+    told, units = reading.units.get("magnitude", ""), UNITS.findall(column.unit)
+    if told or DECIBEL.search(f"{column.name} {column.unit}"):
         decibels, why = (told.lower() == "db" if told else True), ""
     elif bool(np.any(values[np.isfinite(values)] < 0)):
         decibels, why = True, ", as some are negative"
+    elif units and all(unit_of(one).quantity != "unknown" for one in units):
+        decibels, why = False, f", in {column.unit}"
     else:
         decibels, why = _slope_says_decibels(frequency, values, phase), ", as their slope fits the phase then"
     notes.append(f"magnitudes are {'in dB' if decibels else 'linear'}{why}")

@@ -10,7 +10,7 @@ from collections.abc import Container, Mapping
 from dataclasses import dataclass
 
 from xy_sysid.errors import BadRecording
-from xy_sysid.imports.names import Meaning, by_unit, meaning
+from xy_sysid.imports.names import Meaning, by_unit, meaning, tells_time
 from xy_sysid.imports.reading import OF_AN_AXIS, Reading
 from xy_sysid.imports.sheet import Column, Sheet, spoken
 from xy_sysid.samples.recording import SLOWEST
@@ -50,7 +50,7 @@ def assigned(sheet: Sheet, reading: Reading, notes: list[str]) -> Roles:
     found, guessed = _sides(sheet, reading, said, meanings, notes)
     pairs = _named(sheet, found, notes)
     own = any(column.clock is not None for column in pairs["output"].values())  # then no other column needs to be the time
-    time, by_name = (said.get("time"), False) if own else _time(sheet, said, meanings)
+    time, by_name = (said.get("time"), False) if own else _time(sheet, said, meanings, notes)
     counter = said.get("seq") or next((sheet.usable(column) for column in sheet.columns if column.name == "seq"), None)
     if not own and time is None and counter is None and sheet.fs is None and reading.rate is None:
         taken = {column.name for columns in pairs.values() for column in columns.values()}
@@ -74,7 +74,7 @@ def _sides(sheet: Sheet, reading: Reading, said: Found, meanings: Mapping[str, M
         given = {what.rpartition(".")[0]: column for what, column in said.items() if what.endswith(f".{role}")}
         if role in reading.columns:
             given |= _of_any_axis(sheet, reading.columns[role])
-        found[role] = given or plain.get(role, {})
+        found[role] = given or {axis: sheet.usable(column) for axis, column in plain.get(role, {}).items()}
     if not _paired(found):
         for role in OF_AN_AXIS:
             if not any(what == role or what.endswith(f".{role}") for what in reading.columns):
@@ -86,15 +86,19 @@ def _sides(sheet: Sheet, reading: Reading, said: Found, meanings: Mapping[str, M
     return found, guessed
 
 
-def _time(sheet: Sheet, said: Found, meanings: Mapping[str, Meaning]) -> tuple[Column | None, bool]:
+def _time(sheet: Sheet, said: Found, meanings: Mapping[str, Meaning], notes: list[str]) -> tuple[Column | None, bool]:
     """The column of instants, and whether its name had to be understood."""
     if "time" in said:
         return said["time"], False
+    clocks = [column for column in sheet.columns if column.name in meanings and meanings[column.name].role == "time"]
     plain = next((column for column in sheet.columns if column.name in ("time", "t")), None)
-    if plain is not None:
-        return sheet.usable(plain), False
-    clock = next((column for column in sheet.columns if column.name in meanings and meanings[column.name].role == "time"), None)
-    return (None, False) if clock is None else (sheet.usable(clock), True)
+    if plain is None and not clocks:
+        return None, False
+    taken = plain or clocks[0]
+    others = [repr(column.name) for column in clocks if column is not taken]
+    if others:
+        notes.append(f"{taken.name!r} is taken as the time, not {', '.join(others)}; choose with --map time=...")
+    return sheet.usable(taken), plain is None
 
 
 def _by_steps(sheet: Sheet, known: Container[str], notes: list[str]) -> Column | None:
@@ -125,8 +129,8 @@ def _ending(sheet: Sheet, ending: str) -> Found:
     found: Found = {}
     for column in sheet.columns:
         axis, _, last = column.name.rpartition("_")
-        if last == ending and (axis or column.name == ending):
-            found.setdefault(axis or "x", sheet.usable(column))
+        if last == ending and (axis or column.name == ending) and not tells_time(axis):
+            found.setdefault(axis or "x", column)
     return found
 
 
@@ -135,7 +139,7 @@ def _of_any_axis(sheet: Sheet, name: str) -> Found:
     if name not in [column.name for column in sheet.columns]:
         columns = _ending(sheet, name)
         if columns:
-            return columns
+            return {axis: sheet.usable(column) for axis, column in columns.items()}
     return {"": sheet.find(name)}
 
 
@@ -156,11 +160,11 @@ def _by_words(sheet: Sheet, meanings: Mapping[str, Meaning], role: str, notes: l
     for axis, columns in offers.items():
         least = min(rank for rank, _ in columns)
         best = [column for rank, column in columns if rank == least]
+        found[axis] = sheet.usable(best[0])
         if len(best) > 1 and role != "reference":
             names = " and ".join(repr(column.name) for column in best)
             what = f"{axis}.{role}" if axis else role
             raise BadRecording(sheet.path, f"{names} may both be the {role}", f"Choose one with --map {what}={best[0].name!r}.")
-        found[axis] = sheet.usable(best[0])
         others = [column.name for rank, column in columns if rank > least]
         if others and role != "reference":
             notes.append(f"{best[0].name!r} is taken as the {role}, not {', '.join(map(repr, others))}; choose with --map")

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from xy_sysid.errors import BadRecording
+from xy_sysid.imports.instants import Stamps, stamps
 from xy_sysid.imports.names import meaning
 from xy_sysid.imports.reading import Reading
 from xy_sysid.imports.registry import BAG, format_of, sheet_of
@@ -28,18 +29,23 @@ def of_several_files(path: Path, reading: Reading, notes: list[str]) -> tuple[Sh
     sheets = {file: sheet_of(file, format_of(file)) for file in dict.fromkeys([path, *(file for file, _ in named.values())]) if _is_table(file)}
     chosen = {what: named.get(what, (path, column)) for what, column in reading.columns.items()}
     used = dict.fromkeys(file for file, _ in chosen.values())
-    clocks = {file: _clock(sheets[file], reading) for file in used} if "time" not in reading.columns and reading.rate is None else {}
-    by_time = bool(clocks) and all(clock is not None for clock in clocks.values())
+    time = chosen.get("time")
+    joined = dict.fromkeys(file for what, (file, _) in chosen.items() if what != "time")
+    by_row = reading.rate is not None or (time is not None and (time[0] not in joined or len(joined) < 2))
+    said = {time[0]: time[1]} if time is not None else {}
+    clocks = None if by_row else _on_one_clock({file: _stamps(sheets[file], said.get(file, ""), reading) for file in joined})
+    if clocks is not None:
+        chosen.pop("time", None)
     columns = [
-        replace(sheets[file].find(name), name=f"{what} in {file.name}", clock=clocks[file] if by_time else None)
+        replace(sheets[file].find(name), name=f"{what} in {file.name}", clock=None if clocks is None else clocks[file])
         for what, (file, name) in chosen.items()
     ]
     files = " and ".join(file.name for file in used)
     rows = {file.name: len(sheets[file].find(name).values) for file, name in chosen.values()}
-    if not by_time and len(set(rows.values())) > 1:
+    if clocks is None and len(set(rows.values())) > 1:
         counts = ", ".join(f"{name} {count}" for name, count in rows.items())
         raise BadRecording(path, f"the files have different numbers of rows ({counts}) and not all have a time", "Cut them to the same samples.")
-    notes.append(f"{files} are joined {'by their times' if by_time else 'row by row'}")
+    notes.append(f"{files} are joined {'row by row' if clocks is None else 'by their times'}")
     rate = next((sheets[file].fs for file in used if sheets[file].fs is not None), None)
     told = dict(zip(chosen, (column.name for column in columns), strict=True))
     return Sheet(path=path, columns=tuple(columns), fs=rate), dataclasses.replace(reading, columns=told)
@@ -68,13 +74,21 @@ def _is_table(path: Path) -> bool:
     return format_of(path) is not BAG
 
 
-def _clock(sheet: Sheet, reading: Reading) -> FloatArray | None:
-    """The instants of a file that has a column for them, in s."""
-    from xy_sysid.imports.sheet_table import in_seconds
-
+def _stamps(sheet: Sheet, time: str, reading: Reading) -> Stamps | None:
+    """The instants of a file that has a column for them, or whose column ``time`` they are said to be."""
+    if time:
+        return stamps(sheet.path, sheet.find(time), reading, [])
     for column in sheet.columns:
         known = meaning(column.name, column.unit)
-        if known is not None and known.role == "time" and not column.words and np.all(np.isfinite(column.values)):
-            unit = reading.unit("time") or column.unit or known.unit or "s"
-            return np.asarray(in_seconds(sheet.path, column.values * (reading.scale("time") or 1.0), unit, []))
+        if known is not None and known.role == "time" and (column.words or np.all(np.isfinite(column.values))):
+            return stamps(sheet.path, column, reading, [])
     return None
+
+
+def _on_one_clock(found: Mapping[Path, Stamps | None]) -> dict[Path, FloatArray] | None:
+    """The instants of each file in s from one origin; None unless all have some."""
+    told = {file: one for file, one in found.items() if one is not None}
+    if len(told) < len(found) or not told:
+        return None
+    first = next(iter(told.values()))
+    return {file: one.after(first) if any(each.far for each in told.values()) else one.seconds() for file, one in told.items()}

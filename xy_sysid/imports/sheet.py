@@ -17,6 +17,7 @@ from xy_sysid.samples.block import FloatArray
 WORD = re.compile(r"[^\W_]+")
 CAMEL = re.compile(r"(?<=[a-zà-ÿ0-9])(?=[A-ZÀ-Þ][a-zà-ÿ])|(?<=[a-zà-ÿ])(?=[A-ZÀ-Þ])")
 PART = re.compile(r"\[(\d{1,9})\]")
+TWICE = "Give every column its own name, or choose columns by number with --map, 1 for the first."
 MANY = 12  # names said in one line
 EVEN = 0.01  # of the step; a column whose steps differ by less is a clock
 
@@ -74,7 +75,7 @@ class Sheet:
         for same in (lambda one: one == name, lambda one: one.casefold() == name.casefold(), lambda one: spoken(one) == spoken(name) != ()):
             found = [column for column in self.columns if same(column.name) or (column.full and same(column.full))]
             if len(found) > 1:
-                raise BadRecording(self.path, f"the {self.kind} {name!r} is there twice", "Give every column its own name.")
+                raise BadRecording(self.path, f"the {self.kind} {name!r} is there twice", TWICE)
             if found:
                 return self.usable(found[0])
         part = self._part(name)
@@ -82,7 +83,7 @@ class Sheet:
             return part
         number = name.removeprefix("#")
         if number.isascii() and number.isdigit() and 1 <= int(number[:9]) <= len(self.columns):
-            return self.usable(self.columns[int(number) - 1])
+            return self._numeric(self.columns[int(number) - 1])
         raise BadRecording(self.path, f"no {self.kind} {name!r}; {self.names()}", "See xy-sysid columns FILE.")
 
     def _part(self, name: str) -> Column | None:
@@ -96,11 +97,14 @@ class Sheet:
         return replace(whole, name=name, values=whole.values[rows], words=whole.words[rows], starts=())
 
     def usable(self, column: Column) -> Column:
-        """The column; raises BadRecording if it holds something that is not a number."""
+        """The column; raises BadRecording if it holds something that is not a number, or if another has its name."""
+        if sum(other.name == column.name for other in self.columns) > 1:
+            raise BadRecording(self.path, f"row 1: the {self.kind} {column.name!r} is there twice", TWICE)
+        return self._numeric(column)
+
+    def _numeric(self, column: Column) -> Column:
         if column.name in self.bad:
             raise BadRecording(self.path, self.bad[column.name], "Correct or delete that row, or choose another column.")
-        if sum(other.name == column.name for other in self.columns) > 1:
-            raise BadRecording(self.path, f"row 1: the {self.kind} {column.name!r} is there twice", "Give every column its own name.")
         return column
 
 

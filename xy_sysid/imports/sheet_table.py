@@ -19,7 +19,6 @@ from xy_sysid.imports.sheet import Column, Sheet, spoken
 from xy_sysid.imports.table import ONE_UNIT, Table, as_they_stand, places_of
 from xy_sysid.samples.block import FloatArray
 
-EPOCHS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"))  # a clock that reads more than this counts no seconds since 1970
 MEASURED = {"measured", "meas", "actual", "act", "feedback", "fb", "ist"}  # words of an input that was read, not commanded
 JOINTS = 64  # more names than that are no joints
 
@@ -90,29 +89,7 @@ def _time(sheet: Sheet, roles: Roles, reading: Reading, notes: list[str]) -> tup
             raise BadRecording(sheet.path, f"no time {sheet.kind}; {sheet.names()}", "Name it with --map time=..., or give --rate in Hz.")
         notes += as_they_stand(sheet.fs, None)
         return None, sheet.fs
-    values, unit = roles.time.values, reading.unit("time") or roles.time.unit
-    if roles.time.words:
-        return instants.seconds(sheet.path, roles.time), sheet.fs
-    if not unit:
-        known = meaning(roles.time.name, "")
-        unit = "" if known is None else known.unit
-    largest = float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))
-    if not unit:
-        unit = next((name for least, name in EPOCHS if largest > least), "s")
-        if unit != "s":
-            notes.append(f"the time {roles.time.name!r} reads {largest:.4g}: it is taken as {unit} since 1970")
-    seconds = in_seconds(sheet.path, values * (reading.scale("time") or 1.0), unit, notes)
-    if largest > EPOCHS[0][0]:  # a clock of ns since 1970 keeps them only as long as it is not a double of seconds
-        seconds = (values - values[np.isfinite(values)][0]) * unit_of(unit).scale
-    return seconds, sheet.fs
-
-
-def in_seconds(path: Path, values: FloatArray, unit: str, notes: list[str]) -> FloatArray:
-    """Instants in s; raises BadRecording for a unit that is none of time."""
-    seconds, found = to_si(values, unit, "time", notes)
-    if found.quantity != "time":
-        raise BadRecording(path, f"the unit {unit!r} of the time is none of time", "Give s, ms, us, ns, min or h with --unit time=...")
-    return seconds
+    return instants.stamps(sheet.path, roles.time, reading, notes).seconds(), sheet.fs
 
 
 def _values(sheet: Sheet, role: str, columns: Found, axes: tuple[str, ...], reading: Reading, notes: list[str]) -> tuple[FloatArray, Unit]:
@@ -126,6 +103,10 @@ def _values(sheet: Sheet, role: str, columns: Found, axes: tuple[str, ...], read
         if column.words:
             raise BadRecording(sheet.path, f"the {sheet.kind} {column.name!r} holds words ({column.words[0][:20]!r})", "Choose one of numbers.")
         text = reading.unit(role, axis) or column.unit or _usual(column, role)
+        known = meaning(column.name, "")
+        if role == "output" and known is not None and known.quantity in MOTIONS[1:] and unit_of(text).quantity == "unknown":
+            problem = f"the unit {text!r} of the {known.quantity} {column.name!r} is not known"
+            raise BadRecording(sheet.path, problem, "Give one that is, for example --unit output=rpm.")
         scale = reading.scale(role, axis)
         told: list[str] = []
         values, text = scaled(column.values, text, scale, f"the {role} of {axis}", told)

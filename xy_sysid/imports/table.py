@@ -13,7 +13,7 @@ from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.imports.clock import disagreements
 from xy_sysid.imports.even import even
 from xy_sysid.imports.foreign_units import Quantity
-from xy_sysid.imports.motion import wraps
+from xy_sysid.imports.motion import leaps, unwrapped, wraps
 from xy_sysid.imports.paired_streams import LARGEST, cut, hollow, sane
 from xy_sysid.imports.reading import Reading
 from xy_sysid.samples.block import FloatArray
@@ -136,16 +136,18 @@ def _finite(path: Path, table: Table, columns: list[int], time: FloatArray, note
 
 def _unwrapped(table: Table, rows: _Rows, notes: list[str]) -> _Rows:
     """An angle that is kept within a turn goes on where it leaps by one: between two samples of it nothing could be interpolated."""
-    if table.output_unit != "rad" or table.measured != "position":
+    if table.measured != "position":
+        return rows
+    if table.output_unit != "rad":
+        notes += dict.fromkeys(note for column in rows.position.T if (note := leaps(column, table.output_unit)))
         return rows
     turns = [wraps(column) for column in rows.position.T]
-    if not any(turns):
-        return rows
-    notes.append(f"the output leaps by a whole turn {sum(turns)} times, as an angle that wraps; it is unwrapped")
+    if any(turns):
+        notes.append(f"the output leaps by a whole turn {sum(turns)} times, as an angle that wraps; it is unwrapped")
     position = np.column_stack([np.unwrap(column) if count else column for column, count in zip(rows.position.T, turns, strict=True)])
     reference = rows.reference
     if reference is not None:
-        reference = reference + position - rows.position
+        reference = np.column_stack([unwrapped(one, column) for one, column in zip(reference.T, position.T, strict=True)])
     return replace(rows, position=position, reference=reference)
 
 

@@ -19,6 +19,7 @@ SEPARATORS = (";", "\t", ",", BLANKS)  # the first of those that part rows equal
 PROBES = 7  # rows, spread over the file, that show how it is written
 LOOK = 200  # rows among which the table begins
 STEADY = 20  # rows that look alike: there it has begun
+REMARKS = ("#", "%", "//")  # signs with which a line begins that is no row
 WORD = re.compile(r'"[^"]*"|\S+')
 BRACKETS = "[](){}"
 Rows = list[tuple[int, str]]
@@ -45,9 +46,9 @@ def text_table(text: str, notes: list[str]) -> TextTable:
     if not all(map(str.strip, lines)):
         rows = [row for row in rows if row[1].strip()]
     remarks: Rows = []
-    if "#" in text:
-        remarks = [(number, line.lstrip().lstrip("#").strip()) for number, line in rows if line.lstrip().startswith("#")]
-        rows = [row for row in rows if not row[1].lstrip().startswith("#")]
+    if any(sign in text for sign in REMARKS):
+        remarks = [(number, line.strip().lstrip("#%/").strip()) for number, line in rows if _is_remark(line)]
+        rows = [row for row in rows if not _is_remark(row[1])]
     if not rows:
         return TextTable(",", [], [])
     separator = _separator(rows)
@@ -157,10 +158,16 @@ def _with_units(names: Names, rows: Rows, separator: str) -> tuple[Names, Rows]:
     return [(name, unit or cell) for (name, unit), cell in zip(names, cells, strict=True)], rows[1:]
 
 
+def _is_remark(line: str) -> bool:
+    """Whether it begins as one; a row of units may begin with %."""
+    return line.lstrip().startswith(REMARKS) and any(unit_of(cell).quantity == "unknown" for cell in re.split(r"[\s;,]+", line.strip()))
+
+
 def _are_units(cells: Sequence[str], separator: str) -> bool:
-    """Whether a row names units, and nothing else."""
+    """Whether a row names units: more than half of its cells are known ones, and none is a number."""
     texts = [cell.strip(BRACKETS) for cell in cells if cell]
-    return bool(texts) and not any(is_number(text, separator) or unit_of(text).quantity == "unknown" for text in texts)
+    known = sum(unit_of(text).quantity != "unknown" for text in texts)
+    return 2 * known > len(texts) and not any(is_number(text, separator) for text in texts)
 
 
 def _trimmed(cells: list[str]) -> list[str]:
