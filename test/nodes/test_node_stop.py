@@ -151,8 +151,8 @@ def test_two_excitations_of_one_name_never_drive(world: World) -> None:
     driving(world, blocks)
 
 
-def test_a_second_one_of_the_same_name_for_another_topic_does_not_configure(world: World) -> None:
-    """One alone would hear each request; the first, which drives already, goes on."""
+def test_a_second_one_of_the_same_name_for_another_topic_does_not_drive(world: World) -> None:
+    """One alone would hear each request; the first, which drives already, goes on. It is refused as soon as the second has discovered it."""
     from lifecycle_msgs.msg import Transition
     from lifecycle_msgs.srv import ChangeState
 
@@ -163,11 +163,11 @@ def test_a_second_one_of_the_same_name_for_another_topic_does_not_configure(worl
     driving(world, blocks)
     second = world.start(EXCITATION, QUIET, arguments=["-r", "voltage:=voltage_of_another"])
     client = world.node.create_client(ChangeState, "/xy/excitation/change_state")
-    refusal = "another node is called /xy/excitation, too: no configure beside it"
-    for _ in range(20):  # a request reaches those that the client has discovered
-        client.call_async(ChangeState.Request(transition=Transition(label="configure")))
+    refusal = "another node is called /xy/excitation, too: no "
+    for label in ("configure", "activate") * 10:  # a request reaches those that the client has discovered
+        client.call_async(ChangeState.Request(transition=Transition(label=label)))
         if world.until(lambda: refusal in second.output(), 1.0):
             break
-    assert refusal in second.output()
+    assert refusal in second.output() and "driving" not in second.output()
     sent = len(blocks)
     assert world.until(lambda: len(blocks) > sent + 10 and bool(blocks[-1].values.any()))

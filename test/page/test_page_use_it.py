@@ -80,7 +80,8 @@ def test_use_it_follows_the_path_and_shows_that_each_feedforward_makes_the_error
     tab, world = scene.tab, scene.world
     button = tab.page.locator("[data-act=use-it]")
     assert world.transition("excitation", "configure") and world.transition("excitation", "activate")
-    assert not button.is_visible()  # there is no model to be used
+    tab.until(button.is_visible, 30)
+    assert button.is_disabled()  # there is no model to be used
     scene.told.publish(String(data=story()))
     tab.until(lambda: button.is_visible() and button.is_enabled(), 30, "a model came, and it cannot be used")
     tab.press_until("use-it", lambda: "not begun" not in scene.state() and "press Use it" not in scene.state(), 30)

@@ -49,7 +49,7 @@ class UseCard:
         if there:
             values = self._session.heard.values(FOLLOWER)
             status = self._session.heard.statuses.get(FOLLOWER)
-            self._go.set_enabled(len(documents) == len(self._source.axes()) and values.get("state") not in BUSY)
+            self._go.set_enabled(0 < len(documents) == len(self._source.axes()) and values.get("state") not in BUSY)
             self._state.set_text(f"A path on the simulated machine: {status.message if status else 'not begun'}.")
             self._write(values)
 
