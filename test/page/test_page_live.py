@@ -147,12 +147,12 @@ def test_the_failing_picture_comes_by_itself_and_every_number_follows_the_story(
     tab.until(lambda: at_noise(tab.fact("worst place")), 40, lambda: f"the tiles are stale: {tab.fact('worst place')}")
     assert tab.ladder()[1] < 1.2 and "at the noise floor" in tab.verdict() and tab.fact("held-out error").startswith("0.3")
     assert tab.page.locator("[aria-label='linear fit, live']:visible").count() == 0
-    tab.page.get_by_role("button", name="linear fit").click()
-    tab.until(lambda: tab.page.locator("[aria-label='linear fit, live']:visible").count() == 1, 60, "the linear fit is not shown")
+    shows = tab.page.locator("[aria-label='linear fit, live']:visible")
+    tab.click_until(tab.page.get_by_role("button", name="linear fit"), lambda: shows.count() == 1, 60, "the linear fit is not shown")
     tab.until(lambda: tab.page.locator(".fact.unsure[aria-label=gain]").count() == 1 and tab.fact("held-out error") == "", 60, "no linear fit")
     assert "fails" in str(tab.page.locator("[aria-label='linear fit, live']").text_content())
-    tab.page.locator("[data-remove=coulomb_friction]:enabled").first.click()
-    tab.until(lambda: tab.headline().startswith("Something is missing: ") and tab.over_floor() > 4, 40, "stale after Remove")
+    remove = tab.page.locator("[data-remove=coulomb_friction]:enabled").first
+    tab.click_until(remove, lambda: tab.headline().startswith(missing) and tab.over_floor() > 4, 40, "stale after Remove")
     tab.press_until("reset", lambda: len(tab.ladder()) == 1 and tab.headline().startswith("Something is missing: "), 60, "stale after Start over")
     assert tab.filled() == ["Add coulomb friction"]
 
