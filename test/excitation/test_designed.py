@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from xy_sysid.errors import BadInput
-from xy_sysid.excitation.designed import document_of, with_experiment
+from xy_sysid.excitation.designed import document_of, of_an_experiment, with_experiment
 from xy_sysid.experiment_design.experiment import Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
 from xy_sysid.experiment_design.of_run import NextExperiment
@@ -18,6 +18,7 @@ from xy_sysid.settings import AxisExcitation, ExcitationSettings
 
 OWN = ExcitationSettings(axes={"x": AxisExcitation(limit=3.0), "y": AxisExcitation(limit=3.0)})
 SLOW = AxisExcitation(kind="off", rms=0.0, slow=2.0, slow_period=3.0, limit=5.0)
+EXCITATION = document_of("x", 2000.0, Experiment(SLOW, 12.0), (2.0, (-0.05, 0.05)))["experiment"]["excitation"]
 
 
 def document(**changes: Any) -> dict[str, Any]:
@@ -27,12 +28,13 @@ def document(**changes: Any) -> dict[str, Any]:
 
 
 def test_an_experiment_takes_the_place_of_the_signal_and_not_of_the_limits() -> None:
-    """Kind, amplitude and time are the experiment's; limit, travel and guards stay the machine's; the other axis is held."""
-    found = with_experiment(OWN, document(), "next.yaml")
+    """Kind, amplitude and time are the experiment's; limit, travel and guards stay the machine's; the other axis is held, as by an offset."""
+    held = OWN.axes["y"].model_copy(update={"kind": "noise", "offset": 1.0, "slow": 0.5})
+    found = with_experiment(OWN.model_copy(update={"axes": {**OWN.axes, "y": held}}), document(rate=2000.04), "next.yaml")
     x, y = found.axes["x"], found.axes["y"]
     assert (x.kind, x.slow, x.slow_period, found.duration) == ("off", 2.0, 3.0, 12.0)
     assert (x.limit, x.travel_min, x.brake) == (3.0, OWN.axes["x"].travel_min, OWN.axes["x"].brake)
-    assert (y.kind, y.offset) == ("off", 0.0)
+    assert (y.kind, y.offset, y.slow, found.rate) == ("off", 1.0, 0.0, OWN.rate)
 
 
 @pytest.mark.parametrize(
@@ -43,7 +45,11 @@ def test_an_experiment_takes_the_place_of_the_signal_and_not_of_the_limits() -> 
         ({"rate": 1000.0}, "rate is 1000 Hz"),
         ({"axis": "z"}, "axis is 'z'"),
         ({"excitation": {"kind": "noise", "limit": 50.0}}, "'limit'"),
-        ({"excitation": {"kind": "noise", "rms": -1.0}}, "rms"),
+        ({"excitation": {**EXCITATION, "rms": -1.0}}, "rms"),
+        ({"excitation": {**EXCITATION, "slow": 1000.0}}, "excitation of axis x is 1000 V of offset, slow and rms together"),
+        ({"excitation": {**EXCITATION, "kind": "noise", "rms": 1.5}}, "is 3.5 V of offset, slow and rms together; allowed: up to its limit of 3 V"),
+        ({"excitation": {**EXCITATION, "offset": -2.5}}, "is 4.5 V of offset"),
+        ({"excitation": {"kind": "off", "slow": 2.0}}, "excitation is without rms, low, high"),
         ({"needs": {"voltage": True, "travel": [-0.05, 0.05]}}, "needs"),
         ({"seconds": 0.0}, "seconds is 0"),
         ({"units": ["A", "rad"]}, "units is A and rad; allowed: V and m"),
@@ -61,6 +67,7 @@ def test_a_file_that_asks_for_more_is_refused_in_one_line(changes: dict[str, Any
 def test_a_designed_experiment_is_written_and_read_again(tmp_path: Path) -> None:
     """The file of xy-sysid next is what the node loads."""
     limits = MachineLimits(voltage=5.0, travel=(-0.14, 0.14))
+    narrow = OWN.model_copy(update={"axes": {"x": AxisExcitation(limit=2.6666663)}})
     made = NextExperiment(
         axis="x",
         sampling_rate=2000.0,
@@ -68,12 +75,22 @@ def test_a_designed_experiment_is_written_and_read_again(tmp_path: Path) -> None
         limits=limits,
         experiment=Experiment(SLOW, 12.0),
         sets=(("coulomb_friction",), ("stribeck_friction",)),
-        voltage=2.0,
+        voltage=2.6666663,
         travel=(-0.05, 0.05),
     )
     place = tmp_path / "next.yaml"
     write_experiment(place, made)
     assert yaml.safe_load(place.read_text())["experiment"]["expects"] == made.sentence
-    assert read_experiment(OWN, place).axes["x"].slow == 2.0
+    assert read_experiment(OWN, place).axes["x"].slow == read_experiment(narrow, place).axes["x"].slow == 2.0
     with pytest.raises(BadInput, match="Check the path"):
         read_experiment(OWN, tmp_path / "none.yaml")
+
+
+def test_limits_travel_and_guards_are_no_settings_of_an_experiment() -> None:
+    """Whoever sets back what experiments have changed leaves these to the operator."""
+    changed = {
+        name
+        for name in ("duration", "experiment", "ramp", "watchdog", "x.rms", "x.slow", "x.limit", "x.travel_max", "x.brake_voltage")
+        if of_an_experiment(name)
+    }
+    assert changed == {"duration", "experiment", "x.rms", "x.slow"}

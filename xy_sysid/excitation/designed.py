@@ -14,11 +14,12 @@ from xy_sysid.units import USUAL, Units
 
 KEYS = ("axis", "rate", "seconds", "excitation", "needs", "units", "expects", "sets", "made_by")
 DRIVES = ("kind", "rms", "low", "high", "period", "steps", "offset", "seed", "centring", "slow", "slow_period")  # settings that it may have
+SAME_RATE = 1e-3  # relative, as of streams that belong together
 AGAIN = "Design it again within these limits: xy-sysid next with --params."
 
 
 def with_experiment(settings: ExcitationSettings, document: object, where: str) -> ExcitationSettings:
-    """The settings of the excitation with a designed experiment on one axis, and the other axes held at 0 V.
+    """The settings of the excitation with a designed experiment on one axis; the other axes get their constant offset, which may hold a load.
 
     Raises BadInput, in one line, for a document that is none, and for one that asks for more than the settings allow.
     """
@@ -26,7 +27,7 @@ def with_experiment(settings: ExcitationSettings, document: object, where: str) 
     axis = told["axis"]
     if axis not in settings.axes:
         raise BadInput(f"{where}: axis", repr(axis), ", ".join(settings.axes), "Design it for one of these.")
-    if told["rate"] != settings.rate:
+    if abs(told["rate"] / settings.rate - 1.0) > SAME_RATE:
         raise BadInput(
             f"{where}: rate", f"{told['rate']:g} Hz", f"{settings.rate:g} Hz, that of the excitation", "Design it from recordings of this rate."
         )
@@ -41,10 +42,20 @@ def with_experiment(settings: ExcitationSettings, document: object, where: str) 
         asked, allowed = f"{low:.4g} to {high:.4g} {units.output}", f"{own.travel_min:g} to {own.travel_max:g} {units.output}"
         raise BadInput(f"{where}: travel of axis {axis}", asked, f"within {allowed}", AGAIN)
     values: dict[str, Any] = {f"{axis}.{name}": value for name, value in told["excitation"].items()}
-    values |= {
-        f"{other}.{name}": value for other in settings.axes if other != axis for name, value in (("kind", "off"), ("offset", 0.0), ("slow", 0.0))
-    }
-    return changed(settings, {**values, "duration": told["seconds"]})
+    values |= {f"{other}.{name}": value for other in settings.axes if other != axis for name, value in (("kind", "off"), ("slow", 0.0))}
+    made = changed(settings, {**values, "duration": told["seconds"]})
+    drives = made.axes[axis]
+    together = abs(drives.offset) + drives.slow + drives.rms * (drives.kind != "off")
+    if together > own.limit * (1.0 + 1e-9):  # the drive would cut it off, and the motion would be another one
+        words = f"{together:.4g} {units.input} of offset, slow and rms together"
+        raise BadInput(f"{where}: excitation of axis {axis}", words, f"up to its limit of {own.limit:g} {units.input}", AGAIN)
+    return made
+
+
+def of_an_experiment(name: str) -> bool:
+    """Whether a setting of the excitation, such as x.rms, is one that an experiment changes."""
+    axis, _, own = name.rpartition(".")
+    return own in DRIVES if axis else name in ("duration", "experiment")
 
 
 def _checked(document: object, where: str) -> Mapping[str, Any]:
@@ -61,6 +72,9 @@ def _checked(document: object, where: str) -> Mapping[str, Any]:
     for name in told["excitation"]:
         if name not in DRIVES:
             raise unknown_name(str(name), list(DRIVES), f"{where}: excitation")
+    lacking = [name for name in DRIVES if name not in told["excitation"]]
+    if lacking:
+        raise BadInput(f"{where}: excitation", f"without {', '.join(lacking)}", f"all of {', '.join(DRIVES)}", "Make the file again.")
     travel = told["needs"].get("travel")
     numbers = [told.get("rate"), told.get("seconds"), told["needs"].get("voltage"), *(travel if isinstance(travel, list | tuple) else ())]
     if len(numbers) != 5 or not all(isinstance(value, int | float) and not isinstance(value, bool) for value in numbers):

@@ -30,7 +30,10 @@ def document(found: NextExperiment) -> dict[str, Any]:
 
 def write_experiment(path: Path, found: NextExperiment) -> None:
     """The file of an experiment, for parameter ``experiment`` of the excitation node."""
-    text = yaml.safe_dump(_quoted(document(found)), sort_keys=False, width=120, allow_unicode=True)
+    exact = document(found)
+    told = _quoted(exact)
+    told["experiment"]["needs"] = exact["experiment"]["needs"]  # not rounded up beyond the limit
+    text = yaml.safe_dump(told, sort_keys=False, width=120, allow_unicode=True)
     units = found.limits.units
     head = (
         "# Made by xy-sysid next. Run it: parameter experiment of the excitation node. It is refused where it asks for more than the node's limits.\n"

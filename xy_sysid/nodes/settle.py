@@ -25,6 +25,7 @@ from std_msgs.msg import Float64MultiArray
 from xy_sysid.bags import BagWriter
 from xy_sysid.bags.atomic import write_text
 from xy_sysid.errors import BadInput, XySysidError
+from xy_sysid.excitation.designed import of_an_experiment
 from xy_sysid.excitation.motion_check import most_centring
 from xy_sysid.experiment_design.limits import MachineLimits
 from xy_sysid.experiment_design.loop import Budget
@@ -43,7 +44,6 @@ WHOLE = 0.95  # part of its seconds with which an experiment counts as carried o
 LATE = 10.0  # s on the wall without a sample after which a recording ends, however busy the computer is
 SETTLES = 0.5  # s in which the node tells its state after a change
 QUALITY = QoSProfile(depth=1000, history=HistoryPolicy.KEEP_LAST)
-FIXED = ("output", "interface", "command", "unit", "command_topic", "controller_joints", "joint_topic", "joints")  # of the excitation, while it runs
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,14 +225,14 @@ class Settler(ExcitationClient):
         self.wait(0.05)
 
     def _rest(self, before: ExcitationSettings | None) -> None:
-        """The machine stands, and the settings are as they were."""
+        """The machine stands, and what experiments have changed is as it was. What an operator has changed meanwhile, as a limit, stays."""
         if before is None:
             return
         try:
             if self.state() == "active":
                 self.transition("deactivate")
             now = {item.name: item.value for item in knobs(self.settings())}
-            changed = {item.name: item.value for item in knobs(before) if item.value != now.get(item.name) and item.name not in FIXED}
+            changed = {item.name: item.value for item in knobs(before) if item.value != now.get(item.name) and of_an_experiment(item.name)}
             if changed:
                 kind: Any = Parameter
                 request = SetParametersAtomically.Request(parameters=[kind(name, value=value).to_parameter_msg() for name, value in changed.items()])
