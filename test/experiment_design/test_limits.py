@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 
 from xy_sysid.axis.forward import Motion
+from xy_sysid.axis.model import AxisModel
 from xy_sysid.errors import BadInput
 from xy_sysid.excitation.motion_check import check_loop, most_centring
+from xy_sysid.experiment_design.design import broken_in_time
+from xy_sysid.experiment_design.experiment import Experiment
 from xy_sysid.experiment_design.limits import MachineLimits, as_recorded
 from xy_sysid.experiment_design.proposals import neighbours, proposals
 from xy_sysid.samples.recording import Recording
@@ -94,3 +97,12 @@ def test_no_proposal_pulls_harder_than_the_excitation_allows() -> None:
             held += 1
             assert abs(item.excitation.offset / item.excitation.centring) < limits.room
     assert held >= 4
+
+
+def test_what_drifts_slowly_to_a_limit_is_seen_in_an_experiment_that_lasts() -> None:
+    """A load against a weak centring: 86 mm after 8 s, 177 mm after a minute."""
+    limits = MachineLimits(voltage=5.0, travel=(-0.14, 0.14))
+    hangs = AxisModel(0.097, 1e-3, 246.0).with_effect("constant_load", (0.15,))
+    held = AxisExcitation(kind="off", rms=0.0, centring=0.84, limit=5.0)
+    assert broken_in_time([hangs], 2000.0, limits, Experiment(held, 8.0)) == ""
+    assert broken_in_time([AxisModel(0.097, 1e-3, 246.0), hangs], 2000.0, limits, Experiment(held, 60.0)) == "travel"

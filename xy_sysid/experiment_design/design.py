@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from xy_sysid.axis.forward import move
+from xy_sysid.axis.model import AxisModel
 from xy_sysid.experiment_design.beliefs import Belief
 from xy_sysid.experiment_design.criteria import ALIKE, BLOCK, COARSE, ENOUGH, FINAL, JUDGED, LOOKED, NO_EVIDENCE, ROUNDS, SURE
 from xy_sysid.experiment_design.evidence import Power, powers, seconds_needed, settled
@@ -48,12 +49,17 @@ class Judged:
 
 @dataclass(frozen=True)
 class Design:
-    """beliefs: the sets that are to be distinguished; best: the experiment that does it soonest; tried: all that were judged."""
+    """beliefs: the sets that are to be distinguished; best: the experiment that does it soonest; tried: all that were judged; rate: Hz."""
 
     beliefs: tuple[Belief, ...]
     limits: MachineLimits
     best: Judged | None
     tried: tuple[Judged, ...]
+    rate: float
+
+    def broken(self, experiment: Experiment) -> str:
+        """Which limit an experiment would come too near to in all of its time, by any draw, in a word, or nothing."""
+        return broken_in_time([model for belief in self.beliefs for model in belief.draws], self.rate, self.limits, experiment)
 
     @property
     def possible(self) -> bool:
@@ -96,8 +102,19 @@ def design(
         near = (judge(setting, beliefs, limits, item) for item in neighbours(final[0].experiment, limits, rate))
         final = sorted([*final, *(item for item in near if not item.broken)], key=lambda item: item.order)
     tell(1.0)
-    best = _timed(final[0], limits) if final else None
-    return Design(tuple(beliefs), limits, best, (*final, *judged))
+    none = Design(beliefs=tuple(beliefs), limits=limits, best=None, tried=(), rate=rate)
+    for number, item in enumerate(final):
+        best = _timed(item, limits)
+        final[number] = replace(item, broken=none.broken(best.experiment))
+        if not final[number].broken:
+            return replace(none, best=best, tried=(*final, *judged))
+    return replace(none, tried=(*final, *judged))
+
+
+def broken_in_time(models: Sequence[AxisModel], rate: float, limits: MachineLimits, experiment: Experiment) -> str:
+    """Which limit an experiment would come too near to in all of its time, by any of some models, in a word, or nothing. rate: Hz"""
+    drive = experiment.drive(rate, experiment.seconds, limits.start)
+    return next((word for model in models if (word := limits.broken(move(model, rate, drive, COARSE)))), "")
 
 
 def judge(setting: Setting, beliefs: Sequence[Belief], limits: MachineLimits, experiment: Experiment, draws: int | None = None) -> Judged:

@@ -16,6 +16,7 @@ from xy_sysid.axis.model import AxisModel
 from xy_sysid.effects import SIMPLEST_FRICTION
 from xy_sysid.experiment_design.beliefs import Belief
 from xy_sysid.experiment_design.criteria import COARSE, FITTED, LOOKED
+from xy_sysid.experiment_design.design import broken_in_time
 from xy_sysid.experiment_design.experiment import RAMP, Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
 from xy_sysid.experiment_design.of_run import NextExperiment
@@ -49,11 +50,16 @@ def first_experiment(axis: str, sampling_rate: float, limits: MachineLimits, see
             if found:
                 tells = float(np.mean([np.linalg.slogdet(item.each_second[:3, :3] + np.eye(3))[1] for item in found]))
                 judged.append((-tells, number, experiment, found))
-    if not judged:
+    judged.sort(key=lambda item: item[:2])
+    lasting = (
+        (found, best.lasting(float(min(max(math.ceil(_seconds(found, limits.seconds)), SHORTEST), limits.seconds)))) for *_, best, found in judged
+    )
+    chosen = next(((found, item) for found, item in lasting if not broken_in_time(models, sampling_rate, limits, item)), None)
+    if chosen is None:
         sentence = "No experiment is within the limits for every axis that may be there: widen the travel, or start with xy-sysid run --first."
         return NextExperiment(axis=axis, sampling_rate=sampling_rate, sentence=sentence, limits=limits)
-    _, _, best, found = min(judged, key=lambda item: item[:2])
-    seconds = min(max(math.ceil(_seconds(found, limits.seconds)), SHORTEST), limits.seconds)
+    found, best = chosen
+    seconds = best.seconds
     drive = best.drive(sampling_rate, seconds, limits.start)
     motions = [move(model, sampling_rate, drive, COARSE) for model in models]
     free = 1.0 - limits.margin
@@ -65,7 +71,7 @@ def first_experiment(axis: str, sampling_rate: float, limits: MachineLimits, see
         sampling_rate=sampling_rate,
         sentence=sentence,
         limits=limits,
-        experiment=best.lasting(float(seconds)),
+        experiment=best,
         probability=share,
         voltage=max(float(np.max(np.abs(motion.voltage))) for motion in motions),
         travel=(max(limits.start + low / free, limits.travel[0]), min(limits.start + high / free, limits.travel[1])),

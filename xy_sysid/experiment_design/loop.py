@@ -150,7 +150,9 @@ def after(last: Decision, budget: Budget, experiments: int, seconds: float) -> E
     if room < MINIMUM:
         return "seconds"
     if experiments and experiments + 1 == budget.experiments:  # those before did not keep what they promised, and none comes after
-        return last.then.lasting(room)
+        longer, made = last.then.lasting(room), last.choice.found if last.choice is not None else None
+        if made is None or not made.broken(longer):
+            return longer
     unsure = last.choice is not None and last.choice.found is not None and not last.choice.found.possible
     if unsure and experiments + 1 < budget.experiments:  # what it teaches is for a better one, which needs its time too
         room = max(0.5 * room, MINIMUM)

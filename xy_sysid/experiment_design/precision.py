@@ -17,6 +17,7 @@ from xy_sysid.axis.model import AxisModel
 from xy_sysid.errors import BadInput
 from xy_sysid.experiment_design.beliefs import Belief, Evidence, believed
 from xy_sysid.experiment_design.criteria import COARSE, DRAWN, FINAL, FITTED, LONGER, SHORTEST
+from xy_sysid.experiment_design.design import broken_in_time
 from xy_sysid.experiment_design.experiment import RAMP, Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
 from xy_sysid.experiment_design.prediction import Recorded, Setting, expected_error, predicted, recorded, slopes
@@ -110,13 +111,21 @@ def sharpest(data: AxisData, found: GreyboxFit, limits: MachineLimits, target: P
             judged.append((*_needed(belief, told, target, most), len(judged), experiment))
     if not judged:
         return Sharpest(None, before, False, before)
-    seconds, _, _, best = min(judged, key=lambda item: item[:3])
-    lasts = min(max(math.ceil((seconds if math.isfinite(seconds) else most) + RAMP), SHORTEST), limits.seconds)
-    while True:
-        width = rehearsed(data, belief, best.lasting(float(lasts)), limits, target)
-        if width <= target.width or lasts >= limits.seconds:
-            return Sharpest(best.lasting(float(lasts)), width, width <= target.width, before)
-        lasts = min(math.ceil(LONGER * lasts), limits.seconds)
+
+    def stays(experiment: Experiment) -> bool:
+        return not broken_in_time(belief.draws, data.sampling_rate, limits, experiment)
+
+    for seconds, _, _, best in sorted(judged, key=lambda item: item[:3]):
+        lasts = min(max(math.ceil((seconds if math.isfinite(seconds) else most) + RAMP), SHORTEST), limits.seconds)
+        if not stays(best.lasting(float(lasts))):
+            continue
+        while True:
+            width = rehearsed(data, belief, best.lasting(float(lasts)), limits, target)
+            longer = min(math.ceil(LONGER * lasts), limits.seconds)
+            if width <= target.width or lasts >= limits.seconds or not stays(best.lasting(float(longer))):
+                return Sharpest(best.lasting(float(lasts)), width, width <= target.width, before)
+            lasts = longer
+    return Sharpest(None, before, False, before)
 
 
 def rehearsed(data: AxisData, belief: Belief, experiment: Experiment, limits: MachineLimits, target: Precision) -> float:
