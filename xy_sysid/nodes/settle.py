@@ -6,6 +6,7 @@ against its own limits once more. Afterwards its settings are what they were.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -61,6 +62,28 @@ class Wishes:
     effect_files: tuple[str, ...] = ()
 
 
+def plan_of(wishes: Wishes, settings: ExcitationSettings) -> WalkPlan:
+    """The plan of a walk on a machine with these settings, whose limits are its own. Raises BadInput for an axis that no experiment can move so."""
+    axis = wishes.axis
+    if axis not in settings.axes:
+        raise BadInput("axis", repr(axis), ", ".join(settings.axes), "Choose an axis that the excitation drives.")
+    if settings.holds:
+        act = "Design one with xy-sysid next --trajectory, and run it there."
+        raise BadInput("interface", "position", "effort or velocity, since an experiment moves the axis by itself", act)
+    own = settings.axes[axis]
+    limits = MachineLimits(
+        voltage=own.limit,
+        travel=(own.travel_min, own.travel_max),
+        start=0.5 * (own.travel_min + own.travel_max),
+        speed=own.max_speed or math.inf,
+        acceleration=own.max_acceleration or math.inf,
+        units=settings.units,
+        seconds=wishes.budget.seconds,
+        centring=float(most_centring(settings)[list(settings.axes).index(axis)]),
+    )
+    return WalkPlan(axis, limits, wishes.budget, wishes.sets)
+
+
 class Settler(ExcitationClient):
     """``run`` does it all, in a thread of its own; others read ``steps``, ``doing``, ``part``, ``ending`` and ``problem``."""
 
@@ -100,7 +123,7 @@ class Settler(ExcitationClient):
         return not self.problem
 
     def _walk(self, settings: ExcitationSettings) -> None:
-        wishes, plan = self.wishes, self._plan(settings)
+        wishes, plan = self.wishes, plan_of(self.wishes, settings)
         self._listen(settings)
         wishes.folder.mkdir(parents=True, exist_ok=False)
         decider = Decider(plan_document(plan), wishes.effect_files)
@@ -126,19 +149,6 @@ class Settler(ExcitationClient):
                 bag = self._carried_out(len(self.steps), step, settings)
         finally:
             decider.close()
-
-    def _plan(self, settings: ExcitationSettings) -> WalkPlan:
-        axis = self.wishes.axis
-        if axis not in settings.axes:
-            raise BadInput("axis", repr(axis), ", ".join(settings.axes), "Choose an axis that the excitation drives.")
-        own = settings.axes[axis]
-        middle = 0.5 * (own.travel_min + own.travel_max)
-        travel = own.travel_min, own.travel_max
-        centring = float(most_centring(settings)[list(settings.axes).index(axis)])
-        limits = MachineLimits(
-            voltage=own.limit, travel=travel, start=middle, units=settings.units, seconds=self.wishes.budget.seconds, centring=centring
-        )
-        return WalkPlan(axis, limits, self.wishes.budget, self.wishes.sets)
 
     # the machine
 
@@ -170,8 +180,9 @@ class Settler(ExcitationClient):
         self.set({"experiment": str(file.resolve())})
         self._change("configure")
         with self._recording(number, settings):
-            self._change("activate")
-            self._record(seconds + settings.ramp, settings)
+            if not self._over():
+                self._change("activate")
+                self._record(seconds + settings.ramp, settings)
         count, rate = self._samples
         if rate <= 0.0 or count < WHOLE * seconds * rate:
             self.ending = "stopped"
