@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -12,8 +15,10 @@ from xy_sysid.diagnosis.answer import Answer
 from xy_sysid.errors import BadInput
 from xy_sysid.experiment_design.beliefs import Evidence, believed
 from xy_sysid.experiment_design.criteria import ODDS
+from xy_sysid.experiment_design.design import Design, Judged, expects
 from xy_sysid.experiment_design.evidence import Power, nats, seconds_needed, settled
-from xy_sysid.experiment_design.experiment import Experiment
+from xy_sysid.experiment_design.experiment import RAMP, Experiment
+from xy_sysid.experiment_design.limits import MachineLimits
 from xy_sysid.experiment_design.loop import Budget, NextChoice, Question, Signals, settle
 from xy_sysid.experiment_design.precision import Precision, sharpest
 from xy_sysid.experiment_design.prediction import Setting, recorded
@@ -85,6 +90,19 @@ def test_probability_follows_from_the_evidence_and_needs_seconds() -> None:
     needed = seconds_needed([[one]], 1000.0)
     assert settled([[one]], needed) == pytest.approx(0.95, abs=1e-6)
     assert seconds_needed([[one]], 0.5 * needed) == np.inf
+
+
+def test_an_experiment_that_the_budget_makes_shorter_promises_less() -> None:
+    """What is said is of the seconds that it really lasts."""
+    one = Power(truth=0, rival=1, rate=1.0, price=0.0)
+    needed = seconds_needed([[one]], 1000.0)
+    best = Judged(Experiment(AxisExcitation(kind="noise"), 60.0), seconds=needed, probability=1.0, each=((one,),))
+    two: Any = (SimpleNamespace(name="drag"), SimpleNamespace(name="lag"))
+    made = Design(beliefs=two, limits=MachineLimits(voltage=5.0, travel=(-0.1, 0.1)), best=best, tried=(best,), rate=2000.0)
+    whole, short = made.lasting(needed + RAMP + 1.0), made.lasting(0.7 * needed)
+    assert whole.possible and expects(whole) == f"After {needed + RAMP + 1.0:.0f} s, drag and lag are distinguished with 95 % probability."
+    assert not short.possible and short.best is not None and 0.5 < short.best.probability < 0.95
+    assert expects(short).startswith("No experiment within the limits is sure to distinguish drag and lag")
 
 
 def test_a_set_with_one_law_twice_is_refused(data: AxisData) -> None:

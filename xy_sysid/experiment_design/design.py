@@ -57,6 +57,15 @@ class Design:
     tried: tuple[Judged, ...]
     rate: float
 
+    def lasting(self, seconds: float) -> Design:
+        """The same with so many s for the best experiment, and what it promises then."""
+        if self.best is None:
+            return self
+        steady = seconds - RAMP
+        reached = self.best.seconds if self.best.seconds <= steady else math.inf
+        best = replace(self.best, experiment=self.best.experiment.lasting(seconds), seconds=reached, probability=settled(self.best.each, steady))
+        return replace(self, best=best)
+
     def broken(self, experiment: Experiment) -> str:
         """Which limit an experiment would come too near to in all of its time, by any draw, in a word, or nothing."""
         return broken_in_time([model for belief in self.beliefs for model in belief.draws], self.rate, self.limits, experiment)

@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 from xy_sysid.axis.model import STANDARD, Library
 from xy_sysid.diagnosis.of_run import diagnose
 from xy_sysid.experiment_design.beliefs import Belief
-from xy_sysid.experiment_design.design import design
+from xy_sysid.experiment_design.design import design, expects
 from xy_sysid.experiment_design.experiment import Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
 from xy_sysid.experiment_design.loop import Budget, Decision, Ending, NextChoice, Question, after, decide
@@ -86,10 +86,12 @@ def step(plan: WalkPlan, runs: Sequence[Run], before: WalkStep | None = None, te
         seconds = before.seconds + before.following.seconds if before is not None and before.following is not None else 0.0
         follows = after(decision, plan.budget, experiments, seconds)
         made = decision.choice.found if decision.choice is not None else None
+        following = None if isinstance(follows, str) else follows
         answer = answered(plan.axis, rate, made, plan.library) if made is not None else None
-    following = None if isinstance(follows, str) else follows
-    if answer is not None and following is not None:
-        answer = replace(answer, experiment=following)
+        if answer is not None and made is not None and following is not None:
+            now = made.lasting(following.seconds)  # the budget may have made it shorter, or longer
+            promise = now.best.probability if now.best is not None else 0.0
+            answer = replace(answer, experiment=following, sentence=expects(now), probability=promise, settles=now.possible)
     return WalkStep(
         diagnosis=found.sentence.rstrip(),
         decision=decision,
