@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import ast
 import configparser
+import ctypes
 import re
+import sys
 import types
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +25,8 @@ from xy_sysid.control_design.compensation import left_words
 from xy_sysid.control_design.exports import export
 from xy_sysid.control_design.use import use
 from xy_sysid.units import Units
+
+FIVE = [(name, ctypes.c_void_p) for name in ("allocate", "deallocate", "reallocate", "zero_allocate", "state")]  # of rcutils_allocator_t
 
 
 @pytest.fixture(scope="module")
@@ -103,6 +108,27 @@ def test_a_ros2_control_snippet_is_yaml_with_the_names_of_pid_controller() -> No
     assert set(own["gains"]["x"]) == {"p", "i", "d", *clamps, "antiwindup_strategy", "feedforward_gain"}
     assert own["gains"]["x"]["feedforward_gain"] == pytest.approx(used.gains["kV"].value, rel=1e-5), "it multiplies the velocity that is asked for"
     assert set(own) == {"dof_names", "command_interface", "reference_and_state_interfaces", "gains"}
+
+
+@pytest.mark.parametrize("name", ["y", "no", "1", "it's"])
+def test_the_parser_of_ros_2_reads_an_axis_name_as_text(name: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """rcl reads a plain y as true and 1 as an integer; in quotes each is a name, in the list of joints and in the gains."""
+    file = tmp_path / "controllers.yaml"
+    (text,) = export(use(replace(known(), axis=name)), "ros2_control").files.values()
+    file.write_text(text)
+    own = yaml.safe_load(text)["pid_controller"]["ros__parameters"]
+    assert own["dof_names"] == [name] and list(own["gains"]) == [name]
+    library = Path(sys.prefix) / "lib" / "librcl_yaml_param_parser.so"
+    if not library.exists():
+        pytest.skip("rcl comes with the extra [ros]")
+    rcl, allocator = ctypes.CDLL(str(library)), ctypes.CDLL(str(library.with_name("librcutils.so"))).rcutils_get_default_allocator
+    allocator.restype, rcl.rcl_yaml_node_struct_init.restype = type("Allocator", (ctypes.Structure,), {"_fields_": FIVE}), ctypes.c_void_p
+    found = ctypes.c_void_p(rcl.rcl_yaml_node_struct_init(allocator()))
+    assert rcl.rcl_parse_yaml_file(str(file).encode(), found)
+    rcl.rcl_yaml_node_struct_print(found)
+    ctypes.CDLL(None).fflush(None)
+    printed = capfd.readouterr().out
+    assert f" dof_names: {name}, \n" in printed and f" gains.{name}.p: " in printed
 
 
 def test_a_klipper_snippet_is_a_section_that_its_parser_reads() -> None:

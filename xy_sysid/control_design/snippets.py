@@ -44,15 +44,16 @@ def ros2_control(of: Designed) -> Snippet:
     limit = loop.controller.limit
     bound = f"{limit:.6g}" if limit < NO_LIMIT else ".inf"
     low = f"-{limit:.6g}" if limit < NO_LIMIT else "-.inf"
+    name = "'" + of.axis.replace("'", "''") + "'"  # in quotes: the parser of ROS 2 reads a plain y or no as a bool, and 1 as an integer
     lines = [
         f"# u = p e + i int(e) + d de/dt in {of.units.input}, e in {of.units.output}, at {loop.sampling_rate:g} Hz",
         "pid_controller:",
         "  ros__parameters:",
-        f"    dof_names: [{of.axis}]",
+        f"    dof_names: [{name}]",
         "    command_interface: effort",
         "    reference_and_state_interfaces: [position, velocity]",
         "    gains:",
-        f"      {of.axis}:",
+        f"      {name}:",
         f"        p: {loop.controller.kp:.6g}",
         f"        i: {loop.controller.ki:.6g}",
         f"        d: {loop.controller.kd:.6g}",
