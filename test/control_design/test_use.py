@@ -107,7 +107,10 @@ def test_a_ros2_control_snippet_is_yaml_with_the_names_of_pid_controller() -> No
     clamps = {"i_clamp_max", "i_clamp_min", "u_clamp_max", "u_clamp_min"}
     assert set(own["gains"]["x"]) == {"p", "i", "d", *clamps, "antiwindup_strategy", "feedforward_gain"}
     assert own["gains"]["x"]["feedforward_gain"] == pytest.approx(used.gains["kV"].value, rel=1e-5), "it multiplies the velocity that is asked for"
-    assert set(own) == {"dof_names", "command_interface", "reference_and_state_interfaces", "gains"}
+    assert set(own) == {"dof_names", "command_interface", "reference_and_state_interfaces", "enable_feedforward", "gains"}
+    assert own["enable_feedforward"] is True, "it is off by default, and the gain does nothing then"
+    note = export(used, "ros2_control").note
+    assert "~/set_feedforward_control" in note and "not its sum with the feedforward" in note
 
 
 @pytest.mark.parametrize("name", ["y", "no", "1", "it's"])

@@ -52,6 +52,7 @@ def ros2_control(of: Designed) -> Snippet:
         f"    dof_names: [{name}]",
         "    command_interface: effort",
         "    reference_and_state_interfaces: [position, velocity]",
+        "    enable_feedforward: true",
         "    gains:",
         f"      {name}:",
         f"        p: {loop.controller.kp:.6g}",
@@ -65,7 +66,8 @@ def ros2_control(of: Designed) -> Snippet:
         f"        feedforward_gain: {of.gains.value('kV'):.6g}",
     ]
     note = (
-        "feedforward_gain is kV: the controller multiplies the velocity that is asked for by it; "
+        "feedforward_gain is kV: the controller multiplies the velocity that is asked for by it, once enable_feedforward is true; a version "
+        "without this parameter has the service ~/set_feedforward_control instead. u_clamp limits the PID alone, not its sum with the feedforward; "
         f"kS and kA have no place in it, add them in a controller of your own.{_gravity(of)} {_unfiltered(loop)}"
     )
     return Snippet("ros2_control", "controllers.yaml", "\n".join(lines) + "\n", note)
