@@ -23,6 +23,8 @@ from helpers.simulated import recorded
 import xy_sysid as xy
 from xy_sysid.control_design.compensation import left_words
 from xy_sysid.control_design.exports import export
+from xy_sysid.control_design.gains import Gains
+from xy_sysid.control_design.uncertain import Derived
 from xy_sysid.control_design.use import use
 from xy_sysid.units import Units
 
@@ -182,6 +184,22 @@ def test_a_twincat_program_is_parsed_by_blark_with_the_fields_of_fb_ctrl_pid() -
     assert "no kCos: add" in export(arm, "linuxcnc").note and "no kCos: add" in export(arm, "ros2_control").note
     with pytest.raises(xy.BadInput, match=r"rate of 2000 Hz.*--controller-rate"):
         export(use(known("coulomb_friction"), rate=2000.0), "twincat")
+
+
+def test_a_gain_that_the_data_do_not_determine_is_exported_as_0_and_named() -> None:
+    """kS whose interval holds 0 is no number for a controller; an angle and a model without intervals keep theirs, as 0 would be no better."""
+    unsure = use(known("coulomb_friction", coulomb_friction__coulomb=1.5), rate=1000.0, limit=5.0)
+    assert unsure.gains["kS"].low < 0.0 < unsure.gains["kS"].value and unsure.gains.value("kS") == 0.0
+    assert "fKS : LREAL := 0.000000000E+00; (* V, not determined by the data *)" in export(unsure, "twincat").files["x_twincat_axis.st"]
+    matlab = export(unsure, "matlab")
+    assert matlab.mat["axis_x.mat"]["gains"]["kS"] == 0.0 and matlab.mat["axis_x.mat"]["gains"]["kV"] == unsure.gains["kV"].value
+    assert "add 0 V" in export(unsure, "linuxcnc").note
+    for target in ("twincat", "matlab", "linuxcnc", "ros2_control"):
+        assert "0 stands for kS, which the data do not determine" in export(unsure, target).note, target
+    (loaded,) = export(use(known("constant_load", constant_load__load=1.5), limit=5.0), "linuxcnc").files.values()
+    assert "# bias is not determined by the data\n" in loaded and "setp pid.x.bias 0\n" in loaded
+    assert use(unknown("coulomb_friction")).gains.value("kS") == 0.2
+    assert Gains((Derived("zero", 0.5, 0.2, 0.8, "rad", "level"),)).value("zero") == 0.5
 
 
 def test_exported_source_undoes_what_is_predicted_to_help() -> None:

@@ -100,8 +100,9 @@ def matlab_source(used: Used) -> Exported:
     intervals = {item.name.replace(".", "_"): [item.low, item.high] for item in used.model.parameters}
     known = {"parameters": values, "rate": used.sampling_rate}
     content = {**known, "ci95": intervals} if intervals else known
-    gains = {item.name.replace(" ", "_"): item.value for item in used.gains.items}
+    gains = {item.name.replace(" ", "_"): used.gains.value(item.name) for item in used.gains.items}
     note = f"load {name}.mat for the numbers; {name}.m is one function for scripts and MATLAB Function blocks; {_inverse_note(used)}"
+    note += f"; {used.gains.doubt}" if used.gains.doubt else ""
     return Exported({f"{name}.m": to_matlab.source(of, name, title)}, note, mat={f"{name}.mat": {**content, "gains": gains}})
 
 
