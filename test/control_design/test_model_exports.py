@@ -101,6 +101,11 @@ def _push(size: float, x: float) -> float:
 
 
 @law
+def _divided(size: float, x: float) -> float:
+    return float(size * (x * x + 1 / 4) ** (3 / 2) * (7 / 2))
+
+
+@law
 def _strange(size: float, x: float) -> float:
     return size * float(np.sum(np.array([x, x])))
 
@@ -122,9 +127,10 @@ def _own(function: Callable[..., float]) -> AxisModel:
     return AxisModel(0.097, 1.63e-3, 236.0, library=STANDARD.extended([effect])).with_effect("own_effect")
 
 
-def test_an_effect_of_ones_own_is_printed_or_refused(tmp_path: Path) -> None:
-    """A user's law in numbers, ifs and powers goes into C; one that does more is refused in one line."""
-    of = program(_own(_push), RATE)
+@pytest.mark.parametrize("function", [_push, _divided])
+def test_an_effect_of_ones_own_is_printed_or_refused(tmp_path: Path, function: Callable[..., float]) -> None:
+    """A user's law in numbers, ifs, powers and quotients of whole numbers goes into C; one that does more is refused in one line."""
+    of = program(_own(function), RATE)
     header, text = to_c.source(of, "axis", "a test")
     (tmp_path / "axis.h").write_text(header)
     main = 'int main(void) { axis_state s; axis_reset(&s); for (int k = 0; k < 400; k++) printf("%.17g\\n", axis_step(&s, k % 50 - 20.0)); }'
