@@ -62,7 +62,7 @@ def mjcf(model: AxisModel, sampling_rate: float, name: str = "axis") -> Mjcf:
     mass, drag, hung = _bodies(model, said)
     behind, tendon = _behind(hung, name)
     steps = _steps(model, sampling_rate, 2.0 * FINE if dry == 0.0 and lag is None else RUBBING)
-    bend, spring = _spring(said.polynomial)
+    bend, spring = _spring(said.polynomial, turn)
     curve = f" {_num(said.square)} 0" if said.square else ""
     step = 1.0 / (sampling_rate * steps)
     joint = 'type="hinge" axis="0 0 1"' if any(effect.angular for effect, _ in of_category(model, "force")) else 'type="slide" axis="1 0 0"'
@@ -176,15 +176,18 @@ def _power(effect: Effect, values: tuple[float, ...], model: AxisModel, said: Sa
         said.polynomial += found
 
 
-def _spring(polynomial: FloatArray) -> tuple[float, str]:
-    """Constant force, V, and the joint's attributes for the rest: MuJoCo's spring is k0 d + k2 d^3 around its reference."""
+def _spring(polynomial: FloatArray, turn: float) -> tuple[float, str]:
+    """Constant force, V, and the joint's attributes for the rest: MuJoCo's spring is k0 d + k2 d^3 around its reference.
+
+    turn: sign of the gain; the constant goes through the drive, which has that sign, and the spring acts on the joint itself
+    """
     p0, p1, p2, p3 = polynomial.tolist()
     where = -p2 / (3.0 * p3) if abs(p3) > EXACT * abs(p2) else 0.0
     constant = float(np.polynomial.polynomial.polyval(where, polynomial))
     linear = p1 + 2.0 * p2 * where + 3.0 * p3 * where * where
     if linear == 0.0 and p3 == 0.0:
         return p0, ""
-    return constant, f' springref="{_num(where)}" stiffness="{_num(linear)} 0 {_num(p3)}"'
+    return constant, f' springref="{_num(where)}" stiffness="{_num(turn * linear)} 0 {_num(turn * p3)}"'
 
 
 def _friction(model: AxisModel, said: Said) -> float | tuple[float, ...]:
