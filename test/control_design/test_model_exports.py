@@ -244,6 +244,16 @@ def test_an_sdf_says_what_the_model_is_and_names_what_it_loses() -> None:
     assert "<spring_reference>0.002</spring_reference><spring_stiffness>10</spring_stiffness>" in spring and [name for name, _ in lost] == ["delay"]
 
 
+def test_damping_in_sdf_and_urdf_is_the_viscous_part_alone() -> None:
+    """Neither has drag with the square of speed, so its force at 1 m/s is no part of the damping: it is named as lost."""
+    used = use(known("quadratic_drag"), limit=5.0)
+    sdf_text, urdf_text = (next(iter(export(used, target).files.values())) for target in ("sdf", "urdf"))
+    damping = ElementTree.fromstring(sdf_text).findtext("model/joint[@type='prismatic']/axis/dynamics/damping")
+    dynamics = ElementTree.fromstring(urdf_text).find("joint/dynamics")
+    assert dynamics is not None and damping == dynamics.get("damping") and float(damping or "nan") == pytest.approx(1 / 0.097)
+    assert "<!-- lost: quadratic_drag" in sdf_text
+
+
 def test_matlab_gets_parameters_and_a_function(tmp_path: Path) -> None:
     """The .mat file is read back by scipy; the function's ifs, fors and functions are all closed."""
     file = tmp_path / "axes.yaml"

@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from xy_sysid.axis.model import AxisModel
-from xy_sysid.control_design.laws import along, asks, force, friction, largest_voltage
+from xy_sysid.control_design.laws import along, asks, friction, largest_voltage
 from xy_sysid.effects._contract import Effect
 
 PLACES = 101  # at which a spring is asked whether it is straight
@@ -32,7 +32,6 @@ def sdf(model: AxisModel, travel: tuple[float, float], limit: float, angular: bo
     effort = top if math.isfinite(top) else 1e3 / abs(model.gain)
     mass = 1.0 / (abs(model.gain) * model.pole)
     spring = f"<spring_reference>{-offset / stiffness:.9g}</spring_reference><spring_stiffness>{stiffness:.9g}</spring_stiffness>" if straight else ""
-    damping = 1.0 / abs(model.gain) + 0.5 * sum(side * force(model, side, 0.0, of_speed=True) for side in (1.0, -1.0))
     lines = [
         '<?xml version="1.0"?>',
         '<sdf version="1.9">',
@@ -51,7 +50,7 @@ def sdf(model: AxisModel, travel: tuple[float, float], limit: float, angular: bo
         f"      <axis><xyz>{'0 0 1' if angular else '1 0 0'}</xyz>",
         f"        <limit><lower>{travel[0]:.9g}</lower><upper>{travel[1]:.9g}</upper><effort>{effort:.9g}</effort>",
         f"          <velocity>{abs(model.gain) * effort:.9g}</velocity></limit>",
-        f"        <dynamics><damping>{damping:.9g}</damping><friction>{level:.9g}</friction>{spring}</dynamics>",
+        f"        <dynamics><damping>{1.0 / abs(model.gain):.9g}</damping><friction>{level:.9g}</friction>{spring}</dynamics>",
         "      </axis>",
         "    </joint>",
         "  </model>",
