@@ -35,6 +35,7 @@ from xy_sysid.control_design.sdf import sdf
 from xy_sysid.control_design.use import use
 from xy_sysid.effects import Effect, Parameter, law
 from xy_sysid.samples.block import FloatArray
+from xy_sysid.units import Units
 
 RATE = 2000.0
 ALL = [effect.name for effect in STANDARD.acting if effect.name != "load_side_resonance"]
@@ -198,6 +199,13 @@ def test_mujoco_says_each_force_of_an_axis_that_is_wired_backwards(effect: str) 
     """The input pushes the other way, and a spring still pulls back: the same motion in MuJoCo as here, within 1 %."""
     model = replace(axis(effect), gain=-axis().gain)
     assert not mjcf(model, RATE).lost and speeds_apart(model, noise(1000)) < 0.01
+
+
+def test_an_axis_in_radians_turns_in_mujoco() -> None:
+    """Every joint of it is a hinge, also the one behind a resonance; those of an axis in metres slide."""
+    for output, kind in (("rad", mujoco.mjtJoint.mjJNT_HINGE), ("m", mujoco.mjtJoint.mjJNT_SLIDE)):
+        (text,) = export(use(known("base_resonance", units=Units("V", output)), limit=5.0), "mujoco").files.values()
+        assert mujoco.MjModel.from_xml_string(text).jnt_type.tolist() == [kind, kind], output
 
 
 @pytest.mark.parametrize("effect", ["coulomb_friction=0.3", "cogging=0.2", "presliding_hysteresis=0.3"])

@@ -108,7 +108,7 @@ def matlab_source(used: Used) -> Exported:
 
 def mujoco(used: Used) -> Exported:
     """MJCF."""
-    made = mjcf(used.model.model, used.sampling_rate)
+    made = mjcf(used.model.model, used.sampling_rate, used.model.units.output == "rad")
     note = f"hold the input for {made.steps} steps of the simulation; {_losses(made.lost)}"
     return Exported({f"{plain_name(used.axis)}.xml": made.text}, note)
 

@@ -49,8 +49,8 @@ class Mjcf:
     lost: tuple[tuple[str, str], ...]
 
 
-def mjcf(model: AxisModel, sampling_rate: float, name: str = "axis") -> Mjcf:
-    """The model for one input ``drive`` that is held for a sample, and one joint whose position is the axis'."""
+def mjcf(model: AxisModel, sampling_rate: float, angular: bool = False, name: str = "axis") -> Mjcf:
+    """The model for one input ``drive`` that is held for a sample, and one joint whose position is the axis'; angular: it turns, and is in rad."""
     said = Said()
     _forces(model, said)
     turn = math.copysign(1.0, model.gain)
@@ -60,12 +60,12 @@ def mjcf(model: AxisModel, sampling_rate: float, name: str = "axis") -> Mjcf:
     for effect, _ in of_category(model, "encoder"):
         said.lost.append((effect.name, "the joint's position is where the axis is, not what a scale shows"))
     mass, drag, hung = _bodies(model, said)
-    behind, tendon = _behind(hung, name)
+    kind = 'type="hinge" axis="0 0 1"' if angular else 'type="slide" axis="1 0 0"'
+    behind, tendon = _behind(hung, name, kind)
     steps = _steps(model, sampling_rate, 2.0 * FINE if dry == 0.0 and lag is None else RUBBING)
     bend, spring = _spring(said.polynomial, turn)
     curve = f" {_num(said.square)} 0" if said.square else ""
     step = 1.0 / (sampling_rate * steps)
-    joint = 'type="hinge" axis="0 0 1"' if any(effect.angular for effect, _ in of_category(model, "force")) else 'type="slide" axis="1 0 0"'
     drive = [f'name="drive" joint="{name}" gear="{turn:g}" gainprm="1" biastype="affine" biasprm="{_num(-bend)} 0 0"']
     if model.delay > 0.0:
         whole = round(model.delay / step)
@@ -90,7 +90,7 @@ def mjcf(model: AxisModel, sampling_rate: float, name: str = "axis") -> Mjcf:
         f'  <option timestep="{step!r}" gravity="0 0 0" integrator="{integrator}"/>',
         "  <worldbody>",
         f'    <body name="{name}">',
-        f'      <joint name="{name}" {joint} damping="{_num(drag)}{curve}"{spring}{held}/>',
+        f'      <joint name="{name}" {kind} damping="{_num(drag)}{curve}"{spring}{held}/>',
         f"      {moving}",
         "    </body>",
         *behind,
@@ -283,14 +283,14 @@ def _bodies(model: AxisModel, said: Said) -> tuple[float, float, Hung | None]:
     return own, drag - shared, Hung((own, stiffness * z2), (drag - shared, shared), stiffness, stiffness * z1 - shared)
 
 
-def _behind(hung: Hung | None, name: str) -> tuple[list[str], list[str]]:
+def _behind(hung: Hung | None, name: str, kind: str) -> tuple[list[str], list[str]]:
     """Lines of the second body, and of the spring between the two."""
     if hung is None:
         return [], []
     mass = _num(hung.masses[1])
     body = [
         '    <body name="behind">',
-        f'      <joint name="behind" type="slide" axis="1 0 0" damping="{_num(hung.drags[1])}"/>',
+        f'      <joint name="behind" {kind} damping="{_num(hung.drags[1])}"/>',
         f'      <inertial pos="0 0 0" mass="{mass}" diaginertia="{mass} {mass} {mass}"/>',
         "    </body>",
     ]
