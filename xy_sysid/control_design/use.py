@@ -157,7 +157,7 @@ def use(
         feedback=loop,
         states=_tried("state feedback", lambda: state_feedback(model, rate, asked), refused),
         modes=swings,
-        notch=notch(swings[0], rate) if swings and loop is not None else None,
+        notch=_tried("notch", lambda: notch(swings[0], rate), refused) if swings and loop is not None else None,
         allowed=None if loop is None else _tried("bandwidth", lambda: bandwidth_of(model, rate, loop.nominal.crossover, asked), refused),
         filter=None if better is None else better[0],
         filtered=None if better is None else better[1],
