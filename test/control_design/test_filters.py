@@ -51,6 +51,13 @@ def test_shapers_leave_what_their_names_promise() -> None:
     assert vibration((1.0,), (0.0,), mode.held.value, mode.held_damping) == pytest.approx(1.0)
 
 
+def test_a_frequency_whose_interval_has_no_end_may_be_any() -> None:
+    """The worst case of each shaper is all of the vibration then, not what it leaves at the best value."""
+    (mode,) = modes(known("base_resonance"))
+    endless = replace(mode, held=replace(mode.held, high=float("inf")))
+    assert [item.worst for item in shapers(endless)] == [1.0] * 4 and shapers(endless)[0].vibration < 1e-6
+
+
 def test_a_shaped_path_arrives_and_excites_less() -> None:
     """A quick move through the shaper ends at the same place, and a mass on a spring that is carried along rings a twentieth as much afterwards."""
     (mode,) = modes(known("screw_compliance"))

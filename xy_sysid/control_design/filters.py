@@ -66,7 +66,7 @@ class Shaper:
     """Pulses that replace one.
 
     name: zv, mzv, zvd or ei; frequency: Hz; damping: ratio; amplitudes, times: (k,) sum 1, s
-    vibration: part of the unshaped residual vibration that is left at the frequency; worst: over the interval of the frequency
+    vibration: part of the unshaped residual vibration that is left at the frequency; worst: over the interval of the frequency, 1 if that has no end
     """
 
     name: str
@@ -181,8 +181,8 @@ def shapers(mode: Swing) -> tuple[Shaper, ...]:
     for name, (sizes, places) in kinds.items():
         amplitudes = tuple(size / sum(sizes) for size in sizes)
         times = tuple(place * period for place in places)
-        ends = [f, *(end for end in (mode.held.low, mode.held.high) if math.isfinite(end) and end > 0.0)]
-        left = [vibration(amplitudes, times, end, damping) for end in ends]
+        ends = f, mode.held.low, mode.held.high
+        left = [vibration(amplitudes, times, at, damping) if math.isfinite(at) and at > 0.0 else 1.0 for at in ends]
         found.append(Shaper(name=name, frequency=f, damping=damping, amplitudes=amplitudes, times=times, vibration=left[0], worst=max(left)))
     return tuple(found)
 
