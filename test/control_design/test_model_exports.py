@@ -282,3 +282,5 @@ def test_every_target_writes_for_an_axis_that_has_all_of_it(tmp_path: Path) -> N
     assert said.code == 0, said
     names = {path.suffix for path in (tmp_path / "out").iterdir()}
     assert {".c", ".h", ".py", ".m", ".mat", ".fmu", ".xml", ".urdf", ".sdf", ".yaml", ".cfg", ".hal", ".csv"} <= names
+    told = " ".join(said.err.split())
+    assert "axis x to odrive: " in told and "axis x to twincat: " in told and "axis x to urdf" not in told
