@@ -224,12 +224,28 @@ def test_the_circle_through_mujoco_closes(effect: str) -> None:
 
 def test_a_urdf_is_parsed_by_mujoco_and_names_what_it_loses() -> None:
     """Mass, damping, friction and limits come out of another parser; each effect that URDF cannot say is in a comment and in the note."""
-    made = export(use(known("coulomb_friction", "cogging"), limit=5.0), "urdf")
+    made = export(use(known("coulomb_friction", "cogging"), limit=5.0, travel=(-0.025, 0.025)), "urdf")
     (text,) = made.files.values()
     model = mujoco.MjModel.from_xml_string(text)
     assert model.dof_damping[0] == pytest.approx(1 / 0.097) and model.dof_frictionloss[0] == pytest.approx(0.2)
     assert model.jnt_range[0] == pytest.approx([-0.025, 0.025]) and model.body_mass[1] == pytest.approx(1 / (0.097 * 236.0))
     assert "<!-- lost: cogging" in text and "cogging" in made.note and "delay" in made.note
+
+
+@pytest.mark.parametrize("output", ["m", "rad"])
+def test_a_joint_whose_travel_nobody_knows_has_no_ends(output: str) -> None:
+    """Without a recording and without --travel no limit of the position is written, and the note says so; with a travel its ends are there."""
+    model = known(units=Units("V", output))
+    unlimited, limited = (use(model, limit=5.0, travel=ends) for ends in (None, (-0.02, 0.03)))
+    for target, lower, upper in (("sdf", "<lower>", "<upper>"), ("urdf", 'lower="', 'upper="')):
+        (free,), (ended,) = (export(used, target).files.values() for used in (unlimited, limited))
+        assert "0.025" not in free and "travel (it is not known)" in export(unlimited, target).note, target
+        assert f"{lower}-0.02" in ended and f"{upper}0.03" in ended and "travel" not in export(limited, target).note, target
+    joint = ElementTree.fromstring(next(iter(export(unlimited, "sdf").files.values()))).find("model/joint/axis/limit")
+    assert joint is not None and joint.find("lower") is None and joint.findtext("effort") == "5"
+    (text,) = export(unlimited, "urdf").files.values()
+    of = mujoco.MjModel.from_xml_string(text)
+    assert not of.jnt_limited[0] or of.jnt_range[0].tolist() == [-1e16, 1e16]
 
 
 def test_an_sdf_says_what_the_model_is_and_names_what_it_loses() -> None:

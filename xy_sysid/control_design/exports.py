@@ -115,7 +115,7 @@ def mujoco(used: Used) -> Exported:
 
 def robot(used: Used) -> Exported:
     """URDF."""
-    text, lost = urdf(used.model.model, used.travel, used.limit, used.model.units.output == "rad")
+    text, lost = urdf(used.model.model, used.travel, used.limit, used.model.units.output == "rad", ends=used.travel_known)
     return Exported({f"{plain_name(used.axis)}.urdf": text}, _losses(lost))
 
 
@@ -133,7 +133,7 @@ def observer(used: Used) -> Exported:
 
 def gazebo(used: Used) -> Exported:
     """SDF."""
-    text, lost = sdf(used.model.model, used.travel, used.limit, used.model.units.output == "rad")
+    text, lost = sdf(used.model.model, used.travel, used.limit, used.model.units.output == "rad", ends=used.travel_known)
     return Exported({f"{plain_name(used.axis)}.sdf": text}, _losses(lost))
 
 
