@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -12,13 +13,15 @@ import pytest
 from helpers.known_models import DELAY, GAIN, POLE, axis, known, unknown
 from scipy import signal
 
-from xy_sysid.axis.model import STANDARD, simulate
+from xy_sysid.axis.model import STANDARD, Library, simulate
 from xy_sysid.comparison.physical_model import PhysicalModel
+from xy_sysid.control_design import closed_loop, inverse, sample_step
+from xy_sysid.control_design.closed_loop import _loop_of
 from xy_sysid.control_design.gains import gains, simple_feedforward
-from xy_sysid.control_design.inverse import ahead_of, feedforward, not_undone
+from xy_sysid.control_design.inverse import _run_of, ahead_of, feedforward, not_undone
 from xy_sysid.control_design.limits import fastest
 from xy_sysid.control_design.path import Bounds, SampledPath, recorded, s_curve
-from xy_sysid.control_design.sample_step import simulate_alone
+from xy_sysid.control_design.sample_step import simulate_alone, step_of
 from xy_sysid.control_design.tables import friction_table, position_tables
 from xy_sysid.control_design.uncertain import samples, undetermined
 from xy_sysid.control_design.use import use
@@ -187,3 +190,16 @@ def test_a_lag_is_looked_ahead_of_by_what_its_inverse_leaves() -> None:
     for lag, ahead in ((1e-3 * h, 1e-3), (100.0 * h, 0.5), (h, 1.0 - 1.0 / np.expm1(1.0))):
         model = replace(axis(), effects=(("amplifier_lag", (lag,)),))
         assert (ahead_of(model, RATE) - ahead_of(axis(), RATE)) / h == pytest.approx(ahead, abs=2e-3)
+
+
+@pytest.mark.parametrize("loop", [step_of, _run_of, _loop_of])
+def test_a_new_library_never_runs_in_the_loop_of_one_that_is_gone(loop: Callable[[Library], object], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Python gives a new library the place of a deleted one in memory; each has its own loop all the same, and a library that stays keeps it."""
+    for module in (sample_step, inverse, closed_loop):
+        monkeypatch.setattr(module, "compiled_text", lambda *_: lambda: None)
+    made = []
+    for _ in range(5):
+        library = Library([STANDARD["coulomb_friction"]])
+        made.append(loop(library))
+        assert loop(library) is made[-1]
+    assert len(set(map(id, made))) == 5

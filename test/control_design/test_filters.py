@@ -17,6 +17,8 @@ from xy_sysid.control_design.filters import best_shaper, low_pass, modes, notch,
 from xy_sysid.control_design.path import Bounds, s_curve
 from xy_sysid.control_design.sampled import coefficients, controller_response, sampled
 from xy_sysid.control_design.uncertain import samples
+from xy_sysid.control_design.use import use
+from xy_sysid.errors import BadInput
 
 RATE = 2000.0
 
@@ -49,6 +51,13 @@ def test_shapers_leave_what_their_names_promise() -> None:
     assert vibration((1.0,), (0.0,), mode.held.value, mode.held_damping) == pytest.approx(1.0)
 
 
+def test_a_frequency_whose_interval_has_no_end_may_be_any() -> None:
+    """The worst case of each shaper is all of the vibration then, not what it leaves at the best value."""
+    (mode,) = modes(known("base_resonance"))
+    endless = replace(mode, held=replace(mode.held, high=float("inf")))
+    assert [item.worst for item in shapers(endless)] == [1.0] * 4 and shapers(endless)[0].vibration < 1e-6
+
+
 def test_a_shaped_path_arrives_and_excites_less() -> None:
     """A quick move through the shaper ends at the same place, and a mass on a spring that is carried along rings a twentieth as much afterwards."""
     (mode,) = modes(known("screw_compliance"))
@@ -77,6 +86,19 @@ def test_a_notch_takes_the_resonance_and_says_what_it_costs() -> None:
 
     assert abs(response(made.frequency)) == pytest.approx(made.depth, rel=1e-3) and abs(response(0.1)) == pytest.approx(1.0, abs=1e-3)
     assert -np.degrees(np.angle(response(30.0))) == pytest.approx(made.phase_cost(30.0)) and made.phase_cost(30.0) > 0.0 and made.covers
+
+
+def test_a_resonance_that_the_sampling_cannot_show_gets_no_notch_and_a_reason() -> None:
+    """Above 0.45 of the sampling rate a notch would stand at the alias, far below: it is refused, and the loop has no filter there."""
+    for frequency in (920.0, 1500.0):
+        model = known("screw_compliance")
+        of = replace(model, model=model.model.with_effect("screw_compliance", (0.06, frequency, 0.01, 0.01)), known=())
+        (mode,) = modes(of)
+        with pytest.raises(BadInput, match="below 900 Hz"):
+            notch(mode, RATE)
+        used = use(of, rate=RATE)
+        assert used.notch is None and "below 900 Hz" in dict(used.refused)["notch"]
+        assert used.filter is None or used.filter.kind == "low-pass"
 
 
 def test_what_limits_the_bandwidth_is_named_with_its_cost() -> None:

@@ -35,6 +35,7 @@ from xy_sysid.control_design.sdf import sdf
 from xy_sysid.control_design.use import use
 from xy_sysid.effects import Effect, Parameter, law
 from xy_sysid.samples.block import FloatArray
+from xy_sysid.units import Units
 
 RATE = 2000.0
 ALL = [effect.name for effect in STANDARD.acting if effect.name != "load_side_resonance"]
@@ -101,6 +102,11 @@ def _push(size: float, x: float) -> float:
 
 
 @law
+def _divided(size: float, x: float) -> float:
+    return float(size * (x * x + 1 / 4) ** (3 / 2) * (7 / 2))
+
+
+@law
 def _strange(size: float, x: float) -> float:
     return size * float(np.sum(np.array([x, x])))
 
@@ -122,9 +128,10 @@ def _own(function: Callable[..., float]) -> AxisModel:
     return AxisModel(0.097, 1.63e-3, 236.0, library=STANDARD.extended([effect])).with_effect("own_effect")
 
 
-def test_an_effect_of_ones_own_is_printed_or_refused(tmp_path: Path) -> None:
-    """A user's law in numbers, ifs and powers goes into C; one that does more is refused in one line."""
-    of = program(_own(_push), RATE)
+@pytest.mark.parametrize("function", [_push, _divided])
+def test_an_effect_of_ones_own_is_printed_or_refused(tmp_path: Path, function: Callable[..., float]) -> None:
+    """A user's law in numbers, ifs, powers and quotients of whole numbers goes into C; one that does more is refused in one line."""
+    of = program(_own(function), RATE)
     header, text = to_c.source(of, "axis", "a test")
     (tmp_path / "axis.h").write_text(header)
     main = 'int main(void) { axis_state s; axis_reset(&s); for (int k = 0; k < 400; k++) printf("%.17g\\n", axis_step(&s, k % 50 - 20.0)); }'
@@ -187,6 +194,20 @@ def test_mujoco_says_each_effect_or_names_it_as_lost() -> None:
             assert speeds_apart(model, voltage) < 0.01, names
 
 
+@pytest.mark.parametrize("effect", [effect.name for effect in STANDARD.acting if effect.category == "force" and effect.name not in LOST])
+def test_mujoco_says_each_force_of_an_axis_that_is_wired_backwards(effect: str) -> None:
+    """The input pushes the other way, and a spring still pulls back: the same motion in MuJoCo as here, within 1 %."""
+    model = replace(axis(effect), gain=-axis().gain)
+    assert not mjcf(model, RATE).lost and speeds_apart(model, noise(1000)) < 0.01
+
+
+def test_an_axis_in_radians_turns_in_mujoco() -> None:
+    """Every joint of it is a hinge, also the one behind a resonance; those of an axis in metres slide."""
+    for output, kind in (("rad", mujoco.mjtJoint.mjJNT_HINGE), ("m", mujoco.mjtJoint.mjJNT_SLIDE)):
+        (text,) = export(use(known("base_resonance", units=Units("V", output)), limit=5.0), "mujoco").files.values()
+        assert mujoco.MjModel.from_xml_string(text).jnt_type.tolist() == [kind, kind], output
+
+
 @pytest.mark.parametrize("effect", ["coulomb_friction=0.3", "cogging=0.2", "presliding_hysteresis=0.3"])
 def test_the_circle_through_mujoco_closes(effect: str) -> None:
     """Driven with a recorded input, MuJoCo errs on held-out data at most 1.05 times as much as we do; diagnosed again, its motion has the effect."""
@@ -203,12 +224,28 @@ def test_the_circle_through_mujoco_closes(effect: str) -> None:
 
 def test_a_urdf_is_parsed_by_mujoco_and_names_what_it_loses() -> None:
     """Mass, damping, friction and limits come out of another parser; each effect that URDF cannot say is in a comment and in the note."""
-    made = export(use(known("coulomb_friction", "cogging"), limit=5.0), "urdf")
+    made = export(use(known("coulomb_friction", "cogging"), limit=5.0, travel=(-0.025, 0.025)), "urdf")
     (text,) = made.files.values()
     model = mujoco.MjModel.from_xml_string(text)
     assert model.dof_damping[0] == pytest.approx(1 / 0.097) and model.dof_frictionloss[0] == pytest.approx(0.2)
     assert model.jnt_range[0] == pytest.approx([-0.025, 0.025]) and model.body_mass[1] == pytest.approx(1 / (0.097 * 236.0))
     assert "<!-- lost: cogging" in text and "cogging" in made.note and "delay" in made.note
+
+
+@pytest.mark.parametrize("output", ["m", "rad"])
+def test_a_joint_whose_travel_nobody_knows_has_no_ends(output: str) -> None:
+    """Without a recording and without --travel no limit of the position is written, and the note says so; with a travel its ends are there."""
+    model = known(units=Units("V", output))
+    unlimited, limited = (use(model, limit=5.0, travel=ends) for ends in (None, (-0.02, 0.03)))
+    for target, lower, upper in (("sdf", "<lower>", "<upper>"), ("urdf", 'lower="', 'upper="')):
+        (free,), (ended,) = (export(used, target).files.values() for used in (unlimited, limited))
+        assert "0.025" not in free and "travel (it is not known)" in export(unlimited, target).note, target
+        assert f"{lower}-0.02" in ended and f"{upper}0.03" in ended and "travel" not in export(limited, target).note, target
+    joint = ElementTree.fromstring(next(iter(export(unlimited, "sdf").files.values()))).find("model/joint/axis/limit")
+    assert joint is not None and joint.find("lower") is None and joint.findtext("effort") == "5"
+    (text,) = export(unlimited, "urdf").files.values()
+    of = mujoco.MjModel.from_xml_string(text)
+    assert not of.jnt_limited[0] or of.jnt_range[0].tolist() == [-1e16, 1e16]
 
 
 def test_an_sdf_says_what_the_model_is_and_names_what_it_loses() -> None:
@@ -231,6 +268,16 @@ def test_an_sdf_says_what_the_model_is_and_names_what_it_loses() -> None:
     assert "<spring_reference>0.002</spring_reference><spring_stiffness>10</spring_stiffness>" in spring and [name for name, _ in lost] == ["delay"]
 
 
+def test_damping_in_sdf_and_urdf_is_the_viscous_part_alone() -> None:
+    """Neither has drag with the square of speed, so its force at 1 m/s is no part of the damping: it is named as lost."""
+    used = use(known("quadratic_drag"), limit=5.0)
+    sdf_text, urdf_text = (next(iter(export(used, target).files.values())) for target in ("sdf", "urdf"))
+    damping = ElementTree.fromstring(sdf_text).findtext("model/joint[@type='prismatic']/axis/dynamics/damping")
+    dynamics = ElementTree.fromstring(urdf_text).find("joint/dynamics")
+    assert dynamics is not None and damping == dynamics.get("damping") and float(damping or "nan") == pytest.approx(1 / 0.097)
+    assert "<!-- lost: quadratic_drag" in sdf_text
+
+
 def test_matlab_gets_parameters_and_a_function(tmp_path: Path) -> None:
     """The .mat file is read back by scipy; the function's ifs, fors and functions are all closed."""
     file = tmp_path / "axes.yaml"
@@ -251,3 +298,5 @@ def test_every_target_writes_for_an_axis_that_has_all_of_it(tmp_path: Path) -> N
     assert said.code == 0, said
     names = {path.suffix for path in (tmp_path / "out").iterdir()}
     assert {".c", ".h", ".py", ".m", ".mat", ".fmu", ".xml", ".urdf", ".sdf", ".yaml", ".cfg", ".hal", ".csv"} <= names
+    told = " ".join(said.err.split())
+    assert "axis x to odrive: " in told and "axis x to twincat: " in told and "axis x to urdf" not in told

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import ast
 import configparser
+import ctypes
 import re
+import sys
 import types
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +23,12 @@ from helpers.simulated import recorded
 import xy_sysid as xy
 from xy_sysid.control_design.compensation import left_words
 from xy_sysid.control_design.exports import export
+from xy_sysid.control_design.gains import Gains
+from xy_sysid.control_design.uncertain import Derived
 from xy_sysid.control_design.use import use
 from xy_sysid.units import Units
+
+FIVE = [(name, ctypes.c_void_p) for name in ("allocate", "deallocate", "reallocate", "zero_allocate", "state")]  # of rcutils_allocator_t
 
 
 @pytest.fixture(scope="module")
@@ -102,7 +109,31 @@ def test_a_ros2_control_snippet_is_yaml_with_the_names_of_pid_controller() -> No
     clamps = {"i_clamp_max", "i_clamp_min", "u_clamp_max", "u_clamp_min"}
     assert set(own["gains"]["x"]) == {"p", "i", "d", *clamps, "antiwindup_strategy", "feedforward_gain"}
     assert own["gains"]["x"]["feedforward_gain"] == pytest.approx(used.gains["kV"].value, rel=1e-5), "it multiplies the velocity that is asked for"
-    assert set(own) == {"dof_names", "command_interface", "reference_and_state_interfaces", "gains"}
+    assert set(own) == {"dof_names", "command_interface", "reference_and_state_interfaces", "enable_feedforward", "gains"}
+    assert own["enable_feedforward"] is True, "it is off by default, and the gain does nothing then"
+    note = export(used, "ros2_control").note
+    assert "~/set_feedforward_control" in note and "not its sum with the feedforward" in note
+
+
+@pytest.mark.parametrize("name", ["y", "no", "1", "it's"])
+def test_the_parser_of_ros_2_reads_an_axis_name_as_text(name: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """rcl reads a plain y as true and 1 as an integer; in quotes each is a name, in the list of joints and in the gains."""
+    file = tmp_path / "controllers.yaml"
+    (text,) = export(use(replace(known(), axis=name)), "ros2_control").files.values()
+    file.write_text(text)
+    own = yaml.safe_load(text)["pid_controller"]["ros__parameters"]
+    assert own["dof_names"] == [name] and list(own["gains"]) == [name]
+    library = Path(sys.prefix) / "lib" / "librcl_yaml_param_parser.so"
+    if not library.exists():
+        pytest.skip("rcl comes with the extra [ros]")
+    rcl, allocator = ctypes.CDLL(str(library)), ctypes.CDLL(str(library.with_name("librcutils.so"))).rcutils_get_default_allocator
+    allocator.restype, rcl.rcl_yaml_node_struct_init.restype = type("Allocator", (ctypes.Structure,), {"_fields_": FIVE}), ctypes.c_void_p
+    found = ctypes.c_void_p(rcl.rcl_yaml_node_struct_init(allocator()))
+    assert rcl.rcl_parse_yaml_file(str(file).encode(), found)
+    rcl.rcl_yaml_node_struct_print(found)
+    ctypes.CDLL(None).fflush(None)
+    printed = capfd.readouterr().out
+    assert f" dof_names: {name}, \n" in printed and f" gains.{name}.p: " in printed
 
 
 def test_a_klipper_snippet_is_a_section_that_its_parser_reads() -> None:
@@ -153,6 +184,22 @@ def test_a_twincat_program_is_parsed_by_blark_with_the_fields_of_fb_ctrl_pid() -
     assert "no kCos: add" in export(arm, "linuxcnc").note and "no kCos: add" in export(arm, "ros2_control").note
     with pytest.raises(xy.BadInput, match=r"rate of 2000 Hz.*--controller-rate"):
         export(use(known("coulomb_friction"), rate=2000.0), "twincat")
+
+
+def test_a_gain_that_the_data_do_not_determine_is_exported_as_0_and_named() -> None:
+    """kS whose interval holds 0 is no number for a controller; an angle and a model without intervals keep theirs, as 0 would be no better."""
+    unsure = use(known("coulomb_friction", coulomb_friction__coulomb=1.5), rate=1000.0, limit=5.0)
+    assert unsure.gains["kS"].low < 0.0 < unsure.gains["kS"].value and unsure.gains.value("kS") == 0.0
+    assert "fKS : LREAL := 0.000000000E+00; (* V, not determined by the data *)" in export(unsure, "twincat").files["x_twincat_axis.st"]
+    matlab = export(unsure, "matlab")
+    assert matlab.mat["axis_x.mat"]["gains"]["kS"] == 0.0 and matlab.mat["axis_x.mat"]["gains"]["kV"] == unsure.gains["kV"].value
+    assert "add 0 V" in export(unsure, "linuxcnc").note
+    for target in ("twincat", "matlab", "linuxcnc", "ros2_control"):
+        assert "0 stands for kS, which the data do not determine" in export(unsure, target).note, target
+    (loaded,) = export(use(known("constant_load", constant_load__load=1.5), limit=5.0), "linuxcnc").files.values()
+    assert "# bias is not determined by the data\n" in loaded and "setp pid.x.bias 0\n" in loaded
+    assert use(unknown("coulomb_friction")).gains.value("kS") == 0.2
+    assert Gains((Derived("zero", 0.5, 0.2, 0.8, "rad", "level"),)).value("zero") == 0.5
 
 
 def test_exported_source_undoes_what_is_predicted_to_help() -> None:

@@ -33,4 +33,4 @@ def test_the_tutorial_leads_from_a_csv_to_pasted_numbers(tmp_path: Path, monkeyp
     assert set(shown) == {"kS", "kV", "kA"}
     for name, value in shown.items():
         assert float(found[name]) == pytest.approx(float(value), rel=1e-3), name
-    assert "setp pid.x.FF1" in said[2].out and "dof_names: [x]" in said[3].out
+    assert "setp pid.x.FF1" in said[2].out and "dof_names: ['x']" in said[3].out

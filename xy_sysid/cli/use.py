@@ -86,6 +86,8 @@ def use(
             except BadInput as problem:
                 if to and target in to:
                     refused[f"{name} to {target}"] = str(problem)
+                else:  # --to all writes what it can
+                    say(f"axis {name} to {target}: {problem}", aside)
     binary = sorted({target for axis in files.values() for target, item in axis.items() if item.archive or item.mat})
     if binary and out is None:
         raise BadInput("--to", f"{', '.join(binary)} without a folder", "--out DIR", "These files are no text.")

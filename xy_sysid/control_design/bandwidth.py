@@ -17,7 +17,7 @@ from xy_sysid.axis.model import AxisModel
 from xy_sysid.comparison.physical_model import PhysicalModel
 from xy_sysid.control_design.closed_loop import NO_LIMIT, Encoder
 from xy_sysid.control_design.feedback import USUAL, Asked, Feedback, feedback
-from xy_sysid.control_design.filters import LoopFilter, Swing, low_pass, notch
+from xy_sysid.control_design.filters import HIGHEST, LoopFilter, Swing, low_pass, notch
 from xy_sysid.control_design.sampled import sampled
 from xy_sysid.errors import BadInput
 
@@ -76,8 +76,9 @@ def with_filter(
     """The notch or low-pass with which the loop reaches the highest crossover, and that loop; None if none reaches more than ``without`` one."""
     best: tuple[LoopFilter, Feedback] | None = None
     for mode in modes:
-        highest = 0.45 * sampling_rate
-        for tried in (notch(mode, sampling_rate), *(low_pass(min(part * mode.free.value, highest), sampling_rate) for part in PASSED)):
+        highest = HIGHEST * sampling_rate
+        notches = [notch(mode, sampling_rate)] if mode.free.value < highest else []
+        for tried in (*notches, *(low_pass(min(part * mode.free.value, highest), sampling_rate) for part in PASSED)):
             try:
                 loop = feedback(model, sampling_rate, without.asked, tried.section[None, :], encoder, limit)
             except BadInput:

@@ -6,6 +6,7 @@ import inspect
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cache
 
 import numpy as np
 
@@ -113,14 +114,10 @@ def {name}(path, extra, gains, sections, noise, count, behind, p, on, z, a, stil
 """
 
 
-_COMPILED: dict[int, Callable[..., None]] = {}
-
-
+@cache
 def _loop_of(library: Library) -> Callable[..., None]:
-    if id(library) not in _COMPILED:
-        step = step_of(library)
-        _COMPILED[id(library)] = compiled_text(loop_text, {"math": math, "np": np, "step": step}, [inspect.getsource(loop_text), step.__name__])
-    return _COMPILED[id(library)]
+    step = step_of(library)
+    return compiled_text(loop_text, {"math": math, "np": np, "step": step}, [inspect.getsource(loop_text), step.__name__])
 
 
 def follow_path(

@@ -100,21 +100,22 @@ def matlab_source(used: Used) -> Exported:
     intervals = {item.name.replace(".", "_"): [item.low, item.high] for item in used.model.parameters}
     known = {"parameters": values, "rate": used.sampling_rate}
     content = {**known, "ci95": intervals} if intervals else known
-    gains = {item.name.replace(" ", "_"): item.value for item in used.gains.items}
+    gains = {item.name.replace(" ", "_"): used.gains.value(item.name) for item in used.gains.items}
     note = f"load {name}.mat for the numbers; {name}.m is one function for scripts and MATLAB Function blocks; {_inverse_note(used)}"
+    note += f"; {used.gains.doubt}" if used.gains.doubt else ""
     return Exported({f"{name}.m": to_matlab.source(of, name, title)}, note, mat={f"{name}.mat": {**content, "gains": gains}})
 
 
 def mujoco(used: Used) -> Exported:
     """MJCF."""
-    made = mjcf(used.model.model, used.sampling_rate)
+    made = mjcf(used.model.model, used.sampling_rate, used.model.units.output == "rad")
     note = f"hold the input for {made.steps} steps of the simulation; {_losses(made.lost)}"
     return Exported({f"{plain_name(used.axis)}.xml": made.text}, note)
 
 
 def robot(used: Used) -> Exported:
     """URDF."""
-    text, lost = urdf(used.model.model, used.travel, used.limit, used.model.units.output == "rad")
+    text, lost = urdf(used.model.model, used.travel, used.limit, used.model.units.output == "rad", ends=used.travel_known)
     return Exported({f"{plain_name(used.axis)}.urdf": text}, _losses(lost))
 
 
@@ -132,7 +133,7 @@ def observer(used: Used) -> Exported:
 
 def gazebo(used: Used) -> Exported:
     """SDF."""
-    text, lost = sdf(used.model.model, used.travel, used.limit, used.model.units.output == "rad")
+    text, lost = sdf(used.model.model, used.travel, used.limit, used.model.units.output == "rad", ends=used.travel_known)
     return Exported({f"{plain_name(used.axis)}.sdf": text}, _losses(lost))
 
 

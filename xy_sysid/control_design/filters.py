@@ -19,11 +19,13 @@ from xy_sysid.comparison.physical_model import PhysicalModel
 from xy_sysid.control_design.path import SampledPath, of_position
 from xy_sysid.control_design.sample_step import sections
 from xy_sysid.control_design.uncertain import Derived, derive
+from xy_sysid.errors import BadInput
 from xy_sysid.samples.block import FloatArray
 
 TOLERATED = 0.05  # of the unshaped vibration that an EI shaper leaves at its own frequency (Klipper: 1 / 20)
 WIDEST, NARROWEST = 0.7, 0.05  # damping ratio of a notch's poles
 UNIT = 1.0  # rad/s, the rate at which roots are asked for
+HIGHEST = 0.45  # of the sampling rate: frequency of a filter in the loop
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +66,7 @@ class Shaper:
     """Pulses that replace one.
 
     name: zv, mzv, zvd or ei; frequency: Hz; damping: ratio; amplitudes, times: (k,) sum 1, s
-    vibration: part of the unshaped residual vibration that is left at the frequency; worst: over the interval of the frequency
+    vibration: part of the unshaped residual vibration that is left at the frequency; worst: over the interval of the frequency, 1 if that has no end
     """
 
     name: str
@@ -126,15 +128,18 @@ def notch(mode: Swing, sampling_rate: float) -> LoopFilter:
     """The notch of a mode's resonance, as deep as the resonance is high and as wide as its interval.
 
     Its zeros have the damping of the resonance. Source: Franklin, Powell & Emami-Naeini, Feedback Control of Dynamic Systems, 7th ed., sec. 6.7.
+    Raises BadInput for a resonance that lies too high for the sampling rate: the loop would have the notch at its alias.
     """
     f = mode.free.value
+    if f >= HIGHEST * sampling_rate:
+        allowed = f"below {HIGHEST * sampling_rate:g} Hz, which is {HIGHEST:g} of the sampling rate"
+        raise BadInput("notch", f"for a resonance at {f:.4g} Hz", allowed, "Sample faster, or leave it out.")
     spread = max(mode.free.high - f, f - mode.free.low) / f
     width = min(max(NARROWEST, 2.0 * spread, 4.0 * mode.free_damping), WIDEST)
     w = 2.0 * math.pi * f
     top = [1.0, 2.0 * mode.free_damping * w, w * w]
     bottom = [1.0, 2.0 * width * w, w * w]
-    warp = w / (2.0 * math.tan(0.5 * w / sampling_rate)) if w < math.pi * sampling_rate * 0.95 else sampling_rate
-    b, a = scipy.signal.bilinear(top, bottom, warp)
+    b, a = scipy.signal.bilinear(top, bottom, w / (2.0 * math.tan(0.5 * w / sampling_rate)))
     section = np.array([b[0], b[1], b[2], a[1], a[2]])
     return LoopFilter(
         kind="notch",
@@ -176,8 +181,8 @@ def shapers(mode: Swing) -> tuple[Shaper, ...]:
     for name, (sizes, places) in kinds.items():
         amplitudes = tuple(size / sum(sizes) for size in sizes)
         times = tuple(place * period for place in places)
-        ends = [f, *(end for end in (mode.held.low, mode.held.high) if math.isfinite(end) and end > 0.0)]
-        left = [vibration(amplitudes, times, end, damping) for end in ends]
+        ends = f, mode.held.low, mode.held.high
+        left = [vibration(amplitudes, times, at, damping) if math.isfinite(at) and at > 0.0 else 1.0 for at in ends]
         found.append(Shaper(name=name, frequency=f, damping=damping, amplitudes=amplitudes, times=times, vibration=left[0], worst=max(left)))
     return tuple(found)
 

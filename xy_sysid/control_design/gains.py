@@ -16,10 +16,11 @@ from xy_sysid.axis.model import AxisModel
 from xy_sysid.comparison.physical_model import PhysicalModel
 from xy_sysid.control_design.laws import ask, asks, force, friction, of_category
 from xy_sysid.control_design.path import SampledPath
-from xy_sysid.control_design.uncertain import Derived, derive
+from xy_sysid.control_design.uncertain import Derived, derive, is_determined
 from xy_sysid.samples.block import FloatArray
 
 USUAL_SPEED = 1.0  # V of the steady state whose speed is usual, where nobody says another
+ANGLE = "zero"  # the name of the angle at which an arm is level
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,8 +33,18 @@ class Gains:
         return next(item for item in self.items if item.name == name)
 
     def value(self, name: str) -> float:
-        """Of a gain; 0 of one that this axis does not have."""
-        return next((item.value for item in self.items if item.name == name), 0.0)
+        """Of a gain; 0 of one that this axis does not have, or that is in ``unsure``."""
+        return next((item.value for item in self.items if item.name == name and name not in self.unsure), 0.0)
+
+    @property
+    def unsure(self) -> tuple[str, ...]:
+        """Names of the gains that the data do not determine. An angle is none of them: 0 is an angle like any other."""
+        return tuple(item.name for item in self.items if item.name != ANGLE and not is_determined(item.value, item.low, item.high))
+
+    @property
+    def doubt(self) -> str:
+        """Says of exported numbers which of them are 0 for want of better ones; empty if none is."""
+        return f"0 stands for {', '.join(self.unsure)}, which the data do not determine" if self.unsure else ""
 
 
 def gains(model: PhysicalModel, speed: float | None = None) -> Gains:
@@ -63,7 +74,7 @@ def gains(model: PhysicalModel, speed: float | None = None) -> Gains:
         found.append(derive(model, "kG", "V", "holds the constant load", lambda of: force(of, 0.0, 0.0, of_speed=False, by_place=False)))
     if any(effect.angular for effect, _ in of_category(centre, "force")):
         found.append(derive(model, "kCos", "V", "holds the arm level", lambda of: math.hypot(*_turning(of))))
-        found.append(derive(model, "zero", "rad", "angle at which the arm is level", lambda of: math.atan2(_turning(of)[0], _turning(of)[1])))
+        found.append(derive(model, ANGLE, "rad", "angle at which the arm is level", lambda of: math.atan2(_turning(of)[0], _turning(of)[1])))
     return Gains(tuple(found))
 
 
@@ -84,5 +95,5 @@ def simple_feedforward(found: Gains, path: SampledPath, friction_too: bool = Tru
         + found.value("kV") * path.speed
         + found.value("kA") * path.acceleration
         + found.value("kG")
-        + found.value("kCos") * np.cos(path.position - found.value("zero"))
+        + found.value("kCos") * np.cos(path.position - found.value(ANGLE))
     )

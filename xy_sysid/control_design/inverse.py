@@ -6,6 +6,7 @@ import inspect
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -88,16 +89,12 @@ def not_undone(model: AxisModel) -> tuple[tuple[str, str], ...]:
     return tuple(found)
 
 
-_COMPILED: dict[int, Callable[..., None]] = {}
-
-
+@cache
 def _run_of(library: Library) -> Callable[..., None]:
-    if id(library) not in _COMPILED:
-        writer = InverseText(library.acting, most_hanging(library.acting))
-        names = {"math": math, "np": np, **SERIES, **law_names(library.acting)}
-        parts = [*law_texts(library.acting), inspect.getsource(series)]
-        _COMPILED[id(library)] = compiled_text(lambda name: _along(writer, name), names, parts)
-    return _COMPILED[id(library)]
+    writer = InverseText(library.acting, most_hanging(library.acting))
+    names = {"math": math, "np": np, **SERIES, **law_names(library.acting)}
+    parts = [*law_texts(library.acting), inspect.getsource(series)]
+    return compiled_text(lambda name: _along(writer, name), names, parts)
 
 
 def _along(writer: InverseText, name: str) -> str:

@@ -49,8 +49,8 @@ class Mjcf:
     lost: tuple[tuple[str, str], ...]
 
 
-def mjcf(model: AxisModel, sampling_rate: float, name: str = "axis") -> Mjcf:
-    """The model for one input ``drive`` that is held for a sample, and one joint whose position is the axis'."""
+def mjcf(model: AxisModel, sampling_rate: float, angular: bool = False, name: str = "axis") -> Mjcf:
+    """The model for one input ``drive`` that is held for a sample, and one joint whose position is the axis'; angular: it turns, and is in rad."""
     said = Said()
     _forces(model, said)
     turn = math.copysign(1.0, model.gain)
@@ -60,12 +60,12 @@ def mjcf(model: AxisModel, sampling_rate: float, name: str = "axis") -> Mjcf:
     for effect, _ in of_category(model, "encoder"):
         said.lost.append((effect.name, "the joint's position is where the axis is, not what a scale shows"))
     mass, drag, hung = _bodies(model, said)
-    behind, tendon = _behind(hung, name)
+    kind = 'type="hinge" axis="0 0 1"' if angular else 'type="slide" axis="1 0 0"'
+    behind, tendon = _behind(hung, name, kind)
     steps = _steps(model, sampling_rate, 2.0 * FINE if dry == 0.0 and lag is None else RUBBING)
-    bend, spring = _spring(said.polynomial)
+    bend, spring = _spring(said.polynomial, turn)
     curve = f" {_num(said.square)} 0" if said.square else ""
     step = 1.0 / (sampling_rate * steps)
-    joint = 'type="hinge" axis="0 0 1"' if any(effect.angular for effect, _ in of_category(model, "force")) else 'type="slide" axis="1 0 0"'
     drive = [f'name="drive" joint="{name}" gear="{turn:g}" gainprm="1" biastype="affine" biasprm="{_num(-bend)} 0 0"']
     if model.delay > 0.0:
         whole = round(model.delay / step)
@@ -90,7 +90,7 @@ def mjcf(model: AxisModel, sampling_rate: float, name: str = "axis") -> Mjcf:
         f'  <option timestep="{step!r}" gravity="0 0 0" integrator="{integrator}"/>',
         "  <worldbody>",
         f'    <body name="{name}">',
-        f'      <joint name="{name}" {joint} damping="{_num(drag)}{curve}"{spring}{held}/>',
+        f'      <joint name="{name}" {kind} damping="{_num(drag)}{curve}"{spring}{held}/>',
         f"      {moving}",
         "    </body>",
         *behind,
@@ -176,15 +176,18 @@ def _power(effect: Effect, values: tuple[float, ...], model: AxisModel, said: Sa
         said.polynomial += found
 
 
-def _spring(polynomial: FloatArray) -> tuple[float, str]:
-    """Constant force, V, and the joint's attributes for the rest: MuJoCo's spring is k0 d + k2 d^3 around its reference."""
+def _spring(polynomial: FloatArray, turn: float) -> tuple[float, str]:
+    """Constant force, V, and the joint's attributes for the rest: MuJoCo's spring is k0 d + k2 d^3 around its reference.
+
+    turn: sign of the gain; the constant goes through the drive, which has that sign, and the spring acts on the joint itself
+    """
     p0, p1, p2, p3 = polynomial.tolist()
     where = -p2 / (3.0 * p3) if abs(p3) > EXACT * abs(p2) else 0.0
     constant = float(np.polynomial.polynomial.polyval(where, polynomial))
     linear = p1 + 2.0 * p2 * where + 3.0 * p3 * where * where
     if linear == 0.0 and p3 == 0.0:
         return p0, ""
-    return constant, f' springref="{_num(where)}" stiffness="{_num(linear)} 0 {_num(p3)}"'
+    return constant, f' springref="{_num(where)}" stiffness="{_num(turn * linear)} 0 {_num(turn * p3)}"'
 
 
 def _friction(model: AxisModel, said: Said) -> float | tuple[float, ...]:
@@ -280,14 +283,14 @@ def _bodies(model: AxisModel, said: Said) -> tuple[float, float, Hung | None]:
     return own, drag - shared, Hung((own, stiffness * z2), (drag - shared, shared), stiffness, stiffness * z1 - shared)
 
 
-def _behind(hung: Hung | None, name: str) -> tuple[list[str], list[str]]:
+def _behind(hung: Hung | None, name: str, kind: str) -> tuple[list[str], list[str]]:
     """Lines of the second body, and of the spring between the two."""
     if hung is None:
         return [], []
     mass = _num(hung.masses[1])
     body = [
         '    <body name="behind">',
-        f'      <joint name="behind" type="slide" axis="1 0 0" damping="{_num(hung.drags[1])}"/>',
+        f'      <joint name="behind" {kind} damping="{_num(hung.drags[1])}"/>',
         f'      <inertial pos="0 0 0" mass="{mass}" diaginertia="{mass} {mass} {mass}"/>',
         "    </body>",
     ]

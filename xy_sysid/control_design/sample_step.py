@@ -6,6 +6,7 @@ import inspect
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -136,17 +137,13 @@ def most_hanging(effects: tuple[Effect, ...]) -> int:
     return 2 * sum(effect.category == "motion" for effect in effects)
 
 
-_COMPILED: dict[int, Callable[..., float]] = {}
-
-
+@cache
 def step_of(library: Library) -> Callable[..., float]:
     """The compiled sample step of all effects of a library; see ``StepText.text``."""
-    if id(library) not in _COMPILED:
-        writer = StepText(library.acting, most_hanging(library.acting))
-        names = {"math": math, "np": np, **SERIES, **law_names(library.acting)}
-        parts = [*law_texts(library.acting), inspect.getsource(series)]
-        _COMPILED[id(library)] = compiled_text(lambda name: writer.text(name), names, parts)
-    return _COMPILED[id(library)]
+    writer = StepText(library.acting, most_hanging(library.acting))
+    names = {"math": math, "np": np, **SERIES, **law_names(library.acting)}
+    parts = [*law_texts(library.acting), inspect.getsource(series)]
+    return compiled_text(lambda name: writer.text(name), names, parts)
 
 
 def simulate_alone(model: AxisModel, sampling_rate: float, voltage: FloatArray, start: float = 0.0) -> FloatArray:

@@ -10,15 +10,17 @@ import math
 import numpy as np
 
 from xy_sysid.axis.model import AxisModel
-from xy_sysid.control_design.laws import along, asks, force, friction, largest_voltage
+from xy_sysid.control_design.laws import along, asks, friction, largest_voltage
 from xy_sysid.effects._contract import Effect
 
 PLACES = 101  # at which a spring is asked whether it is straight
 STRAIGHT = 1e-6  # of its force at the end of the travel: a spring that bends less is one number
 
 
-def sdf(model: AxisModel, travel: tuple[float, float], limit: float, angular: bool, name: str = "axis") -> tuple[str, tuple[tuple[str, str], ...]]:
-    """(text, what is lost by effect); travel: m or rad; limit: of the drive, infinite if nobody knows it."""
+def sdf(
+    model: AxisModel, travel: tuple[float, float], limit: float, angular: bool, name: str = "axis", ends: bool = True
+) -> tuple[str, tuple[tuple[str, str], ...]]:
+    """(text, what is lost by effect); travel: m or rad; limit: of the drive, infinite if nobody knows it; ends: whether the travel ends there."""
     level = 0.5 * (friction(model, abs(model.gain), 1.0) + friction(model, -abs(model.gain), -1.0))
     places = np.linspace(*travel, PLACES)
     pull = along(model, places, "force") * math.copysign(1.0, model.gain)
@@ -28,11 +30,13 @@ def sdf(model: AxisModel, travel: tuple[float, float], limit: float, angular: bo
     lost = [(effect, _lost(model.library[effect])) for effect, _ in model.effects if not (straight and _spring(model.library[effect]))]
     if model.delay > 0.0:
         lost.append(("delay", "SDF knows none"))
+    if not ends:
+        lost.append(("travel", "it is not known"))
     top = min(limit, largest_voltage(model))
     effort = top if math.isfinite(top) else 1e3 / abs(model.gain)
     mass = 1.0 / (abs(model.gain) * model.pole)
     spring = f"<spring_reference>{-offset / stiffness:.9g}</spring_reference><spring_stiffness>{stiffness:.9g}</spring_stiffness>" if straight else ""
-    damping = 1.0 / abs(model.gain) + 0.5 * sum(side * force(model, side, 0.0, of_speed=True) for side in (1.0, -1.0))
+    between = f"<lower>{travel[0]:.9g}</lower><upper>{travel[1]:.9g}</upper>" if ends else ""
     lines = [
         '<?xml version="1.0"?>',
         '<sdf version="1.9">',
@@ -49,9 +53,9 @@ def sdf(model: AxisModel, travel: tuple[float, float], limit: float, angular: bo
         f'    <joint name="{name}_joint" type="{"revolute" if angular else "prismatic"}">',
         f"      <parent>base</parent><child>{name}</child>",
         f"      <axis><xyz>{'0 0 1' if angular else '1 0 0'}</xyz>",
-        f"        <limit><lower>{travel[0]:.9g}</lower><upper>{travel[1]:.9g}</upper><effort>{effort:.9g}</effort>",
+        f"        <limit>{between}<effort>{effort:.9g}</effort>",
         f"          <velocity>{abs(model.gain) * effort:.9g}</velocity></limit>",
-        f"        <dynamics><damping>{damping:.9g}</damping><friction>{level:.9g}</friction>{spring}</dynamics>",
+        f"        <dynamics><damping>{1.0 / abs(model.gain):.9g}</damping><friction>{level:.9g}</friction>{spring}</dynamics>",
         "      </axis>",
         "    </joint>",
         "  </model>",

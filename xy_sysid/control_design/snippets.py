@@ -44,15 +44,17 @@ def ros2_control(of: Designed) -> Snippet:
     limit = loop.controller.limit
     bound = f"{limit:.6g}" if limit < NO_LIMIT else ".inf"
     low = f"-{limit:.6g}" if limit < NO_LIMIT else "-.inf"
+    name = "'" + of.axis.replace("'", "''") + "'"  # in quotes: the parser of ROS 2 reads a plain y or no as a bool, and 1 as an integer
     lines = [
         f"# u = p e + i int(e) + d de/dt in {of.units.input}, e in {of.units.output}, at {loop.sampling_rate:g} Hz",
         "pid_controller:",
         "  ros__parameters:",
-        f"    dof_names: [{of.axis}]",
+        f"    dof_names: [{name}]",
         "    command_interface: effort",
         "    reference_and_state_interfaces: [position, velocity]",
+        "    enable_feedforward: true",
         "    gains:",
-        f"      {of.axis}:",
+        f"      {name}:",
         f"        p: {loop.controller.kp:.6g}",
         f"        i: {loop.controller.ki:.6g}",
         f"        d: {loop.controller.kd:.6g}",
@@ -61,10 +63,11 @@ def ros2_control(of: Designed) -> Snippet:
         f"        u_clamp_max: {bound}",
         f"        u_clamp_min: {low}",
         "        antiwindup_strategy: conditional_integration",
-        f"        feedforward_gain: {of.gains.value('kV'):.6g}",
+        f"        feedforward_gain: {of.gains.value('kV'):.6g}{_unsure(of, 'kV', '  # ')}",
     ]
     note = (
-        "feedforward_gain is kV: the controller multiplies the velocity that is asked for by it; "
+        "feedforward_gain is kV: the controller multiplies the velocity that is asked for by it, once enable_feedforward is true; a version "
+        "without this parameter has the service ~/set_feedforward_control instead. u_clamp limits the PID alone, not its sum with the feedforward; "
         f"kS and kA have no place in it, add them in a controller of your own.{_gravity(of)} {_unfiltered(loop)}"
     )
     return Snippet("ros2_control", "controllers.yaml", "\n".join(lines) + "\n", note)
@@ -100,6 +103,8 @@ def linuxcnc(of: Designed) -> Snippet:
         "maxoutput": loop.controller.limit if loop.controller.limit < NO_LIMIT else 0.0,
     }
     lines = [f"# command in {of.units.input}, position in {length}; run the thread at {loop.sampling_rate:g} Hz"]
+    unsure = {name: _unsure(of, gain) for name, gain in (("FF1", "kV"), ("FF2", "kA"), ("bias", "kG"))}
+    lines += [f"# {name} is {doubt}" for name, doubt in unsure.items() if doubt]
     lines += [f"setp pid.{at}.{name} {value:.6g}" for name, value in values.items()]
     note = (
         f"pid has no kS: add {of.gains.value('kS'):.4g} {of.units.input} with the sign of the commanded velocity.{_gravity(of)} {_unfiltered(loop)}"
@@ -122,7 +127,7 @@ def odrive(of: Designed) -> Snippet:
         f"{at}.controller.config.pos_gain = {loop.position_gain:.6g}",
         f"{at}.controller.config.vel_gain = {torque}{loop.velocity_gain * TURN:.6g}",
         f"{at}.controller.config.vel_integrator_gain = {torque}{loop.velocity_integral * TURN:.6g}",
-        f"{at}.controller.config.inertia = {torque}{of.gains.value('kA') * TURN:.6g}",
+        f"{at}.controller.config.inertia = {torque}{of.gains.value('kA') * TURN:.6g}{_unsure(of, 'kA', '  # ')}",
     ]
     note = (
         "ODrive's loops run at 8 kHz: these gains keep their margins there; its inertia is what kA is here, per turn. "
@@ -189,25 +194,32 @@ def twincat(of: Designed) -> Snippet:
         "END_PROGRAM",
     ]
     left = f"a phase margin of {loop.counted.phase:.3g} degrees and a gain margin of {loop.counted.gain:.3g} are left"
-    note = f"needs Tc2_ControllerToolbox; its times are whole milliseconds, so {left}; its integral stops at the limit"
+    doubt = f"; {of.gains.doubt}" if of.gains.doubt else ""
+    note = f"needs Tc2_ControllerToolbox; its times are whole milliseconds, so {left}; its integral stops at the limit{doubt}"
     return Snippet("twincat", "axis.st", "\n".join(lines) + "\n", note)
 
 
 def _feedforward(of: Designed, per: float, length: str) -> list[tuple[str, float, str]]:
     unit = of.units.input
     return [
-        ("fKS", of.gains.value("kS"), unit),
-        ("fKV", of.gains.value("kV") * per, f"{unit}/({length}/s)"),
-        ("fKA", of.gains.value("kA") * per, f"{unit}/({length}/s2)"),
-        ("fKG", of.gains.value("kG"), unit),
+        ("fKS", of.gains.value("kS"), f"{unit}{_unsure(of, 'kS', ', ')}"),
+        ("fKV", of.gains.value("kV") * per, f"{unit}/({length}/s){_unsure(of, 'kV', ', ')}"),
+        ("fKA", of.gains.value("kA") * per, f"{unit}/({length}/s2){_unsure(of, 'kA', ', ')}"),
+        ("fKG", of.gains.value("kG"), f"{unit}{_unsure(of, 'kG', ', ')}"),
         *([("fKCos", of.gains.value("kCos"), unit), ("fZero", of.gains.value("zero"), length)] if of.gains.value("kCos") else []),
     ]
 
 
 def _gravity(of: Designed) -> str:
-    """What has to be added for an arm, where the target has no place for it."""
+    """What has to be added for an arm, where the target has no place for it; and which gains are 0 for want of better ones."""
     size, zero = of.gains.value("kCos"), of.gains.value("zero")
-    return f" It has no kCos: add {size:.4g} {of.units.input} times the cosine of the angle minus {zero:.4g} rad." if size else ""
+    arm = f" It has no kCos: add {size:.4g} {of.units.input} times the cosine of the angle minus {zero:.4g} rad." if size else ""
+    return f"{arm} {of.gains.doubt}." if of.gains.doubt else arm
+
+
+def _unsure(of: Designed, gain: str, before: str = "") -> str:
+    """A comment on a gain that the data do not determine; before: what goes before it."""
+    return f"{before}not determined by the data" if gain in of.gains.unsure else ""
 
 
 def _identifier(axis: str) -> str:

@@ -56,6 +56,12 @@ class CPrinter(Printer):
     def place(self, array: str, index: ast.expr) -> str:
         return f"{array}[{self.expression(index)}]"
 
+    def arithmetic(self, node: ast.BinOp) -> str:
+        """A quotient is never one of whole numbers, which C would round."""
+        if isinstance(node.op, ast.Div):
+            return f"((double){self.expression(node.left)} / {self.expression(node.right)})"
+        return super().arithmetic(node)
+
     def power(self, left: str, right: str) -> str:
         return f"pow({left}, {right})"
 

@@ -8,17 +8,24 @@ from xy_sysid.axis.model import AxisModel
 from xy_sysid.control_design.laws import friction, largest_voltage
 from xy_sysid.effects._contract import Effect
 
+ENDLESS = 1e16  # m: end of a joint that has none, as URDF asks for one; SDF takes this number by default
 
-def urdf(model: AxisModel, travel: tuple[float, float], limit: float, angular: bool, name: str = "axis") -> tuple[str, tuple[tuple[str, str], ...]]:
-    """(text, what is lost by effect); travel: m or rad; limit: of the drive, infinite if nobody knows it."""
+
+def urdf(
+    model: AxisModel, travel: tuple[float, float], limit: float, angular: bool, name: str = "axis", ends: bool = True
+) -> tuple[str, tuple[tuple[str, str], ...]]:
+    """(text, what is lost by effect); travel: m or rad; limit: of the drive, infinite if nobody knows it; ends: whether the travel ends there."""
     level = 0.5 * (friction(model, abs(model.gain), 1.0) + friction(model, -abs(model.gain), -1.0))
     lost = [(effect, _lost(model.library[effect])) for effect, _ in model.effects]
     if model.delay > 0.0:
         lost.append(("delay", "URDF knows none"))
+    if not ends:
+        lost.append(("travel", "it is not known"))
     top = min(limit, largest_voltage(model))
     effort = top if math.isfinite(top) else 1e3 / abs(model.gain)
     mass = 1.0 / (abs(model.gain) * model.pole)
-    kind = "revolute" if angular else "prismatic"
+    kind = ("revolute" if ends else "continuous") if angular else "prismatic"
+    low, high = travel if ends else (-ENDLESS, ENDLESS)
     axis = "0 0 1" if angular else "1 0 0"
     inertia = f'ixx="{mass:.9g}" ixy="0" ixz="0" iyy="{mass:.9g}" iyz="0" izz="{mass:.9g}"'
     lines = [
@@ -32,7 +39,7 @@ def urdf(model: AxisModel, travel: tuple[float, float], limit: float, angular: b
         "  </link>",
         f'  <joint name="{name}" type="{kind}">',
         f'    <parent link="base"/><child link="{name}"/><axis xyz="{axis}"/>',
-        f'    <limit lower="{travel[0]:.9g}" upper="{travel[1]:.9g}" effort="{effort:.9g}" velocity="{abs(model.gain) * effort:.9g}"/>',
+        f'    <limit lower="{low:.9g}" upper="{high:.9g}" effort="{effort:.9g}" velocity="{abs(model.gain) * effort:.9g}"/>',
         f'    <dynamics damping="{1.0 / abs(model.gain):.9g}" friction="{level:.9g}"/>',
         "  </joint>",
         "</robot>",

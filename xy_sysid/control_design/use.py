@@ -44,7 +44,8 @@ class Used:
     """What to do with a model; ``axis`` and ``model.units`` say of what.
 
     sampling_rate: Hz of the controller; limit: V of the drive, infinite if nobody knows it; limit_from: who said so
-    travel: m, that tables and paths cover; gains, friction, tables, gap: feedforward and corrections (None: the axis has none)
+    travel: m, that tables and paths cover; travel_known: False where nobody said it, and it is a usual one
+    gains, friction, tables, gap: feedforward and corrections (None: the axis has none)
     feedback, states (state feedback with an observer), modes, notch, shapers (of the lowest mode; shaper: the best), fastest: None or none where
     there is nothing to design, or where it was refused
     allowed: what limits the bandwidth, and what each part of the axis costs; filter, filtered: the notch or low-pass with which the loop reaches the
@@ -60,6 +61,7 @@ class Used:
     limit: float
     limit_from: str
     travel: tuple[float, float]
+    travel_known: bool
     gains: Gains
     friction: Correction | None
     tables: tuple[Correction, ...]
@@ -150,6 +152,7 @@ def use(
         limit=drive if drive < NO_LIMIT else math.inf,
         limit_from=drive_from,
         travel=between,
+        travel_known=travel is not None or run is not None,
         gains=found,
         friction=friction_table(model, max(0.5 * min(drive, 4.0) * abs(model.model.gain), 1e-12)),
         tables=(*position_tables(model, between), *([] if table is None else [table.correction(model)])),
@@ -157,7 +160,7 @@ def use(
         feedback=loop,
         states=_tried("state feedback", lambda: state_feedback(model, rate, asked), refused),
         modes=swings,
-        notch=notch(swings[0], rate) if swings and loop is not None else None,
+        notch=_tried("notch", lambda: notch(swings[0], rate), refused) if swings and loop is not None else None,
         allowed=None if loop is None else _tried("bandwidth", lambda: bandwidth_of(model, rate, loop.nominal.crossover, asked), refused),
         filter=None if better is None else better[0],
         filtered=None if better is None else better[1],
