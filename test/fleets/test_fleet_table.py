@@ -59,6 +59,13 @@ def test_a_recording_that_was_moved_and_done_by_another_version_is_no_second_one
     assert table(tmp_path, "source") == [("new/a.npz",), ("new/b.npz",)]
 
 
+def test_one_file_under_the_names_of_two_axes_is_two_recordings(tmp_path: Path) -> None:
+    """In whatever order they come."""
+    merged(tmp_path, [row("x.npz", file_sha256="same")])
+    merged(tmp_path, [row("y.npz", file_sha256="same", axis="y")])
+    assert table(tmp_path, "axis", "source") == [("x", "x.npz"), ("y", "y.npz")]
+
+
 def test_rows_without_a_date_come_first(tmp_path: Path) -> None:
     merged(tmp_path, [row("a.npz"), row("b.npz", date=None)])
     merged(tmp_path, [row("c.npz", date=None), row("d.npz", machine="mill-00")])

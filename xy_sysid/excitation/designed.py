@@ -9,12 +9,12 @@ from collections.abc import Mapping
 from typing import Any, Protocol
 
 from xy_sysid.errors import BadInput
+from xy_sysid.samples.recording import SAME_RATE
 from xy_sysid.settings import AxisExcitation, ExcitationSettings, changed, unknown_name
 from xy_sysid.units import USUAL, Units
 
 KEYS = ("axis", "rate", "seconds", "excitation", "needs", "units", "expects", "sets", "made_by")
 DRIVES = ("kind", "rms", "low", "high", "period", "steps", "offset", "seed", "centring", "slow", "slow_period")  # settings that it may have
-SAME_RATE = 1e-3  # relative, as of streams that belong together
 AGAIN = "Design it again within these limits: xy-sysid next with --params."
 
 

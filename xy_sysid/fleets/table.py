@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 ENDING = ".parquet"
 ORDER = ["machine", "axis", "date", "source"]
-KNOWS = ("source", "file_sha256", "date")  # what makes a recording the same one
+KNOWS = ("source", "file_sha256", "date", "axis")  # what makes a recording the same one
 NAMED = re.compile(r"[^\w.-]+")
 
 
@@ -106,11 +106,11 @@ def _files(folder: Path) -> list[Path]:
     return files
 
 
-def _of_file(file: Path) -> pyarrow.Table:
-    """A machine's file. Raises BadRecording."""
+def _of_file(file: Path, names: Sequence[str] | None = None) -> pyarrow.Table:
+    """A machine's file; names: of the columns that are wanted, as far as it has them, None is all. Raises BadRecording."""
     pa = arrow()
     try:
-        return pa.parquet.read_table(file, partitioning=None)
+        return pa.parquet.read_table(file, columns=None if names is None else list(names), partitioning=None)
     except (OSError, pa.ArrowException) as error:
         act = "Remove it, and run xy-sysid fleet again."
         raise BadRecording(file, f"cannot be read as Parquet ({_first_line(error)})", act) from None
@@ -133,21 +133,25 @@ def merged(folder: Path, rows: Iterable[Row], library: Library = STANDARD) -> No
     places = {folder / file_name(machine): own for machine, own in new.items()}
     for path in sorted({*_files(folder), *places}):
         own = _each_once(places.get(path, []))
-        copies = {(row["file_sha256"], row.get("date")) for row in own if row.get("file_sha256")}
-        if path.is_file():
-            there = _of_file(path)
-            if set(KNOWS) - {*there.column_names}:
-                raise BadRecording(path, f"not all of the columns {', '.join(KNOWS)}", "Remove it, or choose another folder for the table.")
-            found = (there[name].to_pylist() for name in KNOWS)
-            stays = [source not in sources and (content, date) not in copies for source, content, date in zip(*found, strict=True)]
-            if all(stays) and not own:
-                continue
-            if not any(stays) and not own:
-                path.unlink()
-                continue
-            write(_together(there.filter(stays), as_table(own, library)), path)
-        else:
+        stays = _stay(path, sources, own) if path.is_file() else []
+        if own and any(stays):
+            write(_together(_of_file(path).filter(stays), as_table(own, library)), path)
+        elif own:
             write(as_table(own, library), path)
+        elif not any(stays):
+            path.unlink()
+        elif not all(stays):
+            write(_of_file(path).filter(stays), path)
+
+
+def _stay(path: Path, sources: Collection[str], own: Sequence[Row]) -> list[bool]:
+    """For each row of a machine's file whether none of its new rows, nor of the sources of all new rows, takes its place."""
+    there = _of_file(path, KNOWS)
+    if set(KNOWS) - {*there.column_names}:
+        raise BadRecording(path, f"not all of the columns {', '.join(KNOWS)}", "Remove it, or choose another folder for the table.")
+    copies = {tuple(row.get(name) for name in KNOWS[1:]) for row in own if row.get("file_sha256")}
+    rows = zip(*(there[name].to_pylist() for name in KNOWS), strict=True)
+    return [source not in sources and tuple(content) not in copies for source, *content in rows]
 
 
 def _together(old: pyarrow.Table, new: pyarrow.Table) -> pyarrow.Table:

@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.imports.clock import disagreements, steps
 from xy_sysid.samples.block import Block, FloatArray
-from xy_sysid.samples.recording import Recording, rate_from_time
+from xy_sysid.samples.recording import SAME_RATE, Recording, rate_from_time
 
 LATE = 0.5  # s; a sample number that falls back further than that, for good, is a restart of the source
-SAME_RATE = 1e-3  # relative; sampling rates that differ by more do not belong together
 FEW = 0.01  # part of the samples; more steps than that off their grid in both directions are jitter, not gaps
 STEPS = 100_000  # time steps from which the period is taken; of a longer stream every second, third, ... is looked at
 LARGEST = 2.0**53  # a counter beyond it is not exact in a double, so it is no counter

@@ -10,10 +10,9 @@ import numpy as np
 
 from xy_sysid.errors import BadInput
 from xy_sysid.imports import load
-from xy_sysid.imports.paired_streams import SAME_RATE
 from xy_sysid.imports.reading import Reading
 from xy_sysid.imports.several_files import others
-from xy_sysid.samples.recording import Recording
+from xy_sysid.samples.recording import SAME_RATE, Recording
 
 NAMED = 3  # recordings that a note names
 

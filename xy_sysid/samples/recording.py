@@ -19,6 +19,7 @@ STANDS = 0.02  # part of the longest way of a second: an axis that goes less far
 COMPARABLE = 0.5  # of the longest stretch; shorter ones hold too few of its windows
 MOST_STRETCHES = 24  # that are worked on together
 SLOWEST = 3.0  # Hz; slower samples show no machine's axis, but a wrong unit of time
+SAME_RATE = 1e-3  # relative; sampling rates that differ by more do not belong together
 
 
 @dataclass(frozen=True, slots=True)
