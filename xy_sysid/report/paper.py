@@ -70,9 +70,9 @@ def fit(paper: Figure, axes: Mapping[str, Axes], above: float) -> None:
     """Move and size the axes so that all of their words are on the paper. above: inches at the top that are taken."""
     wide, high = paper.get_size_inches()
     for turn in range(ROUNDS):
-        boxes = [box for ax in axes.values() if (box := ax.get_tightbbox()) is not None]
+        boxes = [box for ax in axes.values() if (box := ax.get_tightbbox(bbox_extra_artists=ax.texts)) is not None]
         if turn == 0 and _tilt(axes):
-            boxes = [box for ax in axes.values() if (box := ax.get_tightbbox()) is not None]
+            boxes = [box for ax in axes.values() if (box := ax.get_tightbbox(bbox_extra_artists=ax.texts)) is not None]
         places = {name: ax.get_position() for name, ax in axes.items()}
         left, right = min(place.x0 for place in places.values()), max(place.x1 for place in places.values())
         bottom, top = min(place.y0 for place in places.values()), max(place.y1 for place in places.values())

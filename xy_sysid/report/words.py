@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
-from xy_sysid.fitting import Interval
 from xy_sysid.units import motion, readable
+
+if TYPE_CHECKING:
+    from xy_sysid.fitting import Interval
 
 LARGE, TINY = 1e6, 1e-4  # numbers are written with a power of ten from LARGE on and below TINY
 
