@@ -218,18 +218,53 @@ def test_what_topic_echo_prints_of_joint_states_needs_no_names(tmp_path: Path) -
         load(echoed(tmp_path, ("slider",), [(Y,), (), ()]))  # nothing that drives
 
 
+def in_own_rows(folder: Path, columns: dict[str, tuple[np.ndarray, np.ndarray]]) -> Path:
+    """A CSV with a row for each instant of each column, as PlotJuggler and joined tables have it. columns: instants and values."""
+    time = np.concatenate([instants for instants, _ in columns.values()])
+    order, begin, table = np.argsort(time, kind="stable"), 0, {}
+    for name, (instants, values) in columns.items():
+        rows = np.full(len(time), np.nan)
+        rows[begin : begin + len(instants)] = values
+        table[name] = rows[order]
+        begin += len(instants)
+    return csv_of(folder, {"__time": time[order], **table})
+
+
 def test_rows_of_their_own_for_input_and_output(tmp_path: Path) -> None:
     """PlotJuggler writes a row for each stamp of each topic: the input is held until its next."""
-    late = 0.0003
-    time = np.concatenate((T, T + late))
-    order = np.argsort(time)
-    hollow = np.full(len(T), np.nan)
-    columns = {"__time": time[order], "/x/voltage": np.concatenate((U, hollow))[order], "/x/position": np.concatenate((hollow, Y))[order]}
-    recording = load(csv_of(tmp_path, columns))
-    assert recording.sampling_rate == RATE and len(recording) == len(T) and len(recording.runs()) == 1
-    np.testing.assert_array_equal(recording.voltage[:, 0], U)
-    np.testing.assert_array_equal(recording.position[:, 0], Y)
-    assert any("rows of their own" in note for note in recording.notes)
+    recording = load(in_own_rows(tmp_path, {"/x/voltage": (T, U), "/x/position": (T + 0.0003, Y)}))
+    assert recording.sampling_rate == RATE and len(recording) == len(T) - 1 and len(recording.runs()) == 1  # nobody knows what was there at the end
+    np.testing.assert_array_equal(recording.voltage[:, 0], U[:-1])
+    np.testing.assert_array_equal(recording.position[:, 0], Y[:-1])
+    assert any("times of their own" in note for note in recording.notes)
+
+
+def test_two_axes_may_have_rows_of_their_own(tmp_path: Path) -> None:
+    """Four topics with four stamps: the second position is interpolated to the instants of the first."""
+    columns = {
+        "/x/voltage": (T, U),
+        "/y/voltage": (T + 0.0001, 2 * U),
+        "/x/position": (T + 0.0002, np.sin(T)),
+        "/y/position": (T + 0.0003, np.cos(T)),
+    }
+    recording = load(in_own_rows(tmp_path, columns))
+    assert recording.axes == ("x", "y") and len(recording) >= len(T) - 2
+    time = recording.time
+    np.testing.assert_allclose(recording.position, np.column_stack((np.sin(time - 0.0002), np.cos(time - 0.0003))), atol=1e-6)
+    np.testing.assert_array_equal(recording.voltage[:, 1], 2 * recording.voltage[:, 0])
+
+
+def test_of_a_faster_input_the_mean_is_taken_and_of_a_sparse_one_the_latest(tmp_path: Path) -> None:
+    """Four commands between two positions move the axis by their mean; a command that is written only when it changes holds until then."""
+    fine = np.arange(4 * len(T)) / (4 * RATE)
+    values = np.random.default_rng(1).normal(size=len(fine))
+    recording = load(in_own_rows(tmp_path, {"/x/voltage": (fine, values), "/x/position": (T + 1e-5, Y)}))
+    np.testing.assert_allclose(recording.voltage[:-1, 0], values.reshape(-1, 4).mean(axis=1)[: len(recording) - 1], atol=1e-12)
+    sparse = np.where(np.arange(len(T)) % 3 == 0, U, np.nan)
+    held = load(csv_of(tmp_path, {"time": T, "x_voltage": sparse, "x_position": Y}))
+    last = (len(T) - 1) // 3 * 3
+    assert held.sampling_rate == RATE and len(held) == last + 1
+    np.testing.assert_array_equal(held.voltage[:, 0], np.repeat(U[::3], 3)[: last + 1])
 
 
 def test_words_in_other_columns_do_not_matter(tmp_path: Path) -> None:

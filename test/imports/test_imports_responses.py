@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 from helpers.cli_tools import cli, refused
 from helpers.real_data import data
+from helpers.table_making import T, U, Y, csv_of
 
 import xy_sysid as xy
 from xy_sysid.imports import load
@@ -90,6 +92,12 @@ def test_keywords_say_of_a_file_what_it_does_not_say(tmp_path: Path) -> None:
     path = written(tmp_path / "frf.csv", "f_Hz,real,imag,coherence", (F, H.real, H.imag, np.full(F.size, 0.9)))
     found = xy.frf_from(path, averages=11, sampling_rate=2000.0)
     assert np.allclose(found.sigma, np.abs(H) * np.sqrt(0.1 / 0.9 / 10)) and found.sampling_rate == 2000.0
+    fits = [json.loads(cli("fit", path, "--averages", count, "--json").out)["axes"]["x"] for count in ("5", "50")]
+    wide, narrow = (np.diff(fit["estimates"]["delay"]["ci95"]) for fit in fits)
+    assert wide == pytest.approx(np.sqrt(49 / 4) * narrow, rel=0.05)
+    assert "a file with a measured frequency response" in refused(
+        "fit", csv_of(tmp_path, {"time": T, "x_voltage": U, "x_position": Y}), "--averages", "5"
+    )
     with pytest.raises(xy.BadInput, match="averages"):
         xy.frf_from(path, avarages=11)
 

@@ -16,6 +16,7 @@ from helpers.table_making import RATE, T, U, Y
 from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.imports import Reading, load
 from xy_sysid.imports.listing import listing
+from xy_sysid.imports.registry import format_of, sheet_of
 from xy_sysid.imports.several import read_all
 
 
@@ -107,6 +108,14 @@ def test_a_mitsubishi_graph_is_torque_to_speed(tmp_path: Path) -> None:
     assert [column.name for column in listing(path).columns] == ["time", "Servo motor speed", "Torque", "INP state"]
 
 
+def test_pulses_by_the_hundred_are_counts(tmp_path: Path) -> None:
+    """MR Configurator shows droop pulses one by one or by the hundred."""
+    path = configurator(tmp_path, Y, U)
+    path.write_text(path.read_text("utf-8").replace("Not selected", "Droop pulses (by 100 pls.)").replace(",0.000000,2.5", ",3.000000,2.5"), "utf-8")
+    pulses = sheet_of(path, format_of(path)).find("Droop pulses")
+    assert pulses.unit == "counts" and set(pulses.values.tolist()) == {300.0}
+
+
 def test_one_move_in_one_direction_tells_nothing(tmp_path: Path) -> None:
     """Friction, load and inertia cannot be told from it: this is said, and diagnose refuses instead of naming effects."""
     ramp = np.clip(np.minimum(np.arange(2000) - 300, 1700 - np.arange(2000)) / 300.0, 0.0, 1.0)
@@ -133,6 +142,10 @@ def test_arrays_of_a_json_log_are_found_by_their_path(tmp_path: Path) -> None:
     found = load(path, columns={"input": "data[*].actions", "output": "data[*].sensor"})
     assert [run.stop - run.start for run in found.runs()] == [1000, 400, 1600] and np.array_equal(found.position[:, 0], Y)
     assert any("3 stretches, one after the other" in note for note in found.notes)
+    path.write_text(json.dumps({"fs": RATE, "u": [U[part].tolist() for part in parts], "y": [Y[part].tolist() for part in parts]}), "utf-8")
+    lists = load(path, columns={"input": "u[*]", "output": "y[*]"})
+    assert [run.stop - run.start for run in lists.runs()] == [1000, 400, 1600] and np.array_equal(lists.voltage[:, 0], U)
+    path.write_text(json.dumps(log), "utf-8")
     one = load(path, columns={"input": "data[1].actions", "output": "data[1].sensor"})
     assert np.array_equal(one.voltage[:, 0], U[1000:1400])
     lines = tmp_path / "log.jsonl"

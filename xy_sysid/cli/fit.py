@@ -35,10 +35,14 @@ def fit(
     held_out: Annotated[float, typer.Option(help="last part of the recording, held out for the check in time")] = 0.2,
     model: Annotated[Path | None, typer.Option("--model", metavar="FILE", help="write the model as YAML")] = None,
     mat: Annotated[Path | None, typer.Option("--mat", metavar="FILE", help="write the model for MATLAB's tf()")] = None,
+    averages: Annotated[
+        float | None, typer.Option("--averages", min=2.0, help="independent windows behind the coherence of a measured response")
+    ] = None,
     force: o.Force = False,
     json: o.Json = False,
 ) -> None:
     """Transfer function with delay of each axis, 95 % intervals, and whether it can be trusted. REC may also be a measured frequency response."""
+    from xy_sysid.errors import BadInput
     from xy_sysid.files import linear_models
     from xy_sysid.fitting.of_given_response import band_of
     from xy_sysid.fitting.of_recording import estimate, few_periods, split
@@ -50,11 +54,15 @@ def fit(
     samples = o.period_from(period)
     way = Method(method, weighting, domain)
     way.structure(settings)  # refuses what makes no sense, before any work is done
-    measured = measured_responses(recs, reading)
+    measured = measured_responses(recs, reading, averages)
     if measured is not None:
         done, problems = each(tuple(measured), lambda name: _of_response(name, band_of(measured[name], settings), settings, way))
         origin: dict[str, Any] = {**provenance_of_response(named(recs)), "notes": []}
     else:
+        if averages is not None:
+            raise BadInput(
+                "--averages", f"{averages:g}", "a file with a measured frequency response", "Leave it out: windows of a recording are counted."
+            )
         recording = read(recs, reading, json)
         if len(recording) and few_periods(recording, held_out):
             held_out = 0.0

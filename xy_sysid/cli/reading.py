@@ -118,8 +118,11 @@ def notes_of(recordings: Sequence[Recording]) -> list[str]:
     return [note for recording in recordings for note in recording.notes]
 
 
-def measured_responses(paths: Sequence[Path], reading: Reading) -> dict[str, FrequencyResponse] | None:
-    """The responses by axis where a file holds a measured frequency response and no samples, or is said to; None where it does not."""
+def measured_responses(paths: Sequence[Path], reading: Reading, averages: float | None = None) -> dict[str, FrequencyResponse] | None:
+    """The responses by axis where a file holds a measured frequency response and no samples, or is said to; None where it does not.
+
+    averages: independent windows behind its coherence
+    """
     from xy_sysid.imports.reading import OF_A_RESPONSE
     from xy_sysid.imports.registry import format_of, sheet_of
     from xy_sysid.imports.response_file import responses
@@ -131,7 +134,7 @@ def measured_responses(paths: Sequence[Path], reading: Reading) -> dict[str, Fre
             return None
         if len(paths) > 1:
             raise BadInput("frequency responses", f"{len(paths)} files", "one", "Fit them one by one.")
-        return responses(paths[0], sheet_of(paths[0], kinds[0]), reading)
+        return responses(paths[0], sheet_of(paths[0], kinds[0]), reading, {} if averages is None else {"averages": averages})
     except OSError:
         return None  # said by whoever reads it as a recording
 

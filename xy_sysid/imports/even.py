@@ -125,7 +125,7 @@ def _resampled(path: Path, time: FloatArray, rate: float, held: FloatArray, smoo
         instants = time[0] + count / rate
         numbers.append(count)
         mine = slice(begin, end)
-        parts.append((_means(time[mine], held[mine], instants, 1.0 / rate), *(_between(time[mine], values[mine], instants) for values in smooth)))
+        parts.append((_means(time[mine], held[mine], instants, 1.0 / rate), *(between(time[mine], values[mine], instants) for values in smooth)))
     if not numbers:
         raise BadRecording(path, f"{uneven}; no stretch is long enough", taken)
     seq = np.concatenate(numbers)
@@ -151,7 +151,8 @@ def _means(time: FloatArray, held: FloatArray, instants: FloatArray, period: flo
     return np.diff(np.column_stack([np.interp(edges, time, column) for column in area.T]), axis=0) / period
 
 
-def _between(time: FloatArray, values: FloatArray, instants: FloatArray) -> FloatArray:
+def between(time: FloatArray, values: FloatArray, instants: FloatArray) -> FloatArray:
+    """Values (n, ...) at other instants, by a cubic spline."""
     from scipy.interpolate import CubicSpline  # only what is uneven pays for it
 
     return np.asarray(CubicSpline(time, values, axis=0)(instants))

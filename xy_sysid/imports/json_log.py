@@ -60,6 +60,8 @@ def _columns(path: str, value: Any, depth: int) -> Iterator[tuple[str, Any, tupl
         if len(rows) == 1 and all(_is_number(number) for one in value for number in one):
             matrix = np.array([[np.nan if number is None else number for number in one] for one in value], np.float64)
             yield from ((f"{path}[*][{place}]", matrix[:, place], ()) for place in range(matrix.shape[1]))
+        else:
+            yield from _together(f"{path}[*]", value, depth + 1)
 
 
 def _together(path: str, items: list[Any], depth: int) -> Iterator[tuple[str, Any, tuple[int, ...]]]:

@@ -5,6 +5,7 @@ Signals are called as MR Configurator2 calls them. Digital ones show a level in 
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from xy_sysid.imports.sheet import Column, Sheet
 
 UNITS = {"speed": "rpm", "torque": "%", "current": "%", "pulses": "counts", "position": "counts"}  # by a word of a signal's name
 NONE = "Not selected"
+BY = re.compile(r"\(by (\d{1,6}) pls")  # pulses are counted by the hundred, too
 
 
 def sheet(path: Path) -> Sheet:
@@ -34,5 +36,7 @@ def sheet(path: Path) -> Sheet:
             continue
         digital = kind.startswith("Digital")
         unit = next((unit for word, unit in UNITS.items() if word in name.lower()), "")
+        times = BY.search(name)
+        column = replace(column, values=column.values * float(times[1])) if times else column
         columns.append(replace(column, name=f"{name} state" if digital else name.partition("(")[0].strip(), unit="" if digital else unit))
     return Sheet(path=path, columns=tuple(columns))

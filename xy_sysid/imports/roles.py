@@ -6,8 +6,8 @@ What the user says (``Reading.columns``) comes first, then the contract's own na
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping
-from dataclasses import dataclass
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from xy_sysid.errors import BadRecording
 from xy_sysid.imports.names import Meaning, by_unit, meaning, tells_time
@@ -41,6 +41,11 @@ class Roles:
     def sides(self) -> tuple[tuple[str, Found], ...]:
         """Columns by axis, of each role that an axis has."""
         return ("input", self.inputs), ("output", self.outputs), ("reference", self.references)
+
+    def of(self, axes: Sequence[str]) -> Roles:
+        """Of some axes only."""
+        inputs, outputs, references = ({axis: side[axis] for axis in axes if axis in side} for _, side in self.sides())
+        return replace(self, inputs=inputs, outputs=outputs, references=references)
 
 
 def assigned(sheet: Sheet, reading: Reading, notes: list[str]) -> Roles:

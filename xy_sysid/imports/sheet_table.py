@@ -12,7 +12,7 @@ from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.imports import instants
 from xy_sysid.imports.foreign_units import COUNTS, DRIVES, MOTIONS, Unit, to_si, unit_of
 from xy_sysid.imports.names import meaning, unit_at_end, usual_unit
-from xy_sysid.imports.own_times import on_one_clock
+from xy_sysid.imports.own_times import clocked, on_one_clock, with_own_times
 from xy_sysid.imports.reading import Reading
 from xy_sysid.imports.roles import Found, Roles, assigned
 from xy_sysid.imports.sheet import Column, Sheet, spoken
@@ -26,12 +26,13 @@ JOINTS = 64  # more names than that are no joints
 def table(sheet: Sheet, reading: Reading, notes: list[str]) -> Table:
     """What the sheet says about a recording; raises BadRecording that names the columns there are."""
     notes += sheet.notes
-    roles = on_one_clock(sheet.path, assigned(sheet, reading, notes), notes)
+    roles = assigned(sheet, reading, notes)
     if roles.joint is not None:
         roles = _by_joint(sheet, roles, notes)
     every = tuple(axis for axis in roles.inputs if axis in roles.outputs)
-    axes = tuple(every[place] for place in places_of(every, reading.axes))  # the units of those that are left out do not matter
-    time, fs = _time(sheet, roles, reading, notes)
+    roles = roles.of([every[place] for place in places_of(every, reading.axes)])  # of those that are left out nothing matters
+    roles, time, fs = _in_time(sheet, roles, reading, notes)
+    axes = tuple(roles.outputs)
     u, input_unit = _values(sheet, "input", roles.inputs, axes, reading, notes)
     y, output_unit = _values(sheet, "output", roles.outputs, axes, reading, notes)
     reference = None
@@ -77,6 +78,22 @@ def same_unit(reading: Reading, unit: Unit, output: Unit, notes: list[str]) -> b
         raise BadInput("--unit", given, f"a unit of the output's quantity, which is in {output.name}", "Give the reference in such a unit.")
     notes.append(f"the reference is in {unit.name} and the output in {output.name}: the reference is left out")
     return False
+
+
+def _in_time(sheet: Sheet, roles: Roles, reading: Reading, notes: list[str]) -> tuple[Roles, FloatArray | None, float | None]:
+    """The roles with a value of each column at every instant, and the instants in s, or None with the rate."""
+    if clocked(roles):
+        roles, clock = on_one_clock(sheet.path, roles, notes)
+        if reading.rate is None:
+            return replace(roles, time=clock), clock.values, sheet.fs
+        notes += as_they_stand(reading.rate, clock.name)
+        return roles, None, reading.rate
+    time, fs = _time(sheet, roles, reading, notes)
+    own = roles if time is None or roles.seq is not None else with_own_times(roles, time, notes)
+    if own is roles:
+        return roles, time, fs
+    moved, clock = on_one_clock(sheet.path, own, notes)
+    return replace(moved, time=roles.time), clock.values, fs
 
 
 def _time(sheet: Sheet, roles: Roles, reading: Reading, notes: list[str]) -> tuple[FloatArray | None, float | None]:

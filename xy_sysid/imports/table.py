@@ -22,7 +22,6 @@ from xy_sysid.units import Sensed
 
 USUAL = ("x", "y", "z")
 ONE_UNIT = "Give all axes of one kind the same unit, or choose axes of one unit with --axis."
-APART = 0.1  # part of the rows; if more have an input and no output or the other way round, the two have stamps of their own
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,9 +122,8 @@ def _finite(path: Path, table: Table, columns: list[int], time: FloatArray, note
     voltage, position = table.input[:, columns], table.output[:, columns]
     reference = None if table.reference is None else table.reference[:, columns]
     seq = np.arange(len(time), dtype=np.float64) if table.seq is None else table.seq
-    voltage, keep = _own_stamps(voltage, position, notes)
-    finite = keep & np.isfinite(time) & sane(voltage) & sane(position) & (np.abs(seq) < LARGEST)
-    left_out = int(np.sum(keep & ~finite))
+    finite = np.isfinite(time) & sane(voltage) & sane(position) & (np.abs(seq) < LARGEST)
+    left_out = int(np.sum(~finite))
     if left_out:
         notes.append(f"{left_out} rows are not numbers; they are left out")
     rows = _Rows(time=time, seq=seq, voltage=voltage, position=position, reference=reference, stretch=_stretches(table, time)).only(finite)
@@ -212,31 +210,13 @@ def _each_once(path: Path, table: Table, rows: _Rows, notes: list[str]) -> _Rows
 
 def _whole(path: Path, table: Table, columns: list[int], notes: list[str]) -> list[int]:
     """The axes without those that have hardly any numbers, as long as others have."""
-    empty = hollow(table.output) | hollow(table.input if not _apart(table.input, table.output) else table.input[:0])
+    empty = hollow(table.output) | hollow(table.input)
     left = [place for place in columns if empty[place]]
     if not left or len(left) == len(columns):
         return columns
     names = ", ".join(table.axes[place] for place in left)
     notes.append(f"axis {names} has hardly any numbers; it is left out")
     return [place for place in columns if place not in left]
-
-
-def _own_stamps(voltage: FloatArray, position: FloatArray, notes: list[str]) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Where input and output stand in different rows, as each has stamps of its own: the held input in the rows of the output."""
-    has_input, has_output = np.isfinite(voltage).all(axis=1), np.isfinite(position).all(axis=1)
-    if not _apart(voltage, position):
-        return voltage, np.ones(len(voltage), dtype=np.bool_)
-    last = np.maximum.accumulate(np.where(has_input, np.arange(len(voltage)), -1))
-    alone, outputs = int(np.sum(has_output & ~has_input)), int(np.sum(has_output))
-    notes.append(f"input and output have rows of their own ({alone} of {outputs} outputs have no input): the input is held until its next row")
-    return voltage[np.maximum(last, 0)], has_output & (last >= 0)
-
-
-def _apart(voltage: FloatArray, position: FloatArray) -> bool:
-    """Whether there are many rows with an output and no input, and others with an input and no output."""
-    has_input, has_output = np.isfinite(voltage).any(axis=1), np.isfinite(position).any(axis=1)
-    alone = int(np.sum(has_output & ~has_input)), int(np.sum(has_input & ~has_output))
-    return alone[0] > APART * int(np.sum(has_output)) and alone[1] > 0 and int(np.sum(has_input)) > 1
 
 
 def places_of(axes: tuple[str, ...], wanted: Sequence[str] | None) -> list[int]:
