@@ -12,13 +12,11 @@ from __future__ import annotations
 
 import importlib
 import os
-import platform
 import sys
-from datetime import date
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from campaigns.bench.tables import Table
+from campaigns.facts import facts
 
 TABLES = ("h1", "frf", "fit", "replay", "bags", "live", "intervals")
 SCRIPTS = (
@@ -37,18 +35,8 @@ SCRIPTS = (
     "fleet_scale",
     "trend",
 )
+PACKAGES = ("numpy", "scipy", "numba", "rosbags", "scikit-rf", "pyFRF")
 PAGE = Path(__file__).parents[2] / "docs" / "benchmarks.md"
-
-
-def facts() -> str:
-    """What this ran on."""
-    versions = []
-    for name in ("numpy", "scipy", "numba", "rosbags", "scikit-rf", "pyFRF"):
-        try:
-            versions.append(f"{name} {version(name)}")
-        except PackageNotFoundError:
-            versions.append(f"{name} not installed")
-    return f"{date.today()}, {os.cpu_count()} cores, {platform.machine()}, Python {platform.python_version()}, {', '.join(versions)}."
 
 
 def text(name: str, table: Table) -> str:
@@ -81,7 +69,7 @@ def main() -> int:
         sys.stdout.write(parts[-1] + "\n")
         sys.stdout.flush()
     if not asked and not short:
-        head = f"# Benchmarks\n\nMade by `make bench`; every ratio is from one run, side by side. {facts()}\n"
+        head = f"# Benchmarks\n\nMade by `make bench`; every ratio is from one run, side by side. {facts(*PACKAGES)}\n"
         PAGE.write_text("\n".join([head, *parts]), encoding="utf-8")
     return 0
 

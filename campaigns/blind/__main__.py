@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import argparse
 import os
-import platform
 import sys
 from pathlib import Path
+
+from campaigns.facts import facts
 
 PAGE = Path(__file__).parents[2] / "docs" / "blind.md"
 
@@ -54,7 +55,7 @@ def main() -> int:
             *([f"--first {asked.first}"] if asked.first else []),
         ]
     )
-    facts = f"{platform.machine()}, Python {platform.python_version()}."
+    machine = facts()
     try:
         for name in asked.sets or known:
             cases = known[name][asked.first :: asked.part]
@@ -70,7 +71,7 @@ def main() -> int:
                 sys.stderr.write(f"{good:6} {item.case.name}: {said} ({item.confidence:.2f}), {item.seconds:.1f} s\n")
             results[name].sort(key=lambda item: cases.index(item.case))
             before = asked.o.read_text(encoding="utf-8") if asked.o.exists() else ""
-            asked.o.write_text(with_remarks(text(results, asked.draws, command, facts), before), encoding="utf-8")
+            asked.o.write_text(with_remarks(text(results, asked.draws, command, machine), before), encoding="utf-8")
     except KeyboardInterrupt:
         return 130
     sys.stderr.write(f"{asked.o} written\n")

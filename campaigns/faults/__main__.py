@@ -8,13 +8,13 @@ from __future__ import annotations
 import argparse
 import importlib
 import os
-import platform
 import signal
 import sys
 import tempfile
 import time
 from pathlib import Path
 
+from campaigns.facts import facts
 from campaigns.faults.groups import GROUPS
 
 PAGE = Path(__file__).parents[2] / "docs" / "faults.md"
@@ -44,7 +44,7 @@ def main() -> int:
             parser.error(f"{name!r} is not a group; there are {', '.join(GROUPS)}, and soak")
     page = asked.o or (None if asked.short or asked.only else PAGE)
     titles = [*GROUPS.values(), "Soak"]
-    facts = f"{platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}."
+    machine = facts()
     holes = 0
     for name in asked.groups or GROUPS:
         module = importlib.import_module(f"campaigns.faults.{name}")
@@ -62,7 +62,7 @@ def main() -> int:
             sys.stderr.writelines(f"      {bad}\n" for bad in row.bad[:12])
             if page is not None:
                 before = page.read_text(encoding="utf-8") if page.exists() else ""
-                page.write_text(text({GROUPS[name]: section(GROUPS[name], module.WORDS, rows)}, before, titles, facts), encoding="utf-8")
+                page.write_text(text({GROUPS[name]: section(GROUPS[name], module.WORDS, rows)}, before, titles, machine), encoding="utf-8")
     sys.stderr.write("no hole\n" if not holes else f"{holes} rows are holes\n")
     return 1 if holes else 0
 
