@@ -28,6 +28,20 @@ def test_what_is_chosen_reads_the_file_and_is_the_same_in_words(tmp_path: Path) 
     assert made.words[-2:] == ("--rate", "500") and "y.output=mm" in made.words
 
 
+def test_units_of_time_factors_and_references_are_chosen_too(tmp_path: Path) -> None:
+    """A time in ticks of a millisecond, an encoder in counts times a factor, and a setpoint."""
+    rng = np.random.default_rng(1)
+    table = np.column_stack([np.arange(3000) * 2.0, rng.normal(size=3000), np.rint(np.cumsum(rng.normal(size=3000)) * 10), np.arange(3000)])
+    np.savetxt(tmp_path / "a.csv", table, "%.9g", ",", header="p,q,r,s", comments="")
+    axis = AxisColumns("x", "q", "r", "A", "", "2", "1e-3", "s")
+    made = reading_of("p", None, [axis], Reading(), "ms")
+    found = load(tmp_path / "a.csv", **made.load)
+    assert found.sampling_rate == 500.0 and found.input_unit == "A"
+    assert np.allclose(found.voltage[:, 0], 2 * table[:, 1]) and np.allclose(found.position[:, 0], 1e-3 * table[:, 2])
+    assert found.reference is not None and np.allclose(found.reference[:, 0], 1e-3 * table[:, 3])
+    assert made.words.count("--scale") == 2 and "time=ms" in made.words and "x.reference=s" in made.words
+
+
 def test_names_that_tell_are_chosen_already(tmp_path: Path) -> None:
     """Time in ms, a voltage and a position: nothing is left to choose; units are no part of a name."""
     rows = np.column_stack((np.arange(400) / 1e3, np.sin(np.arange(400.0)), np.cos(np.arange(400.0))))

@@ -1,4 +1,4 @@
-"""Say which column of a table is what, before it is opened: what ``xy-sysid columns`` lists, and ``--map``, ``--unit``, ``--rate`` by clicks."""
+"""Say which column of a table is what before it is opened: ``xy-sysid columns``, and ``--map``, ``--unit``, ``--scale`` and ``--rate`` by clicks."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from nicegui import run, ui
 from nicegui.events import ValueChangeEventArguments
 
 from xy_sysid.errors import BadInput, XySysidError
+from xy_sysid.imports.reading import OF_AN_AXIS
 from xy_sysid.page.beside import beside
 from xy_sysid.page.fields import on_press, typed
 from xy_sysid.page.orders import Reading, read_so
@@ -25,16 +26,19 @@ HEADS = ("column", "unit", "first", "least", "most", "looks like", "taken as")
 
 @dataclass(frozen=True, slots=True)
 class AxisColumns:
-    """What was chosen for one axis; empty units are those that the file names."""
+    """What was chosen for one axis; empty units are those that the file names, and an empty factor is 1. The reference may be missing."""
 
     axis: str
     input: str
     output: str
     input_unit: str = ""
     output_unit: str = ""
+    input_scale: str = ""
+    output_scale: str = ""
+    reference: str = ""
 
 
-def reading_of(time: str, rate: float | None, axes: Sequence[AxisColumns], usual: Reading) -> Reading:
+def reading_of(time: str, rate: float | None, axes: Sequence[AxisColumns], usual: Reading, time_unit: str = "") -> Reading:
     """How the file is to be read, for the worker and as words for a command. Raises BadInput for what cannot be."""
     if not time and not rate:
         raise BadInput("time", "no column and no rate", "a column, or a rate in Hz", "Choose the column that holds the time, or give the rate.")
@@ -42,16 +46,23 @@ def reading_of(time: str, rate: float | None, axes: Sequence[AxisColumns], usual
     if not names or not all(names) or len(set(names)) < len(names):
         raise BadInput("axes", ", ".join(names) or "none", "a different name for each axis", "Name the axes, for example x and y.")
     columns = {"time": time} if time else {}
-    units: dict[str, str] = {}
+    units = {"time": time_unit} if time and time_unit else {}
+    scales: dict[str, str] = {}
     for one in axes:
-        for role, column, unit in (("input", one.input, one.input_unit), ("output", one.output, one.output_unit)):
-            if not column:
+        for role, column, unit, scale in (
+            ("input", one.input, one.input_unit, one.input_scale),
+            ("output", one.output, one.output_unit, one.output_scale),
+            ("reference", one.reference, "", ""),
+        ):
+            what = f"{one.axis}.{role}"
+            if column:
+                columns[what] = column
+            elif role != "reference":
                 raise BadInput(f"{role} of {one.axis}", "not chosen", "a column", "Choose one.")
-            columns[f"{one.axis}.{role}"] = column
-            if unit:
-                units[f"{one.axis}.{role}"] = unit
-    words = [text for what, column in columns.items() for text in ("--map", f"{what}={column}")]
-    words += [text for what, unit in units.items() for text in ("--unit", f"{what}={unit}")]
+            units |= {what: unit} if unit else {}
+            scales |= {what: scale} if scale else {}
+    given = (("--map", columns), ("--unit", units), ("--scale", scales))
+    words = [text for option, said in given for what, value in said.items() for text in (option, f"{what}={value}")]
     words += ["--rate", f"{rate:.15g}"] if rate else []
     return read_so(usual, words)
 
@@ -65,7 +76,9 @@ def guesses(found: Listing) -> tuple[str, list[AxisColumns]]:
     def column(axis: str, role: str) -> str:
         return roles.get(f"{axis}.{role}", roles.get(role, ""))
 
-    return roles.get("time", clock), [AxisColumns(axis, column(axis, "input"), column(axis, "output")) for axis in axes]
+    return roles.get("time", clock), [
+        AxisColumns(axis, column(axis, "input"), column(axis, "output"), reference=column(axis, "reference")) for axis in axes
+    ]
 
 
 def usable(found: Listing) -> list[str]:
@@ -100,6 +113,7 @@ class ColumnsDialog:
             ui.table(columns=heads, rows=[dict(zip(HEADS, _cells(one), strict=True)) for one in found.columns]).props("dense flat").classes("columns")
             with ui.element("div").classes("buttons"):
                 self._time = self._column("time", time)
+                self._time_unit = _word("its unit", "s, ms, us ...", "time-unit")
                 self._rate = typed(ui.number("or rate (Hz)", value=None, min=0)).props('outlined dense data-pick="rate"')
                 files = [one for one in session.shelf.names(texts=True) if one != name]
                 ui.select(files, label="columns of another file, too", with_input=True, on_change=self._more).props(
@@ -128,7 +142,7 @@ class ColumnsDialog:
         folder = self._session.shelf.folder
         file = os.path.relpath(folder / other, (folder / self._name).parent)
         self._names += [name for one in usable(found) if (name := f"{file}:{one}") not in self._names]
-        for pick in (self._time, *(row[role] for row in self._rows for role in ("input", "output"))):
+        for pick in (self._time, *(row[role] for row in self._rows for role in OF_AN_AXIS)):
             pick.set_options([NONE, *self._names], value=pick.value)
 
     def _add(self, one: AxisColumns) -> None:
@@ -136,23 +150,22 @@ class ColumnsDialog:
             row = {
                 "axis": typed(ui.input("axis", value=one.axis)).props('outlined dense data-pick="axis"').classes("narrow"),
                 "input": self._column("input", one.input),
-                "input_unit": typed(ui.input("its unit", placeholder="V, A, N m ..."))
-                .props('outlined dense data-pick="input-unit"')
-                .classes("narrow"),
+                "input_unit": _word("its unit", "V, A, N m ...", "input-unit"),
+                "input_scale": _word("times", "1", "input-scale"),
                 "output": self._column("output", one.output),
-                "output_unit": typed(ui.input("its unit", placeholder="mm, rad, m/s ..."))
-                .props('outlined dense data-pick="output-unit"')
-                .classes("narrow"),
+                "output_unit": _word("its unit", "mm, rad, m/s ...", "output-unit"),
+                "output_scale": _word("times", "1", "output-scale"),
+                "reference": self._column("reference", one.reference),
             }
         self._rows.append(row)
 
     def _typed(self) -> list[Any]:
-        return [self._rate, *(field for row in self._rows for field in row.values())]
+        return [self._time_unit, self._rate, *(field for row in self._rows for field in row.values())]
 
     def _open(self) -> None:
         try:
             axes = [AxisColumns(**{name: _text(element.value) for name, element in row.items()}) for row in self._rows]
-            reading = reading_of(_text(self._time.value), self._rate.value or None, axes, self._session.reading)
+            reading = reading_of(_text(self._time.value), self._rate.value or None, axes, self._session.reading, _text(self._time_unit.value))
             path = self._session.shelf.find(self._name)
             self._session.shelf.beside(path, reading.load.get("columns", {}))
             self._session.open(path, self._name, reading)
@@ -161,6 +174,10 @@ class ColumnsDialog:
             ui.notify(str(problem), type="negative", multi_line=True)
             return
         self._dialog.close()
+
+
+def _word(label: str, usual: str, pick: str) -> ui.input:
+    return typed(ui.input(label, placeholder=usual)).props(f'outlined dense data-pick="{pick}"').classes("narrow")
 
 
 def _listed(path: Any) -> Listing:
