@@ -54,15 +54,18 @@ def as_mf4(path: Path) -> Path:
 
 
 def as_tdms(path: Path) -> Path:
-    """Waveforms of two rates, with their increments."""
+    """Waveforms of two rates, with their increments; the faster one starts before the other."""
     nptdms = pytest.importorskip("nptdms")
+    begin = np.datetime64("2026-03-03T10:00:00", "us")
 
-    def channel(name: str, values: object, step: float, unit: str) -> object:
-        told = {"wf_increment": step, "wf_start_offset": 0.0, "unit_string": unit}
+    def channel(name: str, values: object, step: float, unit: str, later: int = 0) -> object:
+        told = {"wf_increment": step, "wf_start_offset": 0.0, "wf_start_time": begin + np.timedelta64(later, "us"), "unit_string": unit}
         return nptdms.ChannelObject("run", name, values, properties=told)
 
     with nptdms.TdmsWriter(path / "a.tdms") as file:
-        file.write_segment([channel("motor_voltage", FAST, 0.5 / RATE, "V"), channel("angle", np.rad2deg(Y), 1 / RATE, "deg")])
+        early = np.concatenate((np.zeros(10), FAST))
+        later = round(1e6 * 5 / RATE)
+        file.write_segment([channel("motor_voltage", early, 0.5 / RATE, "V"), channel("angle", np.rad2deg(Y), 1 / RATE, "deg", later)])
     return path / "a.tdms"
 
 

@@ -102,6 +102,13 @@ def test_keywords_say_of_a_file_what_it_does_not_say(tmp_path: Path) -> None:
         xy.frf_from(path, avarages=11)
 
 
+def test_columns_that_are_chosen_say_that_a_file_holds_samples_and_no_response(tmp_path: Path) -> None:
+    """A head of frequency and phase is no response where input and output of an axis are mapped."""
+    path = csv_of(tmp_path, {"f": U, "phase": Y})
+    assert "no samples in time" in refused("diagnose", path)
+    assert load(path, columns={"input": "f", "output": "phase"}, rate=500.0).sampling_rate == 500.0
+
+
 def test_a_response_from_a_file_is_fitted_and_exported(tmp_path: Path) -> None:
     """Resonance, delay and orders come back with intervals from the scatter of the lines; the model file reloads."""
     path = written(tmp_path / "frf.csv", "Frequency (Hz);Gain (dB);Phase (deg)", (F, 20 * np.log10(abs(H)), np.rad2deg(PHASE)), ";")

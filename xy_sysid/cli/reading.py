@@ -123,14 +123,12 @@ def measured_responses(paths: Sequence[Path], reading: Reading, averages: float 
 
     averages: independent windows behind its coherence
     """
-    from xy_sysid.imports.reading import OF_A_RESPONSE
     from xy_sysid.imports.registry import format_of, sheet_of
     from xy_sysid.imports.response_file import responses
 
-    said = any(role in reading.columns for role in OF_A_RESPONSE)
     try:
         kinds = [format_of(path) for path in paths]
-        if not said and all(kind.kind != "response" for kind in kinds):
+        if not any(reading.a_response(kind.kind == "response") for kind in kinds):
             return None
         if len(paths) > 1:
             raise BadInput("frequency responses", f"{len(paths)} files", "one", "Fit them one by one.")

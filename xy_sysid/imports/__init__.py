@@ -68,7 +68,7 @@ def _from_table(path: Path, kind: Format, reading: Reading) -> Recording:
     topics = reading.voltage_topic, reading.position_topic, reading.joint_topic
     if reading.effort_as_voltage or reading.velocity or reading.joints or reading.effort_lag or topics != (VOLTAGE, POSITION, None):
         raise BadInput("--topic, --effort, --velocity or --joint", f"for {path}", "for a bag", "A table has columns: choose them with --map.")
-    if kind.kind == "response":
+    if reading.a_response(kind.kind == "response"):
         raise BadRecording(path, "a measured frequency response, which holds no samples in time", "Fit it: xy-sysid fit, or xy.frf_from in Python.")
     notes: list[str] = []
     sheet, reading = of_several_files(path, reading, notes) or (sheet_of(path, kind), reading)

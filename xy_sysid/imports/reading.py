@@ -66,6 +66,12 @@ class Reading:
             if not (math.isfinite(scale) and scale != 0):
                 raise BadInput("--scale", f"{what}={scale}", "a number that is not 0", "Give the factor to SI.")
 
+    def a_response(self, looks_so: bool) -> bool:
+        """Whether a file holds a measured frequency response, as the columns say that were chosen, or else as it looks."""
+        if any(what in OF_A_RESPONSE for what in self.columns):
+            return True
+        return looks_so and not any(what.rpartition(".")[2] in OF_AN_AXIS for what in self.columns)
+
     def unit(self, role: str, axis: str = "") -> str | None:
         """The unit given for a role of an axis; a reference is measured like the output."""
         return _of(self.units, role, axis)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from xy_sysid.fitting.of_run import fit
-from xy_sysid.imports.reading import OF_A_RESPONSE, Reading
+from xy_sysid.imports.reading import Reading
 from xy_sysid.imports.registry import format_of, sheet_of
 from xy_sysid.imports.response_file import responses
 from xy_sysid.report.plots import bode
@@ -16,7 +16,7 @@ from xy_sysid.report.plots import bode
 def fitted_responses(path: Path, load: Mapping[str, Any]) -> dict[str, dict[str, Any]] | None:
     """Picture and words of the fit of each response in a file; None of a file of samples. Raises BadInput and BadRecording. Takes seconds."""
     kind, reading = format_of(path), Reading(**load)
-    if kind.kind != "response" and not any(role in reading.columns for role in OF_A_RESPONSE):
+    if not reading.a_response(kind.kind == "response"):
         return None
     found = {}
     for name, response in responses(path, sheet_of(path, kind), reading).items():

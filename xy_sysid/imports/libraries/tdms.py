@@ -1,4 +1,4 @@
-"""National Instruments TDMS, by npTDMS. A waveform has its increment; other channels of a group have its column of times, if it has one."""
+"""NI TDMS, by npTDMS. A waveform has its start and increment; other channels of a group have its column of times, if it has one."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ def leaves(path: str) -> Iterator[tuple[str, Any, str, str]]:
 
     file = TdmsFile.read(path)
     several = len(file.groups()) > 1
+    starts = [start for group in file.groups() for channel in group.channels() if (start := channel.properties.get("wf_start_time")) is not None]
     for group in file.groups():
         for channel in group.channels():
             name = f"{group.name}.{channel.name}" if several else channel.name
@@ -24,5 +25,7 @@ def leaves(path: str) -> Iterator[tuple[str, Any, str, str]]:
             elif kind in "fiub" and len(values):
                 clock = f"time of {name}" if channel.properties.get("wf_increment") else ""
                 if clock:
-                    yield clock, channel.time_track(), "s", ""
+                    start = channel.properties.get("wf_start_time")
+                    later = 0.0 if start is None else float((start - min(starts)) / np.timedelta64(1, "s"))
+                    yield clock, channel.time_track() + later, "s", ""
                 yield name, values, str(channel.properties.get("unit_string") or ""), clock
