@@ -73,11 +73,11 @@ def test_c_and_python_run_as_the_design_does(rigid: StateFeedback, tmp_path: Pat
     compiled.restype = ctypes.c_double
     space: dict[str, Any] = {}
     exec(module, space)
-    python, state, z = space["Controller"](), (ctypes.c_double * rigid.b.size)(), np.zeros(rigid.b.size)
-    errors, held = 1e-3 * np.random.default_rng(3).standard_normal(400), []
+    python, state, z = space["Controller"](), (ctypes.c_double * (rigid.b.size + 1))(), np.zeros(rigid.b.size)
+    errors, held = 1e-3 * np.random.default_rng(3).standard_normal(400), [0.0]
     for error in errors.tolist():
-        held.append(float(np.clip(rigid.c @ z, -2.0, 2.0)))
         z = rigid.free @ z + rigid.b * error + rigid.drive * held[-1]
+        held.append(float(np.clip(rigid.c @ z, -2.0, 2.0)))
         assert python.input(error) == pytest.approx(held[-1], rel=1e-9, abs=1e-12)
         assert compiled(state, ctypes.c_double(error)) == pytest.approx(held[-1], rel=1e-9, abs=1e-12)
     assert max(held) == 2.0 and min(np.abs(held)) < 2.0

@@ -54,8 +54,8 @@ def _program(used: Used) -> tuple[Program, str, str]:
     """The program, a name for it, and a title."""
     effects = ", ".join(used.model.effects) or "rigid"
     title = f"axis {used.axis} ({effects}): {used.model.units.input} to {used.model.units.output} at {used.sampling_rate:g} Hz, by xy_sysid"
-    chosen = used.compensation
-    return program(used.model.model, used.sampling_rate, None if chosen is None else chosen.inverse), plain_name(used.axis), title
+    chosen = used.compensation.inverse if used.compensation is not None else None
+    return program(used.model.model, used.sampling_rate, chosen or used.in_loop.model), plain_name(used.axis), title
 
 
 def _inverse_note(used: Used) -> str:
@@ -127,7 +127,9 @@ def observer(used: Used) -> Exported:
     name = f"{plain_name(used.axis)}_control"
     title = f"axis {used.axis}, {used.model.units.input} for {used.model.units.output}, {used.states.bandwidth / (2.0 * math.pi):.3g} Hz"
     text, module = state_text.source(used.states, plain_name(used.axis), title, used.limit)
-    note = f"call it once every {1e3 / used.sampling_rate:g} ms with path minus encoder, and add the feedforward to what it gives"
+    note = (
+        f"call it once every {1e3 / used.sampling_rate:g} ms with path minus encoder, write what it gives one period later, and add the feedforward"
+    )
     return Exported({f"{name}.c": text, f"{name}.py": module}, note)
 
 

@@ -8,8 +8,9 @@ drive; and it is a PID. Margins and stability are those of the sampled loop, wit
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -28,8 +29,10 @@ PHASE_MARGIN, GAIN_MARGIN = 45.0, 2.0  # degrees, and times: Astrom & Murray, Fe
 MOST_PHASE, MOST_GAIN = 90.0, 100.0  # that may be asked for
 COUNT = 24  # samples of the parameters
 STEPS = 60  # crossovers that are tried
+TURN = 2.0 * math.pi  # rad
 HIGHEST = 0.25  # of the sampling rate, for a crossover
 ADVICE = "Ask for less bandwidth or smaller margins, or sample faster."
+Design = TypeVar("Design")
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,25 +191,42 @@ def feedback(
     sections: filters that the feedback passes, (k, 5); encoder: whose noise is counted; limit: of the drive, V
     Raises BadInput where gain or pole are not determined by the data, or where no bandwidth has the margins.
     """
+    systems = loop_systems(model, sampling_rate)
+    filters = np.zeros((0, 5)) if sections is None else sections
+    tried = ((crossover, shaped(systems[0], crossover, filters, limit)) for crossover in (TURN * item for item in asked.tries(sampling_rate, STEPS)))
+    (crossover, controller), *found = first_kept("bandwidth", asked, systems, tried, lambda system, item: margins(system, item[1]))
+    return _made(systems, controller, crossover, asked, (found[0], found[1]), encoder or Encoder())
+
+
+def loop_systems(model: PhysicalModel, sampling_rate: float) -> list[Sampled]:
+    """The model and samples of its parameters, sampled, and the motor alone inside a gap: the systems with which a loop has to keep its margins.
+
+    Raises BadInput where gain or pole are not determined by the data.
+    """
     doubtful = undetermined(model, ("gain", "pole"))
     if model.parameters and doubtful:
         raise BadInput(
             " and ".join(doubtful), "known to worse than a factor of two", "numbers that the data determine", "Record a livelier motion first."
         )
-    filters = np.zeros((0, 5)) if sections is None else sections
     own = samples(model, COUNT)
-    systems = [sampled(item, sampling_rate) for item in (*own, *within_a_gap(own[0]))]
+    return [sampled(item, sampling_rate) for item in (*own, *within_a_gap(own[0]))]
+
+
+def first_kept(
+    what: str, asked: Asked, systems: Sequence[Sampled], tried: Iterable[Design], of: Callable[[Sampled, Design], Margins]
+) -> tuple[Design, Margins, Margins]:
+    """The first controller that keeps the margins with every system, those of the first system, and the least.
+
+    of: margins of a system under a controller. Raises BadInput with the margins of the last one where none keeps them.
+    """
     worst = Margins(phase=0.0, gain=0.0, sensitivity=math.inf, crossover=0.0, stable=False)
-    for crossover in (2.0 * math.pi * item for item in asked.tries(sampling_rate, STEPS)):
-        controller = shaped(systems[0], crossover, filters, limit)
-        nominal = margins(systems[0], controller)
-        if not asked.met(nominal):
-            worst = nominal
-            continue
-        worst = least([margins(system, controller) for system in systems])
-        if asked.met(worst):
-            return _made(systems, controller, crossover, asked, (nominal, worst), encoder or Encoder())
-    raise asked.refused("bandwidth", worst)
+    for item in tried:
+        nominal = worst = of(systems[0], item)
+        if asked.met(nominal) and nominal.crossover > 0.0:  # a loop that never comes to 1 does nothing
+            worst = least([of(system, item) for system in systems])
+            if asked.met(worst):
+                return item, nominal, worst
+    raise asked.refused(what, worst)
 
 
 def within_a_gap(model: AxisModel) -> tuple[AxisModel, ...]:

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from xy_sysid.control_design.closed_loop import NO_LIMIT
-from xy_sysid.control_design.feedback import Feedback, in_milliseconds
+from xy_sysid.control_design.feedback import TURN, Feedback, in_milliseconds
 from xy_sysid.control_design.filters import Shaper
 from xy_sysid.control_design.gains import Gains
 from xy_sysid.errors import BadInput
 from xy_sysid.units import Units
 
-TURN = 2.0 * math.pi  # rad
 LEAST_GAIN, LEAST_PHASE = 1.7, 35.0  # margin without a filter on the derivative: less is near the end for a machine that warms up
 
 

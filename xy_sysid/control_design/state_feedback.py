@@ -12,16 +12,16 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg
 
 from xy_sysid.comparison.physical_model import PhysicalModel
-from xy_sysid.control_design.feedback import COUNT, USUAL, Asked, Margins, least, margins_of, within_a_gap
-from xy_sysid.control_design.sampled import Sampled, grid, on_grid, sampled
-from xy_sysid.control_design.uncertain import samples, undetermined
-from xy_sysid.errors import BadInput
+from xy_sysid.control_design.feedback import TURN, USUAL, Asked, Margins, first_kept, loop_systems, margins_of
+from xy_sysid.control_design.sampled import Sampled, grid, on_grid
 from xy_sysid.response.frf import ComplexArray
 from xy_sysid.samples.block import FloatArray
 
@@ -35,6 +35,7 @@ INTEGRAL = 4.0  # times below the bandwidth where the integral begins
 class StateFeedback:
     """z+ = free z + b (path - encoder) + drive held, u = c z, held = u within the drive's limit: observer and state feedback in one system.
 
+    What an encoder shows makes the voltage of the next sample: one period of calculation is part of the design.
     The observer hears of the voltage that is held, so it does not wind up. Within the limit z+ = a z + b (path - encoder).
 
     free: (n, n); b, c, drive: (n,); sampling_rate: Hz; bandwidth: rad/s that the weights were set by
@@ -76,44 +77,44 @@ def state_feedback(model: PhysicalModel, sampling_rate: float, asked: Asked = US
 
     Raises BadInput where gain or pole are not determined by the data, or where no bandwidth has the margins.
     """
-    doubtful = undetermined(model, ("gain", "pole"))
-    if model.parameters and doubtful:
-        raise BadInput(
-            " and ".join(doubtful), "known to worse than a factor of two", "numbers that the data determine", "Record a livelier motion first."
-        )
-    drawn = samples(model, COUNT)
-    systems = [sampled(item, sampling_rate) for item in (*drawn, *within_a_gap(drawn[0]))]
-    worst = Margins(phase=0.0, gain=0.0, sensitivity=math.inf, crossover=0.0, stable=False)
-    for tried, faster in itertools.product(asked.tries(sampling_rate, STEPS), FASTER):
-        wanted = 2.0 * math.pi * tried
-        try:
-            free, b, c, drive = _designed(systems[0], wanted, faster)
-        except np.linalg.LinAlgError:  # so far apart from the plant that the quadratic problem has no answer in double precision
-            continue
-        parts = free + np.outer(drive, c), b, c
-        own = _response(*parts, grid(sampling_rate), sampling_rate)
+    systems = loop_systems(model, sampling_rate)
 
-        nominal = _margins(systems[0], own, *parts)
-        worst = nominal
-        if not (asked.met(nominal) and nominal.crossover > 0.0):  # a loop that never comes to 1 does nothing
-            continue
-        worst = least([_margins(system, own, *parts) for system in systems])
-        if asked.met(worst):
-            rejects, settles = _load_step(systems[0], *parts)
-            return StateFeedback(
-                free=free,
-                b=b,
-                c=c,
-                drive=drive,
-                sampling_rate=sampling_rate,
-                bandwidth=wanted,
-                nominal=nominal,
-                worst=worst,
-                count=len(systems),
-                rejects=rejects,
-                settles=settles,
-            )
-    raise asked.refused("bandwidth of the state feedback", worst)
+    def designs() -> Iterator[_Design]:
+        for tried, faster in itertools.product(asked.tries(sampling_rate, STEPS), FASTER):
+            try:
+                free, b, c, drive = _designed(systems[0], TURN * tried, faster)
+            except np.linalg.LinAlgError:  # so far apart from the plant that the quadratic problem has no answer in double precision
+                continue
+            parts = free + np.outer(drive, c), b, c
+            yield _Design(TURN * tried, (free, b, c, drive), parts, _response(*parts, grid(sampling_rate), sampling_rate))
+
+    made, nominal, worst = first_kept(
+        "bandwidth of the state feedback", asked, systems, designs(), lambda system, item: _margins(system, item.own, *item.parts)
+    )
+    free, b, c, drive = made.numbers
+    rejects, settles = _load_step(systems[0], *made.parts)
+    return StateFeedback(
+        free=free,
+        b=b,
+        c=c,
+        drive=drive,
+        sampling_rate=sampling_rate,
+        bandwidth=made.bandwidth,
+        nominal=nominal,
+        worst=worst,
+        count=len(systems),
+        rejects=rejects,
+        settles=settles,
+    )
+
+
+class _Design(NamedTuple):
+    """bandwidth: rad/s; numbers: free, b, c, drive; parts: a, b, c within the limit; own: the response of these on the grid."""
+
+    bandwidth: float
+    numbers: tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+    parts: tuple[FloatArray, FloatArray, FloatArray]
+    own: ComplexArray
 
 
 def _designed(system: Sampled, bandwidth: float, faster: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:

@@ -17,25 +17,26 @@ LIMIT = {limit}
 
 
 class Controller:
-    # error: path minus encoder, once every {period:.9g} s; the answer is the input to be held until the next call
+    # error: path minus encoder, once every {period:.9g} s; the answer is the input to be written one period later, and held for one
 
     def __init__(self):
-        self.z = [0.0] * {n}
+        self.z, self.held = [0.0] * {n}, 0.0
 
     def input(self, error):
-        z = self.z
-        u = sum(c * x for c, x in zip(C, z))
-        held = min(max(u, -LIMIT), LIMIT)
+        z, held = self.z, self.held
         self.z = [
             sum(a * x for a, x in zip(FREE[i * {n} : (i + 1) * {n}], z)) + B[i] * error + DRIVE[i] * held
             for i in range({n})
         ]
-        return held
+        u = sum(c * x for c, x in zip(C, self.z))
+        self.held = min(max(u, -LIMIT), LIMIT)
+        return self.held
 """
 
 C_SOURCE = """\
 /* State feedback with an observer: {title}
-   error: path minus encoder, once every {period:.9g} s; z: {n} numbers, 0 at the begin; the answer is the input to be held until the next call */
+   error: path minus encoder, once every {period:.9g} s; z: {n} + 1 numbers, 0 at the begin
+   the answer is the input to be written one period later, and held for one */
 static const double FREE[] = {{{free}}};
 static const double B[] = {{{b}}};
 static const double C[] = {{{c}}};
@@ -43,19 +44,19 @@ static const double DRIVE[] = {{{drive}}};
 
 double {name}_control(double *z, double error)
 {{
-    double next[{n}], u = 0.0, held;
+    double next[{n}], u = 0.0;
     int i, j;
-    for (i = 0; i < {n}; i++)
-        u += C[i] * z[i];
-    held = u > {limit} ? {limit} : u < -{limit} ? -{limit} : u;
     for (i = 0; i < {n}; i++) {{
-        next[i] = B[i] * error + DRIVE[i] * held;
+        next[i] = B[i] * error + DRIVE[i] * z[{n}];
         for (j = 0; j < {n}; j++)
             next[i] += FREE[i * {n} + j] * z[j];
     }}
-    for (i = 0; i < {n}; i++)
+    for (i = 0; i < {n}; i++) {{
         z[i] = next[i];
-    return held;
+        u += C[i] * z[i];
+    }}
+    z[{n}] = u > {limit} ? {limit} : u < -{limit} ? -{limit} : u;
+    return z[{n}];
 }}
 """
 

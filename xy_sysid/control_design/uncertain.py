@@ -97,6 +97,15 @@ def with_values(model: AxisModel, values: dict[str, float]) -> AxisModel:
     return replace(model, **base, effects=effects, per_recording=())
 
 
+def later(model: PhysicalModel, seconds: float) -> PhysicalModel:
+    """The model with so much more delay, and its interval with it: the axis as a controller meets it that calculates for so long."""
+    known = tuple(
+        replace(item, value=item.value + seconds, low=item.low + seconds, high=item.high + seconds) if item.name == "delay" else item
+        for item in model.parameters
+    )
+    return replace(model, model=replace(model.model, delay=model.model.delay + seconds), fit=None, known=known)
+
+
 def samples(model: PhysicalModel, count: int) -> tuple[AxisModel, ...]:
     """The model, and ``count`` more whose parameters lie within their 95 % intervals: evenly, by a Halton sequence (Halton 1960).
 
