@@ -161,7 +161,8 @@ def test_an_odrive_snippet_is_python_in_turns() -> None:
     """Assignments that odrivetool takes; an axis in volts is refused, as ODrive commands a torque."""
     (text,) = export(use(known("coulomb_friction", units=Units("N m", "rad"))), "odrive").files.values()
     targets = [ast.unparse(node.targets[0]) for node in ast.parse(text).body if isinstance(node, ast.Assign)]
-    assert targets == [f"odrv0.axis0.controller.config.{name}" for name in ("pos_gain", "vel_gain", "vel_integrator_gain", "inertia")]
+    gains = [f"controller.config.{name}" for name in ("pos_gain", "vel_gain", "vel_integrator_gain", "inertia")]
+    assert targets == [f"odrv0.axis0.{name}" for name in ("config.encoder_bandwidth", *gains)]
     with pytest.raises(xy.BadInput, match="ODrive commands a torque"):
         export(use(known()), "odrive")
 

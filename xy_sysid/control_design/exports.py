@@ -44,7 +44,7 @@ def tables(used: Used) -> Exported:
 
 def _snippet(write: Callable[[snippets.Designed], snippets.Snippet]) -> Callable[[Used], Exported]:
     def made(used: Used) -> Exported:
-        item = write(snippets.Designed(axis=used.axis, units=used.model.units, gains=used.gains, feedback=used.feedback, shaper=used.shaper))
+        item = write(snippets.Designed(used.axis, used.model, used.gains, used.feedback, used.calculation, used.shaper))
         return Exported({f"{used.axis}_{item.target}_{item.file}": item.text}, item.note)
 
     return made

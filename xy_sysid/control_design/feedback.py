@@ -32,7 +32,7 @@ STEPS = 60  # crossovers that are tried
 TURN = 2.0 * math.pi  # rad
 HIGHEST = 0.25  # of the sampling rate, for a crossover
 ADVICE = "Ask for less bandwidth or smaller margins, or sample faster."
-Design = TypeVar("Design")
+ToTry = TypeVar("ToTry")
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,11 +134,11 @@ def shaped(system: Sampled, crossover: float, sections: FloatArray, limit: float
     at = np.array([crossover / (2.0 * math.pi)])
     plant = system.response(at)[0]
     size = 1.0 / abs(plant * controller_response(one, at, system.sampling_rate)[0])
-    size = math.copysign(float(size), _sign(system))
+    size = math.copysign(float(size), sign_of(system))
     return Controller(kp=size * one.kp, ki=size * one.ki, kd=size, derivative_time=one.derivative_time, sections=sections, limit=limit)
 
 
-def _sign(system: Sampled) -> float:
+def sign_of(system: Sampled) -> float:
     """Of the motion that a positive voltage makes in the end."""
     slow = np.array([1e-5 * system.sampling_rate])
     return -1.0 if float(np.imag(system.response(slow)[0])) > 0.0 else 1.0
@@ -213,8 +213,8 @@ def loop_systems(model: PhysicalModel, sampling_rate: float) -> list[Sampled]:
 
 
 def first_kept(
-    what: str, asked: Asked, systems: Sequence[Sampled], tried: Iterable[Design], of: Callable[[Sampled, Design], Margins]
-) -> tuple[Design, Margins, Margins]:
+    what: str, asked: Asked, systems: Sequence[Sampled], tried: Iterable[ToTry], of: Callable[[Sampled, ToTry], Margins]
+) -> tuple[ToTry, Margins, Margins]:
     """The first controller that keeps the margins with every system, those of the first system, and the least.
 
     of: margins of a system under a controller. Raises BadInput with the margins of the last one where none keeps them.

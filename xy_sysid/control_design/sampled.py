@@ -20,6 +20,7 @@ from xy_sysid.samples.block import FloatArray
 
 EVENLY = 2048  # frequencies of a mean over all of them
 LINES = 600  # frequencies of a response
+LinearSystem = tuple[FloatArray, FloatArray, FloatArray, float]  # A, B, C, D of a sampled controller
 KEPT = 256  # sampled models, and responses, that are remembered: those of a design are asked for again and again
 
 
@@ -94,6 +95,13 @@ def sampled(model: AxisModel, sampling_rate: float) -> Sampled:
     return Sampled(sampling_rate=sampling_rate, a=last @ first, old=last @ fed_first, new=fed_last, whole=back)
 
 
+def response_of(a: FloatArray, b: FloatArray, c: FloatArray, d: float, frequency: FloatArray, sampling_rate: float) -> ComplexArray:
+    """(n,) c (z - a)^-1 b + d at frequencies, Hz."""
+    z = np.exp(2j * np.pi * frequency / sampling_rate)
+    solved = np.linalg.solve(z[:, None, None] * np.eye(b.size) - a, np.broadcast_to(b[:, None], (z.size, b.size, 1)))
+    return np.asarray(solved[:, :, 0] @ c + d, dtype=np.complex128)
+
+
 def _held(a: FloatArray, b: FloatArray, seconds: float) -> tuple[FloatArray, FloatArray]:
     """Transition over a time and what a held input adds."""
     n = b.size
@@ -122,7 +130,7 @@ def coefficients(controller: Controller, sampling_rate: float) -> FloatArray:
     return np.vstack((np.concatenate((top, bottom[1:])), controller.sections))
 
 
-def controller_system(controller: Controller, sampling_rate: float) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+def controller_system(controller: Controller, sampling_rate: float) -> LinearSystem:
     """(A, B, C, D) of the same controller from error to voltage."""
     h, keeps = 1.0 / sampling_rate, controller.keeps(sampling_rate)
     a = np.array([[1.0, 0.0, 0.0], [0.0, keeps, -(1.0 - keeps) / h], [0.0, 0.0, 0.0]])
@@ -141,8 +149,13 @@ def controller_system(controller: Controller, sampling_rate: float) -> tuple[Flo
 
 def closed_poles(system: Sampled, controller: Controller) -> ComplexArray:
     """Poles of the closed loop in z; it is stable if all are within the unit circle."""
+    return looped_poles(system, controller_system(controller, system.sampling_rate))
+
+
+def looped_poles(system: Sampled, controller: LinearSystem) -> ComplexArray:
+    """The same with any linear controller from error to voltage."""
     a, b, c = system.whole_system()
-    ka, kb, kc, kd = controller_system(controller, system.sampling_rate)
+    ka, kb, kc, kd = controller
     top = np.hstack((a - kd * np.outer(b, c), np.outer(b, kc)))
     bottom = np.hstack((-np.outer(kb, c), ka))
     return np.asarray(np.linalg.eigvals(np.vstack((top, bottom))), dtype=np.complex128)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from xy_sysid.comparison.physical_model import PhysicalModel
+from xy_sysid.control_design.cascade import ESTIMATOR, RATE, cascade
 from xy_sysid.control_design.closed_loop import NO_LIMIT
 from xy_sysid.control_design.feedback import TURN, Feedback, in_milliseconds
 from xy_sysid.control_design.filters import Shaper
@@ -17,13 +19,19 @@ LEAST_GAIN, LEAST_PHASE = 1.7, 35.0  # margin without a filter on the derivative
 
 @dataclass(frozen=True, slots=True)
 class Designed:
-    """What a snippet is written from: the axis' name and units, and what was designed for it."""
+    """What a snippet is written from: the axis' name and model, and what was designed for it; calculation: periods from reading to writing."""
 
     axis: str
-    units: Units
+    model: PhysicalModel
     gains: Gains
     feedback: Feedback | None
+    calculation: float
     shaper: Shaper | None = None
+
+    @property
+    def units(self) -> Units:
+        """Of the model."""
+        return self.model.units
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,17 +126,22 @@ def odrive(of: Designed) -> Snippet:
         raise BadInput(
             "odrive", f"an axis in {asked}", "N m (or A) and rad", "ODrive commands a torque: convert the recording with --unit and --scale."
         )
+    own = cascade(of.model, loop.asked, of.calculation)
     torque = "torque_constant * " if of.units.input == "A" else ""
     at = "odrv0.axis0"
     lines = [f"torque_constant = {at}.config.motor.torque_constant"] if torque else []
     lines += [
-        f"{at}.controller.config.pos_gain = {loop.position_gain:.6g}",
-        f"{at}.controller.config.vel_gain = {torque}{loop.velocity_gain * TURN:.6g}",
-        f"{at}.controller.config.vel_integrator_gain = {torque}{loop.velocity_integral * TURN:.6g}",
+        f"{at}.config.encoder_bandwidth = {ESTIMATOR:g}  # rad/s",
+        f"{at}.controller.config.pos_gain = {own.position_gain:.6g}",
+        f"{at}.controller.config.vel_gain = {torque}{own.velocity_gain * TURN:.6g}",
+        f"{at}.controller.config.vel_integrator_gain = {torque}{own.velocity_integral * TURN:.6g}",
         f"{at}.controller.config.inertia = {torque}{of.gains.value('kA') * TURN:.6g}{_unsure(of, 'kA', '  # ')}",
     ]
     note = (
-        "ODrive's loops run at 8 kHz: these gains keep their margins there; its inertia is what kA is here, per turn. "
+        f"designed for ODrive's own loops at {RATE:g} Hz with its encoder estimator of {ESTIMATOR:g} rad/s, which firmware before 0.6 calls "
+        f"encoder.config.bandwidth. Crossover {own.nominal.crossover:.3g} Hz; worst of {own.count} samples: phase margin {own.worst.phase:.3g} "
+        f"degrees, gain margin {own.worst.gain:.3g}. The model has to contain ODrive's current loop: its input is the torque (or current) command. "
+        "ODrive's inertia is what kA is here, per turn. "
         f"It has no kS and kV: add their torque to input_torque.{_gravity(of)}"
     )
     return Snippet("odrive", "odrivetool", "\n".join(lines) + "\n", note)

@@ -21,7 +21,7 @@ import scipy.linalg
 
 from xy_sysid.comparison.physical_model import PhysicalModel
 from xy_sysid.control_design.feedback import TURN, USUAL, Asked, Margins, first_kept, loop_systems, margins_of
-from xy_sysid.control_design.sampled import Sampled, grid, on_grid
+from xy_sysid.control_design.sampled import Sampled, grid, on_grid, response_of
 from xy_sysid.response.frf import ComplexArray
 from xy_sysid.samples.block import FloatArray
 
@@ -62,14 +62,7 @@ class StateFeedback:
 
     def response(self, frequency: FloatArray) -> ComplexArray:
         """(n,) voltage over error at frequencies, Hz."""
-        return _response(self.a, self.b, self.c, frequency, self.sampling_rate)
-
-
-def _response(a: FloatArray, b: FloatArray, c: FloatArray, frequency: FloatArray, sampling_rate: float) -> ComplexArray:
-    """(n,) c (z - a)^-1 b at frequencies, Hz."""
-    z = np.exp(2j * np.pi * frequency / sampling_rate)
-    solved = np.linalg.solve(z[:, None, None] * np.eye(b.size) - a, np.broadcast_to(b[:, None], (z.size, b.size, 1)))
-    return np.asarray(solved[:, :, 0] @ c, dtype=np.complex128)
+        return response_of(self.a, self.b, self.c, 0.0, frequency, self.sampling_rate)
 
 
 def state_feedback(model: PhysicalModel, sampling_rate: float, asked: Asked = USUAL) -> StateFeedback:
@@ -86,7 +79,7 @@ def state_feedback(model: PhysicalModel, sampling_rate: float, asked: Asked = US
             except np.linalg.LinAlgError:  # so far apart from the plant that the quadratic problem has no answer in double precision
                 continue
             parts = free + np.outer(drive, c), b, c
-            yield _Design(TURN * tried, (free, b, c, drive), parts, _response(*parts, grid(sampling_rate), sampling_rate))
+            yield _Design(TURN * tried, (free, b, c, drive), parts, response_of(*parts, 0.0, grid(sampling_rate), sampling_rate))
 
     made, nominal, worst = first_kept(
         "bandwidth of the state feedback", asked, systems, designs(), lambda system, item: _margins(system, item.own, *item.parts)
