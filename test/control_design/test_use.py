@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import configparser
 import ctypes
+import itertools
 import re
 import sys
 import types
@@ -105,7 +106,9 @@ def test_a_ros2_control_snippet_is_yaml_with_the_names_of_pid_controller() -> No
     (text,) = export(used, "ros2_control").files.values()
     own = yaml.safe_load(text)["pid_controller"]["ros__parameters"]
     assert own["dof_names"] == ["x"] and used.feedback is not None
-    assert own["gains"]["x"]["p"] == pytest.approx(used.feedback.controller.kp, rel=1e-5) and own["gains"]["x"]["u_clamp_min"] == -5.0
+    assert own["gains"]["x"]["p"] == pytest.approx(used.feedback.controller.kp, rel=1e-5) and used.fastest is not None
+    fed = used.gains.value("kV") * used.fastest.bounds.speed
+    assert 1.0 < fed < 4.0 and own["gains"]["x"]["u_clamp_max"] == -own["gains"]["x"]["u_clamp_min"] == pytest.approx(5.0 - fed, rel=1e-5)
     clamps = {"i_clamp_max", "i_clamp_min", "u_clamp_max", "u_clamp_min"}
     assert set(own["gains"]["x"]) == {"p", "i", "d", *clamps, "antiwindup_strategy", "feedforward_gain"}
     assert own["gains"]["x"]["feedforward_gain"] == pytest.approx(used.gains["kV"].value, rel=1e-5), "it multiplies the velocity that is asked for"
@@ -155,6 +158,9 @@ def test_a_linuxcnc_snippet_is_hal_commands_with_the_pins_of_pid() -> None:
     found = {m[1]: float(m[2]) for line in lines if (m := re.fullmatch(r"setp pid\.x\.(\w+) (-?[\d.e+-]+)", line))}
     assert len(found) == len(lines) and set(found) == {"Pgain", "Igain", "Dgain", "FF1", "FF2", "bias", "maxoutput"}
     assert found["FF1"] == pytest.approx(1e-3 * used.gains["kV"].value, rel=1e-5)
+    assert found["maxoutput"] == pytest.approx(5.0 - used.gains["kS"].value), "kS is added behind the limit of pid"
+    with pytest.raises(xy.BadInput, match="more than kS and kCos"):
+        export(use(known("coulomb_friction"), limit=0.1), "linuxcnc")
 
 
 def test_an_odrive_snippet_is_python_in_turns() -> None:
@@ -177,7 +183,7 @@ def test_a_twincat_program_is_parsed_by_blark_with_the_fields_of_fb_ctrl_pid() -
     assert names <= set(fields) and fields["tCtrlCycleTime"] == "T#1MS" and used.feedback is not None
     own = used.feedback.controller
     assert float(fields["fKp"]) == pytest.approx(1e-3 * own.kp) and fields["tTn"] == f"T#{round(1e3 * own.kp / own.ki)}MS"
-    assert f"fKV : LREAL := {1e-3 * used.gains['kV'].value:.9E}" in text and "+ fKS * fSign" in text
+    assert f"fKV : LREAL := {1e-3 * used.gains['kV'].value:.9E}" in text and "fKS * fSign +" in text
     assert used.feedback.counted.phase >= 35.0
     arm = use(known("gravity", units=Units("A", "rad")), rate=1000.0, limit=5.0)
     (turning,) = export(arm, "twincat").files.values()
@@ -185,6 +191,34 @@ def test_a_twincat_program_is_parsed_by_blark_with_the_fields_of_fb_ctrl_pid() -
     assert "no kCos: add" in export(arm, "linuxcnc").note and "no kCos: add" in export(arm, "ros2_control").note
     with pytest.raises(xy.BadInput, match=r"rate of 2000 Hz.*--controller-rate"):
         export(use(known("coulomb_friction"), rate=2000.0), "twincat")
+
+
+def test_the_twincat_program_keeps_the_sum_of_feedback_and_feedforward_within_the_limit() -> None:
+    """Run with a block that stops at its limits, as FB_CTRL_PID does: no sum leaves the limit, and the block has all that the feedforward leaves."""
+    used = use(known("coulomb_friction"), rate=1000.0, limit=5.0)
+    (text,) = export(used, "twincat").files.values()
+    body = text.rsplit("END_VAR\n\n", 1)[1].split("END_PROGRAM")[0]
+    program = re.sub(r"\(\*.*?\*\)", "", body).replace(":=", "=").replace(";", "")
+    params = types.SimpleNamespace(fOutMaxLimit=5.0, fOutMinLimit=-5.0)
+
+    class Block:
+        fOut = 0.0
+
+        def __call__(self, fSetpointValue: float, fActualValue: float, eMode: object, stParams: Any) -> None:
+            self.fOut = min(max(1e6 * (fSetpointValue - fActualValue), stParams.fOutMinLimit), stParams.fOutMaxLimit)
+
+    names: dict[str, Any] = {
+        "SEL": lambda choice, no, yes: yes if choice else no,
+        "LIMIT": lambda low, value, high: min(max(value, low), high),
+        "eCTRL_MODE_ACTIVE": 1, "fbPid": Block(), "stParams": params, "fKG": 0.0,
+        **{f"f{name.upper()[0]}{name[1:]}": used.gains.value(name) * (1.0 if name == "kS" else 1e-3) for name in ("kS", "kV", "kA")},
+    }  # fmt: skip
+    for speed, off in itertools.product((-1000.0, -300.0, 0.0, 300.0, 1000.0), (-1.0, 0.0, 1.0)):
+        exec(program, names, asked := {"fSetPosition": off, "fActPosition": 0.0, "fSetVelocity": speed, "fSetAcceleration": 0.0})
+        wanted = {-1.0: -5.0, 0.0: asked["fFeedforward"], 1.0: 5.0}[off]
+        assert asked["fOutput"] == pytest.approx(wanted) and abs(asked["fOutput"]) <= 5.0 + 1e-12
+        fed = used.gains.value("kS") * np.sign(speed) + 1e-3 * used.gains.value("kV") * speed
+        assert asked["fFeedforward"] == pytest.approx(np.clip(fed, -5.0, 5.0))
 
 
 def test_a_gain_that_the_data_do_not_determine_is_exported_as_0_and_named() -> None:

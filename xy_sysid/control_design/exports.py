@@ -44,7 +44,8 @@ def tables(used: Used) -> Exported:
 
 def _snippet(write: Callable[[snippets.Designed], snippets.Snippet]) -> Callable[[Used], Exported]:
     def made(used: Used) -> Exported:
-        item = write(snippets.Designed(used.axis, used.model, used.gains, used.feedback, used.calculation, used.shaper))
+        speed = used.fastest.bounds.speed if used.fastest is not None else None
+        item = write(snippets.Designed(used.axis, used.model, used.gains, used.feedback, used.calculation, used.shaper, speed))
         return Exported({f"{used.axis}_{item.target}_{item.file}": item.text}, item.note)
 
     return made
@@ -128,7 +129,8 @@ def observer(used: Used) -> Exported:
     title = f"axis {used.axis}, {used.model.units.input} for {used.model.units.output}, {used.states.bandwidth / (2.0 * math.pi):.3g} Hz"
     text, module = state_text.source(used.states, plain_name(used.axis), title, used.limit)
     note = (
-        f"call it once every {1e3 / used.sampling_rate:g} ms with path minus encoder, write what it gives one period later, and add the feedforward"
+        f"call it once every {1e3 / used.sampling_rate:g} ms with path minus encoder and the feedforward of the next period; "
+        "its answer is the sum of both within the limit: write it one period later"
     )
     return Exported({f"{name}.c": text, f"{name}.py": module}, note)
 

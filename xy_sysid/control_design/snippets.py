@@ -19,7 +19,10 @@ LEAST_GAIN, LEAST_PHASE = 1.7, 35.0  # margin without a filter on the derivative
 
 @dataclass(frozen=True, slots=True)
 class Designed:
-    """What a snippet is written from: the axis' name and model, and what was designed for it; calculation: periods from reading to writing."""
+    """What a snippet is written from: the axis' name and model, and what was designed for it.
+
+    calculation: periods from reading to writing; speed: m/s, the largest of the fastest path; None where nobody knows the drive's limit
+    """
 
     axis: str
     model: PhysicalModel
@@ -27,6 +30,7 @@ class Designed:
     feedback: Feedback | None
     calculation: float
     shaper: Shaper | None = None
+    speed: float | None = None
 
     @property
     def units(self) -> Units:
@@ -48,8 +52,11 @@ def ros2_control(of: Designed) -> Snippet:
     """Parameters of pid_controller/PidController, with the names of control_toolbox."""
     loop = _unfiltered_loop(of, "ros2_control")
     limit = loop.controller.limit
-    bound = f"{limit:.6g}" if limit < NO_LIMIT else ".inf"
-    low = f"-{limit:.6g}" if limit < NO_LIMIT else "-.inf"
+    bound, shared = ".inf", "u_clamp limits the PID alone, not its sum with the feedforward"
+    if limit < NO_LIMIT:
+        fed = abs(of.gains.value("kV")) * (of.speed or 0.0)
+        bound = f"{limit - fed:.6g}"
+        shared += f": of {limit:.4g} {of.units.input} it leaves {fed:.3g} to the feedforward, for up to {of.speed or 0.0:.3g} {of.units.speed}"
     name = "'" + of.axis.replace("'", "''") + "'"  # in quotes: the parser of ROS 2 reads a plain y or no as a bool, and 1 as an integer
     lines = [
         f"# u = p e + i int(e) + d de/dt in {of.units.input}, e in {of.units.output}, at {loop.sampling_rate:g} Hz",
@@ -65,16 +72,16 @@ def ros2_control(of: Designed) -> Snippet:
         f"        i: {loop.controller.ki:.6g}",
         f"        d: {loop.controller.kd:.6g}",
         f"        i_clamp_max: {bound}",
-        f"        i_clamp_min: {low}",
+        f"        i_clamp_min: -{bound}",
         f"        u_clamp_max: {bound}",
-        f"        u_clamp_min: {low}",
+        f"        u_clamp_min: -{bound}",
         "        antiwindup_strategy: conditional_integration",
         f"        feedforward_gain: {of.gains.value('kV'):.6g}{_unsure(of, 'kV', '  # ')}",
     ]
     note = (
         "feedforward_gain is kV: the controller multiplies the velocity that is asked for by it, once enable_feedforward is true; a version "
-        "without this parameter has the service ~/set_feedforward_control instead. u_clamp limits the PID alone, not its sum with the feedforward; "
-        f"kS and kA have no place in it, add them in a controller of your own.{_gravity(of)} {_unfiltered(loop)}"
+        "without this parameter has the service ~/set_feedforward_control instead. "
+        f"{shared}; kS and kA have no place in it, add them in a controller of your own.{_gravity(of)} {_unfiltered(loop)}"
     )
     return Snippet("ros2_control", "controllers.yaml", "\n".join(lines) + "\n", note)
 
@@ -99,6 +106,9 @@ def linuxcnc(of: Designed) -> Snippet:
     loop = _unfiltered_loop(of, "linuxcnc")
     per, length = (1e-3, "mm") if of.units.output == "m" else (1.0, of.units.output)
     at = of.axis
+    size, outside = loop.controller.limit, abs(of.gains.value("kS")) + abs(of.gains.value("kCos"))
+    if size <= outside:
+        raise BadInput("linuxcnc", f"a limit of {size:g} {of.units.input}", f"more than kS and kCos, {outside:.3g}", "Check --limit, or the model.")
     values = {
         "Pgain": loop.controller.kp * per,
         "Igain": loop.controller.ki * per,
@@ -106,14 +116,15 @@ def linuxcnc(of: Designed) -> Snippet:
         "FF1": of.gains.value("kV") * per,
         "FF2": of.gains.value("kA") * per,
         "bias": of.gains.value("kG"),
-        "maxoutput": loop.controller.limit if loop.controller.limit < NO_LIMIT else 0.0,
+        "maxoutput": size - outside if size < NO_LIMIT else 0.0,
     }
     lines = [f"# command in {of.units.input}, position in {length}; run the thread at {loop.sampling_rate:g} Hz"]
     unsure = {name: _unsure(of, gain) for name, gain in (("FF1", "kV"), ("FF2", "kA"), ("bias", "kG"))}
     lines += [f"# {name} is {doubt}" for name, doubt in unsure.items() if doubt]
     lines += [f"setp pid.{at}.{name} {value:.6g}" for name, value in values.items()]
     note = (
-        f"pid has no kS: add {of.gains.value('kS'):.4g} {of.units.input} with the sign of the commanded velocity.{_gravity(of)} {_unfiltered(loop)}"
+        f"pid has no kS: add {of.gains.value('kS'):.4g} {of.units.input} with the sign of the commanded velocity.{_gravity(of)} "
+        f"{'maxoutput leaves room for it. ' if outside and size < NO_LIMIT else ''}{_unfiltered(loop)}"
     )
     return Snippet("linuxcnc", "axis.hal", "\n".join(lines) + "\n", note)
 
@@ -137,6 +148,9 @@ def odrive(of: Designed) -> Snippet:
         f"{at}.controller.config.vel_integrator_gain = {torque}{own.velocity_integral * TURN:.6g}",
         f"{at}.controller.config.inertia = {torque}{of.gains.value('kA') * TURN:.6g}{_unsure(of, 'kA', '  # ')}",
     ]
+    limit = loop.controller.limit
+    if limit < NO_LIMIT:  # of the sum of its feedback and its feedforward
+        lines += [f"{at}.config.torque_soft_{end} = {torque}{size:.6g}" for end, size in (("max", limit), ("min", -limit))]
     note = (
         f"designed for ODrive's own loops at {RATE:g} Hz with its encoder estimator of {ESTIMATOR:g} rad/s, which firmware before 0.6 calls "
         f"encoder.config.bandwidth. Crossover {own.nominal.crossover:.3g} Hz; worst of {own.count} samples: phase margin {own.worst.phase:.3g} "
@@ -176,8 +190,13 @@ def twincat(of: Designed) -> Snippet:
     if limited:
         fields += [f"fOutMaxLimit := {own.limit:.9E}", f"fOutMinLimit := {-own.limit:.9E}"]
     kept = [f"    {name} : LREAL := {value:.9E}; (* {unit} *)" for name, value, unit in _feedforward(of, per, length)]
-    total = "fbPid.fOut + fKS * fSign + fKV * fSetVelocity + fKA * fSetAcceleration + fKG"
-    total += " + fKCos * COS(fSetPosition - fZero)" if of.gains.value("kCos") else ""
+    fed = "fKS * fSign + fKV * fSetVelocity + fKA * fSetAcceleration + fKG"
+    fed += " + fKCos * COS(fSetPosition - fZero)" if of.gains.value("kCos") else ""
+    shared = [
+        f"fFeedforward := LIMIT({-own.limit:.9E}, {fed}, {own.limit:.9E});",
+        f"stParams.fOutMaxLimit := {own.limit:.9E} - fFeedforward; (* the sum stays within the limit, and the integral stops there *)",
+        f"stParams.fOutMinLimit := {-own.limit:.9E} - fFeedforward;",
+    ]
     lines = [
         f"(* Axis {of.axis}: input in {of.units.input}, position in {length}. Call it in a task of {cycle:g} ms. *)",
         f"PROGRAM {_identifier(of.axis)}",
@@ -197,16 +216,18 @@ def twincat(of: Designed) -> Snippet:
         "    );",
         *kept,
         "    fSign : LREAL;",
+        "    fFeedforward : LREAL;",
         "END_VAR",
         "",
         "fSign := SEL(fSetVelocity > 0.0, SEL(fSetVelocity < 0.0, 0.0, -1.0), 1.0);",
+        *(shared if limited else [f"fFeedforward := {fed};"]),
         "fbPid(fSetpointValue := fSetPosition, fActualValue := fActPosition, eMode := eCTRL_MODE_ACTIVE, stParams := stParams);",
-        f"fOutput := LIMIT({-own.limit:.9E}, {total}, {own.limit:.9E});" if limited else f"fOutput := {total};",
+        "fOutput := fbPid.fOut + fFeedforward;",
         "END_PROGRAM",
     ]
     left = f"a phase margin of {loop.counted.phase:.3g} degrees and a gain margin of {loop.counted.gain:.3g} are left"
     doubt = f"; {of.gains.doubt}" if of.gains.doubt else ""
-    note = f"needs Tc2_ControllerToolbox; its times are whole milliseconds, so {left}; its integral stops at the limit{doubt}"
+    note = f"needs Tc2_ControllerToolbox; times are whole milliseconds, so {left}; the integral stops with the sum at the limit{doubt}"
     return Snippet("twincat", "axis.st", "\n".join(lines) + "\n", note)
 
 

@@ -33,7 +33,7 @@ INTEGRAL = 4.0  # times below the bandwidth where the integral begins
 
 @dataclass(frozen=True, slots=True)
 class StateFeedback:
-    """z+ = free z + b (path - encoder) + drive held, u = c z, held = u within the drive's limit: observer and state feedback in one system.
+    """z+ = free z + b (path - encoder) + drive held, u = c z, held = u as far as the drive gives it: observer and state feedback in one system.
 
     What an encoder shows makes the voltage of the next sample: one period of calculation is part of the design.
     The observer hears of the voltage that is held, so it does not wind up. Within the limit z+ = a z + b (path - encoder).
