@@ -76,7 +76,7 @@ def test_a_bandwidth_that_cannot_be_had_is_refused() -> None:
 def test_a_period_of_calculation_is_part_of_every_margin_and_of_the_simulation() -> None:
     """By default the voltage is written one period after the reading: this test closes that loop by itself, for samples of the parameters too."""
     model = known("base_resonance", spread=0.05)
-    used, at_once = (use(model, rate=RATE, limit=5.0, calculation=periods) for periods in (1.0, 0.0))
+    used, at_once = (use(model, rate=RATE, limit=5.0, travel=(-0.02, 0.02), calculation=periods) for periods in (1.0, 0.0))
     assert used.calculation == 1.0 and used.feedback is not None and at_once.feedback is not None and used.allowed is not None
     assert used.feedback.crossover < at_once.feedback.crossover
     w = np.geomspace(1.0, 0.999 * np.pi * RATE, 20_000)

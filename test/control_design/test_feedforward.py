@@ -178,7 +178,7 @@ def test_a_resonance_that_only_the_load_shows_is_refused_in_one_line() -> None:
 def test_with_an_encoder_on_the_load_there_are_gains_and_no_loops() -> None:
     """kV and kA hold for both masses together; a loop around a spring that no design here knows is refused, in words."""
     model = PhysicalModel(axis().with_effect("load_side_resonance", (60.0, 0.05)))
-    used = use(model, limit=5.0)
+    used = use(model, rate=2000.0, limit=5.0)
     assert [gain.name for gain in used.gains.items[1:3]] == ["kV", "kA"]
     assert used.feedback is None and used.states is None and used.modes == ()
     assert {what for what, _ in used.refused} >= {"feedback", "state feedback", "filters"}

@@ -29,6 +29,7 @@ from xy_sysid.control_design.uncertain import Derived
 from xy_sysid.control_design.use import use
 from xy_sysid.units import Units
 
+TRAVEL = -0.025, 0.025  # m
 FIVE = [(name, ctypes.c_void_p) for name in ("allocate", "deallocate", "reallocate", "zero_allocate", "state")]  # of rcutils_allocator_t
 
 
@@ -64,9 +65,25 @@ def test_a_model_without_intervals_is_used_with_a_warning() -> None:
     assert "no intervals" in used.notes[0] and used.feedback is not None and used.feedback.count == 1
 
 
+def test_the_rate_is_that_of_the_models_recording_or_is_asked_for(tmp_path: Path, model: xy.PhysicalModel) -> None:
+    """A file carries the rate of the recording that its model was fitted to; where nobody knows it nothing is made up, and the travel is no other."""
+    file = tmp_path / "axes.yaml"
+    for name, of in (("fitted", model), ("known", replace(known("cogging"), sampling_rate=500.0))):
+        xy.save(of, file, force=True)
+        read = xy.load_model(file)
+        assert isinstance(read, xy.PhysicalModel) and read.sampling_rate == of.sampling_rate == {"fitted": 2000.0, "known": 500.0}[name]
+    said = cli("use", file, "--limit", "5", "--json").json["axes"]["x"]
+    assert said["sampling_rate"] == 500.0 and said["rate_from"] == "of the recording that the model was fitted to" and said["travel"] is None
+    assert said["tables"] == [] and said["fastest"] is None and said["tracking"] == []
+    assert "--travel LOW HIGH" in {item["what"]: item["reason"] for item in said["refused"]}["path and tables by position"]
+    xy.save(replace(known(), sampling_rate=None), file, force=True)
+    assert "--controller-rate" in refused("use", file, "--limit", "5")
+    assert cli("use", file, "--controller-rate", "1000", "--json").json["axes"]["x"]["rate_from"] == "given"
+
+
 def test_what_cannot_be_designed_safely_is_refused_and_the_rest_is_told() -> None:
     """An undetermined gain makes no controller; the gains are marked; tables are still there."""
-    used = use(known("cogging", gain=0.9), limit=5.0)
+    used = use(known("cogging", gain=0.9), limit=5.0, travel=TRAVEL)
     assert used.feedback is None and not used.tracking
     assert dict(used.refused)["feedback"].startswith("gain is known to worse than a factor of two")
     assert any("kV is not determined" in note for note in used.notes) and used.tables
@@ -102,7 +119,7 @@ def test_a_transfer_function_is_refused() -> None:
 
 def test_a_ros2_control_snippet_is_yaml_with_the_names_of_pid_controller() -> None:
     """Gains, clamps and strategy under the joint's name."""
-    used = use(known("coulomb_friction"), limit=5.0)
+    used = use(known("coulomb_friction"), limit=5.0, travel=TRAVEL)
     (text,) = export(used, "ros2_control").files.values()
     own = yaml.safe_load(text)["pid_controller"]["ros__parameters"]
     assert own["dof_names"] == ["x"] and used.feedback is not None
@@ -152,7 +169,7 @@ def test_a_klipper_snippet_is_a_section_that_its_parser_reads() -> None:
 
 def test_a_linuxcnc_snippet_is_hal_commands_with_the_pins_of_pid() -> None:
     """One setp for each pin, in V and mm."""
-    used = use(known("coulomb_friction"), limit=5.0)
+    used = use(known("coulomb_friction"), limit=5.0, travel=TRAVEL)
     (text,) = export(used, "linuxcnc").files.values()
     lines = [line for line in text.splitlines() if not line.startswith("#")]
     found = {m[1]: float(m[2]) for line in lines if (m := re.fullmatch(r"setp pid\.x\.(\w+) (-?[\d.e+-]+)", line))}
@@ -239,7 +256,8 @@ def test_a_gain_that_the_data_do_not_determine_is_exported_as_0_and_named() -> N
 
 def test_exported_source_undoes_what_is_predicted_to_help() -> None:
     """The laws that the compensation leaves are left by the exported feedforward, too, and the note names them."""
-    sure, unsure = use(known("cogging"), limit=5.0), use(known("cogging", cogging__phase=40.0, cogging__amplitude=2.0), limit=5.0)
+    models = known("cogging"), known("cogging", cogging__phase=40.0, cogging__amplitude=2.0)
+    sure, unsure = (use(model, limit=5.0, travel=TRAVEL) for model in models)
     assert sure.compensation is not None and sure.compensation.terms == ("base", "cogging")
     assert "undoes base, cogging" in export(sure, "c").note
     assert unsure.compensation is not None and "cogging" not in unsure.compensation.terms, "its phase is not known"
@@ -280,7 +298,7 @@ def test_the_command_tells_gains_and_writes_files(tmp_path: Path, model: xy.Phys
     assert {"kS", "kV", "kA"} <= set(said.out.split()) and "phase margin" in said.out
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"x_friction.csv", "x_ros2_control_controllers.yaml"}
     assert "add --force" in refused("use", file, "--to", "tables", "-o", tmp_path / "out")
-    found = cli("use", file, "--limit", "5", "--json").json["axes"]["x"]
+    found = cli("use", file, "--limit", "5", "--travel", "-0.02", "0.02", "--json").json["axes"]["x"]
     assert found["gains"]["kS"]["unit"] == "V" and found["gains"]["kS"]["determined"]
     assert found["feedback"]["worst"]["phase"] >= 45.0 and found["tracking"][0]["whole"] < found["tracking"][0]["feedback"]
 

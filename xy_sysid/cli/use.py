@@ -33,7 +33,8 @@ def use(
     reading: Reading,
     on: On = None,
     controller_rate: Annotated[
-        float | None, typer.Option("--controller-rate", metavar="HZ", help="rate of the controller; by default that of the recording, or 2000")
+        float | None,
+        typer.Option("--controller-rate", metavar="HZ", help="rate of the controller; by default that of the recording, or of the model's"),
     ] = None,
     limit: Annotated[
         float | None,

@@ -108,7 +108,7 @@ def _show_feedback(name: str, used: Used, loop: Feedback) -> None:
         ("derivative filter", lambda item: f"{1e3 * item.controller.derivative_time:.3g}", "ms"),
     ]
     columns = ("number", "value", *([f"with the {used.filter.kind}"] if used.filter is not None else []), "unit")
-    title = f"axis {name}: feedback at {loop.sampling_rate:g} Hz, written {used.calculation:g} periods after reading"
+    title = f"axis {name}: feedback at {loop.sampling_rate:g} Hz ({used.rate_from}), written {used.calculation:g} periods after reading"
     table(title, columns, [(what, *map(of, loops), unit) for what, of, unit in rows])
     found = coefficients(loops[-1].controller, loop.sampling_rate)
     which = ("PID", *([used.filter.kind] if used.filter is not None else []))
@@ -154,7 +154,7 @@ def _mode(mode: Swing) -> str:
 def answer(used: Used) -> dict[str, Any]:
     """Everything but the model, which has a file of its own, and the paths."""
     designs = ("friction", "tables", "gap", "modes", "shaper", "shapers", "allowed")
-    names = ("sampling_rate", "calculation", "limit", "limit_from", "travel", *designs, "predicted", "tracking")
+    names = ("sampling_rate", "rate_from", "calculation", "limit", "limit_from", "travel", *designs, "predicted", "tracking")
     found: dict[str, Any] = {name: getattr(used, name) for name in names}
     found["gains"] = {
         item.name: {"value": item.value, "unit": item.unit, "ci95": [item.low, item.high], "determined": item.determined, "because": item.because}

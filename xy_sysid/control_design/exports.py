@@ -116,7 +116,7 @@ def mujoco(used: Used) -> Exported:
 
 def robot(used: Used) -> Exported:
     """URDF."""
-    text, lost = urdf(used.model.model, used.travel, used.limit, used.model.units.output == "rad", ends=used.travel_known)
+    text, lost = urdf(used.model.model, used.travel, used.limit, used.model.units.output == "rad")
     return Exported({f"{plain_name(used.axis)}.urdf": text}, _losses(lost))
 
 
@@ -137,7 +137,7 @@ def observer(used: Used) -> Exported:
 
 def gazebo(used: Used) -> Exported:
     """SDF."""
-    text, lost = sdf(used.model.model, used.travel, used.limit, used.model.units.output == "rad", ends=used.travel_known)
+    text, lost = sdf(used.model.model, used.travel, used.limit, used.model.units.output == "rad")
     return Exported({f"{plain_name(used.axis)}.sdf": text}, _losses(lost))
 
 

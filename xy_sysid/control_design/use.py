@@ -30,13 +30,11 @@ from xy_sysid.errors import BadInput
 from xy_sysid.linear.any_model import AnyModel
 from xy_sysid.samples.recording import Recording, Run, one_run
 
-RATE = 2000.0  # Hz of the controller, where nobody says another
 CALCULATION, LONGEST_CALCULATION = 1.0, 10.0  # periods of the controller from reading to writing: of most drives, and the most that is taken
 WORST_OF = 6  # samples of the parameters along a path
 CALM = 0.6  # of the fastest path's speed, for the path that tracking is compared on
 FOLLOWED = 0.2  # of the bandwidth: what of a recorded motion a loop is asked to follow
 LONGEST = 10.0  # s of a recorded motion that is followed
-SWING = 0.05  # m (or the output's unit) of the path, where no recording and no travel say another
 Found = TypeVar("Found")
 
 
@@ -44,9 +42,9 @@ Found = TypeVar("Found")
 class Used:
     """What to do with a model; ``axis`` and ``model.units`` say of what.
 
-    sampling_rate: Hz of the controller; calculation: its periods from reading the encoder to writing the voltage
+    sampling_rate: Hz of the controller; rate_from: who said so; calculation: its periods from reading the encoder to writing the voltage
     limit: V of the drive, infinite if nobody knows it; limit_from: who said so
-    travel: m, that tables and paths cover; travel_known: False where nobody said it, and it is a usual one
+    travel: m, that tables and paths cover; None where nobody knows it
     gains, friction, tables, gap: feedforward and corrections (None: the axis has none)
     feedback, states (state feedback with an observer), modes, notch, shapers (of the lowest mode; shaper: the best), fastest: None or none where
     there is nothing to design, or where it was refused
@@ -60,11 +58,11 @@ class Used:
     axis: str
     model: PhysicalModel
     sampling_rate: float
+    rate_from: str
     calculation: float
     limit: float
     limit_from: str
-    travel: tuple[float, float]
-    travel_known: bool
+    travel: tuple[float, float] | None
     gains: Gains
     friction: Correction | None
     tables: tuple[Correction, ...]
@@ -111,7 +109,8 @@ def use(
     """Feedforward with intervals, correction tables, feedback with margins, filters, limits, and what they are worth.
 
     model: of ``refine`` or a file; data: a recording of the same machine, for before and after on its own motion, its noise and its limit
-    rate: Hz of the controller (the recording's, or 2 kHz); limit: V of the drive (the model's saturation, or the recording's largest voltage)
+    rate: Hz of the controller (that of the recording, or of the one that the model was fitted to)
+    limit: V of the drive (the model's saturation, or the recording's largest voltage)
     bandwidth: Hz, asked of the loop (the largest with the margins by default); travel: m, that tables cover (the recording's)
     margins: phase margin, degrees, and gain margin, times, that the worst sample of the parameters has to keep (45 and 2)
     calculation: periods of the controller from reading the encoder to writing the voltage, in margins and simulations (1: written in the next cycle)
@@ -122,7 +121,7 @@ def use(
     run = None if data is None else one_run(data)
     if run is not None and run.units != model.units:
         raise BadInput("units of the recording", "/".join(run.units), "/".join(model.units), "Give a recording in the model's units.")
-    rate = rate or (run.sampling_rate if run is not None else RATE)
+    rate, rate_from = _rate(model, run, rate)
     if not 1.0 <= rate <= 1e6:
         raise BadInput("rate", f"{rate:g} Hz", "1 to 1e6 Hz", "Give the controller's rate.")
     if not 0.0 <= calculation <= LONGEST_CALCULATION:
@@ -130,8 +129,8 @@ def use(
     wait = calculation / rate
     late = later(model, wait)
     drive, drive_from = _limit(model, run, limit)
-    between = travel or _travel(run)
-    if not between[0] < between[1]:
+    between = travel or (None if run is None else (float(np.min(run.position)), float(np.max(run.position))))
+    if between is not None and not between[0] < between[1]:
         raise BadInput("travel", f"{between[0]:g} to {between[1]:g}", "two places, the lower first", "Give --travel LOW HIGH.")
     encoder = Encoder() if run is None else encoder_of(run)
     refused: list[tuple[str, str]] = []
@@ -143,10 +142,13 @@ def use(
     every = shapers(swings[0]) if swings else ()
     better = None if loop is None or bandwidth is not None else with_filter(late, rate, swings, loop, encoder, drive)
     models = _tried("worst cases", lambda: samples(model, WORST_OF), refused) or (model.model,)
-    centre = 0.5 * (between[0] + between[1])
-    ends = [centre, between[1], between[0], centre]
-    quick = None
-    if drive < NO_LIMIT:
+    quick, ends = None, []
+    if between is None:
+        refused.append(("path and tables by position", "the travel is not known: give a recording with --on, or --travel LOW HIGH."))
+    else:
+        centre = 0.5 * (between[0] + between[1])
+        ends = [centre, between[1], between[0], centre]
+    if ends and drive < NO_LIMIT:
         quick = _tried("fastest path", lambda: fastest(models, ends, drive, rate), refused)
     followed: list[tuple[Tracking, Compensation]] = []
     if loop is not None:
@@ -164,14 +166,14 @@ def use(
         axis=model.axis or (run.axis if run is not None else "x"),
         model=model,
         sampling_rate=rate,
+        rate_from=rate_from,
         calculation=calculation,
         limit=drive if drive < NO_LIMIT else math.inf,
         limit_from=drive_from,
         travel=between,
-        travel_known=travel is not None or run is not None,
         gains=found,
         friction=friction_table(model, max(0.5 * min(drive, 4.0) * abs(model.model.gain), 1e-12)),
-        tables=(*position_tables(model, between), *([] if table is None else [table.correction(model)])),
+        tables=(*(() if between is None else position_tables(model, between)), *([] if table is None else [table.correction(model)])),
         gap=_gap(model),
         feedback=loop,
         states=_tried("state feedback", lambda: state_feedback(later(model, max(wait - 1.0 / rate, 0.0)), rate, asked), refused),
@@ -214,10 +216,14 @@ def _limit(model: PhysicalModel, run: Run | None, given: float | None) -> tuple[
     return NO_LIMIT, "not known"
 
 
-def _travel(run: Run | None) -> tuple[float, float]:
-    if run is None:
-        return -0.5 * SWING, 0.5 * SWING
-    return float(np.min(run.position)), float(np.max(run.position))
+def _rate(model: PhysicalModel, run: Run | None, given: float | None) -> tuple[float, str]:
+    if given is not None:
+        return given, "given"
+    if run is not None:
+        return run.sampling_rate, "the recording's"
+    if model.sampling_rate is not None:
+        return model.sampling_rate, "of the recording that the model was fitted to"
+    raise BadInput("rate of the controller", "not known", "in Hz", "Give it with --controller-rate (rate= in Python), or a recording with --on.")
 
 
 def _gap(model: PhysicalModel) -> Derived | None:

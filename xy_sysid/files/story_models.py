@@ -30,7 +30,8 @@ def model_text(source: str, documents: Mapping[str, Mapping[str, Any]]) -> str:
         for axis, document in documents.items()
         if (model := document.get("model"))
     }
-    made = {"format": "xy_sysid axis model 1", "provenance": {"source": source}, "axes": axes}
+    rates = {axis: document["sampling_rate"] for axis, document in documents.items() if axis in axes and document.get("sampling_rate")}
+    made = {"format": "xy_sysid axis model 1", "provenance": {"source": source, "sampling_rate_hz": rates}, "axes": axes}
     return sealed(str(yaml.dump(made, Dumper=Quoting, sort_keys=False, width=120, allow_unicode=True)))
 
 
