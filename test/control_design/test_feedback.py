@@ -8,7 +8,7 @@ import pytest
 from helpers.known_models import DELAY, axis, known
 
 from xy_sysid.control_design.closed_loop import Controller, Encoder, follow_path
-from xy_sysid.control_design.feedback import GAIN_MARGIN, PHASE_MARGIN, Asked, feedback, margins
+from xy_sysid.control_design.feedback import GAIN_MARGIN, PHASE_MARGIN, Asked, feedback, margins, margins_of
 from xy_sysid.control_design.path import Bounds, s_curve
 from xy_sysid.control_design.sample_step import simulate_alone
 from xy_sysid.control_design.sampled import closed_poles, controller_response, controller_system, noise_to_voltage, sampled
@@ -44,6 +44,20 @@ def test_margins_are_those_of_python_control() -> None:
     ours = margins(system, controller)
     assert ours.phase == pytest.approx(theirs[1], abs=2.0) and ours.gain == pytest.approx(theirs[0], rel=0.05)
     assert 1.0 / ours.sensitivity == pytest.approx(theirs[2], rel=0.02)
+
+
+@pytest.mark.parametrize("damping", [0.03, 3e-3, 3e-4])
+def test_the_margins_see_a_lightly_damped_mode(damping: float) -> None:
+    """However sharp the resonance is, margins are those of 400000 lines around it; 600 lines evenly by ratio say 3.3 where 2.1 is left."""
+    system = sampled(axis().with_effect("base_resonance", (2.0 * damping, 150.0, damping, damping)), RATE)
+    controller = feedback(known(), RATE, Asked(bandwidth=20.0)).controller
+    fine = np.unique(
+        np.concatenate((np.geomspace(0.5, 0.499 * RATE, 20_000), 150.0 * (1.0 + 2.0 * damping) * (1.0 + np.linspace(-0.02, 0.02, 400_001))))
+    )
+    loop = np.concatenate([system.response(part) * controller_response(controller, part, RATE) for part in np.array_split(fine, 20)])
+    theirs, ours = margins_of(loop, fine, closed_poles(system, controller)), margins(system, controller)
+    assert ours.stable and ours.gain == pytest.approx(theirs.gain, rel=0.01) and ours.phase == pytest.approx(theirs.phase, abs=0.5)
+    assert ours.sensitivity == pytest.approx(theirs.sensitivity, rel=0.02)
 
 
 def test_a_controllers_matrices_are_its_response() -> None:

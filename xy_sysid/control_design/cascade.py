@@ -48,7 +48,7 @@ def cascade(model: PhysicalModel, asked: Asked = USUAL, calculation: float = 1.0
 
     def margins(system: Sampled, own: tuple[float, float, float]) -> Margins:
         parts = system_of(*own)
-        return margins_of(on_grid(system) * response_of(*parts, grid(RATE), RATE), RATE, looped_poles(system, parts))
+        return margins_of(on_grid(system) * response_of(*parts, grid(system), RATE), grid(system), looped_poles(system, parts))
 
     own, nominal, worst = first_kept("bandwidth under ODrive's encoder estimator", asked, systems, tried, margins)
     return Cascade(*own, nominal=nominal, worst=worst, count=len(systems))

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.comparison.physical_model import PhysicalModel
@@ -146,25 +147,39 @@ def sign_of(system: Sampled) -> float:
 
 def margins(system: Sampled, controller: Controller) -> Margins:
     """Of the sampled loop."""
-    loop = on_grid(system) * controller_response(controller, grid(system.sampling_rate), system.sampling_rate)
-    return margins_of(loop, system.sampling_rate, closed_poles(system, controller))
+    loop = on_grid(system) * controller_response(controller, grid(system), system.sampling_rate)
+    return margins_of(loop, grid(system), closed_poles(system, controller))
 
 
-def margins_of(loop: ComplexArray, sampling_rate: float, poles: ComplexArray) -> Margins:
-    """Of an open loop at the frequencies of ``grid``; poles: of the closed loop. Source: Astrom & Murray, Feedback Systems, 2nd ed., sec. 10.3."""
-    frequency = grid(sampling_rate)
-    size, turn = np.abs(loop), np.unwrap(np.angle(loop))
-    crossing = np.flatnonzero((size[:-1] - 1.0) * (size[1:] - 1.0) <= 0.0)
-    phases = [float(abs(np.angle(-loop[k] if abs(size[k] - 1.0) < abs(size[k + 1] - 1.0) else -loop[k + 1], deg=True))) for k in crossing]
+def margins_of(loop: ComplexArray, frequency: FloatArray, poles: ComplexArray) -> Margins:
+    """Of an open loop at frequencies, Hz, between which it is straight in decibels and degrees; poles: of the closed loop.
+
+    Source: Astrom & Murray, Feedback Systems, 2nd ed., sec. 10.3.
+    """
+    size, turn = np.log(np.abs(loop)), np.unwrap(np.angle(loop))
+    crossing = np.flatnonzero(size[:-1] * size[1:] <= 0.0)
+    there = _share(size, crossing, 0.0)
+    phases = np.abs((_between(turn, crossing, there) + 2.0 * math.pi) % (2.0 * math.pi) - math.pi)
     odd = np.floor((turn + math.pi) / (2.0 * math.pi))
-    passing = np.flatnonzero((odd[:-1] != odd[1:]) & (size[:-1] < 1.0))
+    passing = np.flatnonzero(odd[:-1] != odd[1:])
+    level = 2.0 * math.pi * np.maximum(odd[passing], odd[passing + 1]) - math.pi
+    gains = np.exp(-_between(size, passing, _share(turn, passing, level)))
     return Margins(
-        phase=min(phases, default=180.0),
-        gain=min((1.0 / float(size[k]) for k in passing), default=math.inf),
+        phase=float(np.degrees(np.min(phases, initial=math.pi))),
+        gain=float(np.min(gains[gains > 1.0], initial=math.inf)),
         sensitivity=float(np.max(1.0 / np.abs(1.0 + loop))),
-        crossover=float(frequency[crossing[-1]]) if crossing.size else 0.0,
+        crossover=float(_between(frequency, crossing, there)[-1]) if crossing.size else 0.0,
         stable=bool(np.max(np.abs(poles)) < 1.0),
     )
+
+
+def _share(values: FloatArray, at: NDArray[np.intp], level: FloatArray | float) -> FloatArray:
+    """Which part of the way from each of some values to the next one a level is passed."""
+    return np.asarray((level - values[at]) / (values[at + 1] - values[at] + 1e-300))
+
+
+def _between(values: FloatArray, at: NDArray[np.intp], share: FloatArray) -> FloatArray:
+    return np.asarray(values[at] + share * (values[at + 1] - values[at]))
 
 
 def least(found: Sequence[Margins]) -> Margins:
@@ -254,7 +269,7 @@ def _made(
     systems: list[Sampled], controller: Controller, crossover: float, asked: Asked, found: tuple[Margins, Margins], encoder: Encoder
 ) -> Feedback:
     rate = systems[0].sampling_rate
-    frequency = grid(rate)
+    frequency = grid(systems[0])
     loop = on_grid(systems[0]) * controller_response(controller, frequency, rate)
     low = np.flatnonzero(np.abs(loop / (1.0 + loop)) < math.sqrt(0.5))
     seen = math.hypot(encoder.noise, encoder.count / math.sqrt(12.0))

@@ -19,7 +19,8 @@ from xy_sysid.response.frf import ComplexArray
 from xy_sysid.samples.block import FloatArray
 
 EVENLY = 2048  # frequencies of a mean over all of them
-LINES = 600  # frequencies of a response
+LINES = 600  # frequencies of a response, evenly by ratio
+TURNED = np.linspace(-89.0, 89.0, 60)  # degrees that a resonance has turned, at frequencies around it
 LinearSystem = tuple[FloatArray, FloatArray, FloatArray, float]  # A, B, C, D of a sampled controller
 KEPT = 256  # sampled models, and responses, that are remembered: those of a design are asked for again and again
 
@@ -63,15 +64,23 @@ class Sampled:
         return a, b, c
 
 
-def grid(sampling_rate: float) -> FloatArray:
-    """(n,) Hz, frequencies at which a loop is looked at."""
-    return np.geomspace(2e-4 * sampling_rate, 0.499 * sampling_rate, LINES)
+@functools.lru_cache(maxsize=KEPT)
+def grid(system: Sampled) -> FloatArray:
+    """(n,) Hz, frequencies at which its loop is looked at: evenly by ratio, and around each resonance evenly by the phase that it turns.
+
+    The phase of a pole s = w (-damping + j) turns by atan(x) at w (1 + damping x).
+    """
+    rate = system.sampling_rate
+    poles = np.log(np.linalg.eigvals(system.a).astype(np.complex128) + 1e-300) * rate / (2.0 * np.pi)
+    own = [pole.imag + abs(pole.real) * np.tan(np.radians(TURNED)) for pole in poles if pole.imag > 0.0]
+    every = np.concatenate((np.geomspace(2e-4 * rate, 0.499 * rate, LINES), *own))
+    return np.unique(every[(every >= 2e-4 * rate) & (every <= 0.499 * rate)])
 
 
 @functools.lru_cache(maxsize=KEPT)
 def on_grid(system: Sampled) -> ComplexArray:
     """(n,) its response at the frequencies of ``grid``."""
-    return system.response(grid(system.sampling_rate))
+    return system.response(grid(system))
 
 
 @functools.lru_cache(maxsize=KEPT)

@@ -78,11 +78,10 @@ def state_feedback(model: PhysicalModel, sampling_rate: float, asked: Asked = US
                 free, b, c, drive = _designed(systems[0], TURN * tried, faster)
             except np.linalg.LinAlgError:  # so far apart from the plant that the quadratic problem has no answer in double precision
                 continue
-            parts = free + np.outer(drive, c), b, c
-            yield _Design(TURN * tried, (free, b, c, drive), parts, response_of(*parts, 0.0, grid(sampling_rate), sampling_rate))
+            yield _Design(TURN * tried, (free, b, c, drive), (free + np.outer(drive, c), b, c))
 
     made, nominal, worst = first_kept(
-        "bandwidth of the state feedback", asked, systems, designs(), lambda system, item: _margins(system, item.own, *item.parts)
+        "bandwidth of the state feedback", asked, systems, designs(), lambda system, item: _margins(system, *item.parts)
     )
     free, b, c, drive = made.numbers
     rejects, settles = _load_step(systems[0], *made.parts)
@@ -102,12 +101,11 @@ def state_feedback(model: PhysicalModel, sampling_rate: float, asked: Asked = US
 
 
 class _Design(NamedTuple):
-    """bandwidth: rad/s; numbers: free, b, c, drive; parts: a, b, c within the limit; own: the response of these on the grid."""
+    """bandwidth: rad/s; numbers: free, b, c, drive; parts: a, b, c within the limit."""
 
     bandwidth: float
     numbers: tuple[FloatArray, FloatArray, FloatArray, FloatArray]
     parts: tuple[FloatArray, FloatArray, FloatArray]
-    own: ComplexArray
 
 
 def _designed(system: Sampled, bandwidth: float, faster: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -153,10 +151,11 @@ def _observer(a: FloatArray, c: FloatArray, forces: FloatArray, noise: float) ->
     return np.asarray((a @ p @ c) / (noise + c @ p @ c))
 
 
-def _margins(system: Sampled, own: ComplexArray, a: FloatArray, b: FloatArray, c: FloatArray) -> Margins:
-    """Of the loop, broken at the voltage; own: the controller's response on the grid."""
+def _margins(system: Sampled, a: FloatArray, b: FloatArray, c: FloatArray) -> Margins:
+    """Of the loop, broken at the voltage."""
+    own = response_of(a, b, c, 0.0, grid(system), system.sampling_rate)
     poles = np.linalg.eigvals(closed_loop(system, a, b, c)).astype(np.complex128)
-    return margins_of(on_grid(system) * own, system.sampling_rate, poles)
+    return margins_of(on_grid(system) * own, grid(system), poles)
 
 
 def closed_loop(system: Sampled, a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
