@@ -18,7 +18,7 @@ import pytest
 import yaml
 from blark.parse import parse_source_code
 from helpers.cli_tools import cli, refused
-from helpers.known_models import known, unknown
+from helpers.known_models import GAIN, POLE, known, unknown
 from helpers.simulated import recorded
 
 import xy_sysid as xy
@@ -79,6 +79,25 @@ def test_the_rate_is_that_of_the_models_recording_or_is_asked_for(tmp_path: Path
     xy.save(replace(known(), sampling_rate=None), file, force=True)
     assert "--controller-rate" in refused("use", file, "--limit", "5")
     assert cli("use", file, "--controller-rate", "1000", "--json").json["axes"]["x"]["rate_from"] == "given"
+
+
+def test_an_axis_that_measures_its_speed_only_gets_feedforward_and_no_position_loop(tmp_path: Path) -> None:
+    """The integral of a speed drifts: no position loop, table by position or travel; a file says what was measured. Noise is that of the speed."""
+    run = recorded("coulomb_friction=0.3", 6.0, seed=77).run("x")
+    speed = np.diff(run.position, prepend=run.position[0]) * run.sampling_rate + 5e-3 * np.random.default_rng(2).standard_normal(len(run))
+    fast = replace(run, position=np.cumsum(speed) / run.sampling_rate, measured="velocity")
+    model = replace(known("coulomb_friction", "cogging"), units=fast.units)
+    used = use(model, fast)
+    assert used.feedback is None and used.states is None and not used.tracking and not used.tables and used.travel is None and used.fastest is None
+    assert {"feedback", "state feedback"} <= {what for what, why in used.refused if "velocity is measured, and no position" in why}
+    assert used.gains["kV"].determined and used.predicted is not None
+    with pytest.raises(xy.BadInput, match="without a controller"):
+        export(used, "linuxcnc")
+    size = 0.05 * float(np.std(run.voltage)) * GAIN * POLE / 5e-3 / (2.0 * np.pi)
+    assert used.predicted.below == pytest.approx(size, rel=0.2) and 10.0 < size < 100.0
+    xy.save(model, tmp_path / "speed.yaml")
+    read = xy.load_model(tmp_path / "speed.yaml")
+    assert isinstance(read, xy.PhysicalModel) and read.units.sensed == "velocity" and use(read).feedback is None
 
 
 def test_what_cannot_be_designed_safely_is_refused_and_the_rest_is_told() -> None:

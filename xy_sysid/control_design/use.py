@@ -29,6 +29,7 @@ from xy_sysid.control_design.worth import EDGE, WIDER, Predicted, Tracking, clea
 from xy_sysid.errors import BadInput
 from xy_sysid.linear.any_model import AnyModel
 from xy_sysid.samples.recording import Recording, Run, one_run
+from xy_sysid.units import Sensed
 
 CALCULATION, LONGEST_CALCULATION = 1.0, 10.0  # periods of the controller from reading to writing: of most drives, and the most that is taken
 WORST_OF = 6  # samples of the parameters along a path
@@ -129,22 +130,24 @@ def use(
     wait = calculation / rate
     late = later(model, wait)
     drive, drive_from = _limit(model, run, limit)
-    between = travel or (None if run is None else (float(np.min(run.position)), float(np.max(run.position))))
+    sensed = model.units.sensed if run is None else run.measured
+    placed = run if sensed == "position" else None  # the integral of a speed drifts, and is no place
+    between = travel or (None if placed is None else (float(np.min(placed.position)), float(np.max(placed.position))))
     if between is not None and not between[0] < between[1]:
         raise BadInput("travel", f"{between[0]:g} to {between[1]:g}", "two places, the lower first", "Give --travel LOW HIGH.")
-    encoder = Encoder() if run is None else encoder_of(run)
+    encoder = Encoder() if placed is None else encoder_of(placed)
     refused: list[tuple[str, str]] = []
     found = gains(model)
     asked = Asked(*(margins or (PHASE_MARGIN, GAIN_MARGIN)), bandwidth)
-    loop = _tried("feedback", lambda: feedback(late, rate, asked, encoder=encoder, limit=drive), refused)
+    loop = _tried("feedback", lambda: feedback(_placed(late, sensed), rate, asked, encoder=encoder, limit=drive), refused)
     swings = _tried("filters", lambda: modes(model), refused) or ()
-    table = None if run is None else _tried("measured table", lambda: measured_table(model, run, WIDER * clear_below(model, run)), refused)
+    table = None if placed is None else _tried("measured table", lambda: measured_table(model, placed, WIDER * clear_below(model, placed)), refused)
     every = shapers(swings[0]) if swings else ()
     better = None if loop is None or bandwidth is not None else with_filter(late, rate, swings, loop, encoder, drive)
     models = _tried("worst cases", lambda: samples(model, WORST_OF), refused) or (model.model,)
     quick, ends = None, []
     if between is None:
-        refused.append(("path and tables by position", "the travel is not known: give a recording with --on, or --travel LOW HIGH."))
+        refused.append(("path and tables by position", "the travel is not known: give a recording of the position with --on, or --travel LOW HIGH."))
     else:
         centre = 0.5 * (between[0] + between[1])
         ends = [centre, between[1], between[0], centre]
@@ -176,7 +179,7 @@ def use(
         tables=(*(() if between is None else position_tables(model, between)), *([] if table is None else [table.correction(model)])),
         gap=_gap(model),
         feedback=loop,
-        states=_tried("state feedback", lambda: state_feedback(later(model, max(wait - 1.0 / rate, 0.0)), rate, asked), refused),
+        states=_tried("state feedback", lambda: state_feedback(_placed(later(model, max(wait - 1.0 / rate, 0.0)), sensed), rate, asked), refused),
         modes=swings,
         notch=_tried("notch", lambda: notch(swings[0], rate), refused) if swings and loop is not None else None,
         allowed=None if loop is None else _tried("bandwidth", lambda: bandwidth_of(model, rate, loop.nominal.crossover, asked, wait), refused),
@@ -214,6 +217,14 @@ def _limit(model: PhysicalModel, run: Run | None, given: float | None) -> tuple[
     if run is not None:
         return float(np.max(np.abs(run.voltage))), "the largest that the recording has; the drive may have more"
     return NO_LIMIT, "not known"
+
+
+def _placed(model: PhysicalModel, sensed: Sensed) -> PhysicalModel:
+    """The model, for a position loop. Raises BadInput where no position is measured."""
+    if sensed != "position":
+        given = f"of an axis whose {sensed} is measured, and no position"
+        raise BadInput("position loop", given, "a measured position", "Close a velocity loop in the drive, or measure the position too.")
+    return model
 
 
 def _rate(model: PhysicalModel, run: Run | None, given: float | None) -> tuple[float, str]:

@@ -22,7 +22,7 @@ from xy_sysid.files.unasked import free
 from xy_sysid.fitting.of_run import LinearModel
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.greybox.parameters import Estimate
-from xy_sysid.units import USUAL, Units
+from xy_sysid.units import OF, USUAL, Units
 
 AXIS_FORMAT = "xy_sysid axis model 1"
 REWRITE = "Write the model again with xy-sysid refine --model."
@@ -96,6 +96,7 @@ def _written(model: AxisModel, units: Units, parameters: dict[str, Any], errors:
     return {
         "input_unit": units.input,
         "output_unit": units.output,
+        **({"measured": units.sensed} if units.sensed != "position" else {}),
         "effects": [name for name, _ in model.effects],
         "parameters": parameters,
         **errors,
@@ -139,7 +140,9 @@ def read_models(path: Path, library: Library) -> Mapping[str, Model]:
     found = {}
     for axis, part in document["axes"].items():
         model = _model(path, str(axis), part, library)
-        units = Units(str(part.get("input_unit", USUAL.input)), str(part.get("output_unit", USUAL.output)))
+        measured = str(part.get("measured") or (origin.get("measured") if isinstance(origin, dict) else None))
+        named = str(part.get("input_unit", USUAL.input)), str(part.get("output_unit", USUAL.output))
+        units = next((kind(*named) for sensed, kind in OF.items() if sensed == measured), Units(*named))
         known, rate = _known(part["parameters"], model), _rate(origin, str(axis))
         found[str(axis)] = PhysicalModel(model, str(axis), fitted_to(origin, str(axis)), units, known=known, sampling_rate=rate)
     return found

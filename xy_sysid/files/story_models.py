@@ -38,7 +38,7 @@ def model_text(source: str, documents: Mapping[str, Mapping[str, Any]]) -> str:
 def _units(document: Mapping[str, Any]) -> dict[str, str]:
     """Units of input and output, where the story names them."""
     named = document.get("units") or {}
-    return {f"{name}_unit": str(named[name]) for name in ("input", "output") if name in named}
+    return {key: str(named[name]) for name, key in (("input", "input_unit"), ("output", "output_unit"), ("measured", "measured")) if name in named}
 
 
 def model_of(document: Mapping[str, Any], axis: str, library: Library = STANDARD) -> PhysicalModel:
