@@ -199,6 +199,25 @@ def test_a_linuxcnc_snippet_is_hal_commands_with_the_pins_of_pid() -> None:
         export(use(known("coulomb_friction"), limit=0.1), "linuxcnc")
 
 
+def test_a_rotary_axis_of_linuxcnc_is_in_degrees() -> None:
+    """What moves it by 1 rad/s moves it by 57.3 degrees/s; the note gives the angle of an arm in degrees, too."""
+    used = use(known("gravity", units=Units("V", "rad")), limit=5.0)
+    made = export(used, "linuxcnc")
+    (text,) = made.files.values()
+    found = dict(re.findall(r"setp pid\.x\.(\w+) (\S+)", text))
+    assert "position in deg;" in text and float(found["FF1"]) == pytest.approx(used.gains["kV"].value * np.pi / 180.0, rel=1e-5)
+    assert used.feedback is not None and float(found["Pgain"]) == pytest.approx(used.feedback.controller.kp * np.pi / 180.0, rel=1e-5)
+    assert "(90 degrees)" in made.note
+
+
+def test_a_klipper_snippet_of_another_axis_says_so() -> None:
+    """Shapers are of x and y: any other axis is written as x, in the text and in the note."""
+    made = export(use(replace(known("base_resonance"), axis="gantry")), "klipper")
+    (text,) = made.files.values()
+    assert text.startswith("# of axis 'gantry', written as x\n[input_shaper]\n") and "the axis is 'gantry'" in made.note
+    assert "written as" not in "".join(export(use(replace(known("base_resonance"), axis="y")), "klipper").files.values())
+
+
 def test_an_odrive_snippet_is_python_in_turns() -> None:
     """Assignments that odrivetool takes; an axis in volts is refused, as ODrive commands a torque."""
     (text,) = export(use(known("coulomb_friction", units=Units("N m", "rad"))), "odrive").files.values()
@@ -315,6 +334,7 @@ def test_the_command_tells_gains_and_writes_files(tmp_path: Path, model: xy.Phys
     said = cli("use", file, "--limit", "5", "--to", "tables", "--to", "ros2_control", "-o", tmp_path / "out")
     assert said.code == 0, said
     assert {"kS", "kV", "kA"} <= set(said.out.split()) and "phase margin" in said.out
+    assert "contributes most to each interval: kS coulomb_friction.coulomb, kV gain," in " ".join(said.out.split())
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"x_friction.csv", "x_ros2_control_controllers.yaml"}
     assert "add --force" in refused("use", file, "--to", "tables", "-o", tmp_path / "out")
     found = cli("use", file, "--limit", "5", "--travel", "-0.02", "0.02", "--json").json["axes"]["x"]

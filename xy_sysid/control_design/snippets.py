@@ -14,6 +14,7 @@ from xy_sysid.control_design.gains import Gains
 from xy_sysid.errors import BadInput
 from xy_sysid.units import Units
 
+DEGREE = TURN / 360.0  # rad
 LEAST_GAIN, LEAST_PHASE = 1.7, 35.0  # margin without a filter on the derivative: less is near the end for a machine that warms up
 
 
@@ -91,20 +92,22 @@ def klipper(of: Designed) -> Snippet:
     if of.shaper is None:
         raise BadInput("klipper", "an axis without a resonance", "a model with one", "There is nothing to shape.")
     axis = of.axis if of.axis in ("x", "y") else "x"
+    other = f"; the axis is {of.axis!r}, and Klipper shapes x and y: change _x to _y if it is that one" if axis != of.axis else ""
     lines = [
+        *([f"# of axis {of.axis!r}, written as x"] if other else []),
         "[input_shaper]",
         f"shaper_type_{axis}: {of.shaper.name}",
         f"shaper_freq_{axis}: {of.shaper.frequency:.2f}",
         f"damping_ratio_{axis}: {of.shaper.damping:.4f}",
     ]
-    note = "Klipper drives steppers without feedback: only the shaper applies"
+    note = f"Klipper drives steppers without feedback: only the shaper applies{other}"
     return Snippet("klipper", "printer.cfg", "\n".join(lines) + "\n", note)
 
 
 def linuxcnc(of: Designed) -> Snippet:
-    """HAL commands for a pid component; lengths in mm, as a metric configuration counts."""
+    """HAL commands for a pid component; in mm as a metric configuration counts, and degrees of a rotary axis."""
     loop = _unfiltered_loop(of, "linuxcnc")
-    per, length = (1e-3, "mm") if of.units.output == "m" else (1.0, of.units.output)
+    per, length = {"m": (1e-3, "mm"), "rad": (DEGREE, "deg")}.get(of.units.output, (1.0, of.units.output))
     at = of.axis
     size, outside = loop.controller.limit, abs(of.gains.value("kS")) + abs(of.gains.value("kCos"))
     if size <= outside:
@@ -245,7 +248,11 @@ def _feedforward(of: Designed, per: float, length: str) -> list[tuple[str, float
 def _gravity(of: Designed) -> str:
     """What has to be added for an arm, where the target has no place for it; and which gains are 0 for want of better ones."""
     size, zero = of.gains.value("kCos"), of.gains.value("zero")
-    arm = f" It has no kCos: add {size:.4g} {of.units.input} times the cosine of the angle minus {zero:.4g} rad." if size else ""
+    arm = (
+        f" It has no kCos: add {size:.4g} {of.units.input} times the cosine of the angle minus {zero:.4g} rad ({zero / DEGREE:.4g} degrees)."
+        if size
+        else ""
+    )
     return f"{arm} {of.gains.doubt}." if of.gains.doubt else arm
 
 
