@@ -224,6 +224,8 @@ def test_an_odrive_snippet_is_python_in_turns() -> None:
     targets = [ast.unparse(node.targets[0]) for node in ast.parse(text).body if isinstance(node, ast.Assign)]
     gains = [f"controller.config.{name}" for name in ("pos_gain", "vel_gain", "vel_integrator_gain", "inertia")]
     assert targets == [f"odrv0.axis0.{name}" for name in ("config.encoder_bandwidth", *gains)]
+    (amperes,) = export(use(known(units=Units("A", "rad")), limit=5.0), "odrive").files.values()
+    assert ast.parse(amperes) and "config.torque_soft_min = torque_constant * -5\n" in amperes, "its limit is of the sum with the feedforward"
     with pytest.raises(xy.BadInput, match="ODrive commands a torque"):
         export(use(known()), "odrive")
 
