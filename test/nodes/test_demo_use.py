@@ -15,7 +15,7 @@ from helpers.ros_tools import clean, needs_ros, new_domain
 
 from xy_sysid.control_design.follower import KINDS
 
-LONG = "minutes of processor time; the controller itself is tested in test_node_demo_follower: set XY_SYSID_LONG_TESTS=1"
+LONG = "a minute of processor time; the controller itself is tested in test_node_demo_follower: set XY_SYSID_LONG_TESTS=1"
 pytestmark = [needs_ros, pytest.mark.skipif(not os.environ.get("XY_SYSID_LONG_TESTS"), reason=LONG)]
 
 
