@@ -16,7 +16,7 @@ import os
 import statistics
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -32,7 +32,7 @@ from xy_sysid.control_design.compensation import SIMPLE, Compensation, compensat
 from xy_sysid.control_design.feedback import feedback
 from xy_sysid.control_design.gains import Gains, gains, simple_feedforward
 from xy_sysid.control_design.path import Bounds, Moves, SampledPath, of_position
-from xy_sysid.control_design.uncertain import samples
+from xy_sysid.control_design.uncertain import later, samples
 from xy_sysid.errors import BadInput
 from xy_sysid.samples.block import FloatArray
 
@@ -125,9 +125,8 @@ def _padded(values: FloatArray, count: int) -> FloatArray:
 
 def _own(model: PhysicalModel, rate: float, otherwise: Controller) -> Controller:
     """Our PID, for a reading that is a sample old; the other one where none has the margins."""
-    late = replace(model, model=replace(model.model, delay=model.model.delay + 1.0 / rate))
     try:
-        return feedback(late, rate, limit=LIMIT).controller
+        return feedback(later(model, 1.0 / rate), rate, limit=LIMIT).controller
     except BadInput:
         return otherwise
 

@@ -5,14 +5,15 @@ from __future__ import annotations
 import control
 import numpy as np
 import pytest
-from helpers.known_models import axis, known
+from helpers.known_models import DELAY, axis, known
 
 from xy_sysid.control_design.closed_loop import Controller, Encoder, follow_path
-from xy_sysid.control_design.feedback import GAIN_MARGIN, PHASE_MARGIN, Asked, feedback, margins
+from xy_sysid.control_design.feedback import GAIN_MARGIN, PHASE_MARGIN, Asked, feedback, margins, margins_of
 from xy_sysid.control_design.path import Bounds, s_curve
 from xy_sysid.control_design.sample_step import simulate_alone
 from xy_sysid.control_design.sampled import closed_poles, controller_response, controller_system, noise_to_voltage, sampled
 from xy_sysid.control_design.uncertain import samples
+from xy_sysid.control_design.use import use
 from xy_sysid.errors import BadInput
 
 RATE = 2000.0
@@ -45,6 +46,20 @@ def test_margins_are_those_of_python_control() -> None:
     assert 1.0 / ours.sensitivity == pytest.approx(theirs[2], rel=0.02)
 
 
+@pytest.mark.parametrize("damping", [0.03, 3e-3, 3e-4])
+def test_the_margins_see_a_lightly_damped_mode(damping: float) -> None:
+    """However sharp the resonance is, margins are those of 400000 lines around it; 600 lines evenly by ratio say 3.3 where 2.1 is left."""
+    system = sampled(axis().with_effect("base_resonance", (2.0 * damping, 150.0, damping, damping)), RATE)
+    controller = feedback(known(), RATE, Asked(bandwidth=20.0)).controller
+    fine = np.unique(
+        np.concatenate((np.geomspace(0.5, 0.499 * RATE, 20_000), 150.0 * (1.0 + 2.0 * damping) * (1.0 + np.linspace(-0.02, 0.02, 400_001))))
+    )
+    loop = np.concatenate([system.response(part) * controller_response(controller, part, RATE) for part in np.array_split(fine, 20)])
+    theirs, ours = margins_of(loop, fine, closed_poles(system, controller)), margins(system, controller)
+    assert ours.stable and ours.gain == pytest.approx(theirs.gain, rel=0.01) and ours.phase == pytest.approx(theirs.phase, abs=0.5)
+    assert ours.sensitivity == pytest.approx(theirs.sensitivity, rel=0.02)
+
+
 def test_a_controllers_matrices_are_its_response() -> None:
     """PID, derivative filter and a section: state space and response agree at every frequency."""
     own = Controller(300.0, 2000.0, 5.0, 1e-3, sections=np.array([[0.9, -1.2, 0.5, -1.1, 0.4]]))
@@ -70,6 +85,27 @@ def test_a_bandwidth_that_cannot_be_had_is_refused() -> None:
         feedback(known(), RATE, Asked(bandwidth=400.0))
     asked = feedback(known(), RATE, Asked(bandwidth=10.0))
     assert asked.nominal.crossover == pytest.approx(10.0, rel=0.02) and asked.worst.phase > PHASE_MARGIN
+
+
+def test_a_period_of_calculation_is_part_of_every_margin_and_of_the_simulation() -> None:
+    """By default the voltage is written one period after the reading: this test closes that loop by itself, for samples of the parameters too."""
+    model = known("base_resonance", spread=0.05)
+    used, at_once = (use(model, rate=RATE, limit=5.0, travel=(-0.02, 0.02), calculation=periods) for periods in (1.0, 0.0))
+    assert used.calculation == 1.0 and used.feedback is not None and at_once.feedback is not None and used.allowed is not None
+    assert used.feedback.crossover < at_once.feedback.crossover
+    w = np.geomspace(1.0, 0.999 * np.pi * RATE, 20_000)
+    for item in (model.model, *samples(model, 60)[30:]):
+        loop = sampled(item, RATE).response(w / (2 * np.pi)) * controller_response(used.feedback.controller, w / (2 * np.pi), RATE)
+        theirs = control.stability_margins(control.FRD(loop * np.exp(-1j * w / RATE), w))
+        assert theirs[1] > PHASE_MARGIN - 2.0 and theirs[0] > 0.95 * GAIN_MARGIN
+    cost = next(item for item in used.allowed.costs if item.part == "calculation")
+    assert cost.phase == pytest.approx(360.0 * used.feedback.nominal.crossover / RATE, rel=0.01) and cost.without > used.allowed.crossover
+    assert used.in_loop.model.delay == pytest.approx(model.model.delay + 1.0 / RATE)
+    delays = [(item.value, item.low, item.high) for item in used.in_loop.parameters if item.name == "delay"]
+    assert delays == [pytest.approx([one + 1.0 / RATE for one in (DELAY, 0.95 * DELAY, 1.05 * DELAY)])]
+    assert used.tracking[0].compensated < 0.1 * used.tracking[0].feedback, "the feedforward looks ahead of the calculation, too"
+    with pytest.raises(BadInput, match=r"calculation is 20 periods.*0 to 10"):
+        use(model, calculation=20.0)
 
 
 def test_gains_of_an_undetermined_axis_are_refused() -> None:

@@ -26,6 +26,7 @@ from xy_sysid.control_design.tables import friction_table, position_tables
 from xy_sysid.control_design.uncertain import samples, undetermined
 from xy_sysid.control_design.use import use
 from xy_sysid.errors import BadInput
+from xy_sysid.greybox.parameters import Estimate
 from xy_sysid.samples.block import FloatArray
 
 RATE = 2000.0
@@ -112,6 +113,21 @@ def test_a_number_that_the_data_do_not_determine_says_so() -> None:
     assert undetermined(known(gain=0.8), ("gain", "pole")) == ("gain",)
 
 
+def test_an_angle_is_judged_by_the_width_of_its_interval() -> None:
+    """0 and pi are angles like any other; one that is off by more than 60 degrees leaves more than it takes away, and takes kCos with it."""
+    for phase in (0.5 * math.pi, -0.5 * math.pi, 6.0):  # the arm is level at 0, at pi, and at pi / 2 - 6 rad
+        model = PhysicalModel(axis().with_effect("gravity", (0.5, phase)))
+        for half, sure in ((0.02, True), (1.0, True), (1.1, False), (2.0 * math.pi, False), (math.inf, False)):
+            estimates = [
+                Estimate(name=name, value=value, unit="", low=0.99 * value, high=1.01 * value) for name, value in model.model.values().items()
+            ]
+            known_so = [replace(one, low=phase - half, high=phase + half) if one.name == "gravity.phase" else one for one in estimates]
+            arm = gains(replace(model, known=tuple(known_so)))
+            assert arm["zero"].determined is sure, (phase, half)
+            assert ("kCos" in arm.unsure) is not sure and (arm.value("kCos") > 0.0) is sure
+            assert 0.5 * (arm["zero"].high - arm["zero"].low) == pytest.approx(half, rel=1e-6), "also past half a turn"
+
+
 def test_the_simple_feedforward_leaves_friction_where_ks_is_known_nothing() -> None:
     """kS sign(v) + kV v + kA a, early by the delay, is the whole feedforward of an axis with Coulomb friction."""
     model, wanted = known("coulomb_friction"), path()
@@ -178,7 +194,7 @@ def test_a_resonance_that_only_the_load_shows_is_refused_in_one_line() -> None:
 def test_with_an_encoder_on_the_load_there_are_gains_and_no_loops() -> None:
     """kV and kA hold for both masses together; a loop around a spring that no design here knows is refused, in words."""
     model = PhysicalModel(axis().with_effect("load_side_resonance", (60.0, 0.05)))
-    used = use(model, limit=5.0)
+    used = use(model, rate=2000.0, limit=5.0)
     assert [gain.name for gain in used.gains.items[1:3]] == ["kV", "kA"]
     assert used.feedback is None and used.states is None and used.modes == ()
     assert {what for what, _ in used.refused} >= {"feedback", "state feedback", "filters"}

@@ -154,6 +154,9 @@ def test_an_fmu_is_run_by_fmpy_to_our_numbers(tmp_path: Path) -> None:
     assert cli("use", file, "--limit", "5", "--controller-rate", RATE, "--to", "fmu", "-o", tmp_path).code == 0
     packed = tmp_path / "axis_x.fmu"
     assert fmpy.validation.validate_fmu(str(packed)) == []
+    told = fmpy.read_model_description(str(packed))
+    assert {item.name: item.unit for item in told.modelVariables if item.name != "time"} == {"u": "V", "y": "m", "v": "m/s"}
+    assert {item.name: item.baseUnit.s for item in told.unitDefinitions} == {"V": -3, "m": 0, "m/s": -1}
     voltage = noise(2000)
     at = np.arange(voltage.size) / RATE
     given = np.array(list(zip(at, voltage, strict=True)), dtype=[("time", float), ("u", float)])

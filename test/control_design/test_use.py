@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import configparser
 import ctypes
+import itertools
 import re
 import sys
 import types
@@ -17,7 +18,7 @@ import pytest
 import yaml
 from blark.parse import parse_source_code
 from helpers.cli_tools import cli, refused
-from helpers.known_models import known, unknown
+from helpers.known_models import GAIN, POLE, known, unknown
 from helpers.simulated import recorded
 
 import xy_sysid as xy
@@ -28,6 +29,7 @@ from xy_sysid.control_design.uncertain import Derived
 from xy_sysid.control_design.use import use
 from xy_sysid.units import Units
 
+TRAVEL = -0.025, 0.025  # m
 FIVE = [(name, ctypes.c_void_p) for name in ("allocate", "deallocate", "reallocate", "zero_allocate", "state")]  # of rcutils_allocator_t
 
 
@@ -63,9 +65,44 @@ def test_a_model_without_intervals_is_used_with_a_warning() -> None:
     assert "no intervals" in used.notes[0] and used.feedback is not None and used.feedback.count == 1
 
 
+def test_the_rate_is_that_of_the_models_recording_or_is_asked_for(tmp_path: Path, model: xy.PhysicalModel) -> None:
+    """A file carries the rate of the recording that its model was fitted to; where nobody knows it nothing is made up, and the travel is no other."""
+    file = tmp_path / "axes.yaml"
+    for name, of in (("fitted", model), ("known", replace(known("cogging"), sampling_rate=500.0))):
+        xy.save(of, file, force=True)
+        read = xy.load_model(file)
+        assert isinstance(read, xy.PhysicalModel) and read.sampling_rate == of.sampling_rate == {"fitted": 2000.0, "known": 500.0}[name]
+    said = cli("use", file, "--limit", "5", "--json").json["axes"]["x"]
+    assert said["sampling_rate"] == 500.0 and said["rate_from"] == "of the recording that the model was fitted to" and said["travel"] is None
+    assert said["tables"] == [] and said["fastest"] is None and said["tracking"] == []
+    assert "--travel LOW HIGH" in {item["what"]: item["reason"] for item in said["refused"]}["path and tables by position"]
+    xy.save(replace(known(), sampling_rate=None), file, force=True)
+    assert "--controller-rate" in refused("use", file, "--limit", "5")
+    assert cli("use", file, "--controller-rate", "1000", "--json").json["axes"]["x"]["rate_from"] == "given"
+
+
+def test_an_axis_that_measures_its_speed_only_gets_feedforward_and_no_position_loop(tmp_path: Path) -> None:
+    """The integral of a speed drifts: no position loop, table by position or travel; a file says what was measured. Noise is that of the speed."""
+    run = recorded("coulomb_friction=0.3", 6.0, seed=77).run("x")
+    speed = np.diff(run.position, prepend=run.position[0]) * run.sampling_rate + 5e-3 * np.random.default_rng(2).standard_normal(len(run))
+    fast = replace(run, position=np.cumsum(speed) / run.sampling_rate, measured="velocity")
+    model = replace(known("coulomb_friction", "cogging"), units=fast.units)
+    used = use(model, fast)
+    assert used.feedback is None and used.states is None and not used.tracking and not used.tables and used.travel is None and used.fastest is None
+    assert {"feedback", "state feedback"} <= {what for what, why in used.refused if "velocity is measured, and no position" in why}
+    assert used.gains["kV"].determined and used.predicted is not None
+    with pytest.raises(xy.BadInput, match="without a controller"):
+        export(used, "linuxcnc")
+    size = 0.05 * float(np.std(run.voltage)) * GAIN * POLE / 5e-3 / (2.0 * np.pi)
+    assert used.predicted.below == pytest.approx(size, rel=0.2) and 10.0 < size < 100.0
+    xy.save(model, tmp_path / "speed.yaml")
+    read = xy.load_model(tmp_path / "speed.yaml")
+    assert isinstance(read, xy.PhysicalModel) and read.units.sensed == "velocity" and use(read).feedback is None
+
+
 def test_what_cannot_be_designed_safely_is_refused_and_the_rest_is_told() -> None:
     """An undetermined gain makes no controller; the gains are marked; tables are still there."""
-    used = use(known("cogging", gain=0.9), limit=5.0)
+    used = use(known("cogging", gain=0.9), limit=5.0, travel=TRAVEL)
     assert used.feedback is None and not used.tracking
     assert dict(used.refused)["feedback"].startswith("gain is known to worse than a factor of two")
     assert any("kV is not determined" in note for note in used.notes) and used.tables
@@ -101,11 +138,13 @@ def test_a_transfer_function_is_refused() -> None:
 
 def test_a_ros2_control_snippet_is_yaml_with_the_names_of_pid_controller() -> None:
     """Gains, clamps and strategy under the joint's name."""
-    used = use(known("coulomb_friction"), limit=5.0)
+    used = use(known("coulomb_friction"), limit=5.0, travel=TRAVEL)
     (text,) = export(used, "ros2_control").files.values()
     own = yaml.safe_load(text)["pid_controller"]["ros__parameters"]
     assert own["dof_names"] == ["x"] and used.feedback is not None
-    assert own["gains"]["x"]["p"] == pytest.approx(used.feedback.controller.kp, rel=1e-5) and own["gains"]["x"]["u_clamp_min"] == -5.0
+    assert own["gains"]["x"]["p"] == pytest.approx(used.feedback.controller.kp, rel=1e-5) and used.fastest is not None
+    fed = used.gains.value("kV") * used.fastest.bounds.speed
+    assert 1.0 < fed < 4.0 and own["gains"]["x"]["u_clamp_max"] == -own["gains"]["x"]["u_clamp_min"] == pytest.approx(5.0 - fed, rel=1e-5)
     clamps = {"i_clamp_max", "i_clamp_min", "u_clamp_max", "u_clamp_min"}
     assert set(own["gains"]["x"]) == {"p", "i", "d", *clamps, "antiwindup_strategy", "feedforward_gain"}
     assert own["gains"]["x"]["feedforward_gain"] == pytest.approx(used.gains["kV"].value, rel=1e-5), "it multiplies the velocity that is asked for"
@@ -149,19 +188,44 @@ def test_a_klipper_snippet_is_a_section_that_its_parser_reads() -> None:
 
 def test_a_linuxcnc_snippet_is_hal_commands_with_the_pins_of_pid() -> None:
     """One setp for each pin, in V and mm."""
-    used = use(known("coulomb_friction"), limit=5.0)
+    used = use(known("coulomb_friction"), limit=5.0, travel=TRAVEL)
     (text,) = export(used, "linuxcnc").files.values()
     lines = [line for line in text.splitlines() if not line.startswith("#")]
     found = {m[1]: float(m[2]) for line in lines if (m := re.fullmatch(r"setp pid\.x\.(\w+) (-?[\d.e+-]+)", line))}
     assert len(found) == len(lines) and set(found) == {"Pgain", "Igain", "Dgain", "FF1", "FF2", "bias", "maxoutput"}
     assert found["FF1"] == pytest.approx(1e-3 * used.gains["kV"].value, rel=1e-5)
+    assert found["maxoutput"] == pytest.approx(5.0 - used.gains["kS"].value), "kS is added behind the limit of pid"
+    with pytest.raises(xy.BadInput, match="more than kS and kCos"):
+        export(use(known("coulomb_friction"), limit=0.1), "linuxcnc")
+
+
+def test_a_rotary_axis_of_linuxcnc_is_in_degrees() -> None:
+    """What moves it by 1 rad/s moves it by 57.3 degrees/s; the note gives the angle of an arm in degrees, too."""
+    used = use(known("gravity", units=Units("V", "rad")), limit=5.0)
+    made = export(used, "linuxcnc")
+    (text,) = made.files.values()
+    found = dict(re.findall(r"setp pid\.x\.(\w+) (\S+)", text))
+    assert "position in deg;" in text and float(found["FF1"]) == pytest.approx(used.gains["kV"].value * np.pi / 180.0, rel=1e-5)
+    assert used.feedback is not None and float(found["Pgain"]) == pytest.approx(used.feedback.controller.kp * np.pi / 180.0, rel=1e-5)
+    assert "(90 degrees)" in made.note
+
+
+def test_a_klipper_snippet_of_another_axis_says_so() -> None:
+    """Shapers are of x and y: any other axis is written as x, in the text and in the note."""
+    made = export(use(replace(known("base_resonance"), axis="gantry")), "klipper")
+    (text,) = made.files.values()
+    assert text.startswith("# of axis 'gantry', written as x\n[input_shaper]\n") and "the axis is 'gantry'" in made.note
+    assert "written as" not in "".join(export(use(replace(known("base_resonance"), axis="y")), "klipper").files.values())
 
 
 def test_an_odrive_snippet_is_python_in_turns() -> None:
     """Assignments that odrivetool takes; an axis in volts is refused, as ODrive commands a torque."""
     (text,) = export(use(known("coulomb_friction", units=Units("N m", "rad"))), "odrive").files.values()
     targets = [ast.unparse(node.targets[0]) for node in ast.parse(text).body if isinstance(node, ast.Assign)]
-    assert targets == [f"odrv0.axis0.controller.config.{name}" for name in ("pos_gain", "vel_gain", "vel_integrator_gain", "inertia")]
+    gains = [f"controller.config.{name}" for name in ("pos_gain", "vel_gain", "vel_integrator_gain", "inertia")]
+    assert targets == [f"odrv0.axis0.{name}" for name in ("config.encoder_bandwidth", *gains)]
+    (amperes,) = export(use(known(units=Units("A", "rad")), limit=5.0), "odrive").files.values()
+    assert ast.parse(amperes) and "config.torque_soft_min = torque_constant * -5\n" in amperes, "its limit is of the sum with the feedforward"
     with pytest.raises(xy.BadInput, match="ODrive commands a torque"):
         export(use(known()), "odrive")
 
@@ -176,7 +240,7 @@ def test_a_twincat_program_is_parsed_by_blark_with_the_fields_of_fb_ctrl_pid() -
     assert names <= set(fields) and fields["tCtrlCycleTime"] == "T#1MS" and used.feedback is not None
     own = used.feedback.controller
     assert float(fields["fKp"]) == pytest.approx(1e-3 * own.kp) and fields["tTn"] == f"T#{round(1e3 * own.kp / own.ki)}MS"
-    assert f"fKV : LREAL := {1e-3 * used.gains['kV'].value:.9E}" in text and "+ fKS * fSign" in text
+    assert f"fKV : LREAL := {1e-3 * used.gains['kV'].value:.9E}" in text and "fKS * fSign +" in text
     assert used.feedback.counted.phase >= 35.0
     arm = use(known("gravity", units=Units("A", "rad")), rate=1000.0, limit=5.0)
     (turning,) = export(arm, "twincat").files.values()
@@ -184,6 +248,34 @@ def test_a_twincat_program_is_parsed_by_blark_with_the_fields_of_fb_ctrl_pid() -
     assert "no kCos: add" in export(arm, "linuxcnc").note and "no kCos: add" in export(arm, "ros2_control").note
     with pytest.raises(xy.BadInput, match=r"rate of 2000 Hz.*--controller-rate"):
         export(use(known("coulomb_friction"), rate=2000.0), "twincat")
+
+
+def test_the_twincat_program_keeps_the_sum_of_feedback_and_feedforward_within_the_limit() -> None:
+    """Run with a block that stops at its limits, as FB_CTRL_PID does: no sum leaves the limit, and the block has all that the feedforward leaves."""
+    used = use(known("coulomb_friction"), rate=1000.0, limit=5.0)
+    (text,) = export(used, "twincat").files.values()
+    body = text.rsplit("END_VAR\n\n", 1)[1].split("END_PROGRAM")[0]
+    program = re.sub(r"\(\*.*?\*\)", "", body).replace(":=", "=").replace(";", "")
+    params = types.SimpleNamespace(fOutMaxLimit=5.0, fOutMinLimit=-5.0)
+
+    class Block:
+        fOut = 0.0
+
+        def __call__(self, fSetpointValue: float, fActualValue: float, eMode: object, stParams: Any) -> None:
+            self.fOut = min(max(1e6 * (fSetpointValue - fActualValue), stParams.fOutMinLimit), stParams.fOutMaxLimit)
+
+    names: dict[str, Any] = {
+        "SEL": lambda choice, no, yes: yes if choice else no,
+        "LIMIT": lambda low, value, high: min(max(value, low), high),
+        "eCTRL_MODE_ACTIVE": 1, "fbPid": Block(), "stParams": params, "fKG": 0.0,
+        **{f"f{name.upper()[0]}{name[1:]}": used.gains.value(name) * (1.0 if name == "kS" else 1e-3) for name in ("kS", "kV", "kA")},
+    }  # fmt: skip
+    for speed, off in itertools.product((-1000.0, -300.0, 0.0, 300.0, 1000.0), (-1.0, 0.0, 1.0)):
+        exec(program, names, asked := {"fSetPosition": off, "fActPosition": 0.0, "fSetVelocity": speed, "fSetAcceleration": 0.0})
+        wanted = {-1.0: -5.0, 0.0: asked["fFeedforward"], 1.0: 5.0}[off]
+        assert asked["fOutput"] == pytest.approx(wanted) and abs(asked["fOutput"]) <= 5.0 + 1e-12
+        fed = used.gains.value("kS") * np.sign(speed) + 1e-3 * used.gains.value("kV") * speed
+        assert asked["fFeedforward"] == pytest.approx(np.clip(fed, -5.0, 5.0))
 
 
 def test_a_gain_that_the_data_do_not_determine_is_exported_as_0_and_named() -> None:
@@ -204,7 +296,8 @@ def test_a_gain_that_the_data_do_not_determine_is_exported_as_0_and_named() -> N
 
 def test_exported_source_undoes_what_is_predicted_to_help() -> None:
     """The laws that the compensation leaves are left by the exported feedforward, too, and the note names them."""
-    sure, unsure = use(known("cogging"), limit=5.0), use(known("cogging", cogging__phase=40.0, cogging__amplitude=2.0), limit=5.0)
+    models = known("cogging"), known("cogging", cogging__phase=40.0, cogging__amplitude=2.0)
+    sure, unsure = (use(model, limit=5.0, travel=TRAVEL) for model in models)
     assert sure.compensation is not None and sure.compensation.terms == ("base", "cogging")
     assert "undoes base, cogging" in export(sure, "c").note
     assert unsure.compensation is not None and "cogging" not in unsure.compensation.terms, "its phase is not known"
@@ -243,9 +336,10 @@ def test_the_command_tells_gains_and_writes_files(tmp_path: Path, model: xy.Phys
     said = cli("use", file, "--limit", "5", "--to", "tables", "--to", "ros2_control", "-o", tmp_path / "out")
     assert said.code == 0, said
     assert {"kS", "kV", "kA"} <= set(said.out.split()) and "phase margin" in said.out
+    assert "contributes most to each interval: kS coulomb_friction.coulomb, kV gain," in " ".join(said.out.split())
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"x_friction.csv", "x_ros2_control_controllers.yaml"}
     assert "add --force" in refused("use", file, "--to", "tables", "-o", tmp_path / "out")
-    found = cli("use", file, "--limit", "5", "--json").json["axes"]["x"]
+    found = cli("use", file, "--limit", "5", "--travel", "-0.02", "0.02", "--json").json["axes"]["x"]
     assert found["gains"]["kS"]["unit"] == "V" and found["gains"]["kS"]["determined"]
     assert found["feedback"]["worst"]["phase"] >= 45.0 and found["tracking"][0]["whole"] < found["tracking"][0]["feedback"]
 

@@ -9,6 +9,7 @@ from xy_sysid.comparison.physical_model import PhysicalModel
 from xy_sysid.greybox.parameters import Estimate
 from xy_sysid.units import USUAL, Units
 
+RATE = 2000.0  # Hz, of the recording that they are said to be fitted to
 GAIN, DELAY, POLE = 0.097, 1.63e-3, 236.0  # m/s/V, s, rad/s: the table of the paper
 
 
@@ -28,7 +29,7 @@ def known(*effects: str, spread: float = 0.02, units: Units = USUAL, **wider: fl
     for name, value in model.values().items():
         half = abs(value) * parts.get(name, spread)
         items.append(Estimate(name=name, value=value, unit=_unit(model, name), low=value - half, high=value + half))
-    return PhysicalModel(model, "x", units=units, known=tuple(items))
+    return PhysicalModel(model, "x", units=units, known=tuple(items), sampling_rate=RATE)
 
 
 def _unit(model: AxisModel, name: str) -> str:

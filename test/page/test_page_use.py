@@ -43,7 +43,11 @@ def test_the_files_of_each_axis_are_packed(tmp_path: Path) -> None:
 
     model = known("coulomb_friction")
     parameters = {item.name: {"value": item.value, "unit": item.unit, "ci95": [item.low, item.high]} for item in model.parameters}
-    story = {"model": {"effects": ["coulomb_friction"], "parameters": parameters, "held_out_error": 1e-3, "noise_floor": 1e-3}}
-    with zipfile.ZipFile(io.BytesIO(used_files({"x": story}, 10.0))) as pack:
+    story = {
+        "model": {"effects": ["coulomb_friction"], "parameters": parameters, "held_out_error": 1e-3, "noise_floor": 1e-3},
+        "sampling_rate": 500.0,
+    }
+    with zipfile.ZipFile(io.BytesIO(used_files({"x": story}, None, (), 10.0))) as pack:
         names = set(pack.namelist())
+        assert "RATE 500.0" in pack.read("x/axis_x.py").decode().replace(" =", ""), "the rate of the recording"
     assert {"x/axis_x.c", "x/axis_x.sdf", "x/axis_x_control.py", "x/x_friction.csv"} <= names

@@ -33,7 +33,8 @@ def use(
     reading: Reading,
     on: On = None,
     controller_rate: Annotated[
-        float | None, typer.Option("--controller-rate", metavar="HZ", help="rate of the controller; by default that of the recording, or 2000")
+        float | None,
+        typer.Option("--controller-rate", metavar="HZ", help="rate of the controller; by default that of the recording, or of the model's"),
     ] = None,
     limit: Annotated[
         float | None,
@@ -48,6 +49,10 @@ def use(
     gain_margin: Annotated[
         float, typer.Option("--gain-margin", metavar="TIMES", help="gain margin that the worst sample of the parameters keeps; 2 is 6 dB")
     ] = 2.0,
+    calculation: Annotated[
+        float,
+        typer.Option("--calculation", metavar="PERIODS", help="controller periods from reading the encoder to writing; 1: next cycle"),
+    ] = 1.0,
     travel: Annotated[tuple[float, float] | None, typer.Option(metavar="LOW HIGH", help="positions that tables and paths cover, SI")] = None,
     to: Annotated[
         list[str] | None, typer.Option("--to", metavar="TARGET", help="write for this target, or all (may be repeated; see docs/use.md)")
@@ -75,7 +80,7 @@ def use(
     margins = phase_margin, gain_margin
 
     def of(name: str) -> Used:
-        return logic(found[name], _run(recording, found[name]), controller_rate, limit, bandwidth, travel, margins=margins)
+        return logic(found[name], _run(recording, found[name]), controller_rate, limit, bandwidth, travel, margins=margins, calculation=calculation)
 
     done, refused = each(tuple(found), of)
     files: dict[str, dict[str, Exported]] = {name: {} for name in done}

@@ -33,6 +33,9 @@ def show(name: str, used: Used) -> None:
         for item in used.gains.items
     ]
     table(f"axis {name}: feedforward", ("gain", "value", "95 % interval", "unit", "in words"), shown)
+    most = ", ".join(f"{item.name} {item.because[0][0]}" for item in used.gains.items if item.because)
+    if most:
+        say(f"  The parameter that contributes most to each interval: {most}.")
     if used.feedback is not None:
         _show_feedback(name, used, used.feedback)
     if used.states is not None:
@@ -108,7 +111,9 @@ def _show_feedback(name: str, used: Used, loop: Feedback) -> None:
         ("derivative filter", lambda item: f"{1e3 * item.controller.derivative_time:.3g}", "ms"),
     ]
     columns = ("number", "value", *([f"with the {used.filter.kind}"] if used.filter is not None else []), "unit")
-    table(f"axis {name}: feedback at {loop.sampling_rate:g} Hz", columns, [(what, *map(of, loops), unit) for what, of, unit in rows])
+    periods = f"{used.calculation:g} period{'s' * (used.calculation != 1.0)}"
+    title = f"axis {name}: feedback at {loop.sampling_rate:g} Hz ({used.rate_from}), written {periods} after reading"
+    table(title, columns, [(what, *map(of, loops), unit) for what, of, unit in rows])
     found = coefficients(loops[-1].controller, loop.sampling_rate)
     which = ("PID", *([used.filter.kind] if used.filter is not None else []))
     kind = f", with the {used.filter.kind}" if used.filter is not None else ""
@@ -147,13 +152,15 @@ def _compensation(item: Tracking) -> str:
 
 def _mode(mode: Swing) -> str:
     held, free = (f"{item.value:.4g} Hz ({item.low:.4g} .. {item.high:.4g})" for item in (mode.held, mode.free))
-    return f"Mode: {held} with the encoder's side held, damping {mode.held_damping:.3g}; {free} free, damping {mode.free_damping:.3g}."
+    least = mode.held.because[0][0] if mode.held.because else "nothing that is known"
+    swings = f"{held} with the encoder's side held, damping {mode.held_damping:.3g}; {free} free, damping {mode.free_damping:.3g}"
+    return f"Mode: {swings}; the intervals come mostly from {least}."
 
 
 def answer(used: Used) -> dict[str, Any]:
     """Everything but the model, which has a file of its own, and the paths."""
     designs = ("friction", "tables", "gap", "modes", "shaper", "shapers", "allowed")
-    names = ("sampling_rate", "limit", "limit_from", "travel", *designs, "predicted", "tracking")
+    names = ("sampling_rate", "rate_from", "calculation", "limit", "limit_from", "travel", *designs, "predicted", "tracking")
     found: dict[str, Any] = {name: getattr(used, name) for name in names}
     found["gains"] = {
         item.name: {"value": item.value, "unit": item.unit, "ci95": [item.low, item.high], "determined": item.determined, "because": item.because}

@@ -21,6 +21,7 @@ class PhysicalModel:
     model: gain, delay, pole and the effects with their values; fit: with intervals and errors, None of a model from a file
     axis:  its name; data: SHA-256 of the samples of each recording that it was fitted to; units: of input and output
     known: its parameters with intervals, of a model from a file
+    sampling_rate: Hz of the recording that it was fitted to; None where nobody knows it
     """
 
     model: AxisModel
@@ -29,6 +30,7 @@ class PhysicalModel:
     units: Units = USUAL
     fit: GreyboxFit | None = None
     known: tuple[Estimate, ...] = ()
+    sampling_rate: float | None = None
 
     @property
     def tf(self) -> TransferFunction:

@@ -19,10 +19,11 @@ from xy_sysid.control_design.closed_loop import NO_LIMIT, Encoder
 from xy_sysid.control_design.feedback import USUAL, Asked, Feedback, feedback
 from xy_sysid.control_design.filters import HIGHEST, LoopFilter, Swing, low_pass, notch
 from xy_sysid.control_design.sampled import sampled
+from xy_sysid.control_design.uncertain import later
 from xy_sysid.errors import BadInput
 
 PASSED = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4)  # of a resonance: where a low-pass is tried
-UNCERTAIN, HOLD = "uncertainty of the parameters", "sampling and hold"
+UNCERTAIN, HOLD, CALCULATION = "uncertainty of the parameters", "sampling and hold", "calculation"
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,17 +43,20 @@ class Bandwidth:
     costs: tuple[Cost, ...]
 
 
-def bandwidth_of(model: PhysicalModel, sampling_rate: float, at: float, asked: Asked = USUAL) -> Bandwidth:
-    """The highest crossover with the margins, and what each part costs; at: Hz, the crossover at which phases are counted.
+def bandwidth_of(model: PhysicalModel, sampling_rate: float, at: float, asked: Asked = USUAL, calculation: float = 0.0) -> Bandwidth:
+    """The highest crossover with the margins, and what each part costs.
+
+    at: Hz, the crossover at which phases are counted; calculation: s, delay of the controller, which is added to that of the model
 
     Raises BadInput where no crossover has the margins.
     """
     asked = replace(asked, bandwidth=None)
+    alone, model = model, later(model, calculation)
     best = feedback(model, sampling_rate, asked).nominal.crossover
     own = model.model
     parts: list[tuple[str, AxisModel]] = []
-    if own.delay > 0.0:
-        parts.append(("delay", replace(own, delay=0.0)))
+    if alone.model.delay > 0.0:
+        parts.append(("delay", replace(own, delay=calculation)))
     for name, values in own.effects:
         effect = own.library[name]
         if effect.category == "motion" or lag_of(effect, values) is not None or "share" in effect.names:
@@ -63,6 +67,9 @@ def bandwidth_of(model: PhysicalModel, sampling_rate: float, at: float, asked: A
         kept = tuple(item for item in model.parameters if item.name in left.values() and item.name != name)
         bare = replace(model, model=left, fit=None, known=kept)
         found.append(Cost(name, _less(_phase(left, sampling_rate, at), whole), _reached(bare, sampling_rate, asked)))
+    if calculation > 0.0:
+        phase = _less(_phase(alone.model, sampling_rate, at), whole)
+        found.append(Cost(CALCULATION, phase, _reached(alone, sampling_rate, asked)))
     if model.parameters:
         sure = replace(model, fit=None, known=())
         found.append(Cost(UNCERTAIN, 0.0, _reached(sure, sampling_rate, asked)))

@@ -44,7 +44,8 @@ def tables(used: Used) -> Exported:
 
 def _snippet(write: Callable[[snippets.Designed], snippets.Snippet]) -> Callable[[Used], Exported]:
     def made(used: Used) -> Exported:
-        item = write(snippets.Designed(axis=used.axis, units=used.model.units, gains=used.gains, feedback=used.feedback, shaper=used.shaper))
+        speed = used.fastest.bounds.speed if used.fastest is not None else None
+        item = write(snippets.Designed(used.axis, used.model, used.gains, used.feedback, used.calculation, used.shaper, speed))
         return Exported({f"{used.axis}_{item.target}_{item.file}": item.text}, item.note)
 
     return made
@@ -54,8 +55,8 @@ def _program(used: Used) -> tuple[Program, str, str]:
     """The program, a name for it, and a title."""
     effects = ", ".join(used.model.effects) or "rigid"
     title = f"axis {used.axis} ({effects}): {used.model.units.input} to {used.model.units.output} at {used.sampling_rate:g} Hz, by xy_sysid"
-    chosen = used.compensation
-    return program(used.model.model, used.sampling_rate, None if chosen is None else chosen.inverse), plain_name(used.axis), title
+    chosen = used.compensation.inverse if used.compensation is not None else None
+    return program(used.model.model, used.sampling_rate, chosen or used.in_loop.model), plain_name(used.axis), title
 
 
 def _inverse_note(used: Used) -> str:
@@ -115,7 +116,7 @@ def mujoco(used: Used) -> Exported:
 
 def robot(used: Used) -> Exported:
     """URDF."""
-    text, lost = urdf(used.model.model, used.travel, used.limit, used.model.units.output == "rad", ends=used.travel_known)
+    text, lost = urdf(used.model.model, used.travel, used.limit, used.model.units.output == "rad")
     return Exported({f"{plain_name(used.axis)}.urdf": text}, _losses(lost))
 
 
@@ -127,13 +128,16 @@ def observer(used: Used) -> Exported:
     name = f"{plain_name(used.axis)}_control"
     title = f"axis {used.axis}, {used.model.units.input} for {used.model.units.output}, {used.states.bandwidth / (2.0 * math.pi):.3g} Hz"
     text, module = state_text.source(used.states, plain_name(used.axis), title, used.limit)
-    note = f"call it once every {1e3 / used.sampling_rate:g} ms with path minus encoder, and add the feedforward to what it gives"
+    note = (
+        f"call it once every {1e3 / used.sampling_rate:g} ms with path minus encoder and the feedforward of the next period; "
+        "its answer is the sum of both within the limit: write it one period later"
+    )
     return Exported({f"{name}.c": text, f"{name}.py": module}, note)
 
 
 def gazebo(used: Used) -> Exported:
     """SDF."""
-    text, lost = sdf(used.model.model, used.travel, used.limit, used.model.units.output == "rad", ends=used.travel_known)
+    text, lost = sdf(used.model.model, used.travel, used.limit, used.model.units.output == "rad")
     return Exported({f"{plain_name(used.axis)}.sdf": text}, _losses(lost))
 
 

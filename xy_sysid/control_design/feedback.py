@@ -8,10 +8,12 @@ drive; and it is a PID. Margins and stability are those of the sampled loop, wit
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.comparison.physical_model import PhysicalModel
@@ -28,8 +30,10 @@ PHASE_MARGIN, GAIN_MARGIN = 45.0, 2.0  # degrees, and times: Astrom & Murray, Fe
 MOST_PHASE, MOST_GAIN = 90.0, 100.0  # that may be asked for
 COUNT = 24  # samples of the parameters
 STEPS = 60  # crossovers that are tried
+TURN = 2.0 * math.pi  # rad
 HIGHEST = 0.25  # of the sampling rate, for a crossover
 ADVICE = "Ask for less bandwidth or smaller margins, or sample faster."
+ToTry = TypeVar("ToTry")
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,11 +135,11 @@ def shaped(system: Sampled, crossover: float, sections: FloatArray, limit: float
     at = np.array([crossover / (2.0 * math.pi)])
     plant = system.response(at)[0]
     size = 1.0 / abs(plant * controller_response(one, at, system.sampling_rate)[0])
-    size = math.copysign(float(size), _sign(system))
+    size = math.copysign(float(size), sign_of(system))
     return Controller(kp=size * one.kp, ki=size * one.ki, kd=size, derivative_time=one.derivative_time, sections=sections, limit=limit)
 
 
-def _sign(system: Sampled) -> float:
+def sign_of(system: Sampled) -> float:
     """Of the motion that a positive voltage makes in the end."""
     slow = np.array([1e-5 * system.sampling_rate])
     return -1.0 if float(np.imag(system.response(slow)[0])) > 0.0 else 1.0
@@ -143,25 +147,39 @@ def _sign(system: Sampled) -> float:
 
 def margins(system: Sampled, controller: Controller) -> Margins:
     """Of the sampled loop."""
-    loop = on_grid(system) * controller_response(controller, grid(system.sampling_rate), system.sampling_rate)
-    return margins_of(loop, system.sampling_rate, closed_poles(system, controller))
+    loop = on_grid(system) * controller_response(controller, grid(system), system.sampling_rate)
+    return margins_of(loop, grid(system), closed_poles(system, controller))
 
 
-def margins_of(loop: ComplexArray, sampling_rate: float, poles: ComplexArray) -> Margins:
-    """Of an open loop at the frequencies of ``grid``; poles: of the closed loop. Source: Astrom & Murray, Feedback Systems, 2nd ed., sec. 10.3."""
-    frequency = grid(sampling_rate)
-    size, turn = np.abs(loop), np.unwrap(np.angle(loop))
-    crossing = np.flatnonzero((size[:-1] - 1.0) * (size[1:] - 1.0) <= 0.0)
-    phases = [float(abs(np.angle(-loop[k] if abs(size[k] - 1.0) < abs(size[k + 1] - 1.0) else -loop[k + 1], deg=True))) for k in crossing]
+def margins_of(loop: ComplexArray, frequency: FloatArray, poles: ComplexArray) -> Margins:
+    """Of an open loop at frequencies, Hz, between which it is straight in decibels and degrees; poles: of the closed loop.
+
+    Source: Astrom & Murray, Feedback Systems, 2nd ed., sec. 10.3.
+    """
+    size, turn = np.log(np.abs(loop)), np.unwrap(np.angle(loop))
+    crossing = np.flatnonzero(size[:-1] * size[1:] <= 0.0)
+    there = _share(size, crossing, 0.0)
+    phases = np.abs((_between(turn, crossing, there) + 2.0 * math.pi) % (2.0 * math.pi) - math.pi)
     odd = np.floor((turn + math.pi) / (2.0 * math.pi))
-    passing = np.flatnonzero((odd[:-1] != odd[1:]) & (size[:-1] < 1.0))
+    passing = np.flatnonzero(odd[:-1] != odd[1:])
+    level = 2.0 * math.pi * np.maximum(odd[passing], odd[passing + 1]) - math.pi
+    gains = np.exp(-_between(size, passing, _share(turn, passing, level)))
     return Margins(
-        phase=min(phases, default=180.0),
-        gain=min((1.0 / float(size[k]) for k in passing), default=math.inf),
+        phase=float(np.degrees(np.min(phases, initial=math.pi))),
+        gain=float(np.min(gains[gains > 1.0], initial=math.inf)),
         sensitivity=float(np.max(1.0 / np.abs(1.0 + loop))),
-        crossover=float(frequency[crossing[-1]]) if crossing.size else 0.0,
+        crossover=float(_between(frequency, crossing, there)[-1]) if crossing.size else 0.0,
         stable=bool(np.max(np.abs(poles)) < 1.0),
     )
+
+
+def _share(values: FloatArray, at: NDArray[np.intp], level: FloatArray | float) -> FloatArray:
+    """Which part of the way from each of some values to the next one a level is passed."""
+    return np.asarray((level - values[at]) / (values[at + 1] - values[at] + 1e-300))
+
+
+def _between(values: FloatArray, at: NDArray[np.intp], share: FloatArray) -> FloatArray:
+    return np.asarray(values[at] + share * (values[at + 1] - values[at]))
 
 
 def least(found: Sequence[Margins]) -> Margins:
@@ -188,25 +206,42 @@ def feedback(
     sections: filters that the feedback passes, (k, 5); encoder: whose noise is counted; limit: of the drive, V
     Raises BadInput where gain or pole are not determined by the data, or where no bandwidth has the margins.
     """
+    systems = loop_systems(model, sampling_rate)
+    filters = np.zeros((0, 5)) if sections is None else sections
+    tried = ((crossover, shaped(systems[0], crossover, filters, limit)) for crossover in (TURN * item for item in asked.tries(sampling_rate, STEPS)))
+    (crossover, controller), *found = first_kept("bandwidth", asked, systems, tried, lambda system, item: margins(system, item[1]))
+    return _made(systems, controller, crossover, asked, (found[0], found[1]), encoder or Encoder())
+
+
+def loop_systems(model: PhysicalModel, sampling_rate: float) -> list[Sampled]:
+    """The model and samples of its parameters, sampled, and the motor alone inside a gap: the systems with which a loop has to keep its margins.
+
+    Raises BadInput where gain or pole are not determined by the data.
+    """
     doubtful = undetermined(model, ("gain", "pole"))
     if model.parameters and doubtful:
         raise BadInput(
             " and ".join(doubtful), "known to worse than a factor of two", "numbers that the data determine", "Record a livelier motion first."
         )
-    filters = np.zeros((0, 5)) if sections is None else sections
     own = samples(model, COUNT)
-    systems = [sampled(item, sampling_rate) for item in (*own, *within_a_gap(own[0]))]
+    return [sampled(item, sampling_rate) for item in (*own, *within_a_gap(own[0]))]
+
+
+def first_kept(
+    what: str, asked: Asked, systems: Sequence[Sampled], tried: Iterable[ToTry], of: Callable[[Sampled, ToTry], Margins]
+) -> tuple[ToTry, Margins, Margins]:
+    """The first controller that keeps the margins with every system, those of the first system, and the least.
+
+    of: margins of a system under a controller. Raises BadInput with the margins of the last one where none keeps them.
+    """
     worst = Margins(phase=0.0, gain=0.0, sensitivity=math.inf, crossover=0.0, stable=False)
-    for crossover in (2.0 * math.pi * item for item in asked.tries(sampling_rate, STEPS)):
-        controller = shaped(systems[0], crossover, filters, limit)
-        nominal = margins(systems[0], controller)
-        if not asked.met(nominal):
-            worst = nominal
-            continue
-        worst = least([margins(system, controller) for system in systems])
-        if asked.met(worst):
-            return _made(systems, controller, crossover, asked, (nominal, worst), encoder or Encoder())
-    raise asked.refused("bandwidth", worst)
+    for item in tried:
+        nominal = worst = of(systems[0], item)
+        if asked.met(nominal) and nominal.crossover > 0.0:  # a loop that never comes to 1 does nothing
+            worst = least([of(system, item) for system in systems])
+            if asked.met(worst):
+                return item, nominal, worst
+    raise asked.refused(what, worst)
 
 
 def within_a_gap(model: AxisModel) -> tuple[AxisModel, ...]:
@@ -234,7 +269,7 @@ def _made(
     systems: list[Sampled], controller: Controller, crossover: float, asked: Asked, found: tuple[Margins, Margins], encoder: Encoder
 ) -> Feedback:
     rate = systems[0].sampling_rate
-    frequency = grid(rate)
+    frequency = grid(systems[0])
     loop = on_grid(systems[0]) * controller_response(controller, frequency, rate)
     low = np.flatnonzero(np.abs(loop / (1.0 + loop)) < math.sqrt(0.5))
     seen = math.hypot(encoder.noise, encoder.count / math.sqrt(12.0))

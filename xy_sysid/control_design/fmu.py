@@ -13,6 +13,16 @@ from xy_sysid.control_design.program import Program
 from xy_sysid.control_design.to_c import source
 from xy_sysid.units import Units
 
+BASES = {  # exponents of SI units
+    "V": 'kg="1" m="2" s="-3" A="-1"',
+    "A": 'A="1"',
+    "N": 'kg="1" m="1" s="-2"',
+    "N m": 'kg="1" m="2" s="-2"',
+    "m": 'm="1"',
+    "m/s": 'm="1" s="-1"',
+    "rad": 'rad="1"',
+    "rad/s": 'rad="1" s="-1"',
+}
 FUNCTIONS = """\
 /* FMI 2.0 for co-simulation, with the types that its headers define */
 #include <stdlib.h>
@@ -141,8 +151,9 @@ def files(of: Program, name: str, title: str, units: Units) -> dict[str, str]:
     """modelDescription.xml and the sources, by their places in the archive; the binary is made of ``sources/NAME_fmu.c``."""
     header, text = source(of, name, title)
     guid = "{" + hashlib.sha256(text.encode()).hexdigest()[:32] + "}"
-    rows = (("u", 0, "input", f"input, {units.input}"), ("y", 1, "output", f"position, {units.output}"), ("v", 2, "output", f"speed, {units.speed}"))
+    rows = (("u", 0, "input", "input", units.input), ("y", 1, "output", "position", units.output), ("v", 2, "output", "speed", units.speed))
     variables = "\n".join(_variable(*row) for row in rows)
+    defined = "\n".join(_unit(row[-1]) for row in rows)
     described = f"""\
 <?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="2.0" modelName={quoteattr(name)} guid="{guid}"
@@ -151,6 +162,9 @@ def files(of: Program, name: str, title: str, units: Units) -> dict[str, str]:
     canGetAndSetFMUstate="true" canSerializeFMUstate="true">
     <SourceFiles><File name="{name}_fmu.c"/></SourceFiles>
   </CoSimulation>
+  <UnitDefinitions>
+{defined}
+  </UnitDefinitions>
   <DefaultExperiment startTime="0" stepSize="{1.0 / of.rate!r}"/>
   <ModelVariables>
 {variables}
@@ -165,7 +179,13 @@ def files(of: Program, name: str, title: str, units: Units) -> dict[str, str]:
     return {"modelDescription.xml": described, f"sources/{name}.h": header, f"sources/{name}.c": text, f"sources/{name}_fmu.c": whole}
 
 
-def _variable(name: str, reference: int, causality: str, told: str) -> str:
+def _variable(name: str, reference: int, causality: str, told: str, unit: str) -> str:
     start = ' start="0"' if causality == "input" else ""
     head = f'<ScalarVariable name="{name}" valueReference="{reference}" causality="{causality}" variability="continuous"'
-    return f"    {head} description={quoteattr(told)}><Real{start}/></ScalarVariable>"
+    return f"    {head} description={quoteattr(told)}><Real unit={quoteattr(unit)}{start}/></ScalarVariable>"
+
+
+def _unit(name: str) -> str:
+    """A unit by its name, in SI where that is known."""
+    powers = BASES.get(name)
+    return f"    <Unit name={quoteattr(name)}>{'' if powers is None else f'<BaseUnit {powers}/>'}</Unit>"

@@ -5,7 +5,7 @@ The feedback is calculated once for a block of samples, from the newest reading;
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from xy_sysid.control_design.compensation import Compensation, compensate_within
 from xy_sysid.control_design.feedback import feedback
 from xy_sysid.control_design.gains import Gains, gains, simple_feedforward
 from xy_sysid.control_design.path import Bounds, Moves, SampledPath, s_curve
-from xy_sysid.control_design.uncertain import samples
+from xy_sysid.control_design.uncertain import later, samples
 from xy_sysid.samples.block import FloatArray
 
 KINDS = ("PID alone", "with kS, kV, kA", "compensated")
@@ -44,7 +44,7 @@ class Tryout:
 def plan(model: PhysicalModel, moves: Moves, block: int, limit: float, encoder: Encoder | None = None) -> Tryout:
     """The plan of an axis along the path of the moves. Raises BadInput where no controller has the margins, or the limit would be reached."""
     sampling_rate = moves.sampling_rate
-    late = replace(model, model=replace(model.model, delay=model.model.delay + 1.0 / sampling_rate))  # the newest reading is of the sample before
+    late = later(model, 1.0 / sampling_rate)  # the newest reading is of the sample before
     controller = feedback(late, sampling_rate / block, limit=limit).controller
     found = gains(model)
     path, best = compensate_within(samples(model, DRAWS), found, moves, controller, encoder)

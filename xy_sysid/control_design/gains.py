@@ -16,11 +16,11 @@ from xy_sysid.axis.model import AxisModel
 from xy_sysid.comparison.physical_model import PhysicalModel
 from xy_sysid.control_design.laws import ask, asks, force, friction, of_category
 from xy_sysid.control_design.path import SampledPath
-from xy_sysid.control_design.uncertain import Derived, derive, is_determined
+from xy_sysid.control_design.uncertain import Derived, derive, is_determined, is_known_angle
 from xy_sysid.samples.block import FloatArray
 
 USUAL_SPEED = 1.0  # V of the steady state whose speed is usual, where nobody says another
-ANGLE = "zero"  # the name of the angle at which an arm is level
+ARM, ANGLE = "kCos", "zero"  # names of the gain of an arm, and of the angle at which it is level
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,8 +38,10 @@ class Gains:
 
     @property
     def unsure(self) -> tuple[str, ...]:
-        """Names of the gains that the data do not determine. An angle is none of them: 0 is an angle like any other."""
-        return tuple(item.name for item in self.items if item.name != ANGLE and not is_determined(item.value, item.low, item.high))
+        """Names of the gains that the data do not determine, with kCos where its angle is not. No angle is one of them: 0 is an angle as well."""
+        lost = any(item.name == ANGLE and not is_known_angle(item.low, item.high) for item in self.items)
+        sure = {item.name: is_determined(item.value, item.low, item.high) and not (lost and item.name == ARM) for item in self.items}
+        return tuple(name for name, is_sure in sure.items() if name != ANGLE and not is_sure)
 
     @property
     def doubt(self) -> str:
@@ -73,8 +75,8 @@ def gains(model: PhysicalModel, speed: float | None = None) -> Gains:
     if any(not asks(effect) - {"gain", "pole"} for effect, _ in of_category(centre, "force")):
         found.append(derive(model, "kG", "V", "holds the constant load", lambda of: force(of, 0.0, 0.0, of_speed=False, by_place=False)))
     if any(effect.angular for effect, _ in of_category(centre, "force")):
-        found.append(derive(model, "kCos", "V", "holds the arm level", lambda of: math.hypot(*_turning(of))))
-        found.append(derive(model, ANGLE, "rad", "angle at which the arm is level", lambda of: math.atan2(_turning(of)[0], _turning(of)[1])))
+        found.append(derive(model, ARM, "V", "holds the arm level", lambda of: math.hypot(*_turning(of))))
+        found.append(derive(model, ANGLE, "rad", "angle at which the arm is level", lambda of: math.atan2(*_turning(of)), True))
     return Gains(tuple(found))
 
 

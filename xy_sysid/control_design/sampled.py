@@ -19,7 +19,9 @@ from xy_sysid.response.frf import ComplexArray
 from xy_sysid.samples.block import FloatArray
 
 EVENLY = 2048  # frequencies of a mean over all of them
-LINES = 600  # frequencies of a response
+LINES = 600  # frequencies of a response, evenly by ratio
+TURNED = np.linspace(-89.0, 89.0, 60)  # degrees that a resonance has turned, at frequencies around it
+LinearSystem = tuple[FloatArray, FloatArray, FloatArray, float]  # A, B, C, D of a sampled controller
 KEPT = 256  # sampled models, and responses, that are remembered: those of a design are asked for again and again
 
 
@@ -62,15 +64,23 @@ class Sampled:
         return a, b, c
 
 
-def grid(sampling_rate: float) -> FloatArray:
-    """(n,) Hz, frequencies at which a loop is looked at."""
-    return np.geomspace(2e-4 * sampling_rate, 0.499 * sampling_rate, LINES)
+@functools.lru_cache(maxsize=KEPT)
+def grid(system: Sampled) -> FloatArray:
+    """(n,) Hz, frequencies at which its loop is looked at: evenly by ratio, and around each resonance evenly by the phase that it turns.
+
+    The phase of a pole s = w (-damping + j) turns by atan(x) at w (1 + damping x).
+    """
+    rate = system.sampling_rate
+    poles = np.log(np.linalg.eigvals(system.a).astype(np.complex128) + 1e-300) * rate / (2.0 * np.pi)
+    own = [pole.imag + abs(pole.real) * np.tan(np.radians(TURNED)) for pole in poles if pole.imag > 0.0]
+    every = np.concatenate((np.geomspace(2e-4 * rate, 0.499 * rate, LINES), *own))
+    return np.unique(every[(every >= 2e-4 * rate) & (every <= 0.499 * rate)])
 
 
 @functools.lru_cache(maxsize=KEPT)
 def on_grid(system: Sampled) -> ComplexArray:
     """(n,) its response at the frequencies of ``grid``."""
-    return system.response(grid(system.sampling_rate))
+    return system.response(grid(system))
 
 
 @functools.lru_cache(maxsize=KEPT)
@@ -92,6 +102,13 @@ def sampled(model: AxisModel, sampling_rate: float) -> Sampled:
     rest = 1.0 / sampling_rate - part
     (first, fed_first), (last, fed_last) = _held(a, b, part), _held(a, b, rest)
     return Sampled(sampling_rate=sampling_rate, a=last @ first, old=last @ fed_first, new=fed_last, whole=back)
+
+
+def response_of(a: FloatArray, b: FloatArray, c: FloatArray, d: float, frequency: FloatArray, sampling_rate: float) -> ComplexArray:
+    """(n,) c (z - a)^-1 b + d at frequencies, Hz."""
+    z = np.exp(2j * np.pi * frequency / sampling_rate)
+    solved = np.linalg.solve(z[:, None, None] * np.eye(b.size) - a, np.broadcast_to(b[:, None], (z.size, b.size, 1)))
+    return np.asarray(solved[:, :, 0] @ c + d, dtype=np.complex128)
 
 
 def _held(a: FloatArray, b: FloatArray, seconds: float) -> tuple[FloatArray, FloatArray]:
@@ -122,7 +139,7 @@ def coefficients(controller: Controller, sampling_rate: float) -> FloatArray:
     return np.vstack((np.concatenate((top, bottom[1:])), controller.sections))
 
 
-def controller_system(controller: Controller, sampling_rate: float) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+def controller_system(controller: Controller, sampling_rate: float) -> LinearSystem:
     """(A, B, C, D) of the same controller from error to voltage."""
     h, keeps = 1.0 / sampling_rate, controller.keeps(sampling_rate)
     a = np.array([[1.0, 0.0, 0.0], [0.0, keeps, -(1.0 - keeps) / h], [0.0, 0.0, 0.0]])
@@ -141,8 +158,13 @@ def controller_system(controller: Controller, sampling_rate: float) -> tuple[Flo
 
 def closed_poles(system: Sampled, controller: Controller) -> ComplexArray:
     """Poles of the closed loop in z; it is stable if all are within the unit circle."""
+    return looped_poles(system, controller_system(controller, system.sampling_rate))
+
+
+def looped_poles(system: Sampled, controller: LinearSystem) -> ComplexArray:
+    """The same with any linear controller from error to voltage."""
     a, b, c = system.whole_system()
-    ka, kb, kc, kd = controller_system(controller, system.sampling_rate)
+    ka, kb, kc, kd = controller
     top = np.hstack((a - kd * np.outer(b, c), np.outer(b, kc)))
     bottom = np.hstack((-np.outer(kb, c), ka))
     return np.asarray(np.linalg.eigvals(np.vstack((top, bottom))), dtype=np.complex128)

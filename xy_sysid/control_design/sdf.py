@@ -14,15 +14,16 @@ from xy_sysid.control_design.laws import along, asks, friction, largest_voltage
 from xy_sysid.effects._contract import Effect
 
 PLACES = 101  # at which a spring is asked whether it is straight
+ANYWHERE = -1.0, 1.0  # m or rad, where a spring is looked at if nobody knows the travel
 STRAIGHT = 1e-6  # of its force at the end of the travel: a spring that bends less is one number
 
 
 def sdf(
-    model: AxisModel, travel: tuple[float, float], limit: float, angular: bool, name: str = "axis", ends: bool = True
+    model: AxisModel, travel: tuple[float, float] | None, limit: float, angular: bool, name: str = "axis"
 ) -> tuple[str, tuple[tuple[str, str], ...]]:
-    """(text, what is lost by effect); travel: m or rad; limit: of the drive, infinite if nobody knows it; ends: whether the travel ends there."""
+    """(text, what is lost by effect); travel: m or rad, None where nobody knows it; limit: of the drive, infinite if nobody knows it."""
     level = 0.5 * (friction(model, abs(model.gain), 1.0) + friction(model, -abs(model.gain), -1.0))
-    places = np.linspace(*travel, PLACES)
+    places = np.linspace(*(travel or ANYWHERE), PLACES)
     pull = along(model, places, "force") * math.copysign(1.0, model.gain)
     stiffness, offset = (float(value) for value in np.polyfit(places, pull, 1))
     reach = float(np.max(np.abs(pull)))
@@ -30,13 +31,13 @@ def sdf(
     lost = [(effect, _lost(model.library[effect])) for effect, _ in model.effects if not (straight and _spring(model.library[effect]))]
     if model.delay > 0.0:
         lost.append(("delay", "SDF knows none"))
-    if not ends:
+    if travel is None:
         lost.append(("travel", "it is not known"))
     top = min(limit, largest_voltage(model))
     effort = top if math.isfinite(top) else 1e3 / abs(model.gain)
     mass = 1.0 / (abs(model.gain) * model.pole)
     spring = f"<spring_reference>{-offset / stiffness:.9g}</spring_reference><spring_stiffness>{stiffness:.9g}</spring_stiffness>" if straight else ""
-    between = f"<lower>{travel[0]:.9g}</lower><upper>{travel[1]:.9g}</upper>" if ends else ""
+    between = f"<lower>{travel[0]:.9g}</lower><upper>{travel[1]:.9g}</upper>" if travel is not None else ""
     lines = [
         '<?xml version="1.0"?>',
         '<sdf version="1.9">',

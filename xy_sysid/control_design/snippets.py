@@ -2,30 +2,41 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from xy_sysid.comparison.physical_model import PhysicalModel
+from xy_sysid.control_design.cascade import ESTIMATOR, RATE, cascade
 from xy_sysid.control_design.closed_loop import NO_LIMIT
-from xy_sysid.control_design.feedback import Feedback, in_milliseconds
+from xy_sysid.control_design.feedback import TURN, Feedback, in_milliseconds
 from xy_sysid.control_design.filters import Shaper
 from xy_sysid.control_design.gains import Gains
 from xy_sysid.errors import BadInput
 from xy_sysid.units import Units
 
-TURN = 2.0 * math.pi  # rad
+DEGREE = TURN / 360.0  # rad
 LEAST_GAIN, LEAST_PHASE = 1.7, 35.0  # margin without a filter on the derivative: less is near the end for a machine that warms up
 
 
 @dataclass(frozen=True, slots=True)
 class Designed:
-    """What a snippet is written from: the axis' name and units, and what was designed for it."""
+    """What a snippet is written from: the axis' name and model, and what was designed for it.
+
+    calculation: periods from reading to writing; speed: m/s, the largest of the fastest path; None where nobody knows the drive's limit
+    """
 
     axis: str
-    units: Units
+    model: PhysicalModel
     gains: Gains
     feedback: Feedback | None
+    calculation: float
     shaper: Shaper | None = None
+    speed: float | None = None
+
+    @property
+    def units(self) -> Units:
+        """Of the model."""
+        return self.model.units
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,8 +53,11 @@ def ros2_control(of: Designed) -> Snippet:
     """Parameters of pid_controller/PidController, with the names of control_toolbox."""
     loop = _unfiltered_loop(of, "ros2_control")
     limit = loop.controller.limit
-    bound = f"{limit:.6g}" if limit < NO_LIMIT else ".inf"
-    low = f"-{limit:.6g}" if limit < NO_LIMIT else "-.inf"
+    bound, shared = ".inf", "u_clamp limits the PID alone, not its sum with the feedforward"
+    if limit < NO_LIMIT:
+        fed = abs(of.gains.value("kV")) * (of.speed or 0.0)
+        bound = f"{limit - fed:.6g}"
+        shared += f": of {limit:.4g} {of.units.input} it leaves {fed:.3g} to the feedforward, for up to {of.speed or 0.0:.3g} {of.units.speed}"
     name = "'" + of.axis.replace("'", "''") + "'"  # in quotes: the parser of ROS 2 reads a plain y or no as a bool, and 1 as an integer
     lines = [
         f"# u = p e + i int(e) + d de/dt in {of.units.input}, e in {of.units.output}, at {loop.sampling_rate:g} Hz",
@@ -59,16 +73,16 @@ def ros2_control(of: Designed) -> Snippet:
         f"        i: {loop.controller.ki:.6g}",
         f"        d: {loop.controller.kd:.6g}",
         f"        i_clamp_max: {bound}",
-        f"        i_clamp_min: {low}",
+        f"        i_clamp_min: -{bound}",
         f"        u_clamp_max: {bound}",
-        f"        u_clamp_min: {low}",
+        f"        u_clamp_min: -{bound}",
         "        antiwindup_strategy: conditional_integration",
         f"        feedforward_gain: {of.gains.value('kV'):.6g}{_unsure(of, 'kV', '  # ')}",
     ]
     note = (
         "feedforward_gain is kV: the controller multiplies the velocity that is asked for by it, once enable_feedforward is true; a version "
-        "without this parameter has the service ~/set_feedforward_control instead. u_clamp limits the PID alone, not its sum with the feedforward; "
-        f"kS and kA have no place in it, add them in a controller of your own.{_gravity(of)} {_unfiltered(loop)}"
+        "without this parameter has the service ~/set_feedforward_control instead. "
+        f"{shared}; kS and kA have no place in it, add them in a controller of your own.{_gravity(of)} {_unfiltered(loop)}"
     )
     return Snippet("ros2_control", "controllers.yaml", "\n".join(lines) + "\n", note)
 
@@ -78,21 +92,26 @@ def klipper(of: Designed) -> Snippet:
     if of.shaper is None:
         raise BadInput("klipper", "an axis without a resonance", "a model with one", "There is nothing to shape.")
     axis = of.axis if of.axis in ("x", "y") else "x"
+    other = f"; the axis is {of.axis!r}, and Klipper shapes x and y: change _x to _y if it is that one" if axis != of.axis else ""
     lines = [
+        *([f"# of axis {of.axis!r}, written as x"] if other else []),
         "[input_shaper]",
         f"shaper_type_{axis}: {of.shaper.name}",
         f"shaper_freq_{axis}: {of.shaper.frequency:.2f}",
         f"damping_ratio_{axis}: {of.shaper.damping:.4f}",
     ]
-    note = "Klipper drives steppers without feedback: only the shaper applies"
+    note = f"Klipper drives steppers without feedback: only the shaper applies{other}"
     return Snippet("klipper", "printer.cfg", "\n".join(lines) + "\n", note)
 
 
 def linuxcnc(of: Designed) -> Snippet:
-    """HAL commands for a pid component; lengths in mm, as a metric configuration counts."""
+    """HAL commands for a pid component; in mm as a metric configuration counts, and degrees of a rotary axis."""
     loop = _unfiltered_loop(of, "linuxcnc")
-    per, length = (1e-3, "mm") if of.units.output == "m" else (1.0, of.units.output)
+    per, length = {"m": (1e-3, "mm"), "rad": (DEGREE, "deg")}.get(of.units.output, (1.0, of.units.output))
     at = of.axis
+    size, outside = loop.controller.limit, abs(of.gains.value("kS")) + abs(of.gains.value("kCos"))
+    if size <= outside:
+        raise BadInput("linuxcnc", f"a limit of {size:g} {of.units.input}", f"more than kS and kCos, {outside:.3g}", "Check --limit, or the model.")
     values = {
         "Pgain": loop.controller.kp * per,
         "Igain": loop.controller.ki * per,
@@ -100,14 +119,15 @@ def linuxcnc(of: Designed) -> Snippet:
         "FF1": of.gains.value("kV") * per,
         "FF2": of.gains.value("kA") * per,
         "bias": of.gains.value("kG"),
-        "maxoutput": loop.controller.limit if loop.controller.limit < NO_LIMIT else 0.0,
+        "maxoutput": size - outside if size < NO_LIMIT else 0.0,
     }
     lines = [f"# command in {of.units.input}, position in {length}; run the thread at {loop.sampling_rate:g} Hz"]
     unsure = {name: _unsure(of, gain) for name, gain in (("FF1", "kV"), ("FF2", "kA"), ("bias", "kG"))}
     lines += [f"# {name} is {doubt}" for name, doubt in unsure.items() if doubt]
     lines += [f"setp pid.{at}.{name} {value:.6g}" for name, value in values.items()]
     note = (
-        f"pid has no kS: add {of.gains.value('kS'):.4g} {of.units.input} with the sign of the commanded velocity.{_gravity(of)} {_unfiltered(loop)}"
+        f"pid has no kS: add {of.gains.value('kS'):.4g} {of.units.input} with the sign of the commanded velocity.{_gravity(of)} "
+        f"{'maxoutput leaves room for it. ' if outside and size < NO_LIMIT else ''}{_unfiltered(loop)}"
     )
     return Snippet("linuxcnc", "axis.hal", "\n".join(lines) + "\n", note)
 
@@ -120,17 +140,25 @@ def odrive(of: Designed) -> Snippet:
         raise BadInput(
             "odrive", f"an axis in {asked}", "N m (or A) and rad", "ODrive commands a torque: convert the recording with --unit and --scale."
         )
+    own = cascade(of.model, loop.asked, of.calculation)
     torque = "torque_constant * " if of.units.input == "A" else ""
     at = "odrv0.axis0"
     lines = [f"torque_constant = {at}.config.motor.torque_constant"] if torque else []
     lines += [
-        f"{at}.controller.config.pos_gain = {loop.position_gain:.6g}",
-        f"{at}.controller.config.vel_gain = {torque}{loop.velocity_gain * TURN:.6g}",
-        f"{at}.controller.config.vel_integrator_gain = {torque}{loop.velocity_integral * TURN:.6g}",
+        f"{at}.config.encoder_bandwidth = {ESTIMATOR:g}  # rad/s",
+        f"{at}.controller.config.pos_gain = {own.position_gain:.6g}",
+        f"{at}.controller.config.vel_gain = {torque}{own.velocity_gain * TURN:.6g}",
+        f"{at}.controller.config.vel_integrator_gain = {torque}{own.velocity_integral * TURN:.6g}",
         f"{at}.controller.config.inertia = {torque}{of.gains.value('kA') * TURN:.6g}{_unsure(of, 'kA', '  # ')}",
     ]
+    limit = loop.controller.limit
+    if limit < NO_LIMIT:  # of the sum of its feedback and its feedforward
+        lines += [f"{at}.config.torque_soft_{end} = {torque}{size:.6g}" for end, size in (("max", limit), ("min", -limit))]
     note = (
-        "ODrive's loops run at 8 kHz: these gains keep their margins there; its inertia is what kA is here, per turn. "
+        f"designed for ODrive's own loops at {RATE:g} Hz with its encoder estimator of {ESTIMATOR:g} rad/s, which firmware before 0.6 calls "
+        f"encoder.config.bandwidth. Crossover {own.nominal.crossover:.3g} Hz; worst of {own.count} samples: phase margin {own.worst.phase:.3g} "
+        f"degrees, gain margin {own.worst.gain:.3g}. The model has to contain ODrive's current loop: its input is the torque (or current) command. "
+        "ODrive's inertia is what kA is here, per turn. "
         f"It has no kS and kV: add their torque to input_torque.{_gravity(of)}"
     )
     return Snippet("odrive", "odrivetool", "\n".join(lines) + "\n", note)
@@ -165,8 +193,13 @@ def twincat(of: Designed) -> Snippet:
     if limited:
         fields += [f"fOutMaxLimit := {own.limit:.9E}", f"fOutMinLimit := {-own.limit:.9E}"]
     kept = [f"    {name} : LREAL := {value:.9E}; (* {unit} *)" for name, value, unit in _feedforward(of, per, length)]
-    total = "fbPid.fOut + fKS * fSign + fKV * fSetVelocity + fKA * fSetAcceleration + fKG"
-    total += " + fKCos * COS(fSetPosition - fZero)" if of.gains.value("kCos") else ""
+    fed = "fKS * fSign + fKV * fSetVelocity + fKA * fSetAcceleration + fKG"
+    fed += " + fKCos * COS(fSetPosition - fZero)" if of.gains.value("kCos") else ""
+    shared = [
+        f"fFeedforward := LIMIT({-own.limit:.9E}, {fed}, {own.limit:.9E});",
+        f"stParams.fOutMaxLimit := {own.limit:.9E} - fFeedforward; (* the sum stays within the limit, and the integral stops there *)",
+        f"stParams.fOutMinLimit := {-own.limit:.9E} - fFeedforward;",
+    ]
     lines = [
         f"(* Axis {of.axis}: input in {of.units.input}, position in {length}. Call it in a task of {cycle:g} ms. *)",
         f"PROGRAM {_identifier(of.axis)}",
@@ -186,16 +219,18 @@ def twincat(of: Designed) -> Snippet:
         "    );",
         *kept,
         "    fSign : LREAL;",
+        "    fFeedforward : LREAL;",
         "END_VAR",
         "",
         "fSign := SEL(fSetVelocity > 0.0, SEL(fSetVelocity < 0.0, 0.0, -1.0), 1.0);",
+        *(shared if limited else [f"fFeedforward := {fed};"]),
         "fbPid(fSetpointValue := fSetPosition, fActualValue := fActPosition, eMode := eCTRL_MODE_ACTIVE, stParams := stParams);",
-        f"fOutput := LIMIT({-own.limit:.9E}, {total}, {own.limit:.9E});" if limited else f"fOutput := {total};",
+        "fOutput := fbPid.fOut + fFeedforward;",
         "END_PROGRAM",
     ]
     left = f"a phase margin of {loop.counted.phase:.3g} degrees and a gain margin of {loop.counted.gain:.3g} are left"
     doubt = f"; {of.gains.doubt}" if of.gains.doubt else ""
-    note = f"needs Tc2_ControllerToolbox; its times are whole milliseconds, so {left}; its integral stops at the limit{doubt}"
+    note = f"needs Tc2_ControllerToolbox; times are whole milliseconds, so {left}; the integral stops with the sum at the limit{doubt}"
     return Snippet("twincat", "axis.st", "\n".join(lines) + "\n", note)
 
 
@@ -213,7 +248,11 @@ def _feedforward(of: Designed, per: float, length: str) -> list[tuple[str, float
 def _gravity(of: Designed) -> str:
     """What has to be added for an arm, where the target has no place for it; and which gains are 0 for want of better ones."""
     size, zero = of.gains.value("kCos"), of.gains.value("zero")
-    arm = f" It has no kCos: add {size:.4g} {of.units.input} times the cosine of the angle minus {zero:.4g} rad." if size else ""
+    arm = (
+        f" It has no kCos: add {size:.4g} {of.units.input} times the cosine of the angle minus {zero:.4g} rad ({zero / DEGREE:.4g} degrees)."
+        if size
+        else ""
+    )
     return f"{arm} {of.gains.doubt}." if of.gains.doubt else arm
 
 

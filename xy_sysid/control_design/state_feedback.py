@@ -12,16 +12,16 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg
 
 from xy_sysid.comparison.physical_model import PhysicalModel
-from xy_sysid.control_design.feedback import COUNT, USUAL, Asked, Margins, least, margins_of, within_a_gap
-from xy_sysid.control_design.sampled import Sampled, grid, on_grid, sampled
-from xy_sysid.control_design.uncertain import samples, undetermined
-from xy_sysid.errors import BadInput
+from xy_sysid.control_design.feedback import TURN, USUAL, Asked, Margins, first_kept, loop_systems, margins_of
+from xy_sysid.control_design.sampled import Sampled, grid, on_grid, response_of
 from xy_sysid.response.frf import ComplexArray
 from xy_sysid.samples.block import FloatArray
 
@@ -33,8 +33,9 @@ INTEGRAL = 4.0  # times below the bandwidth where the integral begins
 
 @dataclass(frozen=True, slots=True)
 class StateFeedback:
-    """z+ = free z + b (path - encoder) + drive held, u = c z, held = u within the drive's limit: observer and state feedback in one system.
+    """z+ = free z + b (path - encoder) + drive held, u = c z, held = u as far as the drive gives it: observer and state feedback in one system.
 
+    What an encoder shows makes the voltage of the next sample: one period of calculation is part of the design.
     The observer hears of the voltage that is held, so it does not wind up. Within the limit z+ = a z + b (path - encoder).
 
     free: (n, n); b, c, drive: (n,); sampling_rate: Hz; bandwidth: rad/s that the weights were set by
@@ -61,14 +62,7 @@ class StateFeedback:
 
     def response(self, frequency: FloatArray) -> ComplexArray:
         """(n,) voltage over error at frequencies, Hz."""
-        return _response(self.a, self.b, self.c, frequency, self.sampling_rate)
-
-
-def _response(a: FloatArray, b: FloatArray, c: FloatArray, frequency: FloatArray, sampling_rate: float) -> ComplexArray:
-    """(n,) c (z - a)^-1 b at frequencies, Hz."""
-    z = np.exp(2j * np.pi * frequency / sampling_rate)
-    solved = np.linalg.solve(z[:, None, None] * np.eye(b.size) - a, np.broadcast_to(b[:, None], (z.size, b.size, 1)))
-    return np.asarray(solved[:, :, 0] @ c, dtype=np.complex128)
+        return response_of(self.a, self.b, self.c, 0.0, frequency, self.sampling_rate)
 
 
 def state_feedback(model: PhysicalModel, sampling_rate: float, asked: Asked = USUAL) -> StateFeedback:
@@ -76,44 +70,42 @@ def state_feedback(model: PhysicalModel, sampling_rate: float, asked: Asked = US
 
     Raises BadInput where gain or pole are not determined by the data, or where no bandwidth has the margins.
     """
-    doubtful = undetermined(model, ("gain", "pole"))
-    if model.parameters and doubtful:
-        raise BadInput(
-            " and ".join(doubtful), "known to worse than a factor of two", "numbers that the data determine", "Record a livelier motion first."
-        )
-    drawn = samples(model, COUNT)
-    systems = [sampled(item, sampling_rate) for item in (*drawn, *within_a_gap(drawn[0]))]
-    worst = Margins(phase=0.0, gain=0.0, sensitivity=math.inf, crossover=0.0, stable=False)
-    for tried, faster in itertools.product(asked.tries(sampling_rate, STEPS), FASTER):
-        wanted = 2.0 * math.pi * tried
-        try:
-            free, b, c, drive = _designed(systems[0], wanted, faster)
-        except np.linalg.LinAlgError:  # so far apart from the plant that the quadratic problem has no answer in double precision
-            continue
-        parts = free + np.outer(drive, c), b, c
-        own = _response(*parts, grid(sampling_rate), sampling_rate)
+    systems = loop_systems(model, sampling_rate)
 
-        nominal = _margins(systems[0], own, *parts)
-        worst = nominal
-        if not (asked.met(nominal) and nominal.crossover > 0.0):  # a loop that never comes to 1 does nothing
-            continue
-        worst = least([_margins(system, own, *parts) for system in systems])
-        if asked.met(worst):
-            rejects, settles = _load_step(systems[0], *parts)
-            return StateFeedback(
-                free=free,
-                b=b,
-                c=c,
-                drive=drive,
-                sampling_rate=sampling_rate,
-                bandwidth=wanted,
-                nominal=nominal,
-                worst=worst,
-                count=len(systems),
-                rejects=rejects,
-                settles=settles,
-            )
-    raise asked.refused("bandwidth of the state feedback", worst)
+    def designs() -> Iterator[_Design]:
+        for tried, faster in itertools.product(asked.tries(sampling_rate, STEPS), FASTER):
+            try:
+                free, b, c, drive = _designed(systems[0], TURN * tried, faster)
+            except np.linalg.LinAlgError:  # so far apart from the plant that the quadratic problem has no answer in double precision
+                continue
+            yield _Design(TURN * tried, (free, b, c, drive), (free + np.outer(drive, c), b, c))
+
+    made, nominal, worst = first_kept(
+        "bandwidth of the state feedback", asked, systems, designs(), lambda system, item: _margins(system, *item.parts)
+    )
+    free, b, c, drive = made.numbers
+    rejects, settles = _load_step(systems[0], *made.parts)
+    return StateFeedback(
+        free=free,
+        b=b,
+        c=c,
+        drive=drive,
+        sampling_rate=sampling_rate,
+        bandwidth=made.bandwidth,
+        nominal=nominal,
+        worst=worst,
+        count=len(systems),
+        rejects=rejects,
+        settles=settles,
+    )
+
+
+class _Design(NamedTuple):
+    """bandwidth: rad/s; numbers: free, b, c, drive; parts: a, b, c within the limit."""
+
+    bandwidth: float
+    numbers: tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+    parts: tuple[FloatArray, FloatArray, FloatArray]
 
 
 def _designed(system: Sampled, bandwidth: float, faster: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -159,10 +151,11 @@ def _observer(a: FloatArray, c: FloatArray, forces: FloatArray, noise: float) ->
     return np.asarray((a @ p @ c) / (noise + c @ p @ c))
 
 
-def _margins(system: Sampled, own: ComplexArray, a: FloatArray, b: FloatArray, c: FloatArray) -> Margins:
-    """Of the loop, broken at the voltage; own: the controller's response on the grid."""
+def _margins(system: Sampled, a: FloatArray, b: FloatArray, c: FloatArray) -> Margins:
+    """Of the loop, broken at the voltage."""
+    own = response_of(a, b, c, 0.0, grid(system), system.sampling_rate)
     poles = np.linalg.eigvals(closed_loop(system, a, b, c)).astype(np.complex128)
-    return margins_of(on_grid(system) * own, system.sampling_rate, poles)
+    return margins_of(on_grid(system) * own, grid(system), poles)
 
 
 def closed_loop(system: Sampled, a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:

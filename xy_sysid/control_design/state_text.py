@@ -1,4 +1,4 @@
-"""State feedback as C and Python source without dependencies: one function that takes the error and gives the voltage."""
+"""State feedback as C and Python source without dependencies: error and feedforward in, the voltage within the limit out."""
 
 from __future__ import annotations
 
@@ -17,45 +17,50 @@ LIMIT = {limit}
 
 
 class Controller:
-    # error: path minus encoder, once every {period:.9g} s; the answer is the input to be held until the next call
+    # error: path minus encoder, once every {period:.9g} s; feedforward: of the path, for the next period
+    # the answer is the sum of feedback and feedforward within the limit, to be written one period later, and held for one
 
     def __init__(self):
-        self.z = [0.0] * {n}
+        self.z, self.held = [0.0] * {n}, 0.0
 
-    def input(self, error):
-        z = self.z
-        u = sum(c * x for c, x in zip(C, z))
-        held = min(max(u, -LIMIT), LIMIT)
+    def input(self, error, feedforward=0.0):
+        z, held = self.z, self.held
         self.z = [
             sum(a * x for a, x in zip(FREE[i * {n} : (i + 1) * {n}], z)) + B[i] * error + DRIVE[i] * held
             for i in range({n})
         ]
-        return held
+        u = sum(c * x for c, x in zip(C, self.z))
+        total = min(max(u + feedforward, -LIMIT), LIMIT)
+        self.held = total - feedforward
+        return total
 """
 
 C_SOURCE = """\
 /* State feedback with an observer: {title}
-   error: path minus encoder, once every {period:.9g} s; z: {n} numbers, 0 at the begin; the answer is the input to be held until the next call */
+   error: path minus encoder, once every {period:.9g} s; z: {n} + 1 numbers, 0 at the begin
+   feedforward: of the path, for the next period
+   the answer is the sum of feedback and feedforward within the limit, to be written one period later, and held for one */
 static const double FREE[] = {{{free}}};
 static const double B[] = {{{b}}};
 static const double C[] = {{{c}}};
 static const double DRIVE[] = {{{drive}}};
 
-double {name}_control(double *z, double error)
+double {name}_control(double *z, double error, double feedforward)
 {{
-    double next[{n}], u = 0.0, held;
+    double next[{n}], u = feedforward;
     int i, j;
-    for (i = 0; i < {n}; i++)
-        u += C[i] * z[i];
-    held = u > {limit} ? {limit} : u < -{limit} ? -{limit} : u;
     for (i = 0; i < {n}; i++) {{
-        next[i] = B[i] * error + DRIVE[i] * held;
+        next[i] = B[i] * error + DRIVE[i] * z[{n}];
         for (j = 0; j < {n}; j++)
             next[i] += FREE[i * {n} + j] * z[j];
     }}
-    for (i = 0; i < {n}; i++)
+    for (i = 0; i < {n}; i++) {{
         z[i] = next[i];
-    return held;
+        u += C[i] * z[i];
+    }}
+    u = u > {limit} ? {limit} : u < -{limit} ? -{limit} : u;
+    z[{n}] = u - feedforward;
+    return u;
 }}
 """
 

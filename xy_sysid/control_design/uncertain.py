@@ -20,6 +20,8 @@ from xy_sysid.greybox.parameters import Z95, Estimate
 from xy_sysid.samples.block import FloatArray
 
 FACTOR = 2.0  # a number known to worse than this factor is said to be undetermined
+WIDEST = math.pi / 3.0  # rad, half of the interval of an angle: 2 sin(e / 2) is 1
+WAYPOINTS = 65  # between an angle and the end of its interval: within 200 rad they are less than half a turn apart
 SKIPPED = 7  # first points of the sequence, which lie on a line
 
 
@@ -28,7 +30,7 @@ class Derived:
     """A number with its 95 % interval.
 
     unit: of the axis; because: (parameter, half of the interval that is its own), largest first; determined: False where it is known to worse
-    than a factor of two or where a parameter that it needs has no interval; meaning: in words
+    than a factor of two (an angle: 60 degrees) or where a parameter that it needs has no interval; meaning: in words
     """
 
     name: str
@@ -49,9 +51,9 @@ class Derived:
         return f"{self.name} is not determined by the data: it depends on {most}"
 
 
-def derive(model: PhysicalModel, name: str, unit: str, meaning: str, of: Callable[[AxisModel], float]) -> Derived:
-    """The number ``of`` the model, with its interval."""
-    value, low, high, parts = _moved(model, lambda item: np.array([of(item)]))
+def derive(model: PhysicalModel, name: str, unit: str, meaning: str, of: Callable[[AxisModel], float], angle: bool = False) -> Derived:
+    """The number ``of`` the model, with its interval; angle: whether it is one, in rad, which jumps by a turn somewhere."""
+    value, low, high, parts = _moved(model, lambda item: np.array([of(item)]), WAYPOINTS if angle else 2)
     parts.sort(key=lambda item: -item[1])
     first, down, up = float(value[0]), float(value[0] - low[0]), float(value[0] + high[0])
     because = tuple((who, change) for who, change in parts if change > 0.0)
@@ -63,7 +65,7 @@ def derive(model: PhysicalModel, name: str, unit: str, meaning: str, of: Callabl
         unit=model.units.of(unit),
         meaning=meaning,
         because=because,
-        determined=bool(model.parameters) and is_determined(first, down, up),
+        determined=bool(model.parameters) and (is_known_angle(down, up) if angle else is_determined(first, down, up)),
     )
 
 
@@ -81,6 +83,11 @@ def is_determined(value: float, low: float, high: float) -> bool:
     return math.isfinite(low + high) and low * high > 0.0 and far <= FACTOR * abs(value) and near * FACTOR >= abs(value)
 
 
+def is_known_angle(low: float, high: float) -> bool:
+    """Whether a force that turns with an angle in this interval, rad, leaves less than it takes away: an angle off by e leaves 2 sin(e / 2) of it."""
+    return 0.5 * (high - low) < WIDEST
+
+
 def undetermined(model: PhysicalModel, names: tuple[str, ...]) -> tuple[str, ...]:
     """Those of some parameters whose size the data do not determine; all of them where no interval is known."""
     known = {item.name: item for item in model.parameters}
@@ -95,6 +102,15 @@ def with_values(model: AxisModel, values: dict[str, float]) -> AxisModel:
     )
     base = {name: values.get(name, getattr(model, name)) for name in ("gain", "delay", "pole")}
     return replace(model, **base, effects=effects, per_recording=())
+
+
+def later(model: PhysicalModel, seconds: float) -> PhysicalModel:
+    """The model with so much more delay, and its interval with it: the axis as a controller meets it that calculates for so long."""
+    known = tuple(
+        replace(item, value=item.value + seconds, low=item.low + seconds, high=item.high + seconds) if item.name == "delay" else item
+        for item in model.parameters
+    )
+    return replace(model, model=replace(model.model, delay=model.model.delay + seconds), fit=None, known=known)
 
 
 def samples(model: PhysicalModel, count: int) -> tuple[AxisModel, ...]:
@@ -120,8 +136,10 @@ def _drawn(known: tuple[Estimate, ...], row: FloatArray) -> Iterator[tuple[str, 
             yield item.name, item.value + abs(z) * (end - item.value)
 
 
-def _moved(model: PhysicalModel, of: Callable[[AxisModel], FloatArray]) -> tuple[FloatArray, FloatArray, FloatArray, list[tuple[str, float]]]:
-    """Value, how far below and above it may be, and each parameter's part (of the first number)."""
+def _moved(
+    model: PhysicalModel, of: Callable[[AxisModel], FloatArray], steps: int = 2
+) -> tuple[FloatArray, FloatArray, FloatArray, list[tuple[str, float]]]:
+    """Value, how far below and above it may be, and each parameter's part (of the first number); steps: of more than 2, an angle is followed."""
     value = np.asarray(of(model.model), dtype=np.float64)
     below, above = np.zeros_like(value), np.zeros_like(value)
     parts: list[tuple[str, float]] = []
@@ -129,7 +147,9 @@ def _moved(model: PhysicalModel, of: Callable[[AxisModel], FloatArray]) -> tuple
         own = np.zeros((2, *value.shape))
         for which, end in enumerate((item.low, item.high)):
             if math.isfinite(end):
-                own[which] = np.asarray(of(with_values(model.model, {item.name: _allowed(item.name, end)}))) - value
+                way = np.linspace(item.value, _allowed(item.name, end), steps)[1:].tolist()
+                there = [np.asarray(of(with_values(model.model, {item.name: place}))) for place in way]
+                own[which] = (np.unwrap([value, *there], axis=0)[-1] if steps > 2 else there[-1]) - value
             elif not np.array_equal(of(with_values(model.model, {item.name: item.value * 1.01 + 1e-12})), value):
                 own[which] = math.inf
         down, up = np.maximum(-own.min(axis=0), 0.0), np.maximum(own.max(axis=0), 0.0)

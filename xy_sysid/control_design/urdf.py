@@ -12,20 +12,20 @@ ENDLESS = 1e16  # m: end of a joint that has none, as URDF asks for one; SDF tak
 
 
 def urdf(
-    model: AxisModel, travel: tuple[float, float], limit: float, angular: bool, name: str = "axis", ends: bool = True
+    model: AxisModel, travel: tuple[float, float] | None, limit: float, angular: bool, name: str = "axis"
 ) -> tuple[str, tuple[tuple[str, str], ...]]:
-    """(text, what is lost by effect); travel: m or rad; limit: of the drive, infinite if nobody knows it; ends: whether the travel ends there."""
+    """(text, what is lost by effect); travel: m or rad, None where nobody knows it; limit: of the drive, infinite if nobody knows it."""
     level = 0.5 * (friction(model, abs(model.gain), 1.0) + friction(model, -abs(model.gain), -1.0))
     lost = [(effect, _lost(model.library[effect])) for effect, _ in model.effects]
     if model.delay > 0.0:
         lost.append(("delay", "URDF knows none"))
-    if not ends:
+    if travel is None:
         lost.append(("travel", "it is not known"))
     top = min(limit, largest_voltage(model))
     effort = top if math.isfinite(top) else 1e3 / abs(model.gain)
     mass = 1.0 / (abs(model.gain) * model.pole)
-    kind = ("revolute" if ends else "continuous") if angular else "prismatic"
-    low, high = travel if ends else (-ENDLESS, ENDLESS)
+    kind = ("continuous" if travel is None else "revolute") if angular else "prismatic"
+    low, high = travel or (-ENDLESS, ENDLESS)
     axis = "0 0 1" if angular else "1 0 0"
     inertia = f'ixx="{mass:.9g}" ixy="0" ixz="0" iyy="{mass:.9g}" iyz="0" izz="{mass:.9g}"'
     lines = [

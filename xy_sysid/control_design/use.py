@@ -24,18 +24,18 @@ from xy_sysid.control_design.measured_table import measured_table
 from xy_sysid.control_design.path import Bounds, recorded, s_curve
 from xy_sysid.control_design.state_feedback import StateFeedback, state_feedback
 from xy_sysid.control_design.tables import Correction, friction_table, position_tables
-from xy_sysid.control_design.uncertain import Derived, derive, samples
+from xy_sysid.control_design.uncertain import Derived, derive, later, samples
 from xy_sysid.control_design.worth import EDGE, WIDER, Predicted, Tracking, clear_below, encoder_of, predicted, tracked
 from xy_sysid.errors import BadInput
 from xy_sysid.linear.any_model import AnyModel
 from xy_sysid.samples.recording import Recording, Run, one_run
+from xy_sysid.units import Sensed
 
-RATE = 2000.0  # Hz of the controller, where nobody says another
+CALCULATION, LONGEST_CALCULATION = 1.0, 10.0  # periods of the controller from reading to writing: of most drives, and the most that is taken
 WORST_OF = 6  # samples of the parameters along a path
 CALM = 0.6  # of the fastest path's speed, for the path that tracking is compared on
 FOLLOWED = 0.2  # of the bandwidth: what of a recorded motion a loop is asked to follow
 LONGEST = 10.0  # s of a recorded motion that is followed
-SWING = 0.05  # m (or the output's unit) of the path, where no recording and no travel say another
 Found = TypeVar("Found")
 
 
@@ -43,8 +43,9 @@ Found = TypeVar("Found")
 class Used:
     """What to do with a model; ``axis`` and ``model.units`` say of what.
 
-    sampling_rate: Hz of the controller; limit: V of the drive, infinite if nobody knows it; limit_from: who said so
-    travel: m, that tables and paths cover; travel_known: False where nobody said it, and it is a usual one
+    sampling_rate: Hz of the controller; rate_from: who said so; calculation: its periods from reading the encoder to writing the voltage
+    limit: V of the drive, infinite if nobody knows it; limit_from: who said so
+    travel: m, that tables and paths cover; None where nobody knows it
     gains, friction, tables, gap: feedforward and corrections (None: the axis has none)
     feedback, states (state feedback with an observer), modes, notch, shapers (of the lowest mode; shaper: the best), fastest: None or none where
     there is nothing to design, or where it was refused
@@ -58,10 +59,11 @@ class Used:
     axis: str
     model: PhysicalModel
     sampling_rate: float
+    rate_from: str
+    calculation: float
     limit: float
     limit_from: str
-    travel: tuple[float, float]
-    travel_known: bool
+    travel: tuple[float, float] | None
     gains: Gains
     friction: Correction | None
     tables: tuple[Correction, ...]
@@ -83,6 +85,11 @@ class Used:
     not_undone: tuple[tuple[str, str], ...]
     notes: tuple[str, ...]
 
+    @property
+    def in_loop(self) -> PhysicalModel:
+        """The model as the controller meets it: with the delay of the calculation."""
+        return later(self.model, self.calculation / self.sampling_rate)
+
     def __repr__(self) -> str:
         named = ", ".join(f"{item.name} {item.value:.4g}" for item in self.gains.items[:3])
         loop = f", bandwidth {self.feedback.bandwidth:.3g} Hz" if self.feedback is not None else ""
@@ -98,13 +105,16 @@ def use(
     travel: tuple[float, float] | None = None,
     *,
     margins: tuple[float, float] | None = None,
+    calculation: float = CALCULATION,
 ) -> Used:
     """Feedforward with intervals, correction tables, feedback with margins, filters, limits, and what they are worth.
 
     model: of ``refine`` or a file; data: a recording of the same machine, for before and after on its own motion, its noise and its limit
-    rate: Hz of the controller (the recording's, or 2 kHz); limit: V of the drive (the model's saturation, or the recording's largest voltage)
+    rate: Hz of the controller (that of the recording, or of the one that the model was fitted to)
+    limit: V of the drive (the model's saturation, or the recording's largest voltage)
     bandwidth: Hz, asked of the loop (the largest with the margins by default); travel: m, that tables cover (the recording's)
     margins: phase margin, degrees, and gain margin, times, that the worst sample of the parameters has to keep (45 and 2)
+    calculation: periods of the controller from reading the encoder to writing the voltage, in margins and simulations (1: written in the next cycle)
     Raises BadInput for a transfer function, or values out of range. What cannot be designed safely is in ``refused``.
     """
     if not isinstance(model, PhysicalModel):
@@ -112,27 +122,36 @@ def use(
     run = None if data is None else one_run(data)
     if run is not None and run.units != model.units:
         raise BadInput("units of the recording", "/".join(run.units), "/".join(model.units), "Give a recording in the model's units.")
-    rate = rate or (run.sampling_rate if run is not None else RATE)
+    rate, rate_from = _rate(model, run, rate)
     if not 1.0 <= rate <= 1e6:
         raise BadInput("rate", f"{rate:g} Hz", "1 to 1e6 Hz", "Give the controller's rate.")
+    if not 0.0 <= calculation <= LONGEST_CALCULATION:
+        raise BadInput("calculation", f"{calculation:g} periods", f"0 to {LONGEST_CALCULATION:g}", "Give the periods from reading to writing.")
+    wait = calculation / rate
+    late = later(model, wait)
     drive, drive_from = _limit(model, run, limit)
-    between = travel or _travel(run)
-    if not between[0] < between[1]:
+    sensed = model.units.sensed if run is None else run.measured
+    placed = run if sensed == "position" else None  # the integral of a speed drifts, and is no place
+    between = travel or (None if placed is None else (float(np.min(placed.position)), float(np.max(placed.position))))
+    if between is not None and not between[0] < between[1]:
         raise BadInput("travel", f"{between[0]:g} to {between[1]:g}", "two places, the lower first", "Give --travel LOW HIGH.")
-    encoder = Encoder() if run is None else encoder_of(run)
+    encoder = Encoder() if placed is None else encoder_of(placed)
     refused: list[tuple[str, str]] = []
     found = gains(model)
     asked = Asked(*(margins or (PHASE_MARGIN, GAIN_MARGIN)), bandwidth)
-    loop = _tried("feedback", lambda: feedback(model, rate, asked, encoder=encoder, limit=drive), refused)
+    loop = _tried("feedback", lambda: feedback(_placed(late, sensed), rate, asked, encoder=encoder, limit=drive), refused)
     swings = _tried("filters", lambda: modes(model), refused) or ()
-    table = None if run is None else _tried("measured table", lambda: measured_table(model, run, WIDER * clear_below(model, run)), refused)
+    table = None if placed is None else _tried("measured table", lambda: measured_table(model, placed, WIDER * clear_below(model, placed)), refused)
     every = shapers(swings[0]) if swings else ()
-    better = None if loop is None or bandwidth is not None else with_filter(model, rate, swings, loop, encoder, drive)
+    better = None if loop is None or bandwidth is not None else with_filter(late, rate, swings, loop, encoder, drive)
     models = _tried("worst cases", lambda: samples(model, WORST_OF), refused) or (model.model,)
-    centre = 0.5 * (between[0] + between[1])
-    ends = [centre, between[1], between[0], centre]
-    quick = None
-    if drive < NO_LIMIT:
+    quick, ends = None, []
+    if between is None:
+        refused.append(("path and tables by position", "the travel is not known: give a recording of the position with --on, or --travel LOW HIGH."))
+    else:
+        centre = 0.5 * (between[0] + between[1])
+        ends = [centre, between[1], between[0], centre]
+    if ends and drive < NO_LIMIT:
         quick = _tried("fastest path", lambda: fastest(models, ends, drive, rate), refused)
     followed: list[tuple[Tracking, Compensation]] = []
     if loop is not None:
@@ -144,24 +163,26 @@ def use(
             edge = max(int(EDGE * len(run)), 1)  # what the low-pass makes of both ends is no motion of the machine
             whole = recorded(run.position, rate, FOLLOWED * loop.bandwidth)
             paths.append(("the recorded motion", whole.part(edge, min(len(run) - edge, edge + round(LONGEST * rate)))))
-        followed = [tracked(models, found, loop.controller, path, encoder) for path in paths]
+        slow = samples(late, WORST_OF)
+        followed = [tracked(slow, found, loop.controller, path, encoder) for path in paths]
     return Used(
         axis=model.axis or (run.axis if run is not None else "x"),
         model=model,
         sampling_rate=rate,
+        rate_from=rate_from,
+        calculation=calculation,
         limit=drive if drive < NO_LIMIT else math.inf,
         limit_from=drive_from,
         travel=between,
-        travel_known=travel is not None or run is not None,
         gains=found,
         friction=friction_table(model, max(0.5 * min(drive, 4.0) * abs(model.model.gain), 1e-12)),
-        tables=(*position_tables(model, between), *([] if table is None else [table.correction(model)])),
+        tables=(*(() if between is None else position_tables(model, between)), *([] if table is None else [table.correction(model)])),
         gap=_gap(model),
         feedback=loop,
-        states=_tried("state feedback", lambda: state_feedback(model, rate, asked), refused),
+        states=_tried("state feedback", lambda: state_feedback(_placed(later(model, max(wait - 1.0 / rate, 0.0)), sensed), rate, asked), refused),
         modes=swings,
         notch=_tried("notch", lambda: notch(swings[0], rate), refused) if swings and loop is not None else None,
-        allowed=None if loop is None else _tried("bandwidth", lambda: bandwidth_of(model, rate, loop.nominal.crossover, asked), refused),
+        allowed=None if loop is None else _tried("bandwidth", lambda: bandwidth_of(model, rate, loop.nominal.crossover, asked, wait), refused),
         filter=None if better is None else better[0],
         filtered=None if better is None else better[1],
         shapers=every,
@@ -198,10 +219,22 @@ def _limit(model: PhysicalModel, run: Run | None, given: float | None) -> tuple[
     return NO_LIMIT, "not known"
 
 
-def _travel(run: Run | None) -> tuple[float, float]:
-    if run is None:
-        return -0.5 * SWING, 0.5 * SWING
-    return float(np.min(run.position)), float(np.max(run.position))
+def _placed(model: PhysicalModel, sensed: Sensed) -> PhysicalModel:
+    """The model, for a position loop. Raises BadInput where no position is measured."""
+    if sensed != "position":
+        given = f"of an axis whose {sensed} is measured, and no position"
+        raise BadInput("position loop", given, "a measured position", "Close a velocity loop in the drive, or measure the position too.")
+    return model
+
+
+def _rate(model: PhysicalModel, run: Run | None, given: float | None) -> tuple[float, str]:
+    if given is not None:
+        return given, "given"
+    if run is not None:
+        return run.sampling_rate, "the recording's"
+    if model.sampling_rate is not None:
+        return model.sampling_rate, "of the recording that the model was fitted to"
+    raise BadInput("rate of the controller", "not known", "in Hz", "Give it with --controller-rate (rate= in Python), or a recording with --on.")
 
 
 def _gap(model: PhysicalModel) -> Derived | None:

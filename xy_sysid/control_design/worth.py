@@ -66,7 +66,7 @@ class Tracking:
 
 
 def encoder_of(run: Run) -> Encoder:
-    """Noise and counts of the encoder of a recording."""
+    """Noise and counts of the encoder of a recording whose position was measured."""
     count = count_size(run.position)
     noise = encoder_noise(run.sampling_rate, run.position)
     return Encoder(noise=math.sqrt(max(noise**2 - count**2 / 12.0, 0.0)), count=count)
@@ -108,10 +108,12 @@ def predicted(model: PhysicalModel, found: Gains, run: Run, table: MeasuredTable
 
 
 def clear_below(model: PhysicalModel, run: Run) -> float:
-    """Hz: below it the encoder's noise makes little of a voltage that is calculated from the measured motion."""
-    noise, size = encoder_noise(run.sampling_rate, run.position), float(np.std(run.voltage))
+    """Hz: below it the sensor's noise makes little of a voltage that is calculated from the measured motion."""
+    noise, size = encoder_noise(run.sampling_rate, run.position, run.measured, run.voltage), float(np.std(run.voltage))
     own = abs(model.model.gain * model.model.pole)
-    top = (HEARD * size * own / max(noise, 1e-300)) ** 0.5 / (2.0 * np.pi)
+    allowed = HEARD * size * own / max(noise, 1e-300)  # rad/s to the power of how often the acceleration differentiates what is measured
+    times = {"position": 2, "velocity": 1, "acceleration": 0}[run.measured]
+    top = allowed ** (1.0 / times) / (2.0 * np.pi) if times else math.inf
     return float(np.clip(top, LOWEST * run.sampling_rate, HIGHEST * run.sampling_rate))
 
 

@@ -85,7 +85,9 @@ def refined(data: Data, names: tuple[str, ...], library: Library, effort: Effort
 def _about(runs: tuple[Run, ...], found: Answer) -> Answer:
     """The answer with the runs that it is about; its models have the name of the axis and know the samples that they were fitted to."""
     digests = tuple(run.digest for run in runs)
-    rungs = tuple(replace(rung, made=replace(rung.model, axis=runs[0].axis, data=digests)) for rung in found.rungs)
+    rungs = tuple(
+        replace(rung, made=replace(rung.model, axis=runs[0].axis, data=digests, sampling_rate=runs[0].sampling_rate)) for rung in found.rungs
+    )
     return replace(found, runs=runs, rungs=rungs)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,7 @@ from xy_sysid.files.unasked import free
 from xy_sysid.fitting.of_run import LinearModel
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.greybox.parameters import Estimate
-from xy_sysid.units import USUAL, Units
+from xy_sysid.units import OF, USUAL, Units
 
 AXIS_FORMAT = "xy_sysid axis model 1"
 REWRITE = "Write the model again with xy-sysid refine --model."
@@ -46,7 +47,9 @@ def save(model: Model | Mapping[str, Model], path: Path | str, axis: str = "", *
             "model", names, "transfer functions only, or axis models only", "Give step.model or what fit gives; a file of its own for each kind."
         )
     digests = {name: item.data[0] if len(item.data) == 1 else list(item.data) for name, item in models.items() if item.data}
-    document: dict[str, Any] = {"format": FORMAT, "provenance": {"data_sha256": digests}, "axes": {}}
+    rates = {name: item.sampling_rate for name, item in models.items() if isinstance(item, PhysicalModel) and item.sampling_rate}
+    origin = {"data_sha256": digests, **({"sampling_rate_hz": rates} if rates else {})}
+    document: dict[str, Any] = {"format": FORMAT, "provenance": origin, "axes": {}}
     for name, item in models.items():
         if isinstance(item, LinearModel):
             document["axes"][name] = linear_axis(item)
@@ -93,6 +96,7 @@ def _written(model: AxisModel, units: Units, parameters: dict[str, Any], errors:
     return {
         "input_unit": units.input,
         "output_unit": units.output,
+        **({"measured": units.sensed} if units.sensed != "position" else {}),
         "effects": [name for name, _ in model.effects],
         "parameters": parameters,
         **errors,
@@ -136,9 +140,19 @@ def read_models(path: Path, library: Library) -> Mapping[str, Model]:
     found = {}
     for axis, part in document["axes"].items():
         model = _model(path, str(axis), part, library)
-        units = Units(str(part.get("input_unit", USUAL.input)), str(part.get("output_unit", USUAL.output)))
-        found[str(axis)] = PhysicalModel(model, str(axis), fitted_to(origin, str(axis)), units, known=_known(part["parameters"], model))
+        measured = str(part.get("measured") or (origin.get("measured") if isinstance(origin, dict) else None))
+        named = str(part.get("input_unit", USUAL.input)), str(part.get("output_unit", USUAL.output))
+        units = next((kind(*named) for sensed, kind in OF.items() if sensed == measured), Units(*named))
+        known, rate = _known(part["parameters"], model), _rate(origin, str(axis))
+        found[str(axis)] = PhysicalModel(model, str(axis), fitted_to(origin, str(axis)), units, known=known, sampling_rate=rate)
     return found
+
+
+def _rate(origin: Any, axis: str) -> float | None:
+    """Hz of the recording that an axis was fitted to, from the provenance of its file; None if it does not say."""
+    told = origin.get("sampling_rate_hz") if isinstance(origin, dict) else None
+    told = told.get(axis) if isinstance(told, dict) else told
+    return float(told) if isinstance(told, int | float) and 0.0 < told < math.inf else None
 
 
 def _known(written: Mapping[str, Any], model: AxisModel) -> tuple[Estimate, ...]:

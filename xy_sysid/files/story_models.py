@@ -30,14 +30,15 @@ def model_text(source: str, documents: Mapping[str, Mapping[str, Any]]) -> str:
         for axis, document in documents.items()
         if (model := document.get("model"))
     }
-    made = {"format": "xy_sysid axis model 1", "provenance": {"source": source}, "axes": axes}
+    rates = {axis: document["sampling_rate"] for axis, document in documents.items() if axis in axes and document.get("sampling_rate")}
+    made = {"format": "xy_sysid axis model 1", "provenance": {"source": source, "sampling_rate_hz": rates}, "axes": axes}
     return sealed(str(yaml.dump(made, Dumper=Quoting, sort_keys=False, width=120, allow_unicode=True)))
 
 
 def _units(document: Mapping[str, Any]) -> dict[str, str]:
     """Units of input and output, where the story names them."""
     named = document.get("units") or {}
-    return {f"{name}_unit": str(named[name]) for name in ("input", "output") if name in named}
+    return {key: str(named[name]) for name, key in (("input", "input_unit"), ("output", "output_unit"), ("measured", "measured")) if name in named}
 
 
 def model_of(document: Mapping[str, Any], axis: str, library: Library = STANDARD) -> PhysicalModel:

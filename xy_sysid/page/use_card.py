@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+from pathlib import Path
 from typing import Any
 
 from nicegui import run, ui
@@ -53,6 +54,11 @@ class UseCard:
             self._state.set_text(f"A path on the simulated machine: {status.message if status else 'not begun'}.")
             self._write(values)
 
+    def _asked(self) -> tuple[dict[str, dict[str, Any]], Path | None, tuple[str, ...], float | None]:
+        """Models, the recording and how it is read, and the drive's limit."""
+        path, how = getattr(self._source, "path", None), getattr(self._source, "how", self._session.reading)
+        return self._documents(), path, how.words, self._limit.value
+
     def _documents(self) -> dict[str, dict[str, Any]]:
         found = {axis: self._source.document(axis) for axis in self._source.axes()}
         return {axis: document for axis, document in found.items() if document and document.get("model")}
@@ -74,8 +80,7 @@ class UseCard:
             )
 
     async def _tell(self) -> None:
-        path, how = getattr(self._source, "path", None), getattr(self._source, "how", self._session.reading)
-        text = await self._do(used_text, self._documents(), path, how.words, self._limit.value)
+        text = await self._do(used_text, *self._asked())
         if text:
             self._text.clear()
             with self._text:
@@ -83,7 +88,7 @@ class UseCard:
             self._text.set_visibility(True)
 
     async def _pack(self) -> None:
-        packed = await self._do(used_files, self._documents(), self._limit.value)
+        packed = await self._do(used_files, *self._asked())
         if packed:
             ui.download.content(packed, f"{plain_name(self._source.title)}.use.zip")
 

@@ -19,13 +19,13 @@ def used_text(documents: Mapping[str, Mapping[str, Any]], recording: Path | None
         return _asked(Path(folder), documents, recording, (*reading, *_limit(limit)))
 
 
-def used_files(documents: Mapping[str, Mapping[str, Any]], limit: float | None) -> bytes:
-    """A ZIP with the exports of every axis, each in a folder of its own. Raises BadInput. Takes seconds."""
+def used_files(documents: Mapping[str, Mapping[str, Any]], recording: Path | None, reading: tuple[str, ...], limit: float | None) -> bytes:
+    """A ZIP with the exports of every axis, each in a folder of its own, of the numbers that ``used_text`` gives. Raises BadInput. Takes seconds."""
     packed = io.BytesIO()
     with tempfile.TemporaryDirectory() as folder, zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as pack:
         for axis, document in documents.items():
             out = Path(folder) / f"axis_{len(pack.namelist())}"
-            _asked(Path(folder), {axis: document}, None, (*_limit(limit), "--to", "all", "-o", str(out)))
+            _asked(Path(folder), {axis: document}, recording, (*reading, *_limit(limit), "--to", "all", "-o", str(out)))
             for file in sorted(out.iterdir()):
                 pack.write(file, f"{axis}/{file.name}")
     return packed.getvalue()

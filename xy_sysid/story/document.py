@@ -33,12 +33,13 @@ def document(story: Story) -> dict[str, Any]:
     told = UNKNOWN if story.diagnosis is None else answer_document(story.diagnosis)
     ladder = [rung_document(rung) for rung in story.rungs]
     shown = [_pictures(item, story.sampling_rate) if k == 0 or k >= drawn else None for k, item in enumerate(story.pictures)]
+    sensed = {"measured": story.units.sensed} if story.units.sensed != "position" else {}
     made: dict[str, Any] = {
         "format": FORMAT,
         "axis": story.axis,
         "seconds": story.seconds,
         "sampling_rate": story.sampling_rate,
-        "units": {"input": story.units.input, "output": story.units.output, "judged": story.units.judged},
+        "units": {"input": story.units.input, "output": story.units.output, "judged": story.units.judged, **sensed},
         **told,
         "tolerance": story.tolerance,
         "error": {
