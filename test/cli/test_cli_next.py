@@ -76,5 +76,5 @@ def test_every_sentence_is_in_the_units_of_the_recording(recording: Path, tmp_pa
     assert re.search(r"\d A rms|\d A, each|\d A with", said.out) and re.search(r"up to [\d.]+ A and the travel from \S+ to \S+ rad,", said.out)
     assert not re.search(r"\d m?(V|m)\b", said.out), said.out
     text = out.read_text()
-    assert "are in A, needs.travel is in rad" in text and yaml.safe_load(text)["experiment"]["units"] == ["A", "rad"]
+    assert "are in A, other needs are in rad" in text and yaml.safe_load(text)["experiment"]["units"] == ["A", "rad"]
     assert "to -100 rad; allowed: where the axis stands" in refused("next", *read, "--voltage", 5, "--travel=-140:-100")

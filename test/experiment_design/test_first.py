@@ -24,19 +24,22 @@ def found() -> NextExperiment:
 def test_it_says_how_loud_which_band_and_how_long(found: NextExperiment) -> None:
     """Within the voltage and the travel, with margin, for every axis that may be there."""
     assert isinstance(found.experiment, Experiment)
-    assert 0.0 < found.voltage <= 5.0 and found.seconds >= 30.0
-    assert -0.14 <= found.travel[0] < found.travel[1] <= 0.14
+    needs = found.needs
+    assert needs is not None and 0.0 < needs.voltage <= 5.0 and found.seconds >= 30.0
+    assert -0.14 <= needs.travel[0] < needs.reach[0] < needs.start == LIMITS.start < needs.reach[1] < needs.travel[1] <= 0.14
+    assert needs.within == LIMITS.travel
     assert "known to 5 %" in found.sentence
 
 
 def test_a_table_that_nobody_described_stays_within_its_limits(found: NextExperiment) -> None:
     """The simulated table carries it out: neither voltage nor travel is left, and the guards have nothing to do."""
-    assert found.experiment is not None
+    assert found.experiment is not None and found.needs is not None
     made = Machine.from_file("rigid.yaml")
     axes = dict.fromkeys(made.axes, found.experiment.excitation)
     record = drive(made, ExcitationSettings(rate=made.rate, lockstep=True, speed=0.0, axes=axes), 10.0)
     assert float(np.max(np.abs(record.voltage))) <= 5.0
-    assert found.travel[0] <= float(record.position.min()) and float(record.position.max()) <= found.travel[1]
+    low, high = found.needs.travel
+    assert low <= float(record.position.min()) and float(record.position.max()) <= high
 
 
 def test_where_no_experiment_is_safe_it_says_what_to_do() -> None:

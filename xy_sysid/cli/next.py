@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -189,17 +190,18 @@ def _plain(answer: NextExperiment) -> dict[str, Any]:
         "settles": answer.settles,
         "seconds": answer.seconds,
         "ask": answer.ask or None,
-        "needs": {"voltage": answer.voltage, "travel": answer.travel},
+        "needs": None if answer.needs is None else asdict(answer.needs),
         "units": {"input": answer.limits.units.input, "output": answer.limits.units.output},
     }
 
 
 def _show(answer: NextExperiment, output: Path | None) -> None:
     say(f"  {answer.sentence}")
-    if answer.experiment is not None:
-        limits = answer.limits
+    if answer.experiment is not None and answer.needs is not None:
+        limits, needs = answer.limits, answer.needs
         say(f"  Experiment: {answer.experiment.said(limits.units)}, for {answer.seconds:.0f} s.")
-        say(f"  It needs up to {answer.voltage:.3g} {limits.units.input} and the travel from {limits.span(answer.travel)}, with margin.")
+        say(f"  It needs up to {needs.voltage:.3g} {limits.units.input} and the travel from {limits.span(needs.travel)}, with margin.")
+        say(f"  The axis has to stand between {limits.span(needs.starts(), ' and ')} when it begins.")
     if answer.ask:
         say(f"  Somebody has to help: {answer.ask}")
     if output is not None and answer.experiment is not None:

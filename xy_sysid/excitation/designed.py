@@ -1,12 +1,14 @@
 """An experiment that was designed, on a machine that has limits of its own: taken over only where it keeps within them.
 
-The document is that of ``xy-sysid next``: which axis, for how long, what drives it, and the voltage and travel that it needs.
+The document is that of ``xy-sysid next``: which axis, for how long, what drives it, the voltage and travel that it needs, and where it may begin.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from typing import Any, Protocol
+from dataclasses import asdict, dataclass
+from typing import Any, NamedTuple, Protocol, get_type_hints
 
 from xy_sysid.errors import BadInput
 from xy_sysid.samples.recording import SAME_RATE
@@ -18,7 +20,33 @@ DRIVES = ("kind", "rms", "low", "high", "period", "steps", "offset", "seed", "ce
 AGAIN = "Design it again within these limits: xy-sysid next with --params."
 
 
-def with_experiment(settings: ExcitationSettings, document: object, where: str) -> ExcitationSettings:
+@dataclass(frozen=True, slots=True)
+class Needs:
+    """What an experiment needs of its axis.
+
+    voltage: the largest input; travel: the places that it comes to, with margin, from where the axis stood (``start``) when it was designed
+    reach: the expected motion without margin, from where it begins; within: the ends that were given to the design
+    """
+
+    voltage: float
+    travel: tuple[float, float]
+    start: float
+    reach: tuple[float, float]
+    within: tuple[float, float]
+
+    def starts(self, low: float = -math.inf, high: float = math.inf) -> tuple[float, float]:
+        """Between which places the axis has to stand, so that the expected motion stays within the ends of the design, and within two others."""
+        return max(low, self.within[0]) - self.reach[0], min(high, self.within[1]) - self.reach[1]
+
+
+class Taken(NamedTuple):
+    """An experiment that was taken over. settings: of the excitation; starts: by axis, between which places it has to stand when it begins."""
+
+    settings: ExcitationSettings
+    starts: dict[str, tuple[float, float]]
+
+
+def with_experiment(settings: ExcitationSettings, document: object, where: str) -> Taken:
     """The settings of the excitation with a designed experiment on one axis; the other axes get their constant offset, which may hold a load.
 
     Raises BadInput, in one line, for a document that is none, and for one that asks for more than the settings allow.
@@ -35,7 +63,8 @@ def with_experiment(settings: ExcitationSettings, document: object, where: str) 
     if told["units"] != list(units):
         asked, allowed = (f"{drive} and {place}" for drive, place in (told["units"], units))
         raise BadInput(f"{where}: units", asked, f"{allowed}, those of the excitation", "Design it from recordings of what the excitation sends.")
-    voltage, (low, high) = told["needs"]["voltage"], told["needs"]["travel"]
+    needs = Needs(**told["needs"])
+    voltage, (low, high) = needs.voltage, needs.travel
     if not 0.0 <= voltage <= own.limit * (1.0 + 1e-9):
         raise BadInput(f"{where}: voltage of axis {axis}", f"{voltage:.4g} {units.input}", f"up to its limit of {own.limit:g} {units.input}", AGAIN)
     if not own.travel_min <= low < high <= own.travel_max:
@@ -49,7 +78,7 @@ def with_experiment(settings: ExcitationSettings, document: object, where: str) 
     if together > own.limit * (1.0 + 1e-9):  # the drive would cut it off, and the motion would be another one
         words = f"{together:.4g} {units.input} of offset, slow and rms together"
         raise BadInput(f"{where}: excitation of axis {axis}", words, f"up to its limit of {own.limit:g} {units.input}", AGAIN)
-    return made
+    return Taken(made, {axis: needs.starts(own.travel_min, own.travel_max)})
 
 
 def of_an_experiment(name: str) -> bool:
@@ -75,16 +104,27 @@ def _checked(document: object, where: str) -> Mapping[str, Any]:
     lacking = [name for name in DRIVES if name not in told["excitation"]]
     if lacking:
         raise BadInput(f"{where}: excitation", f"without {', '.join(lacking)}", f"all of {', '.join(DRIVES)}", "Make the file again.")
-    travel = told["needs"].get("travel")
-    numbers = [told.get("rate"), told.get("seconds"), told["needs"].get("voltage"), *(travel if isinstance(travel, list | tuple) else ())]
-    if len(numbers) != 5 or not all(isinstance(value, int | float) and not isinstance(value, bool) for value in numbers):
-        raise BadInput(f"{where}: rate, seconds, needs", repr(numbers), "numbers", "Make the file again.")
+    for name in ("rate", "seconds"):
+        if not _number(told.get(name)):
+            raise BadInput(f"{where}: {name}", repr(told.get(name)), "a number", "Make the file again.")
+    kinds = get_type_hints(Needs)
+    for name in told["needs"]:
+        if name not in kinds:
+            raise unknown_name(str(name), list(kinds), f"{where}: needs")
+    for name, kind in kinds.items():
+        value, one = told["needs"].get(name), kind is float
+        if not (_number(value) if one else isinstance(value, list | tuple) and len(value) == 2 and all(map(_number, value))):
+            raise BadInput(f"{where}: needs.{name}", repr(value), "a number" if one else "two numbers", "Make the file again.")
     units = told.setdefault("units", list(USUAL))
     if not isinstance(units, list | tuple) or len(units) != 2 or not all(isinstance(unit, str) for unit in units):
         raise BadInput(f"{where}: units", repr(units), "two, as [V, m]", "Make the file again.")
     if not 0.0 < told["seconds"] <= 3600.0:
         raise BadInput(f"{where}: seconds", told["seconds"], "above 0, up to 3600", "Make the file again.")
     return told
+
+
+def _number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
 class Lasting(Protocol):
@@ -99,8 +139,8 @@ class Lasting(Protocol):
         """Of motion."""
 
 
-def document_of(axis: str, rate: float, experiment: Lasting, needs: tuple[float, tuple[float, float]], units: Units = USUAL) -> dict[str, Any]:
-    """The document of an experiment. rate: Hz; needs: the largest input, and the travel; units: in which they are."""
+def document_of(axis: str, rate: float, experiment: Lasting, needs: Needs, units: Units = USUAL) -> dict[str, Any]:
+    """The document of an experiment. rate: Hz; units: in which its needs are."""
     values = experiment.excitation.model_dump()
     drives = {name: values[name] for name in DRIVES}
     return {
@@ -109,7 +149,7 @@ def document_of(axis: str, rate: float, experiment: Lasting, needs: tuple[float,
             "rate": rate,
             "seconds": experiment.seconds,
             "excitation": drives,
-            "needs": {"voltage": needs[0], "travel": list(needs[1])},
+            "needs": {name: list(value) if isinstance(value, tuple) else value for name, value in asdict(needs).items()},
             "units": list(units),
         }
     }

@@ -19,7 +19,7 @@ from xy_sysid.experiment_design.criteria import COARSE, FITTED, LOOKED
 from xy_sysid.experiment_design.design import broken_in_time
 from xy_sysid.experiment_design.experiment import RAMP, Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
-from xy_sysid.experiment_design.of_run import NextExperiment
+from xy_sysid.experiment_design.of_run import NextExperiment, with_needs
 from xy_sysid.experiment_design.precision import Information, information
 from xy_sysid.experiment_design.prediction import Setting, seen
 from xy_sysid.experiment_design.proposals import proposals
@@ -60,22 +60,10 @@ def first_experiment(axis: str, sampling_rate: float, limits: MachineLimits, see
         return NextExperiment(axis=axis, sampling_rate=sampling_rate, sentence=sentence, limits=limits)
     found, best = chosen
     seconds = best.seconds
-    drive = best.drive(sampling_rate, seconds, limits.start)
-    motions = [move(model, sampling_rate, drive, COARSE) for model in models]
-    free = 1.0 - limits.margin
-    low, high = (float(end([end(motion.position) for motion in motions])) - limits.start for end in (np.min, np.max))
     share = float(np.mean([_width(item, seconds) <= WIDTH for item in found]))
     sentence = f"After {seconds:.0f} s, gain and pole are known to {100.0 * WIDTH:.0f} % on {100.0 * share:.0f} % of the axes that may be there."
-    return NextExperiment(
-        axis=axis,
-        sampling_rate=sampling_rate,
-        sentence=sentence,
-        limits=limits,
-        experiment=best,
-        probability=share,
-        voltage=max(float(np.max(np.abs(motion.voltage))) for motion in motions),
-        travel=(max(limits.start + low / free, limits.travel[0]), min(limits.start + high / free, limits.travel[1])),
-    )
+    made = NextExperiment(axis=axis, sampling_rate=sampling_rate, sentence=sentence, limits=limits, experiment=best, probability=share)
+    return with_needs(made, models)
 
 
 def _draws(limits: MachineLimits, seed: int) -> list[AxisModel]:

@@ -23,7 +23,7 @@ class MachineLimits:
     """Of one axis.
 
     voltage: V, of each sample; rms: V, that the drive stands for long (its current); speed: m/s; acceleration: m/s^2
-    travel: (low, high) m; start: m, where the axis stands when an experiment begins
+    travel: (low, high) m; start: m, where the axis stands when an experiment begins; with recordings it is where the last one ends
     margin: part of speed, acceleration and travel that is kept free; seconds: s of one experiment at most
     centring: V/m, of the excitation's pull to the start, beyond which the axis would swing
     units: of the axis, in which the limits are told; V and m stand for them above
@@ -62,15 +62,20 @@ class MachineLimits:
         scale, unit = readable(self.units.output)
         return f"{scale * where:.4g} {unit}"
 
-    def span(self, travel: tuple[float, float]) -> str:
+    def span(self, travel: tuple[float, float], to: str = " to ") -> str:
         """Two places as people read them."""
         scale, _ = readable(self.units.output)
-        return f"{scale * travel[0]:.4g} to {self.place(travel[1])}"
+        return f"{scale * travel[0]:.4g}{to}{self.place(travel[1])}"
 
     @property
     def room(self) -> float:
         """m from the start to the nearer end, with the margin."""
         return (1.0 - self.margin) * min(self.start - self.travel[0], self.travel[1] - self.start)
+
+    def needed(self, low: float, high: float) -> tuple[float, float]:
+        """The travel that a motion between two places needs, with the margin."""
+        free = 1.0 - self.margin
+        return max(self.start + (low - self.start) / free, self.travel[0]), min(self.start + (high - self.start) / free, self.travel[1])
 
     def broken(self, motion: Motion) -> str:
         """Which limit a motion would come too near to, in a word, or nothing."""
