@@ -254,9 +254,6 @@ def _own_limits(run_file: Path | None, axis: str) -> dict[str, Any]:
 
 
 def _limits(runs: tuple[Run, ...], own: Mapping[str, Any], asked: Mapping[str, Any], rms: float | None, seconds: float) -> MachineLimits:
-    from dataclasses import replace
-
     from xy_sysid.experiment_design.limits import as_recorded
 
-    values = {**own, **asked, **({} if rms is None else {"rms": rms})}
-    return replace(as_recorded(runs), **values, seconds=seconds)
+    return as_recorded(runs, **{**own, **asked, **({} if rms is None else {"rms": rms}), "seconds": seconds})

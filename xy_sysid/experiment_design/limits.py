@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -97,14 +98,17 @@ class MachineLimits:
         return next((name for name, value, most in checks if value > most), "")
 
 
-def as_recorded(runs: Sequence[Run]) -> MachineLimits:
-    """Nothing beyond what some recordings show: their largest voltage, and their travel about where the last one ends."""
-    voltage = max(_peak(run.voltage) for run in runs)
-    low, high = min(float(np.min(run.position)) for run in runs), max(float(np.max(run.position)) for run in runs)
-    if not (voltage > 0.0 and high > low):
+def as_recorded(runs: Sequence[Run], **told: Any) -> MachineLimits:
+    """Nothing beyond what some recordings show: the largest voltage of all, and the travel of the last one, from where it ends.
+
+    Another recording may have another zero, so its places say nothing of those of the last one. told: limits that are known
+    Raises BadInput where the last recording does not move, or ends where it went farthest.
+    """
+    voltage, last = max(_peak(run.voltage) for run in runs), runs[-1]
+    travel = float(np.min(last.position)), float(np.max(last.position))
+    if not (("voltage" in told or voltage > 0.0) and ("travel" in told or travel[1] > travel[0])):
         raise BadInput("recordings", "without voltage or motion", "an axis that moves", "Give the limits: voltage and travel.")
-    start, least = float(runs[-1].position[-1]), 0.1 * (high - low)
-    return MachineLimits(voltage=voltage, travel=(min(low, start - least), max(high, start + least)), start=start, units=runs[-1].units)
+    return MachineLimits(**{"voltage": voltage, "travel": travel, "start": float(last.position[-1]), "units": last.units, **told})
 
 
 def _peak(values: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> float:
