@@ -41,7 +41,7 @@ def test_the_design_knows_the_effects_that_the_page_was_given(tmp_path: Path, mo
     class Settler:
         """Notes what it is asked for, and ends."""
 
-        problem, ending, steps = "", "stopped", ()
+        problem, outcome, ending, steps = "", "", "stopped", ()
 
         def __init__(self, wishes: Any, *_: Any) -> None:
             wished.append(wishes)

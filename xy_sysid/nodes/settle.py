@@ -30,7 +30,7 @@ from xy_sysid.excitation.designed import of_an_experiment
 from xy_sysid.excitation.motion_check import most_centring
 from xy_sysid.experiment_design.limits import MachineLimits
 from xy_sysid.experiment_design.loop import Budget
-from xy_sysid.experiment_design.walk import WalkPlan
+from xy_sysid.experiment_design.walk import WalkPlan, still_open
 from xy_sysid.files.walk import plan_document, write_walk
 from xy_sysid.nodes.common import NAMESPACE
 from xy_sysid.nodes.convert import from_message
@@ -118,9 +118,17 @@ class Settler(ExcitationClient):
         if self._wall.count:
             self._node.get_logger().error(self._wall.told)
             self.problem = BROKEN
-        if self.problem:
-            self._say(self.problem)
+        if self.problem or self.ending == "stopped":
+            self._say(self.outcome)
         return not self.problem
+
+    @property
+    def outcome(self) -> str:
+        """How it ended, in a sentence: a fault, what is settled, or what is still possible where somebody stopped it."""
+        if self.problem or not self.steps:
+            return self.problem or "Stopped before the first recording was diagnosed."
+        last = self.steps[-1]
+        return str(last["sentence"]) if last["ending"] else still_open("stopped", last["left"], last["chosen"])
 
     def _walk(self, settings: ExcitationSettings) -> None:
         wishes, plan = self.wishes, plan_of(self.wishes, settings)
@@ -161,7 +169,7 @@ class Settler(ExcitationClient):
         with self._recording(0, settings):
             if state == "unconfigured":
                 self._change("configure")
-            if state != "active":
+            if state != "active" and not self._over():
                 self._change("activate")
             self._record(self.wishes.first, settings)
             if not self._over():

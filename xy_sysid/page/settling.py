@@ -65,7 +65,7 @@ class Settling:
         """What went wrong, or that it was stopped; empty while all is well."""
         if self._settler is None or self.running:
             return ""
-        return self._settler.problem or ("It was stopped." if self._settler.ending == "stopped" else "")
+        return self._settler.outcome if self._settler.problem or self._settler.ending == "stopped" else ""
 
     def start(self, axis: str, alone: bool = False) -> None:
         """Record, and design the first experiment; alone: drive and go on without being told. Raises BadInput while a walk is under way."""
@@ -86,8 +86,7 @@ class Settling:
                 settler.run()
             finally:
                 settler.close()
-            last = settler.problem or (settler.steps[-1]["sentence"] if settler.steps else "")
-            self._say(f"axis {axis}: {last}", settler.ending in ("settled", "alike"))
+            self._say(f"axis {axis}: {settler.outcome}", settler.ending in ("settled", "alike"))
 
         self._settler = settler
         self._thread = threading.Thread(target=walk, name="settle", daemon=True)
