@@ -15,7 +15,7 @@ from xy_sysid.diagnosis.answer import Answer
 from xy_sysid.errors import BadInput
 from xy_sysid.experiment_design.beliefs import Evidence, believed
 from xy_sysid.experiment_design.criteria import ODDS
-from xy_sysid.experiment_design.design import Design, Judged, expects
+from xy_sysid.experiment_design.design import Design, Judged, _timed, expects
 from xy_sysid.experiment_design.evidence import Power, nats, seconds_needed, settled
 from xy_sysid.experiment_design.experiment import RAMP, Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
@@ -103,6 +103,20 @@ def test_an_experiment_that_the_budget_makes_shorter_promises_less() -> None:
     assert whole.possible and expects(whole) == f"After {needed + RAMP + 1.0:.0f} s, drag and lag are distinguished with 95 % probability."
     assert not short.possible and short.best is not None and 0.5 < short.best.probability < 0.95
     assert expects(short).startswith("No experiment within the limits is sure to distinguish drag and lag")
+    chance = f"{100.0 * short.best.probability:.0f} %"
+    left = f"In the {0.7 * needed:.0f} s that the budget leaves, drag and lag are distinguished with {chance} probability"
+    assert expects(short, 60.0) == f"{left}; 60 s were designed."
+    assert expects(made.lasting(1.5), 60.0).startswith("In the 2 s that the budget leaves"), "whatever little it promises"
+
+
+def test_an_experiment_that_ends_early_promises_what_its_own_seconds_bring() -> None:
+    """Where none is sure, it ends once more of it would be a waste; the promise is that of its end, not of all the seconds that there were."""
+    one = Power(truth=0, rival=1, rate=0.01, price=3.0)
+    whole = 400.0
+    item = Judged(Experiment(AxisExcitation(kind="noise")), probability=settled([[one]], whole - RAMP), each=((one,),))
+    timed = _timed(item, MachineLimits(voltage=5.0, travel=(-0.1, 0.1), seconds=whole))
+    assert timed.experiment.seconds < whole and not np.isfinite(timed.seconds)
+    assert timed.probability == settled([[one]], timed.experiment.seconds - RAMP) < item.probability
 
 
 def test_a_set_with_one_law_twice_is_refused(data: AxisData) -> None:

@@ -46,6 +46,12 @@ class Judged:
             return max(self.seconds + RAMP, self.shortest), 0.0, -rate
         return math.inf, -round(self.probability / ALIKE), -rate
 
+    def lasting(self, seconds: float) -> Judged:
+        """The same for so many s, and what it is worth then."""
+        steady = seconds - RAMP
+        reached = self.seconds if self.seconds <= steady else math.inf
+        return replace(self, experiment=self.experiment.lasting(seconds), seconds=reached, probability=settled(self.each, steady))
+
 
 @dataclass(frozen=True)
 class Design:
@@ -59,12 +65,7 @@ class Design:
 
     def lasting(self, seconds: float) -> Design:
         """The same with so many s for the best experiment, and what it promises then."""
-        if self.best is None:
-            return self
-        steady = seconds - RAMP
-        reached = self.best.seconds if self.best.seconds <= steady else math.inf
-        best = replace(self.best, experiment=self.best.experiment.lasting(seconds), seconds=reached, probability=settled(self.best.each, steady))
-        return replace(self, best=best)
+        return self if self.best is None else replace(self, best=self.best.lasting(seconds))
 
     def broken(self, experiment: Experiment) -> str:
         """Which limit an experiment would come too near to in all of its time, by any draw, in a word, or nothing."""
@@ -153,12 +154,11 @@ def _timed(item: Judged, limits: MachineLimits) -> Judged:
     wanted = item.seconds
     if not math.isfinite(wanted):
         wanted = next((step for step in steps if settled(item.each, step) >= ENOUGH * item.probability), most)
-    seconds = min(BLOCK * math.ceil(max(wanted + RAMP, item.shortest) / BLOCK), limits.seconds)
-    return replace(item, experiment=item.experiment.lasting(seconds))
+    return item.lasting(min(BLOCK * math.ceil(max(wanted + RAMP, item.shortest) / BLOCK), limits.seconds))
 
 
-def expects(found: Design) -> str:
-    """What the best experiment promises, in a sentence."""
+def expects(found: Design, wanted: float = 0.0) -> str:
+    """What the best experiment promises, in a sentence. wanted: s that it was designed for, where a budget may have left less."""
     names = f"{found.beliefs[0].name} and {' or '.join(item.name for item in found.beliefs[1:])}"
     if found.best is None:
         why = sorted({item.broken for item in found.tried if item.broken})
@@ -166,6 +166,9 @@ def expects(found: Design) -> str:
     chance = f"{100.0 * found.best.probability:.0f} %"
     if found.possible:
         return f"After {found.best.experiment.seconds:.0f} s, {names} are distinguished with {100.0 * SURE:.0f} % probability."
+    if found.best.experiment.seconds < wanted:
+        left = f"{found.best.experiment.seconds:.0f} s that the budget leaves"
+        return f"In the {left}, {names} are distinguished with {chance} probability; {wanted:.0f} s were designed."
     if found.alike:
         return f"Within the limits of this machine {names} are the same: no experiment has evidence for one of them."
     if found.helps:

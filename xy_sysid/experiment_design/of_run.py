@@ -142,15 +142,19 @@ def check_enough(found: Answer) -> None:
         raise BadInput("diagnosis", found.verdict, "one of data that suffice", "Record for longer, or ask for a first experiment (--for nothing).")
 
 
-def answered(axis: str, rate: float, made: Design, library: Library) -> NextExperiment:
-    """A design as an answer: the experiment with what it needs, what it is expected to bring, and what a person would have to change."""
-    best = made.best if made.helps else None
+def answered(axis: str, rate: float, made: Design, library: Library, following: Experiment | None = None) -> NextExperiment:
+    """A design as an answer: the experiment with what it needs, what it is expected to bring, and what a person would have to change.
+
+    following: the experiment that is run whatever it may tell; None: the best one, if it may tell
+    """
+    if following is None and made.best is not None and made.helps:
+        following = made.best.experiment
     found = NextExperiment(
         axis=axis,
         sampling_rate=rate,
         sentence=expects(made),
         limits=made.limits,
-        experiment=best.experiment if best is not None else None,
+        experiment=following,
         sets=tuple(item.effects for item in made.beliefs),
         probability=made.best.probability if made.best is not None else 0.0,
         settles=made.possible,

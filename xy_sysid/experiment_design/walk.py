@@ -87,11 +87,11 @@ def step(plan: WalkPlan, runs: Sequence[Run], before: WalkStep | None = None, te
         follows = after(decision, plan.budget, experiments, seconds)
         made = decision.choice.found if decision.choice is not None else None
         following = None if isinstance(follows, str) else follows
-        answer = answered(plan.axis, rate, made, plan.library) if made is not None else None
-        if answer is not None and made is not None and following is not None:
-            now = made.lasting(following.seconds)  # the budget may have made it shorter, or longer
-            promise = now.best.probability if now.best is not None else 0.0
-            answer = replace(answer, experiment=following, sentence=expects(now), probability=promise, settles=now.possible)
+        if made is not None and made.best is not None and following is not None:  # the budget may have made it shorter, or longer
+            now, wanted = made.lasting(following.seconds), made.best.experiment.seconds
+            answer: NextExperiment | None = replace(answered(plan.axis, rate, now, plan.library, following), sentence=expects(now, wanted))
+        else:
+            answer = answered(plan.axis, rate, made, plan.library) if made is not None else None
     return WalkStep(
         diagnosis=found.sentence.rstrip(),
         decision=decision,
