@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from xy_sysid.errors import BadInput, MissingExtra
 from xy_sysid.fleets.of_file import Done, Task, failed, rows_of_file
+from xy_sysid.fleets.row import FAULT
 from xy_sysid.jit import cores
 from xy_sysid.processes.deaf import deaf
 
@@ -108,7 +109,7 @@ def _window(client: Client, waiting: Iterator[Task], ahead: Callable[[], int], d
         elif isinstance(error, distributed.KilledWorker):
             died.append(task)
         else:
-            text = f"{type(error).__name__}: {error}. This is a fault of xy_sysid; please report it."
+            text = f"{type(error).__name__}: {error}. {FAULT}"
             yield Done(task.path, (failed(task.path, "worker", " ".join(text.split())),)), 0.0
         future.release()
         fill()
