@@ -139,6 +139,26 @@ def test_a_recording_that_kills_its_process_is_tried_twice_and_is_a_row(data: Pa
     assert tries.read_text(encoding="utf-8") == "xx"
 
 
+def test_a_recording_that_kills_its_process_is_not_tried_again_by_the_next_run(data: Path, tmp_path: Path, client: Any) -> None:
+    """The table knows it by its hash: a nightly run would otherwise lose two processes every night. With other options it is tried again."""
+    deadly, tries = tmp_path / "deadly.py", tmp_path / "tries"
+    lines = ["import os", "from dataclasses import replace", "from xy_sysid.axis.model import STANDARD", f"if os.getpid() != {os.getpid()}:"]
+    lines += [
+        f"    open({str(tries)!r}, 'a').write('x')",
+        "    os.kill(os.getpid(), 9)",
+        "EFFECT = replace(STANDARD['coulomb_friction'], name='own')",
+    ]
+    deadly.write_text("\n".join(lines), encoding="utf-8")
+    path, how = data / "mill-01" / f"{DAYS[0]}.npz", Analysis(effect_files=(str(deadly),))
+    first, second = (run([path], tmp_path / "table", how, client) for _ in range(2))
+    assert (first.failed, first.unchanged, second.failed, second.unchanged) == (1, 0, 0, 1)
+    assert tries.read_text(encoding="utf-8") == "xx"
+    (row,) = read(tmp_path / "table").to_pylist()
+    assert row["stage"] == "worker" and "it is not tried again" in row["problem"] and row["machine"] == "mill-01" and row["date"] is not None
+    assert run([path], tmp_path / "table", Analysis(), client).analysed == 1
+    assert [one["stage"] for one in read(tmp_path / "table").to_pylist()] == [None]
+
+
 def workers(client: Any) -> list[int]:
     return list(client.run(os.getpid).values())
 
