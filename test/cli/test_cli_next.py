@@ -61,6 +61,17 @@ def test_wrong_use_is_refused_in_one_line(recording: Path, options: tuple[str, .
     assert words in refused("next", recording, *options)
 
 
+def test_a_run_file_gives_all_limits_of_the_machine(tmp_path: Path) -> None:
+    """Voltage, travel, speed and acceleration: the file needs no more of any, and the excitation refuses no file that was designed for it."""
+    run_file, out = tmp_path / "run.yaml", tmp_path / "next.yaml"
+    own = {"x.limit": 5.0, "x.travel_min": -0.14, "x.travel_max": 0.14, "x.max_speed": 0.3, "x.max_acceleration": 12.0}
+    run_file.write_text(yaml.safe_dump({"excitation": {"ros__parameters": own}}))
+    said = cli("next", "--for", "nothing", "--params", run_file, "-o", out)
+    assert said.code == 0, said
+    needs = yaml.safe_load(out.read_text())["experiment"]["needs"]
+    assert 0.0 < needs["speed"] <= 0.3 and 0.0 < needs["acceleration"] <= 12.0
+
+
 def test_without_a_recording_it_asks_for_one() -> None:
     """Or for --for nothing, with the limits of the machine."""
     assert "--for nothing" in refused("next")

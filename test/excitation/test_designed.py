@@ -20,9 +20,9 @@ from xy_sysid.files.experiment import read_experiment, write_experiment
 from xy_sysid.samples.block import Block
 from xy_sysid.settings import AxisExcitation, ExcitationSettings
 
-OWN = ExcitationSettings(axes={"x": AxisExcitation(limit=3.0), "y": AxisExcitation(limit=3.0)})
+OWN = ExcitationSettings(axes={"x": AxisExcitation(limit=3.0, max_speed=0.4, max_acceleration=9.0), "y": AxisExcitation(limit=3.0)})
 SLOW = AxisExcitation(kind="off", rms=0.0, slow=2.0, slow_period=3.0, limit=5.0)
-NEEDS = Needs(voltage=2.6666663, travel=(-0.05, 0.05), start=0.01, reach=(-0.05, 0.03), within=(-0.08, 0.05))
+NEEDS = Needs(voltage=2.6666663, travel=(-0.05, 0.05), start=0.01, reach=(-0.05, 0.03), within=(-0.08, 0.05), speed=0.3, acceleration=8.0)
 EXCITATION = document_of("x", 2000.0, Experiment(SLOW, 12.0), NEEDS)["experiment"]["excitation"]
 
 
@@ -47,6 +47,8 @@ def test_an_experiment_takes_the_place_of_the_signal_and_not_of_the_limits() -> 
     [
         ({"needs": {**asdict(NEEDS), "voltage": 3.5}}, "next.yaml: voltage of axis x is 3.5 V"),
         ({"needs": {**asdict(NEEDS), "travel": [-0.05, 0.2]}}, "next.yaml: travel of axis x is -0.05 to 0.2 m"),
+        ({"needs": {**asdict(NEEDS), "speed": 0.5}}, "next.yaml: speed of axis x is 0.5 m/s; allowed: up to its max_speed of 0.4 m/s"),
+        ({"needs": {**asdict(NEEDS), "acceleration": 9.5}}, "acceleration of axis x is 9.5 m/s^2; allowed: up to its max_acceleration of 9 m/s^2"),
         ({"rate": 1000.0}, "rate is 1000 Hz"),
         ({"axis": "z"}, "axis is 'z'"),
         ({"excitation": {"kind": "noise", "limit": 50.0}}, "'limit'"),

@@ -27,7 +27,7 @@ def test_it_says_how_loud_which_band_and_how_long(found: NextExperiment) -> None
     needs = found.needs
     assert needs is not None and 0.0 < needs.voltage <= 5.0 and found.seconds >= 30.0
     assert -0.14 <= needs.travel[0] < needs.reach[0] < needs.start == LIMITS.start < needs.reach[1] < needs.travel[1] <= 0.14
-    assert needs.within == LIMITS.travel
+    assert needs.within == LIMITS.travel and needs.speed > 0.0 < needs.acceleration
     assert "known to 5 %" in found.sentence
 
 

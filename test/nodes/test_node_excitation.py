@@ -341,7 +341,7 @@ def test_a_designed_experiment_is_loaded_and_one_beyond_the_limits_is_refused(wo
     slow = AxisExcitation(kind="off", rms=0.0, slow=2.0, slow_period=3.0)
     for place, volts in ((loud, 12.0), (good, 2.0)):
         place.write_text(
-            yaml.safe_dump(document_of("x", 2000.0, Experiment(slow, 12.0), Needs(volts, (-0.05, 0.05), 0.0, (-0.04, 0.04), (-0.14, 0.14))))
+            yaml.safe_dump(document_of("x", 2000.0, Experiment(slow, 12.0), Needs(volts, (-0.05, 0.05), 0.0, (-0.04, 0.04), (-0.14, 0.14), 0.1, 1.0)))
         )
     process = world.start(MODULE, {"experiment": str(loud)})
     assert not world.transition("excitation", "configure")

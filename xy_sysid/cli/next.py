@@ -60,7 +60,7 @@ def next_(
     ] = 0.02,
     run_file: Annotated[
         Path | None,
-        typer.Option("--params", metavar="FILE", help="ROS parameter file or run file; limit and travel of the excitation are the limits"),
+        typer.Option("--params", metavar="FILE", help="ROS parameter file or run file; the limits of the excitation are those of the experiment"),
     ] = None,
     voltage: Annotated[
         float | None, typer.Option(help="largest voltage, V (input in its own unit, as A); without limits: what the recordings show")
@@ -236,21 +236,18 @@ def _asked(unit: str, voltage: float | None, travel: str, speed: float | None, a
 
 def _own_limits(run_file: Path | None, axis: str) -> dict[str, Any]:
     """MachineLimits of the excitation in a parameter file."""
-    from xy_sysid.excitation.motion_check import most_centring
+    from xy_sysid.experiment_design.limits import of_settings
     from xy_sysid.settings import ExcitationSettings, changed, for_axes, knobs
 
     if run_file is None:
         return {}
     told: Mapping[str, Any] = o.told_to("excitation", run_file).parameters
-    found: dict[str, Any] = {}
-    if f"{axis}.limit" in told:
-        found["voltage"] = float(told[f"{axis}.limit"])
-    if f"{axis}.travel_min" in told and f"{axis}.travel_max" in told:
-        found["travel"] = (float(told[f"{axis}.travel_min"]), float(told[f"{axis}.travel_max"]))
     settings = for_axes(ExcitationSettings, [axis])
     names = {item.name for item in knobs(settings)}
     settings = changed(settings, {name: value for name, value in told.items() if name in names})
-    return {**found, "centring": float(most_centring(settings)[0])}
+    said = {"voltage": ("limit",), "travel": ("travel_min", "travel_max")}  # a default is no limit that somebody has set
+    unsaid = {name for name, knobs_of in said.items() if any(f"{axis}.{one}" not in told for one in knobs_of)}
+    return {name: value for name, value in of_settings(settings, axis).items() if name not in unsaid}
 
 
 def _limits(runs: tuple[Run, ...], own: Mapping[str, Any], asked: Mapping[str, Any], rms: float | None, seconds: float) -> MachineLimits:

@@ -26,6 +26,7 @@ class Needs:
 
     voltage: the largest input; travel: the places that it comes to, with margin, from where the axis stood (``start``) when it was designed
     reach: the expected motion without margin, from where it begins; within: the ends that were given to the design
+    speed, acceleration: the largest expected, with margin
     """
 
     voltage: float
@@ -33,6 +34,8 @@ class Needs:
     start: float
     reach: tuple[float, float]
     within: tuple[float, float]
+    speed: float
+    acceleration: float
 
     def starts(self, low: float = -math.inf, high: float = math.inf) -> tuple[float, float]:
         """Between which places the axis has to stand, so that the expected motion stays within the ends of the design, and within two others."""
@@ -61,15 +64,19 @@ def with_experiment(settings: ExcitationSettings, document: object, where: str) 
         )
     own, units = settings.axes[axis], settings.units
     if told["units"] != list(units):
-        asked, allowed = (f"{drive} and {place}" for drive, place in (told["units"], units))
-        raise BadInput(f"{where}: units", asked, f"{allowed}, those of the excitation", "Design it from recordings of what the excitation sends.")
+        other, allowed = (f"{drive} and {place}" for drive, place in (told["units"], units))
+        raise BadInput(f"{where}: units", other, f"{allowed}, those of the excitation", "Design it from recordings of what the excitation sends.")
     needs = Needs(**told["needs"])
     voltage, (low, high) = needs.voltage, needs.travel
     if not 0.0 <= voltage <= own.limit * (1.0 + 1e-9):
         raise BadInput(f"{where}: voltage of axis {axis}", f"{voltage:.4g} {units.input}", f"up to its limit of {own.limit:g} {units.input}", AGAIN)
     if not own.travel_min <= low < high <= own.travel_max:
-        asked, allowed = f"{low:.4g} to {high:.4g} {units.output}", f"{own.travel_min:g} to {own.travel_max:g} {units.output}"
-        raise BadInput(f"{where}: travel of axis {axis}", asked, f"within {allowed}", AGAIN)
+        span, allowed = f"{low:.4g} to {high:.4g} {units.output}", f"{own.travel_min:g} to {own.travel_max:g} {units.output}"
+        raise BadInput(f"{where}: travel of axis {axis}", span, f"within {allowed}", AGAIN)
+    for name, asked, most in (("speed", needs.speed, own.max_speed), ("acceleration", needs.acceleration, own.max_acceleration)):
+        if 0.0 < most < asked:
+            unit = f"{units.output}/s{'^2' * (name == 'acceleration')}"
+            raise BadInput(f"{where}: {name} of axis {axis}", f"{asked:.4g} {unit}", f"up to its max_{name} of {most:g} {unit}", AGAIN)
     values: dict[str, Any] = {f"{axis}.{name}": value for name, value in told["excitation"].items()}
     values |= {f"{other}.{name}": value for other in settings.axes if other != axis for name, value in (("kind", "off"), ("slow", 0.0))}
     made = changed(settings, {**values, "duration": told["seconds"]})

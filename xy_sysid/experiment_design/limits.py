@@ -11,9 +11,10 @@ import numpy as np
 
 from xy_sysid.axis.forward import Motion
 from xy_sysid.errors import BadInput
+from xy_sysid.excitation.motion_check import most_centring
 from xy_sysid.experiment_design.criteria import MARGIN
 from xy_sysid.samples.recording import Run
-from xy_sysid.settings import AxisExcitation
+from xy_sysid.settings import AxisExcitation, ExcitationSettings
 from xy_sysid.units import USUAL, Units, readable
 
 SECONDS = 60.0  # s of motion for one experiment at most
@@ -82,20 +83,37 @@ class MachineLimits:
         """Which limit a motion would come too near to, in a word, or nothing."""
         if not np.all(np.isfinite(motion.position)):
             return "a model that runs away"
-        speed = np.diff(motion.position) * motion.sampling_rate
-        count = max(round(1e-3 * motion.sampling_rate), 1)  # over a millisecond
-        acceleration = np.diff(speed[::count]) * motion.sampling_rate / count
+        speed, acceleration = fastest(motion)
         free = 1.0 - self.margin
         away = motion.position - self.start
         checks = (
             ("voltage", _peak(motion.voltage), self.voltage * (1.0 + 1e-9)),
             ("rms", float(np.sqrt(np.mean(motion.voltage**2))), self.rms),
-            ("speed", _peak(speed), free * self.speed),
-            ("acceleration", _peak(acceleration), free * self.acceleration),
+            ("speed", speed, free * self.speed),
+            ("acceleration", acceleration, free * self.acceleration),
             ("travel", float(np.max(away)), free * (self.travel[1] - self.start)),
             ("travel", -float(np.min(away)), free * (self.start - self.travel[0])),
         )
         return next((name for name, value, most in checks if value > most), "")
+
+
+def fastest(motion: Motion) -> tuple[float, float]:
+    """The largest speed and acceleration of a motion, m/s and m/s^2."""
+    speed = np.diff(motion.position) * motion.sampling_rate
+    count = max(round(1e-3 * motion.sampling_rate), 1)  # over a millisecond
+    return _peak(speed), _peak(np.diff(speed[::count]) * motion.sampling_rate / count)
+
+
+def of_settings(settings: ExcitationSettings, axis: str) -> dict[str, Any]:
+    """The limits of an axis, by name, in the settings of its excitation."""
+    own = settings.axes[axis]
+    return {
+        "voltage": own.limit,
+        "travel": (own.travel_min, own.travel_max),
+        "speed": own.max_speed or math.inf,
+        "acceleration": own.max_acceleration or math.inf,
+        "centring": float(most_centring(settings)[list(settings.axes).index(axis)]),
+    }
 
 
 def as_recorded(runs: Sequence[Run], **told: Any) -> MachineLimits:

@@ -19,7 +19,7 @@ from xy_sysid.experiment_design.beliefs import Evidence, believed
 from xy_sysid.experiment_design.criteria import COARSE, DRAWN
 from xy_sysid.experiment_design.design import Design, design, expects
 from xy_sysid.experiment_design.experiment import Experiment
-from xy_sysid.experiment_design.limits import MachineLimits, as_recorded
+from xy_sysid.experiment_design.limits import MachineLimits, as_recorded, fastest
 from xy_sysid.experiment_design.precision import Precision, sharpest
 from xy_sysid.experiment_design.prediction import Setting
 from xy_sysid.experiment_design.rivals import beliefs_of, names_of, possible, standing
@@ -176,12 +176,13 @@ def _ask(library: Library, made: Design) -> str:
 
 
 def with_needs(found: NextExperiment, models: Sequence[AxisModel]) -> NextExperiment:
-    """With what the experiment needs by any of some models: voltage, the travel with its margin, and where the axis may stand when it begins."""
+    """With what the experiment needs by any of some models: voltage, travel, speed and acceleration with the margin, and from where."""
     if found.experiment is None:
         return found
     limits, rate = found.limits, found.sampling_rate
     drive = found.experiment.drive(rate, found.seconds, limits.start)
     motions = [move(model, rate, drive, COARSE) for model in models]
+    quick, free = [fastest(motion) for motion in motions], 1.0 - limits.margin
     low = min(float(np.min(motion.position)) for motion in motions)
     high = max(float(np.max(motion.position)) for motion in motions)
     needs = Needs(
@@ -190,5 +191,7 @@ def with_needs(found: NextExperiment, models: Sequence[AxisModel]) -> NextExperi
         start=limits.start,
         reach=(low - limits.start, high - limits.start),
         within=limits.travel,
+        speed=min(max(speed for speed, _ in quick) / free, limits.speed),
+        acceleration=min(max(acceleration for _, acceleration in quick) / free, limits.acceleration),
     )
     return replace(found, needs=needs)

@@ -36,7 +36,7 @@ def write_experiment(path: Path, found: NextExperiment) -> None:
     units = found.limits.units
     head = (
         "# Made by xy-sysid next. Run it: parameter experiment of the excitation node. It is refused where it asks for more than the node's limits.\n"
-        f"# rms, offset, slow and needs.voltage are in {units.input}, other needs are in {units.output}, times in s, frequencies in Hz.\n"
+        f"# rms, offset, slow and needs.voltage are in {units.input}, other needs are in {units.output} (and s), times in s, frequencies in Hz.\n"
         "# It was designed for an axis that stands at needs.start. Elsewhere the motion (needs.reach) has to stay within needs.within.\n"
     )
     write_text(path, head + text)
