@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.excitation.motion_check import check_loop, most_centring
 from xy_sysid.experiment_design.design import broken_in_time
 from xy_sysid.experiment_design.experiment import Experiment
-from xy_sysid.experiment_design.limits import MachineLimits, as_recorded
+from xy_sysid.experiment_design.limits import MachineLimits, as_recorded, of_settings
 from xy_sysid.experiment_design.proposals import neighbours, proposals
 from xy_sysid.samples.recording import Recording, Run
 from xy_sysid.settings import AxisExcitation, ExcitationSettings
@@ -60,6 +61,27 @@ def test_a_recording_that_ends_where_it_went_farthest_leaves_no_room_that_is_kno
     with pytest.raises(BadInput, match="where the axis stands, 50 mm, between its ends"):
         as_recorded([ends_high])
     assert as_recorded([ends_high], travel=(-0.1, 0.1)).travel == (-0.1, 0.1)
+
+
+def test_the_zone_in_which_the_excitation_brakes_is_kept_free_where_it_is_longer_than_the_margin() -> None:
+    """30 mm before an end; what goes there would not be the experiment that was designed. From inside it nothing is designed."""
+    limits = MachineLimits(voltage=2.0, travel=(-0.1, 0.1), brake=0.03)
+    assert limits.broken(motion(0.075)) == "travel" and limits.broken(motion(0.069)) == ""
+    assert limits.room == pytest.approx(0.07) and replace(limits, brake=0.01).room == pytest.approx(0.085)
+    with pytest.raises(BadInput, match="where the axis stands, 80 mm, between its ends without brake zones of 30 mm"):
+        replace(limits, start=0.08)
+
+
+def test_the_design_fades_in_as_the_excitation_does() -> None:
+    """Its ramp is in every proposal, and in what is simulated."""
+    settings = ExcitationSettings(axes={"x": AxisExcitation(brake=0.03)}, ramp=4.0)
+    limits = MachineLimits(**of_settings(settings, "x"))
+    assert (limits.ramp, limits.brake) == (4.0, 0.03)
+    item = next(iter(proposals(limits, RATE)))
+    early, late = (float(np.std(item.drive(RATE, 12.0, 0.0).voltage[part])) for part in (slice(0, 1000), slice(4000, 12000)))
+    assert item.ramp == 4.0 and early < 0.2 * late
+    at_once = replace(item, ramp=0.0).drive(RATE, 12.0, 0.0).voltage
+    assert float(np.std(at_once[:1000])) > 5.0 * early
 
 
 @pytest.mark.parametrize(

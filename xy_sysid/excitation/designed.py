@@ -15,7 +15,7 @@ from xy_sysid.samples.recording import SAME_RATE
 from xy_sysid.settings import AxisExcitation, ExcitationSettings, changed, unknown_name
 from xy_sysid.units import USUAL, Units
 
-KEYS = ("axis", "rate", "seconds", "excitation", "needs", "units", "expects", "sets", "made_by")
+KEYS = ("axis", "rate", "seconds", "ramp", "excitation", "needs", "units", "expects", "sets", "made_by")
 DRIVES = ("kind", "rms", "low", "high", "period", "steps", "offset", "seed", "centring", "slow", "slow_period")  # settings that it may have
 AGAIN = "Design it again within these limits: xy-sysid next with --params."
 
@@ -62,6 +62,9 @@ def with_experiment(settings: ExcitationSettings, document: object, where: str) 
         raise BadInput(
             f"{where}: rate", f"{told['rate']:g} Hz", f"{settings.rate:g} Hz, that of the excitation", "Design it from recordings of this rate."
         )
+    if abs(told["ramp"] - settings.ramp) > 1e-6:
+        own_ramp = f"{settings.ramp:g} s, that of the excitation"
+        raise BadInput(f"{where}: ramp", f"{told['ramp']:g} s", own_ramp, "Design it again with --params, which tells the excitation's settings.")
     own, units = settings.axes[axis], settings.units
     if told["units"] != list(units):
         other, allowed = (f"{drive} and {place}" for drive, place in (told["units"], units))
@@ -73,6 +76,11 @@ def with_experiment(settings: ExcitationSettings, document: object, where: str) 
     if not own.travel_min <= low < high <= own.travel_max:
         span, allowed = f"{low:.4g} to {high:.4g} {units.output}", f"{own.travel_min:g} to {own.travel_max:g} {units.output}"
         raise BadInput(f"{where}: travel of axis {axis}", span, f"within {allowed}", AGAIN)
+    inside = own.travel_min + own.brake, own.travel_max - own.brake
+    reach = needs.start + needs.reach[0], needs.start + needs.reach[1]
+    if not inside[0] <= reach[0] < reach[1] <= inside[1]:
+        span, allowed = (f"{one:.4g} to {other:.4g} {units.output}" for one, other in (reach, inside))
+        raise BadInput(f"{where}: motion of axis {axis}", span, f"within {allowed}, where nothing brakes it", AGAIN)
     for name, asked, most in (("speed", needs.speed, own.max_speed), ("acceleration", needs.acceleration, own.max_acceleration)):
         if 0.0 < most < asked:
             unit = f"{units.output}/s{'^2' * (name == 'acceleration')}"
@@ -85,7 +93,7 @@ def with_experiment(settings: ExcitationSettings, document: object, where: str) 
     if together > own.limit * (1.0 + 1e-9):  # the drive would cut it off, and the motion would be another one
         words = f"{together:.4g} {units.input} of offset, slow and rms together"
         raise BadInput(f"{where}: excitation of axis {axis}", words, f"up to its limit of {own.limit:g} {units.input}", AGAIN)
-    return Taken(made, {axis: needs.starts(own.travel_min, own.travel_max)})
+    return Taken(made, {axis: needs.starts(*inside)})
 
 
 def of_an_experiment(name: str) -> bool:
@@ -111,7 +119,7 @@ def _checked(document: object, where: str) -> Mapping[str, Any]:
     lacking = [name for name in DRIVES if name not in told["excitation"]]
     if lacking:
         raise BadInput(f"{where}: excitation", f"without {', '.join(lacking)}", f"all of {', '.join(DRIVES)}", "Make the file again.")
-    for name in ("rate", "seconds"):
+    for name in ("rate", "seconds", "ramp"):
         if not _number(told.get(name)):
             raise BadInput(f"{where}: {name}", repr(told.get(name)), "a number", "Make the file again.")
     kinds = get_type_hints(Needs)
@@ -142,6 +150,10 @@ class Lasting(Protocol):
         """Of the axis."""
 
     @property
+    def ramp(self) -> float:
+        """s in which it fades in."""
+
+    @property
     def seconds(self) -> float:
         """Of motion."""
 
@@ -155,6 +167,7 @@ def document_of(axis: str, rate: float, experiment: Lasting, needs: Needs, units
             "axis": axis,
             "rate": rate,
             "seconds": experiment.seconds,
+            "ramp": experiment.ramp,
             "excitation": drives,
             "needs": {name: list(value) if isinstance(value, tuple) else value for name, value in asdict(needs).items()},
             "units": list(units),

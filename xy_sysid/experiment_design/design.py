@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 from xy_sysid.axis.forward import move
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.experiment_design.beliefs import Belief
-from xy_sysid.experiment_design.criteria import ALIKE, BLOCK, COARSE, ENOUGH, FINAL, JUDGED, LOOKED, NO_EVIDENCE, ROUNDS, SURE
+from xy_sysid.experiment_design.criteria import ALIKE, BLOCK, COARSE, ENOUGH, FINAL, JUDGED, NO_EVIDENCE, ROUNDS, SURE
 from xy_sysid.experiment_design.evidence import Power, powers, seconds_needed, settled
-from xy_sysid.experiment_design.experiment import RAMP, Experiment
+from xy_sysid.experiment_design.experiment import Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
 from xy_sysid.experiment_design.prediction import Setting, seen
 from xy_sysid.experiment_design.proposals import neighbours, proposals
@@ -43,12 +43,12 @@ class Judged:
         """Least is best; where none gets anywhere the evidence a second decides."""
         rate = sum(min((one.rate for one in item), default=0.0) for item in self.each)
         if math.isfinite(self.seconds):
-            return max(self.seconds + RAMP, self.shortest), 0.0, -rate
+            return max(self.seconds + self.experiment.ramp, self.shortest), 0.0, -rate
         return math.inf, -round(self.probability / ALIKE), -rate
 
     def lasting(self, seconds: float) -> Judged:
         """The same for so many s, and what it is worth then."""
-        steady = seconds - RAMP
+        steady = seconds - self.experiment.ramp
         reached = self.seconds if self.seconds <= steady else math.inf
         return replace(self, experiment=self.experiment.lasting(seconds), seconds=reached, probability=settled(self.each, steady))
 
@@ -93,7 +93,7 @@ def design(
     setting: Setting, beliefs: Sequence[Belief], limits: MachineLimits, seed: int = 1, tell: Callable[[float], None] = lambda part: None
 ) -> Design:
     """The experiment for some beliefs; tell: called with the part that is done."""
-    rate = setting.layout.sampling_rate
+    setting, rate = replace(setting, ramp=limits.ramp), setting.layout.sampling_rate
     first = proposals(limits, rate, seed)
     judged = []
     for number, proposal in enumerate(first):
@@ -130,7 +130,7 @@ def broken_in_time(models: Sequence[AxisModel], rate: float, limits: MachineLimi
 def judge(setting: Setting, beliefs: Sequence[Belief], limits: MachineLimits, experiment: Experiment, draws: int | None = None) -> Judged:
     """What one experiment is worth; draws: of each set that are looked at, None is all."""
     told = experiment.excitation
-    seconds = max(LOOKED, min(2.0 * told.slow_period * (told.slow > 0.0), limits.seconds) + RAMP)
+    seconds = max(setting.looked, min(2.0 * told.slow_period * (told.slow > 0.0), limits.seconds) + limits.ramp)
     looked = [(number, model) for number, belief in enumerate(beliefs) for model in belief.draws[:draws]]
     motions = []
     for _, model in looked:
@@ -141,20 +141,20 @@ def judge(setting: Setting, beliefs: Sequence[Belief], limits: MachineLimits, ex
     rounds = 1 if draws else ROUNDS
     pairs = zip(looked, motions, strict=True)
     each = [tuple(powers(beliefs, number, model, seen(setting, motion), rounds)) for (number, model), motion in pairs]
-    most = limits.seconds - RAMP
+    most = limits.seconds - limits.ramp
     needed, chance = seconds_needed(each, most), settled(each, most)
-    least = max(setting.shortest(), told.slow_period + RAMP if told.slow > 0.0 else 0.0)
+    least = max(setting.shortest(), told.slow_period + limits.ramp if told.slow > 0.0 else 0.0)
     return Judged(experiment, seconds=needed, probability=chance, each=tuple(each), shortest=least)
 
 
 def _timed(item: Judged, limits: MachineLimits) -> Judged:
     """With the seconds that it should last."""
-    most = limits.seconds - RAMP
+    most = limits.seconds - limits.ramp
     steps = (BLOCK * k for k in range(1, math.ceil(most / BLOCK)))
     wanted = item.seconds
     if not math.isfinite(wanted):
         wanted = next((step for step in steps if settled(item.each, step) >= ENOUGH * item.probability), most)
-    return item.lasting(min(BLOCK * math.ceil(max(wanted + RAMP, item.shortest) / BLOCK), limits.seconds))
+    return item.lasting(min(BLOCK * math.ceil(max(wanted + limits.ramp, item.shortest) / BLOCK), limits.seconds))
 
 
 def expects(found: Design, wanted: float = 0.0) -> str:

@@ -17,7 +17,7 @@ from xy_sysid.effects import SIMPLEST_FRICTION
 from xy_sysid.experiment_design.beliefs import Belief
 from xy_sysid.experiment_design.criteria import COARSE, FITTED, LOOKED
 from xy_sysid.experiment_design.design import broken_in_time
-from xy_sysid.experiment_design.experiment import RAMP, Experiment
+from xy_sysid.experiment_design.experiment import Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
 from xy_sysid.experiment_design.of_run import NextExperiment, with_needs
 from xy_sysid.experiment_design.precision import Information, information
@@ -41,7 +41,7 @@ SHORTEST = 30.0  # s: a diagnosis needs windows that judge, whatever gain and po
 def first_experiment(axis: str, sampling_rate: float, limits: MachineLimits, seed: int = 1) -> NextExperiment:
     """A good first experiment for an unknown axis: how loud, which band, how long. Raises BadInput for limits that make no sense."""
     encoder = (limits.travel[1] - limits.travel[0]) / COUNTS / math.sqrt(12.0)
-    setting = Setting(bands(sampling_rate, int(LOOKED * sampling_rate / WINDOWS)), encoder, EPSILON)
+    setting = Setting(bands(sampling_rate, int(LOOKED * sampling_rate / WINDOWS)), encoder, EPSILON, ramp=limits.ramp)
     models = _draws(limits, seed)
     judged = []
     with threadpool_limits(1, "blas"):
@@ -81,7 +81,7 @@ def _draws(limits: MachineLimits, seed: int) -> list[AxisModel]:
 def _informations(setting: Setting, models: list[AxisModel], limits: MachineLimits, experiment: Experiment) -> list[Information]:
     rate = setting.layout.sampling_rate
     told = experiment.excitation
-    seconds = max(LOOKED, (told.slow_period + RAMP) * (told.slow > 0.0))
+    seconds = max(setting.looked, (told.slow_period + limits.ramp) * (told.slow > 0.0))
     motions = []
     for model in models:
         motions.append(move(model, rate, experiment.drive(rate, seconds, limits.start), COARSE))

@@ -13,6 +13,7 @@ from xy_sysid.axis.forward import Motion
 from xy_sysid.errors import BadInput
 from xy_sysid.excitation.motion_check import most_centring
 from xy_sysid.experiment_design.criteria import MARGIN
+from xy_sysid.experiment_design.experiment import RAMP
 from xy_sysid.samples.recording import Run
 from xy_sysid.settings import AxisExcitation, ExcitationSettings
 from xy_sysid.units import USUAL, Units, readable
@@ -28,6 +29,7 @@ class MachineLimits:
     travel: (low, high) m; start: m, where the axis stands when an experiment begins; with recordings it is where the last one ends
     margin: part of speed, acceleration and travel that is kept free; seconds: s of one experiment at most
     centring: V/m, of the excitation's pull to the start, beyond which the axis would swing
+    ramp: s in which the excitation fades in; brake: m before each end of the travel in which it brakes, and no experiment goes
     units: of the axis, in which the limits are told; V and m stand for them above
     """
 
@@ -40,6 +42,8 @@ class MachineLimits:
     margin: float = MARGIN
     seconds: float = SECONDS
     centring: float = math.inf
+    ramp: float = RAMP
+    brake: float = 0.0
     units: Units = USUAL
 
     def __post_init__(self) -> None:
@@ -55,8 +59,9 @@ class MachineLimits:
             raise BadInput("travel", self.span(self.travel), allowed, "Give ends that lie nearer, or positions in a larger unit.")
         if not 0.0 <= self.margin < 1.0:
             raise BadInput("margin", self.margin, "0 to below 1", "Give the part of each limit that is kept free.")
-        if not self.travel[0] < self.start < self.travel[1]:
-            allowed = f"where the axis stands, {self.place(self.start)}, between its ends"
+        if not self.travel[0] + self.brake < self.start < self.travel[1] - self.brake:
+            zones = f" without brake zones of {self.place(self.brake)}" if self.brake else ""
+            allowed = f"where the axis stands, {self.place(self.start)}, between its ends{zones}"
             raise BadInput("travel", self.span(self.travel), allowed, "Give the ends of the travel, or move the axis between them.")
 
     def place(self, where: float) -> str:
@@ -72,7 +77,11 @@ class MachineLimits:
     @property
     def room(self) -> float:
         """m from the start to the nearer end, with the margin."""
-        return (1.0 - self.margin) * min(self.start - self.travel[0], self.travel[1] - self.start)
+        return min(map(self._free, (self.start - self.travel[0], self.travel[1] - self.start)))
+
+    def _free(self, way: float) -> float:
+        """m of the way to an end that a motion may take: up to the margin, and not into the brake zone."""
+        return min((1.0 - self.margin) * way, way - self.brake)
 
     def needed(self, low: float, high: float) -> tuple[float, float]:
         """The travel that a motion between two places needs, with the margin."""
@@ -91,8 +100,8 @@ class MachineLimits:
             ("rms", float(np.sqrt(np.mean(motion.voltage**2))), self.rms),
             ("speed", speed, free * self.speed),
             ("acceleration", acceleration, free * self.acceleration),
-            ("travel", float(np.max(away)), free * (self.travel[1] - self.start)),
-            ("travel", -float(np.min(away)), free * (self.start - self.travel[0])),
+            ("travel", float(np.max(away)), self._free(self.travel[1] - self.start)),
+            ("travel", -float(np.min(away)), self._free(self.start - self.travel[0])),
         )
         return next((name for name, value, most in checks if value > most), "")
 
@@ -112,6 +121,8 @@ def of_settings(settings: ExcitationSettings, axis: str) -> dict[str, Any]:
         "travel": (own.travel_min, own.travel_max),
         "speed": own.max_speed or math.inf,
         "acceleration": own.max_acceleration or math.inf,
+        "ramp": settings.ramp,
+        "brake": own.brake,
         "centring": float(most_centring(settings)[list(settings.axes).index(axis)]),
     }
 
