@@ -23,7 +23,7 @@ from xy_sysid.fleets.of_file import Task, rows_of_file
 from xy_sysid.fleets.of_paths import Analysis
 from xy_sysid.fleets.parts import rows_of_parts
 from xy_sysid.fleets.row import Row
-from xy_sysid.fleets.table import merged, read
+from xy_sysid.fleets.table import Known, merged, read
 from xy_sysid.imports import from_table, in_parts, load, save
 from xy_sysid.imports.reading import Reading
 from xy_sysid.samples.block import Block
@@ -132,6 +132,19 @@ def test_parts_in_a_gap_have_no_row_and_what_comes_after_it_has(tmp_path: Path) 
     path = npz(tmp_path / "long.npz", rows=4_000, t=gap)
     rows = rows_of_parts(path, 1.0, Analysis())
     assert [one["source"].rpartition("#")[2] for one in rows] == ["0", "1", "5", "6", "7"]
+
+
+def test_a_recording_is_compared_with_few_others_however_many_have_its_name() -> None:
+    """Each task carries the keys that it may have. With all of a name, 10,000 folders with one rec.csv each would send 100 million."""
+    rows = [row(f"/data/{day}/rec.csv") for day in range(1000)]
+    there = [Path(f"/data/{day}/rec.csv") for day in range(1001)]
+    known = Known(rows, {str(path) for path in there})
+    assert [known.of(path) for path in there] == [*(frozenset({f"key of /data/{day}/rec.csv"}) for day in range(1000)), frozenset()]
+    moved = [Path(f"/archive/{day}/rec.csv") for day in range(1000)]
+    known = Known(rows, {str(path) for path in moved})
+    assert all(known.of(path) == {f"key of /data/{day}/rec.csv"} for day, path in enumerate(moved))
+    alone = Path("/new/place/rec.csv")
+    assert len(Known(rows, {str(alone)}).of(alone)) == 1000, "whichever it was, it is not done again"
 
 
 @pytest.mark.parametrize("ending", [".npz", ".csv", ".mcap", ""])
