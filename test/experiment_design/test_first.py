@@ -8,7 +8,7 @@ import pytest
 from xy_sim.machine import Machine
 from xy_sysid.excitation.lockstep import drive
 from xy_sysid.experiment_design.experiment import Experiment
-from xy_sysid.experiment_design.first import first_experiment
+from xy_sysid.experiment_design.first import _draws, first_experiment
 from xy_sysid.experiment_design.limits import MachineLimits
 from xy_sysid.experiment_design.of_run import NextExperiment
 from xy_sysid.settings import ExcitationSettings
@@ -40,6 +40,12 @@ def test_a_table_that_nobody_described_stays_within_its_limits(found: NextExperi
     assert float(np.max(np.abs(record.voltage))) <= 5.0
     low, high = found.needs.travel
     assert low <= float(record.position.min()) and float(record.position.max()) <= high
+
+
+def test_an_axis_that_its_friction_holds_may_carry_a_load() -> None:
+    """To either side: it would drift while the experiment moves it, and stays within the travel all the same."""
+    loads = [dict(model.effects)["constant_load"][0] / dict(model.effects)["coulomb_friction"][0] for model in _draws(LIMITS, 1)]
+    assert min(loads) < -0.3 and max(loads) > 0.3 and max(map(abs, loads)) <= 1.0
 
 
 def test_where_no_experiment_is_safe_it_says_what_to_do() -> None:
