@@ -70,9 +70,14 @@ def check(library: Library, sets: Iterable[Sequence[str]]) -> None:
             raise BadInput("set of effects", " and ".join(each), "each law once", "Leave one of a family out: it is the other with more parameters.")
 
 
+def _law(library: Library, names: Sequence[str]) -> list[str]:
+    """The same for sets whose equations are the same."""
+    return sorted(equals(library, name)[0].name for name in names)
+
+
 def _of_one_law(library: Library, names: Sequence[tuple[str, ...]], fits: Sequence[GreyboxFit]) -> tuple[GreyboxFit, ...]:
     """Sets whose equations are the same have the same fit, the best of theirs, under their own names."""
-    laws = [sorted(equals(library, name)[0].name for name in each) for each in names]
+    laws = [_law(library, each) for each in names]
     found = []
     for own, law, fitted in zip(names, laws, fits, strict=True):
         best = min((fits[k] for k, other in enumerate(laws) if other == law), key=lambda item: float(np.sum(item.scores)))
@@ -149,7 +154,7 @@ def _belief(
 ) -> Belief | None:
     """fits: of this set, and of the chosen one."""
     own, best = fits
-    if own is best:
+    if own is best or _law(library, names) == _law(library, [name for name, _ in best.model.effects]):  # no data rule it out
         return believed(evidence, own, draws, seed)
     rest = frozenset(name for name, _ in best.model.effects)
     new = [name for name in names if name not in rest]
@@ -181,20 +186,25 @@ def _gives_way(library: Library, name: str, other: str) -> bool:
 def possible(data: AxisData, library: Library, found: Answer, most: int = 4) -> list[tuple[str, ...]]:
     """The set that was named, then those that may be true instead: rivals that predict nearly as well, and look-alikes.
 
-    Where nothing was named: the simplest laws that may hide in the noise.
+    Where nothing was named: the simplest laws that may hide in the noise. Effects stand in the order of the named set.
+    Raises BadInput where an effect was named for which no experiment can be designed.
     """
     named = found.best
+    for name in named:
+        if not library[name].simulable:
+            act = f"Its own experiment: {library[name].experiment}. Or compare other sets: --between."
+            raise BadInput("effect that is named", name, "effects that free simulation can predict; it is judged one sample ahead", act)
     rivals = [item.effects for item in found.rivals if item.doubt >= DOUBTFUL and not item.refused]
     alike = [
-        tuple(sorted({*named} - {name} | {other}))
+        tuple(other if one == name else one for one in named)
         for name in named
         for other in look_alikes(library, name)
         if other not in named and _may_be(data, library, other)
     ]
     simplest = sorted(library.acting, key=lambda other: len(other.parameters))
     hiding = [(other.name,) for other in simplest if not named and _may_be(data, library, other.name)]
-    sets = dict.fromkeys(tuple(each) for each in (named, *rivals, *alike, *hiding) if all(library[name].simulable for name in each))
-    return [each for each in sets if not is_twice(library, each)][: 1 + most]
+    sets = {frozenset(each): tuple(each) for each in reversed([named, *rivals, *alike, *hiding]) if all(library[name].simulable for name in each)}
+    return [each for each in reversed(sets.values()) if not is_twice(library, each)][: 1 + most]
 
 
 def look_alikes(library: Library, name: str) -> list[str]:
