@@ -78,6 +78,15 @@ def test_a_file_that_asks_for_more_is_refused_in_one_line(changes: dict[str, Any
     assert words in str(refusal.value) and "\n" not in str(refusal.value)
 
 
+def test_a_robot_that_takes_positions_or_trajectories_is_refused_one() -> None:
+    """Its controller holds it where it is told; the same motion goes there as a trajectory."""
+    axis = AxisExcitation(kind="multisine", low=0.5, high=5.0, limit=0.05, rms=0.0, max_speed=0.2, max_acceleration=2.0)
+    for command in ("forward", "joint_trajectory"):
+        robot = ExcitationSettings(axes={"x": axis}, output="commands", interface="position", command=command)
+        with pytest.raises(BadInput, match=r"next.yaml: interface is position; allowed: effort or velocity.*next --trajectory"):
+            with_experiment(robot, document(units=["m", "m"]), "next.yaml")
+
+
 def test_a_designed_experiment_is_written_and_read_again(tmp_path: Path) -> None:
     """The file of xy-sysid next is what the node loads."""
     limits = MachineLimits(voltage=5.0, travel=(-0.14, 0.14))

@@ -56,6 +56,9 @@ def with_experiment(settings: ExcitationSettings, document: object, where: str) 
     """
     told = _checked(document, where)
     axis = told["axis"]
+    if settings.holds:
+        act = "Run its motion as a trajectory: xy-sysid next --trajectory."
+        raise BadInput(f"{where}: interface", "position", "effort or velocity, since an experiment moves the axis by itself", act)
     if axis not in settings.axes:
         raise BadInput(f"{where}: axis", repr(axis), ", ".join(settings.axes), "Design it for one of these.")
     if abs(told["rate"] / settings.rate - 1.0) > SAME_RATE:
