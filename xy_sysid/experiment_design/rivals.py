@@ -70,14 +70,9 @@ def check(library: Library, sets: Iterable[Sequence[str]]) -> None:
             raise BadInput("set of effects", " and ".join(each), "each law once", "Leave one of a family out: it is the other with more parameters.")
 
 
-def _law(library: Library, names: Sequence[str]) -> list[str]:
-    """The same for sets whose equations are the same."""
-    return sorted(equals(library, name)[0].name for name in names)
-
-
 def _of_one_law(library: Library, names: Sequence[tuple[str, ...]], fits: Sequence[GreyboxFit]) -> tuple[GreyboxFit, ...]:
     """Sets whose equations are the same have the same fit, the best of theirs, under their own names."""
-    laws = [_law(library, each) for each in names]
+    laws = [sorted(equals(library, name)[0].name for name in each) for each in names]
     found = []
     for own, law, fitted in zip(names, laws, fits, strict=True):
         best = min((fits[k] for k, other in enumerate(laws) if other == law), key=lambda item: float(np.sum(item.scores)))
@@ -154,7 +149,7 @@ def _belief(
 ) -> Belief | None:
     """fits: of this set, and of the chosen one."""
     own, best = fits
-    if own is best or _law(library, names) == _law(library, [name for name, _ in best.model.effects]):  # no data rule it out
+    if own is best:
         return believed(evidence, own, draws, seed)
     rest = frozenset(name for name, _ in best.model.effects)
     new = [name for name in names if name not in rest]
