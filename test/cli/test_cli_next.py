@@ -9,8 +9,16 @@ import numpy as np
 import pytest
 import yaml
 from helpers.cli_tools import cli, refused
+from helpers.simulated import recorded
 
 from campaigns.bench.settle_pairs import PAIRS, first_recording, machine
+from xy_sysid.axis.model import AxisModel
+from xy_sysid.excitation.trajectory import Trajectory
+from xy_sysid.experiment_design.as_trajectory import as_trajectory
+from xy_sysid.experiment_design.experiment import Experiment
+from xy_sysid.experiment_design.limits import MachineLimits
+from xy_sysid.experiment_design.of_run import NextExperiment
+from xy_sysid.settings import AxisExcitation
 
 LAG = next(pair for pair in PAIRS if "amplifier_lag" in pair.sets[1])
 
@@ -61,6 +69,47 @@ def test_wrong_use_is_refused_in_one_line(recording: Path, options: tuple[str, .
     assert words in refused("next", recording, *options)
 
 
+def test_the_trajectory_for_a_parameter_is_that_of_the_diagnosed_model(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And not of a rigid one: with friction the same voltage moves the axis less far."""
+    place, models = tmp_path / "friction.npz", list[AxisModel]()
+    one = recorded("coulomb_friction=0.4", seconds=10.0)
+    np.savez(place, fs=one.sampling_rate, u=one.voltage, y=one.position, axes=np.array(one.axes))
+    slow = Experiment(AxisExcitation(kind="off", rms=0.0, slow=1.0, slow_period=2.0), 6.0)
+    made = NextExperiment("x", one.sampling_rate, "", MachineLimits(voltage=5.0, travel=(-0.14, 0.14)), slow)
+
+    def kept(found: NextExperiment, model: AxisModel, rate: float) -> Trajectory:
+        models.append(model)
+        return as_trajectory(found, model, rate)
+
+    monkeypatch.setattr("xy_sysid.experiment_design.of_run.sharpen", lambda *_: made)
+    monkeypatch.setattr("xy_sysid.experiment_design.as_trajectory.as_trajectory", kept)
+    said = cli("next", place, "--axis", "x", "--for", "coulomb_friction.coulomb", "--trajectory", tmp_path / "motion.yaml")
+    assert said.code == 0, said
+    assert [dict(model.effects)["coulomb_friction"] for model in models] == [pytest.approx((0.4,), rel=0.05)]
+
+
+def test_a_first_experiment_is_in_the_units_of_what_the_run_file_drives(tmp_path: Path) -> None:
+    """Effort and angle of a joint, without --unit; and the file is one that this excitation takes."""
+    run_file, out = tmp_path / "run.yaml", tmp_path / "next.yaml"
+    joint = {"x.limit": 2.0, "x.travel_min": -1.5, "x.travel_max": 1.5, "unit": "rad", "output": "commands", "interface": "effort", "rate": 500.0}
+    run_file.write_text(yaml.safe_dump({"excitation": {"ros__parameters": joint}}))
+    said = cli("next", "--for", "nothing", "--params", run_file, "-o", out)
+    assert said.code == 0 and re.search(r"up to [\d.]+ N m and the travel from \S+ to \S+ rad", said.out), said
+    told = yaml.safe_load(out.read_text())["experiment"]
+    assert told["units"] == ["N m", "rad"] and told["rate"] == 500.0
+
+
+def test_a_run_file_gives_all_limits_of_the_machine(tmp_path: Path) -> None:
+    """Voltage, travel, speed and acceleration: the file needs no more of any, and the excitation refuses no file that was designed for it."""
+    run_file, out = tmp_path / "run.yaml", tmp_path / "next.yaml"
+    own = {"x.limit": 5.0, "x.travel_min": -0.14, "x.travel_max": 0.14, "x.max_speed": 0.3, "x.max_acceleration": 12.0}
+    run_file.write_text(yaml.safe_dump({"excitation": {"ros__parameters": own}}))
+    said = cli("next", "--for", "nothing", "--params", run_file, "-o", out)
+    assert said.code == 0, said
+    needs = yaml.safe_load(out.read_text())["experiment"]["needs"]
+    assert 0.0 < needs["speed"] <= 0.3 and 0.0 < needs["acceleration"] <= 12.0
+
+
 def test_without_a_recording_it_asks_for_one() -> None:
     """Or for --for nothing, with the limits of the machine."""
     assert "--for nothing" in refused("next")
@@ -76,5 +125,5 @@ def test_every_sentence_is_in_the_units_of_the_recording(recording: Path, tmp_pa
     assert re.search(r"\d A rms|\d A, each|\d A with", said.out) and re.search(r"up to [\d.]+ A and the travel from \S+ to \S+ rad,", said.out)
     assert not re.search(r"\d m?(V|m)\b", said.out), said.out
     text = out.read_text()
-    assert "are in A, needs.travel is in rad" in text and yaml.safe_load(text)["experiment"]["units"] == ["A", "rad"]
+    assert "are in A, other needs are in rad" in text and yaml.safe_load(text)["experiment"]["units"] == ["A", "rad"]
     assert "to -100 rad; allowed: where the axis stands" in refused("next", *read, "--voltage", 5, "--travel=-140:-100")

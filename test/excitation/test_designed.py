@@ -2,27 +2,32 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 
 from xy_sysid.errors import BadInput
-from xy_sysid.excitation.designed import document_of, of_an_experiment, with_experiment
+from xy_sysid.excitation.designed import Needs, document_of, of_an_experiment, with_experiment
+from xy_sysid.excitation.drive import Drive
 from xy_sysid.experiment_design.experiment import Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
 from xy_sysid.experiment_design.of_run import NextExperiment
 from xy_sysid.files.experiment import read_experiment, write_experiment
+from xy_sysid.samples.block import Block
 from xy_sysid.settings import AxisExcitation, ExcitationSettings
 
-OWN = ExcitationSettings(axes={"x": AxisExcitation(limit=3.0), "y": AxisExcitation(limit=3.0)})
+OWN = ExcitationSettings(axes={"x": AxisExcitation(limit=3.0, max_speed=0.4, max_acceleration=9.0), "y": AxisExcitation(limit=3.0)})
 SLOW = AxisExcitation(kind="off", rms=0.0, slow=2.0, slow_period=3.0, limit=5.0)
-EXCITATION = document_of("x", 2000.0, Experiment(SLOW, 12.0), (2.0, (-0.05, 0.05)))["experiment"]["excitation"]
+NEEDS = Needs(voltage=2.6666663, travel=(-0.05, 0.05), start=0.01, reach=(-0.05, 0.03), within=(-0.08, 0.05), speed=0.3, acceleration=8.0)
+EXCITATION = document_of("x", 2000.0, Experiment(SLOW, 12.0), NEEDS)["experiment"]["excitation"]
 
 
 def document(**changes: Any) -> dict[str, Any]:
-    made = document_of("x", 2000.0, Experiment(SLOW, 12.0), (2.0, (-0.05, 0.05)))
+    made = document_of("x", 2000.0, Experiment(SLOW, 12.0), NEEDS)
     made["experiment"] |= changes
     return made
 
@@ -30,7 +35,7 @@ def document(**changes: Any) -> dict[str, Any]:
 def test_an_experiment_takes_the_place_of_the_signal_and_not_of_the_limits() -> None:
     """Kind, amplitude and time are the experiment's; limit, travel and guards stay the machine's; the other axis is held, as by an offset."""
     held = OWN.axes["y"].model_copy(update={"kind": "noise", "offset": 1.0, "slow": 0.5})
-    found = with_experiment(OWN.model_copy(update={"axes": {**OWN.axes, "y": held}}), document(rate=2000.04), "next.yaml")
+    found = with_experiment(OWN.model_copy(update={"axes": {**OWN.axes, "y": held}}), document(rate=2000.04), "next.yaml").settings
     x, y = found.axes["x"], found.axes["y"]
     assert (x.kind, x.slow, x.slow_period, found.duration) == ("off", 2.0, 3.0, 12.0)
     assert (x.limit, x.travel_min, x.brake) == (3.0, OWN.axes["x"].travel_min, OWN.axes["x"].brake)
@@ -40,8 +45,13 @@ def test_an_experiment_takes_the_place_of_the_signal_and_not_of_the_limits() -> 
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"needs": {"voltage": 3.5, "travel": [-0.05, 0.05]}}, "next.yaml: voltage of axis x is 3.5 V"),
-        ({"needs": {"voltage": 2.0, "travel": [-0.05, 0.2]}}, "next.yaml: travel of axis x is -0.05 to 0.2 m"),
+        ({"needs": {**asdict(NEEDS), "voltage": 3.5}}, "next.yaml: voltage of axis x is 3.5 V"),
+        ({"needs": {**asdict(NEEDS), "travel": [-0.05, 0.2]}}, "next.yaml: travel of axis x is -0.05 to 0.2 m"),
+        ({"needs": {**asdict(NEEDS), "speed": 0.5}}, "next.yaml: speed of axis x is 0.5 m/s; allowed: up to its max_speed of 0.4 m/s"),
+        ({"needs": {**asdict(NEEDS), "acceleration": 9.5}}, "acceleration of axis x is 9.5 m/s^2; allowed: up to its max_acceleration of 9 m/s^2"),
+        ({"ramp": 2.0}, "next.yaml: ramp is 2 s; allowed: 0.5 s, that of the excitation. Design it again with --params"),
+        ({"ramp": None}, "ramp is None"),
+        ({"needs": {**asdict(NEEDS), "start": 0.1}}, "motion of axis x is 0.05 to 0.13 m; allowed: within -0.12 to 0.12 m, where nothing brakes it"),
         ({"rate": 1000.0}, "rate is 1000 Hz"),
         ({"axis": "z"}, "axis is 'z'"),
         ({"excitation": {"kind": "noise", "limit": 50.0}}, "'limit'"),
@@ -50,7 +60,11 @@ def test_an_experiment_takes_the_place_of_the_signal_and_not_of_the_limits() -> 
         ({"excitation": {**EXCITATION, "kind": "noise", "rms": 1.5}}, "is 3.5 V of offset, slow and rms together; allowed: up to its limit of 3 V"),
         ({"excitation": {**EXCITATION, "offset": -2.5}}, "is 4.5 V of offset"),
         ({"excitation": {"kind": "off", "slow": 2.0}}, "excitation is without rms, low, high"),
-        ({"needs": {"voltage": True, "travel": [-0.05, 0.05]}}, "needs"),
+        ({"needs": {**asdict(NEEDS), "voltage": True}}, "needs"),
+        ({"needs": {"voltage": 2.0, "travel": [-0.05, 0.05]}}, "needs"),
+        ({"needs": {**asdict(NEEDS), "start": [0.0, 0.1]}}, "needs.start"),
+        ({"needs": {**asdict(NEEDS), "reach": [0.0]}}, "needs.reach"),
+        ({"needs": {**asdict(NEEDS), "speeed": 1.0}}, "'speeed'"),
         ({"seconds": 0.0}, "seconds is 0"),
         ({"units": ["A", "rad"]}, "units is A and rad; allowed: V and m"),
         ({"units": "V"}, "units is 'V'"),
@@ -64,6 +78,15 @@ def test_a_file_that_asks_for_more_is_refused_in_one_line(changes: dict[str, Any
     assert words in str(refusal.value) and "\n" not in str(refusal.value)
 
 
+def test_a_robot_that_takes_positions_or_trajectories_is_refused_one() -> None:
+    """Its controller holds it where it is told; the same motion goes there as a trajectory."""
+    axis = AxisExcitation(kind="multisine", low=0.5, high=5.0, limit=0.05, rms=0.0, max_speed=0.2, max_acceleration=2.0)
+    for command in ("forward", "joint_trajectory"):
+        robot = ExcitationSettings(axes={"x": axis}, output="commands", interface="position", command=command)
+        with pytest.raises(BadInput, match=r"next.yaml: interface is position; allowed: effort or velocity.*next --trajectory"):
+            with_experiment(robot, document(units=["m", "m"]), "next.yaml")
+
+
 def test_a_designed_experiment_is_written_and_read_again(tmp_path: Path) -> None:
     """The file of xy-sysid next is what the node loads."""
     limits = MachineLimits(voltage=5.0, travel=(-0.14, 0.14))
@@ -75,15 +98,29 @@ def test_a_designed_experiment_is_written_and_read_again(tmp_path: Path) -> None
         limits=limits,
         experiment=Experiment(SLOW, 12.0),
         sets=(("coulomb_friction",), ("stribeck_friction",)),
-        voltage=2.6666663,
-        travel=(-0.05, 0.05),
+        needs=NEEDS,
     )
     place = tmp_path / "next.yaml"
     write_experiment(place, made)
     assert yaml.safe_load(place.read_text())["experiment"]["expects"] == made.sentence
-    assert read_experiment(OWN, place).axes["x"].slow == read_experiment(narrow, place).axes["x"].slow == 2.0
+    assert read_experiment(OWN, place).settings.axes["x"].slow == read_experiment(narrow, place).settings.axes["x"].slow == 2.0
+    assert read_experiment(OWN, place).starts == {"x": pytest.approx((-0.03, 0.02))}
     with pytest.raises(BadInput, match="Check the path"):
         read_experiment(OWN, tmp_path / "none.yaml")
+
+
+@pytest.mark.parametrize(("place", "moves"), [(0.015, True), (-0.025, True), (0.021, False), (-0.04, False)])
+def test_an_experiment_begins_only_where_it_was_designed_to(place: float, moves: bool) -> None:
+    """Designed about 0 and run elsewhere it would go where it was promised not to go: it stops before the first volt, and says where to move."""
+    taken = with_experiment(OWN, document(), "next.yaml")
+    drive = Drive(taken.settings, starts=taken.starts)
+    drive.start()
+    count = np.arange(2.0)
+    drive.see(Block(("x", "y"), count, count / OWN.rate, np.array([[place, 0.1]] * 2)))
+    drive.next(100)
+    assert drive.next(100).values.any() == moves
+    assert drive.state == ("active" if moves else "stopped") and drive.fault != moves
+    assert moves or f"x stands at {place:g} m, and its experiment was designed to begin between -0.03 and 0.02 m" in drive.reason
 
 
 def test_limits_travel_and_guards_are_no_settings_of_an_experiment() -> None:

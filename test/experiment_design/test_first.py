@@ -8,7 +8,7 @@ import pytest
 from xy_sim.machine import Machine
 from xy_sysid.excitation.lockstep import drive
 from xy_sysid.experiment_design.experiment import Experiment
-from xy_sysid.experiment_design.first import first_experiment
+from xy_sysid.experiment_design.first import _draws, first_experiment
 from xy_sysid.experiment_design.limits import MachineLimits
 from xy_sysid.experiment_design.of_run import NextExperiment
 from xy_sysid.settings import ExcitationSettings
@@ -24,19 +24,28 @@ def found() -> NextExperiment:
 def test_it_says_how_loud_which_band_and_how_long(found: NextExperiment) -> None:
     """Within the voltage and the travel, with margin, for every axis that may be there."""
     assert isinstance(found.experiment, Experiment)
-    assert 0.0 < found.voltage <= 5.0 and found.seconds >= 30.0
-    assert -0.14 <= found.travel[0] < found.travel[1] <= 0.14
+    needs = found.needs
+    assert needs is not None and 0.0 < needs.voltage <= 5.0 and found.seconds >= 30.0
+    assert -0.14 <= needs.travel[0] < needs.reach[0] < needs.start == LIMITS.start < needs.reach[1] < needs.travel[1] <= 0.14
+    assert needs.within == LIMITS.travel and needs.speed > 0.0 < needs.acceleration
     assert "known to 5 %" in found.sentence
 
 
 def test_a_table_that_nobody_described_stays_within_its_limits(found: NextExperiment) -> None:
     """The simulated table carries it out: neither voltage nor travel is left, and the guards have nothing to do."""
-    assert found.experiment is not None
+    assert found.experiment is not None and found.needs is not None
     made = Machine.from_file("rigid.yaml")
     axes = dict.fromkeys(made.axes, found.experiment.excitation)
     record = drive(made, ExcitationSettings(rate=made.rate, lockstep=True, speed=0.0, axes=axes), 10.0)
     assert float(np.max(np.abs(record.voltage))) <= 5.0
-    assert found.travel[0] <= float(record.position.min()) and float(record.position.max()) <= found.travel[1]
+    low, high = found.needs.travel
+    assert low <= float(record.position.min()) and float(record.position.max()) <= high
+
+
+def test_an_axis_that_its_friction_holds_may_carry_a_load() -> None:
+    """To either side: it would drift while the experiment moves it, and stays within the travel all the same."""
+    loads = [dict(model.effects)["constant_load"][0] / dict(model.effects)["coulomb_friction"][0] for model in _draws(LIMITS, 1)]
+    assert min(loads) < -0.3 and max(loads) > 0.3 and max(map(abs, loads)) <= 1.0
 
 
 def test_where_no_experiment_is_safe_it_says_what_to_do() -> None:

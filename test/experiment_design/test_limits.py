@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,9 +14,9 @@ from xy_sysid.errors import BadInput
 from xy_sysid.excitation.motion_check import check_loop, most_centring
 from xy_sysid.experiment_design.design import broken_in_time
 from xy_sysid.experiment_design.experiment import Experiment
-from xy_sysid.experiment_design.limits import MachineLimits, as_recorded
+from xy_sysid.experiment_design.limits import MachineLimits, as_recorded, of_settings
 from xy_sysid.experiment_design.proposals import neighbours, proposals
-from xy_sysid.samples.recording import Recording
+from xy_sysid.samples.recording import Recording, Run
 from xy_sysid.settings import AxisExcitation, ExcitationSettings
 
 RATE = 1000.0
@@ -39,14 +40,48 @@ def test_it_says_which_limit_a_motion_comes_too_near_to() -> None:
     assert limits.broken(Motion(RATE, np.ones(9), np.full(9, np.nan))) == "a model that runs away"
 
 
+def recorded(amplitude: float, volts: float, zero: float, samples: int = 2000) -> Run:
+    """The same as a recording whose zero lies elsewhere."""
+    item = motion(amplitude, volts)
+    return Recording.from_arrays(RATE, item.voltage[:samples], item.position[:samples] + zero, units=("V", "m")).run("x")
+
+
 def test_without_limits_an_experiment_stays_within_what_was_recorded() -> None:
-    """The largest voltage and the travel of the recordings, from where the last one ends."""
-    item = motion(0.05, 3.0)
-    run = Recording.from_arrays(RATE, item.voltage, item.position + 0.02, units=("V", "m")).run("x")
-    limits = as_recorded([run])
+    """The largest voltage of all recordings; the travel of the last one, from where it ends, as the zero of another may be elsewhere."""
+    last = recorded(0.05, 2.0, 0.02)
+    limits = as_recorded([recorded(0.08, 3.0, -0.3), last])
     assert limits.voltage == pytest.approx(3.0, rel=1e-3)
-    assert limits.travel == pytest.approx((-0.03, 0.07), abs=1e-3)
-    assert limits.start == run.position[-1]
+    assert limits.travel == (last.position.min(), last.position.max())
+    assert limits.start == last.position[-1]
+
+
+def test_a_recording_that_ends_where_it_went_farthest_leaves_no_room_that_is_known() -> None:
+    """Nothing is added to what was recorded: refused in one line, unless somebody says how far the axis may go."""
+    ends_high = recorded(0.05, 3.0, 0.0, 251)
+    with pytest.raises(BadInput, match="where the axis stands, 50 mm, between its ends"):
+        as_recorded([ends_high])
+    assert as_recorded([ends_high], travel=(-0.1, 0.1)).travel == (-0.1, 0.1)
+
+
+def test_the_zone_in_which_the_excitation_brakes_is_kept_free_where_it_is_longer_than_the_margin() -> None:
+    """30 mm before an end; what goes there would not be the experiment that was designed. From inside it nothing is designed."""
+    limits = MachineLimits(voltage=2.0, travel=(-0.1, 0.1), brake=0.03)
+    assert limits.broken(motion(0.075)) == "travel" and limits.broken(motion(0.069)) == ""
+    assert limits.room == pytest.approx(0.07) and replace(limits, brake=0.01).room == pytest.approx(0.085)
+    with pytest.raises(BadInput, match="where the axis stands, 80 mm, between its ends without brake zones of 30 mm"):
+        replace(limits, start=0.08)
+
+
+def test_the_design_fades_in_as_the_excitation_does() -> None:
+    """Its ramp is in every proposal, and in what is simulated."""
+    settings = ExcitationSettings(axes={"x": AxisExcitation(brake=0.03)}, ramp=4.0)
+    limits = MachineLimits(**of_settings(settings, "x"))
+    assert (limits.ramp, limits.brake) == (4.0, 0.03)
+    item = next(iter(proposals(limits, RATE)))
+    early, late = (float(np.std(item.drive(RATE, 12.0, 0.0).voltage[part])) for part in (slice(0, 1000), slice(4000, 12000)))
+    assert item.ramp == 4.0 and early < 0.2 * late
+    at_once = replace(item, ramp=0.0).drive(RATE, 12.0, 0.0).voltage
+    assert float(np.std(at_once[:1000])) > 5.0 * early
 
 
 @pytest.mark.parametrize(

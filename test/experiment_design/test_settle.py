@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers.simulated import recorded as recorded_machine
 
 from campaigns.bench.settle import table
 from campaigns.bench.settle_pairs import PAIRS, carry_out, first_recording, left_limits, limits, machine
@@ -15,14 +16,14 @@ from xy_sysid.diagnosis.answer import Answer
 from xy_sysid.errors import BadInput
 from xy_sysid.experiment_design.beliefs import Evidence, believed
 from xy_sysid.experiment_design.criteria import ODDS
-from xy_sysid.experiment_design.design import Design, Judged, expects
+from xy_sysid.experiment_design.design import Design, Judged, _timed, expects
 from xy_sysid.experiment_design.evidence import Power, nats, seconds_needed, settled
 from xy_sysid.experiment_design.experiment import RAMP, Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
-from xy_sysid.experiment_design.loop import Budget, NextChoice, Question, Signals, settle
+from xy_sysid.experiment_design.loop import Budget, Decision, NextChoice, Question, Signals, settle
 from xy_sysid.experiment_design.precision import Precision, sharpest
 from xy_sysid.experiment_design.prediction import Setting, recorded
-from xy_sysid.experiment_design.rivals import possible, standing
+from xy_sysid.experiment_design.rivals import beliefs_of, possible, standing
 from xy_sysid.greybox.axis_data import AxisData, prepare_all
 from xy_sysid.greybox.free_run import fit
 from xy_sysid.hypotheses.moves import is_twice
@@ -103,6 +104,20 @@ def test_an_experiment_that_the_budget_makes_shorter_promises_less() -> None:
     assert whole.possible and expects(whole) == f"After {needed + RAMP + 1.0:.0f} s, drag and lag are distinguished with 95 % probability."
     assert not short.possible and short.best is not None and 0.5 < short.best.probability < 0.95
     assert expects(short).startswith("No experiment within the limits is sure to distinguish drag and lag")
+    chance = f"{100.0 * short.best.probability:.0f} %"
+    left = f"In the {0.7 * needed:.0f} s that the budget leaves, drag and lag are distinguished with {chance} probability"
+    assert expects(short, 60.0) == f"{left}; 60 s were designed."
+    assert expects(made.lasting(1.5), 60.0).startswith("In the 2 s that the budget leaves"), "whatever little it promises"
+
+
+def test_an_experiment_that_ends_early_promises_what_its_own_seconds_bring() -> None:
+    """Where none is sure, it ends once more of it would be a waste; the promise is that of its end, not of all the seconds that there were."""
+    one = Power(truth=0, rival=1, rate=0.01, price=3.0)
+    whole = 400.0
+    item = Judged(Experiment(AxisExcitation(kind="noise")), probability=settled([[one]], whole - RAMP), each=((one,),))
+    timed = _timed(item, MachineLimits(voltage=5.0, travel=(-0.1, 0.1), seconds=whole))
+    assert timed.experiment.seconds < whole and not np.isfinite(timed.seconds)
+    assert timed.probability == settled([[one]], timed.experiment.seconds - RAMP) < item.probability
 
 
 def test_a_set_with_one_law_twice_is_refused(data: AxisData) -> None:
@@ -115,6 +130,30 @@ def test_no_set_that_may_be_true_has_a_law_twice(data: AxisData) -> None:
     """A load beside friction looks like friction that differs between the directions, which takes the place of both."""
     sets = possible(data, STANDARD, Answer(rungs=(), best=("constant_load", "coulomb_friction")))
     assert len(sets) > 1 and not any(is_twice(STANDARD, each) for each in sets)
+
+
+def test_where_backlash_is_named_nothing_is_settled_among_what_looks_like_it(data: AxisData) -> None:
+    """It would be left out of the sets, and one of the others be called settled."""
+    with pytest.raises(BadInput, match=r"effect that is named is backlash; allowed: effects that free simulation can predict.*Its own experiment"):
+        possible(data, STANDARD, Answer(rungs=(), best=("backlash",)))
+
+
+def test_look_alikes_stand_where_what_they_look_like_stands(data: AxisData) -> None:
+    """Sets keep the order of what was named, and none is there twice in another order."""
+    sets = possible(data, STANDARD, Answer(rungs=(), best=("saturation", "cogging")))
+    assert ("saturation", "lead_error") in sets and len({frozenset(each) for each in sets}) == len(sets)
+
+
+def test_sets_with_the_same_equations_are_not_settled_by_their_names() -> None:
+    """A base and a screw that give: what is chosen is one of two that no data distinguish, so both are left, and nothing is called settled."""
+    one = recorded_machine("base_resonance", seconds=8.0)
+    run = one.run("x")
+    data = prepare_all(run.sampling_rate, [(run.voltage, run.position)])
+    sets = [("base_resonance",), ("screw_compliance",)]
+    found = standing(data, STANDARD, sets)
+    left = [belief.effects for belief in beliefs_of(data, STANDARD, found, draws=1)]
+    assert sorted(left) == sorted(sets)
+    assert Decision(found, tuple(left), NextChoice(None)).over() == "impossible"
 
 
 def test_an_effect_that_no_simulation_follows_is_refused(data: AxisData) -> None:

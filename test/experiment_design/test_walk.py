@@ -65,6 +65,28 @@ def test_a_folder_that_is_no_walk_is_refused(tmp_path: Path) -> None:
         replayed(tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('{"plan": {"limits": [1]}}', "walk.json: plan.axis is "),
+        (("limits", [1]), "walk.json: plan.limits is .1.; allowed: Input should be an object"),
+        (("limits", {"voltage": "5"}), "walk.json: plan.limits.voltage is '5'; allowed: Input should be a valid number"),
+        (("limits", {"voltage": 5.0, "travel": [-1.0, 1.0], "speeed": 1.0}), "walk.json: plan.limits.speeed is 1.0; allowed: Unexpected"),
+        (("budget", {"seconds": []}), "walk.json: plan.budget.seconds is "),
+        (("sets", ["gravity"]), "walk.json: plan.sets.0 is 'gravity'"),
+        ("[" * 100_000, "walk.json is .* recursion limit"),
+    ],
+)
+def test_a_walk_that_was_edited_by_hand_is_refused_in_one_line(tmp_path: Path, text: str | tuple[str, Any], words: str) -> None:
+    """It names the key, whatever stands there."""
+    plan = plan_document(WalkPlan("x", limits(LAG), Budget(), LAG.sets))
+    whole = text if isinstance(text, str) else json.dumps({"plan": {**plan, text[0]: text[1]}, "steps": []})
+    (tmp_path / "walk.json").write_text(whole)
+    with pytest.raises(BadInput, match=words) as refusal:
+        replayed(tmp_path)
+    assert "\n" not in str(refusal.value) and len(str(refusal.value)) < 400
+
+
 def test_nothing_follows_what_is_settled_or_a_budget_that_is_spent() -> None:
     """One set left, no experiment that helps, as many experiments as allowed, no seconds: each has its name."""
     budget, two = Budget(experiments=2, seconds=20.0), (("coulomb_friction",), ("stribeck_friction",))

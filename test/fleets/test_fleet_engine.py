@@ -27,6 +27,7 @@ from xy_sysid.fleets.of_file import Task, failed, rows_of_file
 from xy_sysid.fleets.of_paths import Analysis, run
 from xy_sysid.fleets.row import Row
 from xy_sysid.fleets.table import as_table, read
+from xy_sysid.imports import load, save
 
 SAMPLES, MORE = 300, 1_000  # of most recordings: quick, yet each is fitted and searched; of the last of all
 DAYS = ("2026-03-01", "2026-03-02", "2026-03-03")
@@ -139,6 +140,26 @@ def test_a_recording_that_kills_its_process_is_tried_twice_and_is_a_row(data: Pa
     assert tries.read_text(encoding="utf-8") == "xx"
 
 
+def test_a_recording_that_kills_its_process_is_not_tried_again_by_the_next_run(data: Path, tmp_path: Path, client: Any) -> None:
+    """The table knows it by its hash: a nightly run would otherwise lose two processes every night. With other options it is tried again."""
+    deadly, tries = tmp_path / "deadly.py", tmp_path / "tries"
+    lines = ["import os", "from dataclasses import replace", "from xy_sysid.axis.model import STANDARD", f"if os.getpid() != {os.getpid()}:"]
+    lines += [
+        f"    open({str(tries)!r}, 'a').write('x')",
+        "    os.kill(os.getpid(), 9)",
+        "EFFECT = replace(STANDARD['coulomb_friction'], name='own')",
+    ]
+    deadly.write_text("\n".join(lines), encoding="utf-8")
+    path, how = data / "mill-01" / f"{DAYS[0]}.npz", Analysis(effect_files=(str(deadly),))
+    first, second = (run([path], tmp_path / "table", how, client) for _ in range(2))
+    assert (first.failed, first.unchanged, second.failed, second.unchanged) == (1, 0, 0, 1)
+    assert tries.read_text(encoding="utf-8") == "xx"
+    (row,) = read(tmp_path / "table").to_pylist()
+    assert row["stage"] == "worker" and "it is not tried again" in row["problem"] and row["machine"] == "mill-01" and row["date"] is not None
+    assert run([path], tmp_path / "table", Analysis(), client).analysed == 1
+    assert [one["stage"] for one in read(tmp_path / "table").to_pylist()] == [None]
+
+
 def workers(client: Any) -> list[int]:
     return list(client.run(os.getpid).values())
 
@@ -192,6 +213,22 @@ def test_the_command_says_what_it_did(data: Path, tmp_path: Path) -> None:
     """Counts, rate, and why there is no answer; a scheduler that does not answer is bad input."""
     assert "tcp://HOST:PORT" in refused("fleet", data, "-o", tmp_path / "t", "--scheduler", "nonsense")
     assert "recordings or folders" in refused("fleet", data)
+
+
+def test_bags_and_patterns_are_recordings_too_and_counts_are_json(tmp_path: Path, client: Any) -> None:
+    """A bag beside a table file, named by a folder and by a pattern; --json says what was done, and the next run that nothing is left to do."""
+    folder, table = tmp_path / "mill-03", tmp_path / "table"
+    folder.mkdir()
+    save(load(npz(folder / "2026-03-01.npz", rows=SAMPLES)), folder / "2026-03-02")
+    (folder / "2026-03-03.csv").write_text("rubbish\n", encoding="utf-8")
+    command = ("fleet", folder, tmp_path / "*" / "2026-03-0[1-2]*", "-o", table, "--scheduler", client.scheduler.address, "--json")
+    first, second = cli(*command).json, cli(*command).json
+    counts = ("recordings", "analysed", "unchanged", "without_an_answer")
+    assert [first[name] for name in counts] == [3, 3, 0, 1] and first["seconds"] > 0.0 < first["an_hour"]
+    assert [second[name] for name in counts] == [3, 0, 3, 0]
+    assert {row["machine"] for row in read(table).to_pylist()} == {"mill-03"}
+    rows = sorted(read(table).to_pylist(), key=lambda row: str(row["date"]))
+    assert rows[0]["data_sha256"] == rows[1]["data_sha256"] and rows[2]["stage"] == "reading"
 
 
 def test_a_missing_extra_is_named(monkeypatch: pytest.MonkeyPatch, data: Path, tmp_path: Path) -> None:

@@ -15,8 +15,8 @@ from xy_sysid.errors import BadInput
 from xy_sysid.fleets.columns import TIMES, columns
 from xy_sysid.fleets.naming import Name, Named, Names, name_of, names_from
 from xy_sysid.fleets.of_file import Task, rows_of_file
-from xy_sysid.fleets.row import Plan, row_of
-from xy_sysid.samples.recording import Recording
+from xy_sysid.fleets.row import Plan, Row, row_of
+from xy_sysid.samples.recording import Recording, Run
 
 
 @pytest.fixture(scope="module")
@@ -80,6 +80,25 @@ def test_an_axis_that_cannot_be_fitted_keeps_what_is_known_of_it() -> None:
     row = row_of(still, "x", Plan())
     assert row["stage"] == "fit" and "constant" in row["problem"]
     assert row["samples"] == 5000 and row["verdict"] == "not_enough_data"
+
+
+def test_an_error_that_nobody_thought_of_in_one_axis_leaves_the_others_theirs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Both axes of a file have a row; that of the faulty one says where the fault is, and keeps what was found before it."""
+    from xy_sysid.fleets import row as module
+
+    def diagnosed(recording: Recording, run: Run, plan: Plan) -> Row:
+        if run.axis == "x":
+            raise IndexError("index 3 is out of bounds")
+        return {"verdict": "nothing_missing"}
+
+    monkeypatch.setattr(module, "_diagnosis", diagnosed)
+    place = tmp_path / "two.npz"
+    u = np.random.default_rng(1).standard_normal((3000, 2))
+    np.savez(place, fs=1000.0, u=u, y=np.cumsum(u, axis=0) * 1e-6, axes=np.array(["x", "y"]))
+    x, y = rows_of_file(Task(str(place))).rows
+    assert x["stage"] == "diagnosis" and x["problem"].startswith("IndexError in diagnosed, line")
+    assert "index 3 is out of bounds. This is a fault of xy_sysid" in x["problem"] and x["tf_gain"] > 0.0
+    assert y["verdict"] == "nothing_missing" and y.get("problem") is None and x["key"] == y["key"] != ""
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -10,9 +11,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers.cli_tools import npz
+from helpers.cli_tools import cli, npz, refused
 from helpers.simulated import recorded
 
+from xy_sysid.bags import POSITION, VOLTAGE, BagWriter
+from xy_sysid.bags.reading import Bag
 from xy_sysid.errors import BadRecording
 from xy_sysid.fleets.finding import recordings
 from xy_sysid.fleets.naming import date_within
@@ -20,8 +23,11 @@ from xy_sysid.fleets.of_file import Task, rows_of_file
 from xy_sysid.fleets.of_paths import Analysis
 from xy_sysid.fleets.parts import rows_of_parts
 from xy_sysid.fleets.row import Row
-from xy_sysid.fleets.table import merged, read
-from xy_sysid.imports import save
+from xy_sysid.fleets.table import Known, merged, read
+from xy_sysid.imports import from_table, in_parts, load, save
+from xy_sysid.imports.reading import Reading
+from xy_sysid.samples.block import Block
+from xy_sysid.samples.recording import Recording
 
 DAY = datetime(2026, 3, 3, tzinfo=UTC)
 
@@ -126,3 +132,88 @@ def test_parts_in_a_gap_have_no_row_and_what_comes_after_it_has(tmp_path: Path) 
     path = npz(tmp_path / "long.npz", rows=4_000, t=gap)
     rows = rows_of_parts(path, 1.0, Analysis())
     assert [one["source"].rpartition("#")[2] for one in rows] == ["0", "1", "5", "6", "7"]
+
+
+def test_a_recording_is_compared_with_few_others_however_many_have_its_name() -> None:
+    """Each task carries the keys that it may have. With all of a name, 10,000 folders with one rec.csv each would send 100 million."""
+    rows = [row(f"/data/{day}/rec.csv") for day in range(1000)]
+    there = [Path(f"/data/{day}/rec.csv") for day in range(1001)]
+    known = Known(rows, {str(path) for path in there})
+    assert [known.of(path) for path in there] == [*(frozenset({f"key of /data/{day}/rec.csv"}) for day in range(1000)), frozenset()]
+    moved = [Path(f"/archive/{day}/rec.csv") for day in range(1000)]
+    known = Known(rows, {str(path) for path in moved})
+    assert all(known.of(path) == {f"key of /data/{day}/rec.csv"} for day, path in enumerate(moved))
+    alone = Path("/new/place/rec.csv")
+    assert len(Known(rows, {str(alone)}).of(alone)) == 1000, "whichever it was, it is not done again"
+
+
+@pytest.mark.parametrize("ending", [".npz", ".csv", ".mcap", ""])
+@pytest.mark.parametrize("reading", [Reading(), Reading(start=0.4, stop=5.2)], ids=["whole", "cut"])
+def test_every_part_is_what_reading_it_alone_gives_and_is_read_once(
+    ending: str, reading: Reading, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Bit for bit, with the same notes. Reading each part from the start would take a day of a recording of a day."""
+    volts = np.random.default_rng(3).standard_normal((6_500, 1))
+    path = tmp_path / f"long{ending}"
+    save(Recording.from_arrays(1000.0, volts, np.cumsum(volts, axis=0) * 1e-6, axes=("x",)), path)
+    opened: list[object] = []
+
+    def counted(make: Callable[..., Any]) -> Callable[..., Any]:
+        def made(*words: Any) -> Any:
+            opened.append(words)
+            return make(*words)
+
+        return made
+
+    monkeypatch.setattr(in_parts, "Bag", counted(Bag))
+    monkeypatch.setattr(in_parts, "from_table", counted(from_table))
+    found = dict(in_parts.in_parts(path, reading, 1.0))
+    assert len(opened) == 1
+    assert list(found) == list(range(7 if reading.stop is None else 5))
+    for number, part in found.items():
+        stop = min(reading.start + number + 1.0, reading.stop or 99.0)
+        alone = load(path, replace(reading, start=reading.start + number, stop=stop))
+        assert part.run("x").digest == alone.run("x").digest and part.notes == alone.notes and np.array_equal(part.time, alone.time)
+
+
+def blocks(path: Path, order: list[int]) -> Path:
+    """A bag of blocks of 20 ms in this order; the voltage is the sample number."""
+    with BagWriter(path) as bag:
+        for place, number in enumerate(order):
+            seq = np.arange(20 * number, 20 * number + 20, dtype=np.float64)
+            for topic, values in ((VOLTAGE, seq), (POSITION, np.sin(seq))):
+                bag.write_block(topic, Block(("x",), seq, seq / 1000.0, values[:, None]), int(2e7 * (place + 1)))
+    return path
+
+
+def test_where_the_source_starts_anew_a_part_begins(tmp_path: Path) -> None:
+    """Its clock and its counter begin again; nothing of both lies in one part."""
+    found = list(in_parts.in_parts(blocks(tmp_path / "twice", [*range(125), *range(125)]), Reading(), 1.0))
+    assert [len(part) for _, part in found] == [1000, 1000, 500, 1000, 1000, 500]
+    assert np.array_equal(found[0][1].voltage[:, 0], np.arange(1000.0)) and np.array_equal(found[3][1].voltage, found[0][1].voltage)
+
+
+def test_a_block_that_comes_late_is_no_start_of_a_part(tmp_path: Path) -> None:
+    """One message that lay somewhere for a second: the parts after it are where they would be without it."""
+    path = blocks(tmp_path / "late", [*range(60), *range(61, 125), 60, *range(125, 250)])
+    found = dict(in_parts.in_parts(path, Reading(), 1.0))
+    assert [len(part) for part in found.values()] == [1000, 1000, 1000, 1000, 1000]
+    assert np.array_equal(found[4].voltage[:, 0], np.arange(4000.0, 5000.0))
+
+
+def test_parts_are_named_and_analysed_as_the_options_say(tmp_path: Path) -> None:
+    """--names and --effect-file of a long recording, which used to mean nothing; of a table they are refused."""
+    path, names = npz(tmp_path / "long.npz", rows=6_000), tmp_path / "names.yaml"
+    names.write_text("follow: [coulomb_friction]\nrecordings:\n  long.npz: {machine: mill-09, date: 2026-03-03}\n", encoding="utf-8")
+    own = tmp_path / "own.py"
+    lines = (
+        "from dataclasses import replace",
+        "from xy_sysid.axis.model import STANDARD",
+        "EFFECT = replace(STANDARD['coulomb_friction'], name='own')",
+    )
+    own.write_text("\n".join(lines), encoding="utf-8")
+    said = cli("trend", path, "--every", "1s", "--names", names, "--effect-file", own, "--json").json
+    assert said["axes"][0]["machine"] == "mill-09"
+    followed = next(one for one in said["parameters"] if one["parameter"] == "coulomb_friction_coulomb")
+    assert followed["dates"][0].startswith("2026-03-03")
+    assert "without --every" in refused("trend", tmp_path, "--names", names)

@@ -240,6 +240,28 @@ def test_what_the_table_cannot_tell_is_told(gone: Path, tmp_path: Path) -> None:
     assert gaps(xy.trend(gone, machines=["mill-01"])) == ["Recordings that could not be read: 5 (mill-01 with its newest: 5)."]
 
 
+def test_a_year_of_twenty_machines_names_the_three_that_go_bad_and_their_causes() -> None:
+    """The short form of python -m campaigns.bench fleet: the rows as they come out of a year, with their wander, without the recordings."""
+    rows = []
+    for number in range(20):
+        wander = np.random.default_rng(number).standard_normal((3, 12)) * np.array([[0.02], [0.004], [0.004]])
+        for k, (rubs, gain, base) in enumerate((1.0 + wander).T.tolist()):
+            late = k >= 7
+            nut, bolts, amplifier = (late and number == bad for bad in (4, 11, 17))
+            values = {
+                "gain": 0.1 * gain * (0.88 if amplifier else 1.0),
+                "coulomb_friction_coulomb": 0.13 * rubs * (1.33 if nut else 1.0),
+                "tf_resonance_1_frequency": 48.0 * base * (0.92 if bolts else 1.0),
+            }
+            ends = {f"{name}{end}": factor * value for name, value in values.items() for end, factor in (("_low", 0.997), ("_high", 1.003))}
+            effects = "coulomb_friction, backlash" if nut else "coulomb_friction"
+            rows.append(recorded(f"mill-{number:02d}", k, 0.1) | {"verdict": "missing_effect", "effects": effects} | values | ends)
+    found = of_rows(rows)
+    told = {event.machine: event.cause.cause for event in found.events if event.cause is not None}
+    assert told == {"mill-04": "a worn nut", "mill-11": "loose bolts of the base", "mill-17": "the amplifier or its supply"}
+    assert len(found.events) == 3
+
+
 def test_the_page_of_the_fleet_lists_every_column() -> None:
     """python -m xy_sysid.fleets.columns_doc --write"""
     assert document() in (ROOT / "docs" / "fleet.md").read_text(encoding="utf-8")

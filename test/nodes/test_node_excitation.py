@@ -18,7 +18,7 @@ from helpers import ROOT
 from helpers.cli_tools import bare
 from helpers.ros_tools import World, needs_ros
 
-from xy_sysid.excitation.designed import document_of
+from xy_sysid.excitation.designed import Needs, document_of
 from xy_sysid.excitation.drive import Drive
 from xy_sysid.experiment_design.experiment import Experiment
 from xy_sysid.samples.block import Block
@@ -340,7 +340,9 @@ def test_a_designed_experiment_is_loaded_and_one_beyond_the_limits_is_refused(wo
     loud, good = (tmp_path / name for name in ("loud.yaml", "good.yaml"))
     slow = AxisExcitation(kind="off", rms=0.0, slow=2.0, slow_period=3.0)
     for place, volts in ((loud, 12.0), (good, 2.0)):
-        place.write_text(yaml.safe_dump(document_of("x", 2000.0, Experiment(slow, 12.0), (volts, (-0.05, 0.05)))))
+        place.write_text(
+            yaml.safe_dump(document_of("x", 2000.0, Experiment(slow, 12.0), Needs(volts, (-0.05, 0.05), 0.0, (-0.04, 0.04), (-0.14, 0.14), 0.1, 1.0)))
+        )
     process = world.start(MODULE, {"experiment": str(loud)})
     assert not world.transition("excitation", "configure")
     assert world.until(lambda: "loud.yaml: voltage of axis x is 12 V" in process.output())

@@ -5,12 +5,20 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from helpers.ros_tools import needs_ros
+from helpers.ros_tools import needs_ros, new_domain
 
 from xy_sysid.errors import BadInput
 from xy_sysid.settings import AxisExcitation, ExcitationSettings
 
 pytestmark = needs_ros
+
+
+@pytest.fixture
+def said(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """What a walk in a domain of its own says."""
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(new_domain()))
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    return []
 
 
 def test_every_limit_of_the_excitation_is_one_of_the_experiments() -> None:
@@ -23,6 +31,58 @@ def test_every_limit_of_the_excitation_is_one_of_the_experiments() -> None:
     assert (limits.voltage, limits.travel, limits.speed, limits.acceleration) == (3.0, (-0.05, 0.07), 0.3, 4.0)
     free = plan_of(Wishes("y", Path("new")), settings).limits
     assert free.speed == free.acceleration == float("inf")
+
+
+class Excitation:
+    """Answers a walk as an unconfigured excitation does, while somebody presses End here after one of its transitions."""
+
+    def __init__(self, ended_after: str) -> None:
+        self.asked: list[str] = []
+        self._after = ended_after
+
+    def settings(self) -> ExcitationSettings:
+        return ExcitationSettings()
+
+    def state(self) -> str:
+        return {"configure": "inactive", "activate": "active"}.get(self.asked[-1] if self.asked else "", "unconfigured")
+
+    def transition(self, label: str) -> None:
+        self.asked.append(label)
+
+    def ended(self) -> bool:
+        return self._after in self.asked
+
+
+@pytest.mark.parametrize(("press", "asked"), [("configure", ["configure"]), ("activate", ["configure", "activate", "deactivate"])])
+def test_end_here_ends_it_before_anything_moves_and_says_so(
+    press: str, asked: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, said: list[str]
+) -> None:
+    """While the excitation configures: it is not activated any more. While it drives: it is deactivated. Either way a sentence tells the end."""
+    from xy_sysid.nodes.settle import Settler, Wishes
+
+    machine = Excitation(press)
+    for name in ("settings", "state", "transition"):
+        monkeypatch.setattr(Settler, name, lambda _, *words, name=name: getattr(machine, name)(*words))
+    settler = Settler(Wishes("x", tmp_path / "walk", alone=True), said.append, machine.ended, lambda: True)
+    try:
+        assert settler.run()
+    finally:
+        settler.close()
+    assert machine.asked == asked
+    assert settler.ending == "stopped" and said == ["Stopped before the first recording was diagnosed."]
+
+
+def test_what_is_still_possible_is_told_where_somebody_ends_it(said: list[str]) -> None:
+    """And not what the last experiment had promised."""
+    from xy_sysid.nodes.settle import Settler, Wishes
+
+    settler = Settler(Wishes("x", Path("new")), said.append, lambda: True, lambda: False)
+    settler.close()
+    settler.steps = (
+        {"sentence": "After 8 s they are distinguished.", "ending": None, "left": [["gravity"], ["return_spring"]], "chosen": ["gravity"]},
+    )
+    settler.ending = "stopped"
+    assert settler.outcome == "Stopped: gravity, return_spring are still possible, gravity is the most probable."
 
 
 def test_a_joint_whose_controller_holds_its_position_is_refused() -> None:

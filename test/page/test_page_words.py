@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -21,12 +22,44 @@ from xy_sysid.page.downloads import plain_name
 from xy_sysid.page.facts import coherence_fact, dropped_words, facts, polynomial, seconds_text, transfer_function_html
 from xy_sysid.page.live_figures import failing, failing_words, response_figure, tracking_figure
 from xy_sysid.page.notices import BAD_STAYS, BEFORE, GOOD_STAYS, SHOWN, Notices
+from xy_sysid.page.orders import Reading
 from xy_sysid.page.session import Message, Session
 from xy_sysid.page.settings_form import changes, limits
 from xy_sysid.page.shelf import Shelf
 from xy_sysid.page.topics_state import LOST, TopicsState, columns, thinned
 from xy_sysid.page.views import view_of, views
 from xy_sysid.settings import AxisExcitation, knobs
+
+
+def test_the_design_knows_the_effects_that_the_page_was_given(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Files of --effect-file: without them an effect of one's own could never be settled on the page."""
+    pytest.importorskip("rclpy")
+    from xy_sysid.nodes import settle
+
+    wished: list[Any] = []
+
+    class Settler:
+        """Notes what it is asked for, and ends."""
+
+        problem, outcome, ending, steps = "", "", "stopped", ()
+
+        def __init__(self, wishes: Any, *_: Any) -> None:
+            wished.append(wishes)
+
+        def run(self) -> bool:
+            return True
+
+        def close(self) -> None:
+            """Nothing to do."""
+
+    monkeypatch.setattr(settle, "Settler", Settler)
+    monkeypatch.setattr("xy_sysid.page.link.Link", lambda *_: SimpleNamespace(close=lambda: None))
+    monkeypatch.setattr("xy_sysid.page.live.Live", lambda *_: None)
+    session = Session(Shelf(tmp_path), True, "/xy", Reading({}, (), (Path("own.py"),)))
+    assert session.settling is not None
+    session.settling.start("x")
+    session.close()
+    assert wished[0].effect_files == ("own.py",)
 
 
 @pytest.fixture

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -20,10 +21,12 @@ from xy_sysid.units import Units, readable
 
 if TYPE_CHECKING:
     from xy_sysid.axis.model import Library
+    from xy_sysid.diagnosis.answer import Answer
     from xy_sysid.experiment_design.limits import MachineLimits
     from xy_sysid.experiment_design.of_run import NextExperiment
     from xy_sysid.imports.reading import Reading
     from xy_sysid.samples.recording import Run
+    from xy_sysid.settings import ExcitationSettings
 
 NOTHING = "nothing"  # is known
 POINTS = 100.0  # a second, of a trajectory
@@ -59,7 +62,7 @@ def next_(
     ] = 0.02,
     run_file: Annotated[
         Path | None,
-        typer.Option("--params", metavar="FILE", help="ROS parameter file or run file; limit and travel of the excitation are the limits"),
+        typer.Option("--params", metavar="FILE", help="ROS parameter file or run file; the limits of the excitation are those of the experiment"),
     ] = None,
     voltage: Annotated[
         float | None, typer.Option(help="largest voltage, V (input in its own unit, as A); without limits: what the recordings show")
@@ -119,19 +122,19 @@ def next_(
     if not json:
         say(f"axis {names[0]}: {found.sentence.rstrip()}")
     if trajectory is not None:
-        _write_trajectory(answer, runs, known, trajectory)
+        _write_trajectory(answer, found, runs, known, trajectory)
     _answered(answer, output, json, notes_of(recordings))
 
 
-def _write_trajectory(answer: NextExperiment, runs: tuple[Run, ...], known: Library, to: Path) -> None:
-    """The motion of the experiment as the first of its sets predicts it; the joint has the name of the axis."""
+def _write_trajectory(answer: NextExperiment, found: Answer, runs: tuple[Run, ...], known: Library, to: Path) -> None:
+    """The motion of the experiment as the first of its sets predicts it, or the diagnosed model; the joint has the name of the axis."""
     from xy_sysid.bags.atomic import write_text
     from xy_sysid.diagnosis.of_run import refine
     from xy_sysid.experiment_design.as_trajectory import as_trajectory
     from xy_sysid.files.trajectories import as_csv, as_yaml
 
-    fitted = refine(runs, add=answer.sets[0] if answer.sets else (), auto=False, library=known)
-    made = as_trajectory(answer, fitted.model.model, min(POINTS, answer.sampling_rate))
+    model = refine(runs, add=answer.sets[0], auto=False, library=known).model.model if answer.sets else found.final.model
+    made = as_trajectory(answer, model, min(POINTS, answer.sampling_rate))
     write_text(to, as_yaml(made, answer.axis))
     write_text(to.with_suffix(".csv"), as_csv(made))
 
@@ -167,17 +170,16 @@ def _first(reading: Reading, run_file: Path | None, asked: Callable[[str], dict[
     """For an unknown axis with the limits of a run file, or with those that were typed."""
     from xy_sysid.experiment_design.first import first_experiment
     from xy_sysid.experiment_design.limits import MachineLimits
-    from xy_sysid.settings import ExcitationSettings
 
     axis = (reading.axes or ("x",))[0]
-    told = o.told_to("excitation", run_file).parameters if run_file is not None else {}
+    told, settings = _settings(run_file, axis)
     of = {name: reading.units.get(f"{axis}.{name}", reading.units.get(name)) for name in ("input", "output")}
-    units = Units(of["input"] or "V", of["output"] or str(told.get("unit", "m")))
+    units = Units(of["input"] or settings.units.input, of["output"] or settings.units.output)
     values = {**_own_limits(run_file, axis), **asked(units.output), **({} if rms is None else {"rms": rms})}
     for name in ("voltage", "travel"):
         if name not in values:
             raise BadInput("--for nothing", f"without the limit of {name}", f"--{name}, or --params with a run file", "Say what the machine may do.")
-    rate = float(told.get("rate", reading.rate or ExcitationSettings().rate))
+    rate = settings.rate if "rate" in told else reading.rate or settings.rate
     middle = 0.5 * (values["travel"][0] + values["travel"][1])
     return first_experiment(axis, rate, MachineLimits(start=middle, seconds=seconds, units=units, **values))
 
@@ -189,17 +191,18 @@ def _plain(answer: NextExperiment) -> dict[str, Any]:
         "settles": answer.settles,
         "seconds": answer.seconds,
         "ask": answer.ask or None,
-        "needs": {"voltage": answer.voltage, "travel": answer.travel},
+        "needs": None if answer.needs is None else asdict(answer.needs),
         "units": {"input": answer.limits.units.input, "output": answer.limits.units.output},
     }
 
 
 def _show(answer: NextExperiment, output: Path | None) -> None:
     say(f"  {answer.sentence}")
-    if answer.experiment is not None:
-        limits = answer.limits
+    if answer.experiment is not None and answer.needs is not None:
+        limits, needs = answer.limits, answer.needs
         say(f"  Experiment: {answer.experiment.said(limits.units)}, for {answer.seconds:.0f} s.")
-        say(f"  It needs up to {answer.voltage:.3g} {limits.units.input} and the travel from {limits.span(answer.travel)}, with margin.")
+        say(f"  It needs up to {needs.voltage:.3g} {limits.units.input} and the travel from {limits.span(needs.travel)}, with margin.")
+        say(f"  The axis has to stand between {limits.span(needs.starts(), ' and ')} when it begins.")
     if answer.ask:
         say(f"  Somebody has to help: {answer.ask}")
     if output is not None and answer.experiment is not None:
@@ -232,29 +235,29 @@ def _asked(unit: str, voltage: float | None, travel: str, speed: float | None, a
     return asked | {name: value for name, value in (("voltage", voltage), ("acceleration", acceleration)) if value is not None}
 
 
+def _settings(run_file: Path | None, axis: str) -> tuple[Mapping[str, Any], ExcitationSettings]:
+    """What a parameter file tells the excitation, and its settings with that for one axis."""
+    from xy_sysid.settings import ExcitationSettings, changed, for_axes, knobs
+
+    told: Mapping[str, Any] = o.told_to("excitation", run_file).parameters if run_file is not None else {}
+    settings = for_axes(ExcitationSettings, [axis])
+    names = {item.name for item in knobs(settings)}
+    return told, changed(settings, {name: value for name, value in told.items() if name in names})
+
+
 def _own_limits(run_file: Path | None, axis: str) -> dict[str, Any]:
     """MachineLimits of the excitation in a parameter file."""
-    from xy_sysid.excitation.motion_check import most_centring
-    from xy_sysid.settings import ExcitationSettings, changed, for_axes, knobs
+    from xy_sysid.experiment_design.limits import of_settings
 
     if run_file is None:
         return {}
-    told: Mapping[str, Any] = o.told_to("excitation", run_file).parameters
-    found: dict[str, Any] = {}
-    if f"{axis}.limit" in told:
-        found["voltage"] = float(told[f"{axis}.limit"])
-    if f"{axis}.travel_min" in told and f"{axis}.travel_max" in told:
-        found["travel"] = (float(told[f"{axis}.travel_min"]), float(told[f"{axis}.travel_max"]))
-    settings = for_axes(ExcitationSettings, [axis])
-    names = {item.name for item in knobs(settings)}
-    settings = changed(settings, {name: value for name, value in told.items() if name in names})
-    return {**found, "centring": float(most_centring(settings)[0])}
+    told, settings = _settings(run_file, axis)
+    said = {"voltage": ("limit",), "travel": ("travel_min", "travel_max")}  # a default is no limit that somebody has set
+    unsaid = {name for name, knobs_of in said.items() if any(f"{axis}.{one}" not in told for one in knobs_of)}
+    return {name: value for name, value in of_settings(settings, axis).items() if name not in unsaid}
 
 
 def _limits(runs: tuple[Run, ...], own: Mapping[str, Any], asked: Mapping[str, Any], rms: float | None, seconds: float) -> MachineLimits:
-    from dataclasses import replace
-
     from xy_sysid.experiment_design.limits import as_recorded
 
-    values = {**own, **asked, **({} if rms is None else {"rms": rms})}
-    return replace(as_recorded(runs), **values, seconds=seconds)
+    return as_recorded(runs, **{**own, **asked, **({} if rms is None else {"rms": rms}), "seconds": seconds})

@@ -29,6 +29,9 @@ def run(
         answer = first_run(starter.load(params), say)
         if json:
             emit({"run": params, **answer})
+        elif not answer["exit_code"]:
+            axis = next(iter(answer["axes"]), "x")
+            say(f"Next, a first experiment for axis {axis}: xy-sysid next --for nothing --params {params} --axis {axis} -o first.yaml")
         raise typer.Exit(answer["exit_code"])
     code = starter.run(starter.load(params), say=say)
     if json:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from xy_sysid.cli import options as o
+from xy_sysid.cli.diagnose import Own
 from xy_sysid.cli.output import emit, plain, progress, say, table
 from xy_sysid.cli.reading import reads
 
@@ -28,6 +29,10 @@ def trend(
     causes: Annotated[
         Path | None, typer.Option(metavar="FILE", help="YAML that adds to the table of changes and their causes (docs/fleet.md)")
     ] = None,
+    names: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="with --every: YAML with the names of the recording and what is followed, as of fleet")
+    ] = None,
+    effect_file: Own = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", metavar="FILE.html", help="write a page with every parameter over time")] = None,
     axis_months: Annotated[
         float, typer.Option(metavar="N", min=1e-3, help="months of an unchanged axis in which one false alarm is allowed")
@@ -36,7 +41,9 @@ def trend(
     json: o.Json = False,
 ) -> None:
     """Find changes of every parameter of every axis over time: since when, by how much, how certain, and the likely cause."""
+    from xy_sysid.errors import BadInput
     from xy_sysid.fleets.causes import causes as causes_of
+    from xy_sysid.fleets.naming import Names, names_from
     from xy_sysid.fleets.of_paths import Analysis
     from xy_sysid.fleets.parts import rows_of_parts, seconds
     from xy_sysid.fleets.trends import of_rows
@@ -44,12 +51,15 @@ def trend(
     from xy_sysid.fleets.words import gaps, sentence, summary, widest
 
     o.output_file("--out", out, force)
+    if not every and (names or effect_file):
+        raise BadInput("--names or --effect-file", "without --every", "with a recording", "A table has its names and effects already.")
     with progress() as bar:
         task = bar.add_task("comparing recordings", total=1.0)
         if every:
             known = causes_of(causes)
-            parts = rows_of_parts(folder, seconds(every), Analysis(reading=reading), lambda number: bar.update(task, description=f"part {number}"))
-            found = of_rows(parts, (), known, axis_months, machines=machine or ())
+            how = Analysis(names_from(names) if names is not None else Names(), reading, tuple(map(str, effect_file or ())))
+            parts = rows_of_parts(folder, seconds(every), how, lambda number: bar.update(task, description=f"part {number}"))
+            found = of_rows(parts, {name for row in parts for name in row}, known, axis_months, machines=machine or ())
         else:
             found = logic(
                 folder, machines=machine or (), own_causes=causes, axis_months=axis_months, tell=lambda part: bar.update(task, completed=part)

@@ -1,46 +1,93 @@
 """An experiment that was designed, on a machine that has limits of its own: taken over only where it keeps within them.
 
-The document is that of ``xy-sysid next``: which axis, for how long, what drives it, and the voltage and travel that it needs.
+The document is that of ``xy-sysid next``: which axis, for how long, what drives it, the voltage and travel that it needs, and where it may begin.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from typing import Any, Protocol
+from dataclasses import asdict, dataclass
+from typing import Any, NamedTuple, Protocol, get_type_hints
 
 from xy_sysid.errors import BadInput
 from xy_sysid.samples.recording import SAME_RATE
 from xy_sysid.settings import AxisExcitation, ExcitationSettings, changed, unknown_name
 from xy_sysid.units import USUAL, Units
 
-KEYS = ("axis", "rate", "seconds", "excitation", "needs", "units", "expects", "sets", "made_by")
+KEYS = ("axis", "rate", "seconds", "ramp", "excitation", "needs", "units", "expects", "sets", "made_by")
 DRIVES = ("kind", "rms", "low", "high", "period", "steps", "offset", "seed", "centring", "slow", "slow_period")  # settings that it may have
 AGAIN = "Design it again within these limits: xy-sysid next with --params."
 
 
-def with_experiment(settings: ExcitationSettings, document: object, where: str) -> ExcitationSettings:
+@dataclass(frozen=True, slots=True)
+class Needs:
+    """What an experiment needs of its axis.
+
+    voltage: the largest input; travel: the places that it comes to, with margin, from where the axis stood (``start``) when it was designed
+    reach: the expected motion without margin, from where it begins; within: the ends that were given to the design
+    speed, acceleration: the largest expected, with margin
+    """
+
+    voltage: float
+    travel: tuple[float, float]
+    start: float
+    reach: tuple[float, float]
+    within: tuple[float, float]
+    speed: float
+    acceleration: float
+
+    def starts(self, low: float = -math.inf, high: float = math.inf) -> tuple[float, float]:
+        """Between which places the axis has to stand, so that the expected motion stays within the ends of the design, and within two others."""
+        return max(low, self.within[0]) - self.reach[0], min(high, self.within[1]) - self.reach[1]
+
+
+class Taken(NamedTuple):
+    """An experiment that was taken over. settings: of the excitation; starts: by axis, between which places it has to stand when it begins."""
+
+    settings: ExcitationSettings
+    starts: dict[str, tuple[float, float]]
+
+
+def with_experiment(settings: ExcitationSettings, document: object, where: str) -> Taken:
     """The settings of the excitation with a designed experiment on one axis; the other axes get their constant offset, which may hold a load.
 
     Raises BadInput, in one line, for a document that is none, and for one that asks for more than the settings allow.
     """
     told = _checked(document, where)
     axis = told["axis"]
+    if settings.holds:
+        act = "Run its motion as a trajectory: xy-sysid next --trajectory."
+        raise BadInput(f"{where}: interface", "position", "effort or velocity, since an experiment moves the axis by itself", act)
     if axis not in settings.axes:
         raise BadInput(f"{where}: axis", repr(axis), ", ".join(settings.axes), "Design it for one of these.")
     if abs(told["rate"] / settings.rate - 1.0) > SAME_RATE:
         raise BadInput(
             f"{where}: rate", f"{told['rate']:g} Hz", f"{settings.rate:g} Hz, that of the excitation", "Design it from recordings of this rate."
         )
+    if abs(told["ramp"] - settings.ramp) > 1e-6:
+        own_ramp = f"{settings.ramp:g} s, that of the excitation"
+        raise BadInput(f"{where}: ramp", f"{told['ramp']:g} s", own_ramp, "Design it again with --params, which tells the excitation's settings.")
     own, units = settings.axes[axis], settings.units
     if told["units"] != list(units):
-        asked, allowed = (f"{drive} and {place}" for drive, place in (told["units"], units))
-        raise BadInput(f"{where}: units", asked, f"{allowed}, those of the excitation", "Design it from recordings of what the excitation sends.")
-    voltage, (low, high) = told["needs"]["voltage"], told["needs"]["travel"]
+        other, allowed = (f"{drive} and {place}" for drive, place in (told["units"], units))
+        raise BadInput(f"{where}: units", other, f"{allowed}, those of the excitation", "Design it from recordings of what the excitation sends.")
+    needs = Needs(**told["needs"])
+    voltage, (low, high) = needs.voltage, needs.travel
     if not 0.0 <= voltage <= own.limit * (1.0 + 1e-9):
         raise BadInput(f"{where}: voltage of axis {axis}", f"{voltage:.4g} {units.input}", f"up to its limit of {own.limit:g} {units.input}", AGAIN)
     if not own.travel_min <= low < high <= own.travel_max:
-        asked, allowed = f"{low:.4g} to {high:.4g} {units.output}", f"{own.travel_min:g} to {own.travel_max:g} {units.output}"
-        raise BadInput(f"{where}: travel of axis {axis}", asked, f"within {allowed}", AGAIN)
+        span, allowed = f"{low:.4g} to {high:.4g} {units.output}", f"{own.travel_min:g} to {own.travel_max:g} {units.output}"
+        raise BadInput(f"{where}: travel of axis {axis}", span, f"within {allowed}", AGAIN)
+    inside = own.travel_min + own.brake, own.travel_max - own.brake
+    reach = needs.start + needs.reach[0], needs.start + needs.reach[1]
+    if not inside[0] <= reach[0] < reach[1] <= inside[1]:
+        span, allowed = (f"{one:.4g} to {other:.4g} {units.output}" for one, other in (reach, inside))
+        raise BadInput(f"{where}: motion of axis {axis}", span, f"within {allowed}, where nothing brakes it", AGAIN)
+    for name, asked, most in (("speed", needs.speed, own.max_speed), ("acceleration", needs.acceleration, own.max_acceleration)):
+        if 0.0 < most < asked:
+            unit = f"{units.output}/s{'^2' * (name == 'acceleration')}"
+            raise BadInput(f"{where}: {name} of axis {axis}", f"{asked:.4g} {unit}", f"up to its max_{name} of {most:g} {unit}", AGAIN)
     values: dict[str, Any] = {f"{axis}.{name}": value for name, value in told["excitation"].items()}
     values |= {f"{other}.{name}": value for other in settings.axes if other != axis for name, value in (("kind", "off"), ("slow", 0.0))}
     made = changed(settings, {**values, "duration": told["seconds"]})
@@ -49,7 +96,7 @@ def with_experiment(settings: ExcitationSettings, document: object, where: str) 
     if together > own.limit * (1.0 + 1e-9):  # the drive would cut it off, and the motion would be another one
         words = f"{together:.4g} {units.input} of offset, slow and rms together"
         raise BadInput(f"{where}: excitation of axis {axis}", words, f"up to its limit of {own.limit:g} {units.input}", AGAIN)
-    return made
+    return Taken(made, {axis: needs.starts(*inside)})
 
 
 def of_an_experiment(name: str) -> bool:
@@ -75,16 +122,27 @@ def _checked(document: object, where: str) -> Mapping[str, Any]:
     lacking = [name for name in DRIVES if name not in told["excitation"]]
     if lacking:
         raise BadInput(f"{where}: excitation", f"without {', '.join(lacking)}", f"all of {', '.join(DRIVES)}", "Make the file again.")
-    travel = told["needs"].get("travel")
-    numbers = [told.get("rate"), told.get("seconds"), told["needs"].get("voltage"), *(travel if isinstance(travel, list | tuple) else ())]
-    if len(numbers) != 5 or not all(isinstance(value, int | float) and not isinstance(value, bool) for value in numbers):
-        raise BadInput(f"{where}: rate, seconds, needs", repr(numbers), "numbers", "Make the file again.")
+    for name in ("rate", "seconds", "ramp"):
+        if not _number(told.get(name)):
+            raise BadInput(f"{where}: {name}", repr(told.get(name)), "a number", "Make the file again.")
+    kinds = get_type_hints(Needs)
+    for name in told["needs"]:
+        if name not in kinds:
+            raise unknown_name(str(name), list(kinds), f"{where}: needs")
+    for name, kind in kinds.items():
+        value, one = told["needs"].get(name), kind is float
+        if not (_number(value) if one else isinstance(value, list | tuple) and len(value) == 2 and all(map(_number, value))):
+            raise BadInput(f"{where}: needs.{name}", repr(value), "a number" if one else "two numbers", "Make the file again.")
     units = told.setdefault("units", list(USUAL))
     if not isinstance(units, list | tuple) or len(units) != 2 or not all(isinstance(unit, str) for unit in units):
         raise BadInput(f"{where}: units", repr(units), "two, as [V, m]", "Make the file again.")
     if not 0.0 < told["seconds"] <= 3600.0:
         raise BadInput(f"{where}: seconds", told["seconds"], "above 0, up to 3600", "Make the file again.")
     return told
+
+
+def _number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
 class Lasting(Protocol):
@@ -95,12 +153,16 @@ class Lasting(Protocol):
         """Of the axis."""
 
     @property
+    def ramp(self) -> float:
+        """s in which it fades in."""
+
+    @property
     def seconds(self) -> float:
         """Of motion."""
 
 
-def document_of(axis: str, rate: float, experiment: Lasting, needs: tuple[float, tuple[float, float]], units: Units = USUAL) -> dict[str, Any]:
-    """The document of an experiment. rate: Hz; needs: the largest input, and the travel; units: in which they are."""
+def document_of(axis: str, rate: float, experiment: Lasting, needs: Needs, units: Units = USUAL) -> dict[str, Any]:
+    """The document of an experiment. rate: Hz; units: in which its needs are."""
     values = experiment.excitation.model_dump()
     drives = {name: values[name] for name in DRIVES}
     return {
@@ -108,8 +170,9 @@ def document_of(axis: str, rate: float, experiment: Lasting, needs: tuple[float,
             "axis": axis,
             "rate": rate,
             "seconds": experiment.seconds,
+            "ramp": experiment.ramp,
             "excitation": drives,
-            "needs": {"voltage": needs[0], "travel": list(needs[1])},
+            "needs": {name: list(value) if isinstance(value, tuple) else value for name, value in asdict(needs).items()},
             "units": list(units),
         }
     }

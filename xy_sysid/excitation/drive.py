@@ -14,6 +14,7 @@ and until the first usable position nothing is (NaN).
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -30,6 +31,7 @@ from xy_sysid.samples.block import Block, FloatArray
 from xy_sysid.settings import ExcitationSettings, knobs
 
 DriveState = Literal["idle", "active", "stopping", "stopped"]
+Starts = Mapping[str, tuple[float, float]]  # by axis, between which places it has to stand when it begins
 
 # Settings that may change while active; a new rms or offset is reached along a straight line over the next block.
 LIVE_AXIS = frozenset({"rms", "limit", "offset", "centring", "travel_min", "travel_max", "brake", "brake_voltage", "velocity_gain", "breakaway"})
@@ -59,11 +61,13 @@ class Drive:
     """The voltage of all axes, block by block.
 
     settings: what to apply; seq: counter of the first sample; watched: stop when motion and voltage do not fit (a recording of a
-    simulated machine goes on). Raises BadInput if a signal does not fit the rate.
+    simulated machine goes on); starts: where an experiment may begin. Raises BadInput if a signal does not fit the rate.
     """
 
-    def __init__(self, settings: ExcitationSettings, seq: int = 0, watched: bool = True) -> None:
+    def __init__(self, settings: ExcitationSettings, seq: int = 0, watched: bool = True, starts: Starts | None = None) -> None:
         self.axes = tuple(settings.axes)
+        anywhere = (-np.inf, np.inf)
+        self._starts = np.array([(starts or {}).get(axis, anywhere) for axis in self.axes])  # (axes, 2) m
         self._watched = watched
         self.state: DriveState = "idle"
         self.reason = ""
@@ -159,6 +163,7 @@ class Drive:
         self._silence, self._unusable, self._seen_time = 0.0, 0, float(block.time[-1])
         if self._start is None:
             self._start = values[-1].copy()
+            self._check_start(values[-1])
             outside = (values[-1] < self._travel.low) | (values[-1] > self._travel.high)
             if self.settings.holds and outside.any():
                 axis = int(np.argmax(outside))
@@ -170,6 +175,16 @@ class Drive:
             self.fault = True
             self.stop(reason, self.settings.abort_ramp)
         return True
+
+    def _check_start(self, place: FloatArray) -> None:
+        """Stop before anything moves where an experiment was designed to begin at other places."""
+        low, high = self._starts.T
+        outside = (place < low) | (place > high)
+        if outside.any():
+            axis, unit = int(np.argmax(outside)), self.settings.unit
+            self.fault = True
+            designed = f"its experiment was designed to begin between {low[axis]:.6g} and {high[axis]:.6g} {unit}"
+            self.stop(f"{self.axes[axis]} stands at {place[axis]:.6g} {unit}, and {designed}. Move it there, or design it again", 0.0)
 
     def _wrong(self, seq: FloatArray, values: FloatArray) -> str:
         """What the motion shows to be wrong, or nothing."""

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from xy_sysid.errors import BadInput
-from xy_sysid.excitation.drive import LIVE, Drive
+from xy_sysid.excitation.drive import LIVE, Drive, Starts
 from xy_sysid.excitation.motion_plan import MotionPlan, MotionPoints
 from xy_sysid.excitation.trajectory import MotionLimits, Trajectory, trajectory
 from xy_sysid.samples.block import Block, FloatArray
@@ -25,9 +25,9 @@ BEHIND = 0.1  # s of motion that is over in a message, for a controller whose cl
 class TrajectoryDrive(Drive):
     """As ``Drive``; ``message`` is what the controller has to be told."""
 
-    def __init__(self, settings: ExcitationSettings, seq: int = 0, watched: bool = True) -> None:
+    def __init__(self, settings: ExcitationSettings, seq: int = 0, watched: bool = True, starts: Starts | None = None) -> None:
         """See ``Drive``. Raises BadInput for a motion that its limits do not allow."""
-        super().__init__(settings, seq, watched)
+        super().__init__(settings, seq, watched, starts)
         self._motions = [_motion(name, axis, settings) for name, axis in settings.axes.items()]
         self._plan: MotionPlan | None = None
         self._first = 0  # counter at the start of the plan
@@ -165,9 +165,9 @@ class TrajectoryDrive(Drive):
         return np.tile(self.safe, (n, 1)) if self._plan is None else self._plan.at(self._sample, n).position
 
 
-def drive_of(settings: ExcitationSettings, seq: int = 0) -> Drive:
+def drive_of(settings: ExcitationSettings, seq: int = 0, starts: Starts | None = None) -> Drive:
     """The drive that these settings ask for; raises BadInput as it does."""
-    return (TrajectoryDrive if settings.command == "joint_trajectory" else Drive)(settings, seq)
+    return (TrajectoryDrive if settings.command == "joint_trajectory" else Drive)(settings, seq, starts=starts)
 
 
 def _motion(name: str, axis: AxisExcitation, settings: ExcitationSettings) -> Trajectory | None:

@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 from xy_sysid.axis.forward import move
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.experiment_design.beliefs import Belief
-from xy_sysid.experiment_design.criteria import ALIKE, BLOCK, COARSE, ENOUGH, FINAL, JUDGED, LOOKED, NO_EVIDENCE, ROUNDS, SURE
+from xy_sysid.experiment_design.criteria import ALIKE, BLOCK, COARSE, ENOUGH, FINAL, JUDGED, NO_EVIDENCE, ROUNDS, SURE
 from xy_sysid.experiment_design.evidence import Power, powers, seconds_needed, settled
-from xy_sysid.experiment_design.experiment import RAMP, Experiment
+from xy_sysid.experiment_design.experiment import Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
 from xy_sysid.experiment_design.prediction import Setting, seen
 from xy_sysid.experiment_design.proposals import neighbours, proposals
@@ -43,8 +43,14 @@ class Judged:
         """Least is best; where none gets anywhere the evidence a second decides."""
         rate = sum(min((one.rate for one in item), default=0.0) for item in self.each)
         if math.isfinite(self.seconds):
-            return max(self.seconds + RAMP, self.shortest), 0.0, -rate
+            return max(self.seconds + self.experiment.ramp, self.shortest), 0.0, -rate
         return math.inf, -round(self.probability / ALIKE), -rate
+
+    def lasting(self, seconds: float) -> Judged:
+        """The same for so many s, and what it is worth then."""
+        steady = seconds - self.experiment.ramp
+        reached = self.seconds if self.seconds <= steady else math.inf
+        return replace(self, experiment=self.experiment.lasting(seconds), seconds=reached, probability=settled(self.each, steady))
 
 
 @dataclass(frozen=True)
@@ -59,12 +65,7 @@ class Design:
 
     def lasting(self, seconds: float) -> Design:
         """The same with so many s for the best experiment, and what it promises then."""
-        if self.best is None:
-            return self
-        steady = seconds - RAMP
-        reached = self.best.seconds if self.best.seconds <= steady else math.inf
-        best = replace(self.best, experiment=self.best.experiment.lasting(seconds), seconds=reached, probability=settled(self.best.each, steady))
-        return replace(self, best=best)
+        return self if self.best is None else replace(self, best=self.best.lasting(seconds))
 
     def broken(self, experiment: Experiment) -> str:
         """Which limit an experiment would come too near to in all of its time, by any draw, in a word, or nothing."""
@@ -92,7 +93,7 @@ def design(
     setting: Setting, beliefs: Sequence[Belief], limits: MachineLimits, seed: int = 1, tell: Callable[[float], None] = lambda part: None
 ) -> Design:
     """The experiment for some beliefs; tell: called with the part that is done."""
-    rate = setting.layout.sampling_rate
+    setting, rate = replace(setting, ramp=limits.ramp), setting.layout.sampling_rate
     first = proposals(limits, rate, seed)
     judged = []
     for number, proposal in enumerate(first):
@@ -129,7 +130,7 @@ def broken_in_time(models: Sequence[AxisModel], rate: float, limits: MachineLimi
 def judge(setting: Setting, beliefs: Sequence[Belief], limits: MachineLimits, experiment: Experiment, draws: int | None = None) -> Judged:
     """What one experiment is worth; draws: of each set that are looked at, None is all."""
     told = experiment.excitation
-    seconds = max(LOOKED, min(2.0 * told.slow_period * (told.slow > 0.0), limits.seconds) + RAMP)
+    seconds = max(setting.looked, min(2.0 * told.slow_period * (told.slow > 0.0), limits.seconds) + limits.ramp)
     looked = [(number, model) for number, belief in enumerate(beliefs) for model in belief.draws[:draws]]
     motions = []
     for _, model in looked:
@@ -140,25 +141,24 @@ def judge(setting: Setting, beliefs: Sequence[Belief], limits: MachineLimits, ex
     rounds = 1 if draws else ROUNDS
     pairs = zip(looked, motions, strict=True)
     each = [tuple(powers(beliefs, number, model, seen(setting, motion), rounds)) for (number, model), motion in pairs]
-    most = limits.seconds - RAMP
+    most = limits.seconds - limits.ramp
     needed, chance = seconds_needed(each, most), settled(each, most)
-    least = max(setting.shortest(), told.slow_period + RAMP if told.slow > 0.0 else 0.0)
+    least = max(setting.shortest(), told.slow_period + limits.ramp if told.slow > 0.0 else 0.0)
     return Judged(experiment, seconds=needed, probability=chance, each=tuple(each), shortest=least)
 
 
 def _timed(item: Judged, limits: MachineLimits) -> Judged:
     """With the seconds that it should last."""
-    most = limits.seconds - RAMP
+    most = limits.seconds - limits.ramp
     steps = (BLOCK * k for k in range(1, math.ceil(most / BLOCK)))
     wanted = item.seconds
     if not math.isfinite(wanted):
         wanted = next((step for step in steps if settled(item.each, step) >= ENOUGH * item.probability), most)
-    seconds = min(BLOCK * math.ceil(max(wanted + RAMP, item.shortest) / BLOCK), limits.seconds)
-    return replace(item, experiment=item.experiment.lasting(seconds))
+    return item.lasting(min(BLOCK * math.ceil(max(wanted + limits.ramp, item.shortest) / BLOCK), limits.seconds))
 
 
-def expects(found: Design) -> str:
-    """What the best experiment promises, in a sentence."""
+def expects(found: Design, wanted: float = 0.0) -> str:
+    """What the best experiment promises, in a sentence. wanted: s that it was designed for, where a budget may have left less."""
     names = f"{found.beliefs[0].name} and {' or '.join(item.name for item in found.beliefs[1:])}"
     if found.best is None:
         why = sorted({item.broken for item in found.tried if item.broken})
@@ -166,6 +166,9 @@ def expects(found: Design) -> str:
     chance = f"{100.0 * found.best.probability:.0f} %"
     if found.possible:
         return f"After {found.best.experiment.seconds:.0f} s, {names} are distinguished with {100.0 * SURE:.0f} % probability."
+    if found.best.experiment.seconds < wanted:
+        left = f"{found.best.experiment.seconds:.0f} s that the budget leaves"
+        return f"In the {left}, {names} are distinguished with {chance} probability; {wanted:.0f} s were designed."
     if found.alike:
         return f"Within the limits of this machine {names} are the same: no experiment has evidence for one of them."
     if found.helps:

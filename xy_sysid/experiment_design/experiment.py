@@ -13,7 +13,7 @@ from xy_sysid.samples.block import FloatArray
 from xy_sysid.settings import AxisExcitation, ExcitationSettings
 from xy_sysid.units import USUAL, Units, readable
 
-RAMP = float(ExcitationSettings.model_fields["ramp"].default)  # s in which the excitation fades in
+RAMP = float(ExcitationSettings.model_fields["ramp"].default)  # s in which the excitation fades in, where nobody says another time
 AGE = 0.04  # s: age of the position by which the excitation pulls back to the start
 KEPT = 64  # signals, as many as differ in more than their amplitude
 BANDED = ("noise", "multisine", "multisine_odd", "multisine_detect", "sweep", "stepped_sine", "prbs")  # kinds that have a band
@@ -29,10 +29,11 @@ def unit_signal(told: AxisExcitation, sampling_rate: float, n: int) -> FloatArra
 
 @dataclass(frozen=True, slots=True)
 class Experiment:
-    """excitation: of the axis, with its limits; seconds: of motion."""
+    """excitation: of the axis, with its limits; seconds: of motion; ramp: s in which it fades in."""
 
     excitation: AxisExcitation
     seconds: float = 0.0
+    ramp: float = RAMP
 
     def lasting(self, seconds: float) -> Experiment:
         """The same for another time."""
@@ -42,7 +43,7 @@ class Experiment:
         """What it makes of an axis that stands at ``start``, as ``excitation.drive.Drive`` does between its guards."""
         told, n = self.excitation, round(seconds * sampling_rate)
         time = np.arange(n) / sampling_rate
-        fade = 0.5 * (1.0 - np.cos(np.pi * np.minimum(time / RAMP, 1.0)))
+        fade = 0.5 * (1.0 - np.cos(np.pi * np.minimum(time / self.ramp, 1.0))) if self.ramp else np.ones(n)
         voltage = told.rms * self._signal(sampling_rate, n) + told.offset + told.slow * np.sin(2.0 * np.pi * time / told.slow_period)
         return DriveInput(
             voltage=np.asarray(voltage * fade), pull=told.centring * fade, limit=told.limit, seen=round(AGE * sampling_rate), start=start

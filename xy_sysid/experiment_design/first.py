@@ -1,7 +1,9 @@
 """A first experiment for an axis of which nothing is known but its limits.
 
 An axis is taken to cross its travel at full voltage in between a third of a second and ten seconds, with any pole, delay and dry friction that
-machines have. The experiment keeps within the limits for every draw of these, and tells most about gain, delay and pole in the mean over them.
+machines have, and with a load that its friction holds: the axis rests at 0 V, which the first run (``xy-sysid run --first``) tells.
+
+The experiment keeps within the limits for every draw of these, and tells most about gain, delay and pole in the mean over them.
 """
 
 from __future__ import annotations
@@ -13,13 +15,13 @@ from threadpoolctl import threadpool_limits
 
 from xy_sysid.axis.forward import move
 from xy_sysid.axis.model import AxisModel
-from xy_sysid.effects import SIMPLEST_FRICTION
+from xy_sysid.effects import EFFECTS, SIMPLEST_FRICTION
 from xy_sysid.experiment_design.beliefs import Belief
 from xy_sysid.experiment_design.criteria import COARSE, FITTED, LOOKED
 from xy_sysid.experiment_design.design import broken_in_time
-from xy_sysid.experiment_design.experiment import RAMP, Experiment
+from xy_sysid.experiment_design.experiment import Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
-from xy_sysid.experiment_design.of_run import NextExperiment
+from xy_sysid.experiment_design.of_run import NextExperiment, with_needs
 from xy_sysid.experiment_design.precision import Information, information
 from xy_sysid.experiment_design.prediction import Setting, seen
 from xy_sysid.experiment_design.proposals import proposals
@@ -32,6 +34,8 @@ CROSSES = (0.3, 10.0)  # s in which an axis crosses its travel at full voltage
 POLE = (5.0, 500.0)  # rad/s
 DELAY = (0.5e-3, 5e-3)  # s
 FRICTION = (0.01, 0.2)  # of the full voltage
+LOAD = next(effect for effect in EFFECTS.values() if len(effect.parameters) == 1 and effect.parameters[0].per_recording)
+HELD = 1.0  # of the friction, which holds it
 COUNTS = 1e5  # of the encoder within the travel, at least
 WIDTH = 0.05  # half of the 95 % interval of gain and pole that is asked for
 DRAWS = 8
@@ -41,7 +45,7 @@ SHORTEST = 30.0  # s: a diagnosis needs windows that judge, whatever gain and po
 def first_experiment(axis: str, sampling_rate: float, limits: MachineLimits, seed: int = 1) -> NextExperiment:
     """A good first experiment for an unknown axis: how loud, which band, how long. Raises BadInput for limits that make no sense."""
     encoder = (limits.travel[1] - limits.travel[0]) / COUNTS / math.sqrt(12.0)
-    setting = Setting(bands(sampling_rate, int(LOOKED * sampling_rate / WINDOWS)), encoder, EPSILON)
+    setting = Setting(bands(sampling_rate, int(LOOKED * sampling_rate / WINDOWS)), encoder, EPSILON, ramp=limits.ramp)
     models = _draws(limits, seed)
     judged = []
     with threadpool_limits(1, "blas"):
@@ -60,22 +64,10 @@ def first_experiment(axis: str, sampling_rate: float, limits: MachineLimits, see
         return NextExperiment(axis=axis, sampling_rate=sampling_rate, sentence=sentence, limits=limits)
     found, best = chosen
     seconds = best.seconds
-    drive = best.drive(sampling_rate, seconds, limits.start)
-    motions = [move(model, sampling_rate, drive, COARSE) for model in models]
-    free = 1.0 - limits.margin
-    low, high = (float(end([end(motion.position) for motion in motions])) - limits.start for end in (np.min, np.max))
     share = float(np.mean([_width(item, seconds) <= WIDTH for item in found]))
     sentence = f"After {seconds:.0f} s, gain and pole are known to {100.0 * WIDTH:.0f} % on {100.0 * share:.0f} % of the axes that may be there."
-    return NextExperiment(
-        axis=axis,
-        sampling_rate=sampling_rate,
-        sentence=sentence,
-        limits=limits,
-        experiment=best,
-        probability=share,
-        voltage=max(float(np.max(np.abs(motion.voltage))) for motion in motions),
-        travel=(max(limits.start + low / free, limits.travel[0]), min(limits.start + high / free, limits.travel[1])),
-    )
+    made = NextExperiment(axis=axis, sampling_rate=sampling_rate, sentence=sentence, limits=limits, experiment=best, probability=share)
+    return with_needs(made, models)
 
 
 def _draws(limits: MachineLimits, seed: int) -> list[AxisModel]:
@@ -86,14 +78,15 @@ def _draws(limits: MachineLimits, seed: int) -> list[AxisModel]:
         crosses, pole, delay, friction = (low * (high / low) ** random.uniform() for low, high in (CROSSES, POLE, DELAY, FRICTION))
         gain = (limits.travel[1] - limits.travel[0]) / (limits.voltage * (crosses if number else CROSSES[0]))
         rubs = friction if number else FRICTION[0]
-        found.append(AxisModel(gain, delay, pole).with_effect(SIMPLEST_FRICTION.name, (rubs * limits.voltage,)))
+        model = AxisModel(gain, delay, pole).with_effect(SIMPLEST_FRICTION.name, (rubs * limits.voltage,))
+        found.append(model.with_effect(LOAD.name, (random.uniform(-HELD, HELD) * rubs * limits.voltage,)))
     return found
 
 
 def _informations(setting: Setting, models: list[AxisModel], limits: MachineLimits, experiment: Experiment) -> list[Information]:
     rate = setting.layout.sampling_rate
     told = experiment.excitation
-    seconds = max(LOOKED, (told.slow_period + RAMP) * (told.slow > 0.0))
+    seconds = max(setting.looked, (told.slow_period + limits.ramp) * (told.slow > 0.0))
     motions = []
     for model in models:
         motions.append(move(model, rate, experiment.drive(rate, seconds, limits.start), COARSE))
@@ -104,9 +97,10 @@ def _informations(setting: Setting, models: list[AxisModel], limits: MachineLimi
 
 def _believed(model: AxisModel) -> Belief:
     """A draw as if it were known, so that its sensitivities can be asked for."""
-    low, high = np.array([-np.inf, 0.0, 1e-2, 1e-9]), np.array([np.inf, 1.0, 1e5, 1e3])
-    scale = Scale(low, high, np.array([False, False, True, True]), np.array([model.gain, model.delay, 1.0, 1.0]))
-    return Belief(effects=(SIMPLEST_FRICTION.name,), model=model, draws=(model,), scale=scale, precision=np.eye(4), free=1, force=0.0, motion=0.0)
+    low, high = np.array([-np.inf, 0.0, 1e-2, 1e-9, -np.inf]), np.array([np.inf, 1.0, 1e5, 1e3, np.inf])
+    scale = Scale(low, high, np.array([False, False, True, True, False]), np.array([model.gain, model.delay, 1.0, 1.0, 1.0]))
+    effects = tuple(name for name, _ in model.effects)
+    return Belief(effects=effects, model=model, draws=(model,), scale=scale, precision=np.eye(5), free=2, force=0.0, motion=0.0)
 
 
 def _width(item: Information, seconds: float) -> float:

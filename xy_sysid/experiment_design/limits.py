@@ -5,14 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from xy_sysid.axis.forward import Motion
 from xy_sysid.errors import BadInput
+from xy_sysid.excitation.motion_check import most_centring
 from xy_sysid.experiment_design.criteria import MARGIN
+from xy_sysid.experiment_design.experiment import RAMP
 from xy_sysid.samples.recording import Run
-from xy_sysid.settings import AxisExcitation
+from xy_sysid.settings import AxisExcitation, ExcitationSettings
 from xy_sysid.units import USUAL, Units, readable
 
 SECONDS = 60.0  # s of motion for one experiment at most
@@ -23,9 +26,10 @@ class MachineLimits:
     """Of one axis.
 
     voltage: V, of each sample; rms: V, that the drive stands for long (its current); speed: m/s; acceleration: m/s^2
-    travel: (low, high) m; start: m, where the axis stands when an experiment begins
+    travel: (low, high) m; start: m, where the axis stands when an experiment begins; with recordings it is where the last one ends
     margin: part of speed, acceleration and travel that is kept free; seconds: s of one experiment at most
     centring: V/m, of the excitation's pull to the start, beyond which the axis would swing
+    ramp: s in which the excitation fades in; brake: m before each end of the travel in which it brakes, and no experiment goes
     units: of the axis, in which the limits are told; V and m stand for them above
     """
 
@@ -38,6 +42,8 @@ class MachineLimits:
     margin: float = MARGIN
     seconds: float = SECONDS
     centring: float = math.inf
+    ramp: float = RAMP
+    brake: float = 0.0
     units: Units = USUAL
 
     def __post_init__(self) -> None:
@@ -53,8 +59,9 @@ class MachineLimits:
             raise BadInput("travel", self.span(self.travel), allowed, "Give ends that lie nearer, or positions in a larger unit.")
         if not 0.0 <= self.margin < 1.0:
             raise BadInput("margin", self.margin, "0 to below 1", "Give the part of each limit that is kept free.")
-        if not self.travel[0] < self.start < self.travel[1]:
-            allowed = f"where the axis stands, {self.place(self.start)}, between its ends"
+        if not self.travel[0] + self.brake < self.start < self.travel[1] - self.brake:
+            zones = f" without brake zones of {self.place(self.brake)}" if self.brake else ""
+            allowed = f"where the axis stands, {self.place(self.start)}, between its ends{zones}"
             raise BadInput("travel", self.span(self.travel), allowed, "Give the ends of the travel, or move the axis between them.")
 
     def place(self, where: float) -> str:
@@ -62,44 +69,75 @@ class MachineLimits:
         scale, unit = readable(self.units.output)
         return f"{scale * where:.4g} {unit}"
 
-    def span(self, travel: tuple[float, float]) -> str:
+    def span(self, travel: tuple[float, float], to: str = " to ") -> str:
         """Two places as people read them."""
         scale, _ = readable(self.units.output)
-        return f"{scale * travel[0]:.4g} to {self.place(travel[1])}"
+        return f"{scale * travel[0]:.4g}{to}{self.place(travel[1])}"
 
     @property
     def room(self) -> float:
         """m from the start to the nearer end, with the margin."""
-        return (1.0 - self.margin) * min(self.start - self.travel[0], self.travel[1] - self.start)
+        return min(map(self._free, (self.start - self.travel[0], self.travel[1] - self.start)))
+
+    def _free(self, way: float) -> float:
+        """m of the way to an end that a motion may take: up to the margin, and not into the brake zone."""
+        return min((1.0 - self.margin) * way, way - self.brake)
+
+    def needed(self, low: float, high: float) -> tuple[float, float]:
+        """The travel that a motion between two places needs, with the margin."""
+        free = 1.0 - self.margin
+        return max(self.start + (low - self.start) / free, self.travel[0]), min(self.start + (high - self.start) / free, self.travel[1])
 
     def broken(self, motion: Motion) -> str:
         """Which limit a motion would come too near to, in a word, or nothing."""
         if not np.all(np.isfinite(motion.position)):
             return "a model that runs away"
-        speed = np.diff(motion.position) * motion.sampling_rate
-        count = max(round(1e-3 * motion.sampling_rate), 1)  # over a millisecond
-        acceleration = np.diff(speed[::count]) * motion.sampling_rate / count
+        speed, acceleration = fastest(motion)
         free = 1.0 - self.margin
         away = motion.position - self.start
         checks = (
             ("voltage", _peak(motion.voltage), self.voltage * (1.0 + 1e-9)),
             ("rms", float(np.sqrt(np.mean(motion.voltage**2))), self.rms),
-            ("speed", _peak(speed), free * self.speed),
-            ("acceleration", _peak(acceleration), free * self.acceleration),
-            ("travel", float(np.max(away)), free * (self.travel[1] - self.start)),
-            ("travel", -float(np.min(away)), free * (self.start - self.travel[0])),
+            ("speed", speed, free * self.speed),
+            ("acceleration", acceleration, free * self.acceleration),
+            ("travel", float(np.max(away)), self._free(self.travel[1] - self.start)),
+            ("travel", -float(np.min(away)), self._free(self.start - self.travel[0])),
         )
         return next((name for name, value, most in checks if value > most), "")
 
 
-def as_recorded(runs: Sequence[Run]) -> MachineLimits:
-    """Nothing beyond what some recordings show: their largest voltage, and their travel about where the last one ends."""
-    voltage = max(_peak(run.voltage) for run in runs)
-    low, high = min(float(np.min(run.position)) for run in runs), max(float(np.max(run.position)) for run in runs)
-    if not (voltage > 0.0 and high > low):
+def fastest(motion: Motion) -> tuple[float, float]:
+    """The largest speed and acceleration of a motion, m/s and m/s^2."""
+    speed = np.diff(motion.position) * motion.sampling_rate
+    count = max(round(1e-3 * motion.sampling_rate), 1)  # over a millisecond
+    return _peak(speed), _peak(np.diff(speed[::count]) * motion.sampling_rate / count)
+
+
+def of_settings(settings: ExcitationSettings, axis: str) -> dict[str, Any]:
+    """The limits of an axis, by name, in the settings of its excitation."""
+    own = settings.axes[axis]
+    return {
+        "voltage": own.limit,
+        "travel": (own.travel_min, own.travel_max),
+        "speed": own.max_speed or math.inf,
+        "acceleration": own.max_acceleration or math.inf,
+        "ramp": settings.ramp,
+        "brake": own.brake,
+        "centring": float(most_centring(settings)[list(settings.axes).index(axis)]),
+    }
+
+
+def as_recorded(runs: Sequence[Run], **told: Any) -> MachineLimits:
+    """Nothing beyond what some recordings show: the largest voltage of all, and the travel of the last one, from where it ends.
+
+    Another recording may have another zero, so its places say nothing of those of the last one. told: limits that are known
+    Raises BadInput where the last recording does not move, or ends where it went farthest.
+    """
+    voltage, last = max(_peak(run.voltage) for run in runs), runs[-1]
+    travel = float(np.min(last.position)), float(np.max(last.position))
+    if not (("voltage" in told or voltage > 0.0) and ("travel" in told or travel[1] > travel[0])):
         raise BadInput("recordings", "without voltage or motion", "an axis that moves", "Give the limits: voltage and travel.")
-    start, least = float(runs[-1].position[-1]), 0.1 * (high - low)
-    return MachineLimits(voltage=voltage, travel=(min(low, start - least), max(high, start + least)), start=start, units=runs[-1].units)
+    return MachineLimits(**{"voltage": voltage, "travel": travel, "start": float(last.position[-1]), "units": last.units, **told})
 
 
 def _peak(values: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> float:

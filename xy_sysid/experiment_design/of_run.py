@@ -10,15 +10,16 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from xy_sysid.axis.forward import move
-from xy_sysid.axis.model import STANDARD, Library
+from xy_sysid.axis.model import STANDARD, AxisModel, Library
 from xy_sysid.diagnosis.answer import Answer
 from xy_sysid.diagnosis.equal_laws import equals
 from xy_sysid.errors import BadInput
-from xy_sysid.experiment_design.beliefs import Belief, Evidence, believed
+from xy_sysid.excitation.designed import Needs
+from xy_sysid.experiment_design.beliefs import Evidence, believed
 from xy_sysid.experiment_design.criteria import COARSE, DRAWN
 from xy_sysid.experiment_design.design import Design, design, expects
 from xy_sysid.experiment_design.experiment import Experiment
-from xy_sysid.experiment_design.limits import MachineLimits, as_recorded
+from xy_sysid.experiment_design.limits import MachineLimits, as_recorded, fastest
 from xy_sysid.experiment_design.precision import Precision, sharpest
 from xy_sysid.experiment_design.prediction import Setting
 from xy_sysid.experiment_design.rivals import beliefs_of, names_of, possible, standing
@@ -33,7 +34,7 @@ class NextExperiment:
 
     experiment: None where none helps; sentence: what it is expected to bring; sets: of effects that it is to distinguish
     probability: that it tells; settles: whether that is 95 % or more; ask: what a person would have to change, or nothing
-    voltage, travel: the largest input and the places that it needs; limits: within which it was chosen, with the units of the axis
+    needs: what it asks of the axis; limits: within which it was chosen, with the units of the axis
     """
 
     axis: str
@@ -45,8 +46,7 @@ class NextExperiment:
     probability: float = 0.0
     settles: bool = False
     ask: str = ""
-    voltage: float = 0.0
-    travel: tuple[float, float] = (0.0, 0.0)
+    needs: Needs | None = None
 
     @property
     def seconds(self) -> float:
@@ -68,7 +68,8 @@ def next_experiment(
 ) -> NextExperiment:
     """The experiment that best distinguishes what a diagnosis left open.
 
-    found:   of ``diagnose``; limits: what the experiment may ask of the machine, None: nothing beyond what the recordings show
+    found:   of ``diagnose``; limits: what the experiment may ask of the machine, None: nothing beyond what the recordings show; it begins
+             where the last recording ends
     between: sets of effects that are to be distinguished, instead of those that the diagnosis leaves possible
     Raises BadInput for a diagnosis without enough data, and for effects that free simulation cannot predict.
     """
@@ -110,7 +111,7 @@ def sharpen(found: Answer, parameter: str, width: float, limits: MachineLimits |
         sentence = f"After {best.experiment.seconds:.0f} s, {parameter} is known to {to} (95 %), now {100.0 * best.before:.2g} %."
     else:
         sentence = f"No experiment within the limits makes {parameter} known to {100.0 * width:.2g} %: the best reaches {to}."
-    return _needs(
+    return with_needs(
         NextExperiment(
             axis=found.runs[0].axis,
             sampling_rate=data.sampling_rate,
@@ -119,7 +120,7 @@ def sharpen(found: Answer, parameter: str, width: float, limits: MachineLimits |
             experiment=best.experiment,
             settles=best.possible,
         ),
-        beliefs,
+        [model for belief in beliefs for model in belief.draws],
     )
 
 
@@ -130,8 +131,9 @@ def _data(found: Answer, tolerance: float) -> AxisData:
 
 
 def _limits(found: Answer, limits: MachineLimits | None) -> MachineLimits:
-    """Those that were given, in the units of the recordings; without, what the recordings show."""
-    return as_recorded(found.runs) if limits is None else replace(limits, units=found.runs[-1].units)
+    """Those that were given, in the units of the recordings, from where the last one ends; without, what the recordings show."""
+    last = found.runs[-1]
+    return as_recorded(found.runs) if limits is None else replace(limits, units=last.units, start=float(last.position[-1]))
 
 
 def check_enough(found: Answer) -> None:
@@ -140,21 +142,25 @@ def check_enough(found: Answer) -> None:
         raise BadInput("diagnosis", found.verdict, "one of data that suffice", "Record for longer, or ask for a first experiment (--for nothing).")
 
 
-def answered(axis: str, rate: float, made: Design, library: Library) -> NextExperiment:
-    """A design as an answer: the experiment with what it needs, what it is expected to bring, and what a person would have to change."""
-    best = made.best if made.helps else None
+def answered(axis: str, rate: float, made: Design, library: Library, following: Experiment | None = None) -> NextExperiment:
+    """A design as an answer: the experiment with what it needs, what it is expected to bring, and what a person would have to change.
+
+    following: the experiment that is run whatever it may tell; None: the best one, if it may tell
+    """
+    if following is None and made.best is not None and made.helps:
+        following = made.best.experiment
     found = NextExperiment(
         axis=axis,
         sampling_rate=rate,
         sentence=expects(made),
         limits=made.limits,
-        experiment=best.experiment if best is not None else None,
+        experiment=following,
         sets=tuple(item.effects for item in made.beliefs),
         probability=made.best.probability if made.best is not None else 0.0,
         settles=made.possible,
         ask=_ask(library, made),
     )
-    return _needs(found, made.beliefs)
+    return with_needs(found, [model for belief in made.beliefs for model in belief.draws])
 
 
 def _ask(library: Library, made: Design) -> str:
@@ -169,16 +175,23 @@ def _ask(library: Library, made: Design) -> str:
     return f"{library[new[0]].experiment[:1].upper()}{library[new[0]].experiment[1:]}." if new else ""
 
 
-def _needs(found: NextExperiment, beliefs: Sequence[Belief]) -> NextExperiment:
-    """With the voltage and the travel that the experiment needs by any draw of its models, and the margin."""
+def with_needs(found: NextExperiment, models: Sequence[AxisModel]) -> NextExperiment:
+    """With what the experiment needs by any of some models: voltage, travel, speed and acceleration with the margin, and from where."""
     if found.experiment is None:
         return found
     limits, rate = found.limits, found.sampling_rate
     drive = found.experiment.drive(rate, found.seconds, limits.start)
-    motions = [move(model, rate, drive, COARSE) for belief in beliefs for model in belief.draws]
-    free = 1.0 - limits.margin
-    low = min(float(np.min(motion.position)) for motion in motions) - limits.start
-    high = max(float(np.max(motion.position)) for motion in motions) - limits.start
-    travel = max(limits.start + low / free, limits.travel[0]), min(limits.start + high / free, limits.travel[1])
-    voltage = max(float(np.max(np.abs(motion.voltage))) for motion in motions)
-    return replace(found, voltage=voltage, travel=travel)
+    motions = [move(model, rate, drive, COARSE) for model in models]
+    quick, free = [fastest(motion) for motion in motions], 1.0 - limits.margin
+    low = min(float(np.min(motion.position)) for motion in motions)
+    high = max(float(np.max(motion.position)) for motion in motions)
+    needs = Needs(
+        voltage=max(float(np.max(np.abs(motion.voltage))) for motion in motions),
+        travel=limits.needed(low, high),
+        start=limits.start,
+        reach=(low - limits.start, high - limits.start),
+        within=limits.travel,
+        speed=min(max(speed for speed, _ in quick) / free, limits.speed),
+        acceleration=min(max(acceleration for _, acceleration in quick) / free, limits.acceleration),
+    )
+    return replace(found, needs=needs)

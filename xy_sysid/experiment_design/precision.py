@@ -18,7 +18,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.experiment_design.beliefs import Belief, Evidence, believed
 from xy_sysid.experiment_design.criteria import COARSE, DRAWN, FINAL, FITTED, LONGER, SHORTEST
 from xy_sysid.experiment_design.design import broken_in_time
-from xy_sysid.experiment_design.experiment import RAMP, Experiment
+from xy_sysid.experiment_design.experiment import Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
 from xy_sysid.experiment_design.prediction import Recorded, Setting, expected_error, predicted, recorded, slopes
 from xy_sysid.experiment_design.proposals import neighbours, proposals
@@ -102,8 +102,8 @@ def sharpest(data: AxisData, found: GreyboxFit, limits: MachineLimits, target: P
     before = target.of_interval(found.parameter(target.parameter))
     if before <= target.width:
         return Sharpest(None, before, True, before)
-    setting, belief = Setting.of(data), believed(Evidence(data, limits.travel), found, DRAWN)
-    most = limits.seconds - RAMP
+    setting, belief = Setting.of(data, limits.ramp), believed(Evidence(data, limits.travel), found, DRAWN)
+    most = limits.seconds - limits.ramp
     judged: list[tuple[float, float, int, Experiment]] = []
     for experiment in _rounds(setting, belief, limits, target, seed):
         told = informations(setting, belief, limits, experiment)
@@ -116,7 +116,7 @@ def sharpest(data: AxisData, found: GreyboxFit, limits: MachineLimits, target: P
         return not broken_in_time(belief.draws, data.sampling_rate, limits, experiment)
 
     for seconds, _, _, best in sorted(judged, key=lambda item: item[:3]):
-        lasts = min(max(math.ceil((seconds if math.isfinite(seconds) else most) + RAMP), SHORTEST), limits.seconds)
+        lasts = min(max(math.ceil((seconds if math.isfinite(seconds) else most) + limits.ramp), SHORTEST), limits.seconds)
         if not stays(best.lasting(float(lasts))):
             continue
         while True:
@@ -140,7 +140,7 @@ def rehearsed(data: AxisData, belief: Belief, experiment: Experiment, limits: Ma
 
 def _rounds(setting: Setting, belief: Belief, limits: MachineLimits, target: Precision, seed: int) -> Sequence[Experiment]:
     """Proposals, and neighbours of the best of them."""
-    rate, most = setting.layout.sampling_rate, limits.seconds - RAMP
+    rate, most = setting.layout.sampling_rate, limits.seconds - limits.ramp
     first = proposals(limits, rate, seed)
     judged: list[tuple[float, float, int, Experiment]] = []
     for experiment in first:

@@ -25,6 +25,7 @@ class Setting:
 
     layout: windows and bands; encoder: m; epsilon: part of the motion to which laws are trusted; recorded: s of each recording at hand
     response: (bands,) |G|^2 of the machine to a force, as recorded (``greybox.floor``); None where nothing is recorded yet
+    ramp: s in which an experiment fades in
     """
 
     layout: Bands
@@ -32,16 +33,24 @@ class Setting:
     epsilon: float
     recorded: tuple[float, ...] = ()
     response: FloatArray | None = None
+    ramp: float = RAMP
+
+    @property
+    def looked(self) -> float:
+        """s of an experiment that are simulated: as many steady ones, however slowly it fades in."""
+        return LOOKED - RAMP + self.ramp
 
     @staticmethod
-    def of(data: AxisData) -> Setting:
+    def of(data: AxisData, ramp: float = RAMP) -> Setting:
         """As some data were seen, in windows for recordings as long as those that are simulated."""
         recorded = tuple(size / data.sampling_rate for size in data.counts(early=False))
         longest = max(LOOKED, *recorded)
         layout = bands(data.sampling_rate, int(longest * data.sampling_rate / WINDOWS))
         known, asked = (np.log(0.5 * (each.edges()[1:] + each.edges()[:-1])) for each in (data.layout, layout))
         response = np.exp(np.interp(asked, known, np.log(np.maximum(data.floor.response, 1e-300))))
-        return Setting(layout=layout, encoder=data.floor.encoder, epsilon=data.floor.epsilon, recorded=recorded, response=np.asarray(response))
+        return Setting(
+            layout=layout, encoder=data.floor.encoder, epsilon=data.floor.epsilon, recorded=recorded, response=np.asarray(response), ramp=ramp
+        )
 
     def shortest(self) -> float:
         """s of an experiment that holds windows which judge it, when it is compared together with the recordings at hand.
@@ -52,7 +61,7 @@ class Setting:
         while True:
             every = (*self.recorded, seconds)
             window = bands(rate, int(min(sum(every) / WINDOWS, max(every) / ROOM) * rate)).length / rate
-            if seconds - RAMP >= CYCLES * (SEEN + HELD) * window:
+            if seconds - self.ramp >= CYCLES * (SEEN + HELD) * window:
                 return seconds
             seconds += BLOCK
 
@@ -74,17 +83,17 @@ class Recorded:
     moves: bool
 
 
-def recorded(setting: Setting, experiment: Experiment, model: AxisModel, start: float, seconds: float = LOOKED) -> Recorded:
+def recorded(setting: Setting, experiment: Experiment, model: AxisModel, start: float, seconds: float | None = None) -> Recorded:
     """What an experiment of some seconds would record if a model were true."""
     rate = setting.layout.sampling_rate
-    return seen(setting, move(model, rate, experiment.drive(rate, seconds, start), COARSE))
+    return seen(setting, move(model, rate, experiment.drive(rate, setting.looked if seconds is None else seconds, start), COARSE))
 
 
 def seen(setting: Setting, motion: Motion) -> Recorded:
     """A motion as an objective sees it, from the end of the ramp on."""
     rate, length = motion.sampling_rate, setting.layout.length
     velocity = np.diff(motion.position) * rate
-    first = min(round(RAMP * rate), max(velocity.size - length, 0))
+    first = min(round(setting.ramp * rate), max(velocity.size - length, 0))
     windows = Windows(setting.layout, np.arange(first, max(velocity.size - length, first) + 1, max(length // 2, 1), dtype=np.int64))
     least = floor(windows, velocity, setting.encoder, setting.epsilon, motion.voltage[:-1])
     least = least if setting.response is None else replace(least, response=setting.response)

@@ -90,7 +90,7 @@ def _experiment(limits: MachineLimits, sampling_rate: float, told: dict[str, Any
     if "high" in told and told.get("kind") != "off":
         told["high"] = min(told["high"], 0.45 * sampling_rate)
         told["low"] = min(told.get("low", 0.1), 0.5 * told["high"])
-    return Experiment(AxisExcitation(**{name: _within(name, value) for name, value in told.items()}))
+    return Experiment(AxisExcitation(**{name: _within(name, value) for name, value in told.items()}), ramp=limits.ramp)
 
 
 def _within(name: str, value: Any) -> Any:

@@ -181,20 +181,25 @@ def _gives_way(library: Library, name: str, other: str) -> bool:
 def possible(data: AxisData, library: Library, found: Answer, most: int = 4) -> list[tuple[str, ...]]:
     """The set that was named, then those that may be true instead: rivals that predict nearly as well, and look-alikes.
 
-    Where nothing was named: the simplest laws that may hide in the noise.
+    Where nothing was named: the simplest laws that may hide in the noise. Effects stand in the order of the named set.
+    Raises BadInput where an effect was named for which no experiment can be designed.
     """
     named = found.best
+    for name in named:
+        if not library[name].simulable:
+            act = f"Its own experiment: {library[name].experiment}. Or compare other sets: --between."
+            raise BadInput("effect that is named", name, "effects that free simulation can predict; it is judged one sample ahead", act)
     rivals = [item.effects for item in found.rivals if item.doubt >= DOUBTFUL and not item.refused]
     alike = [
-        tuple(sorted({*named} - {name} | {other}))
+        tuple(other if one == name else one for one in named)
         for name in named
         for other in look_alikes(library, name)
         if other not in named and _may_be(data, library, other)
     ]
     simplest = sorted(library.acting, key=lambda other: len(other.parameters))
     hiding = [(other.name,) for other in simplest if not named and _may_be(data, library, other.name)]
-    sets = dict.fromkeys(tuple(each) for each in (named, *rivals, *alike, *hiding) if all(library[name].simulable for name in each))
-    return [each for each in sets if not is_twice(library, each)][: 1 + most]
+    sets = {frozenset(each): tuple(each) for each in reversed([named, *rivals, *alike, *hiding]) if all(library[name].simulable for name in each)}
+    return [each for each in reversed(sets.values()) if not is_twice(library, each)][: 1 + most]
 
 
 def look_alikes(library: Library, name: str) -> list[str]:

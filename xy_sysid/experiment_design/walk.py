@@ -87,11 +87,11 @@ def step(plan: WalkPlan, runs: Sequence[Run], before: WalkStep | None = None, te
         follows = after(decision, plan.budget, experiments, seconds)
         made = decision.choice.found if decision.choice is not None else None
         following = None if isinstance(follows, str) else follows
-        answer = answered(plan.axis, rate, made, plan.library) if made is not None else None
-        if answer is not None and made is not None and following is not None:
-            now = made.lasting(following.seconds)  # the budget may have made it shorter, or longer
-            promise = now.best.probability if now.best is not None else 0.0
-            answer = replace(answer, experiment=following, sentence=expects(now), probability=promise, settles=now.possible)
+        if made is not None and made.best is not None and following is not None:  # the budget may have made it shorter, or longer
+            now, wanted = made.lasting(following.seconds), made.best.experiment.seconds
+            answer: NextExperiment | None = replace(answered(plan.axis, rate, now, plan.library, following), sentence=expects(now, wanted))
+        else:
+            answer = answered(plan.axis, rate, made, plan.library) if made is not None else None
     return WalkStep(
         diagnosis=found.sentence.rstrip(),
         decision=decision,
@@ -115,11 +115,15 @@ def steps(plan: WalkPlan, recordings: Sequence[Run]) -> Iterator[WalkStep]:
 
 def told(decision: Decision, ending: Ending, answer: NextExperiment | None = None) -> str:
     """How a walk ended, in a sentence."""
-    chosen, left = names_of([decision.chosen]), names_of(decision.left)
     others = names_of([names for names in decision.standing.names if names not in decision.left])
     if ending == "settled":
-        return f"Settled: {chosen}." + (f" The recordings rule out {others}." if others else "")
+        return f"Settled: {names_of([decision.chosen])}." + (f" The recordings rule out {others}." if others else "")
     if ending in ("alike", "impossible") and answer is not None:
         return f"{answer.sentence} {answer.ask}".rstrip()
+    return still_open(ending, decision.left, decision.chosen)
+
+
+def still_open(ending: Ending, left: Sequence[Sequence[str]], chosen: Sequence[str]) -> str:
+    """Why no experiment follows although several sets are left, in a sentence."""
     why = {"experiments": "The budget of experiments is spent", "seconds": "The budget of seconds is spent", "stopped": "Stopped"}
-    return f"{why.get(ending, 'Ended')}: {left} are still possible, {chosen} is the most probable."
+    return f"{why.get(ending, 'Ended')}: {names_of(left)} are still possible, {names_of([chosen])} is the most probable."

@@ -10,7 +10,7 @@ import yaml
 from xy_sysid.bags.atomic import write_text
 from xy_sysid.bags.opening import text_of
 from xy_sysid.errors import BadInput, BadRecording
-from xy_sysid.excitation.designed import document_of, with_experiment
+from xy_sysid.excitation.designed import Taken, document_of, with_experiment
 from xy_sysid.files.ros_parameters import load
 from xy_sysid.settings import ExcitationSettings
 
@@ -20,10 +20,9 @@ if TYPE_CHECKING:
 
 def document(found: NextExperiment) -> dict[str, Any]:
     """What the file of an experiment holds. Raises BadInput where there is none."""
-    if found.experiment is None:
+    if found.experiment is None or found.needs is None:
         raise BadInput("experiment", "none", "one that helps", found.sentence)
-    needs = found.voltage, (found.travel[0], found.travel[1])
-    made = document_of(found.axis, found.sampling_rate, found.experiment, needs, found.limits.units)
+    made = document_of(found.axis, found.sampling_rate, found.experiment, found.needs, found.limits.units)
     made["experiment"] |= {"expects": found.sentence, "sets": [list(names) for names in found.sets]}
     return made
 
@@ -37,13 +36,17 @@ def write_experiment(path: Path, found: NextExperiment) -> None:
     units = found.limits.units
     head = (
         "# Made by xy-sysid next. Run it: parameter experiment of the excitation node. It is refused where it asks for more than the node's limits.\n"
-        f"# rms, offset, slow and needs.voltage are in {units.input}, needs.travel is in {units.output}, times in s, frequencies in Hz.\n"
+        f"# rms, offset, slow and needs.voltage are in {units.input}, other needs are in {units.output} (and s), times in s, frequencies in Hz.\n"
+        "# It was designed for an axis that stands at needs.start. Elsewhere the motion (needs.reach) has to stay within needs.within.\n"
     )
     write_text(path, head + text)
 
 
-def read_experiment(settings: ExcitationSettings, path: Path) -> ExcitationSettings:
-    """Settings with the experiment of a file; raises BadInput for a file that cannot be read, or that asks for more than the settings allow."""
+def read_experiment(settings: ExcitationSettings, path: Path) -> Taken:
+    """Settings with the experiment of a file, and where it may begin.
+
+    Raises BadInput for a file that cannot be read, or that asks for more than the settings allow.
+    """
     try:
         text = text_of(path, "an experiment")
     except BadRecording as problem:

@@ -6,10 +6,13 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
+
+from pydantic import ValidationError
 
 from xy_sysid.axis.model import STANDARD, Library
 from xy_sysid.bags.atomic import write_text
@@ -21,10 +24,11 @@ from xy_sysid.experiment_design.walk import WalkPlan, WalkStep, steps
 from xy_sysid.files.experiment import document
 from xy_sysid.imports import load
 from xy_sysid.samples.recording import Run
-from xy_sysid.units import Units
+from xy_sysid.settings import AnySettings, Settings
 
 NAME = "walk.json"
 LONGEST = 1 << 24  # bytes of it; a step takes some thousand
+SHOWN = 60  # characters of a value that a refusal shows
 UNKNOWN = "Give the folder of a walk: xy-sysid demo --settle and the page make them."
 
 
@@ -47,8 +51,8 @@ def step_document(step: WalkStep) -> dict[str, Any]:
 
 
 def plan_document(plan: WalkPlan) -> dict[str, Any]:
-    """A plan as JSON."""
-    limits = {name: None if value in (float("inf"),) else value for name, value in asdict(plan.limits).items() if name != "units"}
+    """A plan as JSON; a limit that there is not is left out."""
+    limits = {name: value for name, value in asdict(plan.limits).items() if value != math.inf}
     return {
         "axis": plan.axis,
         "limits": {**limits, "units": list(plan.limits.units)},
@@ -58,17 +62,40 @@ def plan_document(plan: WalkPlan) -> dict[str, Any]:
     }
 
 
+class _Plan(Settings):
+    """A plan as JSON has it."""
+
+    axis: str
+    limits: MachineLimits
+    budget: Budget
+    sets: tuple[tuple[str, ...], ...]
+    tolerance: float
+
+
+class _Walk(Settings):
+    """What ``NAME`` holds."""
+
+    plan: _Plan
+    steps: list[dict[str, Any]]
+
+
 def plan_of(told: dict[str, Any], library: Library = STANDARD) -> WalkPlan:
     """The plan of a document."""
-    limits = {name: float("inf") if value is None else value for name, value in told["limits"].items() if name not in ("units", "travel")}
-    return WalkPlan(
-        axis=told["axis"],
-        limits=MachineLimits(travel=(told["limits"]["travel"][0], told["limits"]["travel"][1]), units=Units(*told["limits"]["units"]), **limits),
-        budget=Budget(**told["budget"]),
-        sets=tuple(tuple(names) for names in told["sets"]),
-        library=library,
-        tolerance=told["tolerance"],
-    )
+    return _plan(_read(_Plan, json.dumps(told), "plan"), library)
+
+
+def _plan(told: _Plan, library: Library) -> WalkPlan:
+    return WalkPlan(axis=told.axis, limits=told.limits, budget=told.budget, sets=told.sets, library=library, tolerance=told.tolerance)
+
+
+def _read(kind: type[AnySettings], text: str, where: str) -> AnySettings:
+    """What a text of JSON holds. Raises BadInput that names the first key with a fault."""
+    try:
+        return kind.model_validate_json(text, strict=True)
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = ".".join(str(part) for part in first["loc"])
+        raise BadInput(f"{where}: {key}" if key else where, repr(first["input"])[:SHOWN], first["msg"], UNKNOWN) from None
 
 
 def write_walk(folder: Path, plan: WalkPlan, done: Iterable[dict[str, Any]]) -> None:
@@ -87,10 +114,11 @@ def replayed(folder: Path, library: Library = STANDARD) -> list[tuple[dict[str, 
     A step that somebody stopped is compared with what would have followed. Raises BadInput for a folder that is none.
     """
     try:
-        told = json.loads(text_of(folder / NAME, "the plan of a walk", LONGEST))
-        plan, kept = plan_of(told["plan"], library), list(told["steps"])
-    except (BadRecording, ValueError, KeyError, TypeError, RecursionError) as problem:
-        raise BadInput("walk", f"{folder}: {getattr(problem, 'problem', problem)}", f"a folder with {NAME}", UNKNOWN) from None
+        text = text_of(folder / NAME, "the plan of a walk", LONGEST)
+    except BadRecording as problem:
+        raise BadInput("walk", f"{folder}: {problem.problem}", f"a folder with {NAME}", UNKNOWN) from None
+    told = _read(_Walk, text, f"walk {folder / NAME}")
+    plan, kept = _plan(told.plan, library), told.steps
     recordings = [run_of(folder / str(number), plan.axis) for number in range(len(kept))]
     again = [json.loads(json.dumps(step_document(one))) for one in steps(plan, recordings)]
     return list(zip(kept, again, strict=False))

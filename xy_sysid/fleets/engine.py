@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from xy_sysid.errors import BadInput, MissingExtra
-from xy_sysid.fleets.of_file import Done, Task, failed, rows_of_file
+from xy_sysid.fleets.of_file import Done, Task, lost, rows_of_file
+from xy_sysid.fleets.row import FAULT
 from xy_sysid.jit import cores
 from xy_sysid.processes.deaf import deaf
 
@@ -21,7 +22,10 @@ if TYPE_CHECKING:
 
 AHEAD = 2  # tasks for each process that the scheduler has at a time
 PATIENCE = 10.0  # s until a scheduler must answer
-DIED = "its process died twice while it was analysed (too little memory?). Analyse it alone: xy-sysid fleet --one FILE."
+DIED = (
+    "its process died twice while it was analysed (too little memory?). As long as file, options and version are the same it is not tried again. "
+    "Analyse it alone: xy-sysid fleet --one FILE."
+)
 HERE = {
     "distributed.scheduler.allowed-failures": 0,  # a task whose process died is blamed at once
     "distributed.scheduler.worker-saturation": 1.0,  # one task a process
@@ -83,7 +87,7 @@ def results(client: Client, tasks: Sequence[Task]) -> Iterator[tuple[Done, float
     blamed = list[Task]()
     yield from _window(client, iter(doubtful), lambda: 1, blamed)
     for task in blamed:
-        yield Done(task.path, (failed(task.path, "worker", DIED),)), 0.0
+        yield lost(task, DIED), 0.0
 
 
 def _window(client: Client, waiting: Iterator[Task], ahead: Callable[[], int], died: list[Task]) -> Iterator[tuple[Done, float]]:
@@ -108,8 +112,8 @@ def _window(client: Client, waiting: Iterator[Task], ahead: Callable[[], int], d
         elif isinstance(error, distributed.KilledWorker):
             died.append(task)
         else:
-            text = f"{type(error).__name__}: {error}. This is a fault of xy_sysid; please report it."
-            yield Done(task.path, (failed(task.path, "worker", " ".join(text.split())),)), 0.0
+            text = f"{type(error).__name__}: {error}. {FAULT}"
+            yield lost(task, " ".join(text.split())), 0.0
         future.release()
         fill()
 

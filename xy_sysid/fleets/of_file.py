@@ -6,6 +6,7 @@ import hashlib
 import json
 import platform
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -54,7 +55,7 @@ def rows_of_file(task: Task) -> Done:
     """The rows of one recording. What the user can mend (``XySysidError``) is a row with its problem; anything else is raised."""
     path, follow = Path(task.path), tuple(task.names.follow)
     try:
-        origin: Row = {"source": task.path, "file_sha256": digest(path)}
+        content = digest(path)
     except OSError as error:
         return Done(task.path, (failed(task.path, "reading", f"cannot be read ({error.strerror or error}). Check the path and the permissions."),))
     except BadRecording as problem:
@@ -62,8 +63,8 @@ def rows_of_file(task: Task) -> Done:
     try:
         name = name_of(path, task.names)
     except BadInput as problem:
-        return Done(task.path, (failed(task.path, "naming", str(problem)) | origin,))
-    origin |= {"machine": name.machine, "versions": versions(), "key": key_of(task, name, origin["file_sha256"])}
+        return Done(task.path, (failed(task.path, "naming", str(problem)) | {"file_sha256": content},))
+    origin = _origin(task, name, content)
     if origin["key"] in task.known:
         return Done(task.path, (), unchanged=True, key=origin["key"])
     with threadpool_limits(1, "blas"):
@@ -83,6 +84,26 @@ def rows_of_file(task: Task) -> Done:
         plan = Plan(follow=follow, first=first, library=known, clock=process_time)
         rows = [row_of(recording, axis, plan) for axis in recording.axes]
     return Done(task.path, tuple(row | ({"axis": name.axis} if name.axis else {}) | origin for row in rows))
+
+
+def lost(task: Task, problem: str) -> Done:
+    """The row of a recording whose process gave no answer. It has its key, so that the same recording is not tried again by the same version."""
+    row, path = failed(task.path, "worker", problem), Path(task.path)
+    with suppress(OSError, BadRecording, BadInput):  # then it has no key
+        name = name_of(path, task.names)
+        row |= _origin(task, name, digest(path)) | {"date": name.date}
+    return Done(task.path, (row,))
+
+
+def _origin(task: Task, name: Name, content: str) -> Row:
+    """What all rows of a recording have in common. content: the hash of its file"""
+    return {
+        "source": task.path,
+        "file_sha256": content,
+        "machine": name.machine,
+        "versions": versions(),
+        "key": key_of(task, name, content),
+    }
 
 
 def failed(path: str, stage: str, problem: str) -> Row:

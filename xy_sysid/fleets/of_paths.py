@@ -20,7 +20,7 @@ from xy_sysid.fleets.journal import journal
 from xy_sysid.fleets.naming import Names, compiled
 from xy_sysid.fleets.of_file import Done, Task, rows_of_file
 from xy_sysid.fleets.reference import COLUMNS, References
-from xy_sysid.fleets.table import arrow, as_table, keys_of, read, rows_so_far
+from xy_sysid.fleets.table import Known, arrow, as_table, read, rows_so_far
 from xy_sysid.imports.reading import Reading
 
 if TYPE_CHECKING:
@@ -85,8 +85,8 @@ def run(paths: Paths, folder: Path, how: Analysis, where: Cluster | Client, tell
     found = recordings([paths] if isinstance(paths, (str, Path)) else paths, folder)
     with journal(folder, library(how.effect_files)) as kept, ExitStack() as stack:
         before = rows_so_far(folder, COLUMNS)
-        known = keys_of(before)
-        tasks = [dataclasses.replace(how.task(path), known=known.get(path.name, frozenset())) for path in found]
+        known = Known(before, {str(path) for path in found})
+        tasks = [dataclasses.replace(how.task(path), known=known.of(path)) for path in found]
         client = stack.enter_context(connected(where)) if isinstance(where, Cluster) else where
         now = Progress(total=len(tasks), workers=processes(client), place=client.dashboard_link)
         tell(now)

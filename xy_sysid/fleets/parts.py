@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import re
 from collections.abc import Callable
-from datetime import timedelta
+from datetime import datetime, timedelta
 from pathlib import Path
 
 from xy_sysid.errors import BadInput
@@ -14,12 +14,9 @@ from xy_sysid.fleets.history import BEGIN
 from xy_sysid.fleets.naming import date_within, name_of
 from xy_sysid.fleets.of_paths import Analysis
 from xy_sysid.fleets.row import Plan, Row, row_of
-from xy_sysid.imports import load
-from xy_sysid.imports.reading import Reading
-from xy_sysid.samples.recording import Recording
+from xy_sysid.imports.in_parts import SHORTEST, in_parts
 
 UNITS = {"": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
-SHORTEST = 1.0  # s of a part
 
 
 def seconds(text: str) -> float:
@@ -34,29 +31,14 @@ def rows_of_parts(path: Path, every: float, how: Analysis, tell: Callable[[int],
     """The rows of each part of a recording.
 
     every: s of a part; tell: hears how many parts are done. A part's date is when it began; where no clock tells the date, 1970 and the time since
-    the start. A part that lies in a gap has no row. Raises BadRecording or BadInput for a recording that cannot be read.
+    the start. A part in which nothing is has no row. Raises BadRecording or BadInput for a recording that cannot be read.
     """
     how.check()
     name, known = name_of(path, how.names), library(how.effect_files)
     plan = Plan(follow=tuple(how.names.follow), library=known)
     rows: list[Row] = []
-    begin, number, heard = None, 0, 0.0  # heard: the last instant that was read, s
-    last = 0  # number of the last part, as far as it is known
-    while True:
-        start = how.reading.start + number * every
-        stop = start + every if how.reading.stop is None else min(start + every, how.reading.stop)
-        if stop <= start:
-            return rows
-        part = _part(path, dataclasses.replace(how.reading, start=start, stop=stop), first=number == 0)
-        if part is None and number > last:  # a gap, or the end
-            rest = _part(path, dataclasses.replace(how.reading, start=start), first=False)
-            if rest is None:
-                return rows
-            last = number + int((rest.time[-1] - heard) / every) + 1
-        if part is None:
-            number += 1
-            continue
-        heard = part.time[-1]
+    begin: datetime | None = None
+    for number, part in in_parts(path, how.reading, every):
         begin = begin or name.date or date_within(part) or BEGIN
         for axis in part.axes:
             own = {"machine": name.of(part), "source": f"{path}#{number}", "date": begin + timedelta(seconds=number * every)}
@@ -64,15 +46,5 @@ def rows_of_parts(path: Path, every: float, how: Analysis, tell: Callable[[int],
             if row.get("effects") and axis not in dict(plan.first):
                 plan = dataclasses.replace(plan, first=(*plan.first, (axis, tuple(row["effects"].split(", ")))))
             rows.append(row | ({"axis": name.axis} if name.axis and len(part.axes) == 1 else {}) | own)
-        number += 1
-        tell(number)
-
-
-def _part(path: Path, reading: Reading, first: bool) -> Recording | None:
-    """What was read; None where nothing is there, which the first part raises as BadInput."""
-    try:
-        return load(path, reading)
-    except BadInput as problem:
-        if first or problem.what not in ("start", "start and stop"):
-            raise
-        return None
+        tell(number + 1)
+    return rows

@@ -25,9 +25,11 @@ from xy_sysid.response.frf import FrequencyResponse
 from xy_sysid.samples.moves import several_moves
 from xy_sysid.samples.recording import Recording, Run
 from xy_sysid.settings import IdentifierSettings
+from xy_sysid.story.attempt import Attempt
 from xy_sysid.units import derivative_of
 
 Row = dict[str, Any]
+FAULT = "This is a fault of xy_sysid; please report it."
 FirstSets = tuple[tuple[str, tuple[str, ...]], ...]  # axes, and the effects that are tried first in each
 
 
@@ -49,8 +51,10 @@ class Plan:
 def row_of(recording: Recording, axis: str, plan: Plan) -> Row:
     """What a fit and a diagnosis find, by column name; ``problem`` says why something is missing.
 
-    The search ends after a counted amount of work, so that the same samples give the same numbers on a busy machine. Columns that have no
-    value are left out. Raises BadInput for an axis that the recording does not have.
+    An error that nobody thought of is a problem, too, so that the other axes of a file keep their rows. The search ends after a counted amount of
+    work, so that the same samples give the same numbers on a busy machine. Columns that have no value are left out.
+
+    Raises BadInput for an axis that the recording does not have.
     """
     row: Row = {"axis": axis, "input_unit": recording.input_unit, "output_unit": recording.output_unit}
     row |= {"samples": len(recording), "gaps": max(len(recording.runs()) - 1, 0), "sampling_rate": recording.sampling_rate}
@@ -60,10 +64,10 @@ def row_of(recording: Recording, axis: str, plan: Plan) -> Row:
     problems: list[tuple[str, str]] = []
     for stage, work in (("fit", _linear), ("diagnosis", _diagnosis)):
         begun = plan.clock()
-        try:
+        with Attempt() as attempt:
             row |= work(recording, run, plan)
-        except BadInput as refusal:
-            problems.append((stage, str(refusal)))
+        if attempt.problem:
+            problems.append((stage, f"{attempt.detail}. {FAULT}" if attempt.detail else attempt.problem))
         row[f"seconds_{stage}"] = plan.clock() - begun
     if problems:
         row["stage"] = ", ".join(stage for stage, _ in problems)

@@ -188,9 +188,22 @@ def rows_so_far(folder: Path, names: Sequence[str]) -> list[Row]:
     return read(folder, names).to_pylist() if there else []
 
 
-def keys_of(rows: Iterable[Row]) -> dict[str, frozenset[str]]:
-    """By the last part of their paths, which stays when a folder moves: the keys of recordings that are in the table."""
-    found: dict[str, set[str]] = {}
-    for row in rows:
-        found.setdefault(Path(row["source"]).name, set()).add(row["key"])
-    return {name: frozenset(keys) - {""} for name, keys in found.items()}
+class Known:
+    """The keys of recordings that are in a table, by their paths."""
+
+    def __init__(self, rows: Iterable[Row], given: Collection[str]) -> None:
+        """given: paths that are asked for. A recording of another path may have moved: then the last parts of its path are the same."""
+        found: dict[str | tuple[str, ...], set[str]] = {}
+        for row in rows:
+            source = str(row["source"])
+            for place in (source,) if source in given else _ends(Path(source)):
+                found.setdefault(place, set()).add(row["key"])
+        self._keys = {place: frozenset(keys) - {""} for place, keys in found.items()}
+
+    def of(self, path: Path) -> frozenset[str]:
+        """The keys that a recording may have: few, however many have its name."""
+        return next((self._keys[place] for place in (str(path), *_ends(path)) if place in self._keys), frozenset())
+
+
+def _ends(path: Path) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    return path.parts[-2:], path.parts[-1:]

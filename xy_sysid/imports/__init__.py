@@ -13,6 +13,7 @@ foreign_units, given: units of foreign files
 motion:               velocity and acceleration become position
 plausible:            what looks wrong, in words
 several, listing:     several recordings as one; what is in a file
+in_parts:             a long recording as parts, one after another
 limits:               how much a file may become
 """
 
@@ -31,6 +32,7 @@ from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.imports import arrays, csv, sheet_table, table
 from xy_sysid.imports.bag import load_bag
 from xy_sysid.imports.motion import as_position
+from xy_sysid.imports.paired_streams import cut
 from xy_sysid.imports.plausible import meaningful, remarks, without_dead_parts
 from xy_sysid.imports.reading import Reading
 from xy_sysid.imports.registry import BAG, TABLES, Format, format_of, sheet_of
@@ -54,17 +56,23 @@ def load(path: Path | str, reading: Reading | None = None, *, progress: Callable
     with np.errstate(all="ignore"):  # damaged numbers are left out or said, and numpy need not add a word to it
         try:
             kind = format_of(path)
-            result = load_bag(path, reading, progress) if kind is BAG else _from_table(path, kind, reading)
+            result = load_bag(path, reading, progress) if kind is BAG else cut(*from_table(path, kind, reading), reading.start, reading.stop)
         except OSError as error:
             raise BadRecording(path, f"cannot be read ({error.strerror or error})", "Check the path and the permissions.") from None
         if progress is not None:
             progress(1.0)
-        result = without_dead_parts(meaningful(path, result))
-        output, moved = result.position, as_position(result)
-        return dataclasses.replace(moved, notes=(*moved.notes, *remarks(moved, output)))
+        return finished(path, result)
 
 
-def _from_table(path: Path, kind: Format, reading: Reading) -> Recording:
+def finished(path: Path, result: Recording) -> Recording:
+    """A recording, or a part of one, as people get it: positions, without dead parts, and with remarks on what looks wrong."""
+    result = without_dead_parts(meaningful(path, result))
+    output, moved = result.position, as_position(result)
+    return dataclasses.replace(moved, notes=(*moved.notes, *remarks(moved, output)))
+
+
+def from_table(path: Path, kind: Format, reading: Reading) -> tuple[Recording, float]:
+    """The whole of a table, and the instant from which its parts count."""
     topics = reading.voltage_topic, reading.position_topic, reading.joint_topic
     if reading.effort_as_voltage or reading.velocity or reading.joints or reading.effort_lag or topics != (VOLTAGE, POSITION, None):
         raise BadInput("--topic, --effort, --velocity or --joint", f"for {path}", "for a bag", "A table has columns: choose them with --map.")
@@ -73,7 +81,7 @@ def _from_table(path: Path, kind: Format, reading: Reading) -> Recording:
     notes: list[str] = []
     sheet, reading = of_several_files(path, reading, notes) or (sheet_of(path, kind), reading)
     found = arrays.table(sheet, reading, notes) or sheet_table.table(sheet, reading, notes)
-    return table.recording(path, found, reading, notes)
+    return table.uncut(path, found, reading, notes)
 
 
 def save(recording: Recording, path: Path | str) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from xy_sysid.bags.reading import Bag
-from xy_sysid.bags.streaming import Topics, choose, pieces, units
+from xy_sysid.bags.streaming import Source, Topics, choose, pieces, units
 from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.imports.even import drifts, even
 from xy_sysid.imports.given import in_units
@@ -19,6 +19,7 @@ from xy_sysid.imports.reading import Reading
 from xy_sysid.samples.block import Block, StreamName
 from xy_sysid.samples.recording import Recording
 
+KINDS: tuple[StreamName, ...] = ("voltage", "position")
 WHOLE = 1 << 40  # samples; blocks as long as they come
 MARGIN = 1.0  # s kept around the part that was asked for, for samples that came late
 COPIES = 4  # times the size of the samples that pairing needs while it works
@@ -27,42 +28,58 @@ SHARE = 0.6  # of the machine's memory that a recording may take
 
 def load_bag(path: Path, reading: Reading, progress: Callable[[float], None] | None) -> Recording:
     """See ``xy_sysid.imports.load``."""
-    if reading.columns or reading.rate is not None:
-        raise BadInput("--map or --rate", f"for {path}", "for a table", "A bag has topics and stamps: choose topics with --topic, or leave it out.")
-    voltage_topic, position_topic, start, stop = reading.voltage_topic, reading.position_topic, reading.start, reading.stop
     with Bag(path) as bag:
-        source = choose(bag, topics(reading))
-        kept, first = _collect(bag, pieces(bag, source, WHOLE, progress), start, stop)
-        notes = bag.notes
-        named: dict[StreamName, str] = {"voltage": "effort" if source.effort else voltage_topic, "position": source.joints or position_topic}
+        source = chosen(bag, reading)
+        kept, first = _collect(bag, pieces(bag, source, WHOLE, progress), reading.start, reading.stop)
+        named: dict[StreamName, str] = {
+            "voltage": "effort" if source.effort else reading.voltage_topic,
+            "position": source.joints or reading.position_topic,
+        }
         for kind, name in named.items():
             if kind not in first:
                 raise bag.bad(f"no samples on {name} that can be read", "Record while the source publishes.")
-            if not sum(map(len, kept.get(kind, []))):
-                raise BadInput("start", f"{start:g} s", "within the recording", "Begin earlier.")
-        same, common = _axes(bag, kept, reading.axes, source.joints is not None, notes)
-        common = _with_numbers(bag, same, common, notes)
-        streams: dict[str, Stream] = {kind: gather(kind, blocks, common, notes, bag.bad) for kind, blocks in same.items() if blocks}
-        if source.effort:
-            streams |= _in_order(path, streams, source.lag, notes)
-            if "reference" in streams:
-                streams["reference"] = _by_stamp(streams["reference"], streams["position"])
-            if not source.said:
-                notes.append("there is no voltage topic; the joints' effort is the input")
-            if not np.any(streams["voltage"].values):
-                raise bag.bad(f"the effort on {source.joints} is zero throughout and there is no {voltage_topic}", "Record the voltage too.")
-        if source.joints is not None and not source.effort:
-            notes.append("joint states are paired with the voltage by their stamps")
-        if source.effort and source.said and not reading.units and "input_unit" not in bag.custom:
-            per = "/s" if source.output == "velocity" else ""
-            usual = f"effort is taken as V and {source.output} as m{per}"
-            notes.append(f'joint states name no unit: {usual}; else say for example --unit input="N m",output=rad{per}')
-        if source.effort and not source.said:
-            notes.append(f"joint states name no unit; effort and {source.output} are carried as they are")
-        paired = cut(pair(streams, str(path), units(bag, source), notes, bag.bad), first["position"], start, stop)
-        if source.output == "velocity":
-            paired = dataclasses.replace(paired, measured="velocity", output_unit=paired.units.speed)
-        return in_units(dataclasses.replace(paired, machine=bag.custom.get("machine", "")), reading)
+        return together(bag, source, kept, first["position"], reading)
+
+
+def chosen(bag: Bag, reading: Reading) -> Source:
+    """What of a bag is read. Raises BadInput for what only a table has, BadRecording for a bag without it."""
+    if reading.columns or reading.rate is not None:
+        given = f"for {bag.path}"
+        raise BadInput("--map or --rate", given, "for a table", "A bag has topics and stamps: choose topics with --topic, or leave it out.")
+    return choose(bag, topics(reading))
+
+
+def together(bag: Bag, source: Source, kept: dict[StreamName, list[Block]], first: float, reading: Reading) -> Recording:
+    """The blocks of a part as a recording. first: the instant from which ``reading`` counts its start and stop.
+
+    What was odd is added to ``bag.notes``. Raises BadInput where no samples of the part are there.
+    """
+    path, notes, start, stop = bag.path, bag.notes, reading.start, reading.stop
+    if not all(sum(map(len, kept.get(kind, []))) for kind in KINDS):
+        raise BadInput("start", f"{start:g} s", "within the recording", "Begin earlier.")
+    same, common = _axes(bag, kept, reading.axes, source.joints is not None, notes)
+    common = _with_numbers(bag, same, common, notes)
+    streams: dict[str, Stream] = {kind: gather(kind, blocks, common, notes, bag.bad) for kind, blocks in same.items() if blocks}
+    if source.effort:
+        streams |= _in_order(path, streams, source.lag, notes)
+        if "reference" in streams:
+            streams["reference"] = _by_stamp(streams["reference"], streams["position"])
+        if not source.said:
+            notes.append("there is no voltage topic; the joints' effort is the input")
+        if not np.any(streams["voltage"].values):
+            raise bag.bad(f"the effort on {source.joints} is zero throughout and there is no {reading.voltage_topic}", "Record the voltage too.")
+    if source.joints is not None and not source.effort:
+        notes.append("joint states are paired with the voltage by their stamps")
+    if source.effort and source.said and not reading.units and "input_unit" not in bag.custom:
+        per = "/s" if source.output == "velocity" else ""
+        usual = f"effort is taken as V and {source.output} as m{per}"
+        notes.append(f'joint states name no unit: {usual}; else say for example --unit input="N m",output=rad{per}')
+    if source.effort and not source.said:
+        notes.append(f"joint states name no unit; effort and {source.output} are carried as they are")
+    paired = cut(pair(streams, str(path), units(bag, source), notes, bag.bad), first, start, stop)
+    if source.output == "velocity":
+        paired = dataclasses.replace(paired, measured="velocity", output_unit=paired.units.speed)
+    return in_units(dataclasses.replace(paired, machine=bag.custom.get("machine", "")), reading)
 
 
 def _collect(
@@ -74,7 +91,6 @@ def _collect(
     latest: dict[StreamName, float] = {}
     over: set[StreamName] = set()
     restarted, size = False, 0
-    room = SHARE * os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / COPIES
     for kind, block in blocks:
         finite = block.time[np.isfinite(block.time)]
         if not finite.size:
@@ -86,16 +102,26 @@ def _collect(
             elapsed = block.time - begin
             if stop is not None and float(finite.min()) - begin > stop + MARGIN:
                 over.add(kind)
-                if over >= {"voltage", "position"}:
+                if over.issuperset(KINDS):
                     break
                 continue
             inside = ~((elapsed < start - MARGIN) | (elapsed > (np.inf if stop is None else stop + MARGIN)))
             block = Block(block.axes, block.seq[inside], block.time[inside], block.values[inside])
         kept.setdefault(kind, []).append(block)
-        size += block.values.nbytes + block.seq.nbytes + block.time.nbytes
-        if size > room:
-            raise bag.bad(f"more than {size / 1e9:.1f} GB of samples, too long to load at once", "Give a part with --span, or replay it.")
+        size += size_of(block)
+        check_room(bag, size)
     return kept, first
+
+
+def size_of(block: Block) -> int:
+    """Bytes of its samples."""
+    return block.values.nbytes + block.seq.nbytes + block.time.nbytes
+
+
+def check_room(bag: Bag, size: int) -> None:
+    """Raises BadRecording for so many bytes of samples as the memory has no room for."""
+    if size > SHARE * os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / COPIES:
+        raise bag.bad(f"more than {size / 1e9:.1f} GB of samples, too long to load at once", "Give a part with --span, or replay it.")
 
 
 def _axes(

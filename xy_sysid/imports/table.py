@@ -70,6 +70,12 @@ class _Rows:
 
 def recording(path: Path, table: Table, reading: Reading, notes: list[str]) -> Recording:
     """Check, number and cut; raises BadRecording or BadInput."""
+    result, first = uncut(path, table, reading, notes)
+    return cut(result, first, reading.start, reading.stop)
+
+
+def uncut(path: Path, table: Table, reading: Reading, notes: list[str]) -> tuple[Recording, float]:
+    """Check and number; the whole recording, and the instant from which its parts count. Raises BadRecording or BadInput."""
     _same_length(path, table)
     time = _time(path, table)
     columns = _whole(path, table, places_of(table.axes, reading.axes), notes)
@@ -91,7 +97,7 @@ def recording(path: Path, table: Table, reading: Reading, notes: list[str]) -> R
         notes=tuple(notes),
         measured=measured,
     )
-    return cut(result, first, reading.start, reading.stop)
+    return result, first
 
 
 def _same_length(path: Path, table: Table) -> None:

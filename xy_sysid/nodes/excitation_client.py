@@ -20,7 +20,8 @@ from xy_sysid.settings import ExcitationSettings, build, knobs
 
 ANSWER = 10.0  # s for an answer of the excitation,
 ASKED = 3  # times, as long as a node is there
-APPEARS = 60.0  # s until the excitation is there
+APPEARS = 60.0  # s until the excitation is there,
+SOON = 1.0  # s where somebody wants to stop: an excitation that is there has to be told so
 NODE = "excitation"
 
 
@@ -58,8 +59,8 @@ class ExcitationClient:
     def _ask(self, kind: Any, service: str, request: Any) -> Any:
         """The answer, or None if it did not come in time."""
         client = self._node.create_client(kind, f"{NODE}/{service}")
-        until = time.monotonic() + APPEARS
-        while not client.service_is_ready() and time.monotonic() < until and not self._is_over():
+        asked = time.monotonic()
+        while not client.service_is_ready() and time.monotonic() < asked + (SOON if self._is_over() else APPEARS):
             self.wait(0.05)
         future = client.call_async(request)
         until = time.monotonic() + ANSWER

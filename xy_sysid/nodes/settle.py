@@ -6,7 +6,6 @@ against its own limits once more. Afterwards its settings are what they were.
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -27,10 +26,9 @@ from xy_sysid.bags import BagWriter
 from xy_sysid.bags.atomic import write_text
 from xy_sysid.errors import BadInput, XySysidError
 from xy_sysid.excitation.designed import of_an_experiment
-from xy_sysid.excitation.motion_check import most_centring
-from xy_sysid.experiment_design.limits import MachineLimits
+from xy_sysid.experiment_design.limits import MachineLimits, of_settings
 from xy_sysid.experiment_design.loop import Budget
-from xy_sysid.experiment_design.walk import WalkPlan
+from xy_sysid.experiment_design.walk import WalkPlan, still_open
 from xy_sysid.files.walk import plan_document, write_walk
 from xy_sysid.nodes.common import NAMESPACE
 from xy_sysid.nodes.convert import from_message
@@ -70,17 +68,8 @@ def plan_of(wishes: Wishes, settings: ExcitationSettings) -> WalkPlan:
     if settings.holds:
         act = "Design one with xy-sysid next --trajectory, and run it there."
         raise BadInput("interface", "position", "effort or velocity, since an experiment moves the axis by itself", act)
-    own = settings.axes[axis]
-    limits = MachineLimits(
-        voltage=own.limit,
-        travel=(own.travel_min, own.travel_max),
-        start=0.5 * (own.travel_min + own.travel_max),
-        speed=own.max_speed or math.inf,
-        acceleration=own.max_acceleration or math.inf,
-        units=settings.units,
-        seconds=wishes.budget.seconds,
-        centring=float(most_centring(settings)[list(settings.axes).index(axis)]),
-    )
+    own = of_settings(settings, axis)
+    limits = MachineLimits(start=0.5 * sum(own["travel"]), units=settings.units, seconds=wishes.budget.seconds, **own)
     return WalkPlan(axis, limits, wishes.budget, wishes.sets)
 
 
@@ -118,9 +107,17 @@ class Settler(ExcitationClient):
         if self._wall.count:
             self._node.get_logger().error(self._wall.told)
             self.problem = BROKEN
-        if self.problem:
-            self._say(self.problem)
+        if self.problem or self.ending == "stopped":
+            self._say(self.outcome)
         return not self.problem
+
+    @property
+    def outcome(self) -> str:
+        """How it ended, in a sentence: a fault, what is settled, or what is still possible where somebody stopped it."""
+        if self.problem or not self.steps:
+            return self.problem or "Stopped before the first recording was diagnosed."
+        last = self.steps[-1]
+        return str(last["sentence"]) if last["ending"] else still_open("stopped", last["left"], last["chosen"])
 
     def _walk(self, settings: ExcitationSettings) -> None:
         wishes, plan = self.wishes, plan_of(self.wishes, settings)
@@ -161,7 +158,7 @@ class Settler(ExcitationClient):
         with self._recording(0, settings):
             if state == "unconfigured":
                 self._change("configure")
-            if state != "active":
+            if state != "active" and not self._over():
                 self._change("activate")
             self._record(self.wishes.first, settings)
             if not self._over():

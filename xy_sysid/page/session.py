@@ -55,7 +55,7 @@ class Session:
         self._figures: dict[tuple[object, ...], dict[str, Any]] = {}
         self.link: Link | None = None
         self.live: Live | None = None
-        self.settling: Settling | None = Settling(shelf.folder, namespace, self.say) if live else None
+        self.settling: Settling | None = Settling(shelf.folder, namespace, self.say, tuple(map(str, self.reading.effect_files))) if live else None
         if live:  # ROS 2 is needed for this alone
             from xy_sysid.page.link import Link
             from xy_sysid.page.live import Live

@@ -20,9 +20,9 @@ JOIN = 3.0  # s that the walk may take to end when the page does
 class Settling:
     """start, then go on; ``steps`` and ``doing`` say how far it is."""
 
-    def __init__(self, folder: Path, namespace: str, say: Callable[[str, bool], None]) -> None:
-        """folder: of recordings; say: takes a sentence for everybody, and whether it is good news."""
-        self._folder, self._namespace, self._say = folder, namespace, say
+    def __init__(self, folder: Path, namespace: str, say: Callable[[str, bool], None], effect_files: tuple[str, ...] = ()) -> None:
+        """folder: of recordings; say: takes a sentence for everybody, and whether it is good news; effect_files: with effects of the user's own."""
+        self._folder, self._namespace, self._say, self._effect_files = folder, namespace, say, effect_files
         self._thread: threading.Thread | None = None
         self._settler: Settler | None = None
         self._ended, self._go = threading.Event(), threading.Event()
@@ -65,7 +65,7 @@ class Settling:
         """What went wrong, or that it was stopped; empty while all is well."""
         if self._settler is None or self.running:
             return ""
-        return self._settler.problem or ("It was stopped." if self._settler.ending == "stopped" else "")
+        return self._settler.outcome if self._settler.problem or self._settler.ending == "stopped" else ""
 
     def start(self, axis: str, alone: bool = False) -> None:
         """Record, and design the first experiment; alone: drive and go on without being told. Raises BadInput while a walk is under way."""
@@ -78,7 +78,7 @@ class Settling:
         if alone:
             self._go.set()
         self.axis, self.folder = axis, self._folder / f"settle_{axis}_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
-        wishes = Wishes(axis, self.folder, sets=self.sets, alone=alone)
+        wishes = Wishes(axis, self.folder, sets=self.sets, alone=alone, effect_files=self._effect_files)
         settler = Settler(wishes, lambda words: None, self._ended.is_set, self._go.is_set, self._namespace)
 
         def walk() -> None:
@@ -86,8 +86,7 @@ class Settling:
                 settler.run()
             finally:
                 settler.close()
-            last = settler.problem or (settler.steps[-1]["sentence"] if settler.steps else "")
-            self._say(f"axis {axis}: {last}", settler.ending in ("settled", "alike"))
+            self._say(f"axis {axis}: {settler.outcome}", settler.ending in ("settled", "alike"))
 
         self._settler = settler
         self._thread = threading.Thread(target=walk, name="settle", daemon=True)
