@@ -20,6 +20,7 @@ from xy_sysid.fleets.history import DAY, FEWEST, Axis, History, Unread, axes, un
 from xy_sysid.fleets.row import Row
 from xy_sysid.fleets.table import read
 from xy_sysid.fleets.wander import Series
+from xy_sysid.jit import on_all_cores
 from xy_sysid.response.frf import Z95
 from xy_sysid.samples.block import FloatArray
 
@@ -178,9 +179,9 @@ def of_axes(every: Sequence[Axis], known: Causes, axis_months: float = AXIS_MONT
     every_evidence: dict[tuple[int, str], tuple[Evidence, Series]] = {}
     count = sum(len(one.histories) for one in every)
     for number, one in enumerate(every):
-        for history in one.histories:
-            every_evidence[number, history.column] = evidence(_newest(history))
-            tell(len(every_evidence) / count)
+        told = on_all_cores(lambda history: evidence(_newest(history)), one.histories)
+        every_evidence |= {(number, history.column): item for history, item in zip(one.histories, told, strict=True)}
+        tell(len(every_evidence) / count)
     weights: dict[tuple[int, str], FloatArray] = {}
     for name in dict.fromkeys(column for _, column in every_evidence):
         alike = {key: item for key, (item, _) in every_evidence.items() if key[1] == name}
@@ -191,8 +192,12 @@ def of_axes(every: Sequence[Axis], known: Causes, axis_months: float = AXIS_MONT
     trends: list[Trend] = []
     events: list[Event] = []
     for number, one in enumerate(every):
-        keys = [((number, history.column), history) for history in one.histories]
-        own = [_trend(one, history, weights[key], every_evidence[key], axis_months) for key, history in keys]
+
+        def of(history: History, number: int = number, axis: Axis = one) -> Trend:
+            key = number, history.column
+            return _trend(axis, history, weights[key], every_evidence[key], axis_months)
+
+        own = on_all_cores(of, one.histories)
         trends += own
         events += _events(one, [*(moved for item in own for moved in item.moved), *_named(one, often, axis_months)], known)
     pooled = sum(bool(one.histories) for one in every) > 1
