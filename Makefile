@@ -11,7 +11,7 @@ INSTALLED := $(VENV)/.installed
 PYTEST = $(BIN)/python -m pytest -n $(JOBS) --dist loadfile --max-worker-restart 0
 PIP := $(BIN)/python -m pip --disable-pip-version-check -qq install --no-compile -c constraints.txt
 LAWS = OPENBLAS_NUM_THREADS=1 $(BIN)/python -c "import xy_sysid as xy; run = xy.simulate(10, hidden=7, seed=1).run('x'); xy.fit(run); xy.diagnose(run); \
-  xy.use(xy.PhysicalModel(xy.AxisModel(0.1, 1e-3, 200.0)), limit=5.0)"
+  xy.use(xy.PhysicalModel(xy.AxisModel(0.1, 1e-3, 200.0)), limit=5.0, rate=2000.0)"
 FITS := import ensurepip, sys, venv; sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 14))
 
 unexport PYTHONDONTWRITEBYTECODE # or each worker compiles every test again, 9 s of each
