@@ -67,6 +67,14 @@ def without_times(rows: list[Row]) -> list[Row]:
     return [{name: value for name, value in row.items() if name not in TIMES and value is not None} for row in rows]
 
 
+def test_a_cluster_leaves_the_environment_of_this_process_as_it_was() -> None:
+    """One thread for each worker is no matter of whoever asked for the fleet, whose next report has all cores."""
+    before = dict(os.environ)
+    with connected(Cluster(workers=1)):
+        pass
+    assert dict(os.environ) == before
+
+
 def test_the_rows_are_the_same_on_any_number_of_processes(data: Path, table: Path) -> None:
     """Two processes of a cluster, and this one alone: bit for bit."""
     here = [row for path in sorted(data.glob("*/*")) for row in rows_of_file(Task(str(path))).rows]

@@ -6,6 +6,7 @@ A task whose process dies is tried once more at the end, alone, so that no other
 from __future__ import annotations
 
 import itertools
+import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -65,13 +66,26 @@ def connected(where: Cluster) -> Iterator[Client]:
         return
     import dask as settings
 
-    with settings.config.set(HERE), deaf():
-        cluster = distributed.LocalCluster(
-            n_workers=where.workers or cores(), threads_per_worker=1, processes=True, host="127.0.0.1", dashboard_address="127.0.0.1:0",
-            silence_logs="CRITICAL",
-        )  # fmt: skip
-    with cluster, distributed.Client(cluster) as client:
-        yield client
+    with _own_environment():
+        with settings.config.set(HERE), deaf():
+            cluster = distributed.LocalCluster(
+                n_workers=where.workers or cores(), threads_per_worker=1, processes=True, host="127.0.0.1", dashboard_address="127.0.0.1:0",
+                silence_logs="CRITICAL",
+            )  # fmt: skip
+        with cluster, distributed.Client(cluster) as client:
+            yield client
+
+
+@contextmanager
+def _own_environment() -> Iterator[None]:
+    """This process has its environment again at the end: dask gives it that of its workers."""
+    before = dict(os.environ)
+    try:
+        yield
+    finally:
+        for name in {*os.environ} - {*before}:
+            del os.environ[name]
+        os.environ.update(before)
 
 
 def processes(client: Client) -> int:
