@@ -114,7 +114,7 @@ def test_a_number_that_the_data_do_not_determine_says_so() -> None:
 
 
 def test_an_angle_is_judged_by_the_width_of_its_interval() -> None:
-    """0 and pi are angles like any other; one that is off by more than 60 degrees leaves more than it takes away, and takes kCos with it."""
+    """An angle may be 0 or pi. If its interval reaches more than 60 degrees to each side, neither the angle nor kCos is written."""
     for phase in (0.5 * math.pi, -0.5 * math.pi, 6.0):  # the arm is level at 0, at pi, and at pi / 2 - 6 rad
         model = PhysicalModel(axis().with_effect("gravity", (0.5, phase)))
         for half, sure in ((0.02, True), (1.0, True), (1.1, False), (2.0 * math.pi, False), (math.inf, False)):

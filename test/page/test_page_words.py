@@ -32,7 +32,7 @@ from xy_sysid.settings import AxisExcitation, knobs
 
 
 def test_the_design_knows_the_effects_that_the_page_was_given(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Files of --effect-file: without them an effect of one's own could never be settled on the page."""
+    """The files of --effect-file. The design needs them to simulate a user's own effects."""
     pytest.importorskip("rclpy")
     from xy_sysid.nodes import settle
 

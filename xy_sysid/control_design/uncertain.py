@@ -84,7 +84,7 @@ def is_determined(value: float, low: float, high: float) -> bool:
 
 
 def is_known_angle(low: float, high: float) -> bool:
-    """Whether a force that turns with an angle in this interval, rad, leaves less than it takes away: an angle off by e leaves 2 sin(e / 2) of it."""
+    """Whether compensation with an angle from this interval, rad, reduces the force. With an angle that is wrong by e, 2 sin(e / 2) of it remain."""
     return 0.5 * (high - low) < WIDEST
 
 
