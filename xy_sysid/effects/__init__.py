@@ -22,5 +22,6 @@ def _found() -> dict[str, Effect]:
 
 EFFECTS: dict[str, Effect] = _found()
 SIMPLEST_FRICTION = min((effect for effect in EFFECTS.values() if effect.is_dry), key=lambda effect: len(effect.parameters))
+SIMPLEST_LOAD = next(effect for effect in EFFECTS.values() if len(effect.parameters) == 1 and effect.parameters[0].per_recording)
 
-__all__ = ["EFFECTS", "SIMPLEST_FRICTION", "Effect", "Guess", "Parameter", "Scene", "columns", "law"]
+__all__ = ["EFFECTS", "SIMPLEST_FRICTION", "SIMPLEST_LOAD", "Effect", "Guess", "Parameter", "Scene", "columns", "law"]

@@ -15,7 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from xy_sysid.axis.forward import move
 from xy_sysid.axis.model import AxisModel
-from xy_sysid.effects import EFFECTS, SIMPLEST_FRICTION
+from xy_sysid.effects import SIMPLEST_FRICTION, SIMPLEST_LOAD
 from xy_sysid.experiment_design.beliefs import Belief
 from xy_sysid.experiment_design.criteria import COARSE, FITTED, LOOKED
 from xy_sysid.experiment_design.design import broken_in_time
@@ -34,8 +34,6 @@ CROSSES = (0.3, 10.0)  # s in which an axis crosses its travel at full voltage
 POLE = (5.0, 500.0)  # rad/s
 DELAY = (0.5e-3, 5e-3)  # s
 FRICTION = (0.01, 0.2)  # of the full voltage
-LOAD = next(effect for effect in EFFECTS.values() if len(effect.parameters) == 1 and effect.parameters[0].per_recording)
-HELD = 1.0  # of the friction, which holds it
 COUNTS = 1e5  # of the encoder within the travel, at least
 WIDTH = 0.05  # half of the 95 % interval of gain and pole that is asked for
 DRAWS = 8
@@ -78,8 +76,9 @@ def _draws(limits: MachineLimits, seed: int) -> list[AxisModel]:
         crosses, pole, delay, friction = (low * (high / low) ** random.uniform() for low, high in (CROSSES, POLE, DELAY, FRICTION))
         gain = (limits.travel[1] - limits.travel[0]) / (limits.voltage * (crosses if number else CROSSES[0]))
         rubs = friction if number else FRICTION[0]
+        held = random.uniform(-1.0, 1.0) * rubs  # a load that the friction holds
         model = AxisModel(gain, delay, pole).with_effect(SIMPLEST_FRICTION.name, (rubs * limits.voltage,))
-        found.append(model.with_effect(LOAD.name, (random.uniform(-HELD, HELD) * rubs * limits.voltage,)))
+        found.append(model.with_effect(SIMPLEST_LOAD.name, (held * limits.voltage,)))
     return found
 
 
