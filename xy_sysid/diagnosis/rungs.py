@@ -6,10 +6,11 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from xy_sysid.axis.model import Library
+from xy_sysid.axis.model import AxisModel, Library
 from xy_sysid.diagnosis.answer import Answer, Rung, Tried
 from xy_sysid.diagnosis.equal_laws import is_the_same, likely_names
 from xy_sysid.diagnosis.sets import contains, is_taken_for, part_explained
+from xy_sysid.effects import Effect
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit, best_start, fit, fit_base, joined, screened
 from xy_sysid.greybox.one_step import follower, one_step_fit
@@ -25,12 +26,16 @@ def rungs_of(data: AxisData, library: Library, names: Sequence[str] = ()) -> tup
     """The rigid base, then each of these effects, unasked, fitted after those before it."""
     rungs = [Rung.of(fit_base(data, library))]
     for name in names:
-        rungs.append(Rung.of(with_one_more(data, library, rungs[-1].fit, name), (name,)))
+        rungs.append(Rung.of(with_one_more(data, library, rungs[0].fit, rungs[-1].fit, name), (name,)))
     return tuple(rungs)
 
 
-def with_one_more(data: AxisData, library: Library, now: GreyboxFit, name: str) -> GreyboxFit:
-    """A fit with one more effect, unasked; a relative of the same family gives way."""
+def with_one_more(data: AxisData, library: Library, base: GreyboxFit, now: GreyboxFit, name: str) -> GreyboxFit:
+    """A fit with one more effect, unasked; a relative of the same family gives way.
+
+    base: the rigid model. Where other effects were added before, the fit also starts from what the new effect makes of the base alone, so that the
+    order in which effects are added matters little.
+    """
     effect = library[name]
     relative = next((own for own, _ in now.model.effects if effect.family and library[own].family == effect.family), None)
     ahead = follower(now.model)
@@ -39,8 +44,15 @@ def with_one_more(data: AxisData, library: Library, now: GreyboxFit, name: str) 
     if ahead is not None:
         return put_beside(data, now, ahead, effect)
     model = now.model if relative is None else now.model.without(relative)
-    traced = screened(data, now, [effect]).traces[0].values
-    return fit(data, best_start(data, starts.added(data, now, model, effect, traced)))
+    begun = _added(data, now, model, effect)
+    if any(own not in base.model for own, _ in model.effects):
+        alone = fit(data, best_start(data, _added(data, base, base.model, effect)), brief=True)
+        begun += starts.merged(model, alone.model)
+    return fit(data, best_start(data, begun))
+
+
+def _added(data: AxisData, now: GreyboxFit, model: AxisModel, effect: Effect) -> list[AxisModel]:
+    return starts.added(data, now, model, effect, screened(data, now, [effect]).traces[0].values)
 
 
 def answer_of_rungs(data: AxisData, rungs: tuple[Rung, ...]) -> Answer:
@@ -192,4 +204,4 @@ def _with(pool: Pool, now: GreyboxFit, name: str, final: GreyboxFit, asked: bool
     known = pool.nodes.get(effects)
     if known is not None and not known.refused and (known.whole or asked):
         return pool.finished(known, shown=True).fit
-    return with_one_more(pool.data, pool.library, now, name) if asked else None
+    return with_one_more(pool.data, pool.library, pool.nodes[pool.kept].fit, now, name) if asked else None

@@ -96,7 +96,7 @@ def added(story: Story, run: Run, name: str, library: Library = STANDARD) -> Sto
     now = _fit_of(story, data, library)
     relative = next((own for own in story.effects if library[own].family and library[own].family == library[name].family), None)
     before = now if relative is None else fit(data, now.model.without(relative))
-    found = with_one_more(data, library, before, name)
+    found = with_one_more(data, library, _fit_of(story, data, library, story.rungs[0]), before, name)
     if not np.isfinite(found.excess):
         return replace(story, note=f"{name} could not be fitted to these data.")
     return _grown(story, data, found, (name,), () if relative is None else (relative,))
