@@ -149,11 +149,11 @@ def test_a_dead_zone_can_be_added_to_backlash_by_name() -> None:
     """The gap stays, the dead zone gets its width; what heeds the speed cannot be taken out, and that is said."""
     data, base = machine("backlash=30e-6", "dead_zone=0.15")
     alone = one_step_fit(data, base, EFFECTS["backlash"])
-    both = with_one_more(data, STANDARD, alone, "dead_zone")
+    both = with_one_more(data, STANDARD, base, alone, "dead_zone")
     assert both.held_out_error < 0.5 * alone.held_out_error
     assert both.parameter("dead_zone.width").value == pytest.approx(0.15, rel=0.05)
     with pytest.raises(BadInput, match="asymmetric_viscous_friction"):
-        with_one_more(data, STANDARD, alone, "asymmetric_viscous_friction")
+        with_one_more(data, STANDARD, base, alone, "asymmetric_viscous_friction")
 
 
 @pytest.mark.parametrize(
@@ -196,7 +196,7 @@ def test_friction_that_bends_or_sticks_is_told_from_coulomb_friction_beside_a_ga
     """It takes the place of Coulomb friction in the filter, and the innovations fall; Stribeck's numbers stay vague, for sticking is smoothed."""
     data, base = machine("backlash=5e-6", effect)
     alone = one_step_fit(data, fit_with(data, base, ["coulomb_friction"], brief=True), EFFECTS["backlash"])
-    both = with_one_more(data, STANDARD, alone, name)
+    both = with_one_more(data, STANDARD, base, alone, name)
     assert name in both.model
     assert "coulomb_friction" not in both.model
     assert both.held_out_error < 0.7 * alone.held_out_error

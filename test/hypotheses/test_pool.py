@@ -82,7 +82,8 @@ def test_every_set_has_what_is_given() -> None:
     """And the effect that is missing beside it."""
     data = data_of("coulomb_friction+cogging")
     pool = Pool(data, STANDARD, frozenset({"cogging"}), SIZE)
-    pool.begin(with_one_more(data, STANDARD, fit_base(data), "cogging"))
+    base = fit_base(data)
+    pool.begin(with_one_more(data, STANDARD, base, base, "cogging"))
     assert all("cogging" in effects for effects in [*pool.search(), *pool.simplified()])
     assert pool.best.effects == {"cogging", "coulomb_friction"}
 
@@ -147,7 +148,7 @@ def test_a_quick_fit_never_takes_the_place_of_one_on_all_data() -> None:
     """A better quick fit of a known set is fitted on all data, too; when the time is up, what was known stays, and goes on leading."""
     pool, effects = Pool(data_of("coulomb_friction", seconds=5.0), STANDARD), frozenset({"coulomb_friction"})
     base = pool.begin(fit_base(pool.data))
-    whole = with_one_more(pool.data, STANDARD, base.fit, "coulomb_friction")
+    whole = with_one_more(pool.data, STANDARD, base.fit, base.fit, "coulomb_friction")
     quick = fit(pool.data, whole.model, brief=True)
     known = pool.remember(effects, replace(quick, excess=quick.excess + 1.0), whole)
     pool.late = lambda: True
@@ -172,7 +173,7 @@ def test_what_pulls_back_with_the_sine_of_an_angle_is_a_weight_and_no_wave() -> 
     data = prepare(1000.0, *made.axis("x"), units=Units("V", "rad"))
     pool = Pool(data, STANDARD)
     base = pool.begin(fit_base(data)).fit
-    weight = with_one_more(data, STANDARD, base, "gravity").model
+    weight = with_one_more(data, STANDARD, base, base, "gravity").model
     amplitude, phase = dict(weight.effects)["gravity"]
     wave = fit(data, weight.without("gravity").with_effect("cogging", (amplitude, 6.2, phase)))
     pool.remember(frozenset({"cogging"}), wave, wave)

@@ -125,6 +125,22 @@ def test_a_dead_part_becomes_a_gap(tmp_path: Path) -> None:
     assert len(recording) == int(np.sum(~middle)) and len(recording.runs()) == 2
 
 
+def test_a_joint_that_waits_takes_no_part_from_the_others(tmp_path: Path) -> None:
+    """A joint that moves for a moment between two rests is held, and not dead: the other keeps all of its samples."""
+    moment = (np.arange(len(T)) > 1000) & (np.arange(len(T)) < 1100)
+    waiting = np.where(moment, Y - Y[1001], 0.0)
+    recording = load(csv_of(tmp_path, {"time": T, "x_voltage": U, "x_position": Y, "z_voltage": U[::-1], "z_position": waiting}))
+    assert len(recording) == len(T) and len(recording.runs()) == 1
+    assert any("z: the output stands still" in note for note in recording.notes)
+
+
+def test_a_robots_q_is_an_angle(tmp_path: Path) -> None:
+    """The coordinate of a joint that is driven by a torque is in rad, and a position of an axis in m."""
+    recording = load(csv_of(tmp_path, {"time": T, "tau": U, "q": Y}))
+    assert (recording.input_unit, recording.output_unit) == ("N m", "rad")
+    assert load(csv_of(tmp_path, {"time": T, "x_torque": U, "x_position": Y})).output_unit == "m"
+
+
 def test_switching_inputs_are_no_saturation(tmp_path: Path) -> None:
     """Two levels by nature (PRBS), three levels by a relay: nothing is said."""
     assert "saturated" not in notes_of(tmp_path, x_voltage=np.sign(U))

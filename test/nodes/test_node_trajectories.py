@@ -163,6 +163,8 @@ def test_whoever_falls_silent_the_joint_comes_to_rest(world: World) -> None:
     drive.wait()
     moves = len(seen)
     assert world.until(lambda: len(seen) > moves + 600 and np.ptp(seen[-100:]) < 1e-3, 30.0), control.output()
-    ends = [of(message)[1][-1] for message in heard[-2:]]  # a message on its way when its sender dies may reach one listener and not the other
-    assert np.abs(np.mean(seen[-100:]) - ends).min() < 1e-3, (np.mean(seen[-100:]), ends)
+    ends = np.array(
+        [of(message)[1][-1] for message in heard[-2:]]
+    )  # a message on its way when its sender dies may reach one listener and not the other
+    assert np.abs(ends - float(np.mean(seen[-100:]))).min() < 1e-3, (np.mean(seen[-100:]), ends)
     within_limits(heard)

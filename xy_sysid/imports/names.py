@@ -35,7 +35,7 @@ FILLERS = (
     "motor servo actual act measured meas ist value val signal sig raw filtered data feedback fb fbk "
     "joint joints states the axis achse in of root model"
 )
-ANGLES = "angle winkel hoek theta phi omega drehzahl"
+ANGLES = "angle winkel hoek theta phi omega drehzahl q"  # q: of a robot's joint
 LETTERS = ("t", "u", "y", "r", "q")  # roles of one letter give way to a word: y_position is of the axis y
 QUADRATURE = re.compile(r"(?<![a-zA-Z])[iI]_[qQ](?![a-zA-Z])")
 SOLL = re.compile(r"(?i)soll(wert)?")

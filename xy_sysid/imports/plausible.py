@@ -64,7 +64,10 @@ def meaningful(path: Path, recording: Recording) -> Recording:
 
 
 def without_dead_parts(recording: Recording) -> Recording:
-    """Without long stretches in which an output does not change by a bit under an input as lively as elsewhere: they become gaps."""
+    """Without long stretches in which an output does not change by a bit under an input as lively as elsewhere: they become gaps.
+
+    An output that rests long elsewhere, too, is of an axis that is held: a robot's joints move one after another.
+    """
     if len(recording) < ENOUGH:
         return recording
     keep = np.ones(len(recording), dtype=np.bool_)
@@ -76,6 +79,8 @@ def without_dead_parts(recording: Recording) -> Recording:
             continue
         inside = np.zeros(len(y), dtype=np.bool_)
         inside[begin : begin + size] = True
+        if any(_rests(part, recording.sampling_rate) for part in (y[:begin], y[begin + size :])):
+            continue
         lively = all(0.0 < float(np.std(values[part])) >= LIVELY * float(np.std(values[other])) for values, part, other in _compared(u, inside))
         if not lively or int(np.sum(~inside)) < ENOUGH:
             continue
@@ -93,6 +98,11 @@ def _compared(u: FloatArray, inside: NDArray[np.bool_]) -> list[tuple[FloatArray
     """The input and its steps, with where to look at them: inside and outside."""
     both = inside[1:] & inside[:-1], ~inside[1:] & ~inside[:-1]
     return [(u, inside, ~inside), (np.diff(u), *both)]
+
+
+def _rests(y: FloatArray, sampling_rate: float) -> bool:
+    """Whether an output stands long."""
+    return len(y) > 0 and _longest_rest(y)[1] > max(STUCK_SECONDS * sampling_rate, STUCK_PART * len(y))
 
 
 def _longest_rest(y: FloatArray) -> tuple[int, int]:
