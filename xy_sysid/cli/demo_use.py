@@ -107,9 +107,9 @@ class Course:
             self._monitor.start_when_ready()
             heard = float(self._values("diagnoser").get("seconds heard (s)", "0"))
             if heard >= self._seconds:
-                self._next("the effects of both axes are searched ...", self._auto)
+                self._next("searching for the effects of both axes ...", self._auto)
         elif self._step == 1 and self._answered():
-            self._next("Use it: the controllers are designed, and a path is followed three times ...", self._use)
+            self._next("Use it: designing the controllers, and following a path three times ...", self._use)
         elif self._step == 2 and self._answered():
             state = self._values(NODE).get("state", "")
             if state == "failed":

@@ -40,7 +40,7 @@ Between = Annotated[
 def next_(
     reading: Reading,
     recs: Annotated[
-        list[Path] | None, typer.Argument(metavar="[REC]", help="recordings of one machine, as of diagnose; none with --for nothing")
+        list[Path] | None, typer.Argument(metavar="[REC]", help="recordings of one machine, as for diagnose; none with --for nothing")
     ] = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", metavar="FILE", help="write the experiment for the excitation node")] = None,
     trajectory: Annotated[
@@ -90,7 +90,7 @@ def next_(
     o.output_file("--output", output, force)
     if trajectory is not None:
         if precision == NOTHING:
-            raise BadInput("--trajectory", "without a recording", "a recording, whose model says how the axis moves", "Leave out --for nothing.")
+            raise BadInput("--trajectory", "without a recording", "a recording, because its model predicts the motion of the axis", "Leave out --for nothing.")
         o.output_file("--trajectory", trajectory, force)
         o.output_file("--trajectory", trajectory.with_suffix(".csv"), force)
     asked = partial(_asked, voltage=voltage, travel=travel, speed=speed, acceleration=acceleration)
@@ -204,7 +204,7 @@ def _show(answer: NextExperiment, output: Path | None) -> None:
         say(f"  It needs up to {needs.voltage:.3g} {limits.units.input} and the travel from {limits.span(needs.travel)}, with margin.")
         say(f"  The axis has to stand between {limits.span(needs.starts(), ' and ')} when it begins.")
     if answer.ask:
-        say(f"  Somebody has to help: {answer.ask}")
+        say(f"  To do by hand: {answer.ask}")
     if output is not None and answer.experiment is not None:
         say(f"  {output}: run it with parameter experiment of the excitation node, then diagnose all recordings together.")
 

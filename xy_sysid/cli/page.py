@@ -38,7 +38,7 @@ def page(
     namespace: Annotated[str, typer.Option(help="ROS namespace of the machine")] = "/xy",
     browse: Annotated[bool, typer.Option("--browse/--no-browse", help="open a browser if there is a display")] = True,
     between: Between = None,
-    settle: Annotated[str, typer.Option(hidden=True, help="axis that is settled without being told, for the demo")] = "",
+    settle: Annotated[str, typer.Option(hidden=True, help="axis for which the experiments start automatically, for the demo")] = "",
     json: o.Json = False,
 ) -> None:
     """Show measurement and model in a browser, where they differ, and the missing effect; add it there and see the error fall. Ctrl-C ends it."""

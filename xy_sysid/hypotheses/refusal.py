@@ -26,15 +26,15 @@ def refusal(data: AxisData, library: Library, found: GreyboxFit, given: frozense
         if why:
             return f"{name}: {why}"
         if data.passed_once and effect.is_by_place and not _repeats(data, effect, values):
-            return f"{name}: each place is passed once, so that what acts by place cannot be told from what drifts"
+            return f"{name}: each position is passed only once, so an effect of position cannot be distinguished from a drift"
         for k, (item, value) in enumerate(zip(effect.on(data.similar), values, strict=True)):
             edge = value >= item.high * (1.0 - 1e-6) or (k == 0 and not item.positive and value <= item.low * (1.0 + 1e-6) and item.low > 0.0)
             if k == 0 and edge:
                 return f"{name}: {item.name} is at its bound"
             if k == 0 and _is_none(data, effect, found):
-                return f"{name}: {item.name} cannot be told from 0"
+                return f"{name}: {item.name} cannot be distinguished from 0"
             if item.name == effect.mode_frequency and not low <= value <= high:
-                return f"{name}: a mode at {value:.3g} Hz, outside of what these data excite and see ({low:.3g} to {high:.3g} Hz)"
+                return f"{name}: a mode at {value:.3g} Hz, outside the excited band ({low:.3g} to {high:.3g} Hz)"
     limit = data.first / data.sampling_rate / 4.0
     if found.model.delay >= 0.99 * limit:
         return f"time_delay: {found.model.delay:.3g} s is at its bound"
