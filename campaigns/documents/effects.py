@@ -47,9 +47,9 @@ def _section(e: Effect) -> str:
 
 {table}
 
-- Valid for: {e.validity}{"; acts on the table: across a gap the motor does not feel it" if e.on_table else ""}
+- Valid for: {e.validity}{"; acts on the table: inside a backlash gap it does not reach the motor" if e.on_table else ""}
 - Shows as: {e.shows}
-- Taken for: {", ".join(e.look_alikes)}
+- Look-alikes: {", ".join(e.look_alikes)}
 - Distinguished by: {e.experiment}
 - Source: {e.source}
 """

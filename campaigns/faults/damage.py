@@ -96,7 +96,7 @@ def compared(found: Recording, true: Recording, summed: bool) -> Found:
     whole = len(found) == len(true) and found.axes == true.axes
     if same and whole:
         return Found("full")
-    warned = any("may be others" in note or "may be wrong" in note for note in found.notes)
+    warned = any("some values may differ" in note or "may be wrong" in note for note in found.notes)
     if found.notes and (same or warned or not summed):
         return Found("part-and-said")
     if not summed and (not same or np.array_equal(found.seq, true.seq[: len(found)])):  # or cut between two rows

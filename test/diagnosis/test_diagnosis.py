@@ -77,7 +77,7 @@ def test_what_was_found_comes_first_and_what_is_left_is_said() -> None:
     assert found.sentence.startswith("Missing: coulomb_friction") and " of the error's power (" in found.sentence
     assert 0.9 < found.explained < 1.0
     assert found.discrepancy > 0.0
-    assert "What is left: " in found.sentence and "of the motion, beyond the encoder's noise of " in found.sentence
+    assert "Residual error above the encoder noise of " in found.sentence and "of the motion" in found.sentence
 
 
 @pytest.mark.parametrize("effect", ["coulomb_friction", "backlash"])

@@ -33,9 +33,9 @@ def test_nothing_is_said_of_a_good_recording(tmp_path: Path) -> None:
     ("columns", "says"),
     [
         ({"time": T * 1000}, "1 s apart (1 Hz): is time in ms"),
-        ({"time": T * 1e-6}, "is that the unit of time?"),
+        ({"time": T * 1e-6}, "is this the right unit of time?"),
         ({"x_voltage": Y * 1e3, "x_position": U * 1e-3}, "are input and output swapped?"),
-        ({"x_position": Y * 3e7}, "is it in mm or counts? Say --unit output=mm"),
+        ({"x_position": Y * 3e7}, "is it in mm or counts? Give --unit output=mm"),
         ({"x_position": np.where(HALF, Y[len(T) // 2], Y)}, "dead from 1.5 s to the end (50 % of the samples) under an input as lively as elsewhere"),
         ({"x_position": np.where(HALF, Y[len(T) // 2], Y), "x_voltage": np.where(HALF, 0.3 * U, U)}, "stands still from 1.5 s to the end"),
         ({"x_position": Y + 1e9}, "where numbers are 1.2e-07 apart"),

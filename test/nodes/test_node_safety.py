@@ -120,11 +120,11 @@ def test_two_excitations_never_drive_one_machine(world: World) -> None:
     assert "/xy/other publishes" in first.output() or "whose name nobody has told yet publishes" in first.output()  # after a stall
     assert world.until(lambda: not blocks[-1].values.any(), 1.0) and world.state("excitation") == "inactive"
     assert not world.transition("other", "configure")
-    assert "/xy/excitation publishes /xy/voltage, too: no configure beside it. End one of the two." in second.output()
+    assert "/xy/excitation publishes /xy/voltage, too: configure is refused while it runs. End one of the two." in second.output()
     assert not world.transition("excitation", "activate")
-    assert "/xy/other publishes /xy/voltage, too: no activate beside it" in first.output()
-    assert world.until(lambda: any("no activate beside it" in status.message for status in statuses), 2.0)
-    assert world.until(lambda: any("no configure beside it" in status.message for status in statuses), 2.0)
+    assert "/xy/other publishes /xy/voltage, too: activate is refused while it runs" in first.output()
+    assert world.until(lambda: any("activate is refused while it runs" in status.message for status in statuses), 2.0)
+    assert world.until(lambda: any("configure is refused" in status.message for status in statuses), 2.0)
     second.send(signal.SIGTERM)
     assert second.wait() == 0
     assert world.until(lambda: world.transition("excitation", "activate"), 10.0)

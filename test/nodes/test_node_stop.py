@@ -120,7 +120,7 @@ def test_stop_is_quick_whatever_the_ramps_are(world: World) -> None:
 
 
 def alone(process: NodeProcess) -> bool:
-    return "no configure beside it" in process.output()
+    return "configure is refused" in process.output()
 
 
 def test_two_excitations_of_one_name_never_drive(world: World) -> None:

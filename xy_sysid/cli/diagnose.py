@@ -75,7 +75,11 @@ def _show(name: str, item: Answer, drive: Transmission) -> None:
             part = "-" if one.rung.one_step else f"{100 * one.explained:.3g} %"  # of another error, one sample ahead
             rows.append((*error_cells(f"{one.name} (refused)" if one.refused else one.name, one.rung), part))
         if rows:
-            table("each effect alone, smallest error first", ("effect", f"held-out error {motion(item.units.judged)[1]}", "times floor", "share of error"), rows)
+            table(
+                "each effect alone, smallest error first",
+                ("effect", f"held-out error {motion(item.units.judged)[1]}", "times floor", "share of error"),
+                rows,
+            )
         parameter_table(item.rungs[-1].parameters)
         mechanics_table(item.rungs[-1].parameters, item.units, drive)
     say(f"  Next experiment: {item.next_experiment}\n")

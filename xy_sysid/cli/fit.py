@@ -61,7 +61,10 @@ def fit(
     else:
         if averages is not None:
             raise BadInput(
-                "--averages", f"{averages:g}", "a file with a measured frequency response", "Leave it out: the windows of a recording are counted automatically."
+                "--averages",
+                f"{averages:g}",
+                "a file with a measured frequency response",
+                "Leave it out: the windows of a recording are counted automatically.",
             )
         recording = read(recs, reading, json)
         if len(recording) and few_periods(recording, held_out):

@@ -42,7 +42,8 @@ def fleet(
         Path | None, typer.Option("--one", metavar="FILE", help="analyse only this recording, in this process; -o then names a Parquet file")
     ] = None,
     pattern: Annotated[
-        str, typer.Option(metavar="PATTERN", help="pattern of the end of a path: {machine}, {axis}, {date} and *, for example '{machine}/{date}*.csv'")
+        str,
+        typer.Option(metavar="PATTERN", help="pattern of the end of a path: {machine}, {axis}, {date} and *, for example '{machine}/{date}*.csv'"),
     ] = "",
     names: Annotated[
         Path | None, typer.Option(metavar="FILE", help="YAML with pattern, follow, and the names of single recordings (docs/fleet.md)")

@@ -90,7 +90,9 @@ def next_(
     o.output_file("--output", output, force)
     if trajectory is not None:
         if precision == NOTHING:
-            raise BadInput("--trajectory", "without a recording", "a recording, because its model predicts the motion of the axis", "Leave out --for nothing.")
+            raise BadInput(
+                "--trajectory", "without a recording", "a recording, because its model predicts the motion of the axis", "Leave out --for nothing."
+            )
         o.output_file("--trajectory", trajectory, force)
         o.output_file("--trajectory", trajectory.with_suffix(".csv"), force)
     asked = partial(_asked, voltage=voltage, travel=travel, speed=speed, acceleration=acceleration)
@@ -178,7 +180,9 @@ def _first(reading: Reading, run_file: Path | None, asked: Callable[[str], dict[
     values = {**_own_limits(run_file, axis), **asked(units.output), **({} if rms is None else {"rms": rms})}
     for name in ("voltage", "travel"):
         if name not in values:
-            raise BadInput("--for nothing", f"without the limit of {name}", f"--{name}, or --params with a run file", "Say what the machine may do.")
+            raise BadInput(
+                "--for nothing", f"without the limit of {name}", f"--{name}, or --params with a run file", "Give the limits of the machine."
+            )
     rate = settings.rate if "rate" in told else reading.rate or settings.rate
     middle = 0.5 * (values["travel"][0] + values["travel"][1])
     return first_experiment(axis, rate, MachineLimits(start=middle, seconds=seconds, units=units, **values))

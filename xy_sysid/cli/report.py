@@ -26,9 +26,7 @@ def report(
     reading: Reading,
     out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="the page to write")] = Path("report.html"),
     title: Annotated[str, typer.Option("--title", metavar="TEXT", help="title of the report. Default: the name of the recording")] = "",
-    machine: Annotated[
-        str, typer.Option("--machine", metavar="TEXT", help="name of the machine. Default: from the meta data of the recording")
-    ] = "",
+    machine: Annotated[str, typer.Option("--machine", metavar="TEXT", help="name of the machine. Default: from the meta data of the recording")] = "",
     author: Annotated[str, typer.Option("--author", metavar="TEXT", help="author of the report")] = "",
     recorded: Annotated[
         str, typer.Option("--date", metavar="DATE", help="date of the recording, for example 2026-03-03. Default: from its clock or its name")

@@ -25,7 +25,7 @@ HELD_OUT = 1.0 / 3.0  # of the recording, when a model was fitted to it
 SEEN = "the model was fitted to this recording; only its last third is used"
 
 MOST_LEFT = 0.7  # of the motion: half of its power
-HARDLY = "The model leaves most of the motion: it hardly describes this axis, or input and output do not belong together."
+HARDLY = "The model explains little of the motion: it does not describe this axis, or input and output do not belong together."
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +129,9 @@ def frequency_sentence(line: ModelCheck, where: Comparison) -> str:
     """The check in words, and what it cannot see."""
     text = f"in frequency: residual {told(line.rms_sigma)} sigma rms, at worst {told(line.worst_sigma)} at {line.worst_hz:.4g} Hz"
     hidden = line.rms_sigma <= AT_THE_FLOOR and where.error_below_end > TWICE * where.floor_below_end
-    return text + (": what fails does not repeat with the input, so a frequency response takes it for noise (friction does that)." if hidden else ".")
+    return text + (
+        ": the error does not repeat with the input, so the frequency response treats it as noise (friction does this)." if hidden else "."
+    )
 
 
 def held(run: Run) -> int:

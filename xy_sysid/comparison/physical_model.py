@@ -49,11 +49,11 @@ class PhysicalModel:
 
     @property
     def doubt(self) -> str:
-        """What speaks against judging the model by its free simulation; empty if nothing does."""
+        """Why the model cannot be judged by its free simulation; empty if it can."""
         names = [name for name in self.effects if not self.model.library[name].simulable]
         if not names:
             return ""
-        return f"no free simulation can follow {' and '.join(names)} (the contact is chaotic): the error says little about the model"
+        return f"a free simulation cannot follow {' and '.join(names)} (the contact is chaotic), so this error says little about the model"
 
     @property
     def label(self) -> str:

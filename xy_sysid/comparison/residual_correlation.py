@@ -48,7 +48,7 @@ def residual_correlation(residual: FloatArray, voltage: FloatArray, lags: int = 
     Raises BadInput if the lengths differ, there are fewer than twenty samples for each lag, or one of them does not move.
     """
     if residual.size != voltage.size:
-        raise BadInput("residual", f"{residual.size} samples", f"{voltage.size}, as many as of the input", "Give both of the same samples.")
+        raise BadInput("residual", f"{residual.size} samples", f"{voltage.size}, as many as of the input", "Give both for the same samples.")
     if residual.size < COLOUR * lags:
         raise BadInput("samples", residual.size, f"at least {COLOUR * lags} for {lags} lags", "Record longer or ask for fewer lags.")
     far = residual.size // COLOUR

@@ -84,7 +84,7 @@ class Comparison:
     def sentence(self) -> str:
         """For people."""
         if not np.isfinite(self.error):
-            return "the simulated model runs away: it is not stable."
+            return "the simulation diverges: the model is not stable."
         ratio = self.error / self.noise_floor if self.noise_floor > 0 else float("inf")
         if not self.places:
             return f"nothing stands out: the error is {told(ratio, 2)} times the noise floor."
@@ -283,7 +283,7 @@ def _direction(speed: FloatArray, error: FloatArray, noise: float, unit: str) ->
     if difference < TWICE * noise or difference < UNEVEN * float(np.sqrt(np.mean(error**2))):
         return []
     ratio = difference / noise
-    return [_place("direction", (-difference, difference), unit, ratio, f"{told(ratio)} times the floor apart between the two directions of motion")]
+    return [_place("direction", (-difference, difference), unit, ratio, f"{told(ratio)} times the floor between the two directions of motion")]
 
 
 def _periodic(position: FloatArray, error: FloatArray, noise: float, unit: str) -> list[Place]:
@@ -301,4 +301,4 @@ def _periodic(position: FloatArray, error: FloatArray, noise: float, unit: str) 
     if size[best] < 6.0 * float(np.median(size)):
         return []
     period = float(periods[best])
-    return [_place("position", (period, period), unit, ratio, f"{told(ratio)} times the floor repeating every {moved(period, unit)} of position")]
+    return [_place("position", (period, period), unit, ratio, f"{told(ratio)} times the floor, repeating every {moved(period, unit)} of position")]

@@ -188,7 +188,7 @@ def compensate(models: Sequence[AxisModel], found: Gains, path: SampledPath, con
     simple = judged((), path, simple_feedforward(found, path))
     stretched = at_its_bound(models[0])
     better = "they are better than the whole feedforward for a sample of the parameters"
-    reason = f"{stretched} is at its bound, so that another law acts" if stretched else better
+    reason = f"{stretched} is at its bound, so another law probably acts" if stretched else better
     best, left = simple, tuple((name, reason) for name, _ in models[0].effects)
     for model in (models[0], *others) if not stretched else ():
         whole, gone = _worth_undoing(model, undoing(model), simple)

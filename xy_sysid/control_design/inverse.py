@@ -83,9 +83,9 @@ def not_undone(model: AxisModel) -> tuple[tuple[str, str], ...]:
     for name, values in model.effects:
         effect = model.library[name]
         if any("t" in arguments(item) for item in effect.functions.values()):
-            found.append((name, "it changes with time, which a path does not know"))
+            found.append((name, "it changes with time, so it is not known ahead"))
         elif effect.category == "state" and lag_of(effect, values) is None:
-            found.append((name, "no voltage undoes it: see the correction by direction"))
+            found.append((name, "no voltage can cancel it: see the correction by direction"))
     return tuple(found)
 
 

@@ -30,7 +30,7 @@ def sdf(
     straight = reach > 0.0 and stiffness > 0.0 and float(np.max(np.abs(stiffness * places + offset - pull))) <= STRAIGHT * reach
     lost = [(effect, _lost(model.library[effect])) for effect, _ in model.effects if not (straight and _spring(model.library[effect]))]
     if model.delay > 0.0:
-        lost.append(("delay", "SDF knows none"))
+        lost.append(("delay", "SDF has none"))
     if travel is None:
         lost.append(("travel", "it is not known"))
     top = min(limit, largest_voltage(model))
@@ -71,4 +71,4 @@ def _spring(effect: Effect) -> bool:
 
 
 def _lost(effect: Effect) -> str:
-    return "only its mean level at speed is kept" if effect.is_dry else "SDF has no word for it"
+    return "only its mean level at speed is kept" if effect.is_dry else "SDF cannot express it"

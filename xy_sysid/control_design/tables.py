@@ -81,7 +81,7 @@ def position_tables(model: PhysicalModel, travel: tuple[float, float]) -> tuple[
         ("force", "V", "add to the command at this position", _has_force),
         ("drag", "V/(m/s)", "add to kV at this position", _has_drag),
         ("gain", "", "divide the command by this at this position", _has_gain),
-        ("scale", "m", "the encoder shows so much too much: subtract it from what is shown, or add it to the position asked for", _has_scale),
+        ("scale", "m", "error of the encoder at this position: subtract it from the reading, or add it to the commanded position", _has_scale),
     )
     found = []
     for name, unit, meaning, has in kinds:

@@ -18,7 +18,7 @@ def urdf(
     level = 0.5 * (friction(model, abs(model.gain), 1.0) + friction(model, -abs(model.gain), -1.0))
     lost = [(effect, _lost(model.library[effect])) for effect, _ in model.effects]
     if model.delay > 0.0:
-        lost.append(("delay", "URDF knows none"))
+        lost.append(("delay", "URDF has none"))
     if travel is None:
         lost.append(("travel", "it is not known"))
     top = min(limit, largest_voltage(model))
@@ -48,4 +48,4 @@ def urdf(
 
 
 def _lost(effect: Effect) -> str:
-    return "only its mean level at speed is kept" if effect.is_dry else "URDF has no word for it"
+    return "only its mean level at speed is kept" if effect.is_dry else "URDF cannot express it"

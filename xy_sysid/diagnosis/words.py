@@ -32,7 +32,7 @@ def missing(data: AxisData, found: Answer, unsure: Sequence[str], with_all: floa
 
 
 def nothing_missing(data: AxisData, base: GreyboxFit, input_noise: float | None, hides: float) -> str:
-    """Nothing is missing. input_noise: rms of white input noise that would cause the same error, None at the floor; hides: smallest visible part of the motion."""
+    """Nothing is missing. input_noise: rms of white input noise with the same error, None at the floor; hides: least visible part of the motion."""
     unit = data.units.judged
     why = f"at the noise floor ({moved(base.noise_floor, unit)})"
     if input_noise is not None:
@@ -53,7 +53,7 @@ def not_in_library(data: AxisData, found: Answer) -> str:
 
 
 def kept_out(found: Answer) -> str:
-"""The refused set with the smallest error; empty without one."""
+    """The refused set with the smallest error; empty without one."""
     if found.kept_out is None:
         return ""
     names, several = found.kept_out.effects, len(found.kept_out.effects) > 1
@@ -108,7 +108,7 @@ def look_alikes(found: Answer, library: Library) -> tuple[LookAlike, ...]:
         elif rung is None:
             apart, text = True, f"the error shows no trace of {other}, or only a weak one"
         elif rung.excess > own.excess + AT_FLOOR:
-            apart, text = True, f"{other} leaves {moved(rung.held_out_error, unit)}, {name} {bare(own.held_out_error, unit)}"
+            apart, text = True, f"the error with {other} is {moved(rung.held_out_error, unit)}, with {name} {bare(own.held_out_error, unit)}"
         elif richer:
             text = f"{other} contains {name} and predicts as well; these data do not need more than {name}"
         else:
@@ -159,5 +159,5 @@ def _mostly(data: AxisData, fit: GreyboxFit) -> str:
 
 
 def _beyond_noise(data: AxisData, fit: GreyboxFit) -> FloatArray:
-    """(bands,) power of the held-out error above the encoder noise, separately in each band, so that little noise in one band does not offset error in another."""
+    """(bands,) power of the held-out error above the encoder noise, band by band: little noise in one band does not offset error in another."""
     return np.asarray(np.maximum(fit.power - data.floor.noise, 0.0))

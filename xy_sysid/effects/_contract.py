@@ -278,7 +278,7 @@ class Effect:
     sum_of:      other effects that together are the very same law, if there are and motor and table are one
     straight:    True for a force in proportion to speed, forth and back each by its own: it needs no sub-steps
     angular:     True for a law of an angle: it is tried in another's place only where the position is in rad
-    on_table:    True for a force that acts on the table: across a gap the motor does not feel it
+    on_table:    True for a force that acts on the table: inside a backlash gap it does not reach the motor
     rubs:        for ``one_step``: the effect whose dry friction it begins with where no other is given
     hides:       for ``one_step``: names of effects that leave no trace where it acts, and are tried beside it unasked
     suspects:    names of effects whose trace in an error is a reason to try this one, too: its own trace does not tell

@@ -42,7 +42,7 @@ EFFECT = Effect(
     ),
     shows="error grows towards both ends of the travel, with the sign of the position",
     look_alikes=("return_spring", "constant_load"),
-    experiment="hold still at several places: the input needed is the law",
+    experiment="hold the axis at several positions: the input needed follows the law",
     functions={"force": force},
     guesses=guesses,
     refusal=refusal,

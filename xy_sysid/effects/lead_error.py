@@ -50,7 +50,7 @@ EFFECT = Effect(
     name="lead_error",
     law="y = x + amplitude sin(2 pi x / period + phase)",
     meaning="wobble of the screw, or an encoder disk off centre",
-    validity="at least 3 periods within the travel; small against the period",
+    validity="at least 3 periods within the travel; small compared with the period",
     source="ISO 3408-3:2006, travel deviation within one revolution",
     category="encoder",
     parameters=(

@@ -170,7 +170,7 @@ def expects(found: Design, wanted: float = 0.0) -> str:
         left = f"{found.best.experiment.seconds:.0f} s that the budget leaves"
         return f"In the {left}, {names} are distinguished with {chance} probability; {wanted:.0f} s were designed."
     if found.alike:
-        return f"Within the limits of this machine {names} are the same: no experiment has evidence for one of them."
+        return f"Within the limits of this machine {names} are the same: no experiment can favour one of them."
     if found.helps:
         return f"No experiment within the limits is sure to distinguish {names}: the best does with {chance} probability."
     return f"No experiment within the limits can distinguish {names}: the best would with {chance} probability."

@@ -49,7 +49,7 @@ class MachineLimits:
     def __post_init__(self) -> None:
         for name in ("voltage", "rms", "speed", "acceleration", "seconds", "centring"):
             if not getattr(self, name) > 0.0:
-                raise BadInput(f"limit of {name}", getattr(self, name), "above 0", "Give what the machine may do.")
+                raise BadInput(f"limit of {name}", getattr(self, name), "above 0", "Give the limits of the machine.")
         most, farthest = (_most(name) for name in ("limit", "travel_max"))
         if self.voltage > most:
             unit = self.units.input
@@ -91,7 +91,7 @@ class MachineLimits:
     def broken(self, motion: Motion) -> str:
         """Which limit a motion would come too near to, in a word, or nothing."""
         if not np.all(np.isfinite(motion.position)):
-            return "a model that runs away"
+            return "a model whose simulation diverges"
         speed, acceleration = fastest(motion)
         free = 1.0 - self.margin
         away = motion.position - self.start

@@ -29,7 +29,7 @@ def unsealed(path: Path, text: str) -> str:
         return text
     rest = text[found.end() :]
     if _sum(rest) != found.group(1):
-        problem = "was cut off or changed since it was written (the sum in its first line is another)"
+        problem = "was cut off or changed since it was written (the sum in its first line differs)"
         raise BadRecording(path, problem, "Take another copy; if you changed it yourself, delete that line.")
     return rest
 

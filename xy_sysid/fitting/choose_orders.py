@@ -72,19 +72,19 @@ def choose(frf: FrequencyResponse, family: Structure, thorough: bool = True) -> 
         if not good:
             if clear:
                 nearest = min(clear, key=lambda step: description_length(step.fit, data, scale))
-                refused = f"{_orders(nearest.fit)} would leave {_times(nearest.fit)}, but {nearest.doubt}"
+                refused = f"{_orders(nearest.fit)} would have {_times(nearest.fit)}, but {nearest.doubt}"
             break
         best = min(good, key=lambda step: description_length(step.fit, data, scale))
-        words.append(f"{_named(best)} {'take' if len(best.added) > 1 else 'takes'} that to {_times(best.fit)}")
+        words.append(f"{_named(best)} {'reduce' if len(best.added) > 1 else 'reduces'} that to {_times(best.fit)}")
         now = best.fit
     data = independent_data(frf, len(now.frequency))
     scale = max(1.0, excess(now))
     trials = {(fit.structure.numerator_order, fit.structure.denominator_order): fit for fit in tried}
     ranked = sorted((_trial(fit, data, scale) for fit in trials.values()), key=lambda item: item.length)
     base = "a rigid body" if rigid.structure.denominator_order > max(family.integrators, 1) else "an integrator" if family.integrators else "a lag"
-    reason = f"Orders {_orders(now)}, chosen from the data: {base}{' with delay' if family.free_delay else ''} leaves {_times(rigid)}"
+    reason = f"Orders {_orders(now)}, chosen from the data: {base}{' with delay' if family.free_delay else ''} has {_times(rigid)}"
     reason += "".join(f"; {text}" for text in words)
-    reason += f"; {refused}." if refused else f"; nothing richer of {len(trials) - 1} tried is clearly better."
+    reason += f"; {refused}." if refused else f"; of {len(trials) - 1} other orders tried, none with more parameters is clearly better."
     return Choice(now, tuple(ranked), reason)
 
 

@@ -34,7 +34,7 @@ class Names(Settings):
 
     pattern: str = knob("", "of the end of a path, for example {machine}/{axis}/{date}*.csv; * stands for anything but a slash")
     follow: list[str] = knob([], "effects whose parameters are estimated in every recording")
-    recordings: dict[str, Named] = knob({}, "by the end of a path: what cannot be told from it")
+    recordings: dict[str, Named] = knob({}, "by the end of a path: names that the path does not contain")
 
 
 @dataclass(frozen=True, slots=True)

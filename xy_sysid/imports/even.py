@@ -101,7 +101,7 @@ def _resampled(path: Path, time: FloatArray, rate: float, held: FloatArray, smoo
     steps = np.diff(time) * rate
     shortest, middle, longest = (float(value) / rate * 1e3 for value in (steps.min(), np.median(steps), steps.max()))
     uneven = f"time is uneven: steps from {shortest:.4g} to {longest:.4g} ms, most {middle:.4g} ms"
-    taken = "If the samples were taken evenly all the same, say so with --rate in Hz; else record again with a steady clock."
+    taken = "If the samples were evenly spaced nevertheless, give --rate in Hz; otherwise record again with a steady clock."
     if float(np.mean(steps < BURST)) > BURSTS:
         raise BadRecording(path, f"{uneven}; {100 * np.mean(steps < BURST):.0f} % of the stamps come in bursts", taken)
     gap = BRIDGED if _scattered(steps) else GAP

@@ -121,10 +121,10 @@ def _merge(streams: dict[str, Stream], notes: list[str]) -> tuple[dict[str, Stre
         return streams, period
     kept = min(counts.values())
     if kept == most:
-        notes.append(f"the source started anew {most - 1} times; the parts follow each other with a gap")
+        notes.append(f"the source restarted {most - 1} times; the parts are joined with a gap between them")
     else:
         said = ", ".join(f"{name} {count - 1} times" for name, count in counts.items())
-        notes.append(f"the sample counters started anew a different number of times ({said}); only the part before the first is paired")
+        notes.append(f"the sample counters restarted a different number of times ({said}); only the part before the first is paired")
         kept = 1
     merged: dict[str, list[Stream]] = {name: [] for name in streams}
     offset, late = 0.0, 0.0

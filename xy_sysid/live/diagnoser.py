@@ -26,8 +26,8 @@ BEGINS: dict[Act, str] = {
     "diagnose": "fitting the rigid model",
     "renew": "fitting the rigid model",
     "effects": "changing the effects",
-    "add_next": "looking for the next effect",
-    "auto": "looking for the next effect",
+    "add_next": "searching for the next effect",
+    "auto": "searching for the next effect",
 }
 
 
@@ -68,7 +68,7 @@ class Diagnoser:
         self.reset()
 
     def reset(self) -> None:
-        """Forget what was heard; stories stay."""
+        """Delete received data; stories stay."""
         for request in self._queue:
             request.whole = ()
         self.hearing = Newest(self.axes, self._settings.memory, self._settings.minimum, self._settings.reorder)
@@ -117,7 +117,7 @@ class Diagnoser:
         chosen = self.axes if axes is None else tuple(axes)
         busy = [axis for axis in chosen if axis in self.doings()]
         if busy:
-            raise BadInput("reset_model", f"while axis {busy[0]} is worked for", "an axis that nothing is done for", "Call cancel first.")
+            raise BadInput("reset_model", f"while axis {busy[0]} is worked for", "an axis without running work", "Call cancel first.")
         for axis in chosen:
             if axis in self.stories:
                 self.stories[axis] = self.stories[axis].only_base()

@@ -197,7 +197,7 @@ class DiagnoserNode(WalledNode):
         self._diagnoser.reset()
         self._streams.forget()
         self._since.forget()
-        return "everything heard is forgotten"
+        return "all received data were deleted"
 
     def _cancel(self, axes: tuple[str, ...]) -> str:
         if self._diagnoser.under_way in axes:

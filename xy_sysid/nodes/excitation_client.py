@@ -53,7 +53,7 @@ class ExcitationClient:
             if answer is not None or self._is_over():
                 break
         if answer is None:
-            raise BadInput("excitation", f"no answer to {service}", "a node excitation in the run file that lives", "Look at its lines above.")
+            raise BadInput("excitation", f"no answer to {service}", "a running node excitation in the run file", "See its messages above.")
         return answer
 
     def _ask(self, kind: Any, service: str, request: Any) -> Any:
@@ -83,11 +83,11 @@ class ExcitationClient:
         request = SetParameters.Request(parameters=[kind(name, value=value).to_parameter_msg() for name, value in values.items()])
         refused = [result.reason for result in self.call(SetParameters, "set_parameters", request).results if not result.successful]
         if refused:
-            raise BadInput("excitation", f"refused: {refused[0]}", "settings as the sentence says", "Change the run file.")
+            raise BadInput("excitation", f"refused: {refused[0]}", "settings that it accepts", "Change the run file.")
 
     def state(self) -> str:
         return str(self.call(GetState, "get_state", GetState.Request()).current_state.label)
 
     def transition(self, label: str) -> None:
         if not self.call(ChangeState, "change_state", ChangeState.Request(transition=Transition(label=label))).success:
-            raise BadInput("excitation", f"did not {label}", "an excitation that does", "Look at its lines above.")
+            raise BadInput("excitation", f"did not {label}", "an excitation that does", "See its messages above.")

@@ -128,7 +128,7 @@ class IdentifierNode(WalledNode):
         if any(getattr(before, name) != getattr(settings, name) for name in SHAPES_SPECTRA):
             self._identifier = Identifier(settings, self._axes, settings.units)
             self._worker.change(self._fitter(settings))
-            self.get_logger().info("the spectra start anew with the new settings")
+            self.get_logger().info("the spectra are restarted with the new settings")
         else:
             self._identifier.change(settings)
             references = self._worker.fitter.references()
@@ -145,7 +145,7 @@ class IdentifierNode(WalledNode):
         self._identifier.reset()
         self._streams.forget()
         self._worker.change(self._fitter(self._own.settings))
-        return "everything heard is forgotten"
+        return "all received data were deleted"
 
     def _save(self) -> str:
         path = self._path()
@@ -174,7 +174,7 @@ class IdentifierNode(WalledNode):
             self.get_logger().info(self._load())
         except XySysidError as problem:
             kept = set_aside(self._state_path)
-            self.get_logger().error(f"{problem} The file is kept as {kept}; the spectra start anew.")
+            self.get_logger().error(f"{problem} The file is kept as {kept}; the spectra are restarted.")
 
     def _save_quietly(self) -> None:
         try:

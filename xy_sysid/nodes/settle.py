@@ -229,7 +229,7 @@ class Settler(ExcitationClient):
             self.transition(label)
         except BadInput:
             self.wait(SETTLES)
-            raise BadInput("excitation", f"did not {label}: {self._message or 'no reason told'}", "an excitation that does", "See above.") from None
+            raise BadInput("excitation", f"did not {label}: {self._message or 'no reason given'}", "an excitation that does", "See above.") from None
         self.wait(0.05)
 
     def _rest(self, before: ExcitationSettings | None) -> None:

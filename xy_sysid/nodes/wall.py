@@ -20,7 +20,7 @@ LONGEST = 200  # characters of an error that are told
 class Wall:
     """``with wall: ...`` lets no error through but tells it. count: errors so far; told: the last one, empty if there was none."""
 
-    def __init__(self, say: Callable[[str], None], what: str = "a message or request could not be dealt with") -> None:
+    def __init__(self, say: Callable[[str], None], what: str = "a message or request could not be handled") -> None:
         """say: takes the sentence, once for the same error again and again; what: how it begins."""
         self.count, self.told = 0, ""
         self._say, self._what = say, what

@@ -92,7 +92,7 @@ def judge(access: Access, headers: Mapping[str, str], query: str) -> Answer:
         return Answer(403, "Requests from other sites are refused.")
     length = headers.get("content-length", "0")
     if not (length.isascii() and length.isdigit() and len(length) < 20 and int(length) <= LARGEST):
-        return Answer(413, f"Nothing of {length[:40]} bytes is taken here; {LARGEST} are the most.")
+        return Answer(413, f"Nothing of {length[:40]} bytes is accepted here; {LARGEST} are the most.")
     if not access.token:
         return Answer()
     given = parse_qs(query).get("token", [""])[0]

@@ -49,7 +49,7 @@ class Control:
                     ui.button("Configure", on_click=lambda: self._go("configure")).props("outline dense no-caps data-act=configure")
                 )
                 self._activate = heeded(ui.button("Activate", on_click=self._ask_activate).props("outline dense no-caps data-act=activate"))
-                self._reset = heeded(ui.button("Forget what was heard", on_click=self._forget).props("flat dense no-caps data-act=forget"))
+                self._reset = heeded(ui.button("Delete received data", on_click=self._forget).props("flat dense no-caps data-act=forget"))
             self._windows = ui.element("div").classes("rows small windows").props("data-part=windows")
             with ui.expansion("Excitation").classes("w-full").props("dense data-part=excitation"):
                 self._settings = ui.element("div").classes("stack")

@@ -164,7 +164,7 @@ class Link:
 
     def _begin_anew(self, why: str) -> None:
         if not self.problem:
-            self.problem = f"the link to the nodes was lost ({why}) and is begun anew"
+            self.problem = f"the link to the nodes was lost ({why}) and is restarted"
             self._say(self.problem)
         self._line.abandon()
         self._line = _Line(self.heard, self._namespace, self._orders, self._say)
@@ -239,7 +239,7 @@ class _Line:
         if not self._thread.is_alive():
             return self.wall.told or "its thread has ended"
         silent = time.monotonic() - self.beat
-        return f"it has stood still for {silent:.0f} s" if silent > STUCK else ""
+        return f"it has not responded for {silent:.0f} s" if silent > STUCK else ""
 
     def close(self) -> None:
         """Leave the graph."""

@@ -18,7 +18,7 @@ DOING = {
     "diagnose": "diagnosing the missing effect",
     "renew": "fitting the model to the newest data",
     "add": "adding {}",
-    "remove": "taking out {}",
+    "remove": "removing {}",
     "next": "finding the next effect",
     "auto": "adding effects until the floor is reached",
     "reset": "returning to the rigid model",

@@ -19,7 +19,7 @@ from xy_sysid.units import USUAL, Units
 
 LOST = 4.0  # s without a word or a place in the graph after which a node is called lost
 HISTORY = 2000  # resonances remembered for each axis
-IDLE = "idle"  # what the diagnoser says of an axis that nothing is done for
+IDLE = "idle"  # what the diagnoser says of an axis without running work
 KNOWN = ("excitation", "identifier", "ballscrew", "diagnoser", "recorder")
 COUPLING, COUPLED = "coupling", "coupling of "  # beginnings of the topic and of the status about two axes
 SPEAKER = {"streams": "identifier"}  # who sends a status that does not have its own name

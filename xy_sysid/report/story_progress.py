@@ -170,7 +170,7 @@ def _in_lines(item: Mapping[str, Any]) -> str:
 
 def _place(item: Mapping[str, Any], chosen: list[str], runner: str | None) -> str:
     if item["effect"] in chosen:
-        return " · named" if item["effect"] == chosen[0] else " · named beside"
+        return " · named" if item["effect"] == chosen[0] else " · also named"
     return " · runner-up" if item["effect"] == runner else ""
 
 

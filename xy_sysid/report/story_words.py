@@ -147,13 +147,13 @@ def parameter_table(story: Document, axis: str, library: Library) -> Table:
 
 
 def look_alike_table(story: Document, axis: str, library: Library) -> Table | None:
-    """Effects that the named one can be taken for; None without any."""
+    """Look-alikes of the named effect; None without any."""
     if not story["look_alikes"]:
         return None
     rows = tuple(
         (words(item["effect"]), "yes" if item["told_apart"] else "no", spoken(str(item["sentence"]), library)) for item in story["look_alikes"]
     )
-    return Table(f"Axis {axis}: what {words(story['effects'][0])} can be taken for", ("effect", "distinguished", "why"), rows)
+    return Table(f"Axis {axis}: look-alikes of {words(story['effects'][0])}", ("effect", "distinguished", "why"), rows)
 
 
 def _interval(item: Mapping[str, Any], name: str) -> str:

@@ -93,7 +93,7 @@ class Coupling:
             return (
                 f"No coupling of {one} and {other} was found in {span}. In {where} the recording has too few windows ({self.windows}) to exclude "
                 f"it: there it may be {size}. With this excitation, {_lasting(self.needed)} would exclude "
-                f"more than {100 * SUFFICES:g} %; more excitation of both axes there needs less."
+                f"more than {100 * SUFFICES:g} %; with more excitation of both axes there, a shorter recording suffices."
             )
         worst = int(np.argmax(self.coupling))
         low, high = self.band_edges[worst], self.band_edges[worst + 1]
