@@ -15,8 +15,8 @@ from xy_sysid.imports import load, save
 from xy_sysid.samples.recording import Recording
 
 WORDS = (
-    "Some bytes of a recording are changed, cut off, filled with zeros, repeated or swapped, at random; then it is read and compared "
-    "with what was recorded, sample by sample."
+    "Some bytes of a recording are changed, cut off, filled with zeros, repeated or swapped, at random. Then the file is read and compared with "
+    "the original, sample by sample."
 )
 ROWS = 2000
 Damage = Callable[[bytes, np.random.Generator], bytes]
