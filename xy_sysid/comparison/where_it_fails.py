@@ -1,7 +1,7 @@
-"""Where does a model fail? The velocity error on data that no fit saw, against the floor that the data allow.
+"""Where does a model fail? The velocity error on held-out data, compared with the noise floor.
 
 By frequency, speed, direction of motion, position (once or repeating), amplitude of the input, and time: each place with its
-size in multiples of the noise floor.
+error in multiples of the noise floor.
 
 The noise floor is the smallest error that the data can show: the encoder's noise, together with the part of the motion to which
 laws are trusted (EPSILON). It is the floor by which a fit is judged. The error over the floor is one number for the whole recording; the
@@ -82,7 +82,7 @@ class Comparison:
 
     @property
     def sentence(self) -> str:
-        """For people."""
+        """The result in words."""
         if not np.isfinite(self.error):
             return "the simulation diverges: the model is not stable."
         ratio = self.error / self.noise_floor if self.noise_floor > 0 else float("inf")

@@ -1,4 +1,4 @@
-"""The sentences of an answer: its verdict, what each candidate leaves, why the runner-up lost, and what the named effect can be taken for."""
+"""The sentences of an answer: verdict, error with each candidate, why the runner-up lost, and look-alikes of the named effect."""
 
 from __future__ import annotations
 

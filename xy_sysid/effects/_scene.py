@@ -66,7 +66,7 @@ class Scene:
 
     @property
     def swing(self) -> float:
-        """Usual way between two reversals, m."""
+        """Typical distance between two reversals, m."""
         return swing(self.sampling_rate, self.smooth(self.velocity, 300.0), self.velocity)
 
     def smooth(self, signal: FloatArray, cutoff: float) -> FloatArray:

@@ -1,6 +1,6 @@
 """What to measure next: the experiment that distinguishes what the data at hand do not.
 
-criteria:    every number that decides, with its reason
+criteria:    every threshold of the search, with its reason
 limits:      what an experiment may ask of the machine
 experiment:  one experiment: what drives the axis, and for how long
 proposals:   the experiments that are compared

@@ -1,6 +1,6 @@
-"""What an effect would explain of the innovations of a one-step prediction, to first order: a score test, as ``score_test`` is for free simulation.
+"""The part of the innovations that an effect would explain, to first order: a score test, like ``score_test`` for free simulation.
 
-The filter is run with a little of each trace put in; what changes is what the effect would explain.
+The filter is run with a small amount of each trace; the change of the innovations is what the effect would explain.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Effects that only one-step prediction can judge, alone or with others beside them, as fits like all others.
+"""Fits of effects that only one-step prediction can judge, alone or together with others.
 
 Their error is the filter's innovation, measured minus predicted position one sample ahead, times the sampling rate: m/s,
 as for a free simulation. Their floor is the encoder's noise. What acts beside them is taken out of the recording first,

@@ -1,4 +1,4 @@
-"""How much of a model's error an effect would explain, to first order: a score test, and start values for its fit.
+"""The part of the error of a model that an effect would explain, to first order: a score test, with start values for the fit.
 
 An effect's trace is its force on the measured motion, passed through the base (Rao 1948, score test); what a change of
 gain, delay or pole would do is projected out first.

@@ -1,5 +1,5 @@
-"""What acts beside an effect that only one-step prediction can judge: found by its trace in the innovations
-(``greybox.innovation_test``), added while what is left beyond the noise falls.
+"""Effects that act together with one that only one-step prediction can judge. They are found by their trace in the innovations
+(``greybox.innovation_test``), and added while the residual error above the noise falls.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from xy_sysid.hypotheses.refusal import none_of
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """What a fit with one more effect beside it has to be.
+    """Requirements for a fit with one more effect.
 
     limits: until when fits go on; their bar is the error one sample ahead, m/s, of the best without the gap: what cannot come near it ends soon
     least: what one more must explain over what is left unexplained; refused: why a fit explains nothing, or empty

@@ -1,4 +1,4 @@
-"""Is what a fit leaves noise on its input? A measured current or voltage has noise that the machine never felt, and it looks like a force."""
+"""Is the error of a fit noise on its input? A measured current or voltage contains noise that does not act on the machine, but looks like a force."""
 
 from __future__ import annotations
 

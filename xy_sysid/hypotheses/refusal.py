@@ -1,4 +1,4 @@
-"""Why a fit explains nothing, whatever it leaves: a size at its bound, a place where nothing is seen, a mode that nothing excites."""
+"""Why a fit does not count, whatever its error: a size at its bound, a travel that is too short, a mode outside the excited band."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from xy_sysid.hypotheses.criteria import FEWEST
 
 
 def refusal(data: AxisData, library: Library, found: GreyboxFit, given: frozenset[str] = frozenset()) -> str:
-    """Why a fit explains nothing, whatever error it leaves: in words, or empty. given: effects that are not asked, as somebody wants them."""
+    """Why a fit does not count, whatever its error: in words, or empty. given: effects that a user asked for, which are not checked."""
     low, high = data.sampling_rate * 0.0, 0.4 * data.sampling_rate
     excited = data.layout.edges()[:-1][data.floor.excited]
     if excited.size:
@@ -42,7 +42,7 @@ def refusal(data: AxisData, library: Library, found: GreyboxFit, given: frozense
 
 
 def none_of(data: AxisData, found: GreyboxFit) -> str:
-    """The effect of a fit whose size is its least one within its interval: the data do not tell it from none. Empty if there is none such."""
+    """The effect of a fit whose interval contains its least size, so the data do not distinguish it from none. Empty if there is no such effect."""
     library = found.model.library
     return next((name for name, _ in found.model.effects if _is_none(data, library[name], found)), "")
 
@@ -54,6 +54,6 @@ def _is_none(data: AxisData, effect: Effect, found: GreyboxFit) -> bool:
 
 
 def _repeats(data: AxisData, effect: Effect, values: Sequence[float]) -> bool:
-    """A law by place that repeats often enough on the travel to be seen in one pass."""
+    """A law of position that repeats often enough over the travel to be identified from one pass."""
     period = values[effect.names.index("period")] if "period" in effect.names else 2.0 * math.pi
     return effect.repeats and (data.reach[1] - data.reach[0]) / period >= FEWEST

@@ -102,7 +102,7 @@ class TransferFunction:
 
     @property
     def leading_gain(self) -> float:
-        """First coefficient of the numerator over that of the denominator: the gain of the highest frequencies."""
+        """Ratio of the first coefficients of numerator and denominator: the gain at the highest frequencies."""
         trimmed = np.trim_zeros(self.numerator, "f")
         return float(trimmed[0] / np.trim_zeros(self.denominator, "f")[0]) if trimmed.size else 0.0
 

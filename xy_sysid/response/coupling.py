@@ -80,7 +80,7 @@ class Coupling:
 
     @property
     def sentence(self) -> str:
-        """For people."""
+        """The result in words."""
         one, other = self.axes
         span = f"{self.frequency[0]:.3g} to {self.frequency[-1]:.4g} Hz"
         if self.suffice:

@@ -62,7 +62,7 @@ def first_order_words(found: FirstOrder) -> tuple[str, ...]:
 
 
 def servo_words(found: Servo, inertia: float | None) -> tuple[str, ...]:
-    """The answer, then what target and angle alone cannot tell."""
+    """The answer, then everything that target and angle alone do not determine."""
     share, left = f"{100.0 * max(found.explained, 0.0):.4g} %", moved(found.error, found.units.output)
     if found.explained >= GOOD:
         said = [f"The servo with its controller explains {share} of the angle that no fit saw, simulated from the target alone; {left} rms is left."]
