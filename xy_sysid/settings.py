@@ -1,4 +1,4 @@
-"""Every knob, once: default, unit, limits and meaning.
+"""All settings, each defined once: default, unit, limits and meaning.
 
 ROS parameters, CLI options, YAML files, the page and docs/settings.md are made from these classes. Units are SI.
 """

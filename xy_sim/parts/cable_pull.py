@@ -1,4 +1,4 @@
-"""A cable chain pulls, differently at each place and differently on the way back."""
+"""Cable pull: a force that depends on position and, with hysteresis, on direction."""
 
 from __future__ import annotations
 

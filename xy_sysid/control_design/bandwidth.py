@@ -1,4 +1,4 @@
-"""What limits the bandwidth of a loop: what each part of the axis costs, and what a filter in the loop gains.
+"""The limits of the bandwidth: the cost of each part of the axis, and the gain by a filter in the loop.
 
 A part is left out and the loop is designed again: the crossover that it then reaches is what the part costs. The same question is asked of a
 notch and of a low-pass: a filter is worth its place where the loop reaches a higher crossover with it, for every sample of the parameters.

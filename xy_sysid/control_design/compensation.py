@@ -1,4 +1,4 @@
-"""Which laws of a model are worth undoing along a path: those that help in simulation, for every sample of the model's parameters.
+"""Which laws of a model the feedforward should compensate along a path: those that help in simulation, for every sample of the parameters.
 
 The whole feedforward undoes every law. Where a parameter is known badly, where the feedback answers a sudden voltage worse than a slow force, or
 where a load presses one flank of a gap, undoing a law does harm. So each sample of the parameters follows the path in simulation, under the

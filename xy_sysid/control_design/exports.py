@@ -1,4 +1,4 @@
-"""Targets to which a used model can be written: name -> files by name. Each target says what it cannot."""
+"""Targets to which a model can be exported: name -> files by name. Each target names what it cannot represent."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""For the resonances that were found: a notch in the loop, and input shapers for the path, by the names that Klipper's users know.
+"""Filters for the resonances of a model: a notch in the loop, and input shapers for the path, with Klipper's names.
 
 A drive that holds the encoder's side leaves what hangs on it free to swing at the antiresonance: that is the frequency to shape. The loop meets the
 resonance: that is the frequency to notch.

@@ -1,4 +1,4 @@
-"""The feedforward of a refined model along a path: the voltage that brings the axis where it is wanted, as far as laws can be undone."""
+"""The feedforward of a refined model along a path: the voltage that makes the axis follow it, as far as laws can be inverted."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a refined model pushes against the drive, by speed and place: the same laws as in its simulation, asked one by one."""
+"""Forces of a refined model against the drive by speed and position: the laws of its simulation, evaluated one by one."""
 
 from __future__ import annotations
 

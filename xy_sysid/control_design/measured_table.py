@@ -1,4 +1,4 @@
-"""The force by position that a model leaves, as a table measured on a recording: a correction for what no law of the model explains.
+"""A table, measured on a recording, of the force by position that the model does not explain.
 
 A ball screw has cogging of many periods, and a cable pulls in its own way: what a law does not say, a table can. The recorded input that the model
 does not predict is taken as a function of the position, linear between places. How dense the places are, and whether there is a table at all,

@@ -1,4 +1,4 @@
-"""A refined model in MuJoCo's language (MJCF of MuJoCo 4), effect by effect; what it cannot say is named.
+"""A refined model as MJCF (MuJoCo 4), effect by effect; effects that MJCF cannot represent are named.
 
 Forces are in the unit of the input: the mass is kA, the damping kV. A resonance becomes a mass on a spring behind the joint. Cogging and bristles are
 motors without a constant (``dcmotor``), whose friction and cogging MuJoCo knows.

@@ -21,7 +21,7 @@ STRAIGHT = 1e-6  # of its force at the end of the travel: a spring that bends le
 def sdf(
     model: AxisModel, travel: tuple[float, float] | None, limit: float, angular: bool, name: str = "axis"
 ) -> tuple[str, tuple[tuple[str, str], ...]]:
-    """(text, what is lost by effect); travel: m or rad, None where nobody knows it; limit: of the drive, infinite if nobody knows it."""
+    """(text, what is lost by effect); travel: m or rad, None if unknown; limit: of the drive, infinite if unknown."""
     level = 0.5 * (friction(model, abs(model.gain), 1.0) + friction(model, -abs(model.gain), -1.0))
     places = np.linspace(*(travel or ANYWHERE), PLACES)
     pull = along(model, places, "force") * math.copysign(1.0, model.gain)

@@ -1,4 +1,4 @@
-"""The numbers in the words and files of controllers that people use: ros2_control, Klipper, LinuxCNC, ODrive, TwinCAT. One function a target."""
+"""The numbers in the configuration formats of ros2_control, Klipper, LinuxCNC, ODrive and TwinCAT: one function for each target."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ LEAST_GAIN, LEAST_PHASE = 1.7, 35.0  # margin without a filter on the derivative
 class Designed:
     """What a snippet is written from: the axis' name and model, and what was designed for it.
 
-    calculation: periods from reading to writing; speed: m/s, the largest of the fastest path; None where nobody knows the drive's limit
+    calculation: periods from reading to writing; speed: m/s, the largest of the fastest path; None if the limit of the drive is unknown
     """
 
     axis: str

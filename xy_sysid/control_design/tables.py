@@ -1,4 +1,4 @@
-"""Tables to load into a drive: dry friction by speed, and by position the force, the drag, the scale's error; what each leaves."""
+"""Tables for a drive: dry friction by speed; force, drag and scale error by position; and the error that remains with each."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a feedforward is worth: the recorded voltage predicted from the recorded motion, and tracking errors with the refined model in the loop."""
+"""The benefit of a feedforward: recorded voltage predicted from recorded motion, and simulated tracking errors with the refined model."""
 
 from __future__ import annotations
 

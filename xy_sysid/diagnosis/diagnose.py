@@ -1,4 +1,4 @@
-"""Which physical effect is missing? A verdict with its evidence, its rivals, what is left, and the experiment that would settle doubt."""
+"""Which physical effect is missing? A verdict with its evidence, its rivals, the residual error, and the experiment that would resolve doubt."""
 
 from __future__ import annotations
 

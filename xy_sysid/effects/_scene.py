@@ -1,4 +1,4 @@
-"""The measured motion as an effect sees it when it looks for its traces."""
+"""The measured motion, from which effects compute their traces."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A spring between the motor and the load, on which the encoder sits."""
+"""Load-side resonance: a spring between motor and load, with the encoder on the load."""
 
 from __future__ import annotations
 

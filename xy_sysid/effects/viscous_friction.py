@@ -1,4 +1,4 @@
-"""Grease, seals and back-EMF resist in proportion to speed."""
+"""Viscous friction: drag of grease, seals and back-EMF, proportional to speed."""
 
 from __future__ import annotations
 

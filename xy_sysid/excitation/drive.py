@@ -1,4 +1,4 @@
-"""From an excitation signal to the voltage that is really applied: ramps, centring, soft travel limits, amplitude limit.
+"""From an excitation signal to the applied voltage: ramps, centring, soft travel limits, amplitude limit.
 
 Told the time and the positions; asks for neither. The order of the guards for every sample is
 

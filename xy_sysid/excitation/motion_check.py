@@ -1,4 +1,4 @@
-"""Does each axis do what its voltage can do? If not, encoder, wiring or settings are wrong, and driving on is blind.
+"""Does the motion of each axis fit its voltage? If not, encoder, wiring or settings are wrong, and the drive must stop.
 
 One principle: what the voltage could have moved is reckoned alongside, from the volt seconds beyond ``breakaway`` and the speed
 per volt, and compared with what the encoder shows. An encoder may show nothing only as long as nothing can have gone far

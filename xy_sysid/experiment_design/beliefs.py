@@ -1,4 +1,4 @@
-"""A set of effects with its parameters, and how well the data at hand know them.
+"""A set of effects with its parameters and their uncertainty after the present data.
 
 Parameters are Gaussian in the coordinates of the fit (``greybox.least_squares.Scale``: the logarithm of what is positive). Their precision is
 the information of the data, and a little more: a positive number is known to a factor of two before anything is measured, and the shape of a

@@ -1,4 +1,4 @@
-"""The experiment that distinguishes some sets of effects soonest, of those that keep within the limits.
+"""The experiment within the limits that distinguishes some sets of effects in the shortest time.
 
 First every proposal is judged by the likeliest model of each set, then the best by draws of their parameters, and then the neighbours of the
 best. An experiment is judged by the seconds after which the true set is told from its rivals with 95 % probability, in the mean over sets

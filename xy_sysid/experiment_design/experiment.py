@@ -1,4 +1,4 @@
-"""One experiment: what drives the axis, and for how long."""
+"""One experiment: excitation and duration."""
 
 from __future__ import annotations
 

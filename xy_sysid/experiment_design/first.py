@@ -1,4 +1,4 @@
-"""A first experiment for an axis of which nothing is known but its limits.
+"""A first experiment for an unknown axis with known limits.
 
 An axis is taken to cross its travel at full voltage in between a third of a second and ten seconds, with any pole, delay and dry friction that
 machines have, and with a load that its friction holds: the axis rests at 0 V, which the first run (``xy-sysid run --first``) tells.

@@ -1,4 +1,4 @@
-"""Design, run, compare, and again, until one set of effects is left.
+"""Design, run and compare, repeated until one set of effects is left.
 
 A pure function of the recordings that the experiments bring: with the same recordings it takes the same decisions.
 """

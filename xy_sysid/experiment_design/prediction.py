@@ -1,4 +1,4 @@
-"""What an experiment would record if a model were true, and how a rival would then predict it."""
+"""The expected recording of an experiment if a model is true, and how a rival would predict it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The way to a settled diagnosis, step by step: after each recording all are diagnosed together, and the next experiment is designed.
+"""A series of experiments: after each recording all recordings are diagnosed together, and the next experiment is designed.
 
 Each step is a pure function of the recordings so far and the step before, so that a walk can be replayed from its recordings.
 """

@@ -1,4 +1,4 @@
-"""Transfer functions from frequency responses, how sure they are, and whether to believe them.
+"""Transfer functions from frequency responses, with their uncertainty and verdicts.
 
 structure, problem:           what to look for; the lines to be fitted
 basis, linear, damped:        polynomials that stay well conditioned, least squares, steps

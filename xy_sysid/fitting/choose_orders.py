@@ -1,4 +1,4 @@
-"""Which orders does a response tell? From the rigid body with delay upward, as long as every step is clear and could be a machine.
+"""Choice of the orders from a response: from the rigid body with delay upwards, as long as each step is significant and physically plausible.
 
 A step up adds a pole, or a pair with or without its zeros. It is taken if (1) it shortens the description by more than CLEARLY,
 where the cost counts in units of what the richest plausible model leaves (overdispersion: Burnham & Anderson, Model Selection and

@@ -1,4 +1,4 @@
-"""Tasks -> what came of them, on the processes of a dask cluster: this machine's cores, or a scheduler that is there already.
+"""Tasks -> their results, on the processes of a dask cluster: the cores of this machine, or an existing scheduler.
 
 A task whose process dies is tried once more at the end, alone, so that no other can be the reason; if its process dies again, that is its row.
 """

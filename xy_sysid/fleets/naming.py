@@ -1,4 +1,4 @@
-"""Which machine, axis and date a recording belongs to: a list of the user's, a pattern of the path, the recording itself."""
+"""Machine, axis and date of a recording: from the user's list, a pattern of the path, or the recording itself."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Names(Settings):
 class Name:
     """What a recording is called.
 
-    axis: of a file that holds one, empty where the file's own names stand; date: UTC, None if nobody knows
+    axis: of a file that holds one, empty where the file's own names stand; date: UTC, None if unknown
     said: the machine was named by a list or a pattern; else it is the folder, and what the recording itself says is better
     """
 

@@ -1,4 +1,4 @@
-"""What looks wrong in a recording, said in words: none of it is corrected, since only who measured knows.
+"""Warnings about a recording, in words. Nothing is corrected, because only the user knows the truth.
 
 Thresholds are wide of any machine axis that was met in measured data (../docs/real-data.md); they only ask.
 """

@@ -1,4 +1,4 @@
-"""The numbers of an axis as people read them, each with what it means and what is good. Words only; nothing is drawn here."""
+"""The numbers of an axis in display units, each with its meaning and good values. Only words; nothing is drawn here."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Everything about one axis that a report shows: response and fits, verdicts on them, and the story of what is missing.
+"""The content of a report for one axis: response, fits with verdicts, and missing effects.
 
 Transfer functions see the first two thirds of the recording and are tested on the last;
 the story's models see two thirds that are spread over it.

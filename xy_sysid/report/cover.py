@@ -1,4 +1,4 @@
-"""What stands at the head of a report and at the foot of its printed pages: title, machine, author, date."""
+"""Head of a report and foot of its printed pages: title, machine, author, date."""
 
 from __future__ import annotations
 

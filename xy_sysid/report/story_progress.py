@@ -1,4 +1,4 @@
-"""Pictures of progress: the falling ladder of errors, two steps over each other, and the candidates by what they leave."""
+"""Pictures of progress: the ladder of errors, two steps overlaid, and the candidates with their errors."""
 
 from __future__ import annotations
 

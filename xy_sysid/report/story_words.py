@@ -1,4 +1,4 @@
-"""A story in words: the verdict that everybody understands, captions of its pictures, its tables."""
+"""A story in words: verdict, captions of its pictures, and tables."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One move in one direction, from rest to rest: too little to tell friction, load and inertia from each other."""
+"""One move in one direction, from rest to rest: too little to distinguish friction, load and inertia."""
 
 from __future__ import annotations
 

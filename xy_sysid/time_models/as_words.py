@@ -1,4 +1,4 @@
-"""What small models tell, and what these data cannot tell, in sentences."""
+"""The results of small models in sentences, with what these data do not determine."""
 
 from __future__ import annotations
 

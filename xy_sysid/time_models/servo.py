@@ -1,4 +1,4 @@
-"""A position-controlled joint of which the target and the angle are known: the controller is part of the model.
+"""A position-controlled joint with known target and angle: the controller is part of the model.
 
     q'' = limited(kp (target - q)) - damping q' - friction sign(q') - load      all divided by the inertia
 
