@@ -112,7 +112,7 @@ def test_a_base_without_any_excess_is_no_division_by_zero() -> None:
     """Nothing is missing, and it is said what the noise could hide."""
     found = nothing_left(prepare(2000.0, *recorded("").axis("x")))
     assert (found.verdict, found.tolerance) == ("nothing_missing", 0.0)
-    assert "What changes the motion by less than 0." in found.sentence
+    assert "An effect that changes the motion by less than 0." in found.sentence
 
 
 def test_that_nothing_is_missing_is_as_sure_as_the_noise_lets_one_see() -> None:

@@ -191,8 +191,8 @@ def test_an_axis_that_is_off_stays() -> None:
         ({"rms": 0.2, "max_speed": 50.0}, "x.max_acceleration would be exceeded"),
         ({"high": 60.0}, "8.*60 Hz"),
         ({"low": 0.1, "period": 4.0}, "cycles of the lowest"),
-        ({"max_speed": 0.0}, "x.max_speed is 0 rad/s as joint_trajectory; allowed: above 0"),
-        ({"kind": "noise"}, "x.kind is noise as joint_trajectory; allowed: multisine, sweep, off"),
+        ({"max_speed": 0.0}, "x.max_speed is 0 rad/s with joint_trajectory; allowed: above 0"),
+        ({"kind": "noise"}, "x.kind is noise with joint_trajectory; allowed: multisine, sweep, off"),
         ({"slow": 0.1}, "x.slow is 0.1 as joint_trajectory"),
     ],
 )

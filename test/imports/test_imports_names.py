@@ -363,7 +363,7 @@ def test_units_that_are_guessed_or_unknown_are_said(tmp_path: Path) -> None:
     """MM is mm, and a note says so; counts are no length; furlongs are carried."""
     for unit, says in (
         ("MM", "'MM' of the output is taken as mm"),
-        ("counts", "counts, which is no length"),
+        ("counts", "counts, which is not a length"),
         ("furlong", "'furlong' of the output is not known"),
     ):
         assert any(says in note for note in load(csv_of(tmp_path, {"time": T, "u": U, f"y[{unit}]": Y})).notes)

@@ -117,7 +117,7 @@ def test_two_excitations_never_drive_one_machine(world: World) -> None:
     assert world.until(lambda: len(blocks) > 10 and bool(blocks[-1].values.any()))
     second = world.start(EXCITATION, {"watchdog": 2.0}, arguments=["-r", "__node:=other"])
     assert world.until(lambda: "publishes /xy/voltage, too: two must not drive one machine" in first.output(), 20.0), first.output()
-    assert "/xy/other publishes" in first.output() or "whose name nobody has told yet publishes" in first.output()  # after a stall
+    assert "/xy/other publishes" in first.output() or "whose name is not known yet publishes" in first.output()  # after a stall
     assert world.until(lambda: not blocks[-1].values.any(), 1.0) and world.state("excitation") == "inactive"
     assert not world.transition("other", "configure")
     assert "/xy/excitation publishes /xy/voltage, too: configure is refused while it runs. End one of the two." in second.output()
