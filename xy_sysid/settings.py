@@ -28,7 +28,7 @@ def knob(default: Any, meaning: str, unit: str = "", **limits: Any) -> Any:
 
 
 class Settings(BaseModel):
-    """A group of settings that nobody changes in place; an unknown name is an error."""
+    """A group of settings that cannot be changed in place; an unknown name is an error."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
@@ -470,7 +470,7 @@ def changed(settings: AnySettings, values: Mapping[str, Any]) -> AnySettings:
 
 
 def unknown_name(name: str, known: Mapping[str, Any] | list[str], where: str) -> BadInput:
-    """The error for a name that nobody knows, with the nearest that somebody does."""
+    """The error for an unknown name, with the nearest known one."""
     near = difflib.get_close_matches(name, list(known), n=1, cutoff=0.4)
     act = f"Did you mean {near[0]!r}?" if near else "Remove it."
     return BadInput(f"{where}: name", repr(name), ", ".join(known), act)

@@ -125,7 +125,7 @@ def estimate(name: str, figures: tuple[float, float, float], unit: str) -> tuple
 
 
 def progress() -> Progress:
-    """A progress bar on stderr that disappears at its end; none where nobody watches."""
+    """A progress bar on stderr that disappears at its end; none if stderr is not a terminal."""
     words = TextColumn("{task.description}", markup=False)
     return Progress(words, BarColumn(), TaskProgressColumn(), TimeRemainingColumn(), console=aside, transient=True, disable=not aside.is_terminal)
 

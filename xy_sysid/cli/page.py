@@ -105,5 +105,5 @@ def reading(topics: list[str] | None, effort: bool, effect_files: list[Path] | N
 
 
 def display() -> bool:
-    """Whether somebody sits in front of a screen."""
+    """Whether there is a display."""
     return any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))

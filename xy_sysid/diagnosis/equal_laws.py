@@ -42,7 +42,7 @@ def _depth(effect: Effect, values: Sequence[float]) -> float:
 
 
 def likely_names(found: Answer, kept: Sequence[str] = ()) -> Answer:
-    """The answer with the likelier name for each effect of its last model that has equals, but for those that somebody gave."""
+    """The answer with the likelier name for each effect of its last model that has equals, except for those that a user gave."""
     library = found.final.model.library
     names: dict[str, str] = {}
     for name, values in found.final.model.effects:

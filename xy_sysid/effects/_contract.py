@@ -315,7 +315,7 @@ class Effect:
     mode_frequency: str = ""
 
     def __post_init__(self) -> None:
-        """Raises BadInput if the functions do not fit the category or ask for words that nobody knows."""
+        """Raises BadInput if the functions do not fit the category or use unknown argument names."""
         if self.category not in FUNCTIONS:
             raise BadInput(f"effect {self.name}: category", repr(self.category), ", ".join(FUNCTIONS), "Choose one of these.")
         expected = FUNCTIONS[self.category]
@@ -340,7 +340,7 @@ class Effect:
             raise BadInput(f"effect {self.name}: mode_frequency", repr(self.mode_frequency), ", ".join(self.names), "Name one of these.")
 
     def has_equations_of(self, other: Effect) -> bool:
-        """The law of both is one and the same, as of a base that gives and a screw that gives: no data tell them apart."""
+        """Both have the same equations, like a flexible base and a flexible screw, so no data distinguish them."""
         return bool(self.family) and (self.family, self.names, self.law) == (other.family, other.names, other.law)
 
     def is_special_case(self, other: Effect) -> bool:

@@ -43,7 +43,7 @@ def refusal(values: Sequence[float], between: tuple[float, float]) -> str:
     slope, repeats = 2.0 * math.pi * values[0] / values[1], (between[1] - between[0]) / values[1]
     if slope >= 0.2:
         return f"the reading would change by {100 * slope:.3g} % more or less than the motion: no encoder does"
-    return "" if repeats >= 0.5 else f"only {repeats:.2g} of its periods are within the travel: nobody sees whether it repeats"
+    return "" if repeats >= 0.5 else f"only {repeats:.2g} of its periods are within the travel, so it cannot be seen whether it repeats"
 
 
 EFFECT = Effect(

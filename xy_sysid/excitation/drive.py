@@ -275,7 +275,7 @@ class Drive:
                 stream.next(n)
 
     def catch_up(self, missed: int) -> Block:
-        """The next sample, after so many that nobody asked for; all that the controller has gone along since the last call, where it is known."""
+        """The next sample, after the given number of skipped ones; all samples that the controller has executed since the last call, if known."""
         self.skip(missed)
         return self.next(1)
 

@@ -74,7 +74,7 @@ class _Seen:
 
 
 class FirstRun:
-    """``next`` says what to do, ``took`` what came of it; the machine is driven by somebody else."""
+    """``next`` says what to do, ``took`` what came of it; the caller drives the machine."""
 
     def __init__(self, settings: ExcitationSettings) -> None:
         self.settings = settings

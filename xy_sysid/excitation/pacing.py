@@ -54,7 +54,7 @@ class Clock:
 
 @dataclass(slots=True)
 class Answers:
-    """Positions that came back, handed out up to a sample: in lockstep nobody may see a later one, however it was sent."""
+    """Positions that came back, handed out up to a sample: in lockstep no later one may be used, however it was sent."""
 
     _given: float = -1.0
     _blocks: deque[Block] = field(default_factory=deque)

@@ -35,7 +35,7 @@ NORMAL = 3.0  # mean fourth power of normal numbers of variance 1
 FINEST = 1e-6  # no model of a machine is better than this part of the power
 FAST = 0.25  # greatest part of the new in steps that motion within an interval may have, beyond noise and a straight line
 LEAST = 12  # intervals without which nothing is said
-GAP = 5  # intervals without a position, after which it begins anew
+GAP = 5  # intervals without a position, after which it begins again
 
 
 class SignCheck:

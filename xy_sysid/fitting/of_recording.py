@@ -194,7 +194,7 @@ def _moving(axis: str, u: FloatArray, y: FloatArray, units: tuple[str, str], nam
 
 
 def _fitting(settings: IdentifierSettings, runs: list[slice], notes: list[str], tapered: bool) -> IdentifierSettings:
-    """The settings with a window that the record holds often enough; as they are where somebody chose another length than the usual.
+    """The settings with a window that the record holds often enough; unchanged if the user chose another length than the default.
 
     tapered: several windows are averaged; otherwise lines are, so that one window will do, and the longer it is, the finer they lie
     """
@@ -300,7 +300,7 @@ def judged(frf: FrequencyResponse) -> None:
 
 
 def with_orders(frf: FrequencyResponse, settings: IdentifierSettings) -> tuple[IdentifierSettings, Choice | None]:
-    """The settings with the orders that the response tells, and why; unchanged, and None, where somebody asked for orders."""
+    """The settings with orders chosen from the response, and the reason; unchanged, and None, if the user gave orders."""
     if not settings.orders_from_data:
         return settings, None
     family = structure_from(settings)

@@ -181,7 +181,7 @@ def _moved(change: Change, by: int, declared: int) -> Change:
 
 
 def _located(series: Series, weights: FloatArray) -> Change:
-    """When the one change of a series was, and by how much until now: what a change that goes on will be in the end, nobody knows."""
+    """When the one change of a series was, and its size until now; the final size of a change that still goes on is unknown."""
     n, first = series.value.size, _first_change(series)
     shapes = hypotheses(series.time)
     now = shapes[-1, first:]

@@ -97,7 +97,7 @@ def name_of(path: Path, names: Names) -> Name:
 
 
 def _said_date(text: str) -> datetime | None:
-    """A date that somebody means to be one; None where there is none. Raises BadInput."""
+    """The date in a text that a user gave as a date; None for an empty text. Raises BadInput."""
     found = date_of(text) if text else None
     if found is not None and not FIRST <= found < LAST:
         raise BadInput("date", repr(text), f"a year from {FIRST.year} to {LAST.year - 1}", "Correct it, or leave it out.")

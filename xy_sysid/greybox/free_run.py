@@ -320,7 +320,7 @@ def joined(data: AxisData, found: GreyboxFit, late: Callable[[], bool] = in_time
 def sub_steps(data: AxisData, task: FitProblem, finest: float) -> float:
     """Hz: the longest sub-steps, a sample or halves of it, with which a model moves as with half as long.
 
-    As it does: but for a tenth of what it leaves or nobody can tell, by amplitude in the mean over the excited bands.
+    The difference may be a tenth of the error or of the noise floor, in amplitude, as a mean over the excited bands.
     """
     rate = min(data.sampling_rate, finest)
     if rate == finest:

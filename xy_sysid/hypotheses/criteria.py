@@ -52,5 +52,5 @@ FILTERED = (1.0 + SIZE) ** -0.5  # innovation of a filter over that of the best 
 STILL = _number("still", 0.1, "1", "a window with less than this part of the strongest motion is at standstill")
 FEWEST = _number("fewest", 3, "1", "least number of input tones, excited bands and moving held-out windows (twice as many to fit)")
 MOST_EFFECTS = _number("most effects", 4, "1", "most effects in a model; blind tests have three, one real machine needs four")
-WORK = 1.5e8  # samples times sub-steps simulated for one axis, about 10 s, where nobody gives another budget: no criterion, but what people wait for
+WORK = 1.5e8  # samples times sub-steps simulated for one axis, about 10 s, the default budget: a limit for the waiting time, not a criterion
 WORK_EACH = 400.0  # the same for each sample of the record, so that long records are searched as far as short ones

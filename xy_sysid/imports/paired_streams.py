@@ -79,7 +79,7 @@ def gather(name: str, blocks: Sequence[Block], axes: tuple[str, ...], notes: lis
 
 
 def sessions(seq: FloatArray, tolerance: float) -> list[int]:
-    """Where the source began to count anew: first index of each session, 0 included.
+    """Where the source restarted its counter: first index of each session, 0 included.
 
     A number that falls back by more than ``tolerance`` begins a session, unless the old numbers soon go on (then it was
     a straggler, and sorting puts it right).

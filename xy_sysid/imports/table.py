@@ -156,7 +156,7 @@ def _unwrapped(table: Table, rows: _Rows, notes: list[str]) -> _Rows:
 
 
 def _stretches(table: Table, time: FloatArray) -> FloatArray:
-    """(n,) number of the stretch that each row belongs to: as the table says, or each time that the clock begins anew."""
+    """(n,) number of the stretch that each row belongs to: as the table says, or each time that the clock begins again."""
     begins = np.zeros(len(time))
     if table.starts:
         starts = np.array([start for start in table.starts[1:] if start < len(time)], dtype=np.int64)
@@ -189,7 +189,7 @@ def _numbered(path: Path, table: Table, rows: _Rows, notes: list[str]) -> tuple[
 
 
 def _by_time(path: Path, rows: _Rows, notes: list[str]) -> tuple[_Rows, float]:
-    """Numbered by their instants; the time of a stretch that begins anew goes on after the one before."""
+    """Numbered by their instants; the time of a stretch that begins again goes on after the one before."""
     time, number = rows.time.copy(), rows.stretch
     period = float(np.median(np.diff(time)))
     for begin in np.flatnonzero(np.diff(number)) + 1:

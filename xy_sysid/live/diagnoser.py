@@ -1,6 +1,6 @@
 """What a live diagnosis does when: requests come in, jobs go out one at a time, stories come back. No thread, no clock, no IO.
 
-A story stays with the samples it began with, so that its ladder compares like with like; ``diagnose`` and ``renew`` begin anew. Each axis
+A story stays with the samples it began with, so that its ladder compares like with like; ``diagnose`` and ``renew`` begin again. Each axis
 can be asked for by itself: what is done for one leaves the others as they are.
 """
 
@@ -75,7 +75,7 @@ class Diagnoser:
         self._next_time = self._settings.interval
 
     def change(self, settings: DiagnoserSettings) -> None:
-        """Use other settings from now on; those of the memory start it anew."""
+        """Use other settings from now on; those of the memory restart it."""
         before, self._settings = self._settings, settings
         if (before.memory, before.minimum, before.reorder) != (settings.memory, settings.minimum, settings.reorder):
             self.reset()

@@ -143,7 +143,7 @@ class DemoFollowerNode(WalledNode):
 
     @property
     def _quiet(self) -> bool:
-        """Nobody else drives: the simulated machine answers nobody."""
+        """No other node drives: the simulated machine publishes no positions."""
         return time.monotonic() - self._heard > QUIET
 
     def _look(self) -> None:

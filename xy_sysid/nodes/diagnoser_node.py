@@ -161,7 +161,7 @@ class DiagnoserNode(WalledNode):
     # parameters and services
 
     def _check(self, settings: DiagnoserSettings) -> None:
-        """Raises BadInput for an axis or an effect that nobody knows."""
+        """Raises BadInput for an unknown axis or effect."""
         for axis in settings.effects:
             if axis not in self._axes:
                 raise BadInput("effects of axis", repr(axis), ", ".join(self._axes), "Choose one of these.")

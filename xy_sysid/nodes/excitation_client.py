@@ -26,7 +26,7 @@ NODE = "excitation"
 
 
 class ExcitationClient:
-    """A node of its own in the thread that calls it. ended: asked often, true when somebody wants to stop."""
+    """A node of its own in the thread that calls it. ended: called often; true if the user wants to stop."""
 
     def __init__(self, name: str, ended: Callable[[], bool], namespace: str) -> None:
         self._is_over = ended

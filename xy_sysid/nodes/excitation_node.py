@@ -114,7 +114,7 @@ class ExcitationNode(Overridable, LifecycleNode):
     # lifecycle
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Check that every signal fits the rate, and that nobody else is there to drive the machine."""
+        """Check that every signal fits the rate, and that no other node drives the machine."""
         time.sleep(max(0.0, self._made + FOUND - time.monotonic()))
         rivals = self._rivals()
         if rivals:
@@ -251,7 +251,7 @@ class ExcitationNode(Overridable, LifecycleNode):
         return ""
 
     def _no_commands(self, commands: Commands) -> str:
-        """Why no trajectories may be sent: nobody there takes them. Empty if all is well, and where one number a joint is sent."""
+        """Why no trajectories may be sent: no node receives them. Empty if one does, and with a forward controller."""
         if not isinstance(commands, Trajectories):
             return ""
         kinds = {info.topic_type for info in self.get_subscriptions_info_by_topic(self._way)}
@@ -275,7 +275,7 @@ class ExcitationNode(Overridable, LifecycleNode):
         return sorted(set(names))
 
     def _rivals(self) -> str:
-        """Who else drives the machine or has this node's name, in words; empty if nobody."""
+        """Which other node drives the machine or has this node's name, in words; empty if none."""
         others = self._others()
         if others:
             return f"{' and '.join(others)} publishes {self._way}, too"

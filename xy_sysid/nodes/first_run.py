@@ -28,7 +28,7 @@ REST, FORTH = 0.12, 0.15  # s at 0 V before, between and after, and s of each pu
 
 
 class Conductor(ExcitationClient):
-    """``run`` does it all; it returns when the machine stands. ended: asked often, true when somebody wants to stop."""
+    """``run`` does it all; it returns when the machine stands. ended: called often; true if the user wants to stop."""
 
     def __init__(self, say: Callable[[str], None], ended: Callable[[], bool], namespace: str = NAMESPACE) -> None:
         self.found: dict[str, AxisFound] = {}

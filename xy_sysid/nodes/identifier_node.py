@@ -33,7 +33,7 @@ from xy_sysid.settings import IdentifierSettings
 
 PUBLISH_PERIOD = 0.05  # s between two looks for finished fits
 HEARTBEAT = 1.0  # s between two statuses of the streams
-# Changing one of these starts the spectra anew; the topics' names and types are fixed when the node starts.
+# Changing one of these restarts the spectra; the topics' names and types are fixed when the node starts.
 SHAPES_SPECTRA = ("window", "length", "overlap", "differenced", "memory", "sliding", "alarm_windows", "reorder")
 FIXED = ("response", *HEARING, "state_file", "save_every", "baseline", "baseline_table")
 
@@ -137,7 +137,7 @@ class IdentifierNode(WalledNode):
             self._worker.change(fitter)
 
     def _fitter(self, settings: IdentifierSettings) -> LiveFitter:
-        """A fitter that knows nothing yet, and what is compared with the baseline begins anew."""
+        """A fitter that knows nothing yet, and what is compared with the baseline begins again."""
         self._since.forget()
         return LiveFitter(settings, self._since.models)
 

@@ -123,7 +123,7 @@ def story_facts(document: Mapping[str, Any], step: int | None = None) -> list[Fa
 
 
 def base_fails(document: Mapping[str, Any] | None) -> str:
-    """What the rigid model of a story leaves where it fails; empty where it does not, or nobody knows."""
+    """The error of the rigid model of a story where it fails; empty if it does not, or if that is unknown."""
     if document is None or not document["ladder"]:
         return ""
     base = document["ladder"][0]

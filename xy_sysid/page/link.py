@@ -1,4 +1,4 @@
-"""The page's own ROS 2 node: it hears results and stories and passes orders on. Should it die, it is begun anew.
+"""The page's own ROS 2 node: it hears results and stories and passes orders on. If it fails, it is restarted.
 
 The node lives in a thread of its own (``_Line``). ``Link`` looks after it, and stands when it falls: STOP has a wire of its own
 and is published from the thread that asks for it, and every order goes to the node that is there then.

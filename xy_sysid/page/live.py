@@ -103,7 +103,7 @@ class Live:
             self._trigger(asked.state.order)
 
     def begin(self) -> None:
-        """Have the rigid model fitted, once there are data for it and nobody has asked for more."""
+        """Have the rigid model fitted once there are enough data, if no other work was requested."""
         if not self.heard.stories and NODE in self.heard.present and self._kept() >= self._enough:
             self._enough = 2.0 * self._kept()
             self.link.trigger(f"{NODE}/begin", lambda done, words: None, LONG)

@@ -107,7 +107,7 @@ class WorkerNews:
 
 @dataclass(frozen=True, slots=True)
 class OrderState:
-    """An order that is being fulfilled or waits; begun: seconds on the page's clock; part: 0..1 or None when nobody knows."""
+    """An order that is being fulfilled or waits; begun: seconds on the page's clock; part: 0..1, None if unknown."""
 
     order: Order
     begun: float

@@ -199,7 +199,7 @@ class TopicsState:
             return
         past = self.resonances.setdefault(axis, deque(maxlen=HISTORY))
         if past and seconds < past[-1].seconds:
-            past.clear()  # the identifier began anew
+            past.clear()  # the identifier restarted
         past.append(Tracked(seconds, now, reference, status.level == 2))
 
     def _changed(self, name: str) -> None:

@@ -17,7 +17,7 @@ BETWEEN = " · "  # words at the foot of a page
 
 @dataclass(frozen=True, slots=True)
 class Cover:
-    """title: of the page; machine, author, recorded: empty if nobody knows; written: the day of the report."""
+    """title: of the page; machine, author, recorded: empty if unknown; written: the day of the report."""
 
     title: str
     machine: str = ""

@@ -67,7 +67,7 @@ def spoken(text: str, library: Library) -> str:
 
 
 def verdict(story: Document, library: Library) -> str:
-    """What the story found, for somebody who knows the machine and not the method."""
+    """The result of the story, for a reader who knows the machine but not the method."""
     if not story["ladder"]:
         return str(story["sentence"])
     last = story["ladder"][-1]

@@ -21,7 +21,7 @@ from xy_sysid.tables import Table
 
 SUFFICES = 0.01  # of the own motion: less is below what models of machines reach
 BANDS = 24  # over which coupling is averaged
-ALIKE = 0.95  # coherence of the two inputs from which they cannot be told apart
+ALIKE = 0.95  # coherence of the two inputs from which they cannot be distinguished
 FEWEST = 4.0  # independent windows
 LONGER = 4  # windows of coupling over those of one axis: bands average lines here, and the response of the own axis leaks less into them
 COMBINED = {

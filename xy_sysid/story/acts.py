@@ -15,14 +15,14 @@ from xy_sysid.story.story import Story, added, begin, diagnosed, next_best, prun
 from xy_sysid.units import Units, bare, moved
 
 Act = Literal["begin", "diagnose", "renew", "effects", "add_next", "auto"]
-ANEW: tuple[Act, ...] = ("diagnose", "renew")  # acts that begin a story anew
+ANEW: tuple[Act, ...] = ("diagnose", "renew")  # acts that start a new story
 
 
 @dataclass(frozen=True, slots=True)
 class Job:
     """What is to be done with one axis.
 
-    act: ``begin`` fits the rigid model if there is no story yet, ``diagnose`` begins anew with these samples and then has ``effects`` in
+    act: ``begin`` fits the rigid model if there is no story yet, ``diagnose`` begins again with these samples and then has ``effects`` in
     the model, ``renew`` does so without asking what is missing, ``effects`` changes the effects and keeps the samples, ``add_next`` adds the
     best one, ``auto`` all that help
     run: of the axis; story: so far, None to begin
