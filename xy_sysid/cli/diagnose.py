@@ -86,13 +86,13 @@ def _show(name: str, item: Answer, drive: Transmission) -> None:
 
 
 def error_cells(name: str, rung: Rung) -> tuple[str, str, str]:
-    """Name, held-out error and what that is over the noise floor; where free simulation cannot judge, the name says how it was judged."""
+    """Name, held-out error, and its ratio to the noise floor; if free simulation cannot judge, the name says how it was judged."""
     label = f"{name} (error one sample ahead)" if rung.one_step else name
     return label, f"{motion(rung.units.judged)[0] * rung.held_out_error:.4g}", f"{rung.held_out_error / max(rung.noise_floor, 1e-300):.2f}"
 
 
 def parameter_table(parameters: tuple[Estimate, ...]) -> None:
-    """Parameters as people read them."""
+    """The parameters in display units."""
     rows = []
     for p in parameters:
         rows.append(estimate(p.name, (p.value, p.low, p.high), p.unit))

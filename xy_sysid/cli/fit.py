@@ -41,7 +41,7 @@ def fit(
     force: o.Force = False,
     json: o.Json = False,
 ) -> None:
-    """Transfer function with delay of each axis, 95 % intervals, and whether it can be trusted. REC may also be a measured frequency response."""
+    """Fit a transfer function with delay to each axis, with 95 % intervals and checks. REC may also be a measured frequency response."""
     from xy_sysid.errors import BadInput
     from xy_sysid.files import linear_models
     from xy_sysid.fitting.of_given_response import band_of

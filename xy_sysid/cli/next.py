@@ -1,4 +1,4 @@
-"""xy-sysid next: which experiment settles what the recordings leave open?"""
+"""xy-sysid next: which experiment answers what the recordings leave open?"""
 
 from __future__ import annotations
 

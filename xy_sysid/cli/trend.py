@@ -1,4 +1,4 @@
-"""xy-sysid trend: which axis changed, since when, by how much, how sure, and why."""
+"""xy-sysid trend: which axis changed, since when, by how much, how certainly, and why."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What ``xy-sysid use`` says of one axis: tables and sentences, and its part of the JSON document."""
+"""The output of ``xy-sysid use`` for one axis: tables, sentences, and its part of the JSON document."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""An experiment that was designed, on a machine that has limits of its own: taken over only where it keeps within them.
+"""A designed experiment on a machine with its own limits: accepted only if it stays within them.
 
 The document is that of ``xy-sysid next``: which axis, for how long, what drives it, the voltage and travel that it needs, and where it may begin.
 """

@@ -1,6 +1,6 @@
 """From an excitation signal to the applied voltage: ramps, centring, soft travel limits, amplitude limit.
 
-Told the time and the positions; asks for neither. The order of the guards for every sample is
+Time and positions are arguments. The order of the guards for every sample is
 
     (signal * rms + offset + centring) * ramp-in -> travel limits -> fade-out -> amplitude limit
 

@@ -1,4 +1,4 @@
-"""What an encoder shows of an axis that rests: noise, and a last count that toggles. Motion is what goes beyond it."""
+"""The readings of an encoder at rest: noise, and a toggling last count. Only larger changes are motion."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""When the next block is due: by the clock, or by the machine's answers. Told the time and the answers; asks for neither."""
+"""When the next block is due: by the clock, or by the machine's answers. Time and answers are arguments."""
 
 from __future__ import annotations
 

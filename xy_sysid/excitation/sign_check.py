@@ -51,7 +51,7 @@ class SignCheck:
         self._interval = max(round(INTERVAL * settings.rate), settings.step)  # samples
 
     def forget(self) -> None:
-        """Begin anew: after a pause nothing is known of what happened in it."""
+        """Start again, because nothing is known of what happened during a pause."""
         none = np.empty((0, self._number))
         self._ends, self._sums = np.empty(0), none  # of the excitation: counter, and V samples until there
         self._seqs, self._places, self._unsure = np.empty(0), none, none  # of the motion: counter, mean in m, what a step must have in m^2

@@ -1,4 +1,4 @@
-"""Who holds STOP: everybody who has asked for it, until the same one releases it or an operator overrides it by name."""
+"""The holders of STOP: each publisher that requested it, until it releases its STOP or an operator overrides it by name."""
 
 from __future__ import annotations
 

@@ -94,7 +94,7 @@ def _all(item: Recorded, score: float) -> float:
 
 
 def settled(each: Sequence[Sequence[Power]], seconds: float) -> float:
-    """Probability that the true set is told from every rival after some seconds, over sets and draws with the same weight.
+    """Probability that the true set is distinguished from every rival after some seconds, over sets and draws with the same weight.
 
     each: for one draw of one set its powers, the sets that have none left out
     """

@@ -1,4 +1,4 @@
-"""A model file says in its first line what the rest adds up to, so that a cut or a changed one is seen."""
+"""The first line of a model file holds the checksum of the rest, so a cut or changed file is detected."""
 
 from __future__ import annotations
 

@@ -150,7 +150,7 @@ def _added(before: tuple[Mode, ...], after: tuple[Mode, ...], poles: int) -> tup
 
 
 def _doubt(now: Fit, fit: Fit, added: tuple[Mode, ...], poles: int) -> str:
-    """Why a richer fit is no machine, or not told by the data; empty if there is nothing against it."""
+    """Why a richer fit is not physical, or not determined by the data; empty if nothing is wrong."""
     low, high = float(fit.frequency[0]), float(fit.frequency[-1])
     if not fit.tf.is_stable:
         return "it is unstable"

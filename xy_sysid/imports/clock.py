@@ -1,4 +1,4 @@
-"""Time against the sample counter: where they part, so that nothing is paired wrongly in silence."""
+"""Time compared with the sample counter: differences are reported, so that nothing is paired wrongly without a note."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Units of foreign files: what a column measures, and its factor to SI. A unit that is not known is carried and named."""
+"""Units of foreign files: what a column measures, and its factor to SI. An unknown unit is kept and reported."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the table of a text file begins, what its columns are called, and how its cells are parted."""
+"""The table in a text file: its first row, the names of its columns, and the separator of its cells."""
 
 from __future__ import annotations
 

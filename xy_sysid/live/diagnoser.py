@@ -1,4 +1,4 @@
-"""What a live diagnosis does when: requests come in, jobs go out one at a time, stories come back. No thread, no clock, no IO.
+"""The sequence of a live diagnosis: requests come in, jobs go out one at a time, stories come back. No thread, no clock, no IO.
 
 A story stays with the samples it began with, so that its ladder compares like with like; ``diagnose`` and ``renew`` begin again. Each axis
 can be asked for by itself: what is done for one leaves the others as they are.

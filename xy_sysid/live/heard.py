@@ -1,4 +1,4 @@
-"""What a node that listens says of its streams: never OK while nothing is paired."""
+"""The status of the streams of a node: never OK while nothing is paired."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Voltage and position in; on request which effect is missing, and the error falling as effects are added.
+"""Diagnoser node: receives voltage and position; on request it finds the missing effect, and the error after each added effect.
 
 Thin: ``diagnoser.Diagnoser`` knows what is to be done when, ``story_process`` does it in a process of its own.
 """

@@ -1,4 +1,4 @@
-"""What a node says of itself: on ``metrics`` of its namespace, and for monitors of the whole robot on ``/diagnostics``.
+"""The status of a node: on ``metrics`` of its namespace, and on ``/diagnostics`` for monitors of the whole robot.
 
 On /diagnostics names carry the node and its namespace and hardware_id the machine, as REP 107 asks, so that two tables on one
 network are told apart; STALE, which is the aggregator's word, becomes WARN.

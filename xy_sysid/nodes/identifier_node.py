@@ -1,4 +1,4 @@
-"""Voltage and position in; frequency response, transfer function, comparison and metrics out.
+"""Identifier node: receives voltage and position; publishes frequency response, transfer function, comparison and metrics.
 
 Thin: the logic is ``identifier.Identifier`` on the data path and ``live_fit.LiveFitter`` in a thread of its own, so that
 data handling never waits for a fit.

@@ -1,4 +1,4 @@
-"""Writes topics to a bag as they come, still serialized; whole up to the last second even if it is killed."""
+"""Recorder node: writes topics to a bag as they arrive, serialized; complete up to the last second even if it is killed."""
 
 from __future__ import annotations
 

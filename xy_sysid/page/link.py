@@ -247,7 +247,7 @@ class _Line:
         self._thread.join(3.0)
 
     def abandon(self) -> None:
-        """Give it up; whoever waits for an answer is told."""
+        """Give it up, and inform the caller that waits for an answer."""
         self._ended.set()
         for asked in self._waiting:
             if not self._once_more(asked):

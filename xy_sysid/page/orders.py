@@ -1,4 +1,4 @@
-"""What a page can ask for and how far it is: plain values that go to the worker and back."""
+"""Orders of a page and their progress: plain values that go to the worker and back."""
 
 from __future__ import annotations
 

@@ -68,7 +68,7 @@ class Settling:
         return self._settler.outcome if self._settler.problem or self._settler.ending == "stopped" else ""
 
     def start(self, axis: str, alone: bool = False) -> None:
-        """Record, and design the first experiment; alone: drive and go on without being told. Raises BadInput while a walk is under way."""
+        """Record, and design the first experiment; alone: drive and continue automatically. Raises BadInput while a walk is under way."""
         from xy_sysid.nodes.settle import Settler, Wishes
 
         if self.running:

@@ -1,4 +1,4 @@
-"""What came over the topics, and what that means now: who is there, who is lost, where a resonance has been. Pure; time is told."""
+"""The state of the topics: which nodes run or are lost, and the history of the resonance. Pure; time is an argument."""
 
 from __future__ import annotations
 
