@@ -16,7 +16,7 @@ LONG = 1e3  # s: after so long at a constant speed bristles slide
 
 
 def ask(effect: Effect, values: tuple[float, ...], function: str, words: Mapping[str, float]) -> float:
-    """The value of a law; words: what it may ask for beside its parameters."""
+    """The value of a law; words: its arguments besides parameters."""
     known = {**words, **dict(zip(effect.names, values, strict=True))}
     law = effect.functions[function]
     return float(law(**{name: known[name] for name in arguments(law)}))
@@ -30,7 +30,7 @@ def of_category(model: AxisModel, *categories: str) -> Iterator[tuple[Effect, tu
 
 
 def asks(effect: Effect) -> frozenset[str]:
-    """What the laws of an effect ask for beside its parameters."""
+    """The arguments of the laws of an effect, besides parameters."""
     return frozenset(word for item in effect.functions.values() for word in arguments(item)) - set(effect.names) - set(effect.states)
 
 

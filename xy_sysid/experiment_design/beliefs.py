@@ -148,7 +148,7 @@ def believed(evidence: Evidence, found: GreyboxFit, count: int, seed: int = 0) -
 
 
 def hidden(evidence: Evidence, rest: AxisModel, name: str, best: float, draws: tuple[int, int]) -> Belief | None:
-    """An effect that does not show in the data, beside a model that explains them: the usual sizes that the data allow.
+    """An effect that the data do not show, together with a model that explains them: the usual sizes that the data allow.
 
     A relative in the model gives way, and what it calls by the same name is taken over. None where the data allow no such size.
     best: nats of what explains the data best; draws: how many are wanted, and their seed

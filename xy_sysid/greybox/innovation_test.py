@@ -25,7 +25,7 @@ SMALL = 0.02  # of the rms voltage or velocity: how much of a trace is put in to
 
 
 def traces(data: AxisData, model: AxisModel, effect: Effect, found: Followed, effects: Iterable[Effect]) -> list[Trace]:
-    """How much of the innovations' power each effect beside would explain, to first order, best first, with start values."""
+    """The part of the innovations' power that each additional effect would explain, to first order, best first, with start values."""
     assert effect.one_step is not None
     library, fs, n = model.library, data.sampling_rate, data.first
     names = [name for name, _ in beside(model, effect)[1]]

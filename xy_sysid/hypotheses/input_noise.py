@@ -15,7 +15,7 @@ from xy_sysid.samples.block import FloatArray
 
 
 def input_noise(data: AxisData, fit: GreyboxFit) -> float | None:
-    """rms of the white noise on the input, V, that explains by itself the spectrum of the held-out error of a rigid model beyond the floor, or None.
+    """rms of white noise on the input, V, that alone explains the spectrum of the held-out error of a rigid model above the floor, or None.
 
     The spectrum is N + |G|^2 s with the model's own response G, through which the noise goes; s is the likeliest one.
     The power of each band over it is a mean of chi-squares, so that twice the
