@@ -305,7 +305,7 @@ class DiagnoserSettings(Settings):
         return given(self.effects.get(axis, []))
 
 
-AXES = ("x", "y")  # as long as nobody names others
+AXES = ("x", "y")  # by default
 
 
 def for_axes(cls: type[AnySettings], axes: Sequence[str]) -> AnySettings:
@@ -335,7 +335,7 @@ class BallscrewSettings(Settings):
     machine: str = knob("paper.yaml", "machine file: a path, or a name in config/machines")
     seed: int = knob(0, "seed of noise and hidden effects; 0: that of the machine file", "", ge=0, le=2**31 - 1)
     clean: bool = knob(False, "without encoder noise and quantization")
-    realtime: bool = knob(False, "go on by the clock when no voltage comes, as a real machine does; off: time stands still until the next block")
+    realtime: bool = knob(False, "continue by the clock when no voltage comes, as a real machine does; off: time stands still until the next block")
     watchdog: float = knob(
         0.05,
         "with realtime: time after the last block at which the voltage goes to 0 V, as in a real drive; 0: never, the last voltage stays",

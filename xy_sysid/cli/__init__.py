@@ -18,7 +18,7 @@ for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
 
 INTERRUPTED, TERMINATED, WRONG = 130, 143, 2
 _interrupts = Interrupts()
-LONGEST = 800  # characters of a refusal; somebody may give a whole file as a value
+LONGEST = 800  # characters of a refusal; a value may be as long as a whole file
 
 
 def run(arguments: Sequence[str]) -> int:

@@ -256,7 +256,7 @@ def _own_limits(run_file: Path | None, axis: str) -> dict[str, Any]:
     if run_file is None:
         return {}
     told, settings = _settings(run_file, axis)
-    said = {"voltage": ("limit",), "travel": ("travel_min", "travel_max")}  # a default is no limit that somebody has set
+    said = {"voltage": ("limit",), "travel": ("travel_min", "travel_max")}  # a default is not a limit that the user has set
     unsaid = {name for name, knobs_of in said.items() if any(f"{axis}.{one}" not in told for one in knobs_of)}
     return {name: value for name, value in of_settings(settings, axis).items() if name not in unsaid}
 

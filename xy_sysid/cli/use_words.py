@@ -90,7 +90,7 @@ def show(name: str, used: Used) -> None:
     if used.tracking:
         say(f"  {_compensation(used.tracking[0])}")
     for effect, why in used.not_undone:
-        say(f"  The feedforward leaves {effect}: {why}.")
+        say(f"  The feedforward does not compensate {effect}: {why}.")
     for what, why in used.refused:
         say(f"  No {what}: {why}")
     say()

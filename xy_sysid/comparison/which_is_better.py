@@ -22,7 +22,7 @@ ABOVE = 1.2  # times the floor's power that one of the two errors must have for 
 SKIP = 0.5  # s at the start, in which a simulation forgets that it started from rest
 WANTED, FEWEST = 10, 5  # windows side by side
 LEVEL = 0.05  # chance of a false "better" or "worse"
-WORTH = 0.02  # relative change of the error below which nobody cares
+WORTH = 0.02  # relative change of the error that is negligible
 
 
 @dataclass(frozen=True, slots=True)

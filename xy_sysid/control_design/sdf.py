@@ -14,7 +14,7 @@ from xy_sysid.control_design.laws import along, asks, friction, largest_voltage
 from xy_sysid.effects._contract import Effect
 
 PLACES = 101  # at which a spring is asked whether it is straight
-ANYWHERE = -1.0, 1.0  # m or rad, where a spring is looked at if nobody knows the travel
+ANYWHERE = -1.0, 1.0  # m or rad, range for a spring if the travel is unknown
 STRAIGHT = 1e-6  # of its force at the end of the travel: a spring that bends less is one number
 
 

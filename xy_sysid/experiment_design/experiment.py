@@ -13,7 +13,7 @@ from xy_sysid.samples.block import FloatArray
 from xy_sysid.settings import AxisExcitation, ExcitationSettings
 from xy_sysid.units import USUAL, Units, readable
 
-RAMP = float(ExcitationSettings.model_fields["ramp"].default)  # s in which the excitation fades in, where nobody says another time
+RAMP = float(ExcitationSettings.model_fields["ramp"].default)  # s in which the excitation fades in, by default
 AGE = 0.04  # s: age of the position by which the excitation pulls back to the start
 KEPT = 64  # signals, as many as differ in more than their amplitude
 BANDED = ("noise", "multisine", "multisine_odd", "multisine_detect", "sweep", "stepped_sine", "prbs")  # kinds that have a band

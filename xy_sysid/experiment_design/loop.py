@@ -23,7 +23,7 @@ from xy_sysid.units import USUAL, Units
 
 Ending = Literal["settled", "alike", "impossible", "experiments", "seconds", "stopped"]
 Signals = tuple[FloatArray, FloatArray]  # voltage and position, (n,) each
-CarryOut = Callable[[Experiment], Signals | None]  # carries an experiment out; None if somebody stopped it
+CarryOut = Callable[[Experiment], Signals | None]  # carries out an experiment; None if it was stopped
 
 
 @dataclass(frozen=True)

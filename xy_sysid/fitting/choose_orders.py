@@ -30,7 +30,7 @@ HALF = 0.5  # of the misfit near what a step adds that it may leave
 NEAR = 1.4  # times and over the frequencies added: there the misfit is counted
 LIGHT = 0.7  # damping above which a pair is no resonance
 NUMBERS_EACH = 4.0  # independent numbers that every parameter of a step up needs
-WIDEST = 0.1  # relative standard error, misfit counted, of a frequency that is told
+WIDEST = 0.1  # relative standard error, including misfit, of a frequency that counts as determined
 FAR_ABOVE = 3.0  # times the band's end beyond which a rigid body's pole is not seen at all
 
 
@@ -172,7 +172,7 @@ def _doubt(now: Fit, fit: Fit, added: tuple[Mode, ...], poles: int) -> str:
         if item.name.startswith("resonance") and ours and not factor * item.sigma < WIDEST * item.value:
             return f"its resonance at {item.value:.3g} Hz is not determined"
     left = _misfit(fit, fit, added) / max(_misfit(now, fit, added), 1e-300)
-    return f"it leaves {100.0 * left:.0f} % of the misfit where it stands" if left > HALF else ""
+    return f"it leaves {100.0 * left:.0f} % of the misfit at its frequency" if left > HALF else ""
 
 
 def fit_resolution(fit: Fit) -> float:

@@ -79,7 +79,7 @@ class LinearModel:
 
     def velocity(self, sampling_rate: float, voltage: FloatArray, position: FloatArray) -> FloatArray:
         """(n - 1,) simulated mean velocity of each sample, m/s, from rest; of an acceleration its integral without mean and slow drift."""
-        with np.errstate(over="ignore", invalid="ignore"):  # what runs away is told as such
+        with np.errstate(over="ignore", invalid="ignore"):  # an unstable model is reported as such
             moved, derivative = simulate_sampled(self.tf, sampling_rate, voltage, self.hold), derivative_of(self.tf.output_unit)
             if derivative == 2:
                 steps = (moved - np.mean(moved))[:-2] / sampling_rate

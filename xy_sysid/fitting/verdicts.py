@@ -27,7 +27,7 @@ FLAT = 1e-4  # singular value of the scaled Jacobian, of the largest, below whic
 GOOD_SIMULATION = 70.0  # NRMSE fit in per cent that counts as a model good enough to simulate with
 
 NUMBERS_EACH = 2.0  # independent numbers for each parameter, below which nothing is judged
-TRUSTED = 1.5  # times wider: beyond, what the model leaves and not noise decides the intervals
+TRUSTED = 1.5  # times wider: beyond this, the model error and not the noise determines the intervals
 UNTOLD = "Cannot be determined from so few values: {}."
 
 HeldOut = tuple[FloatArray, FloatArray, float]

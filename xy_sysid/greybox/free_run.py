@@ -50,10 +50,10 @@ NEARER = Schedule(4, 6, 3e-3, 3e-3)
 FINER = Schedule(2, 8, 1e-4, 1e-3)
 LONG = Schedule(3, 6, 1e-5, 1e-4)
 COARSE, MIDDLING = 2000.0, 4000.0  # Hz: finest sub-steps of looks and first rounds (errors up to 3e-3 of the motion), and of brief fits (6e-4)
-TOLD = 0.01  # part of what is left of the voltage that an effect takes away at least, to be simulated before any fit: of 14 s below 10 Hz chance
+TOLD = 0.01  # least part of the residual voltage that an effect explains, to be simulated before any fit: of 14 s below 10 Hz chance
 # takes half of it
 LATE = 1.0 / (4.0 * CUTOFFS[-1])  # s, of a delay with which nothing is read if it is wrong: a quarter of the shortest period that is looked at
-FAITHFUL = 0.1  # of what a model leaves: by so much may its motion change with finer sub-steps
+FAITHFUL = 0.1  # of the error of a model: allowed change of its motion with finer sub-steps
 
 
 @dataclass(frozen=True, slots=True)

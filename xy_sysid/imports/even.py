@@ -24,7 +24,10 @@ LOCAL = 50  # samples over which the period is looked at
 STEADY = 0.005  # relative; a period that wanders by less is even enough: frequencies are off by no more
 BURST = 0.2  # of a period; more steps than BURSTS shorter than that are stamps that came in bursts
 BURSTS = 0.2
-STRETCH, APART = 200, 50  # samples over which a period is told from late, lost and jittering stamps; between two of them that are compared
+STRETCH, APART = (
+    200,
+    50,
+)  # samples over which a period is distinguished from late, lost and jittering stamps; distance of two samples that are compared
 DRIFT = 0.02  # relative; a period that changes by more within a recording is not one
 LOST = 0.3  # of the time; where steps jitter, more than that in steps longer than GAP is lost
 Values = tuple[FloatArray, ...]

@@ -41,7 +41,7 @@ MEANINGS = {
 }
 JERK_TIME = 0.02  # s in which an acceleration is built up
 LOOK, BEAT = 0.05, 0.5  # s between two looks, and between two statuses
-QUIET = 0.5  # s without a position after which nobody drives
+QUIET = 0.5  # s without a position after which no drive is active
 FOUND = 0.5  # s in which the machine finds a new source of voltage
 SILENT = 3.0  # s without an answer after which the path is given up
 SHOWN = 600  # rows of the table of errors at most

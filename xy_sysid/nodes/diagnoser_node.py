@@ -138,7 +138,7 @@ class DiagnoserNode(WalledNode):
     def _beat(self) -> None:
         """What is heard, once a second."""
         hearing = self._diagnoser.hearing
-        level, text = verdict(self._streams.heard(hearing.total, hearing.sentences, hearing.faults), "voltage and position are heard")
+        level, text = verdict(self._streams.heard(hearing.total, hearing.sentences, hearing.faults), "voltage and position are received")
         text = f"{text}; {hearing.seconds:.1f} s without a gap are kept"
         if self._streams.recent.goes_on("callbacks", self.wall.count, time.monotonic()):
             level, text = max(level, WARN), f"{text}; {self.wall.told}"

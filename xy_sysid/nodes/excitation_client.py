@@ -21,7 +21,7 @@ from xy_sysid.settings import ExcitationSettings, build, knobs
 ANSWER = 10.0  # s for an answer of the excitation,
 ASKED = 3  # times, as long as a node is there
 APPEARS = 60.0  # s until the excitation is there,
-SOON = 1.0  # s where somebody wants to stop: an excitation that is there has to be told so
+SOON = 1.0  # s, if the user wants to stop: a running excitation must still receive the request
 NODE = "excitation"
 
 

@@ -45,7 +45,7 @@ ARRIVES = Duration(seconds=1.0)  # how long the last zero may take to be acknowl
 SAME_EPOCH = 0.05  # s by which the ROS time of counter 0 may move over a pause before the stamps follow it
 SETTLED = 0.5  # s without a new listener before starting by itself: whoever was started together hears the first sample
 SAME_NODE = 2.0  # s to look for one node that reads voltage and writes position, before any two will do
-ALONE = 0.1  # s between two looks whether somebody else drives
+ALONE = 0.1  # s between two checks for another node that drives
 KNOCK = 1.0  # s after which zeros go out once more in lockstep, while no machine has answered yet
 STOP_LOOK = 0.02  # s between two looks whether STOP was asked for
 FOUND = 1.0  # s after which a node has found all who were there before it
@@ -87,7 +87,7 @@ class ExcitationNode(Overridable, LifecycleNode):
         self._wall = Wall(self._complain)
         for service in self._services:  # rclpy's own: a transition that the state does not have would end the node
             service.callback = self._wall.around(service.callback)
-        self._steady = RosClock(clock_type=ClockType.STEADY_TIME)  # guards must not sleep when somebody stops or sets the clock
+        self._steady = RosClock(clock_type=ClockType.STEADY_TIME)  # guards must not sleep when the clock is stopped or set
         self._voltage = self.create_publisher(Float64MultiArray, "voltage", DATA_QOS)
         self._metrics = Diagnostics(self)
         self._reference = self.create_publisher(Float64MultiArray, "reference", DATA_QOS) if self._knobs.settings.interface != "effort" else None

@@ -101,7 +101,7 @@ class IdentifierNode(WalledNode):
         """What is heard of the streams, once a second, whether or not there is anything to fit."""
         recent, now = self._streams.recent, time.monotonic()
         heard = self._streams.heard(self._identifier.samples, self._identifier.sentences, self._identifier.faults)
-        level, text = verdict(heard, f"{', '.join(heard.streams[:-1])} and {heard.streams[-1]} are heard")
+        level, text = verdict(heard, f"{', '.join(heard.streams[:-1])} and {heard.streams[-1]} are received")
         if recent.goes_on("callbacks", self.wall.count, now):
             level, text = max(level, WARN), f"{text}; {self.wall.told}"
         if recent.goes_on("skipped fits", self._worker.skipped, now):

@@ -35,7 +35,7 @@ CONTENT = {
 """Where the browser may take content from, by kind: this server alone, and pictures that the page itself has made."""
 
 HEADERS = {
-    "x-frame-options": "DENY",  # nobody lays an invisible copy of the buttons over something else
+    "x-frame-options": "DENY",  # so that no other page can frame this one and hide its buttons
     "content-security-policy": "; ".join(f"{kind} {places}" for kind, places in CONTENT.items()),
     "referrer-policy": "no-referrer",
     "x-content-type-options": "nosniff",

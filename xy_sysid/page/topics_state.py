@@ -139,13 +139,13 @@ class TopicsState:
                 continue
             status = self.statuses.get("streams" if name == "identifier" else name)
             if now - seen > LOST:
-                found.append(NodeState(name, 3, f"lost: nothing heard for {now - seen:.0f} s", True))
+                found.append(NodeState(name, 3, f"lost: nothing received for {now - seen:.0f} s", True))
             elif name in OFTEN and name in self.when and now - self.when[name] > LOST:
                 found.append(NodeState(name, 3, f"does not answer: silent for {now - self.when[name]:.0f} s", True))
             else:
                 level = status.level if status else 0
                 if level == 3 and self.lifecycle != "active":
-                    level = 0  # nobody drives: silence of the streams is as it should be
+                    level = 0  # no drive is active: silent streams are normal
                 found.append(NodeState(name, level, status.message if status else "there", False))
         return found
 

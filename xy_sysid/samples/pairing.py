@@ -36,7 +36,7 @@ REASONS = {
     "wrong_columns": "a message did not hold the expected columns",
     "bad_counter": "the sample counter was not whole and increasing",
     "unequal_rates": "voltage and position have different sampling rates",
-    "no_reference": "no reference of the controller was heard at that time",
+    "no_reference": "no reference of the controller was received at that time",
 }
 
 
