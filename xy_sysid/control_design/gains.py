@@ -45,7 +45,7 @@ class Gains:
 
     @property
     def doubt(self) -> str:
-        """Says of exported numbers which of them are 0 for want of better ones; empty if none is."""
+        """Names the exported numbers that are 0 because the data do not determine them; empty if none is."""
         return f"0 stands for {', '.join(self.unsure)}, which the data do not determine" if self.unsure else ""
 
 

@@ -28,7 +28,7 @@ HALF = 0.5  # of a sample: by which a held voltage acts late in the mean
 
 @dataclass(frozen=True, slots=True)
 class Feedforward:
-    """voltage: (n,) V to be held from each sample of the path; ahead: s by which the path is looked at ahead; not_undone: effects, and why."""
+    """voltage: (n,) V to be held from each sample of the path; ahead: s, preview of the path; not_undone: effects that are not inverted, and why."""
 
     voltage: FloatArray
     ahead: float
@@ -78,7 +78,7 @@ def ahead_of(model: AxisModel, sampling_rate: float) -> float:
 
 
 def not_undone(model: AxisModel) -> tuple[tuple[str, str], ...]:
-    """Effects that the feedforward leaves, and why."""
+    """Effects that the feedforward does not compensate, and why."""
     found = []
     for name, values in model.effects:
         effect = model.library[name]

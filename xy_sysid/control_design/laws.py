@@ -64,14 +64,14 @@ def force(model: AxisModel, speed: float, place: float, *, of_speed: bool | None
 
 
 def scale_error(model: AxisModel, place: float) -> float:
-    """What the encoder shows too much at a place, m; 0 at 0."""
+    """Error of the encoder reading at a position, m; 0 at 0."""
     return sum(
         ask(effect, values, "error", {"x": place}) - ask(effect, values, "error", {"x": 0.0}) for effect, values in of_category(model, "encoder")
     )
 
 
 def gain_factor(model: AxisModel, place: float) -> float:
-    """What the voltage's effect is multiplied by at a place, with the axis at rest."""
+    """Factor of the voltage at a position, with the axis at rest."""
     lost = 0.0
     for effect, values in of_category(model, "force"):
         if "u" in asks(effect):

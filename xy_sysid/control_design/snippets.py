@@ -41,7 +41,7 @@ class Designed:
 
 @dataclass(frozen=True, slots=True)
 class Snippet:
-    """target: its name; file: where the text goes; text: in the target's own syntax; note: what it cannot say."""
+    """target: its name; file: name of the file; text: in the target's own syntax; note: what it cannot represent."""
 
     target: str
     file: str
@@ -246,7 +246,7 @@ def _feedforward(of: Designed, per: float, length: str) -> list[tuple[str, float
 
 
 def _gravity(of: Designed) -> str:
-    """What has to be added for an arm, where the target has no place for it; and which gains are 0 for want of better ones."""
+    """What has to be added for an arm, if the target cannot represent it; and which gains are 0 because the data do not determine them."""
     size, zero = of.gains.value("kCos"), of.gains.value("zero")
     arm = (
         f" It has no kCos: add {size:.4g} {of.units.input} times the cosine of the angle minus {zero:.4g} rad ({zero / DEGREE:.4g} degrees)."

@@ -21,7 +21,7 @@ SPEEDS = 13  # in each direction
 
 @dataclass(frozen=True, slots=True)
 class Correction:
-    """What is added to the command, or taken from the encoder, at places or speeds.
+    """A correction table: values to add to the command, or to subtract from the encoder, by position or speed.
 
     name: ``friction``, ``force``, ``drag``, ``gain``, ``scale``, or ``residual`` (measured); at: (n,) places, m, or speeds, m/s
     value, low, high: (n,) with their 95 % intervals
@@ -45,7 +45,7 @@ class Correction:
 
     @property
     def after(self) -> float:
-        """rms that the parameters' uncertainty leaves with it, in ``unit``; that of 1 and not of 2 standard errors."""
+        """rms error with the table, from the uncertainty of the parameters, in ``unit``; for 1 standard error, not 2."""
         return float(np.sqrt(np.mean((0.25 * (self.high - self.low)) ** 2)))
 
     def csv(self) -> str:

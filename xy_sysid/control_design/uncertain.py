@@ -44,7 +44,7 @@ class Derived:
 
     @property
     def doubt(self) -> str:
-        """What speaks against using it; empty if nothing does."""
+        """Why it should not be used; empty if it can be used."""
         if self.determined:
             return ""
         most = self.because[0][0] if self.because else "the parameters, whose intervals are not known"

@@ -53,7 +53,7 @@ class Used:
     highest crossover, and that loop; None where none reaches more
     predicted: input of the recording before and after, if there is one; tracking: simulated tracking errors
     compensation: along the first path of ``tracking``; its laws are those that exported source undoes
-    refused: (what, why) of what could not be designed; not_undone: (effect, why) of what the feedforward leaves; notes: to be read first
+    refused: (what, why) of results without a design; not_undone: (effect, why) that the feedforward does not invert; notes: to be read first
     """
 
     axis: str

@@ -60,7 +60,7 @@ class Belief:
 
 
 class Evidence:
-    """How well models explain the data at hand: in nats over every window, fitted or held out."""
+    """How well models explain the present data: in nats over every window, fitted or held out."""
 
     def __init__(self, data: AxisData, travel: tuple[float, float] | None = None) -> None:
         """travel: of the machine, m; None: as far as the data went."""

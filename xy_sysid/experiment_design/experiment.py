@@ -59,11 +59,11 @@ class Experiment:
 
     @property
     def words(self) -> str:
-        """What it is, as people say it, for an axis that is driven in V."""
+        """The experiment in words, for an axis that is driven in V."""
         return self.said(USUAL)
 
     def said(self, units: Units) -> str:
-        """What it is, as people say it, in the units of an axis."""
+        """The experiment in words, in the units of an axis."""
         told, volt, parts = self.excitation, units.input, []
         if told.rms > 0.0 and told.kind in BANDED:
             parts.append(f"{told.kind} of {told.rms:.3g} {volt} rms from {told.low:.3g} to {told.high:.3g} Hz")

@@ -164,7 +164,7 @@ def answered(axis: str, rate: float, made: Design, library: Library, following: 
 
 
 def _ask(library: Library, made: Design) -> str:
-    """What a person would have to change where no experiment can tell."""
+    """What a person would have to change if no experiment can decide."""
     if made.helps:
         return ""
     own, other = made.beliefs[0].effects, made.beliefs[1].effects

@@ -21,7 +21,7 @@ from xy_sysid.samples.block import FloatArray
 
 @dataclass(frozen=True)
 class Setting:
-    """What an experiment is seen through.
+    """The measurement of an experiment: windows, noise floor and response.
 
     layout: windows and bands; encoder: m; epsilon: part of the motion to which laws are trusted; recorded: s of each recording at hand
     response: (bands,) |G|^2 of the machine to a force, as recorded (``greybox.floor``); None where nothing is recorded yet

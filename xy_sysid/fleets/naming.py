@@ -22,7 +22,7 @@ EXAMPLE = "{machine}/{date}*.csv"
 
 
 class Named(Settings):
-    """What a user says about one recording."""
+    """The user's names for one recording."""
 
     machine: str = knob("", "name of the machine")
     axis: str = knob("", "name of the axis, of a file that holds one")
@@ -30,7 +30,7 @@ class Named(Settings):
 
 
 class Names(Settings):
-    """How recordings are named, and what is followed in all of them: a small YAML file, or options."""
+    """The names of recordings, and the effects followed in all of them: from a small YAML file, or options."""
 
     pattern: str = knob("", "of the end of a path, for example {machine}/{axis}/{date}*.csv; * stands for anything but a slash")
     follow: list[str] = knob([], "effects whose parameters are estimated in every recording")
@@ -39,7 +39,7 @@ class Names(Settings):
 
 @dataclass(frozen=True, slots=True)
 class Name:
-    """What a recording is called.
+    """The name of a recording.
 
     axis: of a file that holds one, empty where the file's own names stand; date: UTC, None if unknown
     said: the machine was named by a list or a pattern; else it is the folder, and what the recording itself says is better
