@@ -168,7 +168,7 @@ def test_what_lacks_is_said_and_the_model_waits_for_data(world: World) -> None:
     ok, text = trigger(world, "reset_model", 10.0)
     assert ok and world.until(lambda: len(results.held_out("x")) == 1, 20.0)
     world.node.create_client(Trigger, "/xy/diagnoser/diagnose").call_async(Trigger.Request())
-    assert world.until(lambda: "looking" in newest(results.diagnosis, "progress")["progress"], 20.0)
+    assert world.until(lambda: "searching" in newest(results.diagnosis, "progress")["progress"], 20.0)
     node.send(signal.SIGINT)
     assert node.wait() == 0
     assert "Traceback" not in node.output()
