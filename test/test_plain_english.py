@@ -24,6 +24,10 @@ INSTEAD = {
     r"\bthis very\b": "this",
     r"\bof which the\b": "a second sentence",
     r"\bwhat is to be\b": "a noun",
+    r"\bwhat (is left|(a|the) model leaves)\b": "residual error",
+    r"\b(can|could)(not)? be told\b": "determine, distinguish",
+    r"\banew\b": "again",
+    r"\bsomebody\b": "a user, an operator",
 }
 
 

@@ -1,4 +1,4 @@
-"""The simulated XY milling table: a truth that the identification has never seen.
+"""The simulated XY milling table, with known true parameters for tests of the identification.
 
     machine file -> parts -> parameter vector -> kernel (fine inner steps) -> encoder
 

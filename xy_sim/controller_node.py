@@ -51,7 +51,7 @@ class ControllerNode(Node):
         self._stiffness = float(self.declare_parameter("stiffness", 15.0).value or 0.0)  # effort a rad, of the position loop
         self._damping = float(self.declare_parameter("damping", 0.3).value or 0.0)  # effort a rad/s, of both loops
         self._integral = float(self.declare_parameter("integral", 10.0).value or 0.0)  # effort a rad, of the velocity loop
-        self._load = float(self.declare_parameter("load", 0.0).value or 0.0)  # rms of a load that nobody measures, in effort
+        self._load = float(self.declare_parameter("load", 0.0).value or 0.0)  # rms of an unmeasured load, in effort
         if self._interface not in INTERFACES:
             raise BadInput("interface", repr(self._interface), ", ".join(INTERFACES), "Choose one of these.")
         if len(joints) != len(machine.axes):
@@ -102,7 +102,7 @@ class ControllerNode(Node):
             self._machine.step(np.repeat(self._effort[None, :], missed, axis=0))
             self._position = self._read()
         speed = (self._position - self._before) / (self._period * (1 + missed))
-        names = ["gripper", *reversed(self._joints)]  # others are there, too, and nobody promises an order
+        names = ["gripper", *reversed(self._joints)]  # there are others, too, in any order
         self._states.publish(
             JointState(
                 header=self._header(),

@@ -1,4 +1,4 @@
-"""What every axis of the table has: motor, screw, masses, travel and encoder."""
+"""The drive of each axis: motor, screw, masses, travel and encoder."""
 
 from __future__ import annotations
 

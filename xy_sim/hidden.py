@@ -1,4 +1,4 @@
-"""Machines whose truth is known to nobody who is asked."""
+"""Machines with hidden effects, drawn from a seed."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ def gain_and_drag(p: FloatArray, t: float, q: float) -> tuple[float, float]:
 
 @inlined
 def hum(p: FloatArray, t: float) -> float:
-    """Volts that nobody asked for, at ``t`` (s)."""
+    """Disturbance in volts at ``t`` (s)."""
     return mains_hum.volts(p[_RIPPLE], p[_RECTIFIED], p[_MAINS], p[_MAINS_PHASE], t) if p[_MAINS] != 0.0 else 0.0
 
 

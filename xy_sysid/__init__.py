@@ -16,20 +16,20 @@ In a notebook::
 
 Packages in the order of the data; each imports only from those before it.
 
-    samples, excitation:       what arrives, and what drives the machine
+    samples, excitation:       recorded samples, and signals that drive the machine
     response, linear, fitting: windows and spectra to a frequency response, transfer functions, their fits and verdicts
-    effects, axis, greybox:    physical effects, an axis with them in time, its fit
+    effects, axis, greybox:    physical effects, simulation of an axis with effects, its fit
     comparison:                where a model fails
     hypotheses, diagnosis:     which effect is missing
     experiment_design:         what to measure next
-    story, live:               what people are shown, and the online logic
+    story, live:               the steps that are shown to users, and the online logic
     control_design:            what to do with the model
     bags, imports, files, processes: reading, writing, other processes
     fleets:                     many recordings of many machines, and what changes over time
-    nodes, report, page, cli:  what people meet
-    front_door:                the public functions as people call them
+    nodes, report, page, cli:  user interfaces
+    front_door:                wrappers of the public functions
 
-What everybody knows stands beside them: ``errors``, ``settings``, ``units``, ``jit``. The names of ``__all__`` are for everybody, each made
+All packages may import ``errors``, ``settings``, ``units`` and ``jit``. The names of ``__all__`` are public, and each is loaded
 when it is first used; all other modules may change.
 """
 
@@ -157,18 +157,18 @@ def __getattr__(name: str) -> Any:
 
 
 def _calls() -> Any:
-    """A call as people make it: a path for what is in the file, a run for its response; a wrong type is one line."""
+    """The wrapped public function: a path or a run is converted, and a wrong type raises one line."""
     return importlib.import_module("xy_sysid.front_door.calls")
 
 
 def _show_as_pictures(home: Any) -> None:
-    """The results of this package draw themselves in a notebook; plotly comes when the first one does."""
+    """Results draw themselves in a notebook; plotly is imported with the first one."""
     for kind in (getattr(home, name) for name in _PICTURES if hasattr(home, name)):
         kind._repr_html_ = _html
 
 
 def _html(result: Any) -> str | None:
-    """For the notebook: the line that ``repr`` gives, and the picture; None if there is nothing to draw."""
+    """For the notebook: ``repr`` as text and the picture; None if there is nothing to draw."""
     html: str | None = importlib.import_module("xy_sysid.report.notebook").html(result, _PICTURES[type(result).__name__])
     return html
 

@@ -1,4 +1,4 @@
-"""Every way a user can be told that something cannot be done.
+"""The exceptions of this package.
 
 A failed fit is a result; a wrong call is one of these exceptions. Each text says what was given, what is allowed,
 and what to do next, in one line, so that any surface can print it as it is.

@@ -1,4 +1,4 @@
-"""Every knob, once: default, unit, limits and meaning.
+"""All settings, each defined once: default, unit, limits and meaning.
 
 ROS parameters, CLI options, YAML files, the page and docs/settings.md are made from these classes. Units are SI.
 """
@@ -28,7 +28,7 @@ def knob(default: Any, meaning: str, unit: str = "", **limits: Any) -> Any:
 
 
 class Settings(BaseModel):
-    """A group of settings that nobody changes in place; an unknown name is an error."""
+    """A group of settings that cannot be changed in place; an unknown name is an error."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
@@ -45,31 +45,33 @@ class AxisExcitation(Settings):
     )
     rms: float = knob(
         1.0,
-        "root mean square of the signal (impulse and step: its height); as joint_trajectory 0 is the largest that the limits allow",
+        "root mean square of the signal (impulse and step: its height); with joint_trajectory, 0: the largest that the limits allow",
         "V",
         ge=0.0,
         le=100.0,
     )
-    limit: float = knob(10.0, "no sample leaves this magnitude", "V", gt=0.0, le=1000.0)
+    limit: float = knob(10.0, "no sample exceeds this magnitude", "V", gt=0.0, le=1000.0)
     low: float = knob(0.1, "lowest frequency excited", "Hz", ge=0.0, le=100_000.0)
     high: float = knob(300.0, "highest frequency excited", "Hz", gt=0.0, le=100_000.0)
     period: float = knob(4.096, "period of a multisine or PRBS, length of a sweep or step, dwell of a stepped sine", "s", gt=0.0, le=3600.0)
     steps: int = knob(60, "frequencies of a stepped sine, spread evenly on a log axis", "", ge=1, le=10_000)
     offset: float = knob(0.0, "constant voltage added", "V", ge=-100.0, le=100.0)
     seed: int = knob(1, "seed of the random numbers; give every axis its own", "", ge=0, le=2**31 - 1)
-    centring: float = knob(2.0, "pull back to the start, volt per metre away from it; 0 is open loop", "V/m", ge=0.0, le=10_000.0)
+    centring: float = knob(2.0, "pull back to the start, volts per metre of distance from it; 0: open loop", "V/m", ge=0.0, le=10_000.0)
     travel_min: float = knob(-0.14, "soft limit of travel, lower", "m", ge=-1000.0, le=1000.0)
     travel_max: float = knob(0.14, "soft limit of travel, upper", "m", ge=-1000.0, le=1000.0)
     brake: float = knob(0.02, "length of the zone before a soft limit in which outward voltage is faded to inward braking", "m", gt=0.0, le=100.0)
     brake_voltage: float = knob(1.0, "inward voltage at and beyond a soft limit", "V", ge=0.0, le=100.0)
     slow: float = knob(0.0, "amplitude of a slow sine added to the signal, which takes a joint through its range", "V", ge=0.0, le=1000.0)
     slow_period: float = knob(10.0, "period of that sine", "s", gt=0.0, le=3600.0)
-    velocity_gain: float = knob(0.0, "steady speed per volt as the first run found it, for the guards; 0 is not known", "m/s/V", ge=0.0, le=1000.0)
-    max_speed: float = knob(0.0, "as joint_trajectory: the reference is never faster", "m/s", ge=0.0, le=1000.0)
+    velocity_gain: float = knob(0.0, "steady speed per volt from the first run, for the guards; 0: not known", "m/s/V", ge=0.0, le=1000.0)
+    max_speed: float = knob(0.0, "with joint_trajectory: largest speed of the reference", "m/s", ge=0.0, le=1000.0)
     max_acceleration: float = knob(
-        0.0, "as joint_trajectory: the reference never speeds up or slows down faster, not even to stop", "m/s^2", ge=0.0, le=100_000.0
+        0.0, "with joint_trajectory: largest acceleration of the reference, also for stopping", "m/s^2", ge=0.0, le=100_000.0
     )
-    breakaway: float = knob(0.0, "voltage that may leave it at rest (friction), for the guards; 0 is 0.5 V or limit / 20", "V", ge=0.0, le=1000.0)
+    breakaway: float = knob(
+        0.0, "voltage at which friction may still hold the axis at rest, for the guards; 0: 0.5 V or limit / 20", "V", ge=0.0, le=1000.0
+    )
 
     @field_validator("kind", mode="before")
     @classmethod
@@ -90,35 +92,35 @@ class ExcitationSettings(Settings):
 
     rate: float = knob(2000.0, "samples per second", "Hz", ge=10.0, le=100_000.0)
     block: int = knob(20, "samples in one message", "", ge=1, le=10_000)
-    speed: float = knob(1.0, "times faster than real time, for a simulated machine only; 0 is as fast as it goes", "", ge=0.0, le=1000.0)
+    speed: float = knob(1.0, "times faster than real time, for a simulated machine only; 0: as fast as possible", "", ge=0.0, le=1000.0)
     lockstep: bool = knob(False, "wait for the machine's answer before going on (simulated machines); on a real machine leave it off")
-    ahead: int = knob(3, "blocks sent before the first answer must be there, with lockstep", "", ge=1, le=1000)
-    duration: float = knob(0.0, "stop after so many seconds of signal; 0 is endless", "s", ge=0.0, le=1e9)
+    ahead: int = knob(3, "with lockstep: blocks that may be sent before the first answer", "", ge=1, le=1000)
+    duration: float = knob(0.0, "stop after this many seconds of signal; 0: never", "s", ge=0.0, le=1e9)
     ramp: float = knob(0.5, "time to fade in, and out at an orderly end", "s", ge=0.0, le=60.0)
-    watchdog: float = knob(0.05, "without a position for so long while active, ramp to zero and go inactive", "s", gt=0.0, le=10.0)
+    watchdog: float = knob(0.05, "if no position comes for this long while active, fade to zero and go inactive", "s", gt=0.0, le=10.0)
     abort_ramp: float = knob(0.02, "time to fade out when a guard trips, and on deactivate", "s", ge=0.0, le=10.0)
     patience: float = knob(10.0, "how long to wait for the first position, at 0 V, and with lockstep for any answer", "s", gt=0.0, le=3600.0)
-    experiment: str = knob("", "file of xy-sysid next that is taken over at configure, if it keeps within limit and travel; empty is none")
-    autostart: bool = knob(False, "configure and activate without being told, once a machine is there")
+    experiment: str = knob("", "file of xy-sysid next that is used from configure on, if it stays within limit and travel; empty: none")
+    autostart: bool = knob(False, "configure and activate automatically, as soon as a machine is present")
     output: Literal["blocks", "commands"] = knob("blocks", "blocks of voltage for a driver, or commands for a controller of ros2_control")
     interface: Literal["effort", "velocity", "position"] = knob(
         "effort", "with commands: the controller's command interface; rms, limit, offset and all others in V are in its unit"
     )
     command: Literal["forward", "joint_trajectory"] = knob(
-        "forward", "with commands: one number a joint for a forward controller, or pieces of trajectory for a JointTrajectoryController"
+        "forward", "with commands: one number for each joint for a forward controller, or pieces of trajectory for a JointTrajectoryController"
     )
     horizon: float = knob(
         0.5,
-        "as joint_trajectory: motion that the controller is told ahead; without a newer message it brakes to rest after it",
+        "with joint_trajectory: duration of the motion that is sent ahead; without a newer message the joint then brakes to rest",
         "s",
         ge=0.05,
         le=10.0,
     )
-    unit: Literal["m", "rad"] = knob("m", "of positions: m, or rad of a joint that turns")
+    unit: Literal["m", "rad"] = knob("m", "unit of positions: m, or rad for a joint that turns")
     command_topic: str = knob("/forward_command_controller/commands", "with commands: topic of the controller")
-    controller_joints: Names = knob([""], "with commands: all joints of the controller, in its order; empty is those of the axes")
+    controller_joints: Names = knob([""], "with commands: all joints of the controller, in its order; empty: those of the axes")
     joint_topic: str = knob("joint_states", "with commands: topic of the joint states; that of ros2_control is /joint_states")
-    joints: Names = knob([""], 'with commands: the joint of an axis, as "x=shoulder_pan_joint"; an axis without one is the name of its joint')
+    joints: Names = knob([""], 'with commands: the joint of an axis, as "x=shoulder_pan_joint"; an axis without an entry has the name of its joint')
     renamed: bool = knob(False, "the topic voltage is renamed: its receiver expects blocks, not commands")
     axes: dict[str, AxisExcitation] = Field(
         default_factory=lambda: {"x": AxisExcitation(seed=1), "y": AxisExcitation(seed=2)}, description="one group per axis"
@@ -142,13 +144,13 @@ class ExcitationSettings(Settings):
             raise ValueError(f"command is joint_trajectory with interface {self.interface}; allowed: position")
         for name, axis in self.axes.items():
             if axis.kind not in ("multisine", "sweep", "off"):
-                raise ValueError(f"{name}.kind is {axis.kind} as joint_trajectory; allowed: multisine, sweep, off")
+                raise ValueError(f"{name}.kind is {axis.kind} with joint_trajectory; allowed: multisine, sweep, off")
             for limit, unit in (("max_speed", f"{self.unit}/s"), ("max_acceleration", f"{self.unit}/s^2")):
                 if axis.kind != "off" and not getattr(axis, limit) > 0.0:
-                    raise ValueError(f"{name}.{limit} is 0 {unit} as joint_trajectory; allowed: above 0, the joint's own limit or less")
+                    raise ValueError(f"{name}.{limit} is 0 {unit} with joint_trajectory; allowed: above 0, the joint's own limit or less")
             for added in ("offset", "slow"):
                 if getattr(axis, added) != 0.0:
-                    raise ValueError(f"{name}.{added} is {getattr(axis, added):g} as joint_trajectory; allowed: 0, nothing is added to the motion")
+                    raise ValueError(f"{name}.{added} is {getattr(axis, added):g} with joint_trajectory; allowed: 0, nothing is added to the motion")
 
     def _as_commands(self) -> None:
         if self.command == "joint_trajectory":
@@ -196,9 +198,11 @@ class IdentifierSettings(Settings):
     response: Literal["h1", "joint_input_output", "local_polynomial", "local_rational"] = knob(
         "h1", "output over input (h1); in closed loop by the reference (joint_input_output); with transients removed, for few windows (local_*)"
     )
-    differenced: bool = knob(True, "put the window on the position's difference (no leakage of the integrator); off is the paper's plain variant")
-    memory: float = knob(0.0, "forget exponentially with this time constant; 0 remembers everything", "s", ge=0.0, le=1e9)
-    sliding: int = knob(0, "keep only so many of the newest windows; 0 keeps all", "", ge=0, le=100_000)
+    differenced: bool = knob(
+        True, "apply the window to the difference of the position (no leakage of the integrator); off: plain windows, as in the paper"
+    )
+    memory: float = knob(0.0, "forget exponentially with this time constant; 0: forget nothing", "s", ge=0.0, le=1e9)
+    sliding: int = knob(0, "keep only this many of the newest windows; 0: keep all", "", ge=0, le=100_000)
     band_low: float = knob(0.5, "lowest frequency used in a fit", "Hz", ge=0.0, le=1e6)
     band_high: float = knob(300.0, "highest frequency used in a fit", "Hz", gt=0.0, le=1e6)
     min_coherence: float = knob(0.3, "lines below this coherence are not trusted", "", ge=0.0, le=1.0)
@@ -211,25 +215,27 @@ class IdentifierSettings(Settings):
     hold: Literal["zoh", "none"] = knob("zoh", "how the voltage behaves between samples: held (zoh) or band-limited (none)")
     refit: float = knob(2.0, "seconds of data between two fits", "s", gt=0.0, le=3600.0)
     reorder: float = knob(0.5, "how late a block may come before its samples count as lost", "s", gt=0.0, le=60.0)
-    frozen: float = knob(0.25, "an encoder that repeats one value for so long while the voltage moves is called frozen", "s", gt=0.0, le=60.0)
-    alarm_windows: int = knob(5, "windows of the short memory that watches for a moved resonance", "", ge=3, le=1000)
-    alarm_sigma: float = knob(4.0, "a resonance has moved when it is so many standard errors away", "", ge=1.0, le=100.0)
+    frozen: float = knob(0.25, "an encoder that repeats one value for this long while the voltage moves counts as frozen", "s", gt=0.0, le=60.0)
+    alarm_windows: int = knob(5, "number of newest windows from which the watched resonance is fitted", "", ge=3, le=1000)
+    alarm_sigma: float = knob(4.0, "a resonance has moved if it is this many standard errors from its reference", "", ge=1.0, le=100.0)
     source: Literal["blocks", "joint_state"] = knob("blocks", "type of the position topic")
     output: Literal["position", "velocity"] = knob(
         "position", "with joint_state: the field that is the output; a velocity, of drives whose position is empty, NaN or wraps, is integrated"
     )
     effort_as_voltage: bool = knob(False, "with joint_state: take the input from `effort` instead of the voltage topic")
-    joints: Names = knob([""], 'with joint_state: the joint of an axis, as "x=shoulder_pan_joint"; an axis without one is the name of its joint')
+    joints: Names = knob(
+        [""], 'with joint_state: the joint of an axis, as "x=shoulder_pan_joint"; an axis without an entry has the name of its joint'
+    )
     joint_topic: str = knob("joint_states", "with joint_state: their topic; that of ros2_control is /joint_states")
     effort_lag: int = knob(
-        0, "samples by which effort in joint states is older than its stamp; 1 where it is that of the cycle before", "", ge=0, le=100
+        0, "samples by which effort in joint states is older than its stamp; 1 if it is that of the previous cycle", "", ge=0, le=100
     )
-    input_unit: str = knob("V", "unit of the input, as N m of an effort; it stands in every answer")
+    input_unit: str = knob("V", "unit of the input, for example N m for an effort; shown in every answer")
     output_unit: str = knob("m", "unit of the position, m or rad, also where the output is a velocity")
-    state_file: str = knob("", "file that keeps the spectra over a restart; empty is none")
+    state_file: str = knob("", "file that keeps the spectra over a restart; empty: none")
     save_every: float = knob(10.0, "seconds between two savings of the state", "s", gt=0.0, le=3600.0)
-    baseline: str = knob("", "model file of fit --model from commissioning, with which the newest estimates are compared; empty is none")
-    baseline_table: str = knob("", "fleet's table that tells how much estimates differ between recordings; empty: 3 % for every parameter")
+    baseline: str = knob("", "model file of fit --model from commissioning, with which the newest estimates are compared; empty: none")
+    baseline_table: str = knob("", "table of xy-sysid fleet, with the spread of the estimates between recordings; empty: 3 % for every parameter")
 
     @model_validator(mode="after")
     def _ordered(self) -> IdentifierSettings:
@@ -262,29 +268,31 @@ class IdentifierSettings(Settings):
 class DiagnoserSettings(Settings):
     """Node ``diagnoser``."""
 
-    memory: float = knob(120.0, "newest gap-free seconds that are kept and looked at", "s", ge=1.0, le=36_000.0)
-    minimum: float = knob(10.0, "gap-free seconds without which nothing is looked at", "s", ge=0.5, le=36_000.0)
-    interval: float = knob(0.0, "diagnose again after so many seconds of data; 0 is on request only", "s", ge=0.0, le=1e9)
-    tolerance: float = knob(0.001, "part of the signal that a model may leave; real machines need 0.01 or more", "", ge=1e-6, le=0.5)
+    memory: float = knob(120.0, "newest seconds without a gap that are kept and analysed", "s", ge=1.0, le=36_000.0)
+    minimum: float = knob(10.0, "seconds without a gap that an analysis needs", "s", ge=0.5, le=36_000.0)
+    interval: float = knob(0.0, "diagnose again after this many seconds of data; 0: only on request", "s", ge=0.0, le=1e9)
+    tolerance: float = knob(0.001, "part of the signal that is treated as noise; real machines need 0.01 or more", "", ge=1e-6, le=0.5)
     reorder: float = knob(0.5, "how late a block may come before its samples count as lost", "s", gt=0.0, le=60.0)
     source: Literal["blocks", "joint_state"] = knob("blocks", "type of the position topic")
     output: Literal["position", "velocity"] = knob(
         "position", "with joint_state: the field that is the output; a velocity, of drives whose position is empty, NaN or wraps, is integrated"
     )
     effort_as_voltage: bool = knob(False, "with joint_state: take the input from `effort` instead of the voltage topic")
-    joints: Names = knob([""], 'with joint_state: the joint of an axis, as "x=shoulder_pan_joint"; an axis without one is the name of its joint')
+    joints: Names = knob(
+        [""], 'with joint_state: the joint of an axis, as "x=shoulder_pan_joint"; an axis without an entry has the name of its joint'
+    )
     joint_topic: str = knob("joint_states", "with joint_state: their topic; that of ros2_control is /joint_states")
     effort_lag: int = knob(
-        0, "samples by which effort in joint states is older than its stamp; 1 where it is that of the cycle before", "", ge=0, le=100
+        0, "samples by which effort in joint states is older than its stamp; 1 if it is that of the previous cycle", "", ge=0, le=100
     )
-    input_unit: str = knob("V", "unit of the input, as N m of an effort; it stands in every answer")
+    input_unit: str = knob("V", "unit of the input, for example N m for an effort; shown in every answer")
     output_unit: str = knob("m", "unit of the position, m or rad, also where the output is a velocity")
-    effect_files: Names = knob([""], "Python files with effects of your own; they are run")
-    baseline: str = knob("", "model file of refine --model from commissioning, with which each diagnosis is compared; empty is none")
-    baseline_table: str = knob("", "fleet's table that tells how much estimates differ between recordings; empty: 3 % for every parameter")
+    effect_files: Names = knob([""], "Python files with effects of your own; they are executed")
+    baseline: str = knob("", "model file of refine --model from commissioning, with which each diagnosis is compared; empty: none")
+    baseline_table: str = knob("", "table of xy-sysid fleet, with the spread of the estimates between recordings; empty: 3 % for every parameter")
     effects: dict[str, Names] = Field(
         default_factory=lambda: {"x": [""], "y": [""]},
-        description="effects in the model of this axis: setting them adds or removes them and fits again; an empty name is none",
+        description="effects in the model of this axis: setting them adds or removes them and fits again; an empty name: none",
     )
 
     @property
@@ -297,7 +305,7 @@ class DiagnoserSettings(Settings):
         return given(self.effects.get(axis, []))
 
 
-AXES = ("x", "y")  # as long as nobody names others
+AXES = ("x", "y")  # by default
 
 
 def for_axes(cls: type[AnySettings], axes: Sequence[str]) -> AnySettings:
@@ -325,18 +333,22 @@ class BallscrewSettings(Settings):
     """Node ``ballscrew``: the simulated machine."""
 
     machine: str = knob("paper.yaml", "machine file: a path, or a name in config/machines")
-    seed: int = knob(0, "seed of noise and hidden effects; 0 is what the machine file says", "", ge=0, le=2**31 - 1)
+    seed: int = knob(0, "seed of noise and hidden effects; 0: that of the machine file", "", ge=0, le=2**31 - 1)
     clean: bool = knob(False, "without encoder noise and quantization")
-    realtime: bool = knob(False, "go on by the clock when no voltage comes, as a real machine does; off: time stands still until the next block")
+    realtime: bool = knob(False, "continue by the clock when no voltage comes, as a real machine does; off: time stands still until the next block")
     watchdog: float = knob(
-        0.05, "with realtime: 0 V so long after the last block, as a real drive has it; 0 is none: the last voltage stays", "s", ge=0.0, le=10.0
+        0.05,
+        "with realtime: time after the last block at which the voltage goes to 0 V, as in a real drive; 0: never, the last voltage stays",
+        "s",
+        ge=0.0,
+        le=10.0,
     )
 
 
 class RecorderSettings(Settings):
     """Node ``recorder``."""
 
-    output: str = knob("", "folder of the new bag; empty is xy_<date>")
+    output: str = knob("", "folder of the new bag; empty: xy_<date>")
     storage: Literal["sqlite3", "mcap"] = knob("sqlite3", "file format of the bag")
     topics: list[str] = Field(
         default_factory=lambda: [
@@ -357,7 +369,7 @@ class RecorderSettings(Settings):
         ],
         description="topics to record, as regular expressions relative to the namespace",
     )
-    seconds: float = knob(0.0, "stop after so long; 0 is until told", "s", ge=0.0, le=1e9)
+    seconds: float = knob(0.0, "stop after this time; 0: never", "s", ge=0.0, le=1e9)
     machine: str = knob("", "name of the machine, kept in the meta data of the bag and shown by report")
 
 
@@ -458,7 +470,7 @@ def changed(settings: AnySettings, values: Mapping[str, Any]) -> AnySettings:
 
 
 def unknown_name(name: str, known: Mapping[str, Any] | list[str], where: str) -> BadInput:
-    """The error for a name that nobody knows, with the nearest that somebody does."""
+    """The error for an unknown name, with the nearest known one."""
     near = difflib.get_close_matches(name, list(known), n=1, cutoff=0.4)
     act = f"Did you mean {near[0]!r}?" if near else "Remove it."
     return BadInput(f"{where}: name", repr(name), ", ".join(known), act)

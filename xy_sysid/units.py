@@ -42,7 +42,7 @@ CHOICES = {  # what a reader may choose for each of them, the usual one first, w
 }
 _CHOSEN: ContextVar[tuple[str, ...]] = ContextVar("chosen units", default=())
 
-BEYOND_REASON = 1e6  # times, sigma or per cent: nobody needs to know how much more
+BEYOND_REASON = 1e6  # times, sigma or per cent: larger values are shown as this one
 
 
 def told(value: float, digits: int = 3) -> str:

@@ -1,6 +1,6 @@
 """How fast bags are read, against deserializing message by message, measured in one run.
 
-The yardstick is the plain loop that everyone writes with rosbags: read, deserialize, take the numbers. Of the time to stream
+The reference is the plain loop with rosbags: read, deserialize, take the numbers. Of the time to stream
 blocks, a third is the kernel's copying of the file out of its cache. Our recorder writes sqlite3 files in pages of 32 KB,
 ``ros2 bag`` in sqlite's usual 4 KB.
 """

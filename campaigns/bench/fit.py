@@ -2,7 +2,7 @@
 
 The response is one of a minute of simulated data of the paper's machine (H1, Hann windows of 4096, 0.5 to 300 Hz). Every fit
 minimises the same cost: errors over sigma, the window's blur and the hold in the model. ``least_squares`` differentiates
-numerically, gets the model in coefficients of powers of s (scaled to 1 at the start) as anybody would write it down, and
+numerically, gets the model in coefficients of powers of s (scaled to 1 at the start) in the usual form, and
 starts from the same model, 10 per cent off. Vector fitting (scikit-rf) has no delay and no hold in its model and no weights:
 it may use more poles instead.
 """

@@ -38,7 +38,7 @@ def main(short: bool = False) -> None:
             figures = (f"{best.experiment.seconds:.0f}", f"{best.width:.3%}", f"{reached:.3%}", f"{reached / best.width:.2f}")
             rows.append((pair.name, name, f"{best.before:.3%}", f"{width:.3%}", best.experiment.words, *figures))
     sys.stdout.write(markdown(COLUMNS, rows) + "\n\n")
-    sys.stdout.write(f"{near} of {len(rows)} intervals are within {NEAR:.0%} of what was expected.\n")
+    sys.stdout.write(f"{near} of {len(rows)} intervals are within {NEAR:.0%} of the expected width.\n")
 
 
 if __name__ == "__main__":

@@ -163,9 +163,9 @@ def table(found: Sequence[Outcome], seconds: float = SECONDS) -> Table:
     middle = tuple(f"{1e6 * statistics.median(item.errors[k] for item in found):.3g}" for k in range(len(KINDS)))
     rows.insert(0, ("median", "", "", "", *middle))
     checks = (
-        at_most("error of the compensation over that of the PID, median", statistics.median(by_pid), 0.1),
-        at_most("the same over that with kS, kV and kA, median", statistics.median(by_simple), 1.0 / 3.0),
-        at_most("the same at worst", max(by_simple), 1.0),
+        at_most("error with the compensation / error with the PID, median", statistics.median(by_pid), 0.1),
+        at_most("error with the compensation / error with kS, kV and kA, median", statistics.median(by_simple), 1.0 / 3.0),
+        at_most("the same, largest", max(by_simple), 1.0),
         Check("axes worse than with kS, kV and kA", str(sum(value > 1.0 for value in by_simple)), "0", max(by_simple) <= 1.0),
         Check("axes that left a limit", str(sum(item.left for item in found)), "0", not any(item.left for item in found)),
     )

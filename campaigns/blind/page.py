@@ -17,9 +17,9 @@ WORDS = {
     "imperfect 3 %": "dirt, 3 %",
     "clean dirt": "no effect, dirt of 0.2, 1 and 3 %",
     "outside": "outside the library, without dirt and with 0.2, 1 and 3 %",
-    "hard": "hard: mild friction, a 1 um encoder and a tenth of another effect besides",
-    "two effects": "two effects, all named",
-    "three effects": "three effects, all named",
+    "hard": "mild friction, a 1 um encoder and a tenth of another effect",
+    "two effects": "all named",
+    "three effects": "all named",
     "first order": "stops and contacts resolved to 25 us only",
     "1 % two effects": "two effects with 1 % of dirt, all named",
     "10 s": "10 s records",
@@ -58,13 +58,14 @@ def text(results: dict[str, list[Judged]], draws: str, command: str, facts: str)
         "",
         "Development draws (another random stream) were used for tuning; reporting draws never were.",
         "",
-        "- **Right**: the truth is named first (`hard`: anywhere; several effects: all of them); of a clean axis, nothing is missing; of "
-        f"dirt alone and of what is outside the library, nothing is named with confidence {CONFIDENT:g} or more.",
-        f"- **Phantom**: something is named with confidence {CONFIDENT:g} or more that is not on the axis, be it beside the truth.",
-        f"- **Wrong**: the first name is not in the truth, with confidence {CONFIDENT:g} or more.",
-        f"- **Hidden**: of what is not right, an effect changes the motion by less than {100 * FAINT:.0f} % of what noise and dirt do.",
-        "- Effects count by law: asymmetric friction is Coulomb friction with a constant load. Whatever dry friction slides has Coulomb friction.",
-        "- Seconds are of one core's time.",
+        "- **Right**: the true effect is named first (`hard`: anywhere in the list; several effects: all of them). For a clean axis: "
+        f"nothing is missing. For dirt alone and for effects outside the library: no effect is named with confidence {CONFIDENT:g} or more.",
+        f"- **Phantom**: an effect that the axis does not have is named with confidence {CONFIDENT:g} or more, alone or together with the true one.",
+        f"- **Wrong**: the first name is not one of the true effects, with confidence {CONFIDENT:g} or more.",
+        f"- **Hidden**: the answer is not right, and an effect changes the motion by less than {100 * FAINT:.0f} % of the change by noise and dirt.",
+        "- Effects are compared by their laws: asymmetric friction counts as Coulomb friction with a constant load, and every dry friction that "
+        "slides contains Coulomb friction.",
+        "- Seconds are processor time.",
         "",
     ]
     parts = [*head, *_table(results), *_reliability(results)]
@@ -88,7 +89,7 @@ def _rows(results: dict[str, list[Judged]]) -> Iterator[tuple[str, str, list[Jud
 
 def _table(results: dict[str, list[Judged]]) -> list[str]:
     rows = [
-        "| set | right | goal | of these named first | phantoms | wrong | hidden | intervals that hold the truth | time: median, worst |",
+        "| set | right | goal | right and named first | phantoms | wrong | hidden | intervals that contain the true value | time: median, worst |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
     every = [item for items in results.values() for item in items]
@@ -112,12 +113,12 @@ def _part(some: int, count: int) -> str:
 
 
 def _reliability(results: dict[str, list[Judged]]) -> list[str]:
-    """Is a confidence what it says?"""
+    """Is the confidence correct?"""
     every = [item for items in results.values() for item in items if item.verdict != "not_enough_data"]
     rows = [
-        "## Is a confidence what it says?",
+        "## Is the confidence correct?",
         "",
-        f"Over all sets; without phantom and right, by confidence of the verdict (goal: 95 % from {CONFIDENT:g} on).",
+        f"All sets; verdicts that are right and without a phantom, by their confidence (goal: 95 % from {CONFIDENT:g} on).",
         "",
         "| confidence | verdicts | right | mean confidence |",
         "|---|---|---|---|",
@@ -143,7 +144,7 @@ def _standard(items: Sequence[Judged]) -> list[str]:
     rows = [
         "## One effect, exact, 60 s",
         "",
-        "| effect | named | held-out error over that of the truth | largest parameter error: median, worst |",
+        "| effect | named | held-out error / that of the true model | largest parameter error: median, worst |",
         "|---|---|---|---|",
     ]
     for name in EFFECTS:
@@ -161,7 +162,7 @@ def _confusion(items: Sequence[Judged]) -> list[str]:
     for item in items:
         said = item.effects[0] if item.verdict == "missing_effect" and item.effects else item.verdict
         table["+".join(item.case.truth) or "none"][said] += 1
-    rows = ["Truth, and what was said first:", "", "| truth | said |", "|---|---|"]
+    rows = ["True effect, and the one that was named first:", "", "| true | named first |", "|---|---|"]
     return [*rows, *(f"| {name} | {', '.join(f'{said} {count}' for said, count in row.most_common())} |" for name, row in table.items()), ""]
 
 

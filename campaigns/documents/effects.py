@@ -8,11 +8,11 @@ from xy_sysid.effects import EFFECTS, Effect
 
 HEAD = """# Effects
 
-Every physical effect that a diagnosis can name, made from `xy_sysid/effects/` by `python -m campaigns.documents.effects > docs/effects.md`.
-`xy-sysid effects` prints the same. Bounds and usual sizes are given for a machine with 25 mm/s and 1 V rms at 2 kHz; they are scaled to the
-motion and the input of each recording. Forces are in volts of the drive (the voltage that overcomes them): times the drive's
-force per volt they are newtons. F is a force against the drive, u_eff the voltage that acts, v velocity, x position; the
-base of every model is `v' = pole (gain u_eff - v)`. How to add your own: [your-own-effect.md](your-own-effect.md).
+All physical effects that a diagnosis can name. This page is made from `xy_sysid/effects/` by
+`python -m campaigns.documents.effects > docs/effects.md`; `xy-sysid effects` prints the same. Bounds and usual sizes are given for a machine with
+25 mm/s and 1 V rms at 2 kHz. They are scaled to the motion and the input of each recording. Forces are given in volts of the drive: the voltage that
+overcomes them. Multiply by the drive's force per volt to get newtons. F is a force against the drive, u_eff the voltage that acts, v velocity,
+x position. The base of every model is `v' = pole (gain u_eff - v)`. How to add your own: [your-own-effect.md](your-own-effect.md).
 
 | name | law | where it acts | look-alikes |
 |---|---|---|---|
@@ -47,9 +47,9 @@ def _section(e: Effect) -> str:
 
 {table}
 
-- Valid for: {e.validity}{"; acts on the table: across a gap the motor does not feel it" if e.on_table else ""}
+- Valid for: {e.validity}{"; acts on the table: inside a backlash gap it does not reach the motor" if e.on_table else ""}
 - Shows as: {e.shows}
-- Taken for: {", ".join(e.look_alikes)}
+- Look-alikes: {", ".join(e.look_alikes)}
 - Distinguished by: {e.experiment}
 - Source: {e.source}
 """

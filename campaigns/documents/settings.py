@@ -7,7 +7,7 @@ from xy_sysid.settings import Knob, knobs
 
 HEAD = """# Settings
 
-Every knob of every node, made from `xy_sysid/settings.py` by `python -m campaigns.documents.settings > docs/settings.md`. They are ROS
+All settings of all nodes. This page is made from `xy_sysid/settings.py` by `python -m campaigns.documents.settings > docs/settings.md`. They are ROS
 parameters of the node; the identifier's are also `--set NAME=VALUE` of `xy-sysid frf`, `fit`, `replay`, `validate`, `report` and `study`, and
 the excitation's axis settings are `--excite NAME=VALUE` of `xy-sysid simulate`. Units are SI. `x` stands for any axis.
 """

@@ -15,8 +15,8 @@ from xy_sysid.imports import load, save
 from xy_sysid.samples.recording import Recording
 
 WORDS = (
-    "Some bytes of a recording are changed, cut off, filled with zeros, repeated or swapped, at random; then it is read and compared "
-    "with what was recorded, sample by sample."
+    "Some bytes of a recording are changed, cut off, filled with zeros, repeated or swapped, at random. Then the file is read and compared with "
+    "the original, sample by sample."
 )
 ROWS = 2000
 Damage = Callable[[bytes, np.random.Generator], bytes]
@@ -96,7 +96,7 @@ def compared(found: Recording, true: Recording, summed: bool) -> Found:
     whole = len(found) == len(true) and found.axes == true.axes
     if same and whole:
         return Found("full")
-    warned = any("may be others" in note or "may be wrong" in note for note in found.notes)
+    warned = any("some values may differ" in note or "may be wrong" in note for note in found.notes)
     if found.notes and (same or warned or not summed):
         return Found("part-and-said")
     if not summed and (not same or np.array_equal(found.seq, true.seq[: len(found)])):  # or cut between two rows

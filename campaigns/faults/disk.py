@@ -18,8 +18,8 @@ from xy_sysid.errors import XySysidError
 from xy_sysid.imports import load, save
 
 WORDS = (
-    "No file may grow beyond a number of bytes drawn at random (a write fails in its middle, as on a full disk), on a file "
-    "that is there already and on none; then a real full disk (a small tmpfs, as root), and /dev/full behind stdout."
+    "The size of files is limited to a random number of bytes, so a write fails in its middle, as on a full disk; with and without an existing "
+    "output file. Then a disk that is really full (a small tmpfs, as root), and /dev/full as stdout."
 )
 RIGID = ("--set", "numerator_order=0", "--set", "denominator_order=2")
 OLD = b"what was there before"

@@ -23,7 +23,7 @@ from campaigns.faults.soak import memory
 
 WORDS = (
     "`xy-sysid page` on a recording, attacked through its port. After each try it must answer within 2 s, its memory must not have grown by more "
-    "than 100 MB, and it must not have said a traceback. Stories of the topic are given to the reader that the page has for them."
+    "than 100 MB, and it must not have printed a traceback. Documents of the topic `story` are given to the page's own reader."
 )
 MORE, ANSWERS = 100.0, 2.0  # MB, s
 BIG = 40_000_000  # bytes of a body

@@ -14,8 +14,9 @@ from xy_sim.machine import Machine
 from xy_sysid.excitation.drive import Drive
 
 WORDS = (
-    "The drive of the excitation node with a simulated table, told the time; from a random moment of a noise of 2 V rms on the encoder is wrong. "
-    "Longest: from the fault to zero volts. Travel: from the fault to rest. The bounds are those of [a real machine, safely](real-machine-safely.md)."
+    "The drive of the excitation node, with a simulated table and clock, is excited with noise of 2 V rms. From a random moment on, the encoder "
+    "is wrong. Longest: from the fault to zero volts. Travel: from the fault to rest. The bounds are those of [a real machine, "
+    "safely](real-machine-safely.md)."
 )
 DOC = Path(__file__).parents[2] / "docs" / "real-machine-safely.md"
 STOP = 0.15  # m, the end stop of the simulated table

@@ -17,9 +17,8 @@ from campaigns.faults.damage import truth
 from xy_sysid.imports import load, save
 
 WORDS = (
-    "A signal at a random moment from the first instruction to the last: exit code 130 after Ctrl-C and 143 after SIGTERM (or the "
-    "answer, when it was quicker), no traceback, and in the folder what was there before or the whole file. "
-    "Longest: from the signal to the end."
+    "A signal at a random moment from the first instruction to the last: exit code 130 after Ctrl-C and 143 after SIGTERM (or the answer, if it "
+    "came first), no traceback, and the folder contains either the old content or the complete new file. Longest: from the signal to the end."
 )
 RIGID = ("--set", "numerator_order=0", "--set", "denominator_order=2")
 COMMANDS: dict[str, tuple[tuple[str, ...], float]] = {

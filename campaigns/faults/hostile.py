@@ -24,8 +24,8 @@ from xy_sysid.samples.block import Block
 from xy_sysid.samples.recording import Recording
 
 WORDS = (
-    "Bombs (declared and hidden sizes, with 40 MB of room), every field of metadata.yaml with every odd value, pipes, and recordings in which "
-    "single messages, counters or clocks are wrong. Rows that are read must be pairs of the same sample."
+    "Decompression bombs (declared and hidden sizes, with 40 MB of memory), every field of metadata.yaml with unusual values, pipes, and "
+    "recordings with single wrong messages, counters or clocks. Voltage and position of a row must belong to the same sample."
 )
 QUICK = 2.0  # s, for a refusal
 Messages = list[tuple[str, Block]]

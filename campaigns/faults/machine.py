@@ -18,8 +18,8 @@ from campaigns.faults.attack import Attack, Found
 from campaigns.faults.tabs import Scene
 
 WORDS = (
-    "Simulated machine and excitation as processes, 1 V constant on x. Longest: from the kill to rest. Travel: from the place where the "
-    "kill was to rest, with the drive's watchdog of 50 ms."
+    "Simulated machine and excitation as processes, 1 V constant on x. Longest: from the kill to rest. Travel: from the position at the kill to "
+    "rest, with the drive's watchdog of 50 ms."
 )
 PUSH = ("x.kind:='off'", "x.offset:=1.0", "x.centring:=0.0", "y.kind:='off'", "y.centring:=0.0", "ramp:=0.05", "watchdog:=1.0")
 WAY = 0.03  # m, as docs/real-machine-safely.md says

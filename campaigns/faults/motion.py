@@ -15,8 +15,8 @@ from xy_sysid.samples.block import Block
 from xy_sysid.settings import AxisExcitation, ExcitationSettings
 
 WORDS = (
-    "Any settings of an axis that are allowed, with places, ages of positions, stalls and stops at random: no outward voltage at or "
-    "beyond a limit, none above the amplitude limit, and who stays outside ends at zero volts."
+    "All allowed settings of an axis, with random positions, ages of positions, stalls and stops. There must be no outward voltage at or beyond a "
+    "travel limit and no voltage above the amplitude limit; an axis that stays outside must end at zero volts."
 )
 ROWS, RATE = 20, 2000.0
 KINDS = ("noise", "off", "multisine", "sweep", "step", "impulse", "prbs")

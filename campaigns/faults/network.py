@@ -19,9 +19,10 @@ from campaigns.faults.attack import Attack, Found, environment
 from campaigns.faults.cable import hosts, why_not
 
 WORDS = (
-    "Two hosts (network namespaces, each with a TAP device, and a cable that loses frames by a seed; no `tc netem` is needed): the drive, "
-    "with a watchdog of 50 ms, and the excitation on one, the identifier on the other; 2 kHz, two axes, windows of 1024. Longest: until "
-    "data or identification go on. A response is right if 95 % of its lines from 5 to 200 Hz lie within three sigma of that without loss."
+    "Two hosts (network namespaces, each with a TAP device, and a cable that loses frames at random with a fixed seed; no `tc netem` is needed): "
+    "the drive, "
+    "with a watchdog of 50 ms, and the excitation on one, the identifier on the other; 2 kHz, two axes, windows of 1024. Longest: until data or "
+    "identification continue. A response is right if 95 % of its lines from 5 to 200 Hz lie within three sigma of the response without loss."
 )
 PROFILE = Path(__file__).parents[2] / "config" / "fastdds.xml"
 SECONDS = 15.0

@@ -10,10 +10,10 @@ from campaigns.faults.attack import GOOD, Row
 ORDER = (*GOOD, "skipped", "silent", "traceback", "too late", "stump", "not told")
 HEAD = """# Faults
 
-Made by `make faults` (`python -m campaigns.faults`): attacks with fixed seeds on what drives a machine, keeps data or answers a network.
+Made by `make faults` (`python -m campaigns.faults`): attacks with fixed seeds on all parts that drive a machine, store data or answer a network.
 `python -m campaigns.faults --short` is the short campaign that `make test` runs.
 
-Acceptable outcomes: **full** (everything is right), **part-and-said** (the rest is right, and what is missing is said),
+Acceptable outcomes: **full** (everything is right), **part-and-said** (a part is missing, the rest is right, and a message says so),
 **one line** (refused in one clear line), **zero volts** (the machine stands within the bound), **no sum** (a number changed in a
 format without checksum: [files](files.md#damaged-and-hostile-files) says so). Any other outcome is a fault, and the campaign ends
 with exit code 1. Seconds are the longest of all tries.

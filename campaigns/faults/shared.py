@@ -15,8 +15,8 @@ from pathlib import Path
 from campaigns.faults.attack import Attack, Found, answered, at_most, command
 
 WORDS = (
-    "Every file of the recordings of other people's machines, with the options that it needs, through the commands that read one; "
-    "an answer or one line. The options are in `campaigns/faults/shared.py`."
+    "Every file of the recordings of other people's machines, with the options that it needs, is given to all commands that read a recording: the "
+    "result must be an answer or one line. The options are in `campaigns/faults/shared.py`."
 )
 LONGEST = 600.0  # s for one command on a whole recording
 DATA = Path(os.environ.get("XY_SYSID_DATA") or Path(__file__).parents[3] / "shared" / "data")
@@ -140,7 +140,7 @@ def told(name: str, row: Shared, folder: Path, short: bool = False, seconds: flo
 def walk(name: str, tries: int, folder: Path) -> Iterator[Found]:
     """One command on every recording."""
     if not DATA.is_dir():
-        yield Found("skipped", note="no recordings of real machines; say where they are with XY_SYSID_DATA")
+        yield Found("skipped", note="no recordings of real machines; give their folder with XY_SYSID_DATA")
         return
     folder.mkdir(parents=True, exist_ok=True)
     for row in RECORDINGS[:tries]:

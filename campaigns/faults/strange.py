@@ -17,9 +17,9 @@ from campaigns.faults.attack import Attack, Found, Said, answered, command
 from campaigns.faults.damage import rigid
 
 WORDS = (
-    "Recordings of a rigid axis in which one signal means nothing, given to frf, fit and diagnose: one line, or an "
-    "answer with a note or a verdict that says what is wrong; never a found effect with confidence. "
-    "Effect files whose text, laws and functions end in errors."
+    "Recordings of a rigid axis in which one signal is meaningless, given to frf, fit and diagnose: the result must be one line, or an answer "
+    "with a note or verdict that says what is wrong, but never an effect named with confidence. Then effect files with errors in their text, laws "
+    "and functions."
 )
 Arrays = dict[str, NDArray[np.float64]]
 ROWS, CONFIDENT = 12_000, 0.9

@@ -26,8 +26,8 @@ from campaigns.faults.soak import NODES, memory
 from xy_sysid.samples.block import Block
 
 WORDS = (
-    "The live page with all nodes over DDS, and a machine that is driven. STOP is by the page's own POST /stop; it counts when the server "
-    "says that the machine has confirmed it and the last voltage heard is zero. Longest: from STOP to that answer."
+    "The live page with all nodes over DDS, and a machine that is driven. STOP is requested with POST /stop. It counts when the server reports "
+    "that the machine has confirmed it and the last received voltage is zero. Longest: from STOP to that answer."
 )
 CHROMIUM = next((path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None)
 STOPS = 3.0  # s
@@ -204,7 +204,7 @@ def fifty(count: int, folder: Path) -> Iterator[Found]:
         here.until(lambda: memory(here.processes["page"].pid)[1] <= before[1] + 5, 90.0)
         after = memory(here.processes["page"].pid)
         note = f"{drawn} of 50 drawn within {seconds:.0f} s; MB and descriptors of the server: {before[0]:.0f} and {before[1]} before, "
-        note += f"{full[0]:.0f} and {full[1]} with them, {after[0]:.0f} and {after[1]} after; {told} tabs tell of the STOP"
+        note += f"{full[0]:.0f} and {full[1]} with them, {after[0]:.0f} and {after[1]} after; {told} tabs show the STOP"
         good = found.outcome == "zero volts" and drawn == 50 and told == 50 and after[1] <= before[1] + 5 and "Traceback" not in here.said("page")
         yield Found("zero volts" if good else "too late", found.seconds, note=note if good else f"{note}; {found.note} {here.said('page')[-300:]}")
 

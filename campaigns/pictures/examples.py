@@ -186,8 +186,8 @@ EXAMPLES = (
     Example(
         "quadratic_drag",
         (FREQUENCY, SPEED, TIME),
-        "The mean error against velocity is an S: the model is too slow at moderate speed and too fast at both ends, as the fit made its drag fit "
-        "the usual speed. With dry friction it is the other way round.",
+        "The mean error against velocity is an S: the model is too slow at moderate speed and too fast at both ends, because the fit "
+        "chose its drag for the usual speed. With dry friction it is the other way round.",
     ),
     Example(
         "gain_drift",

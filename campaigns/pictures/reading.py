@@ -34,7 +34,7 @@ Two steps overlaid, by frequency and in time. Above 1 a model fails. At or below
 
 ## Candidates
 
-![Bars: what each candidate leaves of the error](pictures/candidates.png)
+![Bars: the error that remains with each candidate](pictures/candidates.png)
 
 The held-out error that remains when only this effect is added to the rigid model. Shorter is better. If the runner-up is far behind,
 the name is certain. If bars have the same length, these data cannot distinguish the effects, and the diagnosis proposes an experiment that can.

@@ -355,6 +355,6 @@ def test_compare_says_that_input_and_output_do_not_belong_together(strange: str,
     position = rigid(30_000)["y"]
     own = np.random.default_rng(2).permutation(position) if strange == "in random order" else position[::-1]
     file = npz(tmp_path / "rec.npz", y=own)
-    assert "hardly describes this axis" in cli("compare", file).err
-    assert "hardly describes this axis" in cli("compare", file, "--json").json["notes"][-1]
-    assert "hardly describes this axis" not in cli("compare", npz(tmp_path / "right.npz")).err
+    assert "does not describe this axis" in cli("compare", file).err
+    assert "does not describe this axis" in cli("compare", file, "--json").json["notes"][-1]
+    assert "does not describe this axis" not in cli("compare", npz(tmp_path / "right.npz")).err

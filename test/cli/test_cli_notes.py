@@ -12,7 +12,7 @@ from typer.utils import get_params_from_function
 from xy_sysid.cli.app import app
 from xy_sysid.samples.block import FloatArray
 
-NOTE = "the samples are taken as they stand, 1000 Hz; the time 't' is not used"
+NOTE = "the samples are used as they are, 1000 Hz; the time 't' is not used"
 LITTLE, BRIEF = ("--set", "length=512"), ("--budget", "0.3")
 READING: dict[str, tuple[str, ...]] = {
     "compare": ("compare", "REC", *LITTLE),

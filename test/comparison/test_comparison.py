@@ -128,4 +128,4 @@ def test_of_a_model_that_runs_away_nothing_else_is_said() -> None:
     with np.errstate(over="ignore", invalid="ignore"):
         found = compare_motion(np.exp(np.linspace(0.0, 700.0, 3999)) * 1e100, Unseen(voltage, position, 1000.0))
     assert found.places == ()
-    assert found.sentence == "the simulated model runs away: it is not stable."
+    assert found.sentence == "the simulation diverges: the model is not stable."

@@ -20,4 +20,4 @@ def test_the_table_of_the_documentation_is_what_the_export_says() -> None:
 def test_an_effect_that_mujoco_knows_loses_nothing_and_one_that_it_does_not_is_named() -> None:
     """Cogging is a word of MuJoCo; a gap is not."""
     assert lost("cogging") == lost("presliding_hysteresis") == NOTHING
-    assert "no first-order lag" in lost("backlash")
+    assert "not a first-order lag" in lost("backlash")

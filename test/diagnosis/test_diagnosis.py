@@ -77,7 +77,7 @@ def test_what_was_found_comes_first_and_what_is_left_is_said() -> None:
     assert found.sentence.startswith("Missing: coulomb_friction") and " of the error's power (" in found.sentence
     assert 0.9 < found.explained < 1.0
     assert found.discrepancy > 0.0
-    assert "What is left: " in found.sentence and "of the motion, beyond the encoder's noise of " in found.sentence
+    assert "Residual error above the encoder noise of " in found.sentence and "of the motion" in found.sentence
 
 
 @pytest.mark.parametrize("effect", ["coulomb_friction", "backlash"])
@@ -112,7 +112,7 @@ def test_a_base_without_any_excess_is_no_division_by_zero() -> None:
     """Nothing is missing, and it is said what the noise could hide."""
     found = nothing_left(prepare(2000.0, *recorded("").axis("x")))
     assert (found.verdict, found.tolerance) == ("nothing_missing", 0.0)
-    assert "What changes the motion by less than 0." in found.sentence
+    assert "An effect that changes the motion by less than 0." in found.sentence
 
 
 def test_that_nothing_is_missing_is_as_sure_as_the_noise_lets_one_see() -> None:

@@ -49,7 +49,7 @@ def test_what_is_not_in_the_library_is_never_nothing_of_the_motion(data: AxisDat
     for found in (judged(data, ladder, STANDARD), judged(louder, same, STANDARD)):
         assert found.verdict == "not_in_library"
         figures = re.search(
-            r"leaves \(([\d.]+) (\S+)\)\. Beyond the encoder's noise that is ([\d.]+) (\S+), ([\d.e-]+) % of the motion", found.sentence
+            r"of the rigid model \(([\d.]+) (\S+)\)\. Error above the encoder noise: ([\d.]+) (\S+), ([\d.e-]+) % of the motion", found.sentence
         )
         assert figures is not None, found.sentence
         left, unit, beyond, same_unit, part = figures.groups()

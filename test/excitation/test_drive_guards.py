@@ -336,7 +336,7 @@ def test_centring_that_would_make_the_axis_swing_is_refused(centring: float, gai
         drive.change(wanted)
         return
     for act in (Drive, drive.change):
-        with pytest.raises(BadInput, match=r"x\.centring is .* V/m; allowed: up to .* the loop swings"):
+        with pytest.raises(BadInput, match=r"x\.centring is .* V/m; allowed: up to .* the loop oscillates"):
             act(wanted)
 
 

@@ -60,7 +60,7 @@ def test_friction_is_told_from_a_fault_and_measured() -> None:
         (lambda position: 1000 * position, "is the position in m?"),
         (lambda position: position[:, ::-1], "cables or columns are swapped"),
         (lambda position: np.vstack((np.tile(position[:1], (240, 1)), position[:-240])), "it answers after 1"),
-        (lambda position: position * np.nan, "did not arrive whole"),
+        (lambda position: position * np.nan, "did not arrive completely"),
     ],
     ids=["sign", "unit", "swapped", "late", "not a number"],
 )

@@ -191,9 +191,9 @@ def test_an_axis_that_is_off_stays() -> None:
         ({"rms": 0.2, "max_speed": 50.0}, "x.max_acceleration would be exceeded"),
         ({"high": 60.0}, "8.*60 Hz"),
         ({"low": 0.1, "period": 4.0}, "cycles of the lowest"),
-        ({"max_speed": 0.0}, "x.max_speed is 0 rad/s as joint_trajectory; allowed: above 0"),
-        ({"kind": "noise"}, "x.kind is noise as joint_trajectory; allowed: multisine, sweep, off"),
-        ({"slow": 0.1}, "x.slow is 0.1 as joint_trajectory"),
+        ({"max_speed": 0.0}, "x.max_speed is 0 rad/s with joint_trajectory; allowed: above 0"),
+        ({"kind": "noise"}, "x.kind is noise with joint_trajectory; allowed: multisine, sweep, off"),
+        ({"slow": 0.1}, "x.slow is 0.1 with joint_trajectory"),
     ],
 )
 def test_what_exceeds_the_limits_is_refused_before_anything_moves(x: dict[str, Any], words: str) -> None:

@@ -37,7 +37,7 @@ def test_it_says_which_limit_a_motion_comes_too_near_to() -> None:
     assert limits.broken(motion(0.01, 1.9)) == "rms"
     assert MachineLimits(voltage=2.0, travel=(-0.1, 0.1)).broken(motion(0.09)) == "travel"
     assert MachineLimits(voltage=2.0, travel=(-0.1, 0.1), acceleration=1.0).broken(motion(0.05)) == "acceleration"
-    assert limits.broken(Motion(RATE, np.ones(9), np.full(9, np.nan))) == "a model that runs away"
+    assert limits.broken(Motion(RATE, np.ones(9), np.full(9, np.nan))) == "a model whose simulation diverges"
 
 
 def recorded(amplitude: float, volts: float, zero: float, samples: int = 2000) -> Run:

@@ -102,7 +102,7 @@ def test_a_restart_of_the_source_is_a_gap(tmp_path: Path, first: int) -> None:
     assert len(recording) == 12_000 and len(recording.runs()) == 3
     assert recording.sampling_rate == 2000.0 and bool(np.all(np.diff(recording.time) > 0))
     assert recording.voltage[:, 0].tolist() == [*range(first, first + 4000), *range(6000), *range(2000)]
-    assert any("started anew 2 times" in note for note in recording.notes)
+    assert any("restarted 2 times" in note for note in recording.notes)
 
 
 def test_a_restart_of_one_stream_alone_pairs_nothing_wrongly(tmp_path: Path) -> None:

@@ -140,7 +140,7 @@ def test_what_a_library_wrote_is_read(tmp_path: Path, make: Callable[[Path], Pat
     assert np.allclose(found.position[:, 0], Y[: len(found)], atol=1e-9) and np.allclose(found.voltage[:, 0], U[: len(found)])
     assert len(found) == len(T) and len(found.runs()) == (2 if make is as_parquet else 1)
     if make in (as_mf4, as_tdms, as_ulog, as_wpilog):
-        assert any("have times of their own: at those of" in note for note in found.notes)
+        assert any("have separate times: they are sampled at those of" in note for note in found.notes)
 
 
 @pytest.mark.parametrize("form", [form for form in FORMATS if form.extra], ids=lambda form: form.extra)

@@ -236,7 +236,7 @@ def test_rows_of_their_own_for_input_and_output(tmp_path: Path) -> None:
     assert recording.sampling_rate == RATE and len(recording) == len(T) - 1 and len(recording.runs()) == 1  # nobody knows what was there at the end
     np.testing.assert_array_equal(recording.voltage[:, 0], U[:-1])
     np.testing.assert_array_equal(recording.position[:, 0], Y[:-1])
-    assert any("times of their own" in note for note in recording.notes)
+    assert any("separate times" in note for note in recording.notes)
 
 
 def test_two_axes_may_have_rows_of_their_own(tmp_path: Path) -> None:
@@ -363,12 +363,12 @@ def test_units_that_are_guessed_or_unknown_are_said(tmp_path: Path) -> None:
     """MM is mm, and a note says so; counts are no length; furlongs are carried."""
     for unit, says in (
         ("MM", "'MM' of the output is taken as mm"),
-        ("counts", "counts, which is no length"),
+        ("counts", "counts, which is not a length"),
         ("furlong", "'furlong' of the output is not known"),
     ):
         assert any(says in note for note in load(csv_of(tmp_path, {"time": T, "u": U, f"y[{unit}]": Y})).notes)
     assert load(csv_of(tmp_path, {"time[min]": T / 60, "u": U, "y": Y})).sampling_rate == pytest.approx(RATE)
-    with pytest.raises(BadRecording, match="'V' of the time is none of time"):
+    with pytest.raises(BadRecording, match="'V' of the time is not a unit of time"):
         load(csv_of(tmp_path, {"time[V]": T, "u": U, "y": Y}))
 
 

@@ -33,14 +33,14 @@ def test_nothing_is_said_of_a_good_recording(tmp_path: Path) -> None:
     ("columns", "says"),
     [
         ({"time": T * 1000}, "1 s apart (1 Hz): is time in ms"),
-        ({"time": T * 1e-6}, "is that the unit of time?"),
+        ({"time": T * 1e-6}, "is this the right unit of time?"),
         ({"x_voltage": Y * 1e3, "x_position": U * 1e-3}, "are input and output swapped?"),
-        ({"x_position": Y * 3e7}, "is it in mm or counts? Say --unit output=mm"),
-        ({"x_position": np.where(HALF, Y[len(T) // 2], Y)}, "dead from 1.5 s to the end (50 % of the samples) under an input as lively as elsewhere"),
+        ({"x_position": Y * 3e7}, "is it in mm or counts? Give --unit output=mm"),
+        ({"x_position": np.where(HALF, Y[len(T) // 2], Y)}, "dead from 1.5 s to the end (50 % of the samples) although the input moves as elsewhere"),
         ({"x_position": np.where(HALF, Y[len(T) // 2], Y), "x_voltage": np.where(HALF, 0.3 * U, U)}, "stands still from 1.5 s to the end"),
         ({"x_position": Y + 1e9}, "where numbers are 1.2e-07 apart"),
-        ({"x_position": Y * 1e-12}, "m in all: is that its unit?"),
-        ({"x_voltage": U * 1e-12}, "V in all: is that its unit?"),
+        ({"x_position": Y * 1e-12}, "m in all: is this the right unit?"),
+        ({"x_voltage": U * 1e-12}, "V in all: is this the right unit?"),
         ({"x_position": np.clip(Y, None, np.quantile(Y, 0.7))}, "lies at its highest value"),
         ({"x_voltage": np.clip(U, -0.5, 0.5)}, "the input lies at its highest value, 0.5 V, in 31 % of the samples: is it saturated?"),
         ({"x_position": 0 * Y}, "the output never changes"),
@@ -99,9 +99,9 @@ def test_counts_and_degrees_that_wrap_are_said(tmp_path: Path, name: str, turn: 
 @pytest.mark.parametrize(
     ("head", "says"),
     [
-        ({"x_voltage[rad]": U, "x_position": Y}, "the input is in rad, which drives nothing"),
-        ({"x_voltage": U, "x_position[V]": Y}, "the output is in V, which is no motion"),
-        ({"Measured Voltage": U, "x_position": Y}, "the input 'Measured Voltage' was measured, so it is hardly held"),
+        ({"x_voltage[rad]": U, "x_position": Y}, "the input is in rad, which is not a drive signal"),
+        ({"x_voltage": U, "x_position[V]": Y}, "the output is in V, which is not a motion"),
+        ({"Measured Voltage": U, "x_position": Y}, "the input 'Measured Voltage' was measured, so it is probably not held"),
         ({"x_voltage[A]": U, "x_position": Y}, "if it was measured and not commanded, it is not held"),
     ],
 )

@@ -153,7 +153,7 @@ def test_a_column_without_a_telling_name_that_rises_as_a_clock_does_is_the_time(
     """LabVIEW's X_Value; a note says so. A counter of rows is no time, and of two clocks nobody knows which."""
     recording = load(written(tmp_path, "X_Value,voltage,position\n"))
     assert_read(recording)
-    assert any(note.startswith("'X_Value' rises by 0.001 from row to row: it is taken for the time, in s") for note in recording.notes)
+    assert any(note.startswith("'X_Value' rises by 0.001 from row to row: it is used as the time, in s") for note in recording.notes)
     with pytest.raises(BadRecording, match="no time column"):
         load(written(tmp_path, "row,voltage,position\n", time=lambda t: round(t * RATE)))
     table = np.column_stack((T, 2.0 * T, U, Y))

@@ -29,4 +29,4 @@ def test_what_is_wrong_is_said() -> None:
     level, text = verdict(replace(none, refused="joints a; expected b", refusals=12_191), "well")
     assert (level, text) == (ERROR, "nothing is paired: 12191 messages refused: joints a; expected b")
     assert verdict(replace(GOOD, sentences={"lost": "2 lost"}), "well") == (WARN, "2 lost")
-    assert verdict(replace(none, silent=("voltage",)), "well") == (STALE, "no voltage heard for a second")
+    assert verdict(replace(none, silent=("voltage",)), "well") == (STALE, "no voltage received for a second")

@@ -139,7 +139,7 @@ def test_what_lacks_is_said_and_the_model_waits_for_data(world: World) -> None:
     node = world.start(DIAGNOSER)
     sender = Sender(world, friction())
     ok, text = trigger(world, "diagnose", 10.0, times=3)
-    assert not ok and "no voltage and no position of axes x, y heard yet" in text
+    assert not ok and "no voltage and no position of axes x, y received yet" in text
     sender.send(0, 6000)
     assert world.until(lambda: float(newest(statuses, "diagnoser").get("seconds kept (s)", "0")) >= 2.99, 10.0)
     ok, text = trigger(world, "auto", 10.0)
@@ -168,7 +168,7 @@ def test_what_lacks_is_said_and_the_model_waits_for_data(world: World) -> None:
     ok, text = trigger(world, "reset_model", 10.0)
     assert ok and world.until(lambda: len(results.held_out("x")) == 1, 20.0)
     world.node.create_client(Trigger, "/xy/diagnoser/diagnose").call_async(Trigger.Request())
-    assert world.until(lambda: "looking" in newest(results.diagnosis, "progress")["progress"], 20.0)
+    assert world.until(lambda: "searching" in newest(results.diagnosis, "progress")["progress"], 20.0)
     node.send(signal.SIGINT)
     assert node.wait() == 0
     assert "Traceback" not in node.output()

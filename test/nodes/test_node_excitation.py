@@ -213,7 +213,7 @@ def test_a_transition_that_is_not_allowed_is_refused_and_ends_nothing(world: Wor
         answer = world.call(ChangeState, "/xy/excitation/change_state", ChangeState.Request(transition=Transition(id=number)))
         assert not answer.success, number
         assert world.until(functools.partial(goes_on, len(blocks))) and world.state("excitation") == "active", number
-    assert "could not be dealt with" in node.output() and "Traceback" not in node.output()
+    assert "could not be handled" in node.output() and "Traceback" not in node.output()
 
 
 @needs_ros

@@ -235,7 +235,7 @@ def test_an_excitation_that_starts_by_itself_waits_for_the_machine_however_long_
     world.machine(machine)
     statuses, blocks = world.statuses(), world.blocks()
     node = world.start(EXCITATION, {"autostart": True, "patience": 0.5, "duration": 1.0})
-    assert world.until(lambda: node.output().count("begins anew") >= 1, 40.0), node.output()
+    assert world.until(lambda: node.output().count("starts again") >= 1, 40.0), node.output()
     assert not any(block.values.any() for block in blocks)
     machine.alive = True
     assert world.until(lambda: any(block.values.any() for block in blocks), 20.0), node.output()

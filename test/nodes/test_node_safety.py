@@ -117,14 +117,14 @@ def test_two_excitations_never_drive_one_machine(world: World) -> None:
     assert world.until(lambda: len(blocks) > 10 and bool(blocks[-1].values.any()))
     second = world.start(EXCITATION, {"watchdog": 2.0}, arguments=["-r", "__node:=other"])
     assert world.until(lambda: "publishes /xy/voltage, too: two must not drive one machine" in first.output(), 20.0), first.output()
-    assert "/xy/other publishes" in first.output() or "whose name nobody has told yet publishes" in first.output()  # after a stall
+    assert "/xy/other publishes" in first.output() or "whose name is not known yet publishes" in first.output()  # after a stall
     assert world.until(lambda: not blocks[-1].values.any(), 1.0) and world.state("excitation") == "inactive"
     assert not world.transition("other", "configure")
-    assert "/xy/excitation publishes /xy/voltage, too: no configure beside it. End one of the two." in second.output()
+    assert "/xy/excitation publishes /xy/voltage, too: configure is refused while it runs. End one of the two." in second.output()
     assert not world.transition("excitation", "activate")
-    assert "/xy/other publishes /xy/voltage, too: no activate beside it" in first.output()
-    assert world.until(lambda: any("no activate beside it" in status.message for status in statuses), 2.0)
-    assert world.until(lambda: any("no configure beside it" in status.message for status in statuses), 2.0)
+    assert "/xy/other publishes /xy/voltage, too: activate is refused while it runs" in first.output()
+    assert world.until(lambda: any("activate is refused while it runs" in status.message for status in statuses), 2.0)
+    assert world.until(lambda: any("configure is refused" in status.message for status in statuses), 2.0)
     second.send(signal.SIGTERM)
     assert second.wait() == 0
     assert world.until(lambda: world.transition("excitation", "activate"), 10.0)

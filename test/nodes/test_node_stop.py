@@ -120,7 +120,7 @@ def test_stop_is_quick_whatever_the_ramps_are(world: World) -> None:
 
 
 def alone(process: NodeProcess) -> bool:
-    return "no configure beside it" in process.output()
+    return "configure is refused" in process.output()
 
 
 def test_two_excitations_of_one_name_never_drive(world: World) -> None:
@@ -163,7 +163,7 @@ def test_a_second_one_of_the_same_name_for_another_topic_does_not_drive(world: W
     driving(world, blocks)
     second = world.start(EXCITATION, QUIET, arguments=["-r", "voltage:=voltage_of_another"])
     client = world.node.create_client(ChangeState, "/xy/excitation/change_state")
-    refusal = "another node is called /xy/excitation, too: no "
+    refusal = "another node is called /xy/excitation, too: configure is refused"
     for label in ("configure", "activate") * 10:  # a request reaches those that the client has discovered
         client.call_async(ChangeState.Request(transition=Transition(label=label)))
         if world.until(lambda: refusal in second.output(), 1.0):

@@ -139,7 +139,7 @@ def test_whoever_falls_silent_the_joint_comes_to_rest(world: World) -> None:
     changed, why = world.set_parameter("excitation", "x.rms", 0.0)
     assert changed, why
     assert world.transition("excitation", "configure") and not world.transition("excitation", "activate")
-    assert f"trajectories would go to {TOPIC}, and nobody listens there: no activate" in drive.output()
+    assert f"trajectories would go to {TOPIC}, and no node subscribes to it: activate is refused" in drive.output()
     control = controller(world)
     heard, seen = trajectories(world), places(world)
     assert world.until(lambda: bool(seen), 60.0), control.output()

@@ -65,12 +65,12 @@ def test_each_axis_has_its_own_state(monkeypatch: pytest.MonkeyPatch) -> None:
     page.ask("diagnose", "x")
     assert page.job("x") is not None and page.job("y") is None and deaf.asked == ["diagnoser/diagnose/x"]
     stamp = page.stamp("y")
-    heard.doing({"axis x": "looking for what is missing", "axis y": "idle"}, now[0])
+    heard.doing({"axis x": "searching for missing effects", "axis y": "idle"}, now[0])
     at_work = page.job("x")
-    assert at_work is not None and at_work.words == "looking for what is missing" and at_work.running
+    assert at_work is not None and at_work.words == "searching for missing effects" and at_work.running
     assert page.job("y") is None and page.stamp("y") == stamp
     page.ask("auto", "y")
-    heard.doing({"axis x": "looking for what is missing", "axis y": "waits"}, now[0])
+    heard.doing({"axis x": "searching for missing effects", "axis y": "waits"}, now[0])
     waits = page.job("y")
     assert waits is not None and not waits.running and deaf.asked[-1] == "diagnoser/auto/y"
     page.cancel("y")

@@ -128,7 +128,7 @@ def test_stop_reaches_the_machine_while_the_link_stands_still(driven: Driven) ->
     asking.start()
     assert driven.world.until(lambda: len(driven.blocks) > sent and not driven.blocks[-1].values.any(), allowed(0.5))
     assert driven.stands()
-    assert driven.world.until(lambda: any("stood still" in message.words for message in driven.session.messages), 8.0)
+    assert driven.world.until(lambda: any("not responded" in message.words for message in driven.session.messages), 8.0)
     ends = ("stopped: ", "STOP was not confirmed")  # the second where a new link needs longer to find the machine than STOP waits for its word
     assert driven.world.until(lambda: any(message.words.startswith(ends) for message in driven.session.messages), 8.0)
     assert any("stopped: " in message.words for message in driven.session.messages) or allowed(1.0) > 2.0
@@ -177,7 +177,7 @@ def test_the_excitation_hears_stop_by_itself(world: World, latched: bool) -> Non
     assert world.until(lambda: not blocks[-1].values.any(), 1.0)
     assert time.monotonic() - begun < allowed(0.5)
     assert world.until(lambda: world.state("excitation") == "inactive", 2.0) and not blocks[-1].values.any()
-    assert not world.transition("excitation", "activate") and "no activate before false" in process.output()
+    assert not world.transition("excitation", "activate") and "activate is refused until the same publisher sends false" in process.output()
     stop.publish(Bool(data=False))
     assert world.until(lambda: process.output().count("STOP is released") == 1 + latched)
     assert world.transition("excitation", "activate")

@@ -98,9 +98,9 @@ def test_a_node_that_may_restart_does_and_keeps_the_others_running() -> None:
 
 def test_an_optional_node_may_end() -> None:
     """optional: the others go on, and the run ends when it is told to."""
-    ears = Ears("the others go on")
+    ears = Ears("the others continue")
     assert run([stand_in("calm", POLITE, 1), stand_in("brief", "print('done')", optional=True)], ears.say, enough=ears.enough, grace=QUICK) == 0
-    assert "brief ended; the others go on" in ears.lines
+    assert "brief ended; the others continue" in ears.lines
 
 
 def test_a_program_that_does_not_exist_stops_what_was_started() -> None:

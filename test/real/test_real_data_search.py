@@ -41,7 +41,7 @@ def test_no_mode_is_named_above_what_the_sampling_can_see(path: str) -> None:
             if mode:
                 assert fit.parameter(f"{name}.{mode}").value <= highest, (names, name)
     above = [reason for _, reason in item.refused if "a mode at" in reason]
-    assert all("outside of what these data excite and see" in reason for reason in above)
+    assert all("outside the excited band" in reason for reason in above)
 
 
 def test_emps_has_coulomb_friction_and_drag_that_differs_between_directions() -> None:

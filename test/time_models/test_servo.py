@@ -54,7 +54,7 @@ def test_short_recordings_together_tell_controller_friction_limit_and_delay(runs
 def test_what_target_and_angle_cannot_tell_is_said(runs: list[Run]) -> None:
     """Without an inertia there are ratios only; with one, MuJoCo's numbers in SI."""
     found = servo(runs)
-    assert any("Only ratios to the inertia" in text for text in servo_words(found, None))
+    assert any("determine only ratios to the inertia" in text for text in servo_words(found, None))
     assert any("derivative gain" in text for text in servo_words(found, 0.01))
     known = {item.name: item for item in robot_parameters(found, 0.01)}
     assert set(known) == {"armature", "kp", "damping", "frictionloss", "forcerange"}

@@ -1,4 +1,4 @@
-"""The current needs time to rise."""
+"""Amplifier lag: the current follows the command with a first-order lag."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Motor and table are coupled through a gap."""
+"""Backlash: motor and table are coupled through a gap."""
 
 from __future__ import annotations
 

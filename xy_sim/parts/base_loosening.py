@@ -1,4 +1,4 @@
-"""The base's bolts come loose while it runs."""
+"""Loosening bolts of the base: its stiffness falls during the run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The base is a mass on a spring, and the table pushes it."""
+"""Base resonance: the base is a mass on a spring, and the table accelerates it."""
 
 from __future__ import annotations
 

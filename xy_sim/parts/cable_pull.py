@@ -1,4 +1,4 @@
-"""A cable chain pulls, differently at each place and differently on the way back."""
+"""Cable pull: a force that depends on position and, with hysteresis, on direction."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ PART = Part(
     kind="force",
     group="imperfection",
     law="f = -pull (curve(q / length) + z / reach); z' = v - |v| z / reach",
-    meaning="cables and hoses bend and rub, and settle again after each reversal",
+    meaning="forces of cables and hoses, with hysteresis after each reversal",
     source="hysteresis: P. Dahl, A solid friction model, 1968; smooth random curve",
     parameters=(
         Parameter(

@@ -1,4 +1,4 @@
-"""The motor prefers certain angles."""
+"""Cogging: a force that varies sinusoidally with position."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A steady pull."""
+"""Constant load: a force that does not change."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a part of the machine tells about itself."""
+"""The description of a part of the machine."""
 
 from __future__ import annotations
 

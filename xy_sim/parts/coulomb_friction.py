@@ -1,4 +1,4 @@
-"""Dry friction of constant size."""
+"""Coulomb friction: dry friction of constant magnitude."""
 
 from __future__ import annotations
 

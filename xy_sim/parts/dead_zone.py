@@ -1,4 +1,4 @@
-"""Small commands do nothing."""
+"""Dead zone: small commands have no effect."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A simulator that takes short cuts: steps of first order, and stops found to one step only."""
+"""A simulator with first-order integration steps that resolves stops to one step only."""
 
 from __future__ import annotations
 

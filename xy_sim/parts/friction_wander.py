@@ -1,4 +1,4 @@
-"""All friction wanders slowly, up and down."""
+"""All friction varies slowly and at random."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The drive gets stronger or weaker while it runs."""
+"""Gain drift: the gain of the drive changes linearly with time."""
 
 from __future__ import annotations
 

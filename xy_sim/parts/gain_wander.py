@@ -1,4 +1,4 @@
-"""The drive's gain wanders slowly, up and down."""
+"""The gain of the drive varies slowly and at random."""
 
 from __future__ import annotations
 

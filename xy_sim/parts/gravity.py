@@ -1,4 +1,4 @@
-"""The weight of a joint that lifts."""
+"""Gravity: the weight of a joint's arm."""
 
 from __future__ import annotations
 

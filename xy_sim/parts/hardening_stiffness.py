@@ -1,4 +1,4 @@
-"""A spring to the middle that stiffens."""
+"""Hardening stiffness: a spring towards the middle that stiffens with distance."""
 
 from __future__ import annotations
 

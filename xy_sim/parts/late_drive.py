@@ -1,4 +1,4 @@
-"""Voltages do not arrive when their number says."""
+"""Late drive: voltages act at random times around their sample instants."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The scale and the screw disagree, periodically."""
+"""Lead error: a periodic error of the screw or the scale."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A second mass rattles on the table."""
+"""Loose mode: a second mass with clearance on the table."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The mains are heard in the motor."""
+"""Mains hum: a ripple of the mains in the motor voltage."""
 
 from __future__ import annotations
 

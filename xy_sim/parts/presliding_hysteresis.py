@@ -1,4 +1,4 @@
-"""Before it slides, friction is a spring that forgets."""
+"""Presliding hysteresis: before it slides, friction acts as a spring with hysteresis."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A spring that pulls back to its rest, and may soften."""
+"""Return spring: a spring towards a rest position, which may soften."""
 
 from __future__ import annotations
 

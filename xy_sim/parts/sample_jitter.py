@@ -1,4 +1,4 @@
-"""Samples are not taken when their number says."""
+"""Sample jitter: the encoder is read at random times around the sample instants."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The amplifier has a largest voltage."""
+"""Saturation: the output of the amplifier is limited."""
 
 from __future__ import annotations
 

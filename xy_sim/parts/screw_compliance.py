@@ -1,4 +1,4 @@
-"""The screw is a spring between motor and table."""
+"""Screw compliance: the screw is a spring between motor and table."""
 
 from __future__ import annotations
 

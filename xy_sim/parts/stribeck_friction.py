@@ -1,4 +1,4 @@
-"""Dry friction that is larger at rest than in motion."""
+"""Stribeck friction: dry friction that falls with speed from its breakaway level."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The drag falls as motion warms the grease."""
+"""Thermal viscosity: the drag falls as motion warms the grease."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Computation, bus and drive answer late."""
+"""Time delay of computation, bus and drive."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The drag changes along the travel, as it likes."""
+"""Uneven drag: the drag varies at random along the travel."""
 
 from __future__ import annotations
 

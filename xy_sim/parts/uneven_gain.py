@@ -1,4 +1,4 @@
-"""The motor constant changes along the travel, as it likes."""
+"""Uneven gain: the motor constant varies at random along the travel."""
 
 from __future__ import annotations
 

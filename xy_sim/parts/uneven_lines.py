@@ -1,4 +1,4 @@
-"""The encoder's lines are not where they should be."""
+"""Uneven lines: position errors of the encoder lines."""
 
 from __future__ import annotations
 

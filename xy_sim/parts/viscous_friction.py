@@ -1,4 +1,4 @@
-"""Grease and seals resist in proportion to speed."""
+"""Viscous friction: drag of grease and seals, proportional to speed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Two small masses swing on the table."""
+"""Weak modes: two small masses oscillate on the table."""
 
 from __future__ import annotations
 

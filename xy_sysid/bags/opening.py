@@ -1,4 +1,4 @@
-"""What is looked at before a file that somebody names is opened: that it is a regular file, no longer than such a file can be, and modest YAML."""
+"""Checks before a named file is opened: it is a regular file, not too long for its kind, and YAML of moderate size."""
 
 from __future__ import annotations
 

@@ -55,7 +55,7 @@ class Bag:
             undo.callback(self._closed.close)
             self.files = [self._open(file) for file in self._find()]
             if check_sums(self.path) == "damaged":
-                self.notes.append("its check sums cannot be added up for the damage: numbers that are read may be others than were recorded")
+                self.notes.append("its check sums cannot be computed because of the damage: some values may differ from those recorded")
             undo.pop_all()
         self.topics = list(dict.fromkeys(Topic(name, kind) for file in self.files for name, kind in file.topics))
 
@@ -203,7 +203,7 @@ class Bag:
 def _yaml(path: Path, text: str) -> Any:
     """The content, all values as text; raises BadRecording for what is crafted rather than written by a recorder."""
     if too_much(text, WORDS):
-        raise BadRecording(path, "metadata.yaml is nested, repeated or long as no recorder writes it", ANOTHER_COPY)
+        raise BadRecording(path, "metadata.yaml is nested, repeated or long in a way that no recorder writes", ANOTHER_COPY)
     return yaml.load(text, Loader=PARSER)
 
 

@@ -244,7 +244,7 @@ class _Decoder:
         return [_Part(kind, places, layout.shape[0], block)]
 
     def once(self, name: str, label: str, rows: int, width: int, table: FloatArray) -> tuple[str, int, FloatArray]:
-        """Label, width and numbers without the columns whose names are there twice: nobody knows which is meant."""
+        """Label, width and numbers without the columns whose names occur twice, because they are ambiguous."""
         names = [word.strip() for word in label.split(",")]
         kept = [place for place, word in enumerate(names) if names.count(word) == 1]
         if len(kept) == len(names) or len(names) != width or rows * width != table.shape[1] or names[:2] != ["seq", "time"]:

@@ -66,8 +66,8 @@ def check_sums(path: Path) -> Checked:
         if found.count(topic) == count and found.sum(topic) != value:
             if not all(map(_sound, _databases(path))):
                 return "damaged"
-            problem = f"the messages on {topic} are not those that were recorded (their check sum is another)"
-            raise BadRecording(path, problem, f"Take another copy; to read it all the same, delete {KEY} in its metadata.yaml.")
+            problem = f"the messages on {topic} are not those that were recorded (their check sum differs)"
+            raise BadRecording(path, problem, f"Take another copy; to read it nevertheless, delete {KEY} in its metadata.yaml.")
     return "good" if all(found.count(topic) == count for topic, (count, _) in told.items()) else "damaged"
 
 

@@ -18,11 +18,11 @@ for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
 
 INTERRUPTED, TERMINATED, WRONG = 130, 143, 2
 _interrupts = Interrupts()
-LONGEST = 800  # characters of a refusal; somebody may give a whole file as a value
+LONGEST = 800  # characters of a refusal; a value may be as long as a whole file
 
 
 def run(arguments: Sequence[str]) -> int:
-    """Run one command; 0 is an answer, 1 a model that does not hold, 2 wrong use or bad input, 130 Ctrl-C, 143 SIGTERM."""
+    """Run one command and return its exit code: 0 answer, 1 failed check, 2 wrong use or bad input, 130 Ctrl-C, 143 SIGTERM."""
     from xy_sysid.errors import ReaderGone, XySysidError
     from xy_sysid.files.blame import blamed
 
@@ -47,7 +47,7 @@ def run(arguments: Sequence[str]) -> int:
 
 
 def _command(arguments: Sequence[str]) -> int:
-    """The exit code of a command that was used rightly, or that typer refuses."""
+    """The exit code of a command, or of its refusal by typer."""
     import typer
     from typer.exceptions import TyperException
 
@@ -72,7 +72,7 @@ def _command(arguments: Sequence[str]) -> int:
 
 @cache
 def _commands() -> Callable[..., object]:
-    """What parses the arguments of every command, made once."""
+    """The parser of the arguments of all commands, made once."""
     from typer.main import get_command
 
     from xy_sysid.cli.app import app
@@ -94,13 +94,13 @@ def _stopped() -> int:
 
 
 def _unless_terminated(code: object) -> int:
-    """The exit code of a command; typer makes 130 of whatever interrupts one."""
+    """The exit code of a command; typer turns every interrupt into 130."""
     found = code if isinstance(code, int) else 0
     return TERMINATED if found == INTERRUPTED and _interrupts.terminated else found
 
 
 def _say(line: str) -> None:
-    """A line on stderr; where even that has no room, the exit code tells."""
+    """A line on stderr; if even that cannot be written, the exit code remains."""
     try:
         sys.stderr.write(printable(line))
         sys.stderr.flush()
@@ -109,20 +109,20 @@ def _say(line: str) -> None:
 
 
 def _nobody_reads() -> int:
-    """The reader of a pipe went away: nothing more to say to it."""
+    """The reader of a pipe has closed it: nothing more is written."""
     _discard(sys.stdout)
     return 0
 
 
 def _discard(stream: TextIO) -> None:
-    """What the stream still holds goes nowhere, and so does all that follows."""
+    """Discard the buffer of the stream and all further output."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, stream.fileno())
     os.close(nowhere)
 
 
 def _ended(code: int) -> int:
-    """The exit code once all that was said has left: output that cannot leave is judged here, not by the interpreter's last flush."""
+    """The exit code after all output was flushed: an error in writing is handled here, not in the last flush of the interpreter."""
     try:
         sys.stdout.flush()
     except BrokenPipeError:
@@ -136,7 +136,7 @@ def _ended(code: int) -> int:
 
 
 def _nowhere() -> TextIO:
-    """Stands for a stream that the caller has closed."""
+    """Replaces a stream that the caller has closed."""
     return os.fdopen(os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8")
 
 

@@ -110,7 +110,7 @@ def compare(
 
 
 def _model_last(given: list[Path]) -> tuple[list[Path], Path | None]:
-    """Recordings, and the model after them: a last argument that no recording is called like."""
+    """The recordings, and the model: the last argument, if its ending is not that of a recording."""
     from xy_sysid.imports import TABLES
 
     *first, last = given

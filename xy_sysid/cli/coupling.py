@@ -19,7 +19,7 @@ Combine = Annotated[str, typer.Option(help="for machines on which both drives mo
 
 @reads
 def coupling(recs: o.Recs, reading: Reading, combine: Combine = "", set_: o.Set = None, params: o.Params = None, json: o.Json = False) -> None:
-    """The 2 x 2 response of two axes driven at once, and whether two single-axis models suffice."""
+    """Estimate the 2 x 2 response of two axes driven at once, and whether two single-axis models suffice."""
     from xy_sysid.fitting.two_axes import coupling_in
 
     settings = o.settings_from(params, set_)

@@ -111,7 +111,7 @@ def _specs(table: Machine, machine: str, seconds: float, speed: float, seed: int
 
 
 def _watch(specs: list[Any], axes: tuple[str, ...], seconds: float, plain: bool) -> tuple[int, Monitor, list[str], float]:
-    """Start everything, show it until it is over; exit code, what was heard, the nodes' lines, seconds by the clock."""
+    """Start everything and show it until the end; returns exit code, received results, output of the nodes, and seconds by the clock."""
     import os
 
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
@@ -157,7 +157,7 @@ def _line(monitor: Monitor, axes: tuple[str, ...]) -> str:
 
 
 def _panel(monitor: Monitor, axes: tuple[str, ...], seconds: float) -> RenderableType:
-    """The live picture: for each axis its Bode magnitude and what is known."""
+    """The live picture: Bode magnitude and results of each axis."""
     import numpy as np
     from rich.columns import Columns
     from rich.console import Group
@@ -187,7 +187,7 @@ def _panel(monitor: Monitor, axes: tuple[str, ...], seconds: float) -> Renderabl
 
 
 def figures(values: dict[str, str]) -> list[tuple[str, str]]:
-    """Label and text of what people want to know, from the values of an axis' status."""
+    """Label and text of the main results, from the values of the status of an axis."""
     found = []
     for key, label, scale, unit, digits in (
         ("delay (s)", "delay", 1e3, "ms", 4),
@@ -207,7 +207,7 @@ def figures(values: dict[str, str]) -> list[tuple[str, str]]:
 
 
 def result(monitor: Monitor, axis: str, truth: dict[str, Any]) -> dict[str, Any]:
-    """Estimated, true and apart, SI; ``within`` says whether the demo's promise holds."""
+    """Estimated value, true value and difference, SI; ``within`` tells whether the difference is small enough."""
     values = monitor.statuses.get(f"axis {axis}", (0, "", {}))[2]
     wanted = {
         "delay": ("delay (s)", truth["delay"], DELAY_WITHIN),
@@ -228,7 +228,7 @@ def result(monitor: Monitor, axis: str, truth: dict[str, Any]) -> dict[str, Any]
 
 
 def function_text(monitor: Monitor, axis: str) -> str:
-    """The transfer function that was published, in a line of mathematics."""
+    """The published transfer function as a formula in one line."""
     from xy_sysid.live.messages import read_transfer_function
     from xy_sysid.live.plain_messages import topic_of
 
@@ -240,14 +240,14 @@ def function_text(monitor: Monitor, axis: str) -> str:
 
 
 def together(monitor: Monitor, axes: tuple[str, ...]) -> str:
-    """Whether two single-axis models suffice, in a sentence; empty where that was not judged."""
+    """Whether two single-axis models suffice, in a sentence; empty if this was not tested."""
     from xy_sysid.live.coupling_messages import coupling_name
 
     return monitor.statuses[coupling_name(axes)][1] if len(axes) > 1 and coupling_name(axes) in monitor.statuses else ""
 
 
 def polynomial(coefficients: Any) -> str:
-    """Falling powers of s, as people write them."""
+    """A polynomial in falling powers of s, as text."""
     terms = []
     for power, value in zip(range(len(coefficients) - 1, -1, -1), coefficients, strict=True):
         if value == 0:

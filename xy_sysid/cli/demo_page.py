@@ -14,7 +14,7 @@ LAST = 20  # lines of the nodes that are shown when one of them fails
 
 
 def wished(page: bool | None, json: bool) -> bool:
-    """Whether the demo shows a page: as told, else where somebody sits at a terminal and NiceGUI is installed."""
+    """Whether the demo shows a page: as requested, else if it runs in a terminal and NiceGUI is installed."""
     from xy_sysid.cli.output import aside, people
 
     there = importlib.util.find_spec("nicegui") is not None

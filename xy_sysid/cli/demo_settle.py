@@ -1,4 +1,4 @@
-"""xy-sysid demo --settle: a simulated machine that one recording does not explain, and the experiments that do, over ROS 2."""
+"""xy-sysid demo --settle: a simulated machine that one recording does not settle, and the experiments that do, over ROS 2."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ WORDS = (
 
 
 def pulls() -> tuple[tuple[str, ...], ...]:
-    """What may pull the arm back: a law of an angle, or the first that looks like it."""
+    """The two possible causes: a law of an angle, and its first look-alike."""
     from xy_sysid.effects import EFFECTS
 
     law = next(effect for effect in EFFECTS.values() if effect.angular)

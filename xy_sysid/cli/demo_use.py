@@ -1,4 +1,4 @@
-"""The demo that goes on after the identification: use the models, and watch the tracking error of a path fall on the simulated machine."""
+"""The demo --use: after the identification the models are used, and the tracking error of a path falls on the simulated machine."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def show(found: Mapping[str, Mapping[str, Any]]) -> None:
 
 
 class Course:
-    """What is done when; asked often whether it is over."""
+    """The sequence of the demo; ``over`` is called repeatedly."""
 
     def __init__(self, monitor: Any, seconds: float, tell: Any) -> None:
         from std_srvs.srv import Trigger
@@ -101,15 +101,15 @@ class Course:
         self.failed = ""
 
     def over(self) -> bool:
-        """Go on; whether all is done."""
+        """Continue; returns whether all is done."""
         self._monitor.spin(0.05)
         if self._step == 0:
             self._monitor.start_when_ready()
             heard = float(self._values("diagnoser").get("seconds heard (s)", "0"))
             if heard >= self._seconds:
-                self._next("the effects of both axes are searched ...", self._auto)
+                self._next("searching for the effects of both axes ...", self._auto)
         elif self._step == 1 and self._answered():
-            self._next("Use it: the controllers are designed, and a path is followed three times ...", self._use)
+            self._next("Use it: designing the controllers, and following a path three times ...", self._use)
         elif self._step == 2 and self._answered():
             state = self._values(NODE).get("state", "")
             if state == "failed":

@@ -75,20 +75,24 @@ def _show(name: str, item: Answer, drive: Transmission) -> None:
             part = "-" if one.rung.one_step else f"{100 * one.explained:.3g} %"  # of another error, one sample ahead
             rows.append((*error_cells(f"{one.name} (refused)" if one.refused else one.name, one.rung), part))
         if rows:
-            table("alone, least left first", ("effect", f"held-out error {motion(item.units.judged)[1]}", "times floor", "share of error"), rows)
+            table(
+                "each effect alone, smallest error first",
+                ("effect", f"held-out error {motion(item.units.judged)[1]}", "times floor", "share of error"),
+                rows,
+            )
         parameter_table(item.rungs[-1].parameters)
         mechanics_table(item.rungs[-1].parameters, item.units, drive)
     say(f"  Next experiment: {item.next_experiment}\n")
 
 
 def error_cells(name: str, rung: Rung) -> tuple[str, str, str]:
-    """Name, held-out error and what that is over the noise floor; where free simulation cannot judge, the name says what was judged."""
+    """Name, held-out error, and its ratio to the noise floor; if free simulation cannot judge, the name says how it was judged."""
     label = f"{name} (error one sample ahead)" if rung.one_step else name
     return label, f"{motion(rung.units.judged)[0] * rung.held_out_error:.4g}", f"{rung.held_out_error / max(rung.noise_floor, 1e-300):.2f}"
 
 
 def parameter_table(parameters: tuple[Estimate, ...]) -> None:
-    """Parameters as people read them."""
+    """The parameters in display units."""
     rows = []
     for p in parameters:
         rows.append(estimate(p.name, (p.value, p.low, p.high), p.unit))

@@ -36,7 +36,7 @@ def effects(
 
 
 def _answer(effect: Effect) -> dict[str, Any]:
-    """All that an effect says about itself."""
+    """All fields of an effect."""
     words = ("law", "category", "meaning", "validity", "shows", "look_alikes", "experiment", "source", "family", "simulable")
     parameters = {
         item.name: {"unit": item.unit, "low": item.low, "high": item.high, "typical": item.typical, "meaning": item.meaning}

@@ -41,7 +41,7 @@ def fit(
     force: o.Force = False,
     json: o.Json = False,
 ) -> None:
-    """Transfer function with delay of each axis, 95 % intervals, and whether it can be trusted. REC may also be a measured frequency response."""
+    """Fit a transfer function with delay to each axis, with 95 % intervals and checks. REC may also be a measured frequency response."""
     from xy_sysid.errors import BadInput
     from xy_sysid.files import linear_models
     from xy_sysid.fitting.of_given_response import band_of
@@ -61,7 +61,10 @@ def fit(
     else:
         if averages is not None:
             raise BadInput(
-                "--averages", f"{averages:g}", "a file with a measured frequency response", "Leave it out: windows of a recording are counted."
+                "--averages",
+                f"{averages:g}",
+                "a file with a measured frequency response",
+                "Leave it out: the windows of a recording are counted automatically.",
             )
         recording = read(recs, reading, json)
         if len(recording) and few_periods(recording, held_out):
@@ -141,7 +144,7 @@ def answer(found: AxisEstimate, result: Fit, verdicts: Validation) -> dict[str, 
 
 def _error(result: Fit) -> str:
     if not result.error_cost < 1e6:
-        return "the model explains nothing of the response"
+        return "the model explains none of the response"
     return f"relative error {result.error_cost:.2g} % (paper: error cost {result.error_cost:.2f}, confidence {result.confidence:.2f})"
 
 
@@ -153,7 +156,7 @@ def _show(found: AxisEstimate, result: Fit, verdicts: Validation) -> None:
         say(f"The fit did not converge: {result.reason}", style="bold")
     estimates("", result.intervals_with_misfit)
     if result.misfit > 1.0:
-        left = f"the intervals are {result.misfit:.3g} times those of noise alone, for what the model leaves"
+        left = f"the intervals are {result.misfit:.3g} times those of noise alone, because of the residual error"
         say(f"  {left}." if verdicts.trustworthy else f"  NOT TRUSTWORTHY: {left}; take them as orders of magnitude.")
     for check in verdicts.verdicts:
         say(f"  {'ok  ' if check.ok else 'WARN'} {check.sentence}")

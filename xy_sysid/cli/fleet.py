@@ -23,7 +23,7 @@ Follow = Annotated[
     typer.Option(
         "--follow",
         metavar="EFFECT",
-        help="estimate this effect in every recording, also where it is not found, so that its trend is complete (may be repeated)",
+        help="estimate this effect in every recording, even where it is not found, so that its trend is complete (may be repeated)",
     ),
 ]
 EVERY = 30.0  # s between two lines where no terminal shows a bar
@@ -36,22 +36,23 @@ def fleet(
         list[Path] | None, typer.Argument(metavar="PATH", help="recordings, folders with recordings, or patterns in quotes, as 'data/*/2026*.csv'")
     ] = None,
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", metavar="TABLE", help="folder of Parquet files; recordings that it has already are skipped")
+        Path | None, typer.Option("--out", "-o", metavar="TABLE", help="folder of Parquet files; recordings that are already in it are skipped")
     ] = None,
     one: Annotated[
         Path | None, typer.Option("--one", metavar="FILE", help="analyse only this recording, in this process; -o then names a Parquet file")
     ] = None,
     pattern: Annotated[
-        str, typer.Option(metavar="PATTERN", help="how paths end: {machine}, {axis}, {date} and *, for example '{machine}/{date}*.csv'")
+        str,
+        typer.Option(metavar="PATTERN", help="pattern of the end of a path: {machine}, {axis}, {date} and *, for example '{machine}/{date}*.csv'"),
     ] = "",
     names: Annotated[
         Path | None, typer.Option(metavar="FILE", help="YAML with pattern, follow, and the names of single recordings (docs/fleet.md)")
     ] = None,
     follow: Follow = None,
     effect_file: Own = None,
-    workers: Annotated[int, typer.Option(metavar="N", min=0, max=1024, help="processes on this machine; 0 is one for each core")] = 0,
+    workers: Annotated[int, typer.Option(metavar="N", min=0, max=1024, help="processes on this machine; 0: one for each core")] = 0,
     scheduler: Annotated[str, typer.Option(metavar="ADDRESS", help="use the dask cluster of this scheduler: tcp://HOST:PORT")] = "",
-    force: Annotated[bool, typer.Option("--force", help="with --one: replace a file that is there already")] = False,
+    force: Annotated[bool, typer.Option("--force", help="with --one: replace an existing file")] = False,
     json: o.Json = False,
 ) -> None:
     """Fit and diagnose every recording, and write one row for each axis of each into a table (Parquet)."""

@@ -31,7 +31,7 @@ def frf(
     force: o.Force = False,
     json: o.Json = False,
 ) -> None:
-    """Frequency response, coherence and uncertainty of each axis."""
+    """Estimate frequency response, coherence and uncertainty of each axis."""
     import numpy as np
 
     from xy_sysid.fitting.of_recording import estimate

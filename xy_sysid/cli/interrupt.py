@@ -1,7 +1,7 @@
-"""Ctrl-C and SIGTERM end a command for sure: an interrupt that something swallows is raised again.
+"""Ctrl-C and SIGTERM always end a command: an interrupt that was swallowed is raised again.
 
 Python raises KeyboardInterrupt wherever it is at that moment. In a callback of its own (of a weak reference, in the middle of an import)
-it is printed and forgotten, and the command would go on for ever.
+it is printed and ignored, and the command would continue.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The options --kt and --gear, and mechanical parameters as people read them."""
+"""The options --kt and --gear, and mechanical parameters in display units."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Listens to the identifier's topics and drives the excitation's lifecycle: what the demo shows comes over DDS."""
+"""Subscribes to the topics of the identifier and drives the lifecycle of the excitation: all that the demo shows comes over DDS."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""xy-sysid next: which experiment settles what the recordings leave open?"""
+"""xy-sysid next: which experiment answers what the recordings leave open?"""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ Between = Annotated[
 def next_(
     reading: Reading,
     recs: Annotated[
-        list[Path] | None, typer.Argument(metavar="[REC]", help="recordings of one machine, as of diagnose; none with --for nothing")
+        list[Path] | None, typer.Argument(metavar="[REC]", help="recordings of one machine, as for diagnose; none with --for nothing")
     ] = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", metavar="FILE", help="write the experiment for the excitation node")] = None,
     trajectory: Annotated[
@@ -90,7 +90,9 @@ def next_(
     o.output_file("--output", output, force)
     if trajectory is not None:
         if precision == NOTHING:
-            raise BadInput("--trajectory", "without a recording", "a recording, whose model says how the axis moves", "Leave out --for nothing.")
+            raise BadInput(
+                "--trajectory", "without a recording", "a recording, because its model predicts the motion of the axis", "Leave out --for nothing."
+            )
         o.output_file("--trajectory", trajectory, force)
         o.output_file("--trajectory", trajectory.with_suffix(".csv"), force)
     asked = partial(_asked, voltage=voltage, travel=travel, speed=speed, acceleration=acceleration)
@@ -178,7 +180,9 @@ def _first(reading: Reading, run_file: Path | None, asked: Callable[[str], dict[
     values = {**_own_limits(run_file, axis), **asked(units.output), **({} if rms is None else {"rms": rms})}
     for name in ("voltage", "travel"):
         if name not in values:
-            raise BadInput("--for nothing", f"without the limit of {name}", f"--{name}, or --params with a run file", "Say what the machine may do.")
+            raise BadInput(
+                "--for nothing", f"without the limit of {name}", f"--{name}, or --params with a run file", "Give the limits of the machine."
+            )
     rate = settings.rate if "rate" in told else reading.rate or settings.rate
     middle = 0.5 * (values["travel"][0] + values["travel"][1])
     return first_experiment(axis, rate, MachineLimits(start=middle, seconds=seconds, units=units, **values))
@@ -204,7 +208,7 @@ def _show(answer: NextExperiment, output: Path | None) -> None:
         say(f"  It needs up to {needs.voltage:.3g} {limits.units.input} and the travel from {limits.span(needs.travel)}, with margin.")
         say(f"  The axis has to stand between {limits.span(needs.starts(), ' and ')} when it begins.")
     if answer.ask:
-        say(f"  Somebody has to help: {answer.ask}")
+        say(f"  To do by hand: {answer.ask}")
     if output is not None and answer.experiment is not None:
         say(f"  {output}: run it with parameter experiment of the excitation node, then diagnose all recordings together.")
 
@@ -252,7 +256,7 @@ def _own_limits(run_file: Path | None, axis: str) -> dict[str, Any]:
     if run_file is None:
         return {}
     told, settings = _settings(run_file, axis)
-    said = {"voltage": ("limit",), "travel": ("travel_min", "travel_max")}  # a default is no limit that somebody has set
+    said = {"voltage": ("limit",), "travel": ("travel_min", "travel_max")}  # a default is not a limit that the user has set
     unsaid = {name for name, knobs_of in said.items() if any(f"{axis}.{one}" not in told for one in knobs_of)}
     return {name: value for name, value in of_settings(settings, axis).items() if name not in unsaid}
 

@@ -98,7 +98,7 @@ def ros_domain() -> None:
 
 
 def output_file(option: str, path: Path | None, force: bool) -> None:
-    """Raises BadInput, before any work is done, when a file cannot be written, or would replace one and nobody said --force."""
+    """Raises BadInput, before any work is done, when a file cannot be written, or would replace one without --force."""
     if path is None:
         return
     from xy_sysid.files.unasked import free

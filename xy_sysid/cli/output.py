@@ -1,4 +1,4 @@
-"""How a command answers: a table for people, or one JSON document; progress always on stderr."""
+"""Output of commands: tables, or one JSON document; progress always on stderr."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Terminal(Console):
         raise ReaderGone
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterator[Segment]:
-        """What rich draws a thing with; text steers no terminal, whoever wrote it."""
+        """The renderer of rich; text from outside cannot control the terminal."""
         for part in super().render(renderable, options):
             yield part if part.control else Segment(printable(part.text), part.style)
 
@@ -80,7 +80,7 @@ def emit(document: Mapping[str, Any]) -> None:
 
 
 def say(text: str = "", to: Terminal = people, style: str | None = None) -> None:
-    """Words for people, broken between words at the terminal's width; what goes on is set in below where it began."""
+    """Text wrapped at the width of the terminal; continuation lines are indented."""
     for line in text.split("\n"):
         inset = " " * (len(line) - len(line.lstrip()) + 2)
         broken = textwrap.wrap(line, max(to.width, NARROW), subsequent_indent=inset, break_long_words=False, break_on_hyphens=False)
@@ -105,7 +105,7 @@ def table(title: str, columns: Iterable[str], rows: Iterable[Iterable[str]]) -> 
 
 
 def estimates(title: str, items: Iterable[Interval]) -> None:
-    """Figures with their 95 % intervals, in the units that people read."""
+    """Values with their 95 % intervals, in display units."""
     rows = [estimate(item.name, (item.value, item.low, item.high), item.unit) for item in items]
     table(title, ("parameter", "value", "95 % interval", "unit"), rows)
 
@@ -125,15 +125,15 @@ def estimate(name: str, figures: tuple[float, float, float], unit: str) -> tuple
 
 
 def progress() -> Progress:
-    """A progress bar on stderr that disappears at its end; none where nobody watches."""
+    """A progress bar on stderr that disappears at its end; none if stderr is not a terminal."""
     words = TextColumn("{task.description}", markup=False)
     return Progress(words, BarColumn(), TaskProgressColumn(), TimeRemainingColumn(), console=aside, transient=True, disable=not aside.is_terminal)
 
 
 def compiling() -> tuple[Callable[[], None], Callable[[], None]]:
-    """(what shows that laws are compiled, with a bar and the time that has passed; what takes it away again).
+    """(function that shows that laws are being compiled, with a bar and the elapsed time; function that removes it).
 
-    The bar only moves, as a compiler does not tell how far it is. It may stand above another bar.
+    The bar shows no progress, because the compiler reports none. It may be shown above another bar.
     """
     shown: list[Progress] = []
 
@@ -151,7 +151,7 @@ def compiling() -> tuple[Callable[[], None], Callable[[], None]]:
 
 
 def quantity(value: float, unit: str, digits: int = 4) -> str:
-    """A figure as people read it: ms for short times, mm for small lengths."""
+    """A value in display units: ms for short times, mm for small lengths."""
     if not math.isfinite(value):
         return "-"
     scale, shown = readable(unit)

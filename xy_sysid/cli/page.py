@@ -38,7 +38,7 @@ def page(
     namespace: Annotated[str, typer.Option(help="ROS namespace of the machine")] = "/xy",
     browse: Annotated[bool, typer.Option("--browse/--no-browse", help="open a browser if there is a display")] = True,
     between: Between = None,
-    settle: Annotated[str, typer.Option(hidden=True, help="axis that is settled without being told, for the demo")] = "",
+    settle: Annotated[str, typer.Option(hidden=True, help="axis for which the experiments start automatically, for the demo")] = "",
     json: o.Json = False,
 ) -> None:
     """Show measurement and model in a browser, where they differ, and the missing effect; add it there and see the error fall. Ctrl-C ends it."""
@@ -105,5 +105,5 @@ def reading(topics: list[str] | None, effort: bool, effect_files: list[Path] | N
 
 
 def display() -> bool:
-    """Whether somebody sits in front of a screen."""
+    """Whether there is a display."""
     return any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))

@@ -1,4 +1,4 @@
-"""How a command is told to read recordings, and how it reads them, with progress."""
+"""Options for reading recordings, and reading them with progress."""
 
 from __future__ import annotations
 

@@ -26,12 +26,10 @@ def report(
     reading: Reading,
     out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="the page to write")] = Path("report.html"),
     title: Annotated[str, typer.Option("--title", metavar="TEXT", help="title of the report. Default: the name of the recording")] = "",
-    machine: Annotated[
-        str, typer.Option("--machine", metavar="TEXT", help="name of the machine. Default: the one that the recording names in its meta data")
-    ] = "",
-    author: Annotated[str, typer.Option("--author", metavar="TEXT", help="who answers for the report")] = "",
+    machine: Annotated[str, typer.Option("--machine", metavar="TEXT", help="name of the machine. Default: from the meta data of the recording")] = "",
+    author: Annotated[str, typer.Option("--author", metavar="TEXT", help="author of the report")] = "",
     recorded: Annotated[
-        str, typer.Option("--date", metavar="DATE", help="day of the recording, as 2026-03-03. Default: what its clock or its name tells")
+        str, typer.Option("--date", metavar="DATE", help="date of the recording, for example 2026-03-03. Default: from its clock or its name")
     ] = "",
     set_: o.Set = None,
     params: o.Params = None,

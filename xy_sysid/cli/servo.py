@@ -1,4 +1,4 @@
-"""xy-sysid servo: a position-controlled joint of which target and angle are known."""
+"""xy-sysid servo: a position-controlled joint with known target and angle."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Inertia = Annotated[
 
 @reads
 def servo(recs: o.Recs, reading: Reading, inertia: Inertia = None, json: o.Json = False) -> None:
-    """Controller, damping, friction, torque limit and delay of a servo, from its target (the input) to its angle (the output)."""
+    """Fit controller, damping, friction, torque limit and delay of a servo, from its target (the input) to its angle (the output)."""
     from xy_sysid.time_models.as_words import robot_parameters, servo_words
     from xy_sysid.time_models.servo import servo as logic
 

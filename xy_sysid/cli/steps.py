@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @reads
 def steps(recs: o.Recs, reading: Reading, kt: Kt = None, gear: Gear = "", json: o.Json = False) -> None:
-    """Gain, time constant, delay and friction (kS, kV, kA) from short step and ramp tests, with intervals, and what these tests cannot determine."""
+    """Fit gain, time constant, delay and friction (kS, kV, kA) to short step and ramp tests, with intervals, and name what they do not determine."""
     from xy_sysid.axis.mechanics import drive_from
     from xy_sysid.time_models.as_words import first_order_words
     from xy_sysid.time_models.first_order import first_order

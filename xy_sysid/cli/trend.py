@@ -1,4 +1,4 @@
-"""xy-sysid trend: which axis changed, since when, by how much, how sure, and why."""
+"""xy-sysid trend: which axis changed, since when, by how much, how certainly, and why."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def trend(
         Path | None, typer.Option(metavar="FILE", help="YAML that adds to the table of changes and their causes (docs/fleet.md)")
     ] = None,
     names: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="with --every: YAML with the names of the recording and what is followed, as of fleet")
+        Path | None, typer.Option(metavar="FILE", help="with --every: YAML with the names of the recording and the followed effects, as for fleet")
     ] = None,
     effect_file: Own = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", metavar="FILE.html", help="write a page with every parameter over time")] = None,

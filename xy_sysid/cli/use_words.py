@@ -1,4 +1,4 @@
-"""What ``xy-sysid use`` says of one axis: tables and sentences, and its part of the JSON document."""
+"""The output of ``xy-sysid use`` for one axis: tables, sentences, and its part of the JSON document."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def show(name: str, used: Used) -> None:
     if used.tracking:
         say(f"  {_compensation(used.tracking[0])}")
     for effect, why in used.not_undone:
-        say(f"  The feedforward leaves {effect}: {why}.")
+        say(f"  The feedforward does not compensate {effect}: {why}.")
     for what, why in used.refused:
         say(f"  No {what}: {why}")
     say()

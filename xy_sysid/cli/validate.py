@@ -1,4 +1,4 @@
-"""xy-sysid validate: a model on data that it has not seen."""
+"""xy-sysid validate: a model on new data."""
 
 from __future__ import annotations
 

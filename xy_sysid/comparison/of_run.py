@@ -1,4 +1,4 @@
-"""Models against a run: where one fails, whether one holds, and which of two is better."""
+"""Models compared with a run: where a model fails, whether it holds, and which of two is better."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ HELD_OUT = 1.0 / 3.0  # of the recording, when a model was fitted to it
 SEEN = "the model was fitted to this recording; only its last third is used"
 
 MOST_LEFT = 0.7  # of the motion: half of its power
-HARDLY = "The model leaves most of the motion: it hardly describes this axis, or input and output do not belong together."
+HARDLY = "The model explains little of the motion: it does not describe this axis, or input and output do not belong together."
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,7 @@ class Judgement:
     """A model on the data of one axis.
 
     where:      in time, by speed, place and so on; check: in frequency, None where the data are too short or nothing is coherent
-    notes:      what a user should read before believing it
+    notes:      caveats for the user
     """
 
     where: Comparison
@@ -44,8 +44,8 @@ class Judgement:
 def compare(data: Run | Recording, model: AnyModel | None = None, **settings: Any) -> Comparison:
     """Where a model fails: by frequency, speed, direction, position, amplitude and time, in multiples of the noise floor.
 
-    model: without one, a linear model is fitted to the first two thirds and judged by the last third
-    A model that was fitted to these very data is judged by their last third too. settings: as for ``frf``
+    model: if None, a linear model is fitted to the first two thirds and judged by the last third
+    A model that was fitted to the same data is also judged by their last third. settings: as for ``frf``
     Raises BadInput for a run that is too short, or a model of another unit.
     """
     run = one_run(data)
@@ -54,7 +54,7 @@ def compare(data: Run | Recording, model: AnyModel | None = None, **settings: An
 
 
 def validate(data: Run | Recording, model: AnyModel, period: int | None = 0, **settings: Any) -> ModelCheck:
-    """A model on data that it has not seen: in frequency line by line in sigma, and in time. ``sentence`` and ``holds`` say it.
+    """Validates a model on new data: in frequency line by line in sigma, and in time. The result is in ``sentence`` and ``holds``.
 
     period, settings: as for ``frf``. Raises BadInput for other units, or no line to be trusted.
     """
@@ -64,9 +64,9 @@ def validate(data: Run | Recording, model: AnyModel, period: int | None = 0, **s
 
 
 def better(data: Run | Recording, before: AnyModel, after: AnyModel) -> Paired:
-    """Is ``after`` better than ``before``? Their errors on the same windows, in pairs; ``better`` is None if the test cannot tell.
+    """Is ``after`` better than ``before``? A paired test on the same windows; ``better`` is None if it does not decide.
 
-    Of data that one of them was fitted to, only the last third counts, and no more can be said than that.
+    If one model was fitted to these data, only their last third is used.
     Source: Student, Biometrika 6 (1908); Holm, Scand. J. Statist. 6 (1979). Raises BadInput for too little data.
     """
     run = one_run(data)
@@ -126,10 +126,12 @@ def simulated(recording: Recording, axis: str, model: AnyModel) -> Recording:
 
 
 def frequency_sentence(line: ModelCheck, where: Comparison) -> str:
-    """The check in words, and what it cannot see."""
+    """The check in words, and its limits."""
     text = f"in frequency: residual {told(line.rms_sigma)} sigma rms, at worst {told(line.worst_sigma)} at {line.worst_hz:.4g} Hz"
     hidden = line.rms_sigma <= AT_THE_FLOOR and where.error_below_end > TWICE * where.floor_below_end
-    return text + (": what fails does not repeat with the input, so a frequency response takes it for noise (friction does that)." if hidden else ".")
+    return text + (
+        ": the error does not repeat with the input, so the frequency response treats it as noise (friction does this)." if hidden else "."
+    )
 
 
 def held(run: Run) -> int:

@@ -1,4 +1,4 @@
-"""An axis with physical effects as a model to be judged, drawn and saved like any other."""
+"""A model of an axis with physical effects, which can be compared, drawn and saved like a linear model."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from xy_sysid.units import USUAL, Units, moved
 
 @dataclass(frozen=True, slots=True)
 class PhysicalModel:
-    """A rigid axis with physical effects, and what is known of it.
+    """A rigid axis with physical effects, with its fit and origin.
 
     model: gain, delay, pole and the effects with their values; fit: with intervals and errors, None of a model from a file
     axis:  its name; data: SHA-256 of the samples of each recording that it was fitted to; units: of input and output
     known: its parameters with intervals, of a model from a file
-    sampling_rate: Hz of the recording that it was fitted to; None where nobody knows it
+    sampling_rate: Hz, of the recording that it was fitted to; None if unknown
     """
 
     model: AxisModel
@@ -44,16 +44,16 @@ class PhysicalModel:
 
     @property
     def parameters(self) -> tuple[Estimate, ...]:
-        """gain, delay, pole, then ``effect.parameter``, with 95 % intervals; empty where nobody knows these (``model.values()`` has the values)."""
+        """gain, delay, pole, then ``effect.parameter``, with 95 % intervals; empty if these are unknown (``model.values()`` has the values)."""
         return self.fit.parameters if self.fit is not None else self.known
 
     @property
     def doubt(self) -> str:
-        """What speaks against judging the model by its free simulation; empty if nothing does."""
+        """Why the model cannot be judged by its free simulation; empty if it can."""
         names = [name for name in self.effects if not self.model.library[name].simulable]
         if not names:
             return ""
-        return f"no free simulation can follow {' and '.join(names)} (the contact is chaotic): the error says little about the model"
+        return f"a free simulation cannot follow {' and '.join(names)} (the contact is chaotic), so this error says little about the model"
 
     @property
     def label(self) -> str:
@@ -62,14 +62,14 @@ class PhysicalModel:
 
     @property
     def table(self) -> Table:
-        """Each parameter with its 95 % interval; without intervals of a model from a file."""
+        """Each parameter with its 95 % interval; without intervals for a model from a file."""
         if self.fit is None:
             rows = [(name, value, None, None, "") for name, value in self.model.values().items()]
             return Table(("parameter", "value", "from", "to", "unit"), tuple(rows))
         return parameter_table(self.parameters)
 
     def __str__(self) -> str:
-        """What it is made of, the formula of its linear part, and the table of the parameters."""
+        """Its effects, the formula of its linear part, and the table of the parameters."""
         return "\n\n".join((repr(self)[1:-1], f"linear part:\n{self.tf}", str(self.table)))
 
     def velocity(self, sampling_rate: float, voltage: FloatArray, position: FloatArray) -> FloatArray:

@@ -1,7 +1,7 @@
-"""Is what a model leaves noise? The autocorrelation of the residual, and its cross-correlation with the input.
+"""Is the residual error noise? Its autocorrelation, and its cross-correlation with the input.
 
-Ljung, System Identification, 2nd ed., sec. 16.6: a model that misses nothing leaves a residual that does not go with past inputs.
-The bounds are those of residual and input that have nothing to do with each other, each with its own colour (Bartlett, J. R. Stat.
+Ljung, System Identification, 2nd ed., sec. 16.6: the residual of a complete model does not correlate with past inputs.
+The bounds are those of a residual and an input that are unrelated, each with its own spectrum (Bartlett, J. R. Stat.
 Soc. Suppl. 8, 1946), so that an encoder's noise, which alternates from sample to sample, does not count as a fault of the model.
 """
 
@@ -24,9 +24,9 @@ COLOUR = 20  # part of the record up to which lags count for the bounds
 class ResidualCorrelation:
     """Correlations of a residual.
 
-    lag:    (m,) samples, from 0; autocorrelation: (m,), 1 at lag 0; white: 95 % of it stays below for a white residual
-    shift:  (2 m - 1,) samples by which the residual comes after the input (below 0: before it, as only feedback can bring about)
-    cross:  (2 m - 1,) correlation of input and residual, -1..1; unrelated: 95 % of it stays below where they are not related
+    lag:    (m,) samples, from 0; autocorrelation: (m,), 1 at lag 0; white: bound of 95 % of it for a white residual
+    shift:  (2 m - 1,) samples by which the residual comes after the input (below 0: before it, which only feedback can cause)
+    cross:  (2 m - 1,) correlation of input and residual, -1..1; unrelated: bound of 95 % of it for unrelated signals
     """
 
     lag: FloatArray
@@ -38,7 +38,7 @@ class ResidualCorrelation:
 
     @property
     def outside(self) -> float:
-        """Part of the shifts from 0 on at which the residual goes with the input: 0.05 by chance."""
+        """Part of the shifts from 0 on at which the residual correlates with the input: 0.05 by chance."""
         return float(np.mean(np.abs(self.cross[self.shift >= 0]) > self.unrelated))
 
 
@@ -48,7 +48,7 @@ def residual_correlation(residual: FloatArray, voltage: FloatArray, lags: int = 
     Raises BadInput if the lengths differ, there are fewer than twenty samples for each lag, or one of them does not move.
     """
     if residual.size != voltage.size:
-        raise BadInput("residual", f"{residual.size} samples", f"{voltage.size}, as many as of the input", "Give both of the same samples.")
+        raise BadInput("residual", f"{residual.size} samples", f"{voltage.size}, as many as of the input", "Give both for the same samples.")
     if residual.size < COLOUR * lags:
         raise BadInput("samples", residual.size, f"at least {COLOUR * lags} for {lags} lags", "Record longer or ask for fewer lags.")
     far = residual.size // COLOUR

@@ -1,7 +1,7 @@
-"""Where does a model fail? The velocity error on data that no fit saw, against the floor that the data allow.
+"""Where does a model fail? The velocity error on held-out data, compared with the noise floor.
 
 By frequency, speed, direction of motion, position (once or repeating), amplitude of the input, and time: each place with its
-size in multiples of the noise floor.
+error in multiples of the noise floor.
 
 The noise floor is the smallest error that the data can show: the encoder's noise, together with the part of the motion to which
 laws are trusted (EPSILON). It is the floor by which a fit is judged. The error over the floor is one number for the whole recording; the
@@ -30,7 +30,7 @@ PlaceKind = Literal["frequency", "speed", "direction", "position", "amplitude", 
 SKIP = 0.5  # s at the start, in which the simulation forgets that it started from rest; a fifth of a short run
 SHORTEST_RUN = 600  # samples
 WINDOWS = 7  # window lengths that the samples hold at least
-TWICE = 2.0  # times the floor from which a place is worth a word
+TWICE = 2.0  # times the floor from which a place is reported
 STANDS_OUT = 1.3  # times the whole error that a bin must reach to be a place of its own
 SPEED_BINS, POSITION_BINS, AMPLITUDE_BINS, TIME_BINS = 10, 24, 6, 10
 UNEVEN = 0.3  # of the whole error that the two directions must differ by
@@ -82,9 +82,9 @@ class Comparison:
 
     @property
     def sentence(self) -> str:
-        """For people."""
+        """The result in words."""
         if not np.isfinite(self.error):
-            return "the simulated model runs away: it is not stable."
+            return "the simulation diverges: the model is not stable."
         ratio = self.error / self.noise_floor if self.noise_floor > 0 else float("inf")
         if not self.places:
             return f"nothing stands out: the error is {told(ratio, 2)} times the noise floor."
@@ -283,7 +283,7 @@ def _direction(speed: FloatArray, error: FloatArray, noise: float, unit: str) ->
     if difference < TWICE * noise or difference < UNEVEN * float(np.sqrt(np.mean(error**2))):
         return []
     ratio = difference / noise
-    return [_place("direction", (-difference, difference), unit, ratio, f"{told(ratio)} times the floor apart between the two directions of motion")]
+    return [_place("direction", (-difference, difference), unit, ratio, f"{told(ratio)} times the floor between the two directions of motion")]
 
 
 def _periodic(position: FloatArray, error: FloatArray, noise: float, unit: str) -> list[Place]:
@@ -301,4 +301,4 @@ def _periodic(position: FloatArray, error: FloatArray, noise: float, unit: str) 
     if size[best] < 6.0 * float(np.median(size)):
         return []
     period = float(periods[best])
-    return [_place("position", (period, period), unit, ratio, f"{told(ratio)} times the floor repeating every {moved(period, unit)} of position")]
+    return [_place("position", (period, period), unit, ratio, f"{told(ratio)} times the floor, repeating every {moved(period, unit)} of position")]

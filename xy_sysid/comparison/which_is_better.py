@@ -1,6 +1,6 @@
 """Is one model better than another? The errors of both on the same windows of the same unseen data, compared in pairs.
 
-What the excitation happened to do in a window is common to both errors and drops out: a paired t-test (Student 1908) on
+The excitation in a window affects both errors alike and cancels: a paired t-test (Student 1908) on
 ln(error after / error before), whole and by band of frequency (Holm 1979 for the many bands).
 """
 
@@ -22,7 +22,7 @@ ABOVE = 1.2  # times the floor's power that one of the two errors must have for 
 SKIP = 0.5  # s at the start, in which a simulation forgets that it started from rest
 WANTED, FEWEST = 10, 5  # windows side by side
 LEVEL = 0.05  # chance of a false "better" or "worse"
-WORTH = 0.02  # relative change of the error below which nobody cares
+WORTH = 0.02  # relative change of the error that is negligible
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +41,7 @@ class Paired:
 
     windows: side by side; before, after, noise_floor: rms error up to ``top`` Hz, in ``unit``
     ratio, low, high: after over before, geometric mean over the windows, with its 95 % interval; t, p: of the paired test
-    bands: every band; better: None if the test cannot tell, or the change is not worth a word
+    bands: every band; better: None if the test does not decide, or the change is negligible
     """
 
     windows: int
@@ -80,7 +80,7 @@ class Paired:
 
     @property
     def sentence(self) -> str:
-        """For people."""
+        """The result in words."""
         word = {True: "better", False: "worse", None: "no different"}[self.better]
         figures = f"{moved(self.before, self.unit)} before, {bare(self.after, self.unit)} after (floor {bare(self.noise_floor, self.unit)})"
         test = f"{self.ratio:.3g} times the error, 95 % interval {self.low:.3g} to {self.high:.3g}, t = {self.t:.3g} over {self.windows} windows"

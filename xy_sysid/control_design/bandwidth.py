@@ -1,7 +1,7 @@
-"""What limits the bandwidth of a loop: what each part of the axis costs, and what a filter in the loop gains.
+"""The limits of the bandwidth: the cost of each part of the axis, and the gain by a filter in the loop.
 
-A part is left out and the loop is designed again: the crossover that it then reaches is what the part costs. The same question is asked of a
-notch and of a low-pass: a filter is worth its place where the loop reaches a higher crossover with it, for every sample of the parameters.
+A part is left out and the loop is designed again: the crossover that it then reaches shows the cost of the part. A notch and a low-pass are
+judged in the same way: a filter is used if the loop reaches a higher crossover with it, for every sample of the parameters.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ UNCERTAIN, HOLD, CALCULATION = "uncertainty of the parameters", "sampling and ho
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """A part of the axis. phase: degrees that it takes at the crossover; without: Hz, crossover of a loop without it (NaN: not known)."""
+    """The cost of a part of the axis. phase: its phase lag at the crossover, degrees; without: Hz, crossover of a loop without it (NaN: unknown)."""
 
     part: str
     phase: float
@@ -37,14 +37,14 @@ class Cost:
 
 @dataclass(frozen=True, slots=True)
 class Bandwidth:
-    """crossover: Hz, the highest with the margins; costs: of each part, that which costs most first."""
+    """crossover: Hz, the highest with the margins; costs: of each part, the largest first."""
 
     crossover: float
     costs: tuple[Cost, ...]
 
 
 def bandwidth_of(model: PhysicalModel, sampling_rate: float, at: float, asked: Asked = USUAL, calculation: float = 0.0) -> Bandwidth:
-    """The highest crossover with the margins, and what each part costs.
+    """The highest crossover with the margins, and the cost of each part.
 
     at: Hz, the crossover at which phases are counted; calculation: s, delay of the controller, which is added to that of the model
 

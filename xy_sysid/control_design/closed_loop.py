@@ -58,10 +58,10 @@ class Encoder:
 
 @dataclass(frozen=True, slots=True)
 class Tracked:
-    """What a simulated axis did.
+    """The motion of a simulated axis.
 
-    position: (n,) what the encoder would show without noise, m; shown: (n,) what it shows; voltage: (n,) V; error: (n,) path - position
-    carried: (n,) where what the axis carries truly is, m: without the scale's error, and behind the gap if there is one
+    position: (n,) reading of the encoder without noise, m; shown: (n,) with noise; voltage: (n,) V; error: (n,) path - position
+    carried: (n,) true position of the load, m: without the scale's error, and behind the gap if there is one
     """
 
     position: FloatArray
@@ -72,7 +72,7 @@ class Tracked:
 
     @property
     def rms(self) -> float:
-        """Tracking error, m rms; infinite where the loop ran away."""
+        """Tracking error, m rms; infinite if the simulation diverged."""
         value = float(np.sqrt(np.mean(self.error**2)))
         return value if np.isfinite(value) else float("inf")
 
@@ -142,9 +142,9 @@ def follow_path(
 
 
 def shake(model: AxisModel, place: float, sampling_rate: float, controller: Controller, encoder: Encoder) -> float:
-    """Mean absolute speed, m/s, that the encoder's noise gives the axis through its controller while it is asked to rest at a place, m.
+    """Mean absolute speed, m/s, that encoder noise causes through the controller while the axis should rest at a position, m.
 
-    Presliding friction (LuGre) forgets by this motion: with z' = v - |v| z / length, noise of mean 0 leaves z' = -mean(|v|) z / length.
+    Presliding friction (LuGre) relaxes by this motion: with z' = v - |v| z / length, noise of mean 0 leaves z' = -mean(|v|) z / length.
     """
     count = round(RESTS * sampling_rate)
     rest = SampledPath(sampling_rate, np.full(count, place), np.zeros(count), np.zeros(count))

@@ -1,12 +1,12 @@
-"""Which laws of a model are worth undoing along a path: those that help in simulation, for every sample of the model's parameters.
+"""Which laws of a model the feedforward should compensate along a path: those that help in simulation, for every sample of the parameters.
 
-The whole feedforward undoes every law. Where a parameter is known badly, where the feedback answers a sudden voltage worse than a slow force, or
-where a load presses one flank of a gap, undoing a law does harm. So each sample of the parameters follows the path in simulation, under the
-controller that will be used. A law is left out if the worst sample follows better without it. If kS, kV and kA do better for any sample, they are
-all that is used; as they are where a law was stretched to its bound.
+The complete feedforward inverts every law. This does harm if a parameter is uncertain, if the feedback reacts to a sudden voltage worse than to a
+slow force, or if a load presses one flank of a gap. So each sample of the parameters follows the path in simulation, with the controller that will
+be used. A law is left out if the worst sample has a smaller error without it. If kS, kV and kA are better for any sample, only these are used;
+also if a parameter of a law is at its bound.
 
-Samples are of the parameters' intervals, and of laws that data cannot distinguish (``Effect.sum_of``): friction that differs between the directions
-may be friction and a load.
+The samples cover the parameters' intervals, and laws that data cannot distinguish (``Effect.sum_of``): friction that differs between the directions
+may be friction with a load.
 """
 
 from __future__ import annotations
@@ -38,11 +38,11 @@ SIMPLE = "kS kV kA"
 class Compensation:
     """How a path is followed.
 
-    path: what the encoder is asked to show; voltage: (n,) V, added to the feedback
-    terms: laws that are undone; left: (law, why) of those that are not
-    feedback, simple, chosen: tracking error of the worst sample of the parameters, m rms: alone, with kS kV kA, with what was chosen
+    path: the path in encoder readings; voltage: (n,) V, added to the feedback
+    terms: compensated laws; left: (law, why) of the others
+    feedback, simple, chosen: tracking error of the worst sample of the parameters, m rms: feedback alone, with kS kV kA, with the chosen compensation
     centre: the same three of the model itself; largest: V, that any sample's drive gives
-    inverse: the model with the laws that are undone, of which ``voltage`` is the feedforward; None with kS, kV and kA
+    inverse: the model with the compensated laws, whose feedforward is ``voltage``; None with kS, kV and kA
     """
 
     path: SampledPath
@@ -85,7 +85,7 @@ class _Tried:
 
 
 def asked_of_encoder(model: AxisModel, path: SampledPath, terms: Sequence[str]) -> SampledPath:
-    """What the encoder has to show so that what the axis carries is on the path: with the scale's error, and half of a gap towards the flank.
+    """The encoder readings for which the load is on the path: with the scale's error, and half of a gap towards the flank.
 
     terms: effects that are corrected
     """
@@ -102,7 +102,7 @@ def asked_of_encoder(model: AxisModel, path: SampledPath, terms: Sequence[str]) 
 
 
 def _flank(model: AxisModel, path: SampledPath, rub: float) -> FloatArray:
-    """(n,) the flank of a gap that pushes what the axis carries: 1 forth, -1 back, 0 where that is not known.
+    """(n,) the flank of a gap that is in contact: 1 forth, -1 back, 0 where that is unknown.
 
     Dry friction (``rub``, V, of what is carried) keeps it at the flank behind it. A load keeps it at one flank for good where it is larger than that
     friction, if it acts behind the gap; no encoder at the motor says on which side it acts. So the flank is known where both agree.
@@ -136,7 +136,7 @@ def alike(model: AxisModel, sampling_rate: float) -> tuple[AxisModel, ...]:
 
 
 def _without_breakaway(model: AxisModel, sampling_rate: float) -> AxisModel:
-    """The model with Coulomb friction in place of a friction whose breakaway has gone at the speed that it gives the axis within one sample."""
+    """The model with Coulomb friction in place of a friction whose breakaway is over within one sample."""
     for effect, values in of_category(model, "friction"):
         words = {"direction": 1.0}
         level_alone = [other.name for other in model.library.acting if other.is_dry and other.family == effect.family and len(other.parameters) == 1]
@@ -150,9 +150,9 @@ def _without_breakaway(model: AxisModel, sampling_rate: float) -> AxisModel:
 
 
 def at_its_bound(model: AxisModel) -> str:
-    """The first share or ratio that ended at the largest or smallest that its law takes, other than 0; empty if none did.
+    """The first share or ratio that ended at a bound of its law other than 0; empty if none did.
 
-    The data ask for more than the law can give. What was fitted together with it has taken up the rest, and is not to be trusted either.
+    The data exceed what the law can represent. Parameters that were fitted together with it compensate the rest, and are unreliable, too.
     """
     for name, values in model.effects:
         for item, value in zip(model.library[name].parameters, values, strict=True):
@@ -162,7 +162,7 @@ def at_its_bound(model: AxisModel) -> str:
 
 
 def compensate(models: Sequence[AxisModel], found: Gains, path: SampledPath, controller: Controller, encoder: Encoder | None = None) -> Compensation:
-    """The laws of the first model that are worth undoing along the path.
+    """The laws of the first model whose compensation helps along the path.
 
     models: the model and samples of its parameters (``uncertain.samples``); encoder: with its noise presliding friction creeps while the axis rests
     """
@@ -188,7 +188,7 @@ def compensate(models: Sequence[AxisModel], found: Gains, path: SampledPath, con
     simple = judged((), path, simple_feedforward(found, path))
     stretched = at_its_bound(models[0])
     better = "they are better than the whole feedforward for a sample of the parameters"
-    reason = f"{stretched} is at its bound, so that another law acts" if stretched else better
+    reason = f"{stretched} is at its bound, so another law probably acts" if stretched else better
     best, left = simple, tuple((name, reason) for name, _ in models[0].effects)
     for model in (models[0], *others) if not stretched else ():
         whole, gone = _worth_undoing(model, undoing(model), simple)
@@ -226,7 +226,7 @@ def compensate_within(
 
 
 def _worth_undoing(model: AxisModel, undoing: Callable[[tuple[str, ...]], _Tried], simple: _Tried) -> tuple[_Tried, tuple[str, ...]]:
-    """The best choice of a model's laws, and those that it leaves: one after another goes as long as the worst sample gains by it."""
+    """The best choice of a model's laws, and those that are left out: laws are removed one by one as long as the worst sample improves."""
     best = undoing(tuple(name for name, _ in model.effects))
     gone: tuple[str, ...] = ()
     while best.terms:

@@ -1,4 +1,4 @@
-"""Targets to which a used model can be written: name -> files by name. Each target says what it cannot."""
+"""Targets to which a model can be exported: name -> files by name. Each target names what it cannot represent."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from xy_sysid.settings import unknown_name
 
 @dataclass(frozen=True, slots=True)
 class Exported:
-    """What a target gets.
+    """The output for a target.
 
-    files: text by name; note: what the target cannot say, or how the text is used
+    files: text by name; note: what the target cannot represent, or how the text is used
     archive: the name of a functional mock-up unit into which the files are packed; mat: name of a .mat file -> its variables
     """
 
@@ -60,7 +60,7 @@ def _program(used: Used) -> tuple[Program, str, str]:
 
 
 def _inverse_note(used: Used) -> str:
-    """What the exported feedforward undoes, and whether to use it."""
+    """The laws that the exported feedforward compensates, and whether to use it."""
     chosen = used.compensation
     if chosen is None:
         return "the feedforward undoes every law of the model; no path was simulated with it"

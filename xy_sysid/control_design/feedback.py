@@ -49,7 +49,7 @@ class Margins:
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """What a loop is asked for. phase: degrees; gain: times, upwards; bandwidth: crossover, Hz (None: the largest). Raises BadInput."""
+    """The requirements of a loop. phase: degrees; gain: times, upwards; bandwidth: crossover, Hz (None: the largest). Raises BadInput."""
 
     phase: float = PHASE_MARGIN
     gain: float = GAIN_MARGIN
@@ -70,7 +70,7 @@ class Asked:
         return [self.bandwidth]
 
     def refused(self, what: str, worst: Margins) -> BadInput:
-        """What to raise where no bandwidth has the margins; worst: margins of the last one."""
+        """The error if no bandwidth has the margins; worst: margins of the last one."""
         said = f"phase margin {worst.phase:.3g} degrees and gain margin {worst.gain:.3g}" if worst.stable else "unstable"
         given = f"{self.bandwidth:g} Hz" if self.bandwidth is not None else "any"
         return BadInput(what, f"{given}: {said}", f"at least {self.phase:g} degrees and {self.gain:g}", ADVICE)
@@ -85,7 +85,7 @@ USUAL = Asked()
 
 @dataclass(frozen=True, slots=True)
 class Feedback:
-    """A controller with what it is worth.
+    """A controller with its margins.
 
     controller: as ``closed_loop`` runs it; sampling_rate: Hz; crossover: rad/s asked for
     asked: margins that were asked for; nominal, worst: those of the model, and the least of each over the samples; count: of these
@@ -230,7 +230,7 @@ def loop_systems(model: PhysicalModel, sampling_rate: float) -> list[Sampled]:
 def first_kept(
     what: str, asked: Asked, systems: Sequence[Sampled], tried: Iterable[ToTry], of: Callable[[Sampled, ToTry], Margins]
 ) -> tuple[ToTry, Margins, Margins]:
-    """The first controller that keeps the margins with every system, those of the first system, and the least.
+    """The first controller that keeps the margins with every system; the margins with the first system, and the least.
 
     of: margins of a system under a controller. Raises BadInput with the margins of the last one where none keeps them.
     """

@@ -1,4 +1,4 @@
-"""For the resonances that were found: a notch in the loop, and input shapers for the path, by the names that Klipper's users know.
+"""Filters for the resonances of a model: a notch in the loop, and input shapers for the path, with Klipper's names.
 
 A drive that holds the encoder's side leaves what hangs on it free to swing at the antiresonance: that is the frequency to shape. The loop meets the
 resonance: that is the frequency to notch.
@@ -101,8 +101,8 @@ def modes(model: PhysicalModel) -> tuple[Swing, ...]:
     found = []
     for k, (zero, pole) in enumerate(zip(zeros, poles, strict=True)):
         if zero[1] < 1.0 and pole[1] < 1.0:
-            held = derive(model, "held mode", "Hz", "swings while the encoder's side is held (antiresonance)", _frequency(0, k))
-            free = derive(model, "free mode", "Hz", "swings with the free axis (resonance)", _frequency(1, k))
+            held = derive(model, "held mode", "Hz", "oscillates while the encoder's side is held (antiresonance)", _frequency(0, k))
+            free = derive(model, "free mode", "Hz", "oscillates with the free axis (resonance)", _frequency(1, k))
             found.append(Swing(held=held, held_damping=zero[1], free=free, free_damping=pole[1]))
     return tuple(found)
 

@@ -19,7 +19,7 @@ from xy_sysid.control_design.path import SampledPath
 from xy_sysid.control_design.uncertain import Derived, derive, is_determined, is_known_angle
 from xy_sysid.samples.block import FloatArray
 
-USUAL_SPEED = 1.0  # V of the steady state whose speed is usual, where nobody says another
+USUAL_SPEED = 1.0  # V of the steady state that defines the usual speed, by default
 ARM, ANGLE = "kCos", "zero"  # names of the gain of an arm, and of the angle at which it is level
 
 
@@ -45,7 +45,7 @@ class Gains:
 
     @property
     def doubt(self) -> str:
-        """Says of exported numbers which of them are 0 for want of better ones; empty if none is."""
+        """Names the exported numbers that are 0 because the data do not determine them; empty if none is."""
         return f"0 stands for {', '.join(self.unsure)}, which the data do not determine" if self.unsure else ""
 
 

@@ -1,4 +1,4 @@
-"""The feedforward of a refined model along a path: the voltage that brings the axis where it is wanted, as far as laws can be undone."""
+"""The feedforward of a refined model along a path: the voltage that makes the axis follow it, as far as laws can be inverted."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ HALF = 0.5  # of a sample: by which a held voltage acts late in the mean
 
 @dataclass(frozen=True, slots=True)
 class Feedforward:
-    """voltage: (n,) V to be held from each sample of the path; ahead: s by which the path is looked at ahead; not_undone: effects, and why."""
+    """voltage: (n,) V to be held from each sample of the path; ahead: s, preview of the path; not_undone: effects that are not inverted, and why."""
 
     voltage: FloatArray
     ahead: float
@@ -78,14 +78,14 @@ def ahead_of(model: AxisModel, sampling_rate: float) -> float:
 
 
 def not_undone(model: AxisModel) -> tuple[tuple[str, str], ...]:
-    """Effects that the feedforward leaves, and why."""
+    """Effects that the feedforward does not compensate, and why."""
     found = []
     for name, values in model.effects:
         effect = model.library[name]
         if any("t" in arguments(item) for item in effect.functions.values()):
-            found.append((name, "it changes with time, which a path does not know"))
+            found.append((name, "it changes with time, so it is not known ahead"))
         elif effect.category == "state" and lag_of(effect, values) is None:
-            found.append((name, "no voltage undoes it: see the correction by direction"))
+            found.append((name, "no voltage can cancel it: see the correction by direction"))
     return tuple(found)
 
 

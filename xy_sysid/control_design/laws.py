@@ -1,4 +1,4 @@
-"""What a refined model pushes against the drive, by speed and place: the same laws as in its simulation, asked one by one."""
+"""Forces of a refined model against the drive by speed and position: the laws of its simulation, evaluated one by one."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ LONG = 1e3  # s: after so long at a constant speed bristles slide
 
 
 def ask(effect: Effect, values: tuple[float, ...], function: str, words: Mapping[str, float]) -> float:
-    """The value of a law; words: what it may ask for beside its parameters."""
+    """The value of a law; words: its arguments besides parameters."""
     known = {**words, **dict(zip(effect.names, values, strict=True))}
     law = effect.functions[function]
     return float(law(**{name: known[name] for name in arguments(law)}))
@@ -30,7 +30,7 @@ def of_category(model: AxisModel, *categories: str) -> Iterator[tuple[Effect, tu
 
 
 def asks(effect: Effect) -> frozenset[str]:
-    """What the laws of an effect ask for beside its parameters."""
+    """The arguments of the laws of an effect, besides parameters."""
     return frozenset(word for item in effect.functions.values() for word in arguments(item)) - set(effect.names) - set(effect.states)
 
 
@@ -64,14 +64,14 @@ def force(model: AxisModel, speed: float, place: float, *, of_speed: bool | None
 
 
 def scale_error(model: AxisModel, place: float) -> float:
-    """What the encoder shows too much at a place, m; 0 at 0."""
+    """Error of the encoder reading at a position, m; 0 at 0."""
     return sum(
         ask(effect, values, "error", {"x": place}) - ask(effect, values, "error", {"x": 0.0}) for effect, values in of_category(model, "encoder")
     )
 
 
 def gain_factor(model: AxisModel, place: float) -> float:
-    """What the voltage's effect is multiplied by at a place, with the axis at rest."""
+    """Factor of the voltage at a position, with the axis at rest."""
     lost = 0.0
     for effect, values in of_category(model, "force"):
         if "u" in asks(effect):

@@ -1,4 +1,4 @@
-"""How fast an axis can go from place to place before its drive is at the limit: the whole feedforward along the path says so."""
+"""The fastest motion between two positions within the limit of the drive, from the complete feedforward along the path."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""The force by position that a model leaves, as a table measured on a recording: a correction for what no law of the model explains.
+"""A table, measured on a recording, of the force by position that the model does not explain.
 
-A ball screw has cogging of many periods, and a cable pulls in its own way: what a law does not say, a table can. The recorded input that the model
-does not predict is taken as a function of the position, linear between places. How dense the places are, and whether there is a table at all,
-cross-validation decides: a table of one half of the recording is judged on the other half.
+A ball screw has cogging of many periods, and a cable pulls in its own way; a table can represent such forces without a law. The recorded input
+that the model does not predict is averaged as a function of position, linear between places. Cross-validation decides the distance of the places,
+and whether there is a table: the table of one half of the recording is judged on the other half.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class MeasuredTable:
     """at: (k,) places, m, evenly spaced; value: (k,) V to be added there; error: (k,) its standard error, V.
 
     parts: (2, k) the tables of the first and of the second half of the recording
-    before, after: V rms of the input that the model leaves, and with the table of the other half of the recording
+    before, after: V rms of the unexplained input, without and with the table of the other half of the recording
     """
 
     at: FloatArray
@@ -67,7 +67,7 @@ class MeasuredTable:
 
 
 def measured_table(model: PhysicalModel, run: Run, below: float) -> MeasuredTable | None:
-    """The force by position that the model leaves of a run's input; None where no table gains more than ``SURE`` of its standard errors.
+    """The unexplained input of a run by position, as a table; None if no table gains more than ``SURE`` of its standard errors.
 
     below: Hz of the motion that is used. Raises BadInput where the run is too short.
     """

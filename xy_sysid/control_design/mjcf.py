@@ -1,4 +1,4 @@
-"""A refined model in MuJoCo's language (MJCF of MuJoCo 4), effect by effect; what it cannot say is named.
+"""A refined model as MJCF (MuJoCo 4), effect by effect; effects that MJCF cannot represent are named.
 
 Forces are in the unit of the input: the mass is kA, the damping kV. A resonance becomes a mass on a spring behind the joint. Cogging and bristles are
 motors without a constant (``dcmotor``), whose friction and cogging MuJoCo knows.
@@ -58,7 +58,7 @@ def mjcf(model: AxisModel, sampling_rate: float, angular: bool = False, name: st
     lag = _state(model, said)
     limit = _inputs(model, said)
     for effect, _ in of_category(model, "encoder"):
-        said.lost.append((effect.name, "the joint's position is where the axis is, not what a scale shows"))
+        said.lost.append((effect.name, "the joint's position is the true one, without the error of the scale"))
     mass, drag, hung = _bodies(model, said)
     kind = 'type="hinge" axis="0 0 1"' if angular else 'type="slide" axis="1 0 0"'
     behind, tendon = _behind(hung, name, kind)
@@ -122,11 +122,11 @@ def _forces(model: AxisModel, said: Said) -> None:
     for effect, values in of_category(model, "force"):
         words = asks(effect)
         if "u" in words:
-            said.lost.append((effect.name, "a motor constant that changes with the place"))
+            said.lost.append((effect.name, "a motor constant that changes with position"))
         elif "v" in words and not words & {"x", "direction"} and _square(effect, values, model, said):
             continue
         elif "v" in words:
-            said.lost.append((effect.name, "drag that depends on direction or place; its mean is kept"))
+            said.lost.append((effect.name, "drag that depends on direction or position; its mean is kept"))
         elif "t" in words:
             said.lost.append((effect.name, "it changes with time"))
         elif not _wave(effect, values, model, said):
@@ -171,7 +171,7 @@ def _power(effect: Effect, values: tuple[float, ...], model: AxisModel, said: Sa
     forces = np.array([ask(effect, values, "force", {"x": float(x), "gain": model.gain, "pole": model.pole}) for x in places])
     found = np.polynomial.polynomial.polyfit(places, forces, 3)
     if np.max(np.abs(np.polynomial.polynomial.polyval(places, found) - forces)) > EXACT * np.max(np.abs(forces)):
-        said.lost.append((effect.name, "its force is no wave and no polynomial of the third order"))
+        said.lost.append((effect.name, "its force is neither a sine nor a polynomial of third order"))
     else:
         said.polynomial += found
 
@@ -210,7 +210,7 @@ def _friction(model: AxisModel, said: Said) -> float | tuple[float, ...]:
         stiffness = ask(effect, values, "force", own)
         damping = ask(effect, values, "force", {**own, effect.states[0]: 0.0, "v": 1.0})
         return stiffness, damping, level, rest, speed
-    said.lost += [(effect.name, "its hold before it slides: bristles of 1 um stand for it") for effect, _ in plain]
+    said.lost += [(effect.name, "its breakaway before sliding: bristles of 1 um approximate it") for effect, _ in plain]
     stiffness = level / SHORT
     return stiffness, CRITICAL * math.sqrt(stiffness / (abs(model.gain) * model.pole)), level, rest, speed
 
@@ -232,7 +232,7 @@ def _state(model: AxisModel, said: Said) -> float | None:
     for effect, values in of_category(model, "state"):
         found = lag_of(effect, values)
         if found is None or lag is not None:
-            said.lost.append((effect.name, "a state between input and force that is no first-order lag"))
+            said.lost.append((effect.name, "a state between input and force that is not a first-order lag"))
         else:
             lag = found
     return lag
@@ -243,7 +243,7 @@ def _inputs(model: AxisModel, said: Said) -> float:
     for effect, values in of_category(model, "input"):
         small = 1e-3 * min(limit, 1.0)
         if "t" in asks(effect) or not math.isclose(ask(effect, values, "output", {"u": small, "x": 0.0}), small, rel_tol=1e-9):
-            said.lost.append((effect.name, "what an amplifier does to small inputs, or over time"))
+            said.lost.append((effect.name, "the response of the amplifier to small inputs, or its change over time"))
     return limit
 
 

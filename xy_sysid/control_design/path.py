@@ -115,7 +115,7 @@ def of_position(position: FloatArray, sampling_rate: float) -> SampledPath:
 
 
 def recorded(position: FloatArray, sampling_rate: float, below: float) -> SampledPath:
-    """What a measured position (n,), m, does below a frequency, Hz, without delay. Raises BadInput where the recording is too short."""
+    """The measured position (n,), m, below a frequency, Hz, filtered without delay. Raises BadInput where the recording is too short."""
     top = 0.45 * sampling_rate
     if position.size < 64:
         raise BadInput("samples of the recording", f"{position.size}", "64 or more", "Give a longer one.")

@@ -1,4 +1,4 @@
-"""A refined model that is moved sample by sample, as a controller needs it: its generator, its numbers, its state."""
+"""A refined model simulated sample by sample, as a controller needs it: its generator, its numbers, its state."""
 
 from __future__ import annotations
 

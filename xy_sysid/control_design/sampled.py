@@ -1,4 +1,4 @@
-"""The linear part of a model as a computer sees it: held input, delay of any length, one sample after another; exactly.
+"""The exact sampled linear part of a model, with held input and a delay of any length.
 
 Source: Astrom & Wittenmark, Computer-Controlled Systems, 3rd ed., Prentice Hall 1997, sec. 2.3 (sampling of systems with a time delay).
 """

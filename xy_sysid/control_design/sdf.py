@@ -14,14 +14,14 @@ from xy_sysid.control_design.laws import along, asks, friction, largest_voltage
 from xy_sysid.effects._contract import Effect
 
 PLACES = 101  # at which a spring is asked whether it is straight
-ANYWHERE = -1.0, 1.0  # m or rad, where a spring is looked at if nobody knows the travel
+ANYWHERE = -1.0, 1.0  # m or rad, range for a spring if the travel is unknown
 STRAIGHT = 1e-6  # of its force at the end of the travel: a spring that bends less is one number
 
 
 def sdf(
     model: AxisModel, travel: tuple[float, float] | None, limit: float, angular: bool, name: str = "axis"
 ) -> tuple[str, tuple[tuple[str, str], ...]]:
-    """(text, what is lost by effect); travel: m or rad, None where nobody knows it; limit: of the drive, infinite if nobody knows it."""
+    """(text, what is lost by effect); travel: m or rad, None if unknown; limit: of the drive, infinite if unknown."""
     level = 0.5 * (friction(model, abs(model.gain), 1.0) + friction(model, -abs(model.gain), -1.0))
     places = np.linspace(*(travel or ANYWHERE), PLACES)
     pull = along(model, places, "force") * math.copysign(1.0, model.gain)
@@ -30,7 +30,7 @@ def sdf(
     straight = reach > 0.0 and stiffness > 0.0 and float(np.max(np.abs(stiffness * places + offset - pull))) <= STRAIGHT * reach
     lost = [(effect, _lost(model.library[effect])) for effect, _ in model.effects if not (straight and _spring(model.library[effect]))]
     if model.delay > 0.0:
-        lost.append(("delay", "SDF knows none"))
+        lost.append(("delay", "SDF has none"))
     if travel is None:
         lost.append(("travel", "it is not known"))
     top = min(limit, largest_voltage(model))
@@ -71,4 +71,4 @@ def _spring(effect: Effect) -> bool:
 
 
 def _lost(effect: Effect) -> str:
-    return "only its mean level at speed is kept" if effect.is_dry else "SDF has no word for it"
+    return "only its mean level at speed is kept" if effect.is_dry else "SDF cannot express it"

@@ -1,4 +1,4 @@
-"""The numbers in the words and files of controllers that people use: ros2_control, Klipper, LinuxCNC, ODrive, TwinCAT. One function a target."""
+"""The numbers in the configuration formats of ros2_control, Klipper, LinuxCNC, ODrive and TwinCAT: one function for each target."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ LEAST_GAIN, LEAST_PHASE = 1.7, 35.0  # margin without a filter on the derivative
 class Designed:
     """What a snippet is written from: the axis' name and model, and what was designed for it.
 
-    calculation: periods from reading to writing; speed: m/s, the largest of the fastest path; None where nobody knows the drive's limit
+    calculation: periods from reading to writing; speed: m/s, the largest of the fastest path; None if the limit of the drive is unknown
     """
 
     axis: str
@@ -41,7 +41,7 @@ class Designed:
 
 @dataclass(frozen=True, slots=True)
 class Snippet:
-    """target: its name; file: where the text goes; text: in the target's own syntax; note: what it cannot say."""
+    """target: its name; file: name of the file; text: in the target's own syntax; note: what it cannot represent."""
 
     target: str
     file: str
@@ -246,7 +246,7 @@ def _feedforward(of: Designed, per: float, length: str) -> list[tuple[str, float
 
 
 def _gravity(of: Designed) -> str:
-    """What has to be added for an arm, where the target has no place for it; and which gains are 0 for want of better ones."""
+    """What has to be added for an arm, if the target cannot represent it; and which gains are 0 because the data do not determine them."""
     size, zero = of.gains.value("kCos"), of.gains.value("zero")
     arm = (
         f" It has no kCos: add {size:.4g} {of.units.input} times the cosine of the angle minus {zero:.4g} rad ({zero / DEGREE:.4g} degrees)."

@@ -66,7 +66,7 @@ double {name}_control(double *z, double error, double feedforward)
 
 
 def source(made: StateFeedback, name: str, title: str, limit: float) -> tuple[str, str]:
-    """(C, Python) source; limit: of the drive, in the unit of its input, infinite if nobody knows it."""
+    """(C, Python) source; limit: of the drive, in the unit of its input, infinite if unknown."""
     words = {
         "name": name,
         "title": title,

@@ -123,7 +123,7 @@ class StepText(LawText):
         return [*start, *_filled(FREE, words, parts)] if drags else _filled(PLAIN, words, parts)
 
     def _direction(self) -> list[str]:
-        """Other dry friction beside bristles scales the level at which they slide."""
+        """Other dry friction together with bristles scales the level at which they slide."""
         lines = ["direction = 1.0", f"if v < 0.0 or (v == 0.0 and (push - drag) * {self.numbers['turn']} < 0.0):", "    direction = -1.0"]
         return [*lines, "level = 0.0", *self._levels("v")] if self.of("friction") else ["level = 0.0"]
 

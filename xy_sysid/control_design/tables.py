@@ -1,4 +1,4 @@
-"""Tables to load into a drive: dry friction by speed, and by position the force, the drag, the scale's error; what each leaves."""
+"""Tables for a drive: dry friction by speed; force, drag and scale error by position; and the error that remains with each."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SPEEDS = 13  # in each direction
 
 @dataclass(frozen=True, slots=True)
 class Correction:
-    """What is added to the command, or taken from the encoder, at places or speeds.
+    """A correction table: values to add to the command, or to subtract from the encoder, by position or speed.
 
     name: ``friction``, ``force``, ``drag``, ``gain``, ``scale``, or ``residual`` (measured); at: (n,) places, m, or speeds, m/s
     value, low, high: (n,) with their 95 % intervals
@@ -45,7 +45,7 @@ class Correction:
 
     @property
     def after(self) -> float:
-        """rms that the parameters' uncertainty leaves with it, in ``unit``; that of 1 and not of 2 standard errors."""
+        """rms error with the table, from the uncertainty of the parameters, in ``unit``; for 1 standard error, not 2."""
         return float(np.sqrt(np.mean((0.25 * (self.high - self.low)) ** 2)))
 
     def csv(self) -> str:
@@ -81,7 +81,7 @@ def position_tables(model: PhysicalModel, travel: tuple[float, float]) -> tuple[
         ("force", "V", "add to the command at this position", _has_force),
         ("drag", "V/(m/s)", "add to kV at this position", _has_drag),
         ("gain", "", "divide the command by this at this position", _has_gain),
-        ("scale", "m", "the encoder shows so much too much: subtract it from what is shown, or add it to the position asked for", _has_scale),
+        ("scale", "m", "error of the encoder at this position: subtract it from the reading, or add it to the commanded position", _has_scale),
     )
     found = []
     for name, unit, meaning, has in kinds:

@@ -1,4 +1,4 @@
-"""Numbers that follow from a model's parameters, with what the parameters' intervals make of them.
+"""Numbers derived from the parameters of a model, with intervals from those of the parameters.
 
 Each parameter is moved to both ends of its 95 % interval, one at a time, and the changes add as independent ones do (JCGM 100:2008, sec. 5.1). The
 parameters of a fit are correlated; where their errors cancel, as those of gain and pole do in kA, the interval is wider than it had to be.
@@ -44,7 +44,7 @@ class Derived:
 
     @property
     def doubt(self) -> str:
-        """What speaks against using it; empty if nothing does."""
+        """Why it should not be used; empty if it can be used."""
         if self.determined:
             return ""
         most = self.because[0][0] if self.because else "the parameters, whose intervals are not known"

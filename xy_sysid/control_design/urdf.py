@@ -14,11 +14,11 @@ ENDLESS = 1e16  # m: end of a joint that has none, as URDF asks for one; SDF tak
 def urdf(
     model: AxisModel, travel: tuple[float, float] | None, limit: float, angular: bool, name: str = "axis"
 ) -> tuple[str, tuple[tuple[str, str], ...]]:
-    """(text, what is lost by effect); travel: m or rad, None where nobody knows it; limit: of the drive, infinite if nobody knows it."""
+    """(text, what is lost by effect); travel: m or rad, None if unknown; limit: of the drive, infinite if unknown."""
     level = 0.5 * (friction(model, abs(model.gain), 1.0) + friction(model, -abs(model.gain), -1.0))
     lost = [(effect, _lost(model.library[effect])) for effect, _ in model.effects]
     if model.delay > 0.0:
-        lost.append(("delay", "URDF knows none"))
+        lost.append(("delay", "URDF has none"))
     if travel is None:
         lost.append(("travel", "it is not known"))
     top = min(limit, largest_voltage(model))
@@ -48,4 +48,4 @@ def urdf(
 
 
 def _lost(effect: Effect) -> str:
-    return "only its mean level at speed is kept" if effect.is_dry else "URDF has no word for it"
+    return "only its mean level at speed is kept" if effect.is_dry else "URDF cannot express it"

@@ -1,4 +1,4 @@
-"""One call: everything that an engineer does next with a refined model."""
+"""One call: all results for a controller from a refined model."""
 
 from __future__ import annotations
 
@@ -41,11 +41,11 @@ Found = TypeVar("Found")
 
 @dataclass(frozen=True, slots=True)
 class Used:
-    """What to do with a model; ``axis`` and ``model.units`` say of what.
+    """The results for one axis (``axis``), in the units of the model (``model.units``).
 
-    sampling_rate: Hz of the controller; rate_from: who said so; calculation: its periods from reading the encoder to writing the voltage
-    limit: V of the drive, infinite if nobody knows it; limit_from: who said so
-    travel: m, that tables and paths cover; None where nobody knows it
+    sampling_rate: Hz, of the controller; rate_from: its origin; calculation: controller periods from reading the encoder to writing the voltage
+    limit: V, of the drive, infinite if unknown; limit_from: its origin
+    travel: m, range of tables and paths; None if unknown
     gains, friction, tables, gap: feedforward and corrections (None: the axis has none)
     feedback, states (state feedback with an observer), modes, notch, shapers (of the lowest mode; shaper: the best), fastest: None or none where
     there is nothing to design, or where it was refused
@@ -53,7 +53,7 @@ class Used:
     highest crossover, and that loop; None where none reaches more
     predicted: input of the recording before and after, if there is one; tracking: simulated tracking errors
     compensation: along the first path of ``tracking``; its laws are those that exported source undoes
-    refused: (what, why) of what could not be designed; not_undone: (effect, why) of what the feedforward leaves; notes: to be read first
+    refused: (what, why) of results without a design; not_undone: (effect, why) that the feedforward does not invert; notes: to be read first
     """
 
     axis: str
@@ -107,9 +107,9 @@ def use(
     margins: tuple[float, float] | None = None,
     calculation: float = CALCULATION,
 ) -> Used:
-    """Feedforward with intervals, correction tables, feedback with margins, filters, limits, and what they are worth.
+    """Feedforward with intervals, correction tables, feedback with margins, filters, limits, and the benefit of each.
 
-    model: of ``refine`` or a file; data: a recording of the same machine, for before and after on its own motion, its noise and its limit
+    model: of ``refine`` or a file; data: a recording of the same machine, for a comparison on its own motion, its noise and its limit
     rate: Hz of the controller (that of the recording, or of the one that the model was fitted to)
     limit: V of the drive (the model's saturation, or the recording's largest voltage)
     bandwidth: Hz, asked of the loop (the largest with the margins by default); travel: m, that tables cover (the recording's)

@@ -1,4 +1,4 @@
-"""What a feedforward is worth: the recorded voltage predicted from the recorded motion, and tracking errors with the refined model in the loop."""
+"""The benefit of a feedforward: recorded voltage predicted from recorded motion, and simulated tracking errors with the refined model."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ EDGE = 0.02  # of the recording at each end that a filter without delay spoils
 
 @dataclass(frozen=True, slots=True)
 class Predicted:
-    """The recorded voltage against what the recorded motion asks for.
+    """The recorded voltage compared with the feedforward of the recorded motion.
 
     below: Hz, the part of both that is compared; voltage: rms of what was recorded, V
     rms of the input, V, that a feedforward does not predict. inertia: with kV and kA; simple: with kS and kG too; whole: with every law
@@ -50,7 +50,7 @@ class Tracking:
 
     path: in words; feedback, simple, whole, compensated: alone, with kS, kV and kA, with every law undone, with those that are worth undoing
     worst: of the compensated axis over samples of its parameters; largest: V, the largest voltage of any of them; limit: V
-    undone, left: laws that the compensation undoes, and (law, why) of those that it leaves
+    undone, left: laws that the compensation inverts, and (law, why) of the others
     """
 
     path: str

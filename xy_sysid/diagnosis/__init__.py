@@ -1,13 +1,13 @@
-"""Which effects are missing: the whole way from the data of an axis to the words.
+"""Which effects are missing: from the data of an axis to the sentences of the answer.
 
-answer:     what is found: the rungs, what else was tried, the verdict
+answer:     the result: the steps (rungs), the other sets that were tried, the verdict
 sets:       which laws a set of effects has, and how much it explains
-equal_laws: one law with two names: the likelier, and how likely it is
+equal_laws: effects with equal equations: the more probable one, and its probability
 rungs:      from the fits of a search to its answer
 refine:     search, simpler sets, one-step prediction
-first_set:  a known set that explains the data needs no search
+first_set:  a known set of effects is tried first; if it explains the data, no search is needed
 words:      the sentences of an answer
 as_json:    an answer as a JSON document
-diagnose:   the verdict: which effect is missing, and how sure that is
-of_run:     diagnose and refine of runs, one call each
+diagnose:   the verdict: which effect is missing, with its confidence
+of_run:     diagnose and refine for runs, one call each
 """

@@ -1,6 +1,6 @@
-"""The answer about one axis: its rungs from the rigid base down, what else was tried, and the verdict.
+"""The answer about one axis: its steps (rungs) from the rigid model on, the other sets that were tried, and the verdict.
 
-``refine`` gives one that is not judged, ``diagnose`` judges it. Sentences (``words``), JSON (``as_json``), tables and pictures are functions of it.
+``refine`` returns it without a verdict, ``diagnose`` adds the verdict. Sentences, JSON, tables and pictures are functions of it.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ class Rung:
 
     came, went: effects that were added and removed with it; none of either for the rigid base
     gain, delay, pole, values: the model, and the values of each effect, SI; parameters: the same with 95 % intervals
-    training_error, held_out_error: rms, m/s, of the data of the fit, and of data that no fit saw
+    training_error, held_out_error: rms, m/s, on the fitted and on held-out data
     noise_floor: rms, m/s: the smallest error that the data can show; excess: 0 is at the floor
-    one_step: judged by its prediction of the next sample, as no free simulation can tell
+    one_step: judged by its prediction of the next sample, because a free simulation cannot follow it
     made: the model with its fit; None in another process
     """
 
@@ -121,7 +121,7 @@ class Rung:
 
 @dataclass(frozen=True, slots=True)
 class Tried:
-    """Another set of effects that was tried: one effect alone as a candidate, any set as a rival of the one that was taken.
+    """Another set of effects that was tried: a single effect (candidate), or a rival of the chosen set.
 
     explained: part (0..1) of the base's error power beyond the noise that is gone with it; 0 one step ahead
     doubt: of a rival, the probability (0..1) that it predicts as well as the set that was taken, parameters at their price
@@ -146,7 +146,7 @@ class Tried:
 
 @dataclass(frozen=True, slots=True)
 class LookAlike:
-    """An effect that the named one can be taken for: whether these data tell them apart, and what would."""
+    """A look-alike of the named effect: whether these data distinguish them, and the experiment that would."""
 
     effect: str
     told_apart: bool
@@ -164,7 +164,7 @@ class Answer:
     candidates: single effects on the base, least error first; rivals: other sets, best first
     sizes:    of each effect: error power that it explains, divided by the power that remains
     helps:    the largest part (0..1) of the base's error power beyond the noise that any set explains, named or not
-    kept_out: the refused set that would leave least, if that is less than what the last rung leaves
+    kept_out: the refused set with the smallest error, if that is below the error of the last rung
     refused:  (effects, why they explain nothing); explained: part (0..1) of the base's error power beyond the noise that is gone
     noise, discrepancy: of the held-out error, m/s rms: what the encoder adds, and what no effect explains
     stopped:  the time was up before the search ended by itself

@@ -1,4 +1,4 @@
-"""Which physical effect is missing? A verdict with its evidence, its rivals, what is left, and the experiment that would settle doubt."""
+"""Which physical effect is missing? A verdict with its evidence, its rivals, the residual error, and the experiment that would resolve doubt."""
 
 from __future__ import annotations
 
@@ -161,7 +161,7 @@ def _is_known(low: float, high: float) -> bool:
 def _hidden(left: float, trusted: float) -> float:
     """Part of all sizes that what is left could hide, on a logarithmic scale from what laws are trusted to up to the whole motion.
 
-    left, trusted: parts of the motion. Jeffreys 1946: of a size, nobody knows the order of magnitude.
+    left, trusted: parts of the motion. Prior of Jeffreys 1946: the order of magnitude of a size is unknown.
     """
     return min(max(math.log(max(left, trusted) / trusted) / math.log(1.0 / trusted), 0.0), 1.0)
 

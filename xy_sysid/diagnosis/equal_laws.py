@@ -1,4 +1,4 @@
-"""Effects whose laws are one and the same: no data tell them apart, so the likelier name is said, and how likely it is.
+"""Effects with equal equations: no data distinguish them, so the more probable name is given with its probability.
 
 A base that gives and a screw that gives are the same pole-zero pair to the motor's encoder. What is usual of each (``Parameter.typical``,
 within a factor) tells which it is likely to be: a base is slow and heavy, so that its resonance lies near its antiresonance.
@@ -42,7 +42,7 @@ def _depth(effect: Effect, values: Sequence[float]) -> float:
 
 
 def likely_names(found: Answer, kept: Sequence[str] = ()) -> Answer:
-    """The answer with the likelier name for each effect of its last model that has equals, but for those that somebody gave."""
+    """The answer with the likelier name for each effect of its last model that has equals, except for those that a user gave."""
     library = found.final.model.library
     names: dict[str, str] = {}
     for name, values in found.final.model.effects:

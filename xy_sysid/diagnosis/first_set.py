@@ -1,4 +1,4 @@
-"""A set of effects that is tried first: what earlier recordings of the same axis were explained by.
+"""A set of effects that is tried first: the set that explained earlier recordings of the same axis.
 
 Every search ends where the error of the best set is at the noise floor. If the known set brings it there, and no simpler set does as well, there is
 nothing to search for. Otherwise the search begins as if nothing were known, so that its answer does not depend on the known set.

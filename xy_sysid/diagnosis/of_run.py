@@ -1,4 +1,4 @@
-"""One call each: which effect is missing in a run, or in several of the same axis; and the rungs from the rigid model down."""
+"""Two calls: which effect is missing in a run or several runs of one axis, and the steps from the rigid model to the final one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Add effects, fit them together, and watch the error on held-out data fall: the search, and what it comes to.
+"""The search: effects are added and fitted together, and the held-out error falls; then the answer is assembled.
 
 First sets of effects by simulation, the most promising first; then simpler sets where they do as well. What simulation cannot judge, backlash,
 is tried by one-step prediction against the best simulation with the same freedom: after the first sets, where backlash that explains the

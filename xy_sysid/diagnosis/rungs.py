@@ -163,7 +163,7 @@ def _ordered(library: Library, sizes: Mapping[str, float]) -> tuple[str, ...]:
 
 
 def _kept_out(pool: Pool, base: GreyboxFit, node: Node) -> Tried | None:
-    """The refused set that would leave least, if that is clearly less than the best leaves."""
+    """The refused set with the smallest error, if that is clearly below the error of the best set."""
     nodes = [item for item in pool.nodes.values() if item.refused and item.whole and gain(item.fit, node.fit).is_sure]
     best = max(nodes, key=lambda item: gain(item.fit, node.fit).nats, default=None)
     return None if best is None else _tried(pool, base, best, 0.5)

@@ -1,4 +1,4 @@
-"""The sentences of an answer: its verdict, what each candidate leaves, why the runner-up lost, and what the named effect can be taken for."""
+"""The sentences of an answer: verdict, error with each candidate, why the runner-up lost, and look-alikes of the named effect."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from xy_sysid.units import bare, moved
 
 
 def missing(data: AxisData, found: Answer, unsure: Sequence[str], with_all: float) -> str:
-    """These effects are missing. unsure: effects that may be missing, too; with_all: the confidence if they are named as well."""
+    """These effects are missing. unsure: effects that may also be missing; with_all: the confidence if they are named as well."""
     names, final, unit = found.best, found.final, data.units.judged
     said = f"Missing: {listed(names)}. {'They explain' if len(names) > 1 else 'It explains'} {percent(found.explained)} of the error's power"
     said += f" ({bare(found.base.held_out_error, unit)} -> {moved(final.held_out_error, unit)}). {_left(data, found)}"
@@ -32,54 +32,54 @@ def missing(data: AxisData, found: Answer, unsure: Sequence[str], with_all: floa
 
 
 def nothing_missing(data: AxisData, base: GreyboxFit, input_noise: float | None, hides: float) -> str:
-    """The base suffices. input_noise: rms, that would leave what it leaves, None at the floor; hides: part of the motion that could hide in it."""
+    """Nothing is missing. input_noise: rms of white input noise with the same error, None at the floor; hides: least visible part of the motion."""
     unit = data.units.judged
     why = f"at the noise floor ({moved(base.noise_floor, unit)})"
     if input_noise is not None:
-        why = f"what white noise of {input_noise:.3g} {data.units.input} rms on the input would leave"
-    said = f"Nothing is missing: the rigid model with delay leaves {moved(base.held_out_error, unit)}, which is {why}."
-    return f"{said} What changes the motion by less than {percent(hides)} could hide in it."
+        why = f"the error that white noise of {input_noise:.3g} {data.units.input} rms on the input would cause"
+    said = f"Nothing is missing: the residual error of the rigid model with delay is {moved(base.held_out_error, unit)}, which is {why}."
+    return f"{said} An effect that changes the motion by less than {percent(hides)} could be hidden in it."
 
 
 def not_in_library(data: AxisData, found: Answer) -> str:
-    """No effect explains what the base leaves."""
+    """No effect explains the error of the rigid model."""
     base, names, unit = found.base, found.best, data.units.judged
     beyond, motion = data.layout.rms(_beyond_noise(data, base)), max(data.layout.rms(data.floor.motion), 1e-300)
-    said = f"Not in the library: no effect explains what the rigid model leaves ({moved(base.held_out_error, unit)}). Beyond the encoder's "
-    said += f"noise that is {moved(beyond, unit)}, {percent(beyond / motion)} of the motion{_mostly(data, base)}."
+    said = f"Not in the library: no effect explains the error of the rigid model ({moved(base.held_out_error, unit)}). "
+    said += f"Error above the encoder noise: {moved(beyond, unit)}, {percent(beyond / motion)} of the motion{_mostly(data, base)}."
     if names and found.explained > 0.0:
         said += f" At best {listed(names)} {'explain' if len(names) > 1 else 'explains'} {percent(found.explained)} of the error's power."
     return said
 
 
 def kept_out(found: Answer) -> str:
-    """The refused set that would leave least; empty without one."""
+    """The refused set with the smallest error; empty without one."""
     if found.kept_out is None:
         return ""
     names, several = found.kept_out.effects, len(found.kept_out.effects) > 1
-    leaves = f"{'would leave' if several else 'alone would leave'} {moved(found.kept_out.rung.held_out_error, found.units.judged)}"
-    return f" {listed(names)} {leaves}, and {'are' if several else 'is'} refused: {found.kept_out.refused}."
+    with_it = f"With {listed(names)}{'' if several else ' alone'} the error would be {moved(found.kept_out.rung.held_out_error, found.units.judged)}"
+    return f" {with_it}, but {'they are' if several else 'it is'} refused: {found.kept_out.refused}."
 
 
 def experiment(name: str, library: Library) -> str:
-    """What distinguishes an effect from those that it can be taken for."""
+    """The experiment that distinguishes an effect from its look-alikes."""
     effect = library[name]
-    return f"To tell it from {', '.join(effect.look_alikes)}: {effect.experiment}." if effect.look_alikes else f"{effect.experiment}."
+    return f"To distinguish it from {', '.join(effect.look_alikes)}: {effect.experiment}." if effect.look_alikes else f"{effect.experiment}."
 
 
 def evidence(found: Answer, item: Tried) -> str:
-    """What speaks for and against one candidate."""
+    """The evidence for and against one candidate."""
     unit, error = found.units.judged, moved(item.rung.held_out_error, found.units.judged)
     if item.rung.one_step:
-        said = f"judged one sample ahead, as no free simulation can tell: with it {error} are left, "
-        said += f"the encoder's noise alone is {bare(item.rung.noise_floor, unit)}"
+        said = f"judged one sample ahead, because a free simulation cannot follow it: the error with it is {error}, "
+        said += f"encoder noise alone is {bare(item.rung.noise_floor, unit)}"
     else:
         said = f"alone it explains {100 * item.explained:.3g} % of the error's power: {bare(found.rungs[0].held_out_error, unit)} -> {error}"
     return f"{said}; it is refused ({item.refused})" if item.refused else said
 
 
 def runner_up(found: Answer) -> str:
-    """Why the best other set of effects was not taken; empty without one."""
+    """Why the second-best set of effects was not chosen; empty without one."""
     if found.verdict != "missing_effect" or not found.rivals:
         return ""
     rival, name, taken = found.rivals[0], found.runner_up, " and ".join(found.effects)
@@ -104,15 +104,15 @@ def look_alikes(found: Answer, library: Library) -> tuple[LookAlike, ...]:
         rung, richer = rungs.get(other), library[name].is_special_case(library[other])
         apart = False
         if rung is None and richer:
-            text = f"{other}, with more parameters, was not fitted: nothing in these data asks for more than {name}"
+            text = f"{other} has more parameters and was not fitted: these data do not need more than {name}"
         elif rung is None:
-            apart, text = True, f"the error has no trace of {other}, or a weak one"
+            apart, text = True, f"the error shows no trace of {other}, or only a weak one"
         elif rung.excess > own.excess + AT_FLOOR:
-            apart, text = True, f"{other} leaves {moved(rung.held_out_error, unit)}, {name} {bare(own.held_out_error, unit)}"
+            apart, text = True, f"the error with {other} is {moved(rung.held_out_error, unit)}, with {name} {bare(own.held_out_error, unit)}"
         elif richer:
-            text = f"{other} contains {name} and does as well; nothing in these data asks for more than {name}"
+            text = f"{other} contains {name} and predicts as well; these data do not need more than {name}"
         else:
-            text = f"these data cannot tell {name} from {other}"
+            text = f"these data cannot distinguish {name} from {other}"
         alike.append(LookAlike(other, apart, text, library[name].experiment))
     return tuple(alike)
 
@@ -128,7 +128,7 @@ def percent(part: float) -> str:
 
 
 def _also_called(final: GreyboxFit, names: Sequence[str]) -> str:
-    """What has the very law of an effect that is named, and how much likelier that is."""
+    """Effects whose equations equal those of a named one, and the probability of the name."""
     library, said = final.model.library, ""
     for name, values in final.model.effects:
         others = [other.name for other in equals(library, name) if other.name != name] if name in names else []
@@ -145,11 +145,11 @@ def _left(data: AxisData, found: Answer) -> str:
     if final.excess < AT_FLOOR or not found.discrepancy > 0.0:
         return f"The residual error is at the noise floor ({least})."
     part = "" if final.one_step else f", {percent(found.tolerance)} of the motion"
-    return f"What is left: {beyond}{part}, beyond the encoder's noise of {noise}{_mostly(data, final)}."
+    return f"Residual error above the encoder noise of {noise}: {beyond}{part}{_mostly(data, final)}."
 
 
 def _mostly(data: AxisData, fit: GreyboxFit) -> str:
-    """The frequencies that hold most of the remaining error, in words."""
+    """The frequency range of most of the residual error, in words."""
     power = data.layout.lines * _beyond_noise(data, fit)
     if not float(power.sum()) > 0.0:
         return ""
@@ -159,5 +159,5 @@ def _mostly(data: AxisData, fit: GreyboxFit) -> str:
 
 
 def _beyond_noise(data: AxisData, fit: GreyboxFit) -> FloatArray:
-    """(bands,) power of the held-out error beyond the encoder's noise, band by band: noise that one band has less of hides nothing in another."""
+    """(bands,) power of the held-out error above the encoder noise, band by band: little noise in one band does not offset error in another."""
     return np.asarray(np.maximum(fit.power - data.floor.noise, 0.0))

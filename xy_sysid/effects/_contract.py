@@ -1,7 +1,7 @@
-"""What an effect tells about itself, and the places of the simulation where its law can act.
+"""The description of an effect, and the places of the simulation where its law can act.
 
-A law is an ordinary function of numbers. Its arguments are bound by name: parameters and states of the effect, and what
-the simulation knows at that moment (``WORDS``). So a law reads as the equation does, and needs no other glue.
+A law is an ordinary function of numbers. Its arguments are bound by name: parameters and states of the effect, and
+quantities of the simulation at that moment (``WORDS``). So a law looks like its equation and needs no further code.
 
 | category | function | returns | where it acts |
 |---|---|---|---|
@@ -262,26 +262,26 @@ class Effect:
     category:    where it acts (table above)
     parameters:  the first one is its size, or its limit or frequency: at zero the effect is absent
     shows:       how it looks in data
-    look_alikes: names of effects that it can be taken for; words for people, which steer nothing
-    experiment:  what separates it from them
+    look_alikes: names of effects that it can be mistaken for; shown to users, without influence on the search
+    experiment:  distinguishes it from them
     functions:   the compiled law, by the names of the table above
     guesses:     its signatures on a scene, with a way to read start values
     joint:       start values of base and effect together: (gain, delay beyond the scene's, pole, values of the parameters);
-                 for effects so large that the base alone is led astray
+                 for effects so large that the base cannot be fitted alone
     states:      names of the law's states; all start at zero
     family:      effects of one family replace one another
-    special_of:  the effect, of no such family, that becomes this one at certain values of its parameters
+    special_of:  the effect of another family that becomes this one at certain values of its parameters
     order:       place among the effects of its category, in the direction of the signal
     simulable:   False if free simulation cannot judge it
-    refusal:     why values explain nothing on a travel between two positions (m), though each is within its bounds: in words, or empty
-    one_step:    then this does: fits the effect by one-step prediction (see ``contact.Contact``)
-    sum_of:      other effects that together are the very same law, if there are and motor and table are one
-    straight:    True for a force in proportion to speed, forth and back each by its own: it needs no sub-steps
-    angular:     True for a law of an angle: it is tried in another's place only where the position is in rad
-    on_table:    True for a force that acts on the table: across a gap the motor does not feel it
-    rubs:        for ``one_step``: the effect whose dry friction it begins with where no other is given
-    hides:       for ``one_step``: names of effects that leave no trace where it acts, and are tried beside it unasked
-    suspects:    names of effects whose trace in an error is a reason to try this one, too: its own trace does not tell
+    refusal:     why values do not count on a travel between two positions (m), although each is within its bounds: in words, or empty
+    one_step:    if not simulable, fits the effect by one-step prediction (see ``contact.Contact``)
+    sum_of:      other effects whose sum is the same law, if motor and table move as one
+    straight:    True for a force proportional to speed, with one factor for each direction: it needs no sub-steps
+    angular:     True for a law of an angle: it replaces another law only if the position is in rad
+    on_table:    True for a force that acts on the table: inside a backlash gap it does not reach the motor
+    rubs:        for ``one_step``: the dry friction of its start model, if no other is given
+    hides:       for ``one_step``: names of effects that leave no trace where it acts, and are always tried together with it
+    suspects:    names of effects whose trace in an error is a reason to try this one as well, because its own trace is weak
     mode_frequency: of a resonance: which parameter is its frequency, Hz; a mode that the data do not excite cannot be named
     """
 
@@ -315,7 +315,7 @@ class Effect:
     mode_frequency: str = ""
 
     def __post_init__(self) -> None:
-        """Raises BadInput if the functions do not fit the category or ask for words that nobody knows."""
+        """Raises BadInput if the functions do not fit the category or use unknown argument names."""
         if self.category not in FUNCTIONS:
             raise BadInput(f"effect {self.name}: category", repr(self.category), ", ".join(FUNCTIONS), "Choose one of these.")
         expected = FUNCTIONS[self.category]
@@ -340,7 +340,7 @@ class Effect:
             raise BadInput(f"effect {self.name}: mode_frequency", repr(self.mode_frequency), ", ".join(self.names), "Name one of these.")
 
     def has_equations_of(self, other: Effect) -> bool:
-        """The law of both is one and the same, as of a base that gives and a screw that gives: no data tell them apart."""
+        """Both have the same equations, like a flexible base and a flexible screw, so no data distinguish them."""
         return bool(self.family) and (self.family, self.names, self.law) == (other.family, other.names, other.law)
 
     def is_special_case(self, other: Effect) -> bool:

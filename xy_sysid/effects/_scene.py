@@ -1,4 +1,4 @@
-"""The measured motion as an effect sees it when it looks for its traces."""
+"""The measured motion, from which effects compute their traces."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ USUAL_SWING = 2e-4  # m between two reversals on the usual machine of ``Similari
 PLACES = 2048  # along the travel, for what repeats with it
 REPEATS = 1.5  # periods within the travel at least: what is longer acts as a polynomial, and explains anything
 SHORT = 2**16  # samples up to which a scene keeps all columns of its guesses: 50 MB
-FINER = 16  # parts of a period over the whole travel by which lengths differ: half a part leaves 0.3 % of a sine's power
+FINER = 16  # steps of the period lengths, in parts of a period over the travel: half a step leaves 0.3 % of the power of a sine
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,7 +66,7 @@ class Scene:
 
     @property
     def swing(self) -> float:
-        """Usual way between two reversals, m."""
+        """Typical distance between two reversals, m."""
         return swing(self.sampling_rate, self.smooth(self.velocity, 300.0), self.velocity)
 
     def smooth(self, signal: FloatArray, cutoff: float) -> FloatArray:

@@ -1,4 +1,4 @@
-"""How much longer, slower and stronger a motion is than the one that the effects' bounds and usual sizes are written for.
+"""Ratios of a motion to that of the reference machine, for which bounds and usual sizes of effects are given.
 
 An axis does the same in metres, radians or encoder counts, driven by volts, amperes or newtons, and slowly or quickly; what is said of
 it must be the same, too (similarity; Barenblatt, Scaling, 2003, ch. 1). So bounds, usual sizes and steps in an effect's file are those

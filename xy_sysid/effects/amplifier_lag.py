@@ -1,4 +1,4 @@
-"""The current needs time to rise."""
+"""Amplifier lag: the current follows the command with a first-order lag."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ EFFECT = Effect(
     source="Krishnan, Electric Motor Drives, Prentice Hall 2001, sec. 2.3",
     category="state",
     parameters=(Parameter("lag", "s", 1e-5, 1.0, 1e-3, "time constant"),),
-    shows="one more slope at high frequency, with its phase",
+    shows="a further fall of 20 dB per decade at high frequency, with its phase",
     look_alikes=("time_delay", "viscous_friction"),
     experiment="excite to a higher frequency; measure the motor current",
     functions={"advance": advance},

@@ -22,15 +22,17 @@ def guesses(scene: Scene) -> Iterator[Guess]:
 
 EFFECT = Effect(
     name="asymmetric_viscous_friction",
-    law="F = (1 + asymmetry sign(v)) v / gain, of which v / gain is the base's",
-    meaning="seals, wipers and guides that drag more one way than the other",
-    validity="each direction has one drag coefficient; drag that is mostly back-EMF has none of it",
+    law="F = (1 + asymmetry sign(v)) v / gain, where v / gain is the drag of the base",
+    meaning="seals, wipers and guides with more drag in one direction than in the other",
+    validity="each direction has one drag coefficient; back-EMF, often most of the drag, has no asymmetry",
     source="Janot, Gautier & Brunot, Data set and reference models of EMPS, Nonlinear System Identification Benchmarks 2019",
     category="force",
-    parameters=(Parameter("asymmetry", "", -0.95, 0.95, 0.3, "part by which the drag forth is above and back below the mean", positive=False),),
-    shows="error of one sign that grows with speed, forth and back; even harmonics",
+    parameters=(
+        Parameter("asymmetry", "", -0.95, 0.95, 0.3, "relative difference of each direction from the mean; positive: larger forth", positive=False),
+    ),
+    shows="an error with the same sign forth and back, which grows with speed; even harmonics",
     look_alikes=("asymmetric_friction", "constant_load"),
-    experiment="constant speeds both ways, slow and fast: this difference between the two inputs grows with speed, that of a load stays",
+    experiment="constant speeds both ways, slow and fast: the difference between the inputs grows with speed; with a load it stays the same",
     functions={"force": force},
     guesses=guesses,
     straight=True,

@@ -1,4 +1,4 @@
-"""The base is a mass on a spring, and the table pushes it."""
+"""Base resonance: the base is a mass on a spring, and the table accelerates it."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ EFFECT = Effect(
         Parameter("damping", "", 1e-4, 1.0, 0.02, "damping ratio of the antiresonance"),
         Parameter("pole_damping", "", 1e-4, 1.0, 0.03, "damping ratio of the resonance"),
     ),
-    shows="antiresonance and a resonance near it, mostly below 90 Hz; one law with screw_compliance: what is usual tells which is likelier",
+    shows="antiresonance and a resonance near it, mostly below 90 Hz; same equations as screw_compliance: typical values decide which is more likely",
     look_alikes=("screw_compliance",),
     experiment="a scale on the table, an accelerometer on the base, or another payload",
     functions={"section": section},

@@ -1,4 +1,4 @@
-"""The motor prefers certain angles."""
+"""Cogging: a force that varies sinusoidally with position."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ EFFECT = Effect(
     name="cogging",
     law="F = amplitude sin(2 pi x / period + phase)",
     meaning="magnets against slots, and the current sensor's ripple",
-    validity=f"at least {LEAST:g} periods within the travel (within less it is a spring that softens), better 3; one harmonic",
+    validity=f"at least {LEAST:g} periods within the travel (with less it looks like a softening spring), better 3; one harmonic",
     source="Hanselman, Brushless Permanent Magnet Motor Design, 2nd ed., 2003, ch. 5",
     category="force",
     parameters=(
@@ -65,9 +65,9 @@ EFFECT = Effect(
         Parameter("period", "m", 1e-5, 10.0, 2.5e-3, "length of one period"),
         Parameter("phase", "rad", -100.0, 100.0, 0.0, "phase at x = 0", positive=False),
     ),
-    shows="error repeats along the travel, at all speeds with the same force",
+    shows="error repeats along the travel, with the same force at all speeds",
     look_alikes=("lead_error", "position_dependent_gain", "return_spring"),
-    experiment="a slow traverse: cogging's error in force stays, that of a lead error shrinks with speed",
+    experiment="a slow traverse: the force error of cogging stays the same, that of a lead error shrinks with speed",
     functions={"force": force},
     guesses=guesses,
     refusal=refusal,

@@ -1,4 +1,4 @@
-"""Dry friction of constant size."""
+"""Coulomb friction: dry friction of constant magnitude."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ EFFECT = Effect(
     name="coulomb_friction",
     law="F = coulomb sign(v); at rest it holds up to coulomb",
     meaning="preloaded nut, guide seals and bearings",
-    validity="speeds well above breakaway, motion well above the bending of asperities",
+    validity="speeds well above breakaway, motion well above the presliding range",
     source="Olsson et al., Friction models and friction compensation, Eur. J. Control 4 (1998), eq. 1",
     category="friction",
-    parameters=(Parameter("coulomb", "V", 1e-6, 100.0, 0.2, "input that it eats, moving or not"),),
+    parameters=(Parameter("coulomb", "V", 1e-6, 100.0, 0.2, "input that overcomes it, moving or at rest"),),
     shows="error follows the direction of motion; the gain looks smaller at small amplitude; odd harmonics",
     look_alikes=("stribeck_friction", "presliding_hysteresis", "dead_zone"),
     experiment="slow reversals show breakaway and tiny loops; constant speed shows that the level stays",

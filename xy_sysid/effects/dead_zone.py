@@ -1,4 +1,4 @@
-"""Small commands do nothing."""
+"""Dead zone: small commands have no effect."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ EFFECT = Effect(
     parameters=(Parameter("width", "V", 1e-6, 100.0, 0.15, "half of the zone"),),
     shows="error follows the sign of the input, not of the motion",
     look_alikes=("coulomb_friction",),
-    experiment="fast excitation parts the sign of the input from the sign of velocity; at constant input they look the same",
+    experiment="fast excitation separates the sign of the input from the sign of the velocity; at constant input they look the same",
     functions={"output": output},
     guesses=guesses,
 )

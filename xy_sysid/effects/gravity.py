@@ -1,4 +1,4 @@
-"""The weight of a joint that lifts."""
+"""Gravity: the weight of a joint's arm."""
 
 from __future__ import annotations
 
@@ -34,16 +34,16 @@ EFFECT = Effect(
     name="gravity",
     law="F = amplitude sin(x + phase) = a sin(x) + b cos(x); x is the angle, rad",
     meaning="a joint that lifts its arm, a pendulum, a wheel out of balance",
-    validity=f"x is an angle in rad, of one joint whose load hangs still; travel of {LEAST:g} rad or more",
+    validity=f"x is an angle in rad, of a single joint whose load does not swing; travel of {LEAST:g} rad or more",
     source="Spong, Hutchinson & Vidyasagar, Robot Modeling and Control, 2nd ed., 2020, sec. 6.4 (one link with gravity)",
     category="force",
     parameters=(
         Parameter("amplitude", "V", 1e-6, 1000.0, 0.5, "input that holds the arm level: mass, g and lever"),
         Parameter("phase", "rad", -100.0, 100.0, 0.0, "angle from where the arm hangs to the encoder's zero", positive=False),
     ),
-    shows="error goes with the sine of the angle, the same at all speeds and in both directions; a pendulum's resonance at low frequency",
+    shows="error proportional to the sine of the angle, the same at all speeds and in both directions; a pendulum's resonance at low frequency",
     look_alikes=("return_spring", "hardening_stiffness", "constant_load", "cogging"),
-    experiment="hold still at several angles around the turn: the input needed is a sine, that of a spring goes on rising",
+    experiment="hold the axis at several angles around the turn: with gravity the input needed is a sine, with a spring it keeps rising",
     functions={"force": force},
     guesses=guesses,
     on_table=True,

@@ -1,4 +1,4 @@
-"""A spring to the middle that stiffens."""
+"""Hardening stiffness: a spring towards the middle that stiffens with distance."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ EFFECT = Effect(
     ),
     shows="error grows towards both ends of the travel, with the sign of the position",
     look_alikes=("return_spring", "constant_load"),
-    experiment="hold still at several places: the input needed is the law",
+    experiment="hold the axis at several positions: the input needed follows the law",
     functions={"force": force},
     guesses=guesses,
     refusal=refusal,

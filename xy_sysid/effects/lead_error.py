@@ -1,4 +1,4 @@
-"""The scale and the screw disagree, periodically."""
+"""Lead error: a periodic error of the screw or the scale."""
 
 from __future__ import annotations
 
@@ -43,14 +43,14 @@ def refusal(values: Sequence[float], between: tuple[float, float]) -> str:
     slope, repeats = 2.0 * math.pi * values[0] / values[1], (between[1] - between[0]) / values[1]
     if slope >= 0.2:
         return f"the reading would change by {100 * slope:.3g} % more or less than the motion: no encoder does"
-    return "" if repeats >= 0.5 else f"only {repeats:.2g} of its periods are within the travel: nobody sees whether it repeats"
+    return "" if repeats >= 0.5 else f"only {repeats:.2g} of its periods are within the travel, so it cannot be seen whether it repeats"
 
 
 EFFECT = Effect(
     name="lead_error",
     law="y = x + amplitude sin(2 pi x / period + phase)",
     meaning="wobble of the screw, or an encoder disk off centre",
-    validity="at least 3 periods within the travel; small against the period",
+    validity="at least 3 periods within the travel; small compared with the period",
     source="ISO 3408-3:2006, travel deviation within one revolution",
     category="encoder",
     parameters=(

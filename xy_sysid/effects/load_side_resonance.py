@@ -1,4 +1,4 @@
-"""A spring between the motor and the load, on which the encoder sits."""
+"""Load-side resonance: a spring between motor and load, with the encoder on the load."""
 
 from __future__ import annotations
 
@@ -50,15 +50,15 @@ def joint(scene: Scene) -> Iterable[tuple[float, float, float, tuple[float, ...]
 EFFECT = Effect(
     name="load_side_resonance",
     law="v = v_rigid w^2 / (s^2 + 2 d w s + w^2); w = 2 pi frequency",
-    meaning="shaft, belt or gear between motor and load gives; the encoder sits on the load (link side, glass scale)",
+    meaning="compliance of shaft, belt or gear between motor and load; the encoder sits on the load (link side, glass scale)",
     validity="one mode, small amplitude; friction sits at the motor, whose motion the encoder does not see",
     source="Spong, Modeling and control of elastic joint robots, J. Dyn. Sys. Meas. Control 109 (1987), eq. 10",
     category="motion",
     parameters=(
-        Parameter("frequency", "Hz", 1.0, 2000.0, 60.0, "resonance: motor and load swing against each other"),
+        Parameter("frequency", "Hz", 1.0, 2000.0, 60.0, "resonance: motor and load oscillate against each other"),
         Parameter("damping", "", 1e-4, 1.0, 0.03, "its damping ratio"),
     ),
-    shows="a resonance without an antiresonance before it, above which the motion falls and lags by 180 degrees more",
+    shows="a resonance without an antiresonance before it; above it the motion falls and lags by a further 180 degrees",
     look_alikes=("screw_compliance", "base_resonance", "amplifier_lag"),
     experiment="a second encoder on the motor: it sees an antiresonance before the same resonance",
     functions={"section": section},

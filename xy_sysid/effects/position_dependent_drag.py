@@ -22,15 +22,15 @@ def guesses(scene: Scene) -> Iterator[Guess]:
 
 EFFECT = Effect(
     name="position_dependent_drag",
-    law="F = (1 + slope x) v / gain, of which v / gain is the base's: its drag at x = 0",
-    meaning="a guide or screw that is not quite straight or parallel, preload that grows towards one end, grease on a part of the way",
-    validity="drag that rises steadily from one end to the other and never below zero; what is largest in the middle is not seen",
+    law="F = (1 + slope x) v / gain, where v / gain is the drag of the base, at x = 0",
+    meaning="a guide or screw that is not quite straight or parallel, preload that grows towards one end, grease on part of the travel",
+    validity="drag that rises steadily from one end to the other and never below zero; drag that is largest in the middle is not detected",
     source="Armstrong-Helouvry, Dupont & Canudas de Wit, Automatica 30 (1994), sec. 2 (position-dependent friction)",
     category="force",
     parameters=(Parameter("slope", "1/m", -1e4, 1e4, 3.0, "relative change of the drag per distance along the travel", positive=False),),
-    shows="error in proportion to speed that changes its sign with the place: too slow at one end, too fast at the other",
+    shows="error proportional to speed whose sign depends on position: too slow at one end, too fast at the other",
     look_alikes=("position_dependent_gain", "asymmetric_viscous_friction", "cogging"),
-    experiment="constant speeds from end to end, both ways: the extra input grows with speed and place, and is opposed to the motion both ways",
+    experiment="constant speeds from end to end, both ways: the extra input grows with speed and position, and opposes the motion both ways",
     functions={"force": force},
     guesses=guesses,
 )

@@ -52,7 +52,7 @@ EFFECT = Effect(
     ),
     shows="error repeats along the travel, in proportion to the input",
     look_alikes=("cogging", "lead_error"),
-    experiment="a slow traverse at no load: cogging stays, a change of the gain needs more input",
+    experiment="a slow traverse at no load: it still shows cogging; a change of the gain shows only at larger input",
     functions={"force": force},
     guesses=guesses,
 )

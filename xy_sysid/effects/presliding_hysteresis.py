@@ -1,4 +1,4 @@
-"""Before it slides, friction is a spring that forgets."""
+"""Presliding hysteresis: before it slides, friction acts as a spring with hysteresis."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def _deflection(v: FloatArray, period: float, length: float) -> FloatArray:
 EFFECT = Effect(
     name="presliding_hysteresis",
     law="z' = v - |v| z / length; F = coulomb z / length + damping z'",
-    meaning="asperities bend before they break: tiny loops around each reversal; all dry friction goes through them",
+    meaning="asperities bend before they break away: tiny loops around each reversal; all dry friction acts through them",
     validity="loops that do not drift; other dry friction in the model scales the sliding level",
     source="C. Canudas de Wit et al., A new model for control of systems with friction, IEEE TAC 40 (1995), eq. 1-3",
     category="bristle",

@@ -1,4 +1,4 @@
-"""A spring that pulls back to its rest, and may soften."""
+"""Return spring: a spring towards a rest position, which may soften."""
 
 from __future__ import annotations
 
@@ -41,18 +41,18 @@ def refusal(values: Sequence[float], between: tuple[float, float]) -> str:
 EFFECT = Effect(
     name="return_spring",
     law="F = stiffness d (1 - softening d^2), d = x - rest",
-    meaning="a return or torsion spring: of a valve, a throttle, a flexure, a joint; a rubber bush, which softens",
-    validity="no coil touches another; far below where a softening spring would give way: softening d^2 < 1/3",
+    meaning="a return or torsion spring of a valve, throttle, flexure or joint; a rubber bush, which softens",
+    validity="the coils do not touch; far below the collapse of a softening spring: softening d^2 < 1/3",
     source="Kovacic & Brennan, The Duffing Equation, 2011, sec. 1.2 (linear, softening and hardening restoring forces)",
     category="force",
     parameters=(
         Parameter("stiffness", "V/m", 1e-6, 1e7, 10.0, "input that holds it, per distance (per rad where the position is an angle)"),
-        Parameter("rest", "m", -1e4, 1e4, 0.0, "where it neither pulls nor pushes; far outside the travel for a preloaded one", positive=False),
+        Parameter("rest", "m", -1e4, 1e4, 0.0, "rest position of the spring; far outside the travel if it is preloaded", positive=False),
         Parameter("softening", "1/m2", -1e6, 1e6, 100.0, "part of the stiffness lost per distance squared; below 0 it stiffens", positive=False),
     ),
-    shows="the axis comes back by itself; the response is flat below a low frequency; error with the sign of the position",
+    shows="the axis returns by itself; the response is flat below a low frequency; error with the sign of the position",
     look_alikes=("hardening_stiffness", "gravity", "constant_load", "cogging"),
-    experiment="hold still at several places over the whole travel: the input needed is the law",
+    experiment="hold the axis at several positions over the whole travel: the input needed follows the law",
     functions={"force": force},
     guesses=guesses,
     refusal=refusal,

@@ -1,4 +1,4 @@
-"""The amplifier has a largest voltage."""
+"""Saturation: the output of the amplifier is limited."""
 
 from __future__ import annotations
 
@@ -42,10 +42,10 @@ EFFECT = Effect(
     validity="the same limit on both sides, without memory; limit 0 means none",
     source="Khalil, Nonlinear Systems, 3rd ed., sec. 1.2.7",
     category="input",
-    parameters=(Parameter("limit", "V", 1e-3, 1e6, 1.5, "largest input that comes out"),),
+    parameters=(Parameter("limit", "V", 1e-3, 1e6, 1.5, "largest output"),),
     shows="error only where the input is large, against its sign",
     look_alikes=("gain_drift",),
-    experiment="louder excitation: what never reaches the limit cannot show it",
+    experiment="stronger excitation: an input that never reaches the limit cannot show it",
     functions={"output": output},
     guesses=guesses,
     order=10,

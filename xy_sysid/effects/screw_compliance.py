@@ -1,4 +1,4 @@
-"""The screw is a spring between motor and table."""
+"""Screw compliance: the screw is a spring between motor and table."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def joint(scene: Scene) -> Iterable[tuple[float, float, float, tuple[float, ...]
 EFFECT = Effect(
     name="screw_compliance",
     law="v = v_rigid (s^2 + 2 d w s + w^2) / (s^2 + 2 d_p w_p s + w_p^2) (w_p / w)^2; w = 2 pi frequency, w_p = w (1 + split)",
-    meaning="axial and torsional give of screw, nut and bearing; the encoder sits on the motor",
+    meaning="axial and torsional compliance of screw, nut and bearing; the encoder sits on the motor",
     validity="one mode, small amplitude; friction sits at the motor, whose motion the encoder sees",
     source="Varanasi & Nayfeh, The dynamics of lead-screw drives, J. Dyn. Sys. Meas. Control 126 (2004), sec. 3",
     category="motion",
@@ -38,7 +38,8 @@ EFFECT = Effect(
         Parameter("damping", "", 1e-4, 1.0, 0.02, "damping ratio of the antiresonance"),
         Parameter("pole_damping", "", 1e-4, 1.0, 0.03, "damping ratio of the resonance"),
     ),
-    shows="antiresonance and a resonance far above it, mostly from 90 Hz on; one law with base_resonance: what is usual tells which is likelier",
+    shows="antiresonance and a resonance far above it, mostly from 90 Hz on; same equations as base_resonance: "
+    "typical values decide which is more likely",
     look_alikes=("base_resonance",),
     experiment="a scale on the table, an accelerometer on the base, or another payload",
     functions={"section": section},

@@ -1,4 +1,4 @@
-"""Dry friction that is larger at rest than in motion."""
+"""Stribeck friction: dry friction that falls with speed from its breakaway level."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ EFFECT = Effect(
         Parameter("excess", "V", 1e-6, 100.0, 0.2, "breakaway above the Coulomb level"),
         Parameter("velocity", "m/s", 1e-5, 1.0, 0.01, "speed at which the excess has fallen to 1/e"),
     ),
-    shows="as Coulomb friction, with more error at a crawl than above",
+    shows="as Coulomb friction, with more error at crawling speed than above it",
     look_alikes=("coulomb_friction", "presliding_hysteresis"),
     experiment="slow reversals and constant crawling speeds: the force falls while speed rises",
     functions={"level": level},

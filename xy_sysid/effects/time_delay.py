@@ -1,4 +1,4 @@
-"""Computation, bus and drive answer late."""
+"""Time delay of computation, bus and drive."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from xy_sysid.effects._contract import Effect, Parameter
 EFFECT = Effect(
     name="time_delay",
     law="u_eff(t) = u(t - delay)",
-    meaning="the chain from command to current acts a fixed time late; fractions of a sample count",
+    meaning="the chain from command to current acts after a fixed time, including fractions of a sample",
     validity="always in the model; constant delay, not jitter",
     source="Astrom & Wittenmark, Computer-Controlled Systems, 3rd ed., sec. 2.3 (sampled systems with a fractional delay)",
     category="base",

@@ -1,4 +1,4 @@
-"""Grease, seals and back-EMF resist in proportion to speed."""
+"""Viscous friction: drag of grease, seals and back-EMF, proportional to speed."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ EFFECT = Effect(
     source="Olsson et al., Friction models and friction compensation, Eur. J. Control 4 (1998), eq. 2",
     category="base",
     parameters=(Parameter("pole", "rad/s", 1e-2, 1e5, 250.0, "rate at which speed follows the input: drag over mass"),),
-    shows="velocity per input falls with one slope above pole / (2 pi) Hz",
+    shows="the response from input to velocity falls by 20 dB per decade above pole / (2 pi) Hz",
     look_alikes=("amplifier_lag",),
-    experiment="measure the motor current: the lag lies before it, the pole behind it",
+    experiment="measure the motor current: the lag is before it in the chain, the pole after it",
 )

@@ -1,4 +1,4 @@
-"""An experiment that was designed, on a machine that has limits of its own: taken over only where it keeps within them.
+"""A designed experiment on a machine with its own limits: accepted only if it stays within them.
 
 The document is that of ``xy-sysid next``: which axis, for how long, what drives it, the voltage and travel that it needs, and where it may begin.
 """
@@ -67,7 +67,9 @@ def with_experiment(settings: ExcitationSettings, document: object, where: str) 
         )
     if abs(told["ramp"] - settings.ramp) > 1e-6:
         own_ramp = f"{settings.ramp:g} s, that of the excitation"
-        raise BadInput(f"{where}: ramp", f"{told['ramp']:g} s", own_ramp, "Design it again with --params, which tells the excitation's settings.")
+        raise BadInput(
+            f"{where}: ramp", f"{told['ramp']:g} s", own_ramp, "Design it again with --params, which reads the settings of the excitation."
+        )
     own, units = settings.axes[axis], settings.units
     if told["units"] != list(units):
         other, allowed = (f"{drive} and {place}" for drive, place in (told["units"], units))

@@ -1,6 +1,6 @@
-"""From an excitation signal to the voltage that is really applied: ramps, centring, soft travel limits, amplitude limit.
+"""From an excitation signal to the applied voltage: ramps, centring, soft travel limits, amplitude limit.
 
-Told the time and the positions; asks for neither. The order of the guards for every sample is
+Time and positions are arguments. The order of the guards for every sample is
 
     (signal * rms + offset + centring) * ramp-in -> travel limits -> fade-out -> amplitude limit
 
@@ -212,9 +212,9 @@ class Drive:
         if (np.abs(newest - (low + high) / 2) > ABSURD * (high - low)).any():
             return f"more than {ABSURD:g} travel ranges away"
         if (np.diff(block.seq) <= 0).any() or (self._travel.seen is not None and seq <= self._travel.seen.seq):
-            return f"counter {seq:.0f}, which does not go on"
+            return f"counter {seq:.0f}, which does not advance"
         if block.time[-1] < self._seen_time:
-            return f"stamped {self._seen_time - block.time[-1]:.3g} s before the one before it"
+            return f"stamped {self._seen_time - block.time[-1]:.3g} s before the previous one"
         old, ahead = (self.seq - 1 - seq) / self.settings.rate, (seq + 1 - self.seq - overdue) / self.settings.rate
         if old > (self.settings.watchdog * max(self.settings.speed, 1.0) + FURTHEST) and not self.settings.lockstep:
             if self.settings.output == "commands":
@@ -223,7 +223,7 @@ class Drive:
         if ahead > AHEAD:
             if self.settings.output == "commands":
                 return f"stamped {ahead:.3g} s ahead: is it stamped in ROS time, by a clock that agrees with this one?"
-            return f"{ahead:.3g} s ahead of the voltage by its counter: the machine does not follow this voltage yet, or numbers by itself"
+            return f"{ahead:.3g} s ahead of the voltage by its counter: the machine does not follow this voltage yet, or counts by itself"
         return ""
 
     def _speed(self, values: FloatArray, seq: FloatArray) -> FloatArray:
@@ -255,7 +255,7 @@ class Drive:
         if self.state == "active" and self._silence > allowed:
             self.blind = True
             self.fault = True
-            unusable = f" ({self._unusable} came that were not usable: {self._why})" if self._unusable else ""
+            unusable = f" ({self._unusable} unusable ones came: {self._why})" if self._unusable else ""
             if waiting:
                 reason = f"no answer from the machine for {allowed:g} s{unusable}; is it running, and does it publish position?"
             else:
@@ -275,7 +275,7 @@ class Drive:
                 stream.next(n)
 
     def catch_up(self, missed: int) -> Block:
-        """The next sample, after so many that nobody asked for; all that the controller has gone along since the last call, where it is known."""
+        """The next sample, after the given number of skipped ones; all samples that the controller has executed since the last call, if known."""
         self.skip(missed)
         return self.next(1)
 

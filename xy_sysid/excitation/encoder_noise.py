@@ -1,4 +1,4 @@
-"""What an encoder shows of an axis that rests: noise, and a last count that toggles. Motion is what goes beyond it."""
+"""The readings of an encoder at rest: noise, and a toggling last count. Only larger changes are motion."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class EncoderNoise:
     def _resting(self) -> FloatArray:
         squares = WORTH * self._readings
         if not squares:
-            return np.full(len(self.count), np.inf if len(self._last) > 1 else 0.0)  # nobody knows yet
+            return np.full(len(self.count), np.inf if len(self._last) > 1 else 0.0)  # not known yet
         sigma = np.sqrt(self.variance * max(squares / max(_least(squares), 1e-300), 1.0))
         return np.asarray(COUNTS * np.where(np.isfinite(self.count), self.count, 0.0) + SIGMAS * sigma)
 

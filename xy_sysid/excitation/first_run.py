@@ -25,8 +25,8 @@ NEXT = 1.5  # the next push may go so many times further than in proportion
 SLOWEST = 0.1  # s of delay and lag; the travel limits look no further ahead
 HALF = 0.5  # part of the push at which voltage counts as on
 RETURNS = 0.2  # part of a push that a contact which sticks gives back at 0 V; less is an axis that stays where it was moved
-LOADED = "a load drives it (it hangs or tips over), so nothing is known of the wires. Hold or balance the load, and begin again"
-BY_HAND = "Switch the drive off and push it by hand: does it run off by itself, hold or balance the load; if it stays where it is left, "
+LOADED = "a load drives it (it hangs or tips over), so the wiring cannot be checked. Hold or balance the load, and start again"
+BY_HAND = "Switch the drive off and push it by hand: if it moves on by itself, hold or balance the load; if it stays where it is left, "
 SWAP = "swap the motor's wires or the encoder's sign"
 
 
@@ -74,7 +74,7 @@ class _Seen:
 
 
 class FirstRun:
-    """``next`` says what to do, ``took`` what came of it; the machine is driven by somebody else."""
+    """``next`` says what to do, ``took`` what came of it; the caller drives the machine."""
 
     def __init__(self, settings: ExcitationSettings) -> None:
         self.settings = settings
@@ -103,7 +103,7 @@ class FirstRun:
         seen, volts, place = self._seen[push.axis], voltage[:, column], position[:, column]
         forth, back = np.flatnonzero(volts > HALF * push.volts), np.flatnonzero(volts < -HALF * push.volts)
         if forth.size == 0 or back.size == 0 or not np.isfinite(position).all():
-            return self._end(push, "the push or its positions did not arrive whole")
+            return self._end(push, "the push or its positions did not arrive completely")
         begin, turn = int(np.flatnonzero(volts > 0)[0]), int(np.flatnonzero(volts < 0)[0])
         if begin < 8:
             return self._end(push, "no position at rest before the push")
@@ -133,7 +133,7 @@ class FirstRun:
         gives = small and abs(moved[0]) < (1 - RETURNS) * peak
         if gives or (abs(answer[0]) <= least[column] and abs(answer[1]) <= least[column]):
             seen.still = push.volts
-            what = "held by friction or a spring, it gives and comes back" if gives and peak > least[column] else "at rest"
+            what = "held by friction or a spring: it yields and comes back" if gives and peak > least[column] else "at rest"
             return PushResult(push, moved, f"{push.axis} at {push.volts:.3g} V: {what} (noise {in_words(noise[column], self._units.output, 2)})")
         if answer[0] <= least[column]:
             words = f"{push.axis} at {push.volts:.3g} V: it moves back by {in_words(moved[1], self._units.output)}, and not forth: a load or friction"
@@ -160,7 +160,7 @@ class FirstRun:
             return self._end(push, what, moved)
         if seen.lag > SLOWEST:
             return self._end(
-                push, f"it answers after {seen.lag * 1000:.0f} ms; the guards look {SLOWEST * 1000:.0f} ms ahead: shorten the way", moved
+                push, f"it answers after {seen.lag * 1000:.0f} ms; the guards look {SLOWEST * 1000:.0f} ms ahead: shorten the signal path", moved
             )
         self._leave_room(push, moved)
         return PushResult(push, moved, sentence)

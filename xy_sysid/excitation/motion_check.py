@@ -1,4 +1,4 @@
-"""Does each axis do what its voltage can do? If not, encoder, wiring or settings are wrong, and driving on is blind.
+"""Does the motion of each axis fit its voltage? If not, encoder, wiring or settings are wrong, and the drive must stop.
 
 One principle: what the voltage could have moved is reckoned alongside, from the volt seconds beyond ``breakaway`` and the speed
 per volt, and compared with what the encoder shows. An encoder may show nothing only as long as nothing can have gone far
@@ -42,7 +42,7 @@ RETURN = 0.5  # s beyond a limit in which an axis must have begun to come back
 PROGRESS = 0.02  # of the brake zone, what coming back is at least
 SLOWING = 0.03  # s over which outward motion under full inward voltage must become slower
 BY_HAND = (
-    "Switch the drive off and move it back by hand: if it runs off by itself, hold or balance the load; "
+    "Switch the drive off and move it back by hand: if it moves off by itself, hold or balance the load; "
     "if it stays where it is left, run --first tells whether plus is plus"
 )
 STEADY = 0.5  # greatest centring * speed per volt * age of a position; above 1.57 the loop swings by itself
@@ -90,7 +90,8 @@ def check_loop(settings: ExcitationSettings) -> None:
             raise BadInput(
                 f"{name}.centring",
                 f"{axis.centring:g} {sent}/{unit}",
-                f"up to {most:.3g} {sent}/{unit} with {known} and blocks of {settings.step / settings.rate * 1000:g} ms; beyond that the loop swings",
+                f"up to {most:.3g} {sent}/{unit} with {known} and blocks of {settings.step / settings.rate * 1000:g} ms; "
+                "beyond that the loop oscillates",
                 "Lower it, or set velocity_gain if the axis is slower.",
             )
 

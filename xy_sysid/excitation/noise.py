@@ -46,7 +46,7 @@ def power_gain(sos: FloatArray, low: float, high: float, rate: float) -> float:
 
 @lru_cache(maxsize=32)
 def _designed(low: float, high: float, rate: float) -> tuple[FloatArray, float]:
-    """Sections, which nobody writes to, and power gain: a drive needs them again when it starts again, and its axes share a band."""
+    """Sections (read-only) and power gain: a drive needs them again when it starts again, and its axes share a band."""
     sos = sections(low, high, rate)
     return sos, power_gain(sos, low, high, rate)
 

@@ -1,4 +1,4 @@
-"""When the next block is due: by the clock, or by the machine's answers. Told the time and the answers; asks for neither."""
+"""When the next block is due: by the clock, or by the machine's answers. Time and answers are arguments."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Clock:
 
 @dataclass(slots=True)
 class Answers:
-    """Positions that came back, handed out up to a sample: in lockstep nobody may see a later one, however it was sent."""
+    """Positions that came back, handed out up to a sample: in lockstep no later one may be used, however it was sent."""
 
     _given: float = -1.0
     _blocks: deque[Block] = field(default_factory=deque)

@@ -35,7 +35,7 @@ NORMAL = 3.0  # mean fourth power of normal numbers of variance 1
 FINEST = 1e-6  # no model of a machine is better than this part of the power
 FAST = 0.25  # greatest part of the new in steps that motion within an interval may have, beyond noise and a straight line
 LEAST = 12  # intervals without which nothing is said
-GAP = 5  # intervals without a position, after which it begins anew
+GAP = 5  # intervals without a position, after which it begins again
 
 
 class SignCheck:
@@ -51,7 +51,7 @@ class SignCheck:
         self._interval = max(round(INTERVAL * settings.rate), settings.step)  # samples
 
     def forget(self) -> None:
-        """Begin anew: after a pause nothing is known of what happened in it."""
+        """Start again, because nothing is known of what happened during a pause."""
         none = np.empty((0, self._number))
         self._ends, self._sums = np.empty(0), none  # of the excitation: counter, and V samples until there
         self._seqs, self._places, self._unsure = np.empty(0), none, none  # of the motion: counter, mean in m, what a step must have in m^2

@@ -1,4 +1,4 @@
-"""Who holds STOP: everybody who has asked for it, until the same one releases it or an operator overrides it by name."""
+"""The holders of STOP: each publisher that requested it, until it releases its STOP or an operator overrides it by name."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class StopLatch:
     def release(self, now: float, name: Callable[[bytes], str]) -> tuple[bool, str]:
         """What an operator's release does at a time, s: whether STOP is off, and the answer.
 
-        The first call names whom it would override and changes nothing; a second one within AGAIN overrides those, and nobody else.
+        The first call names whom it would override and changes nothing; a second one within AGAIN overrides exactly those.
         """
         holders = self.holders
         if not holders:

@@ -1,17 +1,17 @@
-"""What to measure next: the experiment that distinguishes what the data at hand do not.
+"""What to measure next: the experiment that distinguishes effects that the present data do not distinguish.
 
-criteria:    every number that decides, with its reason
-limits:      what an experiment may ask of the machine
-experiment:  one experiment: what drives the axis, and for how long
+criteria:    every threshold of the search, with its reason
+limits:      the limits of the machine
+experiment:  one experiment: excitation and duration
 proposals:   the experiments that are compared
-beliefs:     a set of effects with its parameters and how well they are known
-rivals:      the sets that the data at hand leave possible
-prediction:  what would be measured if a set were true
-evidence:    how well a rival would explain it, and how sure one would be after so many seconds
-design:      the experiment that distinguishes the rivals soonest
-precision:   the experiment that makes parameters known best
-first:       a first experiment for an axis of which nothing is known
-loop:        design, run, compare, and again until nothing is left to settle
+beliefs:     a set of effects with its parameters and their uncertainty
+rivals:      the sets that the present data do not rule out
+prediction:  the expected measurement if a set is true
+evidence:    how well a rival would explain it, and the probability of a decision after a given time
+design:      the experiment that distinguishes the rivals in the shortest time
+precision:   the experiment that determines parameters most precisely
+first:       a first experiment for an unknown axis
+loop:        design, run and compare, repeated until no question is open
 of_run:      one call for a diagnosis
 walk:        the loop for recordings of a machine: diagnosed together after each experiment, told in sentences
 """

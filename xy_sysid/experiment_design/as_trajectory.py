@@ -1,4 +1,4 @@
-"""A designed experiment for a robot that takes only trajectories: the motion that the model expects of it, from rest to rest, within the limits."""
+"""A designed experiment for a robot that takes only trajectories: the expected motion, from rest to rest, within the limits."""
 
 from __future__ import annotations
 

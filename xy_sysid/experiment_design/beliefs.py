@@ -1,4 +1,4 @@
-"""A set of effects with its parameters, and how well the data at hand know them.
+"""A set of effects with its parameters and their uncertainty after the present data.
 
 Parameters are Gaussian in the coordinates of the fit (``greybox.least_squares.Scale``: the logarithm of what is positive). Their precision is
 the information of the data, and a little more: a positive number is known to a factor of two before anything is measured, and the shape of a
@@ -60,7 +60,7 @@ class Belief:
 
 
 class Evidence:
-    """How well models explain the data at hand: in nats over every window, fitted or held out."""
+    """How well models explain the present data: in nats over every window, fitted or held out."""
 
     def __init__(self, data: AxisData, travel: tuple[float, float] | None = None) -> None:
         """travel: of the machine, m; None: as far as the data went."""
@@ -148,7 +148,7 @@ def believed(evidence: Evidence, found: GreyboxFit, count: int, seed: int = 0) -
 
 
 def hidden(evidence: Evidence, rest: AxisModel, name: str, best: float, draws: tuple[int, int]) -> Belief | None:
-    """An effect that does not show in the data, beside a model that explains them: the usual sizes that the data allow.
+    """An effect that the data do not show, together with a model that explains them: the usual sizes that the data allow.
 
     A relative in the model gives way, and what it calls by the same name is taken over. None where the data allow no such size.
     best: nats of what explains the data best; draws: how many are wanted, and their seed

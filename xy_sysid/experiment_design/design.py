@@ -1,4 +1,4 @@
-"""The experiment that distinguishes some sets of effects soonest, of those that keep within the limits.
+"""The experiment within the limits that distinguishes some sets of effects in the shortest time.
 
 First every proposal is judged by the likeliest model of each set, then the best by draws of their parameters, and then the neighbours of the
 best. An experiment is judged by the seconds after which the true set is told from its rivals with 95 % probability, in the mean over sets
@@ -25,7 +25,7 @@ from xy_sysid.hypotheses.criteria import DOUBTFUL
 
 @dataclass(frozen=True)
 class Judged:
-    """An experiment with what it is worth.
+    """An experiment with its evaluation.
 
     seconds: of steady motion after which the sets are distinguished with 95 %, infinite if ``most`` do not suffice; probability: that they
     are at the end; each: powers of each draw; broken: which limit it would come too near to, or nothing; shortest: s that it lasts at least
@@ -40,7 +40,7 @@ class Judged:
 
     @property
     def order(self) -> tuple[float, float, float]:
-        """Least is best; where none gets anywhere the evidence a second decides."""
+        """Less is better; if no experiment decides, the evidence per second counts."""
         rate = sum(min((one.rate for one in item), default=0.0) for item in self.each)
         if math.isfinite(self.seconds):
             return max(self.seconds + self.experiment.ramp, self.shortest), 0.0, -rate
@@ -78,14 +78,14 @@ class Design:
 
     @property
     def alike(self) -> bool:
-        """Whether the sets are the same as far as this machine may go: no experiment within the limits has evidence for any of their draws."""
+        """Whether the sets are the same within the limits of the machine: no experiment within the limits gives evidence for any of their draws."""
         looked = [item for item in self.tried if item.each]
         most = max((one.rate for item in looked for draw in item.each for one in draw), default=math.inf)
         return most * JUDGED * self.limits.seconds < NO_EVIDENCE
 
     @property
     def helps(self) -> bool:
-        """Whether the best experiment may tell, or teaches what a better one needs."""
+        """Whether the best experiment may decide, or gives information for a better one."""
         return self.best is not None and self.best.probability >= DOUBTFUL
 
 
@@ -128,7 +128,7 @@ def broken_in_time(models: Sequence[AxisModel], rate: float, limits: MachineLimi
 
 
 def judge(setting: Setting, beliefs: Sequence[Belief], limits: MachineLimits, experiment: Experiment, draws: int | None = None) -> Judged:
-    """What one experiment is worth; draws: of each set that are looked at, None is all."""
+    """The evaluation of one experiment; draws: number of draws of each set, None: all."""
     told = experiment.excitation
     seconds = max(setting.looked, min(2.0 * told.slow_period * (told.slow > 0.0), limits.seconds) + limits.ramp)
     looked = [(number, model) for number, belief in enumerate(beliefs) for model in belief.draws[:draws]]
@@ -158,7 +158,7 @@ def _timed(item: Judged, limits: MachineLimits) -> Judged:
 
 
 def expects(found: Design, wanted: float = 0.0) -> str:
-    """What the best experiment promises, in a sentence. wanted: s that it was designed for, where a budget may have left less."""
+    """The expected result of the best experiment, in a sentence. wanted: s that it was designed for; the budget may allow less."""
     names = f"{found.beliefs[0].name} and {' or '.join(item.name for item in found.beliefs[1:])}"
     if found.best is None:
         why = sorted({item.broken for item in found.tried if item.broken})
@@ -170,7 +170,7 @@ def expects(found: Design, wanted: float = 0.0) -> str:
         left = f"{found.best.experiment.seconds:.0f} s that the budget leaves"
         return f"In the {left}, {names} are distinguished with {chance} probability; {wanted:.0f} s were designed."
     if found.alike:
-        return f"Within the limits of this machine {names} are the same: no experiment has evidence for one of them."
+        return f"Within the limits of this machine {names} are the same: no experiment can favour one of them."
     if found.helps:
         return f"No experiment within the limits is sure to distinguish {names}: the best does with {chance} probability."
     return f"No experiment within the limits can distinguish {names}: the best would with {chance} probability."

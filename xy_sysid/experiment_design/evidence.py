@@ -1,4 +1,4 @@
-"""How well a rival would explain what is recorded if a set of effects were true, and how sure one would be after so many seconds.
+"""How well a rival would explain a recording if a set of effects were true, and the probability of a decision after a given time.
 
 T-optimality (Atkinson & Fedorov, The design of experiments for discriminating between two rival models, Biometrika 62, 1975): the error that
 the rival leaves with the parameters that suit the experiment best. These may move as far as the data at hand allow. The error is scored by the
@@ -94,7 +94,7 @@ def _all(item: Recorded, score: float) -> float:
 
 
 def settled(each: Sequence[Sequence[Power]], seconds: float) -> float:
-    """Probability that the true set is told from every rival after some seconds, over sets and draws with the same weight.
+    """Probability that the true set is distinguished from every rival after some seconds, over sets and draws with the same weight.
 
     each: for one draw of one set its powers, the sets that have none left out
     """

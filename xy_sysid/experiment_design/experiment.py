@@ -1,4 +1,4 @@
-"""One experiment: what drives the axis, and for how long."""
+"""One experiment: excitation and duration."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from xy_sysid.samples.block import FloatArray
 from xy_sysid.settings import AxisExcitation, ExcitationSettings
 from xy_sysid.units import USUAL, Units, readable
 
-RAMP = float(ExcitationSettings.model_fields["ramp"].default)  # s in which the excitation fades in, where nobody says another time
+RAMP = float(ExcitationSettings.model_fields["ramp"].default)  # s in which the excitation fades in, by default
 AGE = 0.04  # s: age of the position by which the excitation pulls back to the start
 KEPT = 64  # signals, as many as differ in more than their amplitude
 BANDED = ("noise", "multisine", "multisine_odd", "multisine_detect", "sweep", "stepped_sine", "prbs")  # kinds that have a band
@@ -59,11 +59,11 @@ class Experiment:
 
     @property
     def words(self) -> str:
-        """What it is, as people say it, for an axis that is driven in V."""
+        """The experiment in words, for an axis that is driven in V."""
         return self.said(USUAL)
 
     def said(self, units: Units) -> str:
-        """What it is, as people say it, in the units of an axis."""
+        """The experiment in words, in the units of an axis."""
         told, volt, parts = self.excitation, units.input, []
         if told.rms > 0.0 and told.kind in BANDED:
             parts.append(f"{told.kind} of {told.rms:.3g} {volt} rms from {told.low:.3g} to {told.high:.3g} Hz")

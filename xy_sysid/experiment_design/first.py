@@ -1,4 +1,4 @@
-"""A first experiment for an axis of which nothing is known but its limits.
+"""A first experiment for an unknown axis with known limits.
 
 An axis is taken to cross its travel at full voltage in between a third of a second and ten seconds, with any pole, delay and dry friction that
 machines have, and with a load that its friction holds: the axis rests at 0 V, which the first run (``xy-sysid run --first``) tells.
@@ -58,12 +58,12 @@ def first_experiment(axis: str, sampling_rate: float, limits: MachineLimits, see
     )
     chosen = next(((found, item) for found, item in lasting if not broken_in_time(models, sampling_rate, limits, item)), None)
     if chosen is None:
-        sentence = "No experiment is within the limits for every axis that may be there: widen the travel, or start with xy-sysid run --first."
+        sentence = "No experiment stays within the limits for every possible axis: widen the travel, or start with xy-sysid run --first."
         return NextExperiment(axis=axis, sampling_rate=sampling_rate, sentence=sentence, limits=limits)
     found, best = chosen
     seconds = best.seconds
     share = float(np.mean([_width(item, seconds) <= WIDTH for item in found]))
-    sentence = f"After {seconds:.0f} s, gain and pole are known to {100.0 * WIDTH:.0f} % on {100.0 * share:.0f} % of the axes that may be there."
+    sentence = f"After {seconds:.0f} s, gain and pole are known to {100.0 * WIDTH:.0f} % on {100.0 * share:.0f} % of the possible axes."
     made = NextExperiment(axis=axis, sampling_rate=sampling_rate, sentence=sentence, limits=limits, experiment=best, probability=share)
     return with_needs(made, models)
 

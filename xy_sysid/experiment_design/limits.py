@@ -1,4 +1,4 @@
-"""What an experiment may ask of the machine."""
+"""The limits of the machine in an experiment."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ SECONDS = 60.0  # s of motion for one experiment at most
 class MachineLimits:
     """Of one axis.
 
-    voltage: V, of each sample; rms: V, that the drive stands for long (its current); speed: m/s; acceleration: m/s^2
-    travel: (low, high) m; start: m, where the axis stands when an experiment begins; with recordings it is where the last one ends
+    voltage: V, of each sample; rms: V, that the drive can give continuously (its current); speed: m/s; acceleration: m/s^2
+    travel: (low, high) m; start: m, position at the start of an experiment; with recordings, the end of the last one
     margin: part of speed, acceleration and travel that is kept free; seconds: s of one experiment at most
-    centring: V/m, of the excitation's pull to the start, beyond which the axis would swing
-    ramp: s in which the excitation fades in; brake: m before each end of the travel in which it brakes, and no experiment goes
-    units: of the axis, in which the limits are told; V and m stand for them above
+    centring: V/m, largest pull of the excitation to the start; above it the axis would oscillate
+    ramp: s, fade-in of the excitation; brake: m, brake zone before each end of the travel, which no experiment enters
+    units: of the axis, for messages; V and m above stand for them
     """
 
     voltage: float
@@ -49,7 +49,7 @@ class MachineLimits:
     def __post_init__(self) -> None:
         for name in ("voltage", "rms", "speed", "acceleration", "seconds", "centring"):
             if not getattr(self, name) > 0.0:
-                raise BadInput(f"limit of {name}", getattr(self, name), "above 0", "Give what the machine may do.")
+                raise BadInput(f"limit of {name}", getattr(self, name), "above 0", "Give the limits of the machine.")
         most, farthest = (_most(name) for name in ("limit", "travel_max"))
         if self.voltage > most:
             unit = self.units.input
@@ -91,7 +91,7 @@ class MachineLimits:
     def broken(self, motion: Motion) -> str:
         """Which limit a motion would come too near to, in a word, or nothing."""
         if not np.all(np.isfinite(motion.position)):
-            return "a model that runs away"
+            return "a model whose simulation diverges"
         speed, acceleration = fastest(motion)
         free = 1.0 - self.margin
         away = motion.position - self.start

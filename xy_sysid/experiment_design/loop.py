@@ -1,4 +1,4 @@
-"""Design, run, compare, and again, until one set of effects is left.
+"""Design, run and compare, repeated until one set of effects is left.
 
 A pure function of the recordings that the experiments bring: with the same recordings it takes the same decisions.
 """
@@ -23,7 +23,7 @@ from xy_sysid.units import USUAL, Units
 
 Ending = Literal["settled", "alike", "impossible", "experiments", "seconds", "stopped"]
 Signals = tuple[FloatArray, FloatArray]  # voltage and position, (n,) each
-CarryOut = Callable[[Experiment], Signals | None]  # carries an experiment out; None if somebody stopped it
+CarryOut = Callable[[Experiment], Signals | None]  # carries out an experiment; None if it was stopped
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Decision:
         return self.standing.names[self.standing.chosen]
 
     def over(self) -> Ending | None:
-        """Why no experiment follows, whatever the budget."""
+        """Why no experiment follows, independent of the budget."""
         if len(self.left) == 1:
             return "settled"
         if self.then is not None:
@@ -111,7 +111,7 @@ def best_design(setting: Setting, beliefs: Sequence[Belief], limits: MachineLimi
 def decide(
     question: Question, more: Sequence[Signals], limits: MachineLimits, choose: Choose, before: Standing | None = None, draws: int = DRAWS
 ) -> Decision:
-    """What the recordings say, and what to measure next."""
+    """The comparison of the sets on the recordings, and the next experiment."""
     data = prepare_all(question.sampling_rate, [*question.recordings, *more], question.tolerance, question.units)
     models = {names: found.model for names, found in zip(before.names, before.fits, strict=True)} if before is not None else {}
     now = standing(data, question.library, question.sets, [models.get(tuple(each)) for each in question.sets])
@@ -140,7 +140,7 @@ def settle(question: Question, limits: MachineLimits, run: CarryOut, budget: Bud
 
 
 def after(last: Decision, budget: Budget, experiments: int, seconds: float) -> Experiment | Ending:
-    """What follows a decision: the next experiment, or why there is none. experiments, seconds: of motion, that were spent."""
+    """The next experiment after a decision, or why there is none. experiments, seconds: of motion, that were spent."""
     over = last.over()
     if over is not None or last.then is None:
         return over or "impossible"

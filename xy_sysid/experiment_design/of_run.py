@@ -1,4 +1,4 @@
-"""One call for a diagnosis: what to measure next, and what that is expected to bring."""
+"""One call for a diagnosis: what to measure next, and the expected result."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ Tell = Callable[[float], None]
 
 @dataclass(frozen=True, slots=True)
 class NextExperiment:
-    """What to measure next on one axis.
+    """The next experiment for one axis.
 
-    experiment: None where none helps; sentence: what it is expected to bring; sets: of effects that it is to distinguish
-    probability: that it tells; settles: whether that is 95 % or more; ask: what a person would have to change, or nothing
-    needs: what it asks of the axis; limits: within which it was chosen, with the units of the axis
+    experiment: None if none helps; sentence: its expected result; sets: the sets of effects that it should distinguish
+    probability: of a decision; settles: whether that is 95 % or more; ask: what a person would have to change, or empty
+    needs: voltage and travel that it needs; limits: for which it was designed, with the units of the axis
     """
 
     axis: str
@@ -66,11 +66,11 @@ def next_experiment(
     tolerance: float = EPSILON,
     tell: Tell = lambda part: None,
 ) -> NextExperiment:
-    """The experiment that best distinguishes what a diagnosis left open.
+    """The experiment that best distinguishes the sets of effects that a diagnosis left open.
 
-    found:   of ``diagnose``; limits: what the experiment may ask of the machine, None: nothing beyond what the recordings show; it begins
-             where the last recording ends
-    between: sets of effects that are to be distinguished, instead of those that the diagnosis leaves possible
+    found:   result of ``diagnose``; limits: of the machine, None: those seen in the recordings; the experiment begins where the last
+             recording ends
+    between: sets of effects to distinguish, instead of those that the diagnosis did not rule out
     Raises BadInput for a diagnosis without enough data, and for effects that free simulation cannot predict.
     """
     data = _data(found, tolerance)
@@ -89,7 +89,7 @@ def next_experiment(
 
 
 def sharpen(found: Answer, parameter: str, width: float, limits: MachineLimits | None = None, tolerance: float = EPSILON) -> NextExperiment:
-    """The experiment that makes a parameter of the diagnosed model known as well as asked for in the least time.
+    """The shortest experiment that determines a parameter of the diagnosed model with the wanted precision.
 
     parameter: ``gain``, ``pole`` or ``effect.parameter``; width: half of the 95 % interval, as a part of the value (0.02: 2 %)
     Raises BadInput as ``next_experiment``, and for a parameter that the model does not have.
@@ -164,7 +164,7 @@ def answered(axis: str, rate: float, made: Design, library: Library, following: 
 
 
 def _ask(library: Library, made: Design) -> str:
-    """What a person would have to change where no experiment can tell."""
+    """What a person would have to change if no experiment can decide."""
     if made.helps:
         return ""
     own, other = made.beliefs[0].effects, made.beliefs[1].effects

@@ -1,4 +1,4 @@
-"""The experiment that makes parameters known best: one of them to an interval that is asked for (c-optimality), or all of them (D-optimality).
+"""The experiment for precise parameters: one of them to a wanted interval (c-optimality), or all of them (D-optimality).
 
 The covariance that a fit will report is predicted from the sensitivities of the simulated motion: the inverse of the information of the data at
 hand and of the experiment, and what laws that are not exact add however long it lasts (Fedorov, Theory of optimal experiments, 1972).

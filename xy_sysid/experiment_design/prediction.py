@@ -1,4 +1,4 @@
-"""What an experiment would record if a model were true, and how a rival would then predict it."""
+"""The expected recording of an experiment if a model is true, and how a rival would predict it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from xy_sysid.samples.block import FloatArray
 
 @dataclass(frozen=True)
 class Setting:
-    """What an experiment is seen through.
+    """The measurement of an experiment: windows, noise floor and response.
 
     layout: windows and bands; encoder: m; epsilon: part of the motion to which laws are trusted; recorded: s of each recording at hand
     response: (bands,) |G|^2 of the machine to a force, as recorded (``greybox.floor``); None where nothing is recorded yet

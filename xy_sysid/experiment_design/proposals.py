@@ -1,4 +1,4 @@
-"""The experiments that are compared: a grid over kind, band, amplitude, period, place in the travel and path, and their neighbours.
+"""The experiments that are compared: a grid over kind, band, amplitude, period, position and path, and neighbours of the best.
 
 A place is approached and held by the excitation's pull: with an offset it pulls to another place than the start. A slow sine about it is a path.
 """

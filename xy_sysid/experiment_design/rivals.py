@@ -1,4 +1,4 @@
-"""The sets of effects that the data at hand leave possible: what was named, what predicts as well, and what may hide in the noise."""
+"""The sets of effects that the present data do not rule out: the named one, those that predict as well, and effects too small to be seen."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The way to a settled diagnosis, step by step: after each recording all are diagnosed together, and the next experiment is designed.
+"""A series of experiments: after each recording all recordings are diagnosed together, and the next experiment is designed.
 
 Each step is a pure function of the recordings so far and the step before, so that a walk can be replayed from its recordings.
 """
@@ -41,7 +41,7 @@ class WalkPlan:
 
 @dataclass(frozen=True)
 class WalkStep:
-    """What is known after some recordings, and what follows.
+    """The state after some recordings, and the next step.
 
     diagnosis: of all recordings, in a sentence; decision: which sets are left; following: the next experiment, None at the end; ending: why
     answer: the same experiment with what it needs; experiments, seconds: of motion, that were spent
@@ -57,14 +57,14 @@ class WalkStep:
 
     @property
     def sentence(self) -> str:
-        """What is settled, or what the next experiment is expected to bring."""
+        """The answer, or the expected result of the next experiment."""
         if self.ending is None:
             return self.answer.sentence if self.answer is not None else ""
         return told(self.decision, self.ending, self.answer)
 
 
 def step(plan: WalkPlan, runs: Sequence[Run], before: WalkStep | None = None, tell: Tell = lambda part: None) -> WalkStep:
-    """What all recordings so far say together, and what to measure next. tell: called with the part of a design that is done.
+    """The diagnosis of all recordings so far, and the next experiment. tell: called with the progress of the design, 0..1.
 
     runs: the first recording, and one of each experiment so far; before: the step before the last experiment, None at the first
     Raises BadInput if the recordings do not suffice for a diagnosis, or if the last one ends outside the travel.

@@ -1,4 +1,4 @@
-"""Whatever goes wrong in a file that a user has given to be run is told as what it is: that file's, with its line.
+"""Errors in a Python file of the user are reported as errors of that file, with the line.
 
 A file may raise anything, end the process or call itself without end, when it is loaded and whenever its functions are used.
 """

@@ -1,4 +1,4 @@
-"""A model file says in its first line what the rest adds up to, so that a cut or a changed one is seen."""
+"""The first line of a model file holds the checksum of the rest, so a cut or changed file is detected."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def unsealed(path: Path, text: str) -> str:
         return text
     rest = text[found.end() :]
     if _sum(rest) != found.group(1):
-        problem = "was cut off or changed since it was written (the sum in its first line is another)"
+        problem = "was cut off or changed since it was written (the sum in its first line differs)"
         raise BadRecording(path, problem, "Take another copy; if you changed it yourself, delete that line.")
     return rest
 

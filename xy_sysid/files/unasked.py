@@ -1,4 +1,4 @@
-"""No file is replaced unasked."""
+"""No file is replaced without --force."""
 
 from __future__ import annotations
 

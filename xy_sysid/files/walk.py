@@ -111,7 +111,7 @@ def run_of(path: Path, axis: str) -> Run:
 def replayed(folder: Path, library: Library = STANDARD) -> list[tuple[dict[str, Any], dict[str, Any]]]:
     """Each step of a walk as it was decided, and as its bags decide it now; the same pairs where nothing has changed.
 
-    A step that somebody stopped is compared with what would have followed. Raises BadInput for a folder that is none.
+    A step that was stopped is compared with the step that would have followed. Raises BadInput for a folder that is none.
     """
     try:
         text = text_of(folder / NAME, "the plan of a walk", LONGEST)

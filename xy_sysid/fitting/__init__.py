@@ -1,4 +1,4 @@
-"""Transfer functions from frequency responses, how sure they are, and whether to believe them.
+"""Transfer functions from frequency responses, with their uncertainty and verdicts.
 
 structure, problem:           what to look for; the lines to be fitted
 basis, linear, damped:        polynomials that stay well conditioned, least squares, steps
@@ -8,7 +8,7 @@ identify:                     the one to trust by default
 covariance, intervals:        how sure a fit is
 finish, result:               what a fit says
 modes:                        poles only, the short way
-model_orders, choose_orders:  which orders the data support, and those that a fit takes when nobody asks for any
+model_orders, choose_orders:  which orders the data support, and the default orders of a fit
 verdicts:                     what to believe
 check_on_data:                a given model against other data
 of_recording:                 the whole way of a recording, axis by axis

@@ -58,7 +58,8 @@ def choose_level(frf: FrequencyResponse, family: Structure) -> Choice:
     late = "with delay" if now.structure.free_delay else "without delay"
     reason = (
         f"Orders {orders} {late}, chosen from the data: the response does not fall at its highest lines, so that it has as many zeros as poles; "
-        f"it leaves {excess(now):.3g} times the cost of noise alone; nothing richer of {len(tried) - 1} tried is clearly better."
+        f"its cost is {excess(now):.3g} times that of noise alone; "
+        f"of {len(tried) - 1} other orders tried, none with more parameters is clearly better."
     )
     return Choice(now, trials, reason)
 

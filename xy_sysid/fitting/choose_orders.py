@@ -1,4 +1,4 @@
-"""Which orders does a response tell? From the rigid body with delay upward, as long as every step is clear and could be a machine.
+"""Choice of the orders from a response: from the rigid body with delay upwards, as long as each step is significant and physically plausible.
 
 A step up adds a pole, or a pair with or without its zeros. It is taken if (1) it shortens the description by more than CLEARLY,
 where the cost counts in units of what the richest plausible model leaves (overdispersion: Burnham & Anderson, Model Selection and
@@ -30,7 +30,7 @@ HALF = 0.5  # of the misfit near what a step adds that it may leave
 NEAR = 1.4  # times and over the frequencies added: there the misfit is counted
 LIGHT = 0.7  # damping above which a pair is no resonance
 NUMBERS_EACH = 4.0  # independent numbers that every parameter of a step up needs
-WIDEST = 0.1  # relative standard error, misfit counted, of a frequency that is told
+WIDEST = 0.1  # relative standard error, including misfit, of a frequency that counts as determined
 FAR_ABOVE = 3.0  # times the band's end beyond which a rigid body's pole is not seen at all
 
 
@@ -72,19 +72,19 @@ def choose(frf: FrequencyResponse, family: Structure, thorough: bool = True) -> 
         if not good:
             if clear:
                 nearest = min(clear, key=lambda step: description_length(step.fit, data, scale))
-                refused = f"{_orders(nearest.fit)} would leave {_times(nearest.fit)}, but {nearest.doubt}"
+                refused = f"{_orders(nearest.fit)} would have {_times(nearest.fit)}, but {nearest.doubt}"
             break
         best = min(good, key=lambda step: description_length(step.fit, data, scale))
-        words.append(f"{_named(best)} {'take' if len(best.added) > 1 else 'takes'} that to {_times(best.fit)}")
+        words.append(f"{_named(best)} {'reduce' if len(best.added) > 1 else 'reduces'} that to {_times(best.fit)}")
         now = best.fit
     data = independent_data(frf, len(now.frequency))
     scale = max(1.0, excess(now))
     trials = {(fit.structure.numerator_order, fit.structure.denominator_order): fit for fit in tried}
     ranked = sorted((_trial(fit, data, scale) for fit in trials.values()), key=lambda item: item.length)
     base = "a rigid body" if rigid.structure.denominator_order > max(family.integrators, 1) else "an integrator" if family.integrators else "a lag"
-    reason = f"Orders {_orders(now)}, chosen from the data: {base}{' with delay' if family.free_delay else ''} leaves {_times(rigid)}"
+    reason = f"Orders {_orders(now)}, chosen from the data: {base}{' with delay' if family.free_delay else ''} has {_times(rigid)}"
     reason += "".join(f"; {text}" for text in words)
-    reason += f"; {refused}." if refused else f"; nothing richer of {len(trials) - 1} tried is clearly better."
+    reason += f"; {refused}." if refused else f"; of {len(trials) - 1} other orders tried, none with more parameters is clearly better."
     return Choice(now, tuple(ranked), reason)
 
 
@@ -150,7 +150,7 @@ def _added(before: tuple[Mode, ...], after: tuple[Mode, ...], poles: int) -> tup
 
 
 def _doubt(now: Fit, fit: Fit, added: tuple[Mode, ...], poles: int) -> str:
-    """Why a richer fit is no machine, or not told by the data; empty if there is nothing against it."""
+    """Why a richer fit is not physical, or not determined by the data; empty if nothing is wrong."""
     low, high = float(fit.frequency[0]), float(fit.frequency[-1])
     if not fit.tf.is_stable:
         return "it is unstable"
@@ -172,7 +172,7 @@ def _doubt(now: Fit, fit: Fit, added: tuple[Mode, ...], poles: int) -> str:
         if item.name.startswith("resonance") and ours and not factor * item.sigma < WIDEST * item.value:
             return f"its resonance at {item.value:.3g} Hz is not determined"
     left = _misfit(fit, fit, added) / max(_misfit(now, fit, added), 1e-300)
-    return f"it leaves {100.0 * left:.0f} % of the misfit where it stands" if left > HALF else ""
+    return f"it leaves {100.0 * left:.0f} % of the misfit at its frequency" if left > HALF else ""
 
 
 def fit_resolution(fit: Fit) -> float:

@@ -1,4 +1,4 @@
-"""How sure a fit is: covariance of the parameters, and the cost that noise and the window alone let expect.
+"""Uncertainty of a fit: covariance of the parameters, and the expected cost for noise and window alone.
 
 Errors of neighbouring lines are correlated, so the sandwich (J'J)^-1 J' S J (J'J)^-1 with S the covariance of the weighted
 errors (Pintelon & Schoukens, System Identification, 2nd ed., 9.11). S has two parts. Noise: independent of the input,

@@ -54,7 +54,12 @@ def minimise(task: Problem, start: Point, options: FitOptions) -> Minimum:
     for iteration in range(options.max_iterations + 1):
         if value <= ROUNDING * size:
             return Minimum(
-                point=point, cost=value, iterations=iteration, converged=True, reason="The model reproduces the data to rounding.", table=rows
+                point=point,
+                cost=value,
+                iterations=iteration,
+                converged=True,
+                reason="The model reproduces the data up to rounding errors.",
+                table=rows,
             )
         upper, scale = _factor(task, rows, point)
         _, predicted = _step(upper, 0.0)
@@ -71,13 +76,15 @@ def minimise(task: Problem, start: Point, options: FitOptions) -> Minimum:
             damping = damping * 10.0 if damped else max(damping * 10.0, 1e-6)
             if damping > LARGEST_DAMPING:
                 rounding = value <= NEAR_ROUNDING * size
-                reason = "The model reproduces the data to rounding." if rounding else "No step lowers the cost, though its slope is not zero."
+                reason = (
+                    "The model reproduces the data up to rounding errors." if rounding else "No step lowers the cost, though its slope is not zero."
+                )
                 return Minimum(point=point, cost=value, iterations=iteration + 1, converged=rounding, reason=reason, table=rows)
         change = (value - trial_value) / value
         point, rows, value = trial, trial_rows, trial_value
         damping = damping * 0.5 if damped else 0.0
         if change <= options.relative_change:
-            return Minimum(point=point, cost=value, iterations=iteration + 1, converged=True, reason="The cost changes no more.", table=rows)
+            return Minimum(point=point, cost=value, iterations=iteration + 1, converged=True, reason="The cost no longer changes.", table=rows)
     return Minimum(
         point=point,
         cost=value,

@@ -1,4 +1,4 @@
-"""What a window makes of a response that bends within its main lobe: random errors, and how they hang together.
+"""Random errors of a response that varies within the main lobe of the window, and their correlation.
 
 The estimate at a line is the response blurred, plus an error e = mean over windows of conj(X) L / mean |X|^2 with the leakage
 L(f) = integral W(f - v) D_f(v) dZ(v), D_f(v) = G(v) - G_blurred(f). For an input that is locally white and Gaussian

@@ -51,7 +51,7 @@ def fit(frf: FrequencyResponse, structure: Structure, start: TransferFunction | 
     theta, iterations, converged = _iterate(data, theta, options)
     up, down = _split(data, theta)
     point = in_bases(task, up, down, 0.0, data.weight / np.abs(down))
-    reason = "The cost changes no more." if converged else f"No convergence in {iterations} iterations."
+    reason = "The cost no longer changes." if converged else f"No convergence in {iterations} iterations."
     return finish(task, point, "nllsfdi", Ended(iterations, converged, reason), "two linear least squares")
 
 

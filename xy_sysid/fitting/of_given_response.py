@@ -29,7 +29,7 @@ def settings_for(response: FrequencyResponse, settings: IdentifierSettings) -> I
 
 
 def band_of(response: FrequencyResponse, settings: IdentifierSettings) -> FrequencyResponse:
-    """All lines of a response that was measured elsewhere, or those of a band that somebody chose."""
+    """All lines of a response that was measured elsewhere, or those of a band that the user chose."""
     low = settings.band_low if settings.band_low != USUAL.band_low else 0.0
     high = settings.band_high if settings.band_high != USUAL.band_high else np.inf
     return response.band(low, high)

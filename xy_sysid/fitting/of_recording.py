@@ -39,7 +39,7 @@ MOST_ON_GRID = 0.5  # of the windows that fit; where the grid holds fewer, each 
 COVERED = 0.5  # of the samples that such windows take in at least
 MANY = 6  # periods that must be there where feedback or friction shape the input
 MOST_TRANSIENT = 2  # periods of a stretch of which none can be left out
-BEST = "Several realisations of a periodic input: noise and nonlinear distortion are separated, and sigma is that of the larger one."
+BEST = "Several realisations of a periodic input: noise and nonlinear distortion are separated, and sigma is the larger of the two."
 TRANSIENT = 1  # periods left out at the start of a periodic recording
 USUAL = IdentifierSettings()
 ROUNDING = 1e-12  # of the response: no line of a made-up signal without noise is more exact than its numbers
@@ -194,7 +194,7 @@ def _moving(axis: str, u: FloatArray, y: FloatArray, units: tuple[str, str], nam
 
 
 def _fitting(settings: IdentifierSettings, runs: list[slice], notes: list[str], tapered: bool) -> IdentifierSettings:
-    """The settings with a window that the record holds often enough; as they are where somebody chose another length than the usual.
+    """The settings with a window that the record holds often enough; unchanged if the user chose another length than the default.
 
     tapered: several windows are averaged; otherwise lines are, so that one window will do, and the longer it is, the finer they lie
     """
@@ -287,8 +287,8 @@ def _closed_loop(recording: Recording, axis: str) -> list[str]:
         return []
     return [
         f"Closed loop: the input follows the tracking error (correlation {likeness:.2f}). H1 is biased where noise and friction are "
-        "large against the excitation; if the reference moves in the whole band, --set response=joint_input_output takes it as instrument; "
-        "otherwise trust lines of high coherence only, or measure with open loop."
+        "large compared with the excitation; if the reference moves in the whole band, --set response=joint_input_output uses it as instrument; "
+        "otherwise trust only lines with high coherence, or measure in open loop."
     ]
 
 
@@ -300,7 +300,7 @@ def judged(frf: FrequencyResponse) -> None:
 
 
 def with_orders(frf: FrequencyResponse, settings: IdentifierSettings) -> tuple[IdentifierSettings, Choice | None]:
-    """The settings with the orders that the response tells, and why; unchanged, and None, where somebody asked for orders."""
+    """The settings with orders chosen from the response, and the reason; unchanged, and None, if the user gave orders."""
     if not settings.orders_from_data:
         return settings, None
     family = structure_from(settings)

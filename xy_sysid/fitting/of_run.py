@@ -1,4 +1,4 @@
-"""From a run to its frequency response, and from that to a transfer function with its verdicts: one call each."""
+"""Two calls: from a run to its frequency response, and from a response to a transfer function with verdicts."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ from xy_sysid.units import derivative_of
 
 @dataclass(frozen=True, slots=True)
 class LinearModel:
-    """A transfer function of one axis, and what is known of it.
+    """A transfer function of one axis, with its origin, fit and verdicts.
 
     hold:     how its input behaves between samples
     axis:     its name; data: SHA-256 of the samples of each recording that it was fitted to
-    fit:      the fit with its intervals, None of a model that comes from a file
-    verdicts: whether to believe it, one check each
+    fit:      the fit with its intervals; None for a model from a file
+    verdicts: the checks of the fit
     """
 
     tf: TransferFunction
@@ -44,7 +44,7 @@ class LinearModel:
 
     @property
     def doubt(self) -> str:
-        """Nothing speaks against simulating it."""
+        """Empty: a linear model can always be simulated."""
         return ""
 
     @property
@@ -54,12 +54,12 @@ class LinearModel:
 
     @property
     def intervals(self) -> tuple[Interval, ...]:
-        """95 % intervals of coefficients, delay, gain, poles, zeros, resonances, for noise alone; empty of a model from a file."""
+        """95 % intervals of coefficients, delay, gain, poles, zeros and resonances, for noise alone; empty for a model from a file."""
         return self.fit.intervals if self.fit is not None else ()
 
     @property
     def intervals_with_misfit(self) -> tuple[Interval, ...]:
-        """The same, widened by what the model leaves beyond noise."""
+        """The same, widened for the residual error above the noise."""
         return self.fit.intervals_with_misfit if self.fit is not None else ()
 
     @property
@@ -69,7 +69,7 @@ class LinearModel:
 
     @property
     def table(self) -> Table:
-        """Each number with its 95 % interval, widened by what the model leaves beyond noise."""
+        """Each parameter with its 95 % interval, widened for the residual error above the noise."""
         rows = ((item.name, item.value, item.low, item.high, item.unit) for item in self.intervals_with_misfit)
         return Table(("parameter", "value", "from", "to", "unit"), tuple(rows))
 
@@ -79,7 +79,7 @@ class LinearModel:
 
     def velocity(self, sampling_rate: float, voltage: FloatArray, position: FloatArray) -> FloatArray:
         """(n - 1,) simulated mean velocity of each sample, m/s, from rest; of an acceleration its integral without mean and slow drift."""
-        with np.errstate(over="ignore", invalid="ignore"):  # what runs away is told as such
+        with np.errstate(over="ignore", invalid="ignore"):  # an unstable model is reported as such
             moved, derivative = simulate_sampled(self.tf, sampling_rate, voltage, self.hold), derivative_of(self.tf.output_unit)
             if derivative == 2:
                 steps = (moved - np.mean(moved))[:-2] / sampling_rate
@@ -99,9 +99,9 @@ class LinearModel:
 def frf(data: Run | Recording, period: int | None = 0, **settings: Any) -> FrequencyResponse:
     """H1 with coherence and sigma of every line.
 
-    data:     a run, or a recording of one axis; period: samples of a period of the input, 0 to look for one, None for none
+    data:     a run, or a recording of one axis; period: of the input in samples; 0: search for one, None: not periodic
     settings: any of the identifier's (docs/settings.md), for example length=8192, window="hann", band_low=1.0
-    Source: Bendat & Piersol, Random Data, 4th ed., sec. 6.1.4. What a user should read is in ``origin.notes``.
+    Source: Bendat & Piersol, Random Data, 4th ed., sec. 6.1.4. Notes for the user are in ``origin.notes``.
     Raises BadInput if the axis does not move, the data are too short for one window, or a setting is unknown.
     """
     run = one_run(data)
@@ -115,7 +115,7 @@ def fit(response: FrequencyResponse, method: str = "best", **settings: Any) -> L
 
     method:   best (maximum likelihood), lls, iwls, nlls, ml, nllsfdi
     settings: any of the identifier's, for example numerator_order=2, denominator_order=3, delay=False
-    Orders that are not given are those that the response tells, from a rigid body with delay upward; the verdict "order" says why.
+    Orders that are not given are chosen from the response, from a rigid body with delay upwards; the verdict "order" says why.
     Source: Pintelon & Schoukens, System Identification, 2nd ed., ch. 9 and 10.
     Raises BadInput for a response without uncertainty, or orders beyond what numbers can hold.
     """
@@ -144,7 +144,7 @@ class Method:
                 raise BadInput(name, repr(value), ", ".join(allowed), "Choose one of these.")
 
     def structure(self, settings: IdentifierSettings) -> Structure:
-        """The model family. Raises BadInput for what makes no sense together."""
+        """The model family. Raises BadInput for settings that contradict each other."""
         values: dict[str, Any] = {"weighting": self.weighting, "domain": self.domain}
         return replace(structure_from(settings), **values)
 
@@ -152,7 +152,7 @@ class Method:
 def fit_response(
     response: FrequencyResponse, settings: IdentifierSettings, method: Method | None = None, unseen: HeldOut | None = None
 ) -> tuple[Fit, Validation]:
-    """The fit and what speaks for it; unseen: samples that no fit saw, for the check in time. Raises BadInput as ``fit``."""
+    """The fit with its verdicts; unseen: held-out samples, for the check in time. Raises BadInput as ``fit``."""
     judged(response)
     settings = settings_for(response, settings)
     method, choice = method or Method(), None

@@ -1,4 +1,4 @@
-"""What a fit says: the model, how sure it is, and whether it can be believed."""
+"""The result of a fit: the model, its uncertainty, and whether it is trustworthy."""
 
 from __future__ import annotations
 

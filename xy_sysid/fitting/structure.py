@@ -1,4 +1,4 @@
-"""What kind of transfer function to look for, and how hard."""
+"""The structure of the transfer function to fit, and the options of the fit."""
 
 from __future__ import annotations
 

@@ -27,8 +27,8 @@ FLAT = 1e-4  # singular value of the scaled Jacobian, of the largest, below whic
 GOOD_SIMULATION = 70.0  # NRMSE fit in per cent that counts as a model good enough to simulate with
 
 NUMBERS_EACH = 2.0  # independent numbers for each parameter, below which nothing is judged
-TRUSTED = 1.5  # times wider: beyond, what the model leaves and not noise decides the intervals
-UNTOLD = "Cannot be told from so few numbers: {}."
+TRUSTED = 1.5  # times wider: beyond this, the model error and not the noise determines the intervals
+UNTOLD = "Cannot be determined from so few values: {}."
 
 HeldOut = tuple[FloatArray, FloatArray, float]
 """Input (n,), output (n,) and sampling rate of data that the fit has not seen."""
@@ -94,7 +94,7 @@ def _few(fit: Fit, frf: FrequencyResponse) -> Verdict | None:
     data, parameters = independent_data(frf, len(fit.frequency)), fit.structure.parameters
     if data >= NUMBERS_EACH * parameters:
         return None
-    text = f"The {len(fit.frequency)} lines hold {data:.2g} independent numbers for {parameters} parameters: a fit of them tells nothing"
+    text = f"The {len(fit.frequency)} lines hold {data:.2g} independent numbers for {parameters} parameters: a fit of them means nothing"
     figures = {"independent_numbers": data, "parameters": float(parameters)}
     return Verdict("data", False, f"{text}. Record longer, widen the band, shorten the window or lower the orders.", figures)
 
@@ -104,7 +104,7 @@ def _cost(fit: Fit) -> Verdict:
     if fit.consistent is None or not fit.expected_cost > 0.0:
         return Verdict("cost", True, "The cost cannot be judged: there is no uncertainty to compare it with.", figures)
     if fit.expected_cost > ENOUGH and fit.cost < FAR_BELOW * fit.expected_cost:
-        text = f"The cost {fit.cost:.3g} is far below the {fit.expected_cost:.3g} that noise lets expect: the lines are not independent"
+        text = f"The cost {fit.cost:.3g} is far below the {fit.expected_cost:.3g} expected from noise: the lines are not independent"
         return Verdict("cost", False, f"{text} (a smooth or short input leaks into them), so the intervals mean little.", figures)
     if fit.consistent:
         return Verdict(
@@ -180,7 +180,7 @@ def _inside(fit: Fit) -> Verdict:
         return Verdict("inside_band", True, "Poles and zeros lie in or near the band.", figures)
     where = ", ".join(f"{mode.frequency:.4g} Hz" for mode in far)
     return Verdict(
-        "inside_band", False, f"Poles or zeros at {where}, far above the band's end of {top:.4g} Hz: they only stand for delay or gain.", figures
+        "inside_band", False, f"Poles or zeros at {where}, far above the band's end of {top:.4g} Hz: they only represent delay or gain.", figures
     )
 
 
@@ -190,7 +190,7 @@ def _cancelled(fit: Fit) -> Verdict:
     if removed.size == 0:
         return Verdict("cancellation", True, "No pole cancels a zero.", figures)
     where = ", ".join(f"{pole.real:.4g}{pole.imag:+.4g}j" for pole in removed)
-    return Verdict("cancellation", False, f"Poles at {where} nearly cancel zeros: a lower order does the same.", figures)
+    return Verdict("cancellation", False, f"Poles at {where} nearly cancel zeros: a lower order fits equally well.", figures)
 
 
 def _feasible(fit: Fit) -> Verdict:
@@ -212,9 +212,9 @@ def _delay(fit: Fit) -> Verdict:
     largest = fit.structure.delay_max
     figures = {"delay": fit.tf.delay, "largest": largest}
     if fit.tf.delay >= largest * (1 - 1e-9):
-        return Verdict("delay", False, f"The delay ends at the largest one looked for, {1e3 * largest:g} ms: it may be larger still.", figures)
+        return Verdict("delay", False, f"The delay ends at the largest value searched, {1e3 * largest:g} ms: it may be larger.", figures)
     if fit.tf.delay <= 0.0:
-        text = "The delay ends at 0, the least there is: the phase leads what the model allows. Is the input really held (--set hold=none)?"
+        text = "The delay ends at 0, its lower bound: the measured phase leads that of the model. Is the input really held (--set hold=none)?"
         return Verdict("delay", False, text, figures)
     return Verdict("delay", True, "The delay lies inside its bounds.", figures)
 
@@ -257,5 +257,5 @@ def simulation_sentence(error: SimulationError) -> str:
     """How much of a measured signal a simulation explains; lengths in mm."""
     scale, unit = readable(error.unit)
     if not np.isfinite(error.nrmse):
-        return f"simulated over {error.seconds:.3g} s: the model runs away, or is of another scale."
+        return f"simulated over {error.seconds:.3g} s: the simulation diverges, or the model has another scale."
     return f"simulated over {error.seconds:.3g} s: {error.nrmse:.1f} % of the {error.compared} explained, rms error {error.rms * scale:.3g} {unit}."

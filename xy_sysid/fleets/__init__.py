@@ -10,5 +10,5 @@ table:     the Parquet data set
 journal:   rows that are not in the table yet, so that a killed run loses none
 estimate:  how long the rest will take
 engine:    files -> rows, on the processes of a dask cluster
-of_paths:  the whole of it in one call
+of_paths:  all of these in one call
 """

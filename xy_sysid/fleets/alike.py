@@ -1,4 +1,4 @@
-"""How a parameter wanders on machines that are alike: what the series of all other axes of a table tell about the wander of one.
+"""The wander of a parameter on similar machines, learned from the series of all other axes of a table.
 
 Machines of a fleet wander alike, but not in the same way. So the model has two levels: each candidate says that the spreads of the axes are
 log-normal about one value with one width, and that mostly one kind of slowness acts. The candidates are weighed by how well they explain the series

@@ -1,4 +1,4 @@
-"""Which parameter of an axis has left its interval since commissioning? The estimates of a running machine against those of a model file.
+"""Which parameter of an axis has left its interval since commissioning? The estimates of a running machine are compared with those of a model file.
 
 The baseline is one recording, and what is heard since the node began is another: temperature, load and lubrication differ between the two and not
 within them. So the estimates of the running machine are not a series of independent recordings. Each of them is compared with the baseline by the

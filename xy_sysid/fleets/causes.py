@@ -1,4 +1,4 @@
-"""Changes that come together -> what may be the cause: a table that users extend."""
+"""Changes that come together -> the likely cause: a table that users can extend."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Causes(Settings):
     causes: list[Cause] = knob([], "in the order in which they are tried")
 
     def quantity(self, column: str) -> str:
-        """What a column measures; its own name where nobody says."""
+        """The quantity that a column measures; its own name if the table has none."""
         return next((name for name, patterns in self.quantities.items() if any(fnmatchcase(column, one) for one in patterns)), column)
 
     def likeliest(self, moves: Moves) -> Cause | None:

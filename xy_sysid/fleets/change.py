@@ -34,7 +34,7 @@ LONGEST = 200  # recordings that are looked at together; of longer series the ol
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """What a series says, for each wander of the grid (g of them) after each recording (n).
+    """The evidence of a series, for each wander of the grid (g of them) after each recording (n).
 
     none: (g, n) log likelihood without a change; odd: (g, n) log factor by which single recordings that are off raise it
     change: (g, n) log of the sum of the likelihood ratios of all changes
@@ -66,9 +66,9 @@ class Change:
 
 
 def evidence(series: Series) -> tuple[Evidence, Series]:
-    """The evidence of a series of up to LONGEST recordings, and the series without the recordings that were surely off: their error is unlimited.
+    """The evidence of a series of up to LONGEST recordings, and the series in which certain outliers have an unlimited error.
 
-    A recording was surely off where that is 99 times likelier than all else, a change or none, with what was measured after it.
+    A recording is a certain outlier if that is 99 times more probable than everything else (a change or none), given the later recordings.
     """
     for _ in range(series.value.size // 4 + 1):
         found, off = _evidence(series)
@@ -81,7 +81,7 @@ def evidence(series: Series) -> tuple[Evidence, Series]:
 
 
 def _evidence(series: Series) -> tuple[Evidence, tuple[int, ...]]:
-    """The evidence, and the numbers of recordings that were surely off."""
+    """The evidence, and the numbers of the recordings that are certain outliers."""
     n, changed, every = series.value.size, _first_change(series), grid()
     shapes = hypotheses(series.time)
     none, odd, change = (np.full((len(every), n), -np.inf) for _ in range(3))
@@ -181,7 +181,7 @@ def _moved(change: Change, by: int, declared: int) -> Change:
 
 
 def _located(series: Series, weights: FloatArray) -> Change:
-    """When the one change of a series was, and by how much until now: what a change that goes on will be in the end, nobody knows."""
+    """When the one change of a series was, and its size until now; the final size of a change that still goes on is unknown."""
     n, first = series.value.size, _first_change(series)
     shapes = hypotheses(series.time)
     now = shapes[-1, first:]

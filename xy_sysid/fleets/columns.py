@@ -30,7 +30,7 @@ class Column:
 _RECORDING = (
     Column("machine", "text", "", "name of the machine"),
     Column("axis", "text", "", "name of the axis; empty where the file could not be read"),
-    Column("date", "date", "", "when the recording was made, UTC; empty where nothing tells it"),
+    Column("date", "date", "", "when the recording was made, UTC; empty if unknown"),
     Column("source", "text", "", "path of the recording"),
     Column("problem", "text", "", "why an answer is missing, in one line; empty where none is"),
     Column("stage", "text", "", "what could not be done: naming, reading, fit, diagnosis, or worker (its process died)"),
@@ -56,26 +56,26 @@ _RESPONSE = (
 _DIAGNOSIS = (
     Column("verdict", "text", "", "missing_effect, nothing_missing, not_in_library or not_enough_data"),
     Column("effects", "text", "", "the effects that are named, largest first, separated by commas"),
-    Column("confidence", "number", "", "of the verdict, 0 to 1"),
+    Column("confidence", "number", "", "confidence of the verdict, 0 to 1"),
     Column("sentence", "text", "", "the verdict in words"),
     Column("explained", "number", "", "part of the rigid model's error power beyond the noise that the effects explain, 0 to 1"),
     Column("rigid_error", "number", "m/s", "held-out error of the rigid model, rms"),
     Column("held_out_error", "number", "m/s", "held-out error of the model below, rms", trended=True),
     Column("noise_floor", "number", "m/s", "smallest error that the data can show: encoder noise and a tolerated part of the motion, rms"),
-    Column("noise", "number", "m/s", "what the encoder adds to the error, rms", trended=True),
-    Column("discrepancy", "number", "m/s", "what no effect explains, rms"),
-    Column("model", "text", "", "effects of the model whose parameters follow: those that are named, and those that the fleet follows"),
+    Column("noise", "number", "m/s", "part of the error that comes from encoder noise, rms", trended=True),
+    Column("discrepancy", "number", "m/s", "part of the error that neither noise nor an effect explains, rms"),
+    Column("model", "text", "", "effects of the model whose parameters are in the next columns: the named ones, and those given with --follow"),
     Column("tried_first", "text", "", "effects of the axis' first recording, if they explain this one too, so that no others were tried; else empty"),
-    Column("one_step", "truth", "", "the model is judged one sample ahead (backlash), and its held-out error is of that"),
+    Column("one_step", "truth", "", "the model is judged one sample ahead (backlash); its held-out error is that of the prediction"),
 )
 _ORIGIN = (
     Column("seconds_reading", "number", "s", "processor time for reading the file, shared by its axes"),
     Column("seconds_fit", "number", "s", "processor time for the response and the transfer function"),
     Column("seconds_diagnosis", "number", "s", "processor time for the diagnosis"),
-    Column("versions", "text", "", "of the software that made the row"),
+    Column("versions", "text", "", "versions of the software that made the row"),
     Column("file_sha256", "text", "", "SHA-256 of the file, or of all files of a bag"),
     Column("data_sha256", "text", "", "SHA-256 of the samples of the longest stretch without a gap"),
-    Column("key", "text", "", "SHA-256 of file, name, options and version: a recording whose key is in the table is not done again"),
+    Column("key", "text", "", "SHA-256 of file, name, options and version: a recording whose key is in the table is skipped"),
 )
 
 

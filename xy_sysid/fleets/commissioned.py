@@ -1,4 +1,4 @@
-"""A model file, and a fleet's table -> what a running machine is compared with: the estimates at commissioning and the spread between recordings."""
+"""A model file and a fleet's table -> the reference for a running machine: estimates at commissioning, and the spread between recordings."""
 
 from __future__ import annotations
 

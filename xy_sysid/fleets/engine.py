@@ -1,4 +1,4 @@
-"""Tasks -> what came of them, on the processes of a dask cluster: this machine's cores, or a scheduler that is there already.
+"""Tasks -> their results, on the processes of a dask cluster: the cores of this machine, or an existing scheduler.
 
 A task whose process dies is tried once more at the end, alone, so that no other can be the reason; if its process dies again, that is its row.
 """
@@ -95,7 +95,7 @@ def processes(client: Client) -> int:
 
 
 def results(client: Client, tasks: Sequence[Task]) -> Iterator[tuple[Done, float]]:
-    """What came of each task, in the order in which they end, and the s that it took; never more than a few of them wait at the scheduler."""
+    """The result of each task with its duration, s, in the order in which they end; only a few tasks wait at the scheduler at a time."""
     waiting, doubtful = iter(tasks), list[Task]()
     yield from _window(client, waiting, lambda: AHEAD * processes(client), doubtful)
     blamed = list[Task]()

@@ -46,7 +46,7 @@ class Journal:
             self.fold()
 
     def fold(self) -> None:
-        """Put all rows into the table, and begin anew. Killed in between, it does so again: the same rows replace themselves."""
+        """Put all rows into the table, and begin again. Killed in between, it does so again: the same rows replace themselves."""
         if self._rows:
             merged(self._folder, self._rows, self._library)
         self._rows = []

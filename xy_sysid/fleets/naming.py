@@ -1,4 +1,4 @@
-"""Which machine, axis and date a recording belongs to: a list of the user's, a pattern of the path, the recording itself."""
+"""Machine, axis and date of a recording: from the user's list, a pattern of the path, or the recording itself."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ EXAMPLE = "{machine}/{date}*.csv"
 
 
 class Named(Settings):
-    """What a user says about one recording."""
+    """The user's names for one recording."""
 
     machine: str = knob("", "name of the machine")
     axis: str = knob("", "name of the axis, of a file that holds one")
@@ -30,18 +30,18 @@ class Named(Settings):
 
 
 class Names(Settings):
-    """How recordings are named, and what is followed in all of them: a small YAML file, or options."""
+    """The names of recordings, and the effects followed in all of them: from a small YAML file, or options."""
 
     pattern: str = knob("", "of the end of a path, for example {machine}/{axis}/{date}*.csv; * stands for anything but a slash")
     follow: list[str] = knob([], "effects whose parameters are estimated in every recording")
-    recordings: dict[str, Named] = knob({}, "by the end of a path: what cannot be told from it")
+    recordings: dict[str, Named] = knob({}, "by the end of a path: names that the path does not contain")
 
 
 @dataclass(frozen=True, slots=True)
 class Name:
-    """What a recording is called.
+    """The name of a recording.
 
-    axis: of a file that holds one, empty where the file's own names stand; date: UTC, None if nobody knows
+    axis: of a file that holds one, empty where the file's own names stand; date: UTC, None if unknown
     said: the machine was named by a list or a pattern; else it is the folder, and what the recording itself says is better
     """
 
@@ -97,7 +97,7 @@ def name_of(path: Path, names: Names) -> Name:
 
 
 def _said_date(text: str) -> datetime | None:
-    """A date that somebody means to be one; None where there is none. Raises BadInput."""
+    """The date in a text that a user gave as a date; None for an empty text. Raises BadInput."""
     found = date_of(text) if text else None
     if found is not None and not FIRST <= found < LAST:
         raise BadInput("date", repr(text), f"a year from {FIRST.year} to {LAST.year - 1}", "Correct it, or leave it out.")

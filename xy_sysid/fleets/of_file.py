@@ -43,7 +43,7 @@ class Task:
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """What came of a task. rows: one for each axis; empty where the table has them already (``unchanged``), with this key."""
+    """The result of a task. rows: one for each axis; empty where the table has them already (``unchanged``), with this key."""
 
     path: str
     rows: tuple[Row, ...]
@@ -96,7 +96,7 @@ def lost(task: Task, problem: str) -> Done:
 
 
 def _origin(task: Task, name: Name, content: str) -> Row:
-    """What all rows of a recording have in common. content: the hash of its file"""
+    """The columns that all rows of a recording share. content: the hash of its file"""
     return {
         "source": task.path,
         "file_sha256": content,
@@ -107,7 +107,7 @@ def _origin(task: Task, name: Name, content: str) -> Row:
 
 
 def failed(path: str, stage: str, problem: str) -> Row:
-    """The row of a recording of which nothing is known but why; the folder stands for the machine."""
+    """The row of a recording that could not be read, with the reason; the folder is used as the machine."""
     text = problem.removeprefix(f"{path}: ")
     return {"machine": Path(path).absolute().parent.name, "axis": "", "source": path, "stage": stage, "problem": text, "file_sha256": "", "key": ""}
 

@@ -1,4 +1,4 @@
-"""Recordings -> the fleet's table: the whole of it in one call."""
+"""Recordings -> the fleet's table, in one call."""
 
 from __future__ import annotations
 
@@ -64,11 +64,11 @@ def fleet(
 ) -> pyarrow.Table:
     """Fit and diagnose every recording, and give the table of all results: one row for each axis of each recording.
 
-    paths:   recordings, folders or patterns; table: a folder. What it has already is not done again. Without one nothing is kept
+    paths:   recordings, folders or patterns; table: a folder. Recordings that it contains are skipped. Without a folder nothing is kept
     client:  of a dask cluster; without one, processes of this machine: ``workers``, or one for each core
-    pattern: of the end of a path, which tells machine, axis and date: "{machine}/{date}*.csv"
+    pattern: of the end of a path, with machine, axis and date: "{machine}/{date}*.csv"
     follow:  effects whose parameters are estimated in every recording
-    Raises BadInput or BadRecording for what cannot be done at all; a recording that cannot be read is a row with its problem.
+    Raises BadInput or BadRecording if the call cannot be carried out; an unreadable recording becomes a row with its problem.
     """
     names = Names(pattern=pattern, follow=[follow] if isinstance(follow, str) else list(follow))
     with TemporaryDirectory() as kept_for_now:

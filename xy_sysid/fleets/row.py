@@ -49,9 +49,9 @@ class Plan:
 
 
 def row_of(recording: Recording, axis: str, plan: Plan) -> Row:
-    """What a fit and a diagnosis find, by column name; ``problem`` says why something is missing.
+    """The results of fit and diagnosis, by column name; ``problem`` says why one is missing.
 
-    An error that nobody thought of is a problem, too, so that the other axes of a file keep their rows. The search ends after a counted amount of
+    An unforeseen error is also reported as a problem, so that the other axes of a file keep their rows. The search ends after a counted amount of
     work, so that the same samples give the same numbers on a busy machine. Columns that have no value are left out.
 
     Raises BadInput for an axis that the recording does not have.

@@ -1,6 +1,6 @@
 """The fleet's table: a folder with one Parquet file for each machine, every column with its unit and meaning in the file.
 
-A file is written whole or not at all. Rows of one machine are sorted by axis, date and source, so that the same rows make the same file.
+A file is written completely or not at all. Rows of one machine are sorted by axis, date and source, so that the same rows make the same file.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ def write(table: pyarrow.Table, path: Path) -> None:
 def read(folder: Path, names: Sequence[str] | None = None) -> pyarrow.Table:
     """The table, sorted by machine, axis, date and source. names: of the columns that are wanted; None is all.
 
-    Raises BadRecording for what is no table of a fleet.
+    Raises BadRecording if it is not a table of a fleet.
     """
     pa = arrow()
     files = _files(folder)

@@ -1,4 +1,4 @@
-"""The fleet's table -> what changed, when, by how much, how sure, and what may be the cause."""
+"""The fleet's table -> changes, with date, size, certainty and likely cause."""
 
 from __future__ import annotations
 
@@ -133,10 +133,10 @@ def trend(
     axis_months: float = AXIS_MONTHS,
     tell: Callable[[float], None] = lambda _: None,
 ) -> Trends:
-    """What changed in the recordings of a fleet's table.
+    """The changes in the recordings of a fleet's table.
 
     table:  the folder that ``fleet`` made; machines: only their trends; own_causes: a YAML file that adds to the table of causes
-    axis_months: of an axis that does not change, in which one false alarm is allowed; tell: hears the part that is done
+    axis_months: months of an unchanged axis in which one false alarm is allowed; tell: called with the progress, 0..1
     The spread between recordings is learned for each parameter from all axes of the table together, and is in every interval.
     Raises BadRecording for what is no table, BadInput for a machine that is not in it, or where no axis has four recordings with a date and an
     answer.

@@ -1,4 +1,4 @@
-"""How a parameter of an axis moves that does not change: a grid of wanders, and the likelihood of a series for one of them.
+"""The wander of a parameter without a change: a grid of wanders, and the likelihood of a series for each.
 
 A wander is a Gaussian process: its standard deviation is a part of the level, and some of its variance is slow. A series that is divided by the
 Cholesky factor of its covariance is white; then a change is a regression (the equations are in ``change``).

@@ -1,5 +1,5 @@
-"""What stands between a person and the public functions: each takes what is meant, or says how it is called.
+"""Wrappers of the public functions: they convert what a user passes, and raise an error with the right call where they cannot.
 
-calls: a path where a recording is meant, a run where a frequency response is meant, two arguments in the other order
-types: whether a value is what an annotation asks for, and the words for it
+calls: a path instead of a recording, a run instead of a frequency response, two arguments in the other order
+types: whether a value has the annotated type, and the type in words
 """

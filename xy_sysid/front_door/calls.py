@@ -1,4 +1,4 @@
-"""A public function as a person calls it: what is meant is done, and a wrong call says in one line what the right one is."""
+"""Wraps a public function: equivalent arguments are converted, and a wrong call raises one line with the right call."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ LONGEST = 60  # characters of a value that is quoted
 
 
 def for_people(function: Callable[..., Any], name: str) -> Callable[..., Any]:
-    """The function, which also takes what stands for its arguments (``meant``), in either order if one order is meant.
+    """The function with conversion of its arguments (``meant``), in either order if only one order is possible.
 
-    name: as people write it, for example xy.fit. The result raises BadInput for arguments of a wrong type, too many, or too few.
+    name: the public name, for example xy.fit. The result raises BadInput for arguments of a wrong type, too many, or too few.
     """
     signature, hints = inspect.signature(function), _hints(function)
     usage = _usage(name, signature)
@@ -45,7 +45,7 @@ def for_people(function: Callable[..., Any], name: str) -> Callable[..., Any]:
 
 
 def _hints(function: Callable[..., Any]) -> dict[str, Any]:
-    """The annotated types of the arguments; one of a library that only a type checker imports counts as any."""
+    """The annotated types of the arguments; a type from a library that only a type checker imports counts as any."""
     found: dict[str, Any] = {}
     for name, text in function.__annotations__.items():
         try:
@@ -56,7 +56,7 @@ def _hints(function: Callable[..., Any]) -> dict[str, Any]:
 
 
 def pictures(module: types.ModuleType) -> types.ModuleType:
-    """A module of functions with each of its own public functions as a person calls it."""
+    """The module with each of its public functions wrapped."""
     shown = types.ModuleType("xy_sysid.plot", module.__doc__)
     for name, value in vars(module).items():
         if inspect.isfunction(value) and value.__module__ == module.__name__ and not name.startswith("_"):
@@ -65,7 +65,7 @@ def pictures(module: types.ModuleType) -> types.ModuleType:
 
 
 def meant(value: Any, wanted: Any) -> Any:
-    """What a value stands for where another type is wanted, one by one in a list: a path for what is in the file, a run for its response."""
+    """Converts a value to the wanted type, item by item in a list: a path to the content of the file, a run to its response."""
     kinds = get_args(wanted) if get_origin(wanted) is not None else (wanted,)
     if isinstance(value, list | tuple) and Run in kinds:
         return [meant(item, wanted) for item in value]
@@ -85,7 +85,7 @@ def meant(value: Any, wanted: Any) -> Any:
 
 
 def _response(value: Any) -> Any:
-    """The frequency response of a run, of a recording, or of what is in a file."""
+    """The frequency response of a run, a recording or a file."""
     from xy_sysid.fitting.of_run import frf
 
     if isinstance(value, str | Path):
@@ -119,14 +119,14 @@ def _in_order(given: tuple[Any, ...], wanted: list[Any]) -> tuple[Any, ...]:
 
 
 def _quoted(value: Any) -> str:
-    """Short values as they are, with their type; of others the type."""
+    """Short values with their type; for others only the type."""
     words = repr(value) if isinstance(value, str | int | float | bool | list | dict | tuple | None) else ""
     kind = type(value).__name__
     return f"{kind} {words}" if 0 < len(words) <= LONGEST else kind
 
 
 def _usage(name: str, signature: inspect.Signature) -> str:
-    """The call with the arguments that are needed, and dots for the others."""
+    """The call with the required arguments, and dots for the others."""
     needed, more = [], False
     for item in signature.parameters.values():
         if item.kind is inspect.Parameter.VAR_POSITIONAL:

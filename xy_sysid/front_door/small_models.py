@@ -26,13 +26,13 @@ from xy_sysid.units import Units
 
 
 class StepTest(FirstOrder):
-    """A first order with delay and friction. ``found["gain"]`` is a number with its interval; ``sentences`` say what the tests do not determine."""
+    """A first-order model with delay and friction. ``found["gain"]`` is a number with its interval; ``sentences`` name what remains undetermined."""
 
     __slots__ = ()
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """The answer, then each thing that these tests do not determine, with what would."""
+        """The answer, then everything that these tests do not determine, and a test that would."""
         return first_order_words(self)
 
     @property
@@ -49,18 +49,18 @@ class StepTest(FirstOrder):
 
 
 class ServoTest(Servo):
-    """A position-controlled joint. ``found["stiffness"]`` is a number with its interval; ``sentences`` say what target and angle cannot tell."""
+    """A position-controlled joint. ``found["stiffness"]`` is a number with its interval; ``sentences`` name what remains undetermined."""
 
     __slots__ = ()
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """The answer, then what target and angle alone cannot tell."""
+        """The answer, then everything that target and angle alone do not determine."""
         return servo_words(self, None)
 
     @property
     def table(self) -> Table:
-        """Each quantity, over the inertia, with its 95 % interval."""
+        """Each quantity, divided by the inertia, with its 95 % interval."""
         return told_table(self.quantities)
 
     def in_si(self, inertia: float) -> Table:
@@ -81,7 +81,7 @@ def steps(data: Data) -> StepTest:
     """Gain, time constant, delay and friction (kS, kV, kA) from short step and ramp tests, with 95 % intervals.
 
     data: a run or several of one axis, or a recording of one axis with all its stretches, however short
-    ``found.sentences`` say what these tests do not determine. Raises BadInput for an input or an output that never changes.
+    ``found.sentences`` name what these tests do not determine. Raises BadInput for an input or an output that never changes.
     """
     return StepTest(**_fields(first_order(_every(data))))
 
@@ -89,18 +89,18 @@ def steps(data: Data) -> StepTest:
 def servo(data: Data) -> ServoTest:
     """Stiffness, damping, friction, torque limit and delay of a position-controlled joint, from its target (the input) to its angle (the output).
 
-    data: as for ``steps``, target and angle in one unit. All numbers are over the inertia; ``found.in_si(inertia)`` has those of MuJoCo and URDF.
+    data: as for ``steps``, target and angle in one unit. All values are per inertia; ``found.in_si(inertia)`` has those of MuJoCo and URDF.
     Raises BadInput for too few samples or different units.
     """
     return ServoTest(**_fields(servo_of(_every(data))))
 
 
 def coupling(data: Recording, combine: str = "", **settings: Any) -> Coupling:
-    """What two axes that are driven at once do to each other: the 2 x 2 response, its coupling by band, and whether two single-axis models suffice.
+    """The coupling of two axes that are driven at once: the 2 x 2 response, the coupling in each band, and whether two single-axis models suffice.
 
-    combine:  corexy or gantry, of a machine whose two drives move both axes
+    combine:  corexy or gantry, for a machine whose two drives move both axes
     settings: any of the identifier's (docs/settings.md), for example band_low=1.0
-    Source: Bendat & Piersol, Random Data, 4th ed., sec. 7.4. Raises BadInput for fewer than two axes, too few windows, or inputs that are alike.
+    Source: Bendat & Piersol, Random Data, 4th ed., sec. 7.4. Raises BadInput for fewer than two axes, too few windows, or similar inputs.
     """
     return coupling_in(data, build(IdentifierSettings, settings, "coupling"), combine)
 
@@ -108,9 +108,9 @@ def coupling(data: Recording, combine: str = "", **settings: Any) -> Coupling:
 def mechanics(found: FirstOrder | PhysicalModel | Answer, kt: float | None = None, gear: str = "") -> Table:
     """Inertia or mass, damping and friction in SI, at the joint or table and at the motor, with the names of MuJoCo and URDF.
 
-    found: of ``steps``, ``refine`` or ``diagnose``, or a model; kt: torque constant of a current as input, N m/A
-    gear:  turns of the motor for one of the joint ("50"), or the way of one turn ("5mm")
-    Empty where the input is no torque, force or current with a constant. Raises BadInput for a gear that cannot be read.
+    found: result of ``steps``, ``refine`` or ``diagnose``, or a model; kt: torque constant, N m/A, if the input is a current
+    gear:  motor turns per joint turn ("50"), or travel per motor turn ("5mm")
+    Empty if the input is not a torque, a force, or a current with a known torque constant. Raises BadInput for a gear that cannot be read.
     """
     figures, units = _figures(found)
     drive = drive_from(kt, gear, units)

@@ -1,4 +1,4 @@
-"""Whether a value is of the type that an annotation names, and that type in words."""
+"""Whether a value has the annotated type, and the type in words."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ TEXT = (str, bytes)
 
 
 def is_a(value: object, wanted: Any) -> bool:
-    """A value is of the wanted type, as far as that can be seen without looking into its items; int counts as float, text is no list of words."""
+    """Whether a value has the wanted type, without checking its items; int counts as float, and text does not count as a list of words."""
     kind = get_origin(wanted) or wanted
     if kind in (Union, types.UnionType):
         return any(is_a(value, one) for one in get_args(wanted))
@@ -40,7 +40,7 @@ def is_a(value: object, wanted: Any) -> bool:
 
 
 def in_words(wanted: Any) -> str:
-    """The type as a person says it."""
+    """The type in words."""
     kind, parts = get_origin(wanted) or wanted, get_args(wanted)
     if kind in (Union, types.UnionType):
         words = list(dict.fromkeys(in_words(one) for one in parts if one is not str or Path not in parts))

@@ -1,15 +1,15 @@
-"""Fitting an axis model to a recording, and the floor that the data allow.
+"""Fits of an axis model to a recording, and the noise floor of the data.
 
-floor:           how large an error is, band by band, against the least that the data allow
-axis_data:       what is fitted: one axis, cut into windows of which some are held out
-start_rigid:     gain, delay and pole without a start value
-start_inverse:   base and effect together by linear least squares
-score_test:      how much of the error an effect would explain, to first order
+floor:           the noise floor, and the error compared with it, band by band
+axis_data:       the data of one axis, divided into fitted and held-out windows
+start_rigid:     start values of gain, delay and pole
+start_inverse:   start values of base and effect together, by linear least squares
+score_test:      part of the error that an effect would explain, to first order
 least_squares:   Levenberg-Marquardt on the whitened error in velocity
-parameters:      a model's parameters as one row: simulated, bounded, and read back with intervals
-free_run:        the fit: base alone or with chosen effects, judged on data held out
+parameters:      the parameters of a model as one row: simulation, bounds, and intervals
+free_run:        the fit by free simulation: base alone or with effects, scored on held-out data
 one_step:        the fit of effects that only one-step prediction can judge
-innovation_test: the score test on the innovations of that
-whitened:        the rival of that: a simulation, and an autoregressive model of its error
-open_loop:       a model on its own from the first sample to the last
+innovation_test: the score test on the innovations of one-step prediction
+whitened:        the rival of one-step prediction: a simulation with an autoregressive model of its error
+open_loop:       free simulation of the position from the first sample to the last
 """

@@ -1,7 +1,7 @@
-"""What is fitted: one axis, moving in one or several recordings, cut into windows of which some are held out.
+"""The data of a fit: one axis in one or several recordings, divided into fitted and held-out windows.
 
-Windows that judge are spread over the record, in blocks between those that a fit sees, and share no sample with them; so they
-hold the motion that they judge. Of several recordings each is cut so.
+Held-out windows are spread over the record, in blocks between the fitted ones, and share no sample with them, so both contain similar
+motion. Each of several recordings is divided in this way.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ SHIFTS = 4  # places tried for the blocks that are held out
 
 
 class Work:
-    """What was simulated so far: samples times sub-steps, the same on every machine and however busy it is."""
+    """The amount of simulation so far: samples times sub-steps. It is the same on every computer, busy or not."""
 
     def __init__(self) -> None:
         self._sum = 0.0
@@ -59,15 +59,15 @@ class Work:
 
 @dataclass(frozen=True)
 class AxisData:
-    """One axis without gaps, ready to be fitted, with what its data allow.
+    """One axis without gaps, ready for fits, with its noise floor.
 
     voltage, position: (n,) V and m, recordings one after the other; velocity: (n - r,) mean of each sample, m/s, of r recordings
     starts: sample of ``voltage`` at which each recording begins
-    fitted, held: windows of ``velocity`` that a fit sees, and that judge it
+    fitted, held: windows of ``velocity`` for the fit, and held-out windows
     early: samples of each recording's velocity that are in the first stage; brief: windows in these (``begun``) that a fit sees there
-    training: samples of ``velocity`` for what must run through
-    units: what V and m stand for, wherever words are made of it
-    work: what was simulated for it
+    training: samples of ``velocity`` for filters that must run without interruption
+    units: the units that V and m stand for, used in sentences
+    work: amount of simulation
     """
 
     sampling_rate: float
@@ -87,7 +87,7 @@ class AxisData:
 
     @property
     def noise_floor(self) -> float:
-        """The smallest error that the data can show: of encoder noise and of the part of the motion that a model may leave, m/s rms."""
+        """The smallest error that the data can show: encoder noise and the tolerated part of the motion, m/s rms."""
         return self.layout.rms(self.floor.power)
 
     @property
@@ -126,18 +126,18 @@ class AxisData:
 
     @property
     def moving(self) -> float:
-        """rms of the motion where it is held out over that where it is fitted."""
+        """rms of the motion in held-out windows divided by that in fitted windows."""
         held, fitted = (float(np.mean(np.abs(windows.spectrum(self.velocity)) ** 2)) for windows in (self.held, self.fitted))
         return float(np.sqrt(held / fitted)) if fitted > 0.0 else 0.0
 
     @cached_property
     def similar(self) -> Similarity:
-        """How this motion compares with the one that the effects' bounds are written for."""
+        """Ratio of this motion to that of the reference machine, for which the bounds of effects are given."""
         return Similarity.of(self.sampling_rate, self.voltage, self.velocity)
 
     @cached_property
     def swing(self) -> float:
-        """Usual way between two reversals, m."""
+        """Typical distance between two reversals, m."""
         return swing(self.sampling_rate, smoothed(self.sampling_rate, self.velocity, 300.0), self.velocity)
 
     @cached_property
@@ -147,7 +147,7 @@ class AxisData:
 
     @cached_property
     def passed_once(self) -> bool:
-        """Each place is passed once: what acts there cannot be told from what drifts with time."""
+        """Each position is passed only once, so an effect of position cannot be distinguished from a drift."""
         apart = max(int(LOOK * self.sampling_rate), 1)
         way = sum(float(np.sum(np.abs(np.diff(self.position[run][::apart])))) for run in self.runs)
         return way < ONCE * (self.reach[1] - self.reach[0])
@@ -258,7 +258,7 @@ def _within(windows: Windows, steps: Sequence[slice], early: Sequence[int] | NDA
 
 
 def loosened(data: AxisData, epsilon: float) -> AxisData:
-    """The same axis with laws that are trusted less."""
+    """The same axis with a larger tolerance."""
     both = Windows(data.layout, np.concatenate((data.fitted.begins, data.held.begins)))
     return replace(data, floor=replace(floor(both, data.velocity, data.floor.encoder, epsilon), response=data.floor.response))
 

@@ -1,4 +1,4 @@
-"""How large an error in velocity is, band by band, against the least that the data allow.
+"""The error in velocity, band by band, compared with the noise floor.
 
 The error passes overlapping Hann windows; one line of one window is one number. With half overlap the windows add up to a
 constant, so scaled by ``1 / sqrt(sum of window^2 per sample)`` the squares add up to those of the samples (Parseval), and
@@ -128,7 +128,7 @@ def bands(sampling_rate: float, samples: int, count: int = 36, sensed: Sensed = 
 
 @dataclass(frozen=True, slots=True)
 class Floor:
-    """What no model can go below.
+    """The noise floor: no model has a smaller error.
 
     noise:   (bands,) of the encoder alone, m^2/s^2, as of ``Bands.power``; power: with what laws and their integration are not trusted to
     motion:  (bands,) of what is measured; excited: (bands,) bool

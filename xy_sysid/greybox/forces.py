@@ -1,6 +1,6 @@
-"""What the effects of a model push against the drive on the measured motion, and how others push what one of them did.
+"""Forces of the effects of a model on the measured motion, and models in which other effects take over the force of one.
 
-No simulation: place, time and speed are measured, and these laws ask for nothing else.
+Nothing is simulated: position, time and speed are measured, and these laws depend on nothing else.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ SPEEDS = 100  # at which levels of dry friction are compared
 
 
 def pushing(model: AxisModel) -> list[str]:
-    """Effects whose force follows from place and time alone."""
+    """Effects whose force depends on position and time alone."""
     return [name for name, _ in model.effects if pushes(model.library[name])]
 
 
 def force_of(data: AxisData, model: AxisModel, name: str, counts: Sequence[int]) -> FloatArray:
-    """(samples,) V, what one effect of a model pushes against the drive on the measured motion; counts: samples of each recording."""
+    """(samples,) V, force of one effect of a model against the drive, on the measured motion; counts: samples of each recording."""
     row = np.array([model.gain, model.delay, model.pole, *dict(model.effects)[name]])
     parts = []
     for run, count in zip(data.runs, counts, strict=True):
@@ -38,12 +38,12 @@ def force_of(data: AxisData, model: AxisModel, name: str, counts: Sequence[int])
 
 
 def rubbing(model: AxisModel) -> list[str]:
-    """Effects whose friction follows from the speed alone."""
+    """Effects whose friction depends on speed alone."""
     return [name for name, _ in model.effects if model.library[name].category == "friction"]
 
 
 def friction_of(scene: Scene, model: AxisModel, name: str) -> FloatArray:
-    """(n,) V, what the friction of a model pushes against the drive on the measured motion, while it moves."""
+    """(n,) V, friction force of a model against the drive, on the measured motion, while the axis moves."""
     velocity = scene.smooth(scene.velocity, SMOOTH)
     speeds = np.linspace(float(np.min(velocity)), float(np.max(velocity)), 2 * SPEEDS)
     level = np.interp(velocity, speeds, _levels(model.library[name], np.array(dict(model.effects)[name]), speeds))
@@ -51,9 +51,9 @@ def friction_of(scene: Scene, model: AxisModel, name: str) -> FloatArray:
 
 
 def taken_over(data: AxisData, model: AxisModel, name: str) -> AxisModel:
-    """The model without an effect, whose force the others that push by place and time take over as well as they can.
+    """The model without an effect; the other forces of position and time are adapted to replace its force as well as possible.
 
-    A load beside a spring, say, is a spring that rests elsewhere. If there are no others, or a law gives no number, they stay as they were.
+    For example, a spring with a load is a spring with another rest position. Without other forces, or if a law is not finite, nothing is adapted.
     """
     others = [own for own in pushing(model) if own != name]
     less = model.without(name)
@@ -78,14 +78,14 @@ def taken_over(data: AxisData, model: AxisModel, name: str) -> AxisModel:
 
 
 def of_one_name(data: AxisData, model: AxisModel, name: str, relative: Effect) -> AxisModel:
-    """The model with a relative in the place of an effect: parameters of one name keep their value, others begin with the usual one."""
+    """The model with a relative in the place of an effect: parameters of the same name keep their value, others get typical values."""
     own = dict(zip(model.library[name].names, dict(model.effects)[name], strict=True))
     begun = ((own.get(item.name, item.typical), item) for item in relative.on(data.similar))
     return model.without(name).with_effect(relative.name, [min(max(value, item.low), item.high) for value, item in begun])
 
 
 def stood_in(data: AxisData, model: AxisModel, name: str, relative: Effect) -> AxisModel:
-    """The model with a relative in the place of an effect, which pushes as that did, as well as it can.
+    """The model with a relative in the place of an effect, with a force as similar as possible.
 
     As ``of_one_name`` where the laws are neither forces by place nor dry friction.
     """
@@ -157,7 +157,7 @@ def braked(data: AxisData, model: AxisModel, name: str, relative: Effect) -> lis
 
 
 def pushes(effect: Effect) -> bool:
-    """The force follows from place and time alone."""
+    """Whether the force depends on position and time alone."""
     return effect.category == "force" and undoable(effect)
 
 
@@ -170,7 +170,7 @@ def _levels(effect: Effect, values: FloatArray, speeds: FloatArray) -> FloatArra
 
 
 def _least(left: Callable[[FloatArray], FloatArray], begun: FloatArray, items: Sequence[Parameter]) -> FloatArray:
-    """The values within the parameters' bounds that leave least; the first ones, within these, where they leave no number."""
+    """The values within the bounds with the smallest error; the start values within the bounds, if the error is not finite."""
     from scipy.optimize import least_squares  # here, as it takes a while to import, and few ask
 
     low, high = np.array([item.low for item in items]), np.array([item.high for item in items])

@@ -1,6 +1,6 @@
-"""Fitting an axis model by free simulation: the base alone, or with chosen effects, all parameters together.
+"""Fits of an axis model by free simulation: the base alone or with effects, all parameters together.
 
-First on the first stage's data, where a step is quick, then on all windows that are not held out.
+A screening fit uses the data of the first stage; a full fit uses all windows that are not held out.
 """
 
 from __future__ import annotations
@@ -50,10 +50,10 @@ NEARER = Schedule(4, 6, 3e-3, 3e-3)
 FINER = Schedule(2, 8, 1e-4, 1e-3)
 LONG = Schedule(3, 6, 1e-5, 1e-4)
 COARSE, MIDDLING = 2000.0, 4000.0  # Hz: finest sub-steps of looks and first rounds (errors up to 3e-3 of the motion), and of brief fits (6e-4)
-TOLD = 0.01  # part of what is left of the voltage that an effect takes away at least, to be simulated before any fit: of 14 s below 10 Hz chance
+TOLD = 0.01  # least part of the residual voltage that an effect explains, to be simulated before any fit: of 14 s below 10 Hz chance
 # takes half of it
 LATE = 1.0 / (4.0 * CUTOFFS[-1])  # s, of a delay with which nothing is read if it is wrong: a quarter of the shortest period that is looked at
-FAITHFUL = 0.1  # of what a model leaves: by so much may its motion change with finer sub-steps
+FAITHFUL = 0.1  # of the error of a model: allowed change of its motion with finer sub-steps
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,16 +62,16 @@ class GreyboxFit:
 
     parameters:     gain, delay, pole, then ``effect.parameter``, with 95 % intervals
     training_error: rms in the windows of the fit, below the top band, m/s
-    held_out_error: the same in those held out, which no fit saw
-    noise_floor:    what the encoder's noise makes, together with the part of the motion that a model may leave, m/s; one step ahead the noise alone
+    held_out_error: the same in held-out windows
+    noise_floor:    encoder noise together with the tolerated part of the motion, m/s; one step ahead the noise alone
     excess:         score of the held-out error, nats a line above the floor (``objective``); scores: (windows,) nats of each window
-    forced:         lines of a window in which the unmodelled force stands out of the floor
+    forced:         lines of a window in which the unmodelled force exceeds the floor
     force:          of the unmodelled force, V a sample (rms, white), that explains the held-out error beyond the floor
     simulated:      (n - r,) velocity over all recordings, m/s; error: (n - r,) measured minus simulated
     held:           (windows, bands) power of the held-out error, m^2/s^2
     units:          of input and output; m/s above is ``units.speed``
-    brief:          of the first stage's data only: errors are of all of its windows, and what it simulates ends with them
-    one_step:       judged by how it predicts the next sample from all before it, and not by how it simulates: errors are of that
+    brief:          a screening fit, on the data of the first stage: errors are of all its windows, and the simulation ends with them
+    one_step:       judged by the prediction of the next sample from all earlier ones, not by simulation; errors are those of the prediction
     """
 
     model: AxisModel
@@ -123,10 +123,10 @@ def fit_with(
     brief: bool = False,
     hopeless: float = np.inf,
 ) -> GreyboxFit:
-    """The model of ``base`` with more effects, all refitted together; starts: their first values, else read from the data.
+    """The model of ``base`` with more effects, all parameters fitted together; starts: their start values, else determined from the data.
 
-    A model that ends worse than ``base`` is fitted again from there, with what is new nearly absent.
-    brief: on the first stage's data only, and no longer than a first round if that leaves more excess than ``hopeless``
+    If the result is worse than ``base``, it is fitted again from ``base`` with a nearly absent new effect.
+    brief: a screening fit, which stops after its first round if its excess is then above ``hopeless``
     """
     model = base.model
     for name in names:
@@ -144,13 +144,13 @@ def fit_with(
 
 
 def fitted_score(data: AxisData, fitted: GreyboxFit) -> float:
-    """What a fit minimises, of the windows that it was fitted to: nats a line."""
+    """The objective of a fit in its fitted windows, nats a line."""
     power = data.layout.power(data.fitted.spectrum(fitted.error))
     return Objective.of(data.floor).of_power(np.where(np.isfinite(power), power, np.inf))
 
 
 def _begun(data: AxisData, base: GreyboxFit, model: AxisModel, name: str) -> AxisModel:
-    """The model with one more effect, its start read from the data: the best of trace, inverse and joint starts."""
+    """The model with one more effect, with the best start value from trace, inverse dynamics and joint start."""
     effect = model.library[name]
     traced = model.with_effect(name, look(data, base, [effect])[0].values)
     return best_start(data, [traced, *other_starts(data, base, model, name)])
@@ -225,7 +225,7 @@ def _sized(model: AxisModel, name: str, times: float) -> tuple[float, ...]:
 
 
 def best_start(data: AxisData, candidates: list[AxisModel]) -> AxisModel:
-    """The candidate with the least score on the first stage's data, without a fit."""
+    """The candidate with the least score on the data of the first stage, without a fit."""
     if len(candidates) == 1:
         return candidates[0]
     scores = on_all_cores(partial(first_excess, data), candidates)
@@ -242,12 +242,12 @@ def first_excess(data: AxisData, model: AxisModel) -> float:
 
 
 def look(data: AxisData, fitted: GreyboxFit, effects: Iterable[Effect]) -> list[Trace]:
-    """What each effect would explain of the error of a fit, best first, with start values."""
+    """The part of the error of a fit that each effect would explain, best first, with start values."""
     return list(screened(data, fitted, effects).traces)
 
 
 def screened(data: AxisData, fitted: GreyboxFit, effects: Iterable[Effect], scene: Scene | None = None) -> Screen:
-    """The score test of effects on what a fit leaves, alone and together; scene: of the first stage's data (None), or of all."""
+    """The score test of effects on the residual error of a fit, alone and together; scene: of the first stage's data (None), or of all."""
     scene = scene or scene_of(data, fitted)
     early = scene.velocity.size == data.first
     task = problem(data, fitted.model, early)
@@ -259,7 +259,7 @@ def screened(data: AxisData, fitted: GreyboxFit, effects: Iterable[Effect], scen
 
 
 def scene_of(data: AxisData, fitted: GreyboxFit, early: bool = True) -> Scene:
-    """The measured motion of the first stage, or of the whole, as effects see it."""
+    """The measured motion of the first stage, or of all data, as input to the traces of effects."""
     model, part = fitted.model, data.begun if early else np.asarray
     scene = _scene(data, model, fitted.error if fitted.brief else part(fitted.error), part)
     prompt = _scene(data, replace(model, delay=0.0), scene.error, part)
@@ -320,7 +320,7 @@ def joined(data: AxisData, found: GreyboxFit, late: Callable[[], bool] = in_time
 def sub_steps(data: AxisData, task: FitProblem, finest: float) -> float:
     """Hz: the longest sub-steps, a sample or halves of it, with which a model moves as with half as long.
 
-    As it does: but for a tenth of what it leaves or nobody can tell, by amplitude in the mean over the excited bands.
+    The difference may be a tenth of the error or of the noise floor, in amplitude, as a mean over the excited bands.
     """
     rate = min(data.sampling_rate, finest)
     if rate == finest:

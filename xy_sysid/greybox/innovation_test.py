@@ -1,6 +1,6 @@
-"""What an effect would explain of the innovations of a one-step prediction, to first order: a score test, as ``score_test`` is for free simulation.
+"""The part of the innovations that an effect would explain, to first order: a score test, like ``score_test`` for free simulation.
 
-The filter is run with a little of each trace put in; what changes is what the effect would explain.
+The filter is run with a small amount of each trace; the change of the innovations is what the effect would explain.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ SMALL = 0.02  # of the rms voltage or velocity: how much of a trace is put in to
 
 
 def traces(data: AxisData, model: AxisModel, effect: Effect, found: Followed, effects: Iterable[Effect]) -> list[Trace]:
-    """How much of the innovations' power each effect beside would explain, to first order, best first, with start values."""
+    """The part of the innovations' power that each additional effect would explain, to first order, best first, with start values."""
     assert effect.one_step is not None
     library, fs, n = model.library, data.sampling_rate, data.first
     names = [name for name, _ in beside(model, effect)[1]]

@@ -1,10 +1,10 @@
 """Levenberg-Marquardt on the whitened error in velocity: the fit that minimises the objective.
 
 Levenberg 1944, Marquardt 1963. The error is divided by the spectrum that the objective gives it (``objective.spectrum``), which is worked
-out again before each round: iteratively reweighted least squares. A round that does not lower the objective is taken back, so that a fit
+out again before each round: iteratively reweighted least squares. A round that does not lower the objective is undone, so a fit
 never ends worse than it starts.
-Derivatives are forward differences of the simulation. They are computed again only where a step did not do what they promised, and are otherwise
-updated with what the step did (Broyden 1965).
+Derivatives are forward differences of the simulation. They are computed again only if a step did not lower the cost as predicted, and are
+otherwise updated with the result of the step (Broyden 1965).
 """
 
 from __future__ import annotations
@@ -130,7 +130,7 @@ def solve(
     schedule: Schedule,
     known: Solution | None = None,
 ) -> Solution:
-    """The parameters that explain a target best.
+    """The parameters with the smallest error for a target.
 
     run: parameters -> velocity (n,), called from several threads at once; schedule: the weights are worked out before each round;
     known: an earlier solution that ended at the start, whose derivatives hold nearly, and whose error does if it was of the same run

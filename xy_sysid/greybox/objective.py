@@ -1,4 +1,4 @@
-"""One score of a model on data: the likelihood of its error, caused by the encoder's noise and by what the model does not have.
+"""The score of a model on data: the likelihood of its error, which encoder noise and unmodelled causes produce.
 
 The spectrum of the error in velocity is S(f) = N(f) + |G(f)|^2 s + v. N is the floor of the data and G the machine's measured response to a force at
 the motor, which acts as the input does: both are the same for all models, so that no model can make its own error cheap. The power s of an

@@ -1,8 +1,8 @@
-"""Effects that only one-step prediction can judge, alone or with others beside them, as fits like all others.
+"""Fits of effects that only one-step prediction can judge, alone or together with others.
 
-Their error is the filter's innovation, measured minus predicted position one sample ahead, times the sampling rate: m/s,
-as for a free simulation. Their floor is the encoder's noise. What acts beside them is taken out of the recording first,
-with numbers that are fitted together with theirs.
+The error is the innovation of the filter, measured minus predicted position one sample ahead, times the sampling rate: m/s,
+as for a free simulation. The floor is the encoder noise. Other effects are first removed from the recording,
+with parameters that are fitted together with those of the effect.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ Others = Sequence[tuple[str, tuple[float, ...]]]
 def one_step_fit(
     data: AxisData, base: GreyboxFit, effect: Effect, new: Others = (), begin: Followed | None = None, limits: Limits = PATIENT
 ) -> GreyboxFit:
-    """An effect, and what ``base`` has beside it, by one-step prediction; excess is 0 where that explains the axis.
+    """Fit an effect together with those of ``base`` by one-step prediction; excess is 0 if that explains the axis.
 
-    new: more effects beside it, with start values; begin: an earlier result without them; limits: see ``Limits``, bar in m/s.
+    new: additional effects, with start values; begin: an earlier result without them; limits: see ``Limits``, bar in m/s.
     Raises BadInput if it cannot.
     """
     return followed(data, base, effect, new, begin, limits)[0]
@@ -75,7 +75,7 @@ def followed(
 
 
 def _with_law(dry: DryFriction, law: Effect, values: tuple[float, ...], effect: Effect) -> DryFriction:
-    """One more law of dry friction, in the place of its relatives and of what the effect begins with."""
+    """Add a law of dry friction, in the place of its relatives and of the default friction of the effect."""
     kept = [(own, its) for own, its, _ in dry.rows() if own.name not in (law.name, effect.rubs) and not (law.family and own.family == law.family)]
     return DryFriction((*(own for own, _ in kept), law), (*(value for _, its in kept for value in its), *values))
 

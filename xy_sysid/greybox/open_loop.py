@@ -1,7 +1,7 @@
-"""A model on its own from the first sample to the last: the position that it predicts from the voltage alone.
+"""Free simulation of the position from the voltage alone, from the first sample to the last.
 
-The hardest test, as every small error in velocity adds up. What depends on position in a model (cogging) is simulated at the
-measured one, as everywhere here.
+This is the hardest test, because every small error in velocity adds up. Laws of position (cogging) use the measured position,
+as everywhere in this package.
 """
 
 from __future__ import annotations

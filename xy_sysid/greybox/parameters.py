@@ -1,7 +1,7 @@
-"""The parameters of an axis model as one row of numbers: what it simulates, how each may move, and the model and its intervals, read back.
+"""The parameters of an axis model as one row of numbers: their simulation, bounds and scales, and the fitted model with its intervals.
 
 What may differ from one recording to the next (a load) stands in the row for the first recording, and behind all others what each later
-recording adds to it. The speed with which each begins is none of them: it is worked out anew wherever a fit begins.
+recording adds to it. The speed with which each begins is none of them: it is computed again at the start of each fit.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""How much of a model's error an effect would explain, to first order: a score test, and start values for its fit.
+"""The part of the error of a model that an effect would explain, to first order: a score test, with start values for the fit.
 
 An effect's trace is its force on the measured motion, passed through the base (Rao 1948, score test); what a change of
 gain, delay or pole would do is projected out first.
@@ -60,7 +60,7 @@ class Screen:
         inner, seen = self.inner[:, rows[:, None], rows], self.seen[:, rows]
         coefficients = np.linalg.lstsq(inner.sum(axis=0), seen.sum(axis=0), rcond=1e-8)[0]
         left = self.error - 2.0 * seen @ coefficients + np.einsum("bij,i,j->b", inner, coefficients, coefficients)
-        # 0 in bands that are not excited: nobody knows what happens there
+        # 0 in bands that are not excited: the response there is unknown
         ratio = np.where(self.error > 0.0, np.maximum(left, 0.0) / np.maximum(self.error, 1e-300), 1.0)
         return self.score - self.objective.of_power(self.power * np.minimum(ratio, 1.0))
 

@@ -1,8 +1,8 @@
-"""Base and effect together from the measured motion by linear least squares: a start that has no wrong valley.
+"""Start values of base and effect together, from the measured motion by linear least squares, without local minima.
 
 The voltage is explained by acceleration, velocity and the effect's traces on the measured motion (inverse dynamic
-identification; Gautier & Khalil 1990, eq. 8), all seen through the same low-pass. Friction that the base alone takes for
-drag is told apart here. At rest friction takes whatever the drive gives, so that a law of friction is read from the samples
+identification; Gautier & Khalil 1990, eq. 8), all seen through the same low-pass. This
+distinguishes friction from the drag of the base. At rest friction balances any drive, so a law of friction is determined from the samples
 in motion alone.
 """
 

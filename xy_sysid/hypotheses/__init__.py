@@ -1,12 +1,12 @@
-"""Which effects are missing: sets of effects, their fits, and what follows from them.
+"""Which effects are missing: sets of effects, their fits, and the search over them.
 
-criteria:    every number that decides
-enough_data: what is lacking before anything can be judged
-refusal:     why a fit explains nothing, whatever error it leaves
+criteria:    every threshold of the search
+enough_data: whether the data suffice for a diagnosis
+refusal:     why a fit does not count, whatever its error
 compare:     the gain of one fit over another, with its standard error
-starts:      where the fit of a set begins
-moves:       what may be tried next from a set
+starts:      start values for the fit of a set
+moves:       possible changes of a set
 pool:        sets with their fits, and the search over them
-companions:  what acts together with an effect that only one-step prediction can judge
-one_step:    when such effects are tried, and whether they win
+companions:  effects together with one that only one-step prediction can judge
+one_step:    when effects of one-step prediction are tried, and whether they are accepted
 """

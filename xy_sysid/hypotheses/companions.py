@@ -1,5 +1,5 @@
-"""What acts beside an effect that only one-step prediction can judge: found by its trace in the innovations
-(``greybox.innovation_test``), added while what is left beyond the noise falls.
+"""Effects that act together with one that only one-step prediction can judge. They are found by their trace in the innovations
+(``greybox.innovation_test``), and added while the residual error above the noise falls.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from xy_sysid.hypotheses.refusal import none_of
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """What a fit with one more effect beside it has to be.
+    """Requirements for a fit with one more effect.
 
-    limits: until when fits go on; their bar is the error one sample ahead, m/s, of the best without the gap: what cannot come near it ends soon
-    least: what one more must explain over what is left unexplained; refused: why a fit explains nothing, or empty
-    hidden: begin with what the effect hides (``Effect.hides``) beside it
+    limits: when fits end; their bar is the error one sample ahead, m/s, of the best set without the gap: fits that cannot come near it end early
+    least: least size of an added effect; refused: why a fit does not count, or empty
+    hidden: start with the effects that this one hides (``Effect.hides``)
     """
 
     limits: Limits = PATIENT
@@ -44,13 +44,13 @@ class Grown:
 
 
 def told_apart(effect: Effect) -> bool:
-    """A filter can have it beside a gap, and tell it from one. A resonance it cannot: together with a gap it explains too much
-    (cogging at small amplitude, friction that bends)."""
+    """Whether a filter with a gap can contain the effect and distinguish it from the gap. It cannot contain a resonance: together with a gap it
+    explains too much (cogging at small amplitude, presliding friction)."""
     return undoable(effect) and effect.category != "motion"
 
 
 def grown(data: AxisData, base: GreyboxFit, effect: Effect, wanted: Wanted | None = None) -> Grown:
-    """Rungs: the effect with what the base has beside it, then one more beside it at each."""
+    """Rungs: the effect together with those of the base, then one more effect at each."""
     wanted = wanted or Wanted()
     fit, found = followed(data, base, effect, _hidden(data, base, effect) if wanted.hidden else (), limits=wanted.limits)
     while not found.given_up and (name := none_of(data, fit)) not in ("", effect.name):  # a simulation had taken the gap for it
@@ -72,19 +72,19 @@ def grown(data: AxisData, base: GreyboxFit, effect: Effect, wanted: Wanted | Non
 
 
 def _does_something(data: AxisData, fit: GreyboxFit, found: Followed) -> bool:
-    """Without the effect the same filter leaves more: else it is no such effect."""
+    """Whether the same filter without the effect has a larger error; otherwise the effect is absent."""
     return not found.given_up and 2.0 * log(error_without(data, found) / fit.held_out_error) >= LEAST
 
 
 def _hidden(data: AxisData, base: GreyboxFit, effect: Effect) -> Others:
-    """What the effect hides and the base does not have, of usual size."""
+    """The hidden effects that the base does not have, with their usual sizes."""
     library = base.model.library
     hidden = (library[name] for name in effect.hides if name in library.effects and name not in base.model)
     return [(other.name, tuple(item.typical for item in other.on(data.similar))) for other in hidden]
 
 
 def _needed(data: AxisData, fit: GreyboxFit, found: Followed, effect: Effect, wanted: Wanted) -> tuple[GreyboxFit, Followed]:
-    """Without what a simulation had, and is of no use beside the effect: it must be worth as much as what is put beside it later."""
+    """Without effects of the simulation that do not help together with this effect; they must be as large as effects that are added later."""
     for name, _ in fit.model.effects:
         if name in (effect.name, effect.rubs) or wanted.limits.late():
             continue
@@ -98,11 +98,11 @@ _Tried = tuple[str, GreyboxFit, Followed]
 
 
 def _better(data: AxisData, now: GreyboxFit, effect: Effect, found: Followed, wanted: Wanted) -> _Tried | None:
-    """The best fit with one more beside, None if none is worth it.
+    """The best fit with one more effect; None if none is large enough.
 
-    First what its trace promises; then, if that does not explain the axis, laws of dry friction that say more than the one that the filter
-    has: their traces do not tell, as friction that bends or sticks changes what the filter believes of the gap; last, where nothing was
-    promised and something acts, what promises most, as what is slow promises little.
+    First the effects with the best predicted gain. Then, if these do not explain the axis, richer laws of dry friction than the present one:
+    their traces are not reliable, because presliding or sticking friction changes the estimate of the gap. Last, if nothing was predicted
+    but an error remains, the effect with the largest prediction, because slow effects predict little.
     """
     library, on = now.model.library, replace(wanted.limits, bar=None)
     known = {name for name, _ in beside(now.model, effect)[1]} | {name for name, _ in now.model.effects}
@@ -135,27 +135,27 @@ def _better(data: AxisData, now: GreyboxFit, effect: Effect, found: Followed, wa
 
 
 def _alike(seen: Sequence[Trace]) -> list[Trace]:
-    """Those that promise as much as the first."""
+    """The effects whose predicted gain is nearly that of the first."""
     return [trace for trace in seen if trace.share >= ALIKE * seen[0].share]
 
 
 def size_ahead(before: float, after: float, noise: float) -> float:
-    """What is gone of an error one sample ahead, over what is left of it, as powers beyond the noise; all in m/s."""
+    """Explained power of an error one sample ahead, divided by the remaining power, both above the noise; arguments in m/s."""
     return (before**2 - noise**2) / max(after**2 - noise**2, 1e-300) - 1.0
 
 
 def _size(now: GreyboxFit, part: float) -> float:
-    """The same if only a part of the power of a fit's error is left."""
+    """The same, if a given part of the error power of a fit remains."""
     return size_ahead(now.held_out_error, sqrt(max(part, 0.0)) * now.held_out_error, now.noise_floor)
 
 
 def _least(name: str, effect: Effect, wanted: Wanted) -> float:
-    """What one more beside must explain; more of what the contact's own imperfections look like."""
+    """The least size of one more effect; larger for effects that imperfections of the contact imitate."""
     return max(wanted.least, SIZE) if name in effect.suspects else wanted.least
 
 
 def put_beside(data: AxisData, now: GreyboxFit, effect: Effect, other: Effect) -> GreyboxFit:
-    """One more beside an effect that the fit has already, in the place of its relatives. Raises BadInput if the filter cannot have it."""
+    """Add one more effect to a fit, in the place of its relatives. Raises BadInput if the filter cannot contain it."""
     assert effect.one_step is not None
     library, model = now.model.library, now.model.without(effect.name)
     for name, _ in model.effects:
@@ -172,21 +172,21 @@ def put_beside(data: AxisData, now: GreyboxFit, effect: Effect, other: Effect) -
 
 
 def _rubbing(now: GreyboxFit, library: Library, found: Followed) -> list[Effect]:
-    """Laws of dry friction that say more than the one that the model has now."""
+    """Richer laws of dry friction than the present one."""
     if not any(law.name in now.model for law in found.dry.laws):
         return []
     return [law for law in library.acting if law.is_dry and len(law.parameters) > len(found.dry.values) and law.sum_of is None]
 
 
 def _uneven(effect: Effect, library: Library, found: Followed) -> list[Effect]:
-    """Friction that is Coulomb's and a load at the motor: its trace does tell."""
+    """Whether a law is Coulomb friction with a load at the motor: its trace is reliable."""
     if found.dry.names != (effect.rubs,):
         return []
     return [law for law in library.acting if law.is_dry and law.sum_of is not None]
 
 
 def _start(trace: Trace, library: Library, found: Followed) -> tuple[str, tuple[float, ...]]:
-    """Name and values to begin with: friction at the level that it has already."""
+    """Name and start values: friction at its present level."""
     if not library[trace.effect].is_dry:
         return trace.effect, trace.values
     rest = trace.values[1:] if library[trace.effect].sum_of is None else (0.0,) * (len(trace.values) - 1)

@@ -1,4 +1,4 @@
-"""Is one set of effects better than another on data that neither has seen, by how much, and by more than chance?"""
+"""Is one set of effects better than another on held-out data, by how much, and by more than chance?"""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from xy_sysid.hypotheses.criteria import CHANCE, OVERLAP
 
 @dataclass(frozen=True, slots=True)
 class Gain:
-    """nats: by which one fit is better than another on all held-out windows; error: its standard error; windows: independent ones."""
+    """nats: gain of one fit over another on all held-out windows; error: its standard error; windows: number of independent windows."""
 
     nats: float
     error: float
@@ -22,7 +22,7 @@ class Gain:
 
     @property
     def probability(self) -> float:
-        """That it is better at all, 0..1, by Student's t over the windows."""
+        """Probability that it is better, 0..1, by Student's t over the windows."""
         if not math.isfinite(self.nats):
             return float(self.nats > 0.0)
         if self.error == 0.0:
@@ -36,7 +36,7 @@ class Gain:
 
 
 def gain(one: GreyboxFit, other: GreyboxFit) -> Gain:
-    """Of one fit over another of the same data, paired over windows."""
+    """Gain of one fit over another of the same data, paired over windows."""
     if not np.all(np.isfinite(one.scores)):
         return Gain(-math.inf, 0.0, 1.0)
     if not np.all(np.isfinite(other.scores)):
@@ -47,9 +47,9 @@ def gain(one: GreyboxFit, other: GreyboxFit) -> Gain:
 
 
 def size(one: GreyboxFit, before: GreyboxFit) -> float:
-    """Power that a fit explains of what one before it left, over what it leaves itself: of the unmodelled force, or of the error, whichever is more.
+    """Power that a fit explains of the error of an earlier one, divided by the power that remains: of the unmodelled force or the error, the larger.
 
-    That of the force is an average over frequencies; a load or a slow wave acts at few of them, and may still be most of the error.
+    The power of the force is an average over frequencies; a load or a slow wave acts at few of them, and may still be most of the error.
     """
     force = force_explained(one, before)
     error = math.log(max(before.held_out_error, 1e-300) / max(one.held_out_error, 1e-300))
@@ -57,6 +57,6 @@ def size(one: GreyboxFit, before: GreyboxFit) -> float:
 
 
 def force_explained(one: GreyboxFit, before: GreyboxFit) -> float:
-    """The same of the unmodelled force alone: n nats over l lines in which it stands out of the floor are a factor exp(2 n / l) of its power."""
+    """The same for the unmodelled force alone: n nats over l lines in which it exceeds the floor are a factor exp(2 n / l) of its power."""
     nats = float(np.mean(before.scores) - np.mean(one.scores))
     return math.expm1(min(max(2.0 * nats / max(before.forced, 1.0), -50.0), 50.0))

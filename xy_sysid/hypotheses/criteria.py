@@ -32,17 +32,17 @@ def _number(name: str, value: N, unit: str, because: str) -> N:
 PRICE = _number("price", 4.0, "nats", "cost of a parameter: half the logarithm of the number of independent lines (Schwarz 1978)")
 CHANCE = _number("chance", 0.977, "1", "least probability that a held-out gain is real: two standard errors")
 OVERLAP = _number("overlap", 1.5, "windows", "half-overlapping Hann windows per independent window (Welch 1967)")
-WHITE = _number("white", 0.01, "1", "probability that white noise on the input is taken for something that is missing")
-DOUBTFUL = _number("doubtful", 0.1, "1", "above this probability that it predicts as well, a rival is mentioned")
+WHITE = _number("white", 0.01, "1", "probability that white noise on the input is taken for a missing effect")
+DOUBTFUL = _number("doubtful", 0.1, "1", "a rival is mentioned if it predicts as well with at least this probability")
 SIZE = _number("size", 0.7, "1", "least size of a named effect; an unmodelled force could imitate a smaller one")
 WORTH = _number("worth adding", 0.25, "1", "least size of an effect that is added without being named")
 WIDTH = _number("width", 6, "moves", "most swaps, and most pairs, from one set; the true one was among the first four")
 ALMOST = _number(
-    "almost", 0.7, "1", "of two gains or sizes the smaller is almost as large: dry friction is then named first, a pair promises no more"
+    "almost", 0.7, "1", "ratio above which two gains or sizes are almost equal: dry friction is then named first, a pair promises no more"
 )
 OPTIMISM = _number("optimism", 3.0, "1", "a fit gains at most this multiple of its first-order prediction")
-HOPELESS = _number("hopeless", 1.5, "nats a line", "a quick fit this far behind after one round stops; none came near the best")
-NEAR = _number("near", 0.03, "1", "a quick fit within this part of the best gain is fitted to all data")
+HOPELESS = _number("hopeless", 1.5, "nats a line", "a screening fit this far behind after one round stops; none came near the best")
+NEAR = _number("near", 0.03, "1", "a set whose screening fit is within this part of the best gain is fitted to all data")
 AT_FLOOR = _number("at the floor", 0.2, "nats a line", "below this the error is noise; clean axes have 0.03, the weakest effects 1")
 LEAST = _number("least one step ahead", 0.03, "nats", "least gain in log error power; repeated fits agree within 0.02")
 OPTIMISM_AHEAD = _number("optimism one step ahead", 5.0, "1", "with backlash, the same for gains one step ahead")
@@ -52,5 +52,5 @@ FILTERED = (1.0 + SIZE) ** -0.5  # innovation of a filter over that of the best 
 STILL = _number("still", 0.1, "1", "a window with less than this part of the strongest motion is at standstill")
 FEWEST = _number("fewest", 3, "1", "least number of input tones, excited bands and moving held-out windows (twice as many to fit)")
 MOST_EFFECTS = _number("most effects", 4, "1", "most effects in a model; blind tests have three, one real machine needs four")
-WORK = 1.5e8  # samples times sub-steps simulated for one axis, about 10 s, where nobody gives another budget: no criterion, but what people wait for
+WORK = 1.5e8  # samples times sub-steps simulated for one axis, about 10 s, the default budget: a limit for the waiting time, not a criterion
 WORK_EACH = 400.0  # the same for each sample of the record, so that long records are searched as far as short ones

@@ -1,4 +1,4 @@
-"""Do the data suffice to name anything? What is lacking, in words: time, motion, tones, an output that follows the input."""
+"""Do the data suffice for a diagnosis? If not, what is lacking, in words: time, motion, tones, an output that follows the input."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from xy_sysid.units import USUAL, Units
 
 
 def lacking(sampling_rate: float, recordings: Sequence[tuple[FloatArray, FloatArray]], units: Units = USUAL) -> str:
-    """What is missing in the data, in words; empty if they will do."""
+    """What is missing in the data, in words; empty if they suffice."""
     found = prepared(sampling_rate, recordings, units=units)
     return found if isinstance(found, str) else ""
 
@@ -58,7 +58,7 @@ def prepared(
 
 
 def _one_after_the_other(recordings: Sequence[tuple[FloatArray, FloatArray]]) -> tuple[FloatArray, FloatArray]:
-    """(n,) input and output of all recordings, each going on where the last one ended."""
+    """(n,) input and output of all recordings; each continues where the last one ended."""
     if len(recordings) == 1:
         return recordings[0]
     steps = [np.diff(position) for _, position in recordings]
@@ -66,7 +66,7 @@ def _one_after_the_other(recordings: Sequence[tuple[FloatArray, FloatArray]]) ->
 
 
 def _moving(data: AxisData, begins: np.ndarray, about_mean: bool = True) -> int:
-    """How many windows hold motion, against the liveliest tenth of all; about_mean: speed that changes, otherwise any."""
+    """Number of windows with motion, compared with the tenth with the strongest motion; about_mean: only changes of speed count."""
     every = np.concatenate((data.fitted.begins, data.held.begins))
     length = data.layout.length
 
@@ -78,13 +78,13 @@ def _moving(data: AxisData, begins: np.ndarray, about_mean: bool = True) -> int:
 
 
 def _tones(voltage: FloatArray) -> float:
-    """How many tones the input holds, at least: lines of its spectrum within 50 dB of the largest, over the width of one tone's."""
+    """Least number of tones of the input: lines of its spectrum within 50 dB of the largest, divided by the width of one tone."""
     power = np.abs(np.fft.rfft((voltage - voltage.mean()) * scipy.signal.get_window("blackmanharris", voltage.size))) ** 2
     return float(np.sum(power > 1e-5 * float(power.max()))) / 8.0  # the window's main lobe; its side lobes are 92 dB down
 
 
 def _coherence(sampling_rate: float, voltage: FloatArray, position: FloatArray) -> tuple[float, float]:
-    """The best of all octaves' mean coherence of input and velocity, and the least that is not chance, for the best length of window.
+    """The largest mean coherence of input and velocity in an octave, and the least value above chance, for the best window length.
 
     Of unrelated signals it is one over the number of windows, and spreads as much (Carter, Knapp & Nuttall 1973); an octave has two lines
     at least.

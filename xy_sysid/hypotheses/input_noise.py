@@ -1,4 +1,4 @@
-"""Is what a fit leaves noise on its input? A measured current or voltage has noise that the machine never felt, and it looks like a force."""
+"""Is the error of a fit noise on its input? A measured current or voltage contains noise that does not act on the machine, but looks like a force."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from xy_sysid.samples.block import FloatArray
 
 
 def input_noise(data: AxisData, fit: GreyboxFit) -> float | None:
-    """rms of the white noise on the input, V, that explains by itself the spectrum of the held-out error of a rigid model beyond the floor, or None.
+    """rms of white noise on the input, V, that alone explains the spectrum of the held-out error of a rigid model above the floor, or None.
 
     The spectrum is N + |G|^2 s with the model's own response G, through which the noise goes; s is the likeliest one.
     The power of each band over it is a mean of chi-squares, so that twice the

@@ -1,4 +1,4 @@
-"""What may be tried next from a set of effects, and the score that each move promises: a joint score test, so that pairs cost no fit."""
+"""The possible moves from a set of effects, with their predicted scores: a joint score test, so that pairs need no fit."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from xy_sysid.hypotheses.starts import added, swapped
 
 @dataclass(frozen=True, slots=True)
 class Move:
-    """From one set of effects to another.
+    """A change of one set of effects to another.
 
-    effects: the new set; parameters: that it has more; promised: gain, nats a line, to first order or of the best start, whichever is more
-    starts: models to begin from
+    effects: the new set; parameters: number of added ones; promised: predicted gain, nats a line, to first order or of the best start, the larger
+    starts: models with start values
     """
 
     effects: frozenset[str]
@@ -35,7 +35,7 @@ def count(library: Library, names: Iterable[str]) -> int:
 
 
 def is_twice(library: Library, names: Iterable[str]) -> bool:
-    """One law is in a set twice: two of a family, or one as a part of what is the sum of several."""
+    """Whether a law is in a set twice: two of one family, or one as part of a sum."""
     own = set(names)
     families = [library[name].family for name in own if library[name].family]
     sums = (library[name].sum_of for name in own)
@@ -43,11 +43,11 @@ def is_twice(library: Library, names: Iterable[str]) -> bool:
 
 
 def moves(data: AxisData, library: Library, now: GreyboxFit, brief: GreyboxFit, early: bool = True) -> list[Move]:
-    """What may be added, alone or two at once, and what may take the place of a relative or of a law that it is mistaken for.
+    """Effects to add, alone or in pairs, and effects that may replace a relative or a look-alike.
 
     The best of each kind.
 
-    brief: the same set on the first stage's data, which are looked at; early: else all data are
+    brief: the screening fit of the same set; early: use the data of the first stage, else all
     """
     model, own = now.model, frozenset(name for name, _ in now.model.effects)
     open_to = [e for e in library.acting if e.simulable and e.name not in own and (e.repeats or not (data.passed_once and e.is_by_place))]
@@ -58,7 +58,7 @@ def moves(data: AxisData, library: Library, now: GreyboxFit, brief: GreyboxFit, 
     here = first_excess(data, brief.model) if early else 0.0
 
     def promised(names: Iterable[str], begun: Sequence[AxisModel] = ()) -> float:
-        """To first order, or by models of starts as they are, whichever is more."""
+        """To first order, or from the start models without a fit, whichever is larger."""
         first = screen.gain(names) if all(name in screen.rows for name in names) else 0.0
         return max(first, *(here - first_excess(data, start) for start in begun if early), 0.0)
 
@@ -83,7 +83,7 @@ def moves(data: AxisData, library: Library, now: GreyboxFit, brief: GreyboxFit, 
 
 
 def _both(data: AxisData, now: GreyboxFit, effects: Sequence[Effect], traces: Mapping[str, tuple[float, ...]]) -> list[AxisModel]:
-    """The model with two more effects, the second begun beside each start of the first."""
+    """The model with two more effects; the second gets a start value for each start of the first."""
     models = [now.model]
     for effect in effects:
         models = [start for model in models for start in added(data, now, model, effect, traces.get(effect.name))]
@@ -98,7 +98,7 @@ def _pairs(
     together: Callable[[Iterable[str]], float],
     starts: Callable[[Sequence[str]], list[AxisModel]],
 ) -> list[Move]:
-    """Two at once, where together they promise clearly more than the better of them alone."""
+    """Pairs of effects whose predicted gain is clearly above that of the better one alone."""
     found = []
     for one, other in combinations(sorted(gains, key=lambda name: -gains[name]), 2):
         if is_twice(library, own | {one, other}):

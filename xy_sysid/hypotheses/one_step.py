@@ -1,4 +1,4 @@
-"""Effects that only one-step prediction can judge, such as backlash: when they are tried, from which sets, and whether they win."""
+"""Effects that only one-step prediction can judge, such as backlash: when they are tried, from which sets, and whether they are accepted."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from xy_sysid.hypotheses.refusal import refusal
 
 @dataclass(frozen=True, slots=True)
 class Filtered:
-    """What one-step prediction found, and what it has beaten.
+    """The result of one-step prediction, and the errors that it had to beat.
 
     rungs: names and fits, the last is the answer; bar: error one sample ahead, m/s, of the best simulation with an autoregressive error
     without: of the same filter with the effect taken out
@@ -32,20 +32,20 @@ class Filtered:
 
     @property
     def wins(self) -> bool:
-        """It explains as much beyond the noise as what is named must, and what is best without it leaves an error that can be seen."""
+        """It explains as much above the noise as a named effect must, and the best set without it has an error above the floor."""
         seen = min(self.bar, self.without) >= exp(0.5 * TELLS) * self.rungs[-1][1].held_out_error
         return seen and self.size >= SIZE
 
     @property
     def size(self) -> float:
-        """Power of the error one sample ahead that the effect explains, over what is left with it, beyond the noise."""
+        """Power of the error one sample ahead that the effect explains, divided by the power that remains, both above the noise."""
         last = self.rungs[-1][1]
         return size_ahead(min(self.bar, self.without), last.held_out_error, last.noise_floor)
 
 
 @dataclass
 class OneStepTrials:
-    """Each is fitted once from a set, and taken if it beats the best simulation with an autoregressive error. found: what won."""
+    """Each effect is fitted once from a set, and accepted if it beats the best simulation with an autoregressive error. found: the result."""
 
     pool: Pool
     found: Filtered | None = None
@@ -54,20 +54,20 @@ class OneStepTrials:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Effects to be tried: none where recordings are several."""
+        """Effects to be tried; none for several recordings."""
         one = len(self.pool.data.starts) == 1
         return tuple(effect.name for effect in self.pool.library.acting if effect.one_step is not None and one)
 
     def due(self, last: bool) -> bool:
-        """The best set leaves more than it explains: asked once after the first simulations, and when the search has ended (last)."""
+        """Whether the best set leaves more error than it explains; checked after the first simulations and at the end of the search (last)."""
         best = self.pool.best
         left = best.fit.excess >= AT_FLOOR and not self._explains(best)
         return bool(self.names) and left and (last or (not self.asked and len(self.pool.nodes) > FEWEST))
 
     def tried(self, last: bool) -> Iterator[frozenset[str]]:
-        """Try each beside what a filter can have of the best set, and beside nothing; last: also with what it hides.
+        """Try each together with the effects of the best set that a filter can contain, and alone; last: also with the effects that it hides.
 
-        Yields what is about to be fitted.
+        Yields the set that is fitted next.
         """
         best = self.pool.best
         self.asked.add(best.effects)
@@ -80,13 +80,13 @@ class OneStepTrials:
                     self._look(name, node, hidden)
 
     def _explains(self, node: Node) -> bool:
-        """A set explains more of the error's power than it leaves, by effects that a filter can have beside a gap: others may feign one."""
+        """A set explains more error power than it leaves, with effects that a filter with a gap can contain; other effects may imitate a gap."""
         library, rigid = self.pool.library, self.pool.nodes[self.pool.kept]
         apart = all(told_apart(library[name]) or library[name].is_dry for name in node.effects)
         return apart and 2.0 * node.fit.held_out_error**2 < rigid.fit.held_out_error**2
 
     def _begins(self, best: Node) -> list[Node]:
-        """What a filter can have of the best set, as a large force beside a gap hides it; and the rigid base, unless that set explains most."""
+        """Effects of the best set that a filter can contain, because a large force hides a gap; and the rigid base, unless the set explains most."""
         pool, library = self.pool, self.pool.library
         names = frozenset(name for name in best.effects if told_apart(library[name]) or library[name].is_dry)
         found = []
@@ -99,7 +99,7 @@ class OneStepTrials:
         return found if found and self._explains(found[0]) else list(dict.fromkeys((*found, pool.nodes[pool.kept])))
 
     def ahead(self, found: GreyboxFit) -> float:
-        """Error one sample ahead, m/s, held out, that an autoregressive model leaves of a simulation; 0 where the data are too few for that."""
+        """Held-out error one sample ahead, m/s, of a simulation with an autoregressive model of its error; 0 if the data are too short for that."""
         data = self.pool.data
         later = np.arange(data.velocity.size) >= data.training
         return whitened_rms(found.error, later) if enough(later) else 0.0
@@ -118,7 +118,7 @@ class OneStepTrials:
             self.found = result
 
     def _up_to(self, node: Node) -> list[tuple[str, GreyboxFit]]:
-        """Rungs up to a set, of the fits that are known."""
+        """Rungs up to a set, from the known fits."""
         names = [name for name, _ in node.fit.model.effects]
         known = [(names[n], self.pool.nodes.get(frozenset(names[: n + 1]))) for n in range(len(names))]
         return [(name, item.fit) for name, item in known if item is not None and item.whole]

@@ -1,4 +1,4 @@
-"""Sets of effects with their best fits, and the search over them: the most promising move next, each set fitted from the best of its starts."""
+"""Sets of effects with their best fits, and the best-first search over them: the move with the best predicted score is fitted next."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from xy_sysid.hypotheses.refusal import refusal
 class Node:
     """One set that was fitted.
 
-    brief, fit: on the first stage's data, and on all (the brief one where it was not worth that); refused: why it explains nothing, or empty
-    large: what it adds to the best set that it contains is worth adding; leads: and more than chance
+    brief, fit: screening fit and full fit (the screening fit again if no full fit was made); refused: why the fit does not count, or empty
+    large: its gain over the best set that it contains is large enough; leads: and above chance
     promised: gain of the move to it, nats a line
-    moves: what may be tried from it, None until asked for
+    moves: possible moves from it; None until asked for
     """
 
     effects: frozenset[str]
@@ -49,7 +49,7 @@ class Node:
 
 @dataclass
 class Pool:
-    """The sets of one axis. worth: size of what is added at least; most: effects; late: time is up; kept: effects that every set has.
+    """The sets of one axis. worth: least size of an added effect; most: largest number of effects; late: time is up; kept: effects of every set.
 
     tried: (from, to) of the moves that were fitted
     """
@@ -65,26 +65,26 @@ class Pool:
 
     @property
     def scale(self) -> float:
-        """Nats over all held-out windows for one nat a line."""
+        """Nats over all held-out windows that correspond to one nat a line."""
         lines = self.data.floor.lines @ self.data.floor.excited
         return max(0.5 * float(lines) * self.data.held.begins.size, 1.0)
 
     def score(self, node: Node) -> float:
-        """Nats of the held-out windows, with the price of the parameters; less is better."""
+        """Score of the held-out windows in nats, with the penalty for parameters; less is better."""
         if not node.whole:
             return inf
         return float(np.sum(node.fit.scores)) + PRICE * node.parameters
 
     @property
     def best(self) -> Node:
-        """The set with the least score, of those that are worth their effects."""
+        """The set with the least score, among those whose effects are large enough."""
         return min((node for node in self.nodes.values() if node.leads and not node.refused and node.whole), key=self.score)
 
     @property
     def answer(self) -> Node:
         """The best set whose held-out error in velocity (rms) is below that of every set that it contains, or the first.
 
-        Of sets that are as good and have as many effects, that with dry friction, as every machine has it.
+        Among equally good sets with as many effects, the one with dry friction, because every machine has friction.
         """
         first = self.nodes[self.kept]
         better = [node for node in self.nodes.values() if node.leads and not node.refused and node.whole and self._lowers(node)]
@@ -104,7 +104,7 @@ class Pool:
         return self.remember(frozenset(name for name, _ in start.model.effects), brief, start)
 
     def remember(self, effects: frozenset[str], brief: GreyboxFit, found: GreyboxFit, leads: bool = True, promised: float = 0.0) -> Node:
-        """A set with its fit, in the place of a worse one of the same set; a fit on all data gives way to another one only."""
+        """Store a set with its fit; it replaces a worse fit of the same set. Only another full fit replaces a full fit."""
         parameters, known = count(self.library, effects - self.kept), self.nodes.get(effects)
         leads = leads or (known is not None and known.leads)
         node = Node(effects, parameters, brief, found, refused=self._refusal(effects, found), large=leads, leads=leads, promised=promised)
@@ -120,7 +120,7 @@ class Pool:
         return refusal(self.data, self.library, found, self.kept) if effects > self.kept else ""
 
     def search(self) -> Iterator[frozenset[str]]:
-        """Try moves until none promises a better set; yields each set that is about to be fitted."""
+        """Try moves until none predicts a better set; yields each set before it is fitted."""
         if self.nodes[self.kept].moves is None:
             yield from self._alone_first()
         while not self.late():
@@ -142,7 +142,7 @@ class Pool:
     def _alone_first(self) -> Iterator[frozenset[str]]:
         """Try each effect alone before two are combined, the most promising first; yields as ``search``.
 
-        Promises are worth little where the first model is far from the data.
+        Predicted gains are unreliable if the first model is far from the data.
         """
         first = self.nodes[self.kept]
         first.moves = self._moves(first)
@@ -161,9 +161,9 @@ class Pool:
                 self._try(*chosen)
 
     def suspected(self) -> Iterator[frozenset[str]]:
-        """Try the laws that those of the answer are mistaken for, though they promise no more; yields as ``search``.
+        """Try the look-alikes of the laws in the answer, even if no gain is predicted; yields as ``search``.
 
-        If one does as well, the name is in doubt.
+        If one predicts as well, the name is uncertain.
         """
         node = self.answer
         node.moves = self._moves(node) if node.moves is None and not self.late() else node.moves
@@ -179,7 +179,7 @@ class Pool:
         return min((node for node in self.nodes.values() if node.large and node.whole and not node.refused), key=self.score)
 
     def _best_refused(self) -> Node | None:
-        """The best of the sets that are refused, if its score is better than that of all others."""
+        """The best of the refused sets, if its score is better than that of all others."""
         refused = [node for node in self.nodes.values() if node.refused and node.whole and self.score(node) < self.score(self.best)]
         return min(refused, key=self.score, default=None)
 
@@ -193,7 +193,7 @@ class Pool:
         return [move for move in [Move(less, -count(self.library, [name]), 0.0, begun)] if self._is_open(node, move)]
 
     def _alone(self, effects: frozenset[str]) -> list[AxisModel]:
-        """Models of single effects of a set, as far as they are known."""
+        """Models with single effects of a set, if they are known."""
         return [self.nodes[one].fit.model for other in sorted(effects) if (one := self.kept | {other}) in self.nodes]
 
     def _moves(self, node: Node, early: bool = True) -> list[Move]:
@@ -202,8 +202,8 @@ class Pool:
         return [move for move in allowed if self._is_open(node, move)]
 
     def _is_open(self, parent: Node, move: Move) -> bool:
-        """A set that is not known, by other names neither; or that came to nothing from one start, and may begin from another, in the place of a law
-        or without one."""
+        """A set that is not known, not even by other names of its effects; or one whose fit failed from one start, and that has another start: in the
+        place of a law, or without one."""
         laws = self._laws(move.effects)
         if any(node.whole and not node.refused and self._laws(effects) == laws for effects, node in self.nodes.items()):
             return False
@@ -213,7 +213,7 @@ class Pool:
         )
 
     def _laws(self, effects: frozenset[str]) -> frozenset[str]:
-        """One name for each law: effects with the same equations are one."""
+        """One name for each law: effects with equal equations count as one."""
         return frozenset(self._names.get(name, name) for name in effects)
 
     @cached_property
@@ -222,10 +222,10 @@ class Pool:
         return {one.name: other.name for k, one in enumerate(acting) for other in acting[:k] if one.has_equations_of(other)}
 
     def _next(self, nodes: Sequence[Node] = ()) -> tuple[Node, Move] | None:
-        """The move that promises the best score, of those that promise a better one than would be said; from some sets, or from all.
+        """The move with the best predicted score, if that is better than the score of the present answer; from some sets, or from all.
 
-        Two effects at once only where no other move from their set promises that: one after the other costs less, and says which of them helps.
-        Sets that raise the held-out error are gone on from last.
+        Two effects at once only if no other move from their set predicts that: one after the other costs less, and shows which of them helps.
+        Sets that raise the held-out error are continued last.
         """
         least, hopeful = self.score(self.answer) - PRICE, []
         for node in nodes or self.nodes.values():
@@ -237,17 +237,17 @@ class Pool:
         return min(hopeful, key=lambda item: item[:2])[2:] if hopeful else None
 
     def _hoped(self, node: Node, move: Move) -> float:
-        """The score that a move promises, nats."""
+        """The predicted score of a move, nats."""
         return self.score(node) - self.scale * move.promised + PRICE * move.parameters
 
     def _may_be_worth(self, node: Node, move: Move) -> bool:
-        """What is new may be worth adding, if it gains a few times what it promises to first order."""
+        """The new effect may be large enough, if its gain is a few times its first-order prediction."""
         lines = max(node.fit.forced, 1.0) * self.data.held.begins.size
         most = OPTIMISM * 2.0 * self.scale * move.promised / lines
         return move.parameters <= 0 or most >= len(move.effects - node.effects) * math.log1p(self.worth)
 
     def _try(self, parent: Node, move: Move) -> Node | None:
-        """Fit the set of a move, on all data if it comes near the best."""
+        """Fit the set of a move; a full fit only if it is near the best."""
         self.tried.add((parent.effects, move.effects))
         begun = [*move.starts()]
         new = move.effects - parent.effects
@@ -270,23 +270,23 @@ class Pool:
         return node
 
     def _near(self) -> float:
-        """The score up to which a quick fit is fitted on all data."""
+        """The score up to which a screening fit is followed by a full fit."""
         best = self.score(self.answer)
         rigid = max(self.score(node) for node in self.nodes.values() if node.whole)
         return best + NEAR * (rigid - best) + PRICE
 
     def _inside(self, node: Node) -> list[Node]:
-        """The sets that a set contains, as far as they are fitted on all data."""
+        """The sets that a set contains and that have a full fit."""
         return [item for item in self.nodes.values() if item.effects < node.effects and item.whole and not item.refused]
 
     def _is_better(self, node: Node, simpler: Node) -> bool:
-        """More than chance better than a simpler set, and by as much as its effects must be worth."""
+        """Better than a simpler set by more than chance, and by the least size of its effects."""
         return self._is_large(node, simpler) and gain(*alike(node, simpler)).is_sure
 
     def _is_large(self, node: Node, simpler: Node) -> bool:
-        """Better than a simpler set at the price of its parameters, and by as much as its effects must be worth.
+        """Better than a simpler set including the penalty for parameters, and by the least size of its effects.
 
-        Of a richer law in the place of a simpler one WORTH is asked. Beside a set at the floor nothing more is needed.
+        A richer law in the place of a simpler one must have the size WORTH. Compared with a set at the floor nothing more is needed.
         """
         one, other = alike(node, simpler)
         if other.excess < AT_FLOOR:
@@ -296,9 +296,9 @@ class Pool:
         return gain(one, other).nats > PRICE * (node.parameters - simpler.parameters) and size(one, other) >= least
 
     def simplified(self) -> Iterator[frozenset[str]]:
-        """Try simpler sets than the best; yields as ``search``. What the best gains over a simpler one by chance, or too little, it does not keep.
+        """Try simpler sets than the best; yields as ``search``. Effects whose gain is chance or too small are removed.
 
-        When time is up, of those that are known on all data.
+        When time is up, only sets with a full fit are compared.
         """
         while True:
             best, simpler = self.best, None
@@ -317,7 +317,7 @@ class Pool:
             simpler.large = simpler.leads = True
 
     def _simpler(self, best: Node) -> Iterator[tuple[frozenset[str], Callable[[], Sequence[AxisModel]]]]:
-        """Sets without an effect, or with a simpler relative in its place, and where their fits begin."""
+        """Sets without an effect, or with a simpler relative in its place, and their start values."""
         data, library, model = self.data, self.library, best.fit.model
         for name, _ in reversed(model.effects):
             if name in self.kept:
@@ -331,9 +331,9 @@ class Pool:
             yield best.effects - {name}, partial(starts.dropped, data, best.fit, name, alone)
 
     def fitted(self, effects: frozenset[str], begun: Callable[[], Sequence[AxisModel]]) -> Node | None:
-        """A set fitted on the first stage's data; a known one again where a start is already better than its fit.
+        """A screening fit of a set; a known set is fitted again if a start value is already better than its fit.
 
-        The first set stays as it was given: its error is the one that every answer is shown beside.
+        The first set stays as given, because every answer is compared with its error.
         """
         known = self.nodes.get(effects)
         if self.late() or (known is not None and effects == self.kept):
@@ -345,7 +345,7 @@ class Pool:
         return self.remember(effects, brief, brief, leads=False) if np.isfinite(brief.excess) else known
 
     def finished(self, node: Node, shown: bool = False) -> Node:
-        """The same node, fitted on all data, unless the time is up; one that is shown beside others is fitted even so."""
+        """The same node with a full fit, unless the time is up; a set that is shown with others is always fitted."""
         if not node.whole and (shown or not self.late()):
             node.fit = finish(self.data, node.brief.model, node.brief.runs, in_time if shown else self.late)
             node.refused = self._refusal(node.effects, node.fit)
@@ -361,5 +361,5 @@ class Pool:
 
 
 def alike(one: Node, other: Node) -> tuple[GreyboxFit, GreyboxFit]:
-    """Fits of two sets to the same data: to all if both have been fitted to all, else to those of the first stage."""
+    """Fits of two sets to the same data: full fits if both sets have one, else screening fits."""
     return (one.fit, other.fit) if one.whole and other.whole else (one.brief, other.brief)

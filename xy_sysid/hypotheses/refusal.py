@@ -1,4 +1,4 @@
-"""Why a fit explains nothing, whatever it leaves: a size at its bound, a place where nothing is seen, a mode that nothing excites."""
+"""Why a fit does not count, whatever its error: a size at its bound, a travel that is too short, a mode outside the excited band."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from xy_sysid.hypotheses.criteria import FEWEST
 
 
 def refusal(data: AxisData, library: Library, found: GreyboxFit, given: frozenset[str] = frozenset()) -> str:
-    """Why a fit explains nothing, whatever error it leaves: in words, or empty. given: effects that are not asked, as somebody wants them."""
+    """Why a fit does not count, whatever its error: in words, or empty. given: effects that a user asked for, which are not checked."""
     low, high = data.sampling_rate * 0.0, 0.4 * data.sampling_rate
     excited = data.layout.edges()[:-1][data.floor.excited]
     if excited.size:
@@ -26,15 +26,15 @@ def refusal(data: AxisData, library: Library, found: GreyboxFit, given: frozense
         if why:
             return f"{name}: {why}"
         if data.passed_once and effect.is_by_place and not _repeats(data, effect, values):
-            return f"{name}: each place is passed once, so that what acts by place cannot be told from what drifts"
+            return f"{name}: each position is passed only once, so an effect of position cannot be distinguished from a drift"
         for k, (item, value) in enumerate(zip(effect.on(data.similar), values, strict=True)):
             edge = value >= item.high * (1.0 - 1e-6) or (k == 0 and not item.positive and value <= item.low * (1.0 + 1e-6) and item.low > 0.0)
             if k == 0 and edge:
                 return f"{name}: {item.name} is at its bound"
             if k == 0 and _is_none(data, effect, found):
-                return f"{name}: {item.name} cannot be told from 0"
+                return f"{name}: {item.name} cannot be distinguished from 0"
             if item.name == effect.mode_frequency and not low <= value <= high:
-                return f"{name}: a mode at {value:.3g} Hz, outside of what these data excite and see ({low:.3g} to {high:.3g} Hz)"
+                return f"{name}: a mode at {value:.3g} Hz, outside the excited band ({low:.3g} to {high:.3g} Hz)"
     limit = data.first / data.sampling_rate / 4.0
     if found.model.delay >= 0.99 * limit:
         return f"time_delay: {found.model.delay:.3g} s is at its bound"
@@ -42,7 +42,7 @@ def refusal(data: AxisData, library: Library, found: GreyboxFit, given: frozense
 
 
 def none_of(data: AxisData, found: GreyboxFit) -> str:
-    """The effect of a fit whose size is its least one within its interval: the data do not tell it from none. Empty if there is none such."""
+    """The effect of a fit whose interval contains its least size, so the data do not distinguish it from none. Empty if there is no such effect."""
     library = found.model.library
     return next((name for name, _ in found.model.effects if _is_none(data, library[name], found)), "")
 
@@ -54,6 +54,6 @@ def _is_none(data: AxisData, effect: Effect, found: GreyboxFit) -> bool:
 
 
 def _repeats(data: AxisData, effect: Effect, values: Sequence[float]) -> bool:
-    """A law by place that repeats often enough on the travel to be seen in one pass."""
+    """A law of position that repeats often enough over the travel to be identified from one pass."""
     period = values[effect.names.index("period")] if "period" in effect.names else 2.0 * math.pi
     return effect.repeats and (data.reach[1] - data.reach[0]) / period >= FEWEST

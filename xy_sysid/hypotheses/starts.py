@@ -1,4 +1,4 @@
-"""Where the fit of a set of effects begins: what is known of another set, and what the measured motion shows without a model."""
+"""Start values for the fit of a set of effects: from the fit of another set, and from the measured motion without a model."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from xy_sysid.greybox.score_test import bounded
 def added(
     data: AxisData, now: GreyboxFit, model: AxisModel, effect: Effect, traced: Sequence[float] | None, scene: Scene | None = None
 ) -> list[AxisModel]:
-    """The model with one more effect: as its trace shows it, by inverse dynamics, and of base and effect together."""
+    """Start models with one more effect: from its trace, by inverse dynamics, and from base and effect together."""
     begun = [] if traced is None else [model.with_effect(effect.name, bounded(effect, traced, data.similar))]
     return [*begun, *other_starts(data, now, model, effect.name, scene)]
 
 
 def swapped(data: AxisData, now: GreyboxFit, name: str, other: Effect, traced: Sequence[float] | None) -> list[AxisModel]:
-    """The model with another effect in the place of one: with the values of parameters of one name, acting as it did, and by inverse dynamics."""
+    """Start models with one effect replaced: with equal values of parameters of the same name, with an equal force, and by inverse dynamics."""
     model = now.model
     begun = [make(data, model, name, other) for make in (of_one_name, stood_in)]
     rest = model.without(name)
@@ -36,7 +36,7 @@ def swapped(data: AxisData, now: GreyboxFit, name: str, other: Effect, traced: S
 
 
 def dropped(data: AxisData, now: GreyboxFit, name: str, alone: Sequence[AxisModel]) -> list[AxisModel]:
-    """The model without an effect: as it is, with its force taken over by others, by inverse dynamics, and with the others as they were alone."""
+    """Start models without an effect: unchanged, with its force moved to the others, by inverse dynamics, and with the others' values alone."""
     less, scene = now.model.without(name), scene_of(data, now)
     begun = [less.with_effect(other, values) for model in alone for other, values in model.effects if other in less]
     read = [start for other, _ in less.effects for start in other_starts(data, now, less.without(other), other, scene)]
@@ -44,7 +44,7 @@ def dropped(data: AxisData, now: GreyboxFit, name: str, alone: Sequence[AxisMode
 
 
 def merged(now: AxisModel, other: AxisModel) -> list[AxisModel]:
-    """The effects of both on the base of either."""
+    """Start models with the effects of both, on the base of each."""
     found = []
     for base, more in ((now, other), (other, now)):
         model = base

@@ -107,7 +107,7 @@ def table(sheet: Sheet, reading: Reading, notes: list[str]) -> Table | None:
     inputs, outputs, reference, axes = _sides(path, arrays, None if stamps is None else len(stamps), reading.axes)
     time, fs = _time(path, arrays, reading, (time_name, stamps), notes)
     if str(arrays.get("InterSample", np.array("zoh")).ravel()[:1]).find("foh") >= 0:
-        notes.append("the file says that its input goes straight from sample to sample (foh): fit it with --set hold=none")
+        notes.append("the file says that its input is linear between samples (foh): fit it with --set hold=none")
     input_unit, output_unit = (_unit(arrays, names, usual) for names, usual in ((INPUT_UNITS, "V"), (OUTPUT_UNITS, "m")))
     u, input_si = _si(("input", inputs, input_unit), path, axes, reading, notes)
     y, output_si = _si(("output", outputs, output_unit), path, axes, reading, notes)

@@ -73,7 +73,7 @@ def together(bag: Bag, source: Source, kept: dict[StreamName, list[Block]], firs
     if source.effort and source.said and not reading.units and "input_unit" not in bag.custom:
         per = "/s" if source.output == "velocity" else ""
         usual = f"effort is taken as V and {source.output} as m{per}"
-        notes.append(f'joint states name no unit: {usual}; else say for example --unit input="N m",output=rad{per}')
+        notes.append(f'joint states name no unit: {usual}; otherwise give for example --unit input="N m",output=rad{per}')
     if source.effort and not source.said:
         notes.append(f"joint states name no unit; effort and {source.output} are carried as they are")
     paired = cut(pair(streams, str(path), units(bag, source), notes, bag.bad), first, start, stop)
@@ -146,7 +146,7 @@ def _axes(
         notes.append(f"voltage has the axes {', '.join(inputs)} and position {', '.join(outputs)}; {', '.join(common)} are read")
     if not set(common) <= set(names.get("reference", common)):
         notes.append(
-            f"the reference has {', '.join(names['reference'])} and the axes are {', '.join(common)}: say --joint AXIS=JOINT; it is left out"
+            f"the reference has {', '.join(names['reference'])} and the axes are {', '.join(common)}: use --joint AXIS=JOINT; it is left out"
         )
         del same["reference"]
     if wanted is None:

@@ -1,4 +1,4 @@
-"""Time against the sample counter: where they part, so that nothing is paired wrongly in silence."""
+"""Time compared with the sample counter: differences are reported, so that nothing is paired wrongly without a note."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def disagreements(name: str, seq: FloatArray, time: FloatArray, rate: float) -> 
     if slips:
         places = ", ".join(f"by {round(size):+d} at sample {seq[row]:.0f} ({time[row]:.6g} s)" for row, size in slips[:SAID])
         said.append(
-            f"the counter of {name} slips{_times(slips)} while its time goes on: {places}; a sample may be paired with a neighbour's from there on"
+            f"the counter of {name} slips{_times(slips)} while its time goes on: {places}; from there on a sample may be paired with a neighbour"
         )
     return said
 

@@ -24,7 +24,10 @@ LOCAL = 50  # samples over which the period is looked at
 STEADY = 0.005  # relative; a period that wanders by less is even enough: frequencies are off by no more
 BURST = 0.2  # of a period; more steps than BURSTS shorter than that are stamps that came in bursts
 BURSTS = 0.2
-STRETCH, APART = 200, 50  # samples over which a period is told from late, lost and jittering stamps; between two of them that are compared
+STRETCH, APART = (
+    200,
+    50,
+)  # samples over which a period is distinguished from late, lost and jittering stamps; distance of two samples that are compared
 DRIFT = 0.02  # relative; a period that changes by more within a recording is not one
 LOST = 0.3  # of the time; where steps jitter, more than that in steps longer than GAP is lost
 Values = tuple[FloatArray, ...]
@@ -101,7 +104,7 @@ def _resampled(path: Path, time: FloatArray, rate: float, held: FloatArray, smoo
     steps = np.diff(time) * rate
     shortest, middle, longest = (float(value) / rate * 1e3 for value in (steps.min(), np.median(steps), steps.max()))
     uneven = f"time is uneven: steps from {shortest:.4g} to {longest:.4g} ms, most {middle:.4g} ms"
-    taken = "If the samples were taken evenly all the same, say so with --rate in Hz; else record again with a steady clock."
+    taken = "If the samples were evenly spaced nevertheless, give --rate in Hz; otherwise record again with a steady clock."
     if float(np.mean(steps < BURST)) > BURSTS:
         raise BadRecording(path, f"{uneven}; {100 * np.mean(steps < BURST):.0f} % of the stamps come in bursts", taken)
     gap = BRIDGED if _scattered(steps) else GAP

@@ -1,4 +1,4 @@
-"""Units of foreign files: what a column measures, and its factor to SI. A unit that is not known is carried and named."""
+"""Units of foreign files: what a column measures, and its factor to SI. An unknown unit is kept and reported."""
 
 from __future__ import annotations
 
@@ -90,10 +90,10 @@ def to_si(values: FloatArray, text: str, what: str, notes: list[str]) -> tuple[F
     """Values in SI and their unit; a note says what was converted, guessed, or not known."""
     unit = unit_of(text)
     if unit.quantity == "unknown":
-        notes.append(f"the unit {text!r} of {what} is not known; it is carried as it is (give another with --unit, or a factor with --scale)")
+        notes.append(f"the unit {text!r} of {what} is not known; it is kept as it is (give another with --unit, or a factor with --scale)")
         return values, unit
     if unit.name.startswith(COUNTS):
-        notes.append(f"{what} is in {unit.name}, which is no length: say what one is in m with --scale")
+        notes.append(f"{what} is in {unit.name}, which is not a length: give its size in m with --scale")
     if unit.guessed:
         meant = FOLDED[text.strip().casefold()][0] if text.strip().casefold() in FOLDED else unit.name
         notes.append(f"the unit {text!r} of {what} is taken as {meant}")

@@ -46,7 +46,7 @@ def leaves(path: Path, reader: str, extra: str = "") -> list[Leaf]:
         raise BadRecording(path, f"not readable as {path.suffix} ({why[:120]})", COPY)
     if done.returncode != 0 or not line:
         how = f"signal {-done.returncode}" if done.returncode < 0 else f"exit code {done.returncode}"
-        raise BadRecording(path, f"not readable as {path.suffix}: the reader's own process died of it ({how}; {(why or how)[:100]})", COPY)
+        raise BadRecording(path, f"not readable as {path.suffix}: the process of the reader crashed ({how}; {(why or how)[:100]})", COPY)
     told = json.loads(line)
     if "missing" in told:
         raise MissingExtra(f"{told['missing']}, which reads {path.name},", extra)

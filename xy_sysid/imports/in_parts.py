@@ -28,7 +28,7 @@ SHORTEST = MARGIN  # s of a part
 def in_parts(path: Path, reading: Reading, every: float) -> Iterator[tuple[int, Recording]]:
     """Number and samples of each part in which something is; the first begins at ``reading.start``, the last one ends at ``reading.stop``.
 
-    every: s of a part, ``SHORTEST`` at least. Where the source of a bag starts anew a part begins.
+    every: s of a part, ``SHORTEST`` at least. Where the source of a bag starts again a part begins.
     Raises BadRecording or BadInput as ``imports.load``.
     """
     found = False
@@ -70,7 +70,7 @@ def _numbers(elapsed: FloatArray, every: float, margin: float) -> list[int]:
 
 
 def _counted(blocks: Iterator[tuple[StreamName, Block]]) -> Iterator[tuple[StreamName, int, Block, FloatArray]]:
-    """Each block with how often its stream had started anew, and the instants that it knows. A single block that comes late is no start."""
+    """Each block with how often its stream had restarted, and the instants that it knows. A single block that comes late is no start."""
     starts: dict[StreamName, int] = {}
     latest: dict[StreamName, float] = {}
     odd: dict[StreamName, tuple[Block, FloatArray]] = {}

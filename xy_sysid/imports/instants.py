@@ -60,7 +60,7 @@ def stamps(path: Path, column: Column, reading: Reading, notes: list[str]) -> St
             notes.append(f"the time {column.name!r} reads {largest:.4g}: it is taken as {unit} since 1970")
     _, found = to_si(column.values, unit, "time", notes)
     if found.quantity != "time":
-        raise BadRecording(path, f"the unit {unit!r} of the time is none of time", "Give s, ms, us, ns, min or h with --unit time=...")
+        raise BadRecording(path, f"the unit {unit!r} of the time is not a unit of time", "Give s, ms, us, ns, min or h with --unit time=...")
     return Stamps(column.values, found.scale * (reading.scale("time") or 1.0), far=largest > EXACT)
 
 

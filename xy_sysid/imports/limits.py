@@ -1,4 +1,4 @@
-"""How much a file may become: nothing is unpacked before its size is known to fit."""
+"""Limits of the size of files: nothing is unpacked before its size is known to fit."""
 
 from __future__ import annotations
 

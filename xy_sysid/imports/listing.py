@@ -1,4 +1,4 @@
-"""What is in a file, before it is read as a recording: its columns, topics or arrays, and what each may be."""
+"""The content of a file before it is read as a recording: columns, topics or arrays, and the possible role of each."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from xy_sysid.samples.integral import detrended, integral
 from xy_sysid.samples.recording import Recording
 
 TURN, NEARLY = 2 * np.pi, 0.5  # rad; a step that is a turn within so much, where others are smaller than that, is an angle that wraps
-FEWEST = 8  # bits of the shortest counter that is told from small steps
+FEWEST = 8  # bits of the shortest counter that is distinguished from small steps
 LOOK = 200_000  # samples from which the usual step is taken
 
 

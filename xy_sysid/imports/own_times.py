@@ -70,8 +70,8 @@ def on_one_clock(path: Path, roles: Roles, notes: list[str]) -> tuple[Roles, Col
     moved = [column.name for column in sides if not _same(column.clock, base.clock)]
     if moved:
         notes.append(
-            f"{', '.join(map(repr, moved))} and {base.name!r} have times of their own: at those of {base.name!r} an input has the mean of its "
-            "values until the next, or the latest, and outputs are interpolated"
+            f"{', '.join(map(repr, moved))} and {base.name!r} have separate times: they are sampled at those of {base.name!r}; an input has "
+            "the mean of its values until the next time, or its latest value, and outputs are interpolated"
         )
     inputs = {axis: _held(column, instants) for axis, column in roles.inputs.items()}
     outputs, references = (_moving(side, instants) for side in (roles.outputs, roles.references))

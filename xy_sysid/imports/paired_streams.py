@@ -79,7 +79,7 @@ def gather(name: str, blocks: Sequence[Block], axes: tuple[str, ...], notes: lis
 
 
 def sessions(seq: FloatArray, tolerance: float) -> list[int]:
-    """Where the source began to count anew: first index of each session, 0 included.
+    """Where the source restarted its counter: first index of each session, 0 included.
 
     A number that falls back by more than ``tolerance`` begins a session, unless the old numbers soon go on (then it was
     a straggler, and sorting puts it right).
@@ -121,10 +121,10 @@ def _merge(streams: dict[str, Stream], notes: list[str]) -> tuple[dict[str, Stre
         return streams, period
     kept = min(counts.values())
     if kept == most:
-        notes.append(f"the source started anew {most - 1} times; the parts follow each other with a gap")
+        notes.append(f"the source restarted {most - 1} times; the parts are joined with a gap between them")
     else:
         said = ", ".join(f"{name} {count - 1} times" for name, count in counts.items())
-        notes.append(f"the sample counters started anew a different number of times ({said}); only the part before the first is paired")
+        notes.append(f"the sample counters restarted a different number of times ({said}); only the part before the first is paired")
         kept = 1
     merged: dict[str, list[Stream]] = {name: [] for name in streams}
     offset, late = 0.0, 0.0

@@ -1,4 +1,4 @@
-"""What looks wrong in a recording, said in words: none of it is corrected, since only who measured knows.
+"""Warnings about a recording, in words. Nothing is corrected, because only the user knows the truth.
 
 Thresholds are wide of any machine axis that was met in measured data (../docs/real-data.md); they only ask.
 """
@@ -43,7 +43,7 @@ def meaningful(path: Path, recording: Recording) -> Recording:
     for name, values in (("input", recording.voltage), ("output", recording.position)):
         largest = float(np.max(np.abs(values))) if values.size else 0.0
         if largest > HUGE:
-            raise BadRecording(path, f"the {name} reaches {largest:.3g}, which cannot be squared", "Say its unit with --unit, or --scale.")
+            raise BadRecording(path, f"the {name} reaches {largest:.3g}, which cannot be squared", "Give its unit with --unit, or --scale.")
     if len(recording) < ENOUGH:
         return recording
     same = [axis for axis in recording.axes if np.array_equal(*recording.axis(axis)) and float(np.ptp(recording.axis(axis)[0])) > 0]
@@ -86,7 +86,7 @@ def without_dead_parts(recording: Recording) -> Recording:
             continue
         keep &= ~inside
         notes.append(
-            f"axis {axis}: the output is dead {_between(recording, begin, size)} under an input as lively as elsewhere (encoder, enable, end stop?); "
+            f"axis {axis}: the output is dead {_between(recording, begin, size)} although the input moves as elsewhere (encoder, enable, end stop?); "
             f"that part is left out{' of all axes' if len(recording.axes) > 1 else ''}"
         )
     if not notes or int(np.sum(keep)) < ENOUGH:
@@ -134,9 +134,9 @@ def _of_time(recording: Recording) -> list[str]:
     rate, runs = recording.sampling_rate, recording.runs()
     found = []
     if rate < SLOWEST:
-        found.append(f"the samples are {1 / rate:.4g} s apart ({rate:.4g} Hz): is time in ms, or a sample number? Say --unit time=ms, or --rate")
+        found.append(f"the samples are {1 / rate:.4g} s apart ({rate:.4g} Hz): is time in ms, or a sample number? Give --unit time=ms, or --rate")
     if rate > 1e6:
-        found.append(f"the samples are {1e9 / rate:.4g} ns apart ({rate:.4g} Hz): is that the unit of time? Say --unit time=...")
+        found.append(f"the samples are {1e9 / rate:.4g} ns apart ({rate:.4g} Hz): is this the right unit of time? Give --unit time=...")
     if len(runs) > 1:
         gaps = [(int(recording.seq[b.start] - recording.seq[a.stop - 1]) - 1, float(recording.time[a.stop - 1])) for a, b in itertools.pairwise(runs)]
         most, where = max(gaps)
@@ -149,7 +149,7 @@ def _of_time(recording: Recording) -> list[str]:
     for axis in recording.axes:
         idle = (most_rows - len(recording.run(axis))) / rate
         if idle > 0.0:
-            found.append(f"axis {axis} is not driven and stands for {idle:.4g} s at its ends, which are left out")
+            found.append(f"axis {axis} is neither driven nor moving for {idle:.4g} s at the ends of the recording, which are left out")
     return found
 
 
@@ -158,10 +158,11 @@ def _of_units(recording: Recording) -> list[str]:
     drive, motion = unit_of(recording.input_unit).quantity, unit_of(recording.output_unit).quantity
     if drive not in (*DRIVES, "unknown"):
         found.append(
-            f"the input is in {recording.input_unit}, which drives nothing: are columns swapped, or is it a target? xy-sysid servo models those"
+            f"the input is in {recording.input_unit}, which is not a drive signal: are columns swapped, or is it a target? "
+            "xy-sysid servo models targets"
         )
     if motion in DRIVES:
-        found.append(f"the output is in {recording.output_unit}, which is no motion: are columns swapped, or is it a sensor's voltage (--scale)?")
+        found.append(f"the output is in {recording.output_unit}, which is not a motion: are columns swapped, or is it a sensor's voltage (--scale)?")
     if drive == "current":
         found.append("the input is a current: if it was measured and not commanded, it is not held between samples (--set hold=none)")
     return found
@@ -176,7 +177,7 @@ def _of_axis(recording: Recording, u: FloatArray, y: FloatArray) -> list[str]:
         if size == 0.0:
             found.append(f"the {name} never changes")
         elif size < TINY.get(unit, 0.0):
-            found.append(f"the {name} moves by {size:.3g} {unit} in all: is that its unit? Say --unit or --scale")
+            found.append(f"the {name} moves by {size:.3g} {unit} in all: is this the right unit? Give --unit or --scale")
     if 0.0 in ranges:
         return found
     found += _of_size(recording, y, ranges[1])
@@ -193,8 +194,8 @@ def _of_motion(recording: Recording, u: FloatArray, y: FloatArray) -> list[str]:
     """Too little of it to tell anything by."""
     runs = recording.runs()
     if len(runs) > 1 and float(np.ptp(u)) > 0.0 and all(float(np.ptp(u[run])) == 0.0 for run in runs):
-        return [f"the input keeps one value in each of the {len(runs)} stretches: only the speed that each leads to can be told"]
-    return [f"{ONE_MOVE}: friction, load and inertia cannot be told from each other"] if len(runs) == 1 and one_move(y) else []
+        return [f"the input keeps one value in each of the {len(runs)} stretches: only the final speed of each can be determined"]
+    return [f"{ONE_MOVE}: friction, load and inertia cannot be distinguished"] if len(runs) == 1 and one_move(y) else []
 
 
 def _per(recording: Recording) -> str:
@@ -208,13 +209,13 @@ def _of_size(recording: Recording, y: FloatArray, size: float) -> list[str]:
     if recording.measured == "position":
         speed = step * recording.sampling_rate
         if recording.output_unit == "m" and (size > FAR or speed > FAST):
-            found.append(f"the output moves over {size:.4g} m at {speed:.3g} m/s: is it in mm or counts? Say --unit output=mm, or --scale")
+            found.append(f"the output moves over {size:.4g} m at {speed:.3g} m/s: is it in mm or counts? Give --unit output=mm, or --scale")
         if recording.output_unit == "rad" and speed > TURNING:
-            found.append(f"the output turns at {speed:.3g} rad/s: is it in deg or counts? Say --unit output=deg, or --scale")
+            found.append(f"the output turns at {speed:.3g} rad/s: is it in deg or counts? Give --unit output=deg, or --scale")
         turns = wraps(y) if recording.output_unit == "rad" else 0
         if turns:
             often = "once" if turns == 1 else f"{turns} times"
-            found.append(f"the output leaps by a whole turn {often}, as an angle that wraps: unwrap it, or of joint states say --velocity")
+            found.append(f"the output leaps by a whole turn {often}, as an angle that wraps: unwrap it, or for joint states use --velocity")
     largest = float(np.max(np.abs(y)))
     apart = float(np.spacing(largest))
     if apart > COARSE * step and step > 0 and largest > 10 * size:

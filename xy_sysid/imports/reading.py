@@ -61,7 +61,7 @@ class Reading:
                     raise BadInput(option, repr(what), WHAT, f"Write for example {option} x.output=...")
         for what, unit in self.units.items():
             if NUMBER.fullmatch(unit.strip()) and unit.strip() != "1":  # 1 is a part of full scale
-                raise BadInput("--unit", f"{what}={unit}", "a unit like V, mm or rad/s, and no number", "A factor is given with --scale.")
+                raise BadInput("--unit", f"{what}={unit}", "a unit like V, mm or rad/s, not a number", "A factor is given with --scale.")
         for what, scale in self.scales.items():
             if not (math.isfinite(scale) and scale != 0):
                 raise BadInput("--scale", f"{what}={scale}", "a number that is not 0", "Give the factor to SI.")

@@ -15,7 +15,7 @@ from xy_sysid.imports.limits import fits
 from xy_sysid.imports.sheet import Sheet
 
 TEXT = (".csv", ".txt", ".tsv", ".dat", ".asc", ".lvm", ".prn", ".log")
-HEAD = 65536  # bytes by which texts are told from each other
+HEAD = 65536  # bytes by which text formats are distinguished
 COPIES = 2  # bytes in memory for one in a file of text
 BAGS = ("", ".db3", ".mcap")
 

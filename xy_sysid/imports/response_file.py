@@ -110,7 +110,7 @@ def column_of(sheet: Sheet, role: str, reading: Reading) -> Column | None:
 def _complete(path: Path, sheet: Sheet, columns: Mapping[str, Column]) -> None:
     if any("psd" in spoken(one.name) for one in sheet.columns) and "phase" not in columns:
         act = "Record the acceleration itself, as raw data, together with the command."
-        raise BadRecording(path, "power spectra without a phase, which are no frequency response", act)
+        raise BadRecording(path, "power spectra without a phase, which are not a frequency response", act)
     missing = [role for role in ("frequency",) if role not in columns]
     if not ({"magnitude", "phase"} <= set(columns) or {"real", "imag"} <= set(columns)):
         missing.append("magnitude with phase, or real with imag")
@@ -166,7 +166,7 @@ def _radians(column: Column, values: FloatArray, reading: Reading, notes: list[s
     smooth = float(np.median(np.abs(np.angle(np.exp(1j * np.diff(finite)))))) < JUMP if finite.size > 1 else True
     why = ""
     if not told and radians and not within and not smooth:
-        degrees, why = True, ": the header says rad, and in rad the phase would leap by turns from line to line (--unit phase=rad overrides)"
+        degrees, why = True, ": the header says rad, and in rad the phase would jump by whole turns from line to line (--unit phase=rad overrides)"
     elif not degrees and not radians:
         degrees, why = not within, ", by their size"
     notes.append(f"phases are in {'degrees' if degrees else 'radians'}{why}")

@@ -113,7 +113,7 @@ def _by_steps(sheet: Sheet, known: Container[str], notes: list[str]) -> Column |
     if len(clocks) != 1:
         return None
     name, step = clocks[0].name, clocks[0].step
-    notes.append(f"{name!r} rises by {step:.6g} from row to row: it is taken for the time, in s (another unit with --map time={name} --unit time=ms)")
+    notes.append(f"{name!r} rises by {step:.6g} from row to row: it is used as the time, in s (another unit with --map time={name} --unit time=ms)")
     return sheet.usable(clocks[0])
 
 

@@ -64,7 +64,7 @@ def _alike(found: list[Recording]) -> list[Recording]:
     for one, unit in zip(found, units, strict=True):
         if unit != units[0]:
             given = f"{', '.join(units[0])} in {first.source} and {', '.join(unit)} in {one.source}"
-            raise BadInput("units of the recordings", given, "the same in all", "Say them with --unit, or give recordings of one machine.")
+            raise BadInput("units of the recordings", given, "the same in all", "Give them with --unit, or give recordings of one machine.")
     axes = tuple(axis for axis in first.axes if all(axis in one.axes for one in found))
     if not axes:
         given = "; ".join(f"{', '.join(one.axes)} in {one.source}" for one in found)
@@ -92,7 +92,7 @@ def joined(recordings: Sequence[Recording]) -> Recording:
     for one in recordings[1:]:
         if abs(one.sampling_rate / first.sampling_rate - 1) > SAME_RATE:
             given = f"{first.sampling_rate:.6g} Hz in {first.source} and {one.sampling_rate:.6g} Hz in {one.source}"
-            raise BadInput("sampling rates", given, "the same in all", "Give them one by one, or say --rate if the stamps are wrong.")
+            raise BadInput("sampling rates", given, "the same in all", "Give them one by one, or use --rate if the stamps are wrong.")
     seq, time, end, late = [], [], int(first.seq[0]), float(first.time[0])
     for one in recordings:
         seq.append(one.seq - one.seq[0] + end)

@@ -1,4 +1,4 @@
-"""What a file holds before anybody says what it means: columns with a name, perhaps a unit, and numbers or words."""
+"""The content of a file before its meaning is known: columns with a name, perhaps a unit, and numbers or text."""
 
 from __future__ import annotations
 

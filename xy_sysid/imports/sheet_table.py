@@ -41,7 +41,7 @@ def table(sheet: Sheet, reading: Reading, notes: list[str]) -> Table:
         reference = r if same_unit(reading, unit, output_unit, notes) else None
     read = [column.name for axis, column in roles.inputs.items() if axis in axes and MEASURED & set(spoken(column.name))]
     if read:
-        notes.append(f"the input {', '.join(map(repr, read))} was measured, so it is hardly held from sample to sample: fit it with --set hold=none")
+        notes.append(f"the input {', '.join(map(repr, read))} was measured, so it is probably not held between samples: fit it with --set hold=none")
     if roles.guessed:
         notes.append(_taken(roles, axes, {"input": input_unit, "output": output_unit}))
     return Table(

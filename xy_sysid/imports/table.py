@@ -110,7 +110,7 @@ def _same_length(path: Path, table: Table) -> None:
 def as_they_stand(rate: float | None, unused: str | None) -> list[str]:
     """The note on samples whose instants are not read. rate: Hz, None if it is not known; unused: name of a time that is there."""
     if unused is not None:
-        return [f"the samples are taken as they stand, {rate:g} Hz; the time {unused!r} is not used"]
+        return [f"the samples are used as they are, {rate:g} Hz; the time {unused!r} is not used"]
     return [] if rate is None else [f"there is no time; fs = {rate:g} Hz is taken"]
 
 
@@ -156,7 +156,7 @@ def _unwrapped(table: Table, rows: _Rows, notes: list[str]) -> _Rows:
 
 
 def _stretches(table: Table, time: FloatArray) -> FloatArray:
-    """(n,) number of the stretch that each row belongs to: as the table says, or each time that the clock begins anew."""
+    """(n,) number of the stretch that each row belongs to: as the table says, or each time that the clock begins again."""
     begins = np.zeros(len(time))
     if table.starts:
         starts = np.array([start for start in table.starts[1:] if start < len(time)], dtype=np.int64)
@@ -172,7 +172,7 @@ def _numbered(path: Path, table: Table, rows: _Rows, notes: list[str]) -> tuple[
     if table.seq is None:
         stretches = int(rows.stretch[-1]) + 1
         if stretches > 1:
-            notes.append(f"{stretches} stretches, one after the other with a gap between each and the next")
+            notes.append(f"{stretches} stretches, one after the other with gaps between them")
         if table.time is None:
             rate = float(table.fs or 0.0)
             number = np.unique(rows.stretch, return_inverse=True)[1]
@@ -189,7 +189,7 @@ def _numbered(path: Path, table: Table, rows: _Rows, notes: list[str]) -> tuple[
 
 
 def _by_time(path: Path, rows: _Rows, notes: list[str]) -> tuple[_Rows, float]:
-    """Numbered by their instants; the time of a stretch that begins anew goes on after the one before."""
+    """Numbered by their instants; the time of a stretch that begins again goes on after the one before."""
     time, number = rows.time.copy(), rows.stretch
     period = float(np.median(np.diff(time)))
     for begin in np.flatnonzero(np.diff(number)) + 1:

@@ -1,4 +1,4 @@
-"""Where the table of a text file begins, what its columns are called, and how its cells are parted."""
+"""The table in a text file: its first row, the names of its columns, and the separator of its cells."""
 
 from __future__ import annotations
 
@@ -68,9 +68,9 @@ def text_table(text: str, notes: list[str]) -> TextTable:
     above = [line for number, line in remarks if number < rows[begin][0]][-1:]
     called = cells_of(above[0], separator, len(head)) if above else []
     if len(called) == len(head) > 1:
-        notes.append(f"the columns are called as the remark above them says ({above[0][:40]!r})")
+        notes.append(f"the columns have the names in the remark above them ({above[0][:40]!r})")
         return TextTable(separator, [header(cell) for cell in called], rows[begin:])
-    notes.append("the first row holds numbers and no names; the columns are called by their numbers from 1 on")
+    notes.append("the first row holds numbers and no names; the columns are numbered from 1")
     return TextTable(separator, [(str(number), "") for number in range(1, len(head) + 1)], rows[begin:])
 
 

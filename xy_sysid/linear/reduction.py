@@ -75,11 +75,11 @@ def _polynomial(roots: ComplexArray) -> FloatArray:
 
 
 def balanced_truncation(model: TransferFunction | AnyModel, order: int) -> Truncated:
-    """The model of ``order`` poles that keeps integrators, unstable poles and the delay, and the strongest stable states.
+    """A model with ``order`` poles: integrators, unstable poles and delay are kept, and the strongest stable states.
 
-    ``tf`` is the smaller one, ``bound`` the largest error of its response. Of a model with physical effects it is made from the linear part.
+    ``tf`` is the reduced model, ``bound`` the largest error of its response. For a model with physical effects its linear part is reduced.
     Source: Moore, IEEE Trans. Automatic Control 26 (1981); Glover, Int. J. Control 39 (1984).
-    Raises BadInput for an order that is not between the poles that must stay and those that are there.
+    Raises BadInput for an order below the number of poles that must be kept, or above the number of poles.
     """
     tf = model if isinstance(model, TransferFunction) else model.tf
     discrete = tf.sampling_time is not None

@@ -44,7 +44,7 @@ class TransferFunction:
 
     def __post_init__(self) -> None:
         if not self.delay >= 0.0 or self.delay == inf:
-            raise BadInput("delay", f"{self.delay} s", ">= 0 s", "A model cannot answer before it is asked.")
+            raise BadInput("delay", f"{self.delay} s", ">= 0 s", "A causal model has no negative delay.")
         if self.denominator.size == 0 or not np.any(self.denominator != 0):
             raise BadInput("denominator", "zero", "at least one coefficient that is not 0", "Give its coefficients in falling powers.")
 
@@ -102,7 +102,7 @@ class TransferFunction:
 
     @property
     def leading_gain(self) -> float:
-        """First coefficient of the numerator over that of the denominator: the gain of the highest frequencies."""
+        """Ratio of the first coefficients of numerator and denominator: the gain at the highest frequencies."""
         trimmed = np.trim_zeros(self.numerator, "f")
         return float(trimmed[0] / np.trim_zeros(self.denominator, "f")[0]) if trimmed.size else 0.0
 

@@ -1,4 +1,4 @@
-"""The online logic: told of samples and of time, it asks for neither.
+"""The online logic: samples and time are arguments; it never asks for them.
 
 identifier:      samples in, requests for fits out
 fitter:          fits that follow one another

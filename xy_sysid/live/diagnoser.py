@@ -1,6 +1,6 @@
-"""What a live diagnosis does when: requests come in, jobs go out one at a time, stories come back. No thread, no clock, no IO.
+"""The sequence of a live diagnosis: requests come in, jobs go out one at a time, stories come back. No thread, no clock, no IO.
 
-A story stays with the samples it began with, so that its ladder compares like with like; ``diagnose`` and ``renew`` begin anew. Each axis
+A story stays with the samples it began with, so that its ladder compares like with like; ``diagnose`` and ``renew`` begin again. Each axis
 can be asked for by itself: what is done for one leaves the others as they are.
 """
 
@@ -26,8 +26,8 @@ BEGINS: dict[Act, str] = {
     "diagnose": "fitting the rigid model",
     "renew": "fitting the rigid model",
     "effects": "changing the effects",
-    "add_next": "looking for the next effect",
-    "auto": "looking for the next effect",
+    "add_next": "searching for the next effect",
+    "auto": "searching for the next effect",
 }
 
 
@@ -68,14 +68,14 @@ class Diagnoser:
         self.reset()
 
     def reset(self) -> None:
-        """Forget what was heard; stories stay."""
+        """Delete received data; stories stay."""
         for request in self._queue:
             request.whole = ()
         self.hearing = Newest(self.axes, self._settings.memory, self._settings.minimum, self._settings.reorder)
         self._next_time = self._settings.interval
 
     def change(self, settings: DiagnoserSettings) -> None:
-        """Use other settings from now on; those of the memory start it anew."""
+        """Use other settings from now on; those of the memory restart it."""
         before, self._settings = self._settings, settings
         if (before.memory, before.minimum, before.reorder) != (settings.memory, settings.minimum, settings.reorder):
             self.reset()
@@ -117,7 +117,7 @@ class Diagnoser:
         chosen = self.axes if axes is None else tuple(axes)
         busy = [axis for axis in chosen if axis in self.doings()]
         if busy:
-            raise BadInput("reset_model", f"while axis {busy[0]} is worked for", "an axis that nothing is done for", "Call cancel first.")
+            raise BadInput("reset_model", f"while axis {busy[0]} is worked for", "an axis without running work", "Call cancel first.")
         for axis in chosen:
             if axis in self.stories:
                 self.stories[axis] = self.stories[axis].only_base()

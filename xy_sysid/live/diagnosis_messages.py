@@ -1,4 +1,4 @@
-"""What the diagnoser says of an axis, as plain numbers and words: its error ladder and its diagnosis."""
+"""The messages of the diagnoser for an axis, as plain numbers and words: error ladder and diagnosis."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a node that listens says of its streams: never OK while nothing is paired."""
+"""The status of the streams of a node: never OK while nothing is paired."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def verdict(heard: Heard, well: str) -> tuple[int, str]:
         said.append(f"{heard.refusals} message{'s' if heard.refusals > 1 else ''} refused: {heard.refused}")
     said += heard.sentences.values()
     if heard.silent:
-        return STALE, "; ".join((f"no {' and no '.join(heard.silent)} heard for a second", *said))
+        return STALE, "; ".join((f"no {' and no '.join(heard.silent)} received for a second", *said))
     if not heard.paired:
         return (ERROR, f"nothing is paired: {'; '.join(said)}") if said else (WARN, "nothing is paired yet")
     return (WARN, "; ".join(said)) if said else (OK, well)

@@ -179,7 +179,7 @@ class Identifier:
         if rate is None or abs(rate / before - 1.0) <= RATE_TOLERANCE:
             return before
         self._counts["rate_changed"] += 1
-        self._said["rate_changed"] = f"the source came back at {rate:.6g} Hz, before it was {before:.6g} Hz; the spectra start anew"
+        self._said["rate_changed"] = f"the source came back at {rate:.6g} Hz, before it was {before:.6g} Hz; the spectra are restarted"
         self._rate, self._samples, self._slot, self._line = rate, 0, -1, StampLine()
         self._main, self._recent, self._used = {}, {}, Counter()
         self._both = None if self._both is None else RunningCrossSpectra(self._long)

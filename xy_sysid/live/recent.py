@@ -1,4 +1,4 @@
-"""Which complaints still go on: what has recovered is counted, and is no warning any more."""
+"""Which faults still occur: recovered faults are counted, but no longer a warning."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Watch a resonance: has it moved away from where it was when the machine was known to be well?
+"""Watch a resonance: has it moved since its first value?
 
 Loose base bolts lower the base's stiffness, so that its antiresonance and resonance move left (the paper's finding).
 """

@@ -48,7 +48,7 @@ class Commands:
         axes = tuple(settings.axes)
         if settings.command_topic.rpartition("/")[2] in BLOCK_TOPICS:
             raise BadInput(
-                "command_topic", repr(settings.command_topic), "the topic of a controller", "Blocks travel under this name: choose another."
+                "command_topic", repr(settings.command_topic), "the topic of a controller", "Blocks are published under this name: choose another."
             )
         self._joints = tuple(joints_of(axes, given(settings.joints)).values())
         self._order = given(settings.controller_joints) or self._joints

@@ -58,15 +58,15 @@ class WalledNode(Overridable):
         super().__init__(name, namespace=NAMESPACE, automatically_declare_parameters_from_overrides=True)
 
     def create_subscription(self, msg_type: Any, topic: str, callback: Callable[..., Any], *rest: Any, **more: Any) -> Any:
-        """As rclpy's; an error of the callback is told."""
+        """As in rclpy; an error of the callback is logged."""
         return super().create_subscription(msg_type, topic, self.wall.around(callback), *rest, **more)
 
     def create_service(self, srv_type: Any, srv_name: str, callback: Callable[..., Any], **more: Any) -> Any:
-        """As rclpy's; an error of the callback is told."""
+        """As in rclpy; an error of the callback is logged."""
         return super().create_service(srv_type, srv_name, self.wall.around(callback), **more)
 
     def create_timer(self, timer_period_sec: float, callback: Callable[..., Any], *rest: Any, **more: Any) -> Any:
-        """As rclpy's; an error of the callback is told."""
+        """As in rclpy; an error of the callback is logged."""
         return super().create_timer(timer_period_sec, self.wall.around(callback), *rest, **more)
 
     def ask_to_stop(self, reason: str) -> None:

@@ -34,14 +34,14 @@ from xy_sysid.samples.block import Block
 BLOCK = 4  # samples of a block: the feedback is calculated 500 times a second at 2 kHz
 PARAMETERS = {"distance": 0.02, "speed": 0.06, "acceleration": 1.0, "limit": 10.0}  # m, m/s, m/s2, V
 MEANINGS = {
-    "distance": "the path goes so far to each side of the start, m",
+    "distance": "length of the path to each side of the start, m",
     "speed": "largest speed of the path, m/s",
     "acceleration": "its largest acceleration, m/s2",
     "limit": "largest voltage, V",
 }
 JERK_TIME = 0.02  # s in which an acceleration is built up
 LOOK, BEAT = 0.05, 0.5  # s between two looks, and between two statuses
-QUIET = 0.5  # s without a position after which nobody drives
+QUIET = 0.5  # s without a position after which no drive is active
 FOUND = 0.5  # s in which the machine finds a new source of voltage
 SILENT = 3.0  # s without an answer after which the path is given up
 SHOWN = 600  # rows of the table of errors at most
@@ -119,7 +119,7 @@ class DemoFollowerNode(WalledNode):
                 raise BadInput(f"axis {axis}", "without a story", "a diagnosed axis", "Press Diagnose or Auto first.")
             models[axis] = model_of(self._stories[axis], axis)
         if self._here is None:
-            raise BadInput("position", "not heard", "a machine that answers", "Activate the excitation, so that it is known where the axes are.")
+            raise BadInput("position", "not heard", "a machine that answers", "Activate the excitation, so that the positions of the axes are known.")
         self._state, self._words, self._errors, self._plans = STOPPING, "the excitation is stopped", {}, None
         if self._excitation.service_is_ready():
             request = ChangeState.Request(transition=Transition(id=Transition.TRANSITION_DEACTIVATE))
@@ -143,7 +143,7 @@ class DemoFollowerNode(WalledNode):
 
     @property
     def _quiet(self) -> bool:
-        """Nobody else drives: the simulated machine answers nobody."""
+        """No other node drives: the simulated machine publishes no positions."""
         return time.monotonic() - self._heard > QUIET
 
     def _look(self) -> None:
@@ -217,7 +217,7 @@ class DemoFollowerNode(WalledNode):
         if self._state == FOLLOWING:
             self._measure()
             kind = next(iter(self._followers.values())).kind
-            told = "on the way to the begin of the path" if kind is None else f"following the path: {KINDS[kind]}"
+            told = "moving to the start of the path" if kind is None else f"following the path: {KINDS[kind]}"
         for axis, errors in self._errors.items():
             values |= {f"axis {axis} {name} (m)": f"{value:.6g}" for name, value in zip(KINDS, errors, strict=False)}
             values[f"axis {axis} undone"] = ", ".join(self._followers[axis].plan.compensation.terms)

@@ -1,4 +1,4 @@
-"""Voltage and position in; on request which effect is missing, and the error falling as effects are added.
+"""Diagnoser node: receives voltage and position; on request it finds the missing effect, and the error after each added effect.
 
 Thin: ``diagnoser.Diagnoser`` knows what is to be done when, ``story_process`` does it in a process of its own.
 """
@@ -138,7 +138,7 @@ class DiagnoserNode(WalledNode):
     def _beat(self) -> None:
         """What is heard, once a second."""
         hearing = self._diagnoser.hearing
-        level, text = verdict(self._streams.heard(hearing.total, hearing.sentences, hearing.faults), "voltage and position are heard")
+        level, text = verdict(self._streams.heard(hearing.total, hearing.sentences, hearing.faults), "voltage and position are received")
         text = f"{text}; {hearing.seconds:.1f} s without a gap are kept"
         if self._streams.recent.goes_on("callbacks", self.wall.count, time.monotonic()):
             level, text = max(level, WARN), f"{text}; {self.wall.told}"
@@ -161,7 +161,7 @@ class DiagnoserNode(WalledNode):
     # parameters and services
 
     def _check(self, settings: DiagnoserSettings) -> None:
-        """Raises BadInput for an axis or an effect that nobody knows."""
+        """Raises BadInput for an unknown axis or effect."""
         for axis in settings.effects:
             if axis not in self._axes:
                 raise BadInput("effects of axis", repr(axis), ", ".join(self._axes), "Choose one of these.")
@@ -197,7 +197,7 @@ class DiagnoserNode(WalledNode):
         self._diagnoser.reset()
         self._streams.forget()
         self._since.forget()
-        return "everything heard is forgotten"
+        return "all received data were deleted"
 
     def _cancel(self, axes: tuple[str, ...]) -> str:
         if self._diagnoser.under_way in axes:

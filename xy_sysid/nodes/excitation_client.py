@@ -21,12 +21,12 @@ from xy_sysid.settings import ExcitationSettings, build, knobs
 ANSWER = 10.0  # s for an answer of the excitation,
 ASKED = 3  # times, as long as a node is there
 APPEARS = 60.0  # s until the excitation is there,
-SOON = 1.0  # s where somebody wants to stop: an excitation that is there has to be told so
+SOON = 1.0  # s, if the user wants to stop: a running excitation must still receive the request
 NODE = "excitation"
 
 
 class ExcitationClient:
-    """A node of its own in the thread that calls it. ended: asked often, true when somebody wants to stop."""
+    """A node of its own in the thread that calls it. ended: called often; true if the user wants to stop."""
 
     def __init__(self, name: str, ended: Callable[[], bool], namespace: str) -> None:
         self._is_over = ended
@@ -53,7 +53,7 @@ class ExcitationClient:
             if answer is not None or self._is_over():
                 break
         if answer is None:
-            raise BadInput("excitation", f"no answer to {service}", "a node excitation in the run file that lives", "Look at its lines above.")
+            raise BadInput("excitation", f"no answer to {service}", "a running node excitation in the run file", "See its messages above.")
         return answer
 
     def _ask(self, kind: Any, service: str, request: Any) -> Any:
@@ -83,11 +83,11 @@ class ExcitationClient:
         request = SetParameters.Request(parameters=[kind(name, value=value).to_parameter_msg() for name, value in values.items()])
         refused = [result.reason for result in self.call(SetParameters, "set_parameters", request).results if not result.successful]
         if refused:
-            raise BadInput("excitation", f"refused: {refused[0]}", "settings as the sentence says", "Change the run file.")
+            raise BadInput("excitation", f"refused: {refused[0]}", "settings that it accepts", "Change the run file.")
 
     def state(self) -> str:
         return str(self.call(GetState, "get_state", GetState.Request()).current_state.label)
 
     def transition(self, label: str) -> None:
         if not self.call(ChangeState, "change_state", ChangeState.Request(transition=Transition(label=label))).success:
-            raise BadInput("excitation", f"did not {label}", "an excitation that does", "Look at its lines above.")
+            raise BadInput("excitation", f"did not {label}", "an excitation that does", "See its messages above.")

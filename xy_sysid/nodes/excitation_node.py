@@ -45,12 +45,12 @@ ARRIVES = Duration(seconds=1.0)  # how long the last zero may take to be acknowl
 SAME_EPOCH = 0.05  # s by which the ROS time of counter 0 may move over a pause before the stamps follow it
 SETTLED = 0.5  # s without a new listener before starting by itself: whoever was started together hears the first sample
 SAME_NODE = 2.0  # s to look for one node that reads voltage and writes position, before any two will do
-ALONE = 0.1  # s between two looks whether somebody else drives
+ALONE = 0.1  # s between two checks for another node that drives
 KNOCK = 1.0  # s after which zeros go out once more in lockstep, while no machine has answered yet
 STOP_LOOK = 0.02  # s between two looks whether STOP was asked for
 FOUND = 1.0  # s after which a node has found all who were there before it
 INTRODUCES = 0.5  # s in which a node that is seen becomes known by its name
-KILLED = "One that was killed is forgotten after 20 s."
+KILLED = "A node that was killed is forgotten after 20 s."
 
 FIXED = ("output", "interface", "command", "unit", "command_topic", "controller_joints", "joint_topic", "joints")  # when the node starts
 LAST = 5  # times that the last command is sent: a controller listens with best effort
@@ -87,7 +87,7 @@ class ExcitationNode(Overridable, LifecycleNode):
         self._wall = Wall(self._complain)
         for service in self._services:  # rclpy's own: a transition that the state does not have would end the node
             service.callback = self._wall.around(service.callback)
-        self._steady = RosClock(clock_type=ClockType.STEADY_TIME)  # guards must not sleep when somebody stops or sets the clock
+        self._steady = RosClock(clock_type=ClockType.STEADY_TIME)  # guards must not sleep when the clock is stopped or set
         self._voltage = self.create_publisher(Float64MultiArray, "voltage", DATA_QOS)
         self._metrics = Diagnostics(self)
         self._reference = self.create_publisher(Float64MultiArray, "reference", DATA_QOS) if self._knobs.settings.interface != "effort" else None
@@ -114,11 +114,11 @@ class ExcitationNode(Overridable, LifecycleNode):
     # lifecycle
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Check that every signal fits the rate, and that nobody else is there to drive the machine."""
+        """Check that every signal fits the rate, and that no other node drives the machine."""
         time.sleep(max(0.0, self._made + FOUND - time.monotonic()))
         rivals = self._rivals()
         if rivals:
-            return self._refuse(f"{rivals}: no configure beside it. End one of the two. {KILLED}")
+            return self._refuse(f"{rivals}: configure is refused while it runs. End one of the two. {KILLED}")
         try:
             self._starts = self._take_experiment()
             self._drive = drive_of(self._knobs.settings, 0 if self._drive is None else self._drive.seq)  # the counter never goes back
@@ -147,7 +147,7 @@ class ExcitationNode(Overridable, LifecycleNode):
             return self._refuse(self._stop.why())
         others = self._others()
         if others:
-            return self._refuse(f"{' and '.join(others)} publishes {self._way}, too: no activate beside it. {KILLED}")
+            return self._refuse(f"{' and '.join(others)} publishes {self._way}, too: activate is refused while it runs. {KILLED}")
         strange = self._no_commands(self._commands) if self._commands else self._no_blocks()
         if strange:
             return self._refuse(strange)
@@ -236,7 +236,7 @@ class ExcitationNode(Overridable, LifecycleNode):
             return ""
         if topic.rpartition("/")[2] != "voltage":
             return (
-                f"blocks of voltage would go to {topic}, where a controller would take their counter for a command: no activate. "
+                f"blocks of voltage would go to {topic}, where a controller would take their counter for a command: activate is refused. "
                 "Set output to commands for a controller, or renamed to true if blocks are expected there."
             )
         infos = self.get_subscriptions_info_by_topic(topic)
@@ -245,21 +245,21 @@ class ExcitationNode(Overridable, LifecycleNode):
         )
         if strange:
             return (
-                f"{' and '.join(strange)} listens to {topic} and expects something else than blocks of voltage: no activate. "
+                f"{' and '.join(strange)} subscribes to {topic} and does not expect blocks of voltage: activate is refused. "
                 "Set output to commands for a controller, or renamed to true if blocks are expected there."
             )
         return ""
 
     def _no_commands(self, commands: Commands) -> str:
-        """Why no trajectories may be sent: nobody there takes them. Empty if all is well, and where one number a joint is sent."""
+        """Why no trajectories may be sent: no node receives them. Empty if one does, and with a forward controller."""
         if not isinstance(commands, Trajectories):
             return ""
         kinds = {info.topic_type for info in self.get_subscriptions_info_by_topic(self._way)}
         if "trajectory_msgs/msg/JointTrajectory" in kinds:
             return ""
-        there = f"its subscribers expect {', '.join(sorted(kinds))}" if kinds else "nobody listens there"
+        there = f"its subscribers expect {', '.join(sorted(kinds))}" if kinds else "no node subscribes to it"
         return (
-            f"trajectories would go to {self._way}, and {there}: no activate. Start the JointTrajectoryController, "
+            f"trajectories would go to {self._way}, and {there}: activate is refused. Start the JointTrajectoryController, "
             "and set command_topic to its topic, /NAME_OF_CONTROLLER/joint_trajectory."
         )
 
@@ -275,7 +275,7 @@ class ExcitationNode(Overridable, LifecycleNode):
         return sorted(set(names))
 
     def _rivals(self) -> str:
-        """Who else drives the machine or has this node's name, in words; empty if nobody."""
+        """Which other node drives the machine or has this node's name, in words; empty if none."""
         others = self._others()
         if others:
             return f"{' and '.join(others)} publishes {self._way}, too"
@@ -292,7 +292,7 @@ class ExcitationNode(Overridable, LifecycleNode):
         self._unnamed = self._unnamed + ALONE if unnamed else 0.0
         if others and not 0 < self._unnamed < INTRODUCES:
             drive.fault = True
-            who = " and ".join("a node whose name nobody has told yet" if "UNKNOWN" in name else name for name in others)
+            who = " and ".join("a node whose name is not known yet" if "UNKNOWN" in name else name for name in others)
             drive.stop(f"{who} publishes {self._way}, too: two must not drive one machine", drive.settings.abort_ramp)
             self.get_logger().error(drive.reason)
             self.trigger_deactivate()
@@ -489,7 +489,7 @@ class ExcitationNode(Overridable, LifecycleNode):
             if self._knobs.settings.autostart and drive.fault and not drive.answered:
                 self.trigger_cleanup()
                 self._wait_for_machine()
-                self.get_logger().info("it begins anew as soon as a machine is there: nothing has moved yet")
+                self.get_logger().info("it starts again as soon as a machine is present: nothing has moved yet")
 
     # parameters, diagnostics, start
 
@@ -543,7 +543,7 @@ class ExcitationNode(Overridable, LifecycleNode):
         """Configure and activate once a machine is there: one node that reads voltage and writes position."""
         if self.count_subscribers(self._way) == 0 or self._position.get_publisher_count() == 0:
             if time.monotonic() - self._waiting_since > self._knobs.settings.patience:
-                self._complain(f"no machine yet: nobody reads {self._way} and writes {self._position.topic_name}")
+                self._complain(f"no machine yet: no node reads {self._way} and writes {self._position.topic_name}")
             return
         readers = {(info.node_namespace, info.node_name) for info in self.get_subscriptions_info_by_topic(self._way)}
         writers = {(info.node_namespace, info.node_name) for info in self.get_publishers_info_by_topic(self._position.topic_name)}

@@ -28,7 +28,7 @@ REST, FORTH = 0.12, 0.15  # s at 0 V before, between and after, and s of each pu
 
 
 class Conductor(ExcitationClient):
-    """``run`` does it all; it returns when the machine stands. ended: asked often, true when somebody wants to stop."""
+    """``run`` does it all; it returns when the machine stands. ended: called often; true if the user wants to stop."""
 
     def __init__(self, say: Callable[[str], None], ended: Callable[[], bool], namespace: str = NAMESPACE) -> None:
         self.found: dict[str, AxisFound] = {}
@@ -96,7 +96,7 @@ class Conductor(ExcitationClient):
             if self._over() or (whole and all(bool(np.any(sign * voltage[:, column] > 0.5 * push.volts)) for sign in (1.0, -1.0))):
                 return voltage, position
         what, value = f"push of {push.axis} at {push.volts:.3g} V", f"without all its messages, {TRIES} times"
-        raise BadInput(what, value, "streams without a gap", "Run fewer other programs on this computer, or look at the network.")
+        raise BadInput(what, value, "streams without a gap", "Run fewer other programs on this computer, or check the network.")
 
     def _pushed(self, push: Push, settings: ExcitationSettings) -> tuple[FloatArray, FloatArray, bool]:
         """Voltage and position of rest, forth, rest, back, rest, and whether they are without a gap."""

@@ -20,7 +20,7 @@ LOOK = 0.2  # s between two looks for a publisher that offers something else
 
 
 class Ear:
-    """Subscribes, and subscribes anew when what the publishers offer has changed."""
+    """Subscribes, and subscribes again when what the publishers offer has changed."""
 
     def __init__(self, node: Node, kind: Any, topic: str, callback: Callable[[Any], None], quality: QoSProfile) -> None:
         """quality: depth and history; the reliability is that of the publishers."""

@@ -1,4 +1,4 @@
-"""Voltage and position in; frequency response, transfer function, comparison and metrics out.
+"""Identifier node: receives voltage and position; publishes frequency response, transfer function, comparison and metrics.
 
 Thin: the logic is ``identifier.Identifier`` on the data path and ``live_fit.LiveFitter`` in a thread of its own, so that
 data handling never waits for a fit.
@@ -33,7 +33,7 @@ from xy_sysid.settings import IdentifierSettings
 
 PUBLISH_PERIOD = 0.05  # s between two looks for finished fits
 HEARTBEAT = 1.0  # s between two statuses of the streams
-# Changing one of these starts the spectra anew; the topics' names and types are fixed when the node starts.
+# Changing one of these restarts the spectra; the topics' names and types are fixed when the node starts.
 SHAPES_SPECTRA = ("window", "length", "overlap", "differenced", "memory", "sliding", "alarm_windows", "reorder")
 FIXED = ("response", *HEARING, "state_file", "save_every", "baseline", "baseline_table")
 
@@ -101,7 +101,7 @@ class IdentifierNode(WalledNode):
         """What is heard of the streams, once a second, whether or not there is anything to fit."""
         recent, now = self._streams.recent, time.monotonic()
         heard = self._streams.heard(self._identifier.samples, self._identifier.sentences, self._identifier.faults)
-        level, text = verdict(heard, f"{', '.join(heard.streams[:-1])} and {heard.streams[-1]} are heard")
+        level, text = verdict(heard, f"{', '.join(heard.streams[:-1])} and {heard.streams[-1]} are received")
         if recent.goes_on("callbacks", self.wall.count, now):
             level, text = max(level, WARN), f"{text}; {self.wall.told}"
         if recent.goes_on("skipped fits", self._worker.skipped, now):
@@ -128,7 +128,7 @@ class IdentifierNode(WalledNode):
         if any(getattr(before, name) != getattr(settings, name) for name in SHAPES_SPECTRA):
             self._identifier = Identifier(settings, self._axes, settings.units)
             self._worker.change(self._fitter(settings))
-            self.get_logger().info("the spectra start anew with the new settings")
+            self.get_logger().info("the spectra are restarted with the new settings")
         else:
             self._identifier.change(settings)
             references = self._worker.fitter.references()
@@ -137,7 +137,7 @@ class IdentifierNode(WalledNode):
             self._worker.change(fitter)
 
     def _fitter(self, settings: IdentifierSettings) -> LiveFitter:
-        """A fitter that knows nothing yet, and what is compared with the baseline begins anew."""
+        """A fitter that knows nothing yet, and what is compared with the baseline begins again."""
         self._since.forget()
         return LiveFitter(settings, self._since.models)
 
@@ -145,7 +145,7 @@ class IdentifierNode(WalledNode):
         self._identifier.reset()
         self._streams.forget()
         self._worker.change(self._fitter(self._own.settings))
-        return "everything heard is forgotten"
+        return "all received data were deleted"
 
     def _save(self) -> str:
         path = self._path()
@@ -174,7 +174,7 @@ class IdentifierNode(WalledNode):
             self.get_logger().info(self._load())
         except XySysidError as problem:
             kept = set_aside(self._state_path)
-            self.get_logger().error(f"{problem} The file is kept as {kept}; the spectra start anew.")
+            self.get_logger().error(f"{problem} The file is kept as {kept}; the spectra are restarted.")
 
     def _save_quietly(self) -> None:
         try:

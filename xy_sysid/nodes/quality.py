@@ -1,4 +1,4 @@
-"""What ROS lets a user change of a node, and what not.
+"""Which properties of a node a user can change through ROS.
 
 Quality of service: ``qos_overrides./xy/position.subscription.reliability`` and the like, as in rclcpp.
 

@@ -1,4 +1,4 @@
-"""Writes topics to a bag as they come, still serialized; whole up to the last second even if it is killed."""
+"""Recorder node: writes topics to a bag as they arrive, serialized; complete up to the last second even if it is killed."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ DEPTH = 10_000  # messages that may wait while the disk is busy
 
 
 class RecorderNode(WalledNode):
-    """Subscribes to every topic that a pattern matches, as soon as somebody publishes it."""
+    """Subscribes to every topic that a pattern matches, as soon as a node publishes it."""
 
     def __init__(self) -> None:
         super().__init__("recorder")

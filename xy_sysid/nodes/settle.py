@@ -79,7 +79,7 @@ class Settler(ExcitationClient):
     def __init__(
         self, wishes: Wishes, say: Callable[[str], None], ended: Callable[[], bool], go: Callable[[], bool], namespace: str = NAMESPACE
     ) -> None:
-        """say: takes each line for people; ended: asked often, true when somebody wants to end it; go: whether experiments may run."""
+        """say: takes each line for people; ended: called often; true if the user wants to end it; go: whether experiments may run."""
         super().__init__("settle", ended, namespace)
         self.wishes = wishes
         self.steps: tuple[dict[str, Any], ...] = ()
@@ -113,7 +113,7 @@ class Settler(ExcitationClient):
 
     @property
     def outcome(self) -> str:
-        """How it ended, in a sentence: a fault, what is settled, or what is still possible where somebody stopped it."""
+        """How it ended, in a sentence: a fault, what is settled, or what is still possible if it was stopped."""
         if self.problem or not self.steps:
             return self.problem or "Stopped before the first recording was diagnosed."
         last = self.steps[-1]
@@ -201,7 +201,7 @@ class Settler(ExcitationClient):
                 return
 
     def _decided(self, decider: Decider, bag: Path) -> dict[str, Any] | None:
-        """The next step, or None where somebody ended it meanwhile."""
+        """The next step, or None if it was ended meanwhile."""
         if self.ending:
             return None
         self.doing, self.part = "diagnosing all recordings and designing the next experiment", 0.0
@@ -229,7 +229,7 @@ class Settler(ExcitationClient):
             self.transition(label)
         except BadInput:
             self.wait(SETTLES)
-            raise BadInput("excitation", f"did not {label}: {self._message or 'no reason told'}", "an excitation that does", "See above.") from None
+            raise BadInput("excitation", f"did not {label}: {self._message or 'no reason given'}", "an excitation that does", "See above.") from None
         self.wait(0.05)
 
     def _rest(self, before: ExcitationSettings | None) -> None:

@@ -39,7 +39,7 @@ class StopTopic:
         try:
             self._take: Any = ctypes.CDLL("librcl.so").rcl_take
         except OSError as problem:
-            raise BadInput("ROS 2", f"without librcl.so ({problem})", "rclpy on Linux", "STOP must know who has asked for it.") from None
+            raise BadInput("ROS 2", f"without librcl.so ({problem})", "rclpy on Linux", "STOP needs the identity of its publisher.") from None
         self._take.argtypes, self._take.restype = [ctypes.c_void_p] * 4, ctypes.c_int
         check_for_type_support(Bool)
         kind: Any = rclpy_implementation.Subscription
@@ -76,7 +76,7 @@ class StopTopic:
         """Whose STOP is on and what to do, in a sentence."""
         who = ", ".join(self.holders)
         return (
-            f"STOP is on (topic {STOP_TOPIC}, from {who}): no activate before false is published there by the same; "
+            f"STOP is on (topic {STOP_TOPIC}, from {who}): activate is refused until the same publisher sends false; "
             f"the service {self._node.get_name()}/release_stop overrides it"
         )
 

@@ -63,7 +63,7 @@ class Streams:
             Ear(node, Float64MultiArray, "reference", self._on_reference, DATA_QOS)
 
     def forget(self) -> None:
-        """Begin anew with all that was learned from the streams: the rate and the counter of joint states, what was refused."""
+        """Discard all that was learned from the streams: the rate and the counter of joint states, what was refused."""
         self.refused, self.refusals = "", 0
         self.recent = Recent()
         self._joints = JointCounter(self._axes, with_voltage=not self._effort, output=self._output)

@@ -1,4 +1,4 @@
-"""Around every callback: what one message makes go wrong is told once, and the node goes on with the next.
+"""Wrapper of every callback: an error is reported once, and the node continues with the next message.
 
 The wall stands around each callback and not around the executor, because an error that leaves a callback makes rclpy's
 EventsExecutor leave the messages that wait behind it unread (7.1.6).
@@ -18,9 +18,9 @@ LONGEST = 200  # characters of an error that are told
 
 
 class Wall:
-    """``with wall: ...`` lets no error through but tells it. count: errors so far; told: the last one, empty if there was none."""
+    """``with wall: ...`` catches errors and reports them. count: errors so far; told: the last one, empty if there was none."""
 
-    def __init__(self, say: Callable[[str], None], what: str = "a message or request could not be dealt with") -> None:
+    def __init__(self, say: Callable[[str], None], what: str = "a message or request could not be handled") -> None:
         """say: takes the sentence, once for the same error again and again; what: how it begins."""
         self.count, self.told = 0, ""
         self._say, self._what = say, what

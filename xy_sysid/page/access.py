@@ -35,7 +35,7 @@ CONTENT = {
 """Where the browser may take content from, by kind: this server alone, and pictures that the page itself has made."""
 
 HEADERS = {
-    "x-frame-options": "DENY",  # nobody lays an invisible copy of the buttons over something else
+    "x-frame-options": "DENY",  # so that no other page can frame this one and hide its buttons
     "content-security-policy": "; ".join(f"{kind} {places}" for kind, places in CONTENT.items()),
     "referrer-policy": "no-referrer",
     "x-content-type-options": "nosniff",
@@ -92,7 +92,7 @@ def judge(access: Access, headers: Mapping[str, str], query: str) -> Answer:
         return Answer(403, "Requests from other sites are refused.")
     length = headers.get("content-length", "0")
     if not (length.isascii() and length.isdigit() and len(length) < 20 and int(length) <= LARGEST):
-        return Answer(413, f"Nothing of {length[:40]} bytes is taken here; {LARGEST} are the most.")
+        return Answer(413, f"Nothing of {length[:40]} bytes is accepted here; {LARGEST} are the most.")
     if not access.token:
         return Answer()
     given = parse_qs(query).get("token", [""])[0]

@@ -1,4 +1,4 @@
-"""Work beside the page's loop: whatever goes wrong in it becomes a sentence on the page, and its place in the log."""
+"""Work outside the page's event loop: an error becomes a sentence on the page, with its place in the log."""
 
 from __future__ import annotations
 

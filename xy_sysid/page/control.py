@@ -49,7 +49,7 @@ class Control:
                     ui.button("Configure", on_click=lambda: self._go("configure")).props("outline dense no-caps data-act=configure")
                 )
                 self._activate = heeded(ui.button("Activate", on_click=self._ask_activate).props("outline dense no-caps data-act=activate"))
-                self._reset = heeded(ui.button("Forget what was heard", on_click=self._forget).props("flat dense no-caps data-act=forget"))
+                self._reset = heeded(ui.button("Delete received data", on_click=self._forget).props("flat dense no-caps data-act=forget"))
             self._windows = ui.element("div").classes("rows small windows").props("data-part=windows")
             with ui.expansion("Excitation").classes("w-full").props("dense data-part=excitation"):
                 self._settings = ui.element("div").classes("stack")
@@ -121,7 +121,7 @@ class Control:
             values = heard.values(f"axis {axis}")
             if "windows" in values:
                 data = float(values.get("seconds of data (s)", "0"))
-                rows.append((f"axis {axis}", f"{values['windows']} windows heard in {seconds_text(data)}, dropped: {dropped_words(values)}"))
+                rows.append((f"axis {axis}", f"{values['windows']} windows received in {seconds_text(data)}, dropped: {dropped_words(values)}"))
         if rows == getattr(self, "_rows", None):
             return
         self._rows = rows

@@ -1,4 +1,4 @@
-"""What can be taken away: the model, the story, the report. Content goes to the browser; no path comes from it."""
+"""Downloads: the model, the story, the report. Content goes to the browser; no path comes from it."""
 
 from __future__ import annotations
 

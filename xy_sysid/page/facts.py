@@ -1,4 +1,4 @@
-"""The numbers of an axis as people read them, each with what it means and what is good. Words only; nothing is drawn here."""
+"""The numbers of an axis in display units, each with its meaning and good values. Only words; nothing is drawn here."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ def story_facts(document: Mapping[str, Any], step: int | None = None) -> list[Fa
 
 
 def base_fails(document: Mapping[str, Any] | None) -> str:
-    """What the rigid model of a story leaves where it fails; empty where it does not, or nobody knows."""
+    """The error of the rigid model of a story where it fails; empty if it does not, or if that is unknown."""
     if document is None or not document["ladder"]:
         return ""
     base = document["ladder"][0]

@@ -1,4 +1,4 @@
-"""Puts the rules of ``access`` before the application: HTTP and WebSocket alike."""
+"""Applies the rules of ``access`` before the application, for HTTP and WebSocket."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The page's own ROS 2 node: it hears results and stories and passes orders on. Should it die, it is begun anew.
+"""The page's own ROS 2 node: it hears results and stories and passes orders on. If it fails, it is restarted.
 
 The node lives in a thread of its own (``_Line``). ``Link`` looks after it, and stands when it falls: STOP has a wire of its own
 and is published from the thread that asks for it, and every order goes to the node that is there then.
@@ -41,7 +41,7 @@ LOOK = 0.5  # s between two looks at the graph and the lifecycle
 PATIENCE = 5.0  # s for an answer of a node
 AGAIN = 2  # times that parameters are asked for or set once more without an answer
 TABLES = ("frf", "transfer_function", "comparison", COUPLING)
-STOP_AGAIN = 0.5  # s after which STOP is sent again while nobody has confirmed it
+STOP_AGAIN = 0.5  # s after which STOP is sent again if it is not confirmed
 STOP_LOOK = 0.05  # s between two looks whether the excitation has said that it stands
 STOP_GIVES_UP = 6.0  # s
 AT_REST = ("inactive", "unconfigured", "finalized")
@@ -164,7 +164,7 @@ class Link:
 
     def _begin_anew(self, why: str) -> None:
         if not self.problem:
-            self.problem = f"the link to the nodes was lost ({why}) and is begun anew"
+            self.problem = f"the link to the nodes was lost ({why}) and is restarted"
             self._say(self.problem)
         self._line.abandon()
         self._line = _Line(self.heard, self._namespace, self._orders, self._say)
@@ -239,7 +239,7 @@ class _Line:
         if not self._thread.is_alive():
             return self.wall.told or "its thread has ended"
         silent = time.monotonic() - self.beat
-        return f"it has stood still for {silent:.0f} s" if silent > STUCK else ""
+        return f"it has not responded for {silent:.0f} s" if silent > STUCK else ""
 
     def close(self) -> None:
         """Leave the graph."""
@@ -247,7 +247,7 @@ class _Line:
         self._thread.join(3.0)
 
     def abandon(self) -> None:
-        """Give it up; whoever waits for an answer is told."""
+        """Give it up, and inform the caller that waits for an answer."""
         self._ended.set()
         for asked in self._waiting:
             if not self._once_more(asked):

@@ -23,7 +23,7 @@ SETTLES = 3.0  # s after an answer in which the diagnoser begins, or has said wh
 LOST = 10.0  # s without an answer and without work of the diagnoser after which it is asked again,
 AGAIN = 2  # times
 ENOUGH = 10.0  # s of data with which the rigid model is fitted unasked, so that the first picture shows where it fails
-NEWER = 1.0  # s of newer data that are worth a word
+NEWER = 1.0  # s of newer data from which they are mentioned
 SERVICES = {"diagnose": "diagnose", "renew": "renew", "next": "add_next", "auto": "auto", "reset": "reset_model"}
 
 
@@ -103,7 +103,7 @@ class Live:
             self._trigger(asked.state.order)
 
     def begin(self) -> None:
-        """Have the rigid model fitted, once there are data for it and nobody has asked for more."""
+        """Have the rigid model fitted once there are enough data, if no other work was requested."""
         if not self.heard.stories and NODE in self.heard.present and self._kept() >= self._enough:
             self._enough = 2.0 * self._kept()
             self.link.trigger(f"{NODE}/begin", lambda done, words: None, LONG)

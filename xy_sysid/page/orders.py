@@ -1,4 +1,4 @@
-"""What a page can ask for and how far it is: plain values that go to the worker and back."""
+"""Orders of a page and their progress: plain values that go to the worker and back."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ DOING = {
     "diagnose": "diagnosing the missing effect",
     "renew": "fitting the model to the newest data",
     "add": "adding {}",
-    "remove": "taking out {}",
+    "remove": "removing {}",
     "next": "finding the next effect",
     "auto": "adding effects until the floor is reached",
     "reset": "returning to the rigid model",
@@ -107,7 +107,7 @@ class WorkerNews:
 
 @dataclass(frozen=True, slots=True)
 class OrderState:
-    """An order that is being fulfilled or waits; begun: seconds on the page's clock; part: 0..1 or None when nobody knows."""
+    """An order that is being fulfilled or waits; begun: seconds on the page's clock; part: 0..1, None if unknown."""
 
     order: Order
     begun: float

@@ -38,7 +38,7 @@ class Plot:
                     keep.props(f'aria-label="save {name} as {kind.upper()}"')
 
     async def show(self, session: Session, key: tuple[object, ...], make: Callable[..., go.Figure], *arguments: Any, **named: Any) -> None:
-        """Draw it unless it is drawn already; made beside the page's loop, so that nothing waits for it."""
+        """Draw it unless it is drawn already; computed outside the page's loop, so that nothing waits for it."""
         key = (*key, chosen_units())
         if key == self._shown:
             return

@@ -30,7 +30,7 @@ QUESTIONS = (
     Question("steps", "Step test", "Short step and ramp tests: gain, time constant, delay and friction (kS, kV, kA).", ("--kt", "--gear")),
     Question("servo", "Servo", "A position-controlled joint, target to angle: stiffness, damping, friction, torque limit and delay.", ("--inertia",)),
     Question("diagnose", "What is missing, in SI", "Inertia or mass and friction in SI: give the torque constant of a current.", ("--kt", "--gear")),
-    Question("frf", "Response", "The frequency response as a table, with what was noticed."),
+    Question("frf", "Response", "The frequency response as a table, with remarks."),
 )
 
 
@@ -82,7 +82,7 @@ class QuestionsCard:
 
 def answer(command: str, path: Path, words: tuple[str, ...]) -> str:
     """What a command says of a recording that is read so. Raises BadInput with what it says."""
-    return asked((command, str(path), *words), (command, "not told", "a recording that tells it"))
+    return asked((command, str(path), *words), (command, "not told", "a recording that determines it"))
 
 
 def as_html(text: str) -> str:

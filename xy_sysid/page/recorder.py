@@ -40,7 +40,7 @@ class Recorder:
         self.path, self._begun = path, time.monotonic()
 
     def stop(self) -> str:
-        """Finish the bag; what came of it. Waits for the recorder: call it beside the page's loop."""
+        """Finish the bag and return the result. Waits for the recorder: call it outside the page's loop."""
         process = self._process
         if process is None or self.path is None:
             return "nothing is being recorded"

@@ -15,7 +15,10 @@ from xy_sysid.page.session import Session
 if TYPE_CHECKING:
     from xy_sysid.page.recordings import OpenRecording
 
-READING = "Measured elsewhere, with its 95 % band, and the fitted transfer function. What needs samples cannot be asked of such a file."
+READING = (
+    "A response that was measured elsewhere, with its 95 % band, and the fitted transfer function. "
+    "Questions that need samples in time cannot be answered from such a file."
+)
 
 
 class ResponseCard:

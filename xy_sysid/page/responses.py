@@ -1,4 +1,4 @@
-"""What the page shows of a measured frequency response: made in the worker's process."""
+"""The measured frequency response as the page shows it, computed in the worker's process."""
 
 from __future__ import annotations
 

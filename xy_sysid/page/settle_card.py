@@ -78,7 +78,7 @@ class SettleCard:
         settling = self._session.settling
         if settling is None or not settling.waits:
             return
-        words = "It goes on by itself until nothing is left to settle. Keep your hand at the emergency stop. STOP, or Escape, ends it."
+        words = "It continues automatically until no question is open. Keep your hand at the emergency stop. STOP, or Escape, ends it."
         will_move.ask(self._session, words, "Run it", "sure-run", settling.go)
 
     def _stop(self) -> None:

@@ -26,7 +26,7 @@ class Settling:
         self._thread: threading.Thread | None = None
         self._settler: Settler | None = None
         self._ended, self._go = threading.Event(), threading.Event()
-        self.axis, self.folder, self.wished = "", folder, ""  # wished: axis that is settled without being told
+        self.axis, self.folder, self.wished = "", folder, ""  # wished: axis for which experiments start automatically
         self.first = False  # whether its card stands before the story
         self.sets: tuple[tuple[str, ...], ...] = ()  # of effects that are to be distinguished; empty: those that the diagnosis leaves possible
 
@@ -68,7 +68,7 @@ class Settling:
         return self._settler.outcome if self._settler.problem or self._settler.ending == "stopped" else ""
 
     def start(self, axis: str, alone: bool = False) -> None:
-        """Record, and design the first experiment; alone: drive and go on without being told. Raises BadInput while a walk is under way."""
+        """Record, and design the first experiment; alone: drive and continue automatically. Raises BadInput while a walk is under way."""
         from xy_sysid.nodes.settle import Settler, Wishes
 
         if self.running:

@@ -1,4 +1,4 @@
-"""What came over the topics, and what that means now: who is there, who is lost, where a resonance has been. Pure; time is told."""
+"""The state of the topics: which nodes run or are lost, and the history of the resonance. Pure; time is an argument."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from xy_sysid.units import USUAL, Units
 
 LOST = 4.0  # s without a word or a place in the graph after which a node is called lost
 HISTORY = 2000  # resonances remembered for each axis
-IDLE = "idle"  # what the diagnoser says of an axis that nothing is done for
+IDLE = "idle"  # what the diagnoser says of an axis without running work
 KNOWN = ("excitation", "identifier", "ballscrew", "diagnoser", "recorder")
 COUPLING, COUPLED = "coupling", "coupling of "  # beginnings of the topic and of the status about two axes
 SPEAKER = {"streams": "identifier"}  # who sends a status that does not have its own name
@@ -139,13 +139,13 @@ class TopicsState:
                 continue
             status = self.statuses.get("streams" if name == "identifier" else name)
             if now - seen > LOST:
-                found.append(NodeState(name, 3, f"lost: nothing heard for {now - seen:.0f} s", True))
+                found.append(NodeState(name, 3, f"lost: nothing received for {now - seen:.0f} s", True))
             elif name in OFTEN and name in self.when and now - self.when[name] > LOST:
                 found.append(NodeState(name, 3, f"does not answer: silent for {now - self.when[name]:.0f} s", True))
             else:
                 level = status.level if status else 0
                 if level == 3 and self.lifecycle != "active":
-                    level = 0  # nobody drives: silence of the streams is as it should be
+                    level = 0  # no drive is active: silent streams are normal
                 found.append(NodeState(name, level, status.message if status else "there", False))
         return found
 
@@ -199,7 +199,7 @@ class TopicsState:
             return
         past = self.resonances.setdefault(axis, deque(maxlen=HISTORY))
         if past and seconds < past[-1].seconds:
-            past.clear()  # the identifier began anew
+            past.clear()  # the identifier restarted
         past.append(Tracked(seconds, now, reference, status.level == 2))
 
     def _changed(self, name: str) -> None:

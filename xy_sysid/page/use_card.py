@@ -93,7 +93,7 @@ class UseCard:
             ui.download.content(packed, f"{plain_name(self._source.title)}.use.zip")
 
     async def _do(self, act: Any, *arguments: Any) -> Any:
-        """What ``act`` gives, made beside the page's loop; None where it is refused, which is told, or while it runs."""
+        """The result of ``act``, computed outside the page's loop; None if it is refused, with a message, or while it runs."""
         if self._working:
             return None
         self._working = True

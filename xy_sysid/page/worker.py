@@ -85,7 +85,7 @@ class Desk:
 
 
 def main(path: str, reading: Reading, orders: Connection, words: Connection) -> None:
-    """The worker's process: orders in, news out, until nobody is there any more."""
+    """The worker's process: orders in, news out, until its parent process has ended."""
     busy = [False]
 
     def leave(_number: int, _frame: FrameType | None) -> None:

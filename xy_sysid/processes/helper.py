@@ -60,7 +60,7 @@ class Helper:
 
 
 def serve(pipe: Connection, module: str) -> None:
-    """What the process does: work in, results out, until nobody is there any more."""
+    """What the process does: work in, results out, until its parent process has ended."""
     threading.Thread(target=importlib.import_module, args=(module,), daemon=True).start()
     try:
         while True:

@@ -58,7 +58,7 @@ def plan(text: str, where: str, folder: Path) -> list[ProcessSpec]:
     """The processes that a run file asks for, in the order to start them: who listens first, who drives last.
 
     ``text`` is the file's content, ``where`` its name for messages, ``folder`` what its paths are relative to.
-    Raises BadInput that names the value, what is allowed and, for a name that nobody knows, the nearest spelling.
+    Raises BadInput that names the value, what is allowed and, for an unknown name, the nearest spelling.
     """
     document = load(text, where)
     if not isinstance(document, dict) or not document.get("nodes"):

@@ -1,4 +1,4 @@
-"""A process that decides the steps of a walk to a settled diagnosis, so that whoever hears the machine never waits for a design."""
+"""A process that decides the steps of a walk to a settled diagnosis, so that the process that receives data never waits for a design."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class Decider:
 
 
 def work(pipe: Connection, told: dict[str, Any], effect_files: tuple[str, ...]) -> None:
-    """What the process does: bags in, steps out, until nobody is there any more."""
+    """What the process does: bags in, steps out, until its parent process has ended."""
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     os.nice(NICE)
     from xy_sysid.experiment_design.walk import step

@@ -235,7 +235,7 @@ class _Crew:
             self.say(f"{member.spec.name} {why}; starting it again")
             self.due.append((time.monotonic() + RESTART_PAUSE, member.spec, recent))
         elif member.spec.optional:
-            self.say(f"{member.spec.name} {why}; the others go on")
+            self.say(f"{member.spec.name} {why}; the others continue")
         else:
             self.say(f"{member.spec.name} {why}; stopping the others")
             self.ended, self.died = True, self.died or code != 0

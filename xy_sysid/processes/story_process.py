@@ -1,4 +1,4 @@
-"""A process that performs jobs on stories, so that nobody who hears data ever waits for a fit; cancelling ends the process.
+"""A process that performs jobs on stories, so that the process that receives data never waits for a fit; cancelling ends the process.
 
 It is started at once, so that the first job need not wait for it, and stays, idle, for the next ones. The core knows no processes; this is
 the adapters' own.
@@ -122,7 +122,7 @@ def _begin(effect_files: tuple[str, ...]) -> tuple[BaseProcess, Connection]:
 
 
 def work(pipe: Connection, effect_files: tuple[str, ...]) -> None:
-    """What the process does: jobs in, news out, until nobody is there any more."""
+    """What the process does: jobs in, news out, until its parent process has ended."""
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     os.nice(NICE)
     try:

@@ -1,4 +1,4 @@
-"""Recordings drawn and told on one page of HTML that needs nothing else.
+"""Reports: a recording on one self-contained HTML page.
 
 axis_report:    what is known of one axis, from all that stands upstream
 study:          the study of the paper, parameter by parameter, and what its tables say (``tables``)

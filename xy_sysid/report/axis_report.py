@@ -1,4 +1,4 @@
-"""Everything about one axis that a report shows: response and fits, verdicts on them, and the story of what is missing.
+"""The content of a report for one axis: response, fits with verdicts, and missing effects.
 
 Transfer functions see the first two thirds of the recording and are tested on the last;
 the story's models see two thirds that are spread over it.
@@ -27,7 +27,7 @@ from xy_sysid.story.document import document
 from xy_sysid.story.story import tell as whole_story
 
 HELD_OUT = 1.0 / 3.0  # of the recording, as in every story
-LONGEST = 600.0  # s of which the story is told: more would teach it nothing and take memory (2 MB a second at 2 kHz)
+LONGEST = 600.0  # s of data for the story: more would not improve it and take memory (2 MB a second at 2 kHz)
 MOST_SENT = 1 << 27  # bytes of positions of a recording that another process gets a copy of
 STAGES = ("response and fits", "diagnosis")
 

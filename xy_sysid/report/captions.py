@@ -1,4 +1,4 @@
-"""What each figure says in words: captions for everybody, and the alternative text for who cannot see it."""
+"""Captions of the figures, and alternative text for people who cannot see them."""
 
 from __future__ import annotations
 

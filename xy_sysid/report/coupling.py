@@ -13,8 +13,9 @@ from xy_sysid.response.coupling import SUFFICES, Coupling
 from xy_sysid.samples.block import FloatArray
 
 CAPTION = (
-    "Coupling is the motion of one axis by the input of the other, over the geometric mean of what each input does to its own axis: "
-    "the larger of both directions, rms in each band. Solid and dotted: lower and upper 95 % limit. Dashed: below it two single-axis models suffice."
+    "Coupling is the motion of one axis caused by the input of the other, divided by the geometric mean of the responses "
+    "of both axes to their own inputs: the larger of both directions, rms in each band. "
+    "Solid and dotted: lower and upper 95 % limit. Dashed: below it two single-axis models suffice."
 )
 
 

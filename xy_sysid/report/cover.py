@@ -1,4 +1,4 @@
-"""What stands at the head of a report and at the foot of its printed pages: title, machine, author, date."""
+"""Head of a report and foot of its printed pages: title, machine, author, date."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ BETWEEN = " · "  # words at the foot of a page
 
 @dataclass(frozen=True, slots=True)
 class Cover:
-    """title: of the page; machine, author, recorded: empty if nobody knows; written: the day of the report."""
+    """title: of the page; machine, author, recorded: empty if unknown; written: the day of the report."""
 
     title: str
     machine: str = ""

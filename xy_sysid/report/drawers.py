@@ -1,4 +1,4 @@
-"""Pictures of stories, drawn by other processes while the next story is told: Matplotlib lets nobody else use the interpreter."""
+"""Pictures of stories, drawn in other processes while the next story is computed, because Matplotlib blocks the interpreter."""
 
 from __future__ import annotations
 

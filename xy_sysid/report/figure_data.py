@@ -1,4 +1,4 @@
-"""The numbers of a figure as a table: what is drawn can be taken away and drawn anew elsewhere."""
+"""The numbers of a figure as a table, to be drawn again elsewhere."""
 
 from __future__ import annotations
 

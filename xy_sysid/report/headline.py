@@ -50,8 +50,8 @@ def detail(document: Document) -> str:
     names = " and ".join(words(name) for name in last["effects"])
     left = _error(document, last)
     if last["explained"]:
-        return f"With {names} the model leaves {left}: it is at the noise floor ({_floor(document, last)})."
-    return f"With {names} the model leaves {left}, {_times(last)} ({_floor(document, last)})."
+        return f"With {names} the residual error is {left}: it is at the noise floor ({_floor(document, last)})."
+    return f"With {names} the residual error is {left}, {_times(last)} ({_floor(document, last)})."
 
 
 def next_act(document: Document | None) -> tuple[str, str] | None:

@@ -98,7 +98,7 @@ def _change(one: AxisStudy) -> list[str]:
             )
         made.append(text)
     if change.shifts and not any(shift.certain for shift in change.shifts):
-        made.append(f"Axis {one.axis}: no shift of the pair that its interval would not explain.")
+        made.append(f"Axis {one.axis}: the shift of the pair is within its interval.")
     return made
 
 

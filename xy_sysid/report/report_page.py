@@ -1,4 +1,4 @@
-"""The report: one page with a summary for everybody, and behind it everything that the summary stands on."""
+"""The report: one page with a summary, and all evidence behind it."""
 
 from __future__ import annotations
 

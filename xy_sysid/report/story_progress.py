@@ -1,4 +1,4 @@
-"""Pictures of progress: the falling ladder of errors, two steps over each other, and the candidates by what they leave."""
+"""Pictures of progress: the ladder of errors, two steps overlaid, and the candidates with their errors."""
 
 from __future__ import annotations
 
@@ -170,7 +170,7 @@ def _in_lines(item: Mapping[str, Any]) -> str:
 
 def _place(item: Mapping[str, Any], chosen: list[str], runner: str | None) -> str:
     if item["effect"] in chosen:
-        return " · named" if item["effect"] == chosen[0] else " · named beside"
+        return " · named" if item["effect"] == chosen[0] else " · also named"
     return " · runner-up" if item["effect"] == runner else ""
 
 

@@ -1,4 +1,4 @@
-"""A story in words: the verdict that everybody understands, captions of its pictures, its tables."""
+"""A story in words: verdict, captions of its pictures, and tables."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def spoken(text: str, library: Library) -> str:
 
 
 def verdict(story: Document, library: Library) -> str:
-    """What the story found, for somebody who knows the machine and not the method."""
+    """The result of the story, for a reader who knows the machine but not the method."""
     if not story["ladder"]:
         return str(story["sentence"])
     last = story["ladder"][-1]
@@ -147,13 +147,13 @@ def parameter_table(story: Document, axis: str, library: Library) -> Table:
 
 
 def look_alike_table(story: Document, axis: str, library: Library) -> Table | None:
-    """Effects that the named one can be taken for; None without any."""
+    """Look-alikes of the named effect; None without any."""
     if not story["look_alikes"]:
         return None
     rows = tuple(
         (words(item["effect"]), "yes" if item["told_apart"] else "no", spoken(str(item["sentence"]), library)) for item in story["look_alikes"]
     )
-    return Table(f"Axis {axis}: what {words(story['effects'][0])} can be taken for", ("effect", "distinguished", "why"), rows)
+    return Table(f"Axis {axis}: look-alikes of {words(story['effects'][0])}", ("effect", "distinguished", "why"), rows)
 
 
 def _interval(item: Mapping[str, Any], name: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-# told apart by who sees no red, green or blue, and readable on white and on near-black: test_report_theme.py
+# distinguishable without red, green or blue vision, and readable on white and on near-black: test_report_theme.py
 AXES = ("#1e8fe4", "#e85a0d", "#257250", "#8a36ec", "#c9478a", "#8a8420")
 METHODS = {"measured": "#7f8993", "LLS": "#e85a0d", "NLLS": "#8a36ec", "ML": "#1e8fe4"}
 DRIFT = "#8a36ec"

@@ -36,7 +36,7 @@ def trend_page(found: Trends, title: str) -> str:
         name = f"{event.machine} {event.axis}"
         made = [Drawing(f"plot-event-{number}", axis_figure(_drawn(found, event), axis), f"The parameters of {name} over time")]
         drawings += made
-        extra = listing(f"{told(one, axis)}; such evidence comes by chance {chance(one)}" for one in event.moved)
+        extra = listing(f"{told(one, axis)}; such evidence arises by chance {chance(one)}" for one in event.moved)
         heading = f"{name}, {day(event.since)}: {event.cause.cause if event.cause is not None else 'cause unknown'}"
         parts.append(section(f"event-{number}", heading, made, ABOUT if number == 0 else "", extra))
     columns = list(dict.fromkeys(one.history.column for one in found.trends))
@@ -47,7 +47,7 @@ def trend_page(found: Trends, title: str) -> str:
     drawings += made
     parts.append(section("all", "All axes", made, OVER))
     spreads = [(name, f"{100 * between:.2g}", f"{100 * own:.2g}") for name, between, own in widest(found)]
-    words = "Standard deviations, median over the axes. Where the first is larger, a recording's own interval does not hold for the next one."
+    words = "Standard deviations, median over the axes. Where the first is larger, the interval of one recording is not valid for the next one."
     table = Table("", ("parameter", "between recordings, %", "within one recording, %"), tuple(spreads))
     parts.append(block("spread", "Spread between recordings", words, table_html(table)))
     head = [sentence(one, axes[one.machine, one.axis]) for one in found.events] or ["Nothing changed."]

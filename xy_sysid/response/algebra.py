@@ -1,7 +1,7 @@
-"""Responses that add, multiply, invert and close a loop, with their uncertainty (to first order, errors of two measurements independent).
+"""Sum, product, inverse and closed loop of responses, with their uncertainty (to first order; the errors of two measurements are independent).
 
 The second operand may be another response, anything with ``response(frequency)`` and units (a transfer function), or a number. Two
-measured responses are brought to the lines of the first, within the band that both have.
+measured responses are interpolated to the lines of the first, within their common band.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def added(one: FrequencyResponse, other: Any, sign: float = 1.0) -> FrequencyRes
 
 
 def multiplied(one: FrequencyResponse, other: Any) -> FrequencyResponse:
-    """one after other: what other gives is what one takes."""
+    """Series connection: the output of other is the input of one."""
     one, second = _together(one, other)
     if second.output_unit and second.output_unit != one.input_unit:
         raise _apart("product", one, second)
@@ -94,7 +94,7 @@ def _together(one: FrequencyResponse, other: Any) -> tuple[FrequencyResponse, Op
 
 
 def _made(one: FrequencyResponse, response: ComplexArray, sigma: FloatArray, trusted: Any) -> FrequencyResponse:
-    """Without a window's blur, which was of the first operand alone."""
+    """Without the smoothing kernel, which belongs to the first operand alone."""
     return replace(
         one,
         response=np.asarray(response, dtype=np.complex128),

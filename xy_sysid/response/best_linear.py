@@ -1,4 +1,4 @@
-"""Best linear approximation from several realisations of a periodic input: noise and nonlinear distortion, told apart.
+"""Best linear approximation from several realisations of a periodic input, with separate noise and nonlinear distortion.
 
 Within a realisation only noise differs from period to period. From one realisation (other random phases) to the next, what friction and other
 nonlinear laws add differs as well: it looks like noise, and does not average out over periods. So the scatter over periods tells the noise,

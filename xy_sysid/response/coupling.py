@@ -21,7 +21,7 @@ from xy_sysid.tables import Table
 
 SUFFICES = 0.01  # of the own motion: less is below what models of machines reach
 BANDS = 24  # over which coupling is averaged
-ALIKE = 0.95  # coherence of the two inputs from which they cannot be told apart
+ALIKE = 0.95  # coherence of the two inputs from which they cannot be distinguished
 FEWEST = 4.0  # independent windows
 LONGER = 4  # windows of coupling over those of one axis: bands average lines here, and the response of the own axis leaks less into them
 COMBINED = {
@@ -80,7 +80,7 @@ class Coupling:
 
     @property
     def sentence(self) -> str:
-        """For people."""
+        """The result in words."""
         one, other = self.axes
         span = f"{self.frequency[0]:.3g} to {self.frequency[-1]:.4g} Hz"
         if self.suffice:
@@ -93,7 +93,7 @@ class Coupling:
             return (
                 f"No coupling of {one} and {other} was found in {span}. In {where} the recording has too few windows ({self.windows}) to exclude "
                 f"it: there it may be {size}. With this excitation, {_lasting(self.needed)} would exclude "
-                f"more than {100 * SUFFICES:g} %; more excitation of both axes there needs less."
+                f"more than {100 * SUFFICES:g} %; with more excitation of both axes there, a shorter recording suffices."
             )
         worst = int(np.argmax(self.coupling))
         low, high = self.band_edges[worst], self.band_edges[worst + 1]

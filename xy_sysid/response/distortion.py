@@ -54,7 +54,7 @@ class Distortion:
 
     @property
     def sentence(self) -> str:
-        """For people."""
+        """The result in words."""
         words = [f"even distortion {_words(self.even)}", *([f"odd distortion {_words(self.odd)}"] if self.odd else [])]
         if self.odd is None:
             words.append("no odd line was left free (kind multisine_detect does that)")

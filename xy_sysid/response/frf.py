@@ -48,21 +48,21 @@ class FrequencyResponse:
     coherence:        (m,) ordinary coherence, 0..1
     sigma:            (m,) standard deviation of the complex error: E|measured - true|^2 = sigma^2
     trusted:          (m,) bool: excited and coherent enough to be used for a fit
-    sampling_rate:    Hz; rate_error: its standard error, relative, where the stamps tell
+    sampling_rate:    Hz; rate_error: its relative standard error, if the time stamps give one
     averages:         effective number of independent averages
     resolution:       spacing of the original lines, Hz
-    line_correlation: (k,) correlation of the errors that noise makes on lines 0..k-1 apart (1 at 0), from window and overlap
+    line_correlation: (k,) correlation of the noise errors of lines that are 0..k-1 apart (1 at 0), from window and overlap
     kernel_offset:    (j,) Hz and
-    kernel_weight:    (j,) how the window blurs: the expected estimate at f is sum_j weight_j G(f + offset_j),
+    kernel_weight:    (j,) smoothing by the window: the expected estimate at f is sum_j weight_j G(f + offset_j),
                       where G is the response of the quantity that was transformed (see ``differenced``)
-    kernel_amplitude: (j,) the window's transform at kernel_offset, its square is kernel_weight; empty where nothing leaks
-    pairs:            (n,) share of the pairs of windows that lie 0, 1, .. hops apart, counted both ways: sum of
+    kernel_amplitude: (j,) transform of the window at kernel_offset; its square is kernel_weight; empty without leakage
+    pairs:            (n,) share of the pairs of windows that are 0, 1, .. hops apart, counted both ways: sum of
                       weight_i weight_j / (sum of weights)^2; hop: from window to window, in lengths of the window
     smoothing:        lines over which the noise power was averaged for sigma
-    differenced:      True if the window was put on the output's difference y[n+1] - y[n] and the estimate divided by
-                      exp(j w T) - 1, so that blurring acts on the response times (exp(j w T) - 1)
-    noise, distortion: (m,) standard deviations of one realisation's response by noise, and by what is not linear, where several realisations of a
-                      periodic input tell them apart; else (0,)
+    differenced:      True if the window was applied to the difference y[n+1] - y[n] of the output, and the estimate divided by
+                      exp(j w T) - 1, so that the smoothing acts on the response times (exp(j w T) - 1)
+    noise, distortion: (m,) standard deviations of the response of one realisation due to noise and due to nonlinear distortion, if several
+                      realisations of a periodic input separate them; else (0,)
     origin:           axis, samples and notes, where they are known
     """
 
@@ -117,11 +117,11 @@ class FrequencyResponse:
         return _algebra("added")(self, other)
 
     def __sub__(self, other: Any) -> FrequencyResponse:
-        """Difference, as the sum."""
+        """Difference; see the sum."""
         return _algebra("added")(self, other, -1.0)
 
     def __mul__(self, other: Any) -> FrequencyResponse:
-        """This one after the other: ``plant * controller``. Raises BadInput where the other's output is not this one's input."""
+        """Series connection ``plant * controller``. Raises BadInput if the output of the other is not the input of this one."""
         return _algebra("multiplied")(self, other)
 
     __rmul__ = __mul__

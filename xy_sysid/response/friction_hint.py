@@ -68,7 +68,7 @@ def friction_note(hint: FrictionHint | None) -> str:
         return ""
     return (
         "Friction: part of the input follows the direction of motion. It distorts the frequency response, most at low frequency and small "
-        "amplitude, and the response changes with the amplitude. Its size is told by: xy-sysid refine REC --auto."
+        "amplitude, and the response changes with the amplitude. To estimate its size: xy-sysid refine REC --auto."
     )
 
 

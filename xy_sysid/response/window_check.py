@@ -15,7 +15,10 @@ CREST_FACTOR = 10.0  # a step of the encoder counts as a leap when it stands out
 OFTEN = 0.1  # of the samples; an encoder that changes less often than that is broken rather than held
 CREST_USUAL = 4.0  # crest factor that any noise reaches in a few thousand samples
 
-HELD = "In every window the output stands at times while the input moves: friction holds it. The {kept} of {total} in which it goes on are used."
+HELD = (
+    "In every window the output stands still at times while the input moves: friction holds it. "
+    "The {kept} of {total} windows in which it moves again are used."
+)
 REASONS = {
     "frozen": "the encoder repeated one value while the voltage moved",
     "leap": "the encoder leapt further than the voltage can explain",

@@ -1,4 +1,4 @@
-"""Samples and streams of them: what arrives, how it is put in order, and what is kept.
+"""Streams of samples: their pairing, order and storage.
 
 block:        consecutive samples of one quantity, as they travel in one message; a gap-free pair of both quantities
 recording:    a whole recording, checked and in SI

@@ -10,7 +10,7 @@ import numpy as np
 
 from xy_sysid.samples.block import FloatArray
 
-FAR = 1e9  # of any unit; beyond it a position becomes coarse in a double, and begins anew
+FAR = 1e9  # of any unit; beyond it a position becomes coarse in a double, and begins again
 
 
 def integral(values: FloatArray, lasting: FloatArray, start: FloatArray | float = 0.0) -> FloatArray:

@@ -26,7 +26,7 @@ LOOK, FEW_LOOK, MANY_LOOK = 2.0, RATE_SAMPLES // 2, 40_000  # s of stamps, and a
 OTHER_RATE = 1.01  # factor by which their counted and their mean step must both differ from it: losses change the mean alone, bursts the count alone
 COUNTED = 3  # rounds in which the step that stamps are counted by becomes that of the line through them
 STICKS = 0.8  # samples by which a sample may leave its voltage sample before it is given to another
-STILL = 20  # messages in a row with one stamp that mean that nobody stamps them
+STILL = 20  # consecutive messages with one stamp that mean that they are not stamped
 
 
 def counted_step(times: FloatArray) -> float:

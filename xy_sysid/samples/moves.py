@@ -1,4 +1,4 @@
-"""One move in one direction, from rest to rest: too little to tell friction, load and inertia from each other."""
+"""One move in one direction, from rest to rest: too little to distinguish friction, load and inertia."""
 
 from __future__ import annotations
 
@@ -29,5 +29,5 @@ def one_move(position: FloatArray) -> bool:
 def several_moves(runs: Sequence[Run]) -> None:
     """Raises BadInput where all that there is to judge by is one move."""
     if len(runs) == 1 and one_move(runs[0].position):
-        act = "Nothing can be told from it: record several moves in both directions, better 60 s of noise."
+        act = "It cannot be analysed: record several moves in both directions, better 60 s of noise."
         raise BadInput(f"motion of axis {runs[0].axis}", "one move in one direction, from rest to rest", "several moves in both directions", act)

@@ -98,13 +98,13 @@ class Newest:
         """What is missing for a diagnosis, in words; empty if there is enough."""
         silent = [kind for kind in QUANTITIES if self._pairer.waiting[kind] < 0]
         if silent:
-            return f"no {' and no '.join(silent)} of axes {', '.join(self.axes)} heard yet; start the machine and its excitation."
+            return f"no {' and no '.join(silent)} of axes {', '.join(self.axes)} received yet; start the machine and its excitation."
         if self.sampling_rate is None:
             return "the sampling rate is not known yet; wait, or check the time column."
         if self.seconds < self._minimum:
             lost = ", ".join(f"{name} {count}" for name, count in self.faults.items())
             why = f" (streams: {lost})" if lost else ""
-            return f"{self.seconds:.3g} s without a gap{why}, {self._minimum:g} s are needed; go on exciting."
+            return f"{self.seconds:.3g} s without a gap{why}, {self._minimum:g} s are needed; continue the excitation."
         return ""
 
     def newest(self) -> NewestSamples:

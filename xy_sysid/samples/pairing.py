@@ -19,7 +19,7 @@ from xy_sysid.samples.ring import RATE_SAMPLES, Ring, shared
 Quantity = Literal["voltage", "position"]
 QUANTITIES: tuple[Quantity, Quantity] = ("voltage", "position")
 
-LOOK_AGAIN = 5 * RATE_SAMPLES  # blocks of unequal rates after which both are read anew
+LOOK_AGAIN = 5 * RATE_SAMPLES  # blocks of unequal rates after which both are estimated again
 RATE_TOLERANCE = 1e-3  # two streams, or one before and after a restart, have the same rate within this
 TIME_TOLERANCE = 1.5  # samples by which a time stamp may leave its place before that counts as a jump
 REORDER_UNKNOWN = 1000  # samples a block may be late as long as the rate is not known
@@ -36,7 +36,7 @@ REASONS = {
     "wrong_columns": "a message did not hold the expected columns",
     "bad_counter": "the sample counter was not whole and increasing",
     "unequal_rates": "voltage and position have different sampling rates",
-    "no_reference": "no reference of the controller was heard at that time",
+    "no_reference": "no reference of the controller was received at that time",
 }
 
 
@@ -110,7 +110,7 @@ class Pairer:
         ring.learn_rate(block)
         usable = self._check_values(kind, seq, block.values[:, columns]) & self._check_time(kind, ring, seq, block.time)
         if ring.jumping >= RATE_SAMPLES:
-            self._fault("restart", f"{kind}: for {ring.jumping} samples the time has not followed {ring.rate:.6g} Hz; the rate is read anew")
+            self._fault("restart", f"{kind}: for {ring.jumping} samples the time has not followed {ring.rate:.6g} Hz; the rate is estimated again")
             return [*found, self._anew(int(seq[-1]) + 1)]
         if self._next is not None:
             past = seq < self._next
@@ -127,7 +127,9 @@ class Pairer:
     def _go_on(self, kind: Quantity, ring: Ring) -> list[Samples | Gap]:
         """What can be paired now that samples were laid in; nothing of a stream that has come to another rate."""
         if ring.left_its_rate():
-            self._fault("restart", f"{kind}: from about counter {ring.newest} on the time does not follow {ring.rate:.6g} Hz; the rate is read anew")
+            self._fault(
+                "restart", f"{kind}: from about counter {ring.newest} on the time does not follow {ring.rate:.6g} Hz; the rate is estimated again"
+            )
             return [self._anew(ring.newest + 1)]
         return [] if self._rates_differ() else self._emit()
 

@@ -19,7 +19,7 @@ from xy_sysid.samples.recording import rate_from_time, whole_rate
 
 BATCH = 50  # samples of one mean
 JUMP = 1.5  # periods by which a stamp may leave the one before it, as live
-FEWEST = 4  # means from which an error can be told, and a first period
+FEWEST = 4  # means from which an error and a first period can be estimated
 LEAP, STEP, ASIDE = 0.5, 0.75, 10  # a number slipped where one sample leaps by LEAP periods, and the means of ASIDE before and after by STEP
 
 

@@ -1,4 +1,4 @@
-"""A recording: what was applied to the axes and what their encoders read, checked and in SI."""
+"""A recording: input and output of all axes, checked and in SI."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SAME_RATE = 1e-3  # relative; sampling rates that differ by more do not belong t
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """Where a result comes from: axis, SHA-256 of its samples (empty if not known), and notes that a user should read."""
+    """The origin of a result: axis, SHA-256 of its samples (empty if unknown), and notes for the user."""
 
     axis: str = ""
     data: str = ""
@@ -61,11 +61,11 @@ class Run:
 
     @property
     def rows(self) -> slice:
-        """Where the samples are in the recording."""
+        """The rows of the samples in the recording."""
         return slice(self.first, self.first + len(self))
 
     def until(self, seconds: float) -> Run:
-        """The samples before that time; all if there are no more."""
+        """The samples before that time; all of them if the run is shorter."""
         last = round(seconds * self.sampling_rate)
         return replace(self, voltage=self.voltage[:last], position=self.position[:last])
 
@@ -80,7 +80,7 @@ class Run:
 
     @property
     def digest(self) -> str:
-        """SHA-256 of the samples: two runs with the same one are the same data."""
+        """SHA-256 of the samples; runs with the same hash hold the same data."""
         return hashlib.sha256(self.voltage.tobytes() + self.position.tobytes()).hexdigest()
 
     def recording(self) -> Recording:
@@ -100,12 +100,12 @@ class Run:
 
     @property
     def signals(self) -> tuple[FloatArray, FloatArray, float]:
-        """(voltage, position, sampling rate): what a simulation is compared with."""
+        """(voltage, position, sampling rate), for comparison with a simulation."""
         return self.voltage, self.position, self.sampling_rate
 
     @property
     def sensed(self) -> tuple[FloatArray, FloatArray, float]:
-        """(voltage, output as its sensor reads it, sampling rate): what a transfer function is compared with."""
+        """(voltage, output as its sensor reads it, sampling rate), for comparison with a transfer function."""
         output = as_sensed(self.position, self.sampling_rate, self.measured)
         return self.voltage[: output.size], output, self.sampling_rate
 
@@ -127,7 +127,7 @@ class Recording:
     reference:     (n, axes) the commanded position where the file has one (a sign of closed loop), else None
     notes:         what was converted or assumed while reading, one sentence each
     measured:      what the sensor reads; ``position`` is the integral of a velocity or an acceleration
-    machine:       its name where the meta data of the file tell it, else empty
+    machine:       its name from the meta data of the file, else empty
     """
 
     sampling_rate: float
@@ -161,10 +161,10 @@ class Recording:
     ) -> Recording:
         """A gap-free recording from samples in memory: lists, arrays, columns of a table, or a mapping of them by axis.
 
-        sampling_rate: Hz; voltage, position: (n,) of one axis, (n, axes), or {axis: (n,)}, sample by sample of the same instants
+        sampling_rate: Hz; voltage, position: (n,) of one axis, (n, axes), or {axis: (n,)}, both at the same instants
         axes:          names, one per column; x, y, ... if not given
-        units:         of voltage and position; lengths, voltages and angles become SI (mm -> m), any other is carried as it is
-        Raises BadInput for what is not numbers, is not finite, or does not fit together.
+        units:         of voltage and position; lengths, voltages and angles are converted to SI (mm -> m), others are kept
+        Raises BadInput if values are not finite numbers, or if shapes do not fit together.
         """
         inputs, outputs, axes = _columns(voltage, position, axes)
         names = tuple(axes) or tuple("xyzabc"[: inputs.shape[1]] if inputs.shape[1] <= 6 else (f"axis{k + 1}" for k in range(inputs.shape[1])))
@@ -236,7 +236,7 @@ class Recording:
         return self.voltage[:, column], self.position[:, column]
 
     def run(self, axis: str) -> Run:
-        """The longest stretch of one axis without a gap, the first of several, without the ends at which it is not driven and stands.
+        """The longest stretch of one axis without a gap (the first if several are equal), without idle ends: no drive, no motion.
 
         Raises BadInput if there is no such axis, or no sample.
         """
@@ -245,9 +245,9 @@ class Recording:
         return self._within(axis, max(self.runs(), key=_size))
 
     def stretches(self, axis: str) -> tuple[Run, ...]:
-        """All stretches of one axis without a gap that are long enough to tell what the longest tells, in their order; of very many the longest.
+        """All stretches of one axis without a gap that are at least half as long as the longest, in their order; if they are many, the longest.
 
-        Each is without the ends at which the axis is not driven and stands. Raises BadInput as ``run``.
+        Each without idle ends (no drive, no motion). Raises BadInput as ``run``.
         """
         least = COMPARABLE * _size(self.run(axis).rows)
         found = [self._within(axis, part) for part in self.runs() if _size(part) >= least]
@@ -255,7 +255,7 @@ class Recording:
         return tuple(sorted(longest, key=lambda run: run.first))
 
     def every_stretch(self, axis: str) -> tuple[Run, ...]:
-        """All stretches of one axis without a gap, however short, whole as they were recorded. Raises BadInput if there is no such axis."""
+        """All stretches of one axis without a gap, however short, complete as recorded. Raises BadInput if there is no such axis."""
         u, y = self.axis(axis)
         return tuple(self._run(axis, u, y, part) for part in self.runs())
 
@@ -291,7 +291,7 @@ def _size(rows: slice) -> int:
 
 
 def _driven(voltage: FloatArray, position: FloatArray, second: int) -> slice:
-    """The samples (n,) without the seconds at either end in which the input is one and the same and the output stands; one second of each stays."""
+    """The samples (n,) without idle ends, where the input is constant and the output at rest; one second of each end is kept."""
     begins = np.arange(0, max(voltage.size - second, 0) + 1, second)
     ways, inputs = (np.array([np.ptp(signal[at : at + second]) for at in begins]) for signal in (position, voltage))
     lively = np.flatnonzero((inputs > 0.0) | (ways > STANDS * ways.max(initial=0.0)))
@@ -312,7 +312,7 @@ def _rate(value: Any) -> float:
 
 
 def _columns(voltage: Any, position: Any, axes: Sequence[str]) -> tuple[FloatArray, FloatArray, Sequence[str]]:
-    """(n, axes) of both, and the axes' names as far as they are told."""
+    """(n, axes) of both, and the names of the axes if they are given."""
     if isinstance(voltage, Mapping) != isinstance(position, Mapping):
         raise BadInput("voltage and position", "one by axis and one not", "both by axis, or both arrays", "Give both alike.")
     both = {"voltage": voltage, "position": position}
@@ -336,7 +336,7 @@ def _columns(voltage: Any, position: Any, axes: Sequence[str]) -> tuple[FloatArr
 
 
 def _numbers(name: str, values: Any) -> FloatArray:
-    """Finite numbers, whatever they come in."""
+    """Finite numbers from any array-like value."""
     try:
         found = np.array(values, dtype=np.float64)
     except (TypeError, ValueError):
@@ -365,7 +365,7 @@ def one_run(data: Run | Recording) -> Run:
 def rate_from_time(time: FloatArray, seq: NDArray[np.int64] | None = None) -> float:
     """Sampling rate in Hz from sample instants, robust to jitter and gaps.
 
-    The median step gives the scale; all that is regular gives the figure: with a counter a line by least squares, else its mean; a rate within
+    The median step gives the scale. All regular steps give the rate: with a counter by a straight line, else by their mean. A rate within
     20 ppm of a whole number is that number. Raises BadInput if time does not increase.
     """
     if time.shape[0] < 2:

@@ -1,4 +1,4 @@
-"""Lay the reference of a controller beside paired samples, by its stamps.
+"""Assign the reference of a controller to paired samples, by its stamps.
 
 Each sample gets the newest reference that was sent up to its instant. The reference is an instrument: what a constant lead, or a sample
 that got its neighbour's reference, does to it is the same for input and output, and cancels in their quotient

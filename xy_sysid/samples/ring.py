@@ -116,7 +116,7 @@ class Ring:
         return np.concatenate((store[begin:], store[: end - self.capacity]))
 
     def clear(self) -> None:
-        """Forget everything, the rate too: who comes back may be another source."""
+        """Forget everything, the rate too: a source that comes back may be another one."""
         self.tag.fill(-1)
         self.newest, self.offset, self.behind, self.jumping, self._anchor = -1, None, 0, 0, None
         self.rate, self._seqs, self._times = None, [], []

@@ -1,4 +1,4 @@
-"""What people are shown of one axis, from the rigid base to the floor.
+"""The story of one axis, as users see it: the steps from the rigid model to the noise floor.
 
 pictures: one fit as short rows of numbers
 standing: how far an axis is from being explained

@@ -15,14 +15,14 @@ from xy_sysid.story.story import Story, added, begin, diagnosed, next_best, prun
 from xy_sysid.units import Units, bare, moved
 
 Act = Literal["begin", "diagnose", "renew", "effects", "add_next", "auto"]
-ANEW: tuple[Act, ...] = ("diagnose", "renew")  # acts that begin a story anew
+ANEW: tuple[Act, ...] = ("diagnose", "renew")  # acts that start a new story
 
 
 @dataclass(frozen=True, slots=True)
 class Job:
     """What is to be done with one axis.
 
-    act: ``begin`` fits the rigid model if there is no story yet, ``diagnose`` begins anew with these samples and then has ``effects`` in
+    act: ``begin`` fits the rigid model if there is no story yet, ``diagnose`` begins again with these samples and then has ``effects`` in
     the model, ``renew`` does so without asking what is missing, ``effects`` changes the effects and keeps the samples, ``add_next`` adds the
     best one, ``auto`` all that help
     run: of the axis; story: so far, None to begin
@@ -46,12 +46,12 @@ def perform(job: Job, library: Library, clock: Callable[[], float] = never) -> I
     if not story.rungs or job.act == "begin":
         return
     if job.act not in ("renew", "effects") and story.diagnosis is None:
-        yield "looking for what is missing", None
+        yield "searching for missing effects", None
         story = diagnosed(story, run, library, clock)
         yield "diagnosed", story
     if job.act in ("diagnose", "renew", "effects"):
         for name in [name for name in story.effects if name not in job.effects]:
-            yield f"taking {name} out", None
+            yield f"removing {name}", None
             story = removed(story, run, name, library)
             yield f"without {name}", story
         for name in [name for name in job.effects if name not in story.effects]:
@@ -60,13 +60,13 @@ def perform(job: Job, library: Library, clock: Callable[[], float] = never) -> I
             yield f"with {name}", story
         return
     for _ in range(MOST_EFFECTS if job.act == "auto" else 1):
-        yield "looking for the next effect", None
+        yield "searching for the next effect", None
         before, story = len(story.rungs), next_best(story, run, library)
         yield story.note or story.rungs[-1].label, story
         if len(story.rungs) == before:
             break
     if job.act == "auto" and len(story.effects) > 1:
-        yield "taking out what is not needed", None
+        yield "removing effects that are not needed", None
         story = pruned(story, run, library)
         yield "done", story
 

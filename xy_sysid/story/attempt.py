@@ -23,7 +23,7 @@ class Attempt:
     """
 
     def __init__(self, unforeseen: str = UNFORESEEN) -> None:
-        """unforeseen: the sentence for an error that nobody thought of."""
+        """unforeseen: the sentence for an unforeseen error."""
         self.problem, self.detail = "", ""
         self._unforeseen = unforeseen
 

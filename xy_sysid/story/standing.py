@@ -1,4 +1,4 @@
-"""How far an axis is from being explained: the one rule for what counts as a part."""
+"""How much of the error of an axis is explained, by one common rule."""
 
 from __future__ import annotations
 

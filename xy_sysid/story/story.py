@@ -1,4 +1,4 @@
-"""One axis from the rigid base to the noise floor: see where the model fails, name what is missing, add it, watch the error fall.
+"""The story of one axis, from the rigid model to the noise floor: where the model fails, which effect is missing, and the error after each step.
 
 Each function takes a story and gives the next one. A story holds plain numbers and short pictures only: it can be sent to
 another process, and written as a document (``document``).

@@ -1,4 +1,4 @@
-"""What small models tell, and what these data cannot tell, in sentences."""
+"""The results of small models in sentences, with what these data do not determine."""
 
 from __future__ import annotations
 
@@ -36,33 +36,33 @@ def first_order_words(found: FirstOrder) -> tuple[str, ...]:
     elif "offset" in found.terms:
         said.append("All motion is in one direction: the offset is friction and load together. A test in the other direction distinguishes them.")
     elif not found.both_ways:
-        said.append("All motion is in one direction, and no friction is distinguished from zero. A slow ramp in both directions tells it.")
+        said.append("All motion is in one direction, and no friction is distinguished from zero. A slow ramp in both directions determines it.")
     if found.settled < SETTLED and constant.value > 0.0 and found.levels < 10:
         said.append(
             f"The longest level lasts {found.settled:.2g} time constants: gain and time constant are extrapolated. "
             f"Hold each level for {SETTLED * constant.value:.2g} s or longer."
         )
     if not math.isfinite(constant.high):
-        said.append("These tests do not determine every parameter together: add a step of another size, or in the other direction.")
+        said.append("These tests do not determine all parameters together: add a step of another size, or in the other direction.")
     elif constant.value * found.sampling_rate < 1.0 or not constant.told or constant.high > 3.0 * constant.low:
         said.append(f"The time constant is known only to {_span(constant)} ms: sample faster, or repeat the step.")
     if delay.high >= found.longest_delay:
         said.append(
             f"The delay is unknown: any up to {1e3 * delay.high:.3g} ms fits as well. A quick step within a recording, after some samples at "
-            "rest, tells it."
+            "rest, determines it."
         )
     elif not delay.told:
         said.append(f"No delay is distinguished from zero (at most {1e3 * delay.high:.3g} ms).")
     if found.repeats * found.sampling_rate > REPEATS and found.explained >= GOOD:
         said.append(
-            f"What is left goes on for {1e3 * found.repeats:.3g} ms at a time: a ripple, a resonance or friction that varies, and no noise. "
-            "The intervals count that."
+            f"The residual error is correlated over {1e3 * found.repeats:.3g} ms: a ripple, a resonance or varying friction, not noise. "
+            "The intervals include this."
         )
     return tuple(said)
 
 
 def servo_words(found: Servo, inertia: float | None) -> tuple[str, ...]:
-    """The answer, then what target and angle alone cannot tell."""
+    """The answer, then everything that target and angle alone do not determine."""
     share, left = f"{100.0 * max(found.explained, 0.0):.4g} %", moved(found.error, found.units.output)
     if found.explained >= GOOD:
         said = [f"The servo with its controller explains {share} of the angle that no fit saw, simulated from the target alone; {left} rms is left."]
@@ -73,17 +73,19 @@ def servo_words(found: Servo, inertia: float | None) -> tuple[str, ...]:
         speed = f", which allows {moved(limit.value / damping.value, found.units.speed)}" if damping.value > 0.0 else ""
         said.append(f"The torque is at its limit for {100.0 * found.at_limit:.2g} % of the time{speed}.")
     else:
-        said.append(f"The torque's limit is not reached: it is above {found.reached:.3g} {found.units.output}/s^2. Larger steps tell it.")
+        said.append(f"The torque's limit is not reached: it is above {found.reached:.3g} {found.units.output}/s^2. Larger steps determine it.")
     if not found["friction"].told:
-        said.append(f"No friction is distinguished from zero (at most {found['friction'].high:.3g} {found.units.output}/s^2). Slow ramps tell it.")
+        said.append(
+            f"No friction is distinguished from zero (at most {found['friction'].high:.3g} {found.units.output}/s^2). Slow ramps determine it."
+        )
     if inertia is None:
         said.append(
-            "Only ratios to the inertia can be told from target and angle: kp, damping, frictionloss and forcerange follow from a known inertia "
+            "Target and angle determine only ratios to the inertia: kp, damping, frictionloss and forcerange follow from a known inertia "
             "of joint and load (--inertia KG_M2), or from one recording with a known mass added."
         )
     said.append(
         "A derivative gain (kd, kv) of the controller and the joint's own damping act alike: the damping is their sum. The same joint without "
-        "power, moved by hand, tells its own."
+        "power, moved by hand, shows its own damping."
     )
     return tuple(said)
 

@@ -1,4 +1,4 @@
-"""Output error: the parameters with which a simulation comes nearest to what was measured, and how sure each is.
+"""Output error: the parameters with the smallest error between simulation and measurement, with their uncertainty.
 
 What a small model leaves is no white noise. The covariance of the parameters is therefore White's sandwich with the autocovariance of the
 scores up to the lag at which the error forgets itself (Newey & West, Econometrica 55, 1987; Ljung, System Identification, 2nd ed., sec. 9.3).

@@ -1,4 +1,4 @@
-"""A position-controlled joint of which the target and the angle are known: the controller is part of the model.
+"""A position-controlled joint with known target and angle: the controller is part of the model.
 
     q'' = limited(kp (target - q)) - damping q' - friction sign(q') - load      all divided by the inertia
 
@@ -71,7 +71,7 @@ def servo(runs: Sequence[Run]) -> Servo:
     first = used[0]
     if first.measured != "position" or first.input_unit != first.output_unit:
         given = f"{first.input_unit} to {first.units.measured}"
-        raise BadInput("units", given, "a target and a position in one and the same unit", "Say them with --unit, for example input=rad,output=rad.")
+        raise BadInput("units", given, "a target and a position in one and the same unit", "Give them with --unit, for example input=rad,output=rad.")
     seen, unseen = _split(used)
     free, limited = (_fitted(seen, with_limit) for with_limit in (False, True))
     at_limit = shortest((limited, free)) == 0 and _at_limit(seen, limited.values) > REACHED

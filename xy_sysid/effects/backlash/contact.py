@@ -1,4 +1,4 @@
-"""Gap, masses and contact of an axis with backlash, from one-step prediction.
+"""Gap, masses and contact of an axis with backlash, fitted by one-step prediction.
 
 Contact is chaotic: free simulations of the same gap part within milliseconds, so a model with backlash can only be judged
 by how well it predicts the next sample from what was measured up to now (one-step prediction; Ljung, System

@@ -1,4 +1,4 @@
-"""What the filter across a gap is made of: the force of the contact, and how the covariance goes on."""
+"""Parts of the filter across a gap: the contact force, and the step of the covariance."""
 
 from __future__ import annotations
 

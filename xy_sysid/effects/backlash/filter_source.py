@@ -1,4 +1,4 @@
-"""The text of one filter across a gap, written from the laws of dry friction that act beside it."""
+"""The source text of a filter across a gap, made from the laws of dry friction in the same model."""
 
 from __future__ import annotations
 

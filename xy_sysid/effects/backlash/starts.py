@@ -1,4 +1,4 @@
-"""Where a fit of the contact begins: the best of a grid, then of a second grid around what that became.
+"""Start values for a fit of the contact: the best of a grid, then of a second grid around the first result.
 
 The innovations of a gap have many valleys, and those of a stiff contact are narrow. A filter that is told of much process noise
 forgets within a few milliseconds, so that its valleys are wide; a thousand runs over two seconds take less than a second.

@@ -1,4 +1,4 @@
-"""A task of one-step prediction as it would be on the usual machine, for which the filter's constants and bounds are; and its result back."""
+"""Scales a task of one-step prediction to the reference machine, for which constants and bounds of the filter are given, and the result back."""
 
 from __future__ import annotations
 
