@@ -15,7 +15,6 @@ from typing import Literal
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.floor import Floor, Windows, bands, encoder_noise, floor
@@ -142,7 +141,7 @@ def compare_motion(model: FloatArray, unseen: Unseen) -> Comparison:
     measured, predicted = np.diff(y)[first:] * sampling_rate, model[first:]
     error = measured - predicted
     windows, least = unseen.windows(measured)
-    counts = _inside(windows, error.size) if unseen.held is not None else slice(None)
+    counts = windows.covered(error.size) if unseen.held is not None else slice(None)
     layout = windows.layout
     accelerated = unseen.units.sensed == "acceleration"
     offset = 0.0 if accelerated else float(np.mean(error[counts]))  # a constant velocity leaves no trace in an acceleration
@@ -195,14 +194,6 @@ def compare_motion(model: FloatArray, unseen: Unseen) -> Comparison:
             sorted((place for place in places if place.error_over_floor >= TWICE and np.isfinite(whole)), key=lambda place: -place.error_over_floor)
         ),
     )
-
-
-def _inside(windows: Windows, samples: int) -> NDArray[np.bool_]:
-    """(samples,) those in a window."""
-    inside = np.zeros(samples, dtype=np.bool_)
-    for begin in windows.begins:
-        inside[begin : begin + windows.layout.length] = True
-    return inside
 
 
 def _place(kind: PlaceKind, span: tuple[float, float], unit: str, ratio: float, sentence: str) -> Place:
