@@ -146,6 +146,10 @@ class AxisData:
         way = sum(float(np.sum(np.abs(np.diff(self.position[run][::apart])))) for run in self.runs)
         return way < ONCE * (self.reach[1] - self.reach[0])
 
+    def begins(self, signal: FloatArray) -> FloatArray:
+        """(n - r,) of a signal (n,), such as the voltage: at the beginning of each sample."""
+        return np.concatenate([signal[run][:-1] for run in self.runs])
+
     def middle(self) -> FloatArray:
         """(n - r,) measured position at the middle of each sample, m."""
         return np.concatenate([0.5 * (self.position[run][1:] + self.position[run][:-1]) for run in self.runs])

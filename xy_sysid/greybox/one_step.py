@@ -51,6 +51,8 @@ def followed(
     """As ``one_step_fit``, with the filter's own result, from which a next fit can begin."""
     if effect.one_step is None:
         raise BadInput(f"effect {effect.name}", "no one-step prediction", "an effect that has one", "Fit it by simulation.")
+    if len(data.starts) > 1:
+        raise BadInput(f"stretches for {effect.name}", len(data.starts), "one, as a filter runs through it", "Give one recording without a gap.")
     library = base.model.library
     dry, others = beside(base.model, effect)
     for name, values in new:
