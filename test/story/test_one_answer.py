@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -82,6 +83,28 @@ def test_the_report_says_what_the_command_says(rec: Path, command: dict[str, Any
     story = cli("report", rec, "-o", tmp_path / "report.html", "--json").json["axes"]["x"]["story"]
     assert says_the_same(story, command)
     assert story["seconds"] == pytest.approx(24.0 - 0.75, abs=0.01)
+
+
+def test_what_is_left_out_is_said_everywhere(tmp_path: Path) -> None:
+    """Ends at which nothing drives the axis and it stands, and a stretch between gaps that is far shorter than the others."""
+    whole = recorded("coulomb_friction", seconds=12.0)
+    voltage, position = (
+        np.concatenate([values, np.full(8000, last)]) for values, last in zip(whole.axis("x"), (0.0, whole.position[-1, 0]), strict=True)
+    )
+    kept = np.ones(voltage.size, dtype=np.bool_)
+    kept[[*range(3000, 3200), *range(4200, 4400)]] = False
+    path = tmp_path / "rests.npz"
+    np.savez(path, time=np.arange(voltage.size)[kept] / 2000.0, voltage=voltage[kept], position=position[kept])
+    said = r"left out (3|3\.\d+|2\.\d+) s at the ends, where it is not driven and stands and 2 short stretches between gaps, 2 s"
+    assert re.search(f"axis x: {said}", cli("diagnose", path).out.replace("\n", " "))
+    for command in (["diagnose", path], ["refine", path, "--auto"]):
+        assert any(re.search(f"axis x: {said}", note) for note in cli(*command, "--json").json["notes"])
+    news: list[WorkerNews] = []
+    Desk(path, Reading(), news.append)
+    opened = next(item.content for item in news if item.kind == "opened")
+    assert any(re.search(f"axis x: {said}", note) for note in opened["notes"])
+    cli("report", path, "-o", tmp_path / "rests.html")
+    assert re.search(f"Axis x: {said}", (tmp_path / "rests.html").read_text(encoding="utf-8"))
 
 
 def test_one_move_tells_nothing_anywhere(tmp_path: Path) -> None:

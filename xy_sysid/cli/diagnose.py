@@ -52,10 +52,12 @@ def diagnose(
     if json:
         answers: dict[str, Any] = {name: answer_document(item) | _mechanics(item, drive) for name, item in found.items()}
         answers |= {name: {"verdict": "not_enough_data", "effect": None, "confidence": 1.0, "sentence": text} for name, text in refused.items()}
-        emit({"axes": answers, "seconds": seconds, "notes": notes_of(recordings)})
+        emit({"axes": answers, "seconds": seconds, "notes": notes_of(recordings, names)})
         return
     for name, item in found.items():
         _show(name, item, drive)
+    for text in (text for one in recordings for text in one.left_out(names)):
+        say(text)
     say_refused(refused)
 
 

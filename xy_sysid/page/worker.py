@@ -45,7 +45,12 @@ class Desk:
         self._recording = load(path, **reading.load, progress=lambda part: say(WorkerNews("progress", words=f"reading {path.name}", part=part)))
         self._stories: dict[str, Any] = {}
         seconds, rate = self._recording.duration, self._recording.sampling_rate
-        told = {"axes": list(self._recording.axes), "seconds": seconds, "rate": rate, "notes": list(self._recording.notes)}
+        told = {
+            "axes": list(self._recording.axes),
+            "seconds": seconds,
+            "rate": rate,
+            "notes": [*self._recording.notes, *self._recording.left_out(self._recording.axes)],
+        }
         told["effects"] = [effect.name for effect in self._library.acting]
         say(WorkerNews("opened", content=told))
 

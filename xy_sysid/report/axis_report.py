@@ -92,10 +92,10 @@ def axis_reports(
 def _report(recording: Recording, axis: str, wanted: Wanted, tell: Tell, fits: Callable[[], Any]) -> AxisReport:
     """All that can be said about one axis; what cannot is said in words."""
     runs = recording.stretches(axis) if len(recording) else ()
-    seconds, note = sum(run.seconds for run in runs), ""
+    seconds, notes = sum(run.seconds for run in runs), [text.partition(": ")[2] for text in recording.left_out((axis,))]
     if seconds > LONGEST:
         stretches = "the longest stretch" if len(runs) == 1 else f"{len(runs)} stretches"
-        note = f"The diagnosis uses the first {LONGEST:g} s of {stretches}, of {seconds:.4g} s."
+        notes.append(f"The diagnosis uses the first {LONGEST:g} s of {stretches}, of {seconds:.4g} s.")
     story, problem = None, ""
     tell(axis, STAGES[1])
     try:
@@ -104,7 +104,7 @@ def _report(recording: Recording, axis: str, wanted: Wanted, tell: Tell, fits: C
         problem = str(refusal)
     studied, verdicts = fits()
     speed = float("nan") if story is None else _speed(recording, axis)
-    return AxisReport(study=studied, verdicts=verdicts, story=story, speed=speed, problem=problem, note=note)
+    return AxisReport(study=studied, verdicts=verdicts, story=story, speed=speed, problem=problem, note="; ".join(notes))
 
 
 def _studied(recording: Recording, axis: str, settings: IdentifierSettings, period: int | None) -> tuple[AxisStudy, Validation | None]:
