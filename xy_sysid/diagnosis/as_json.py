@@ -37,8 +37,17 @@ def answer_document(found: Answer) -> dict[str, Any]:
         "explained": found.explained,
         "noise": found.noise,
         "discrepancy": found.discrepancy,
+        "unmodelled_force": _force(found),
         **stopped_and_refused(found),
     }
+
+
+def _force(found: Answer) -> dict[str, Any] | None:
+    """The force that nobody modelled, and its spectrum by bands, in the unit of the input."""
+    if found.force is None:
+        return None
+    spectrum = [{"from": low, "to": high, "rms": rms} for low, high, rms in found.force.bands]
+    return {"unit": found.units.input, "rms": found.force.rms, "input": found.force.input, "spectrum": spectrum}
 
 
 def stopped_and_refused(found: Answer) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from xy_sysid.diagnosis.equal_laws import likelihood
 from xy_sysid.diagnosis.first_set import settled
 from xy_sysid.diagnosis.refine import Effort, never, refine
 from xy_sysid.diagnosis.sets import contains, part_explained
+from xy_sysid.diagnosis.unmodelled import unmodelled_force
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit
@@ -67,7 +68,7 @@ def judged(data: AxisData, found: Answer, library: Library) -> Answer:
     every, with_all, (found, sure) = found.best, _confidence(data, found, found.final), _told(data, found)
     motion = max(data.layout.rms(data.floor.motion), 1e-300)
     left = found.discrepancy / motion
-    found, base, names = replace(found, tolerance=left), found.base, found.best
+    found, base, names = replace(found, tolerance=left, force=unmodelled_force(data, found.final)), found.base, found.best
     hides = math.sqrt(math.expm1(AT_FLOOR)) * data.layout.rms(data.floor.power) / motion  # in the noise
     noise = None
     if names and (found.explained >= 1.0 - found.explained or found.final.excess < AT_FLOOR):
@@ -84,6 +85,7 @@ def judged(data: AxisData, found: Answer, library: Library) -> Answer:
     else:
         verdict, experiment = "not_in_library", _UNKNOWN
         confidence = (1.0 - found.helps) * (1.0 - _hidden(max(left, hides), data.floor.epsilon))
+        found = replace(found, force=unmodelled_force(data, base))
         sentence = words.not_in_library(data, found)
     sentence += words.kept_out(found)
     if found.stopped:

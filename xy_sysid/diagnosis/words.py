@@ -47,6 +47,10 @@ def not_in_library(data: AxisData, found: Answer) -> str:
     beyond, motion = data.layout.rms(_beyond_noise(data, base)), max(data.layout.rms(data.floor.motion), 1e-300)
     said = f"Not in the library: no effect explains what the rigid model leaves ({moved(base.held_out_error, unit)}). Beyond the encoder's "
     said += f"noise that is {moved(beyond, unit)}, {percent(beyond / motion)} of the motion{_mostly(data, base)}."
+    if found.force is not None:
+        low, high = found.force.mostly
+        said += f" At the motor that is a force of {moved(found.force.rms, data.units.input)} rms, of {moved(found.force.input, data.units.input)} "
+        said += f"of the input, mostly between {low:.3g} and {high:.3g} Hz."
     if names and found.explained > 0.0:
         said += f" At best {listed(names)} {'explain' if len(names) > 1 else 'explains'} {percent(found.explained)} of the error's power."
     return said
