@@ -129,3 +129,18 @@ def test_a_gap_in_the_recording_is_no_place_for_backlash(rec: Path) -> None:
     with pytest.raises(BadInput, match="without a gap"):
         desk = Desk(rec, Reading(), lambda news: None)
         desk.do(Order(1, "add", "x", "backlash"))
+
+
+def test_backlash_that_could_not_be_looked_for_is_said(tmp_path: Path) -> None:
+    """Its filter runs through one stretch; where friction explains all, nothing was to be looked for."""
+    voltage, position = recorded("backlash", seconds=12.0).axis("x")
+    kept = np.ones(voltage.size, dtype=np.bool_)
+    kept[11_000:12_000] = False
+    np.savez(tmp_path / "gap.npz", time=np.arange(voltage.size)[kept] / 2000.0, voltage=voltage[kept], position=position[kept])
+    found = cli("diagnose", tmp_path / "gap.npz", "--json").json["axes"]["x"]
+    assert "backlash was not tried: that takes one stretch without a gap, and there are 2." in found["sentence"]
+
+
+def test_where_nothing_is_left_no_backlash_is_missed(command: dict[str, Any]) -> None:
+    """The two effects leave the noise floor."""
+    assert "not tried" not in command["sentence"]

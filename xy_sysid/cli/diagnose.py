@@ -62,7 +62,7 @@ def diagnose(
 
 
 def _mechanics(item: Answer, drive: Transmission) -> dict[str, Any]:
-    return {"mechanics": mechanics_document(item.rungs[-1].parameters if item.rungs else (), item.units, drive)}
+    return {"mechanics": mechanics_document(item.told.parameters if item.told else (), item.units, drive)}
 
 
 def _show(name: str, item: Answer, drive: Transmission) -> None:
@@ -71,15 +71,15 @@ def _show(name: str, item: Answer, drive: Transmission) -> None:
     if item.where is not None and item.where.places:
         places = "; ".join(place.sentence for place in item.where.places[:3])
         say(f"  The rigid model fails: {places}.")
-    if item.rungs and item.verdict != "nothing_missing":
+    if item.told and item.verdict != "nothing_missing":
         rows = []
         for one in sorted(item.candidates, key=lambda one: (float(f"{one.rung.held_out_error:.2g}"), one.name not in item.effects)):
             part = "-" if one.rung.one_step else f"{100 * one.explained:.3g} %"  # of another error, one sample ahead
             rows.append((*error_cells(f"{one.name} (refused)" if one.refused else one.name, one.rung), part))
         if rows:
             table("alone, least left first", ("effect", f"held-out error {motion(item.units.judged)[1]}", "times floor", "share of error"), rows)
-        parameter_table(item.rungs[-1].parameters)
-        mechanics_table(item.rungs[-1].parameters, item.units, drive)
+        parameter_table(item.told.parameters)
+        mechanics_table(item.told.parameters, item.units, drive)
     say(f"  Next experiment: {item.next_experiment}\n")
 
 

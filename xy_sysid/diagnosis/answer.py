@@ -212,6 +212,11 @@ class Answer:
         return self.effects[0] if self.effects else None
 
     @property
+    def told(self) -> Rung | None:
+        """The rung whose effects are named: the last, the base where none is named; None if the data do not suffice."""
+        return (self.rungs[-1] if self.effects else self.rungs[0]) if self.rungs else None
+
+    @property
     def base(self) -> GreyboxFit:
         """The rigid base."""
         return self.rungs[0].fit

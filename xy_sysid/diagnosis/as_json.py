@@ -14,7 +14,7 @@ from xy_sysid.greybox.parameters import Estimate
 
 def answer_document(found: Answer) -> dict[str, Any]:
     """One axis of the document that ``diagnose --json`` gives."""
-    first, last = (found.rungs[0], found.rungs[-1]) if found.rungs else (None, None)
+    first, last = found.rungs[0] if found.rungs else None, found.told
     runner_up = words.runner_up(found)
     return {
         "verdict": found.verdict,

@@ -88,6 +88,7 @@ def judged(data: AxisData, found: Answer, library: Library) -> Answer:
         found = replace(found, force=unmodelled_force(data, base))
         sentence = words.not_in_library(data, found)
     sentence += words.kept_out(found)
+    sentence += words.not_tried(data, found, library) if verdict != "nothing_missing" else ""
     if found.stopped:
         sentence += " The search was stopped by its budget."
         confidence *= 0.8

@@ -65,6 +65,16 @@ def kept_out(found: Answer) -> str:
     return f" {listed(names)} {leaves}, and {'are' if several else 'is'} refused: {found.kept_out.refused}."
 
 
+def not_tried(data: AxisData, found: Answer, library: Library) -> str:
+    """Effects that ask for one stretch without a gap, where there are several and something is left to explain; empty otherwise."""
+    names = [effect.name for effect in library.acting if effect.one_step is not None]
+    if len(data.starts) < 2 or not names or found.final.excess < AT_FLOOR:
+        return ""
+    return (
+        f" {listed(names)} {'was' if len(names) == 1 else 'were'} not tried: that takes one stretch without a gap, and there are {len(data.starts)}."
+    )
+
+
 def experiment(name: str, library: Library) -> str:
     """What distinguishes an effect from those that it can be taken for."""
     effect = library[name]
