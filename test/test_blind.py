@@ -15,10 +15,12 @@ from campaigns.blind import judge
 from campaigns.blind.__main__ import main
 from campaigns.blind.cases import EFFECTS, OUTSIDE, Case, _dirt, sets
 from campaigns.blind.dirt import DIRT, FEWEST, MOST, change, moved
+from campaigns.blind.foreign import foreign as foreign_sets
 from campaigns.blind.judge import Judged, run
 from campaigns.blind.page import hit, text, with_remarks
-from campaigns.blind.recordings import Recorded, file_name, recorded
+from campaigns.blind.recordings import Recorded, Seen, file_name, recorded
 from campaigns.blind.store import add, load
+from xy_sysid.axis.model import STANDARD
 
 SHORT = 20.0
 OLD_COGGING = {"amplitude": 0.391866894694146, "per_revolution": 6.0, "phase": 0.6869931843997854}
@@ -203,6 +205,33 @@ def test_what_is_really_there_beside_the_truth_is_no_phantom(monkeypatch: pytest
     assert run(case).phantoms == ()
     monkeypatch.setattr(judge, "diagnose", lambda *_, **__: verdict("cogging", "base_resonance"))
     assert run(Case("test", ("cogging",), 1, "development", seconds=5.0, dirt=0.03)).phantoms == ("base_resonance",)
+
+
+@pytest.mark.parametrize(("kinds", "phantoms"), [(("quadratic_drag", "mains_hum"), ()), (("mains_hum",), ("quadratic_drag",))])
+def test_an_effect_that_the_dirt_really_has_is_no_phantom(kinds: tuple[str, ...], phantoms: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nor wrong, if it comes first: it is on the axis."""
+    case = Case("test", ("cogging",), 1, "development", seconds=5.0, dirt=0.03)
+    seen = Seen(change={"cogging": 0.1}, noise=1e-4, dirt=0.03, kinds=kinds)
+    monkeypatch.setattr(judge, "recorded", lambda *_: Recorded(2000.0, np.zeros(0), np.zeros(0), seen))
+    monkeypatch.setattr(judge, "diagnose", lambda *_, **__: verdict("quadratic_drag", "cogging"))
+    found = run(case)
+    assert found.phantoms == phantoms and found.wrong is bool(phantoms) and not found.right
+
+
+def test_every_law_is_drawn_by_some_set() -> None:
+    """But for the base, which every axis has."""
+    own = {name for cases in sets("reporting").values() for case in cases for name in case.truth}
+    others = {name for cases in foreign_sets("reporting").values() for case in cases for name in case.truth}
+    assert {effect.name for effect in STANDARD.acting} <= own | others
+    assert {effect.name for effect in STANDARD.acting} - own == {"gravity"}
+
+
+@pytest.mark.parametrize("name", ["load_side_resonance", "position_dependent_gain"])
+def test_a_law_that_came_later_is_named(name: str) -> None:
+    """With the parameters that the machine has."""
+    found = run(Case("further laws", (name,), 2, "development", seconds=SHORT))
+    assert found.effects == (name,) and found.right and not found.phantoms, found
+    assert found.errors and max(found.errors.values()) < 0.05
 
 
 def test_dirt_alone_may_be_called_not_in_the_library(monkeypatch: pytest.MonkeyPatch) -> None:

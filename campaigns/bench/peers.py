@@ -19,11 +19,11 @@ import scipy.signal
 
 from campaigns.bench.recordings import axes, markdown, rows, written
 from xy_sysid.axis.model import FINE, STANDARD, AxisModel, simulator, start_of
-from xy_sysid.greybox.axis_data import AxisData, prepare_all
+from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.floor import Windows
 from xy_sysid.greybox.free_run import GreyboxFit, fit_base, fit_with
 from xy_sysid.greybox.objective import Objective
-from xy_sysid.hypotheses.enough_data import lacking
+from xy_sysid.hypotheses.enough_data import prepared
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import moved
 
@@ -166,11 +166,11 @@ def main(short: bool = False) -> None:
             continue
         for axis in axes(row):
             signals = [(run.voltage, run.position) for run in axis.runs]
-            reason = axis.refused or lacking(axis.runs[0].sampling_rate, signals)
-            if reason:
-                refused.append(f"- {axis.name}: {reason}")
+            ready = axis.refused or prepared(axis.runs[0].sampling_rate, signals, units=axis.runs[0].units)
+            if isinstance(ready, str):
+                refused.append(f"- {axis.name}: {ready}")
             else:
-                lines += compared(axis.name, prepare_all(axis.runs[0].sampling_rate, signals, units=axis.runs[0].units))
+                lines += compared(axis.name, ready)
     table = markdown(COLUMNS, lines)
     above = sum(float(line[5]) > GOAL for line in lines)
     count = f"{len(lines) - above} of {len(lines)} rows are at most {GOAL:g} times the better peer."

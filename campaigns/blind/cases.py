@@ -36,6 +36,15 @@ EFFECTS = (
     "hardening_stiffness",
     "gain_drift",
 )
+FURTHER = (  # laws that came later; gravity is drawn on the axes and joints of MuJoCo
+    "asymmetric_viscous_friction",
+    "load_side_resonance",
+    "position_dependent_drag",
+    "position_dependent_gain",
+    "quadratic_drag",
+    "return_spring",
+)
+BEHIND = {"load_side_resonance": "screw_compliance"}  # law -> part that is seen as this from the table
 OUTSIDE = ("loose_mode", "thermal_viscosity")
 AMOUNTS = (0.002, 0.01, 0.03)  # of dirt
 SMOOTH = 5.0  # inner steps per sample that will do for an axis without effects
@@ -79,6 +88,11 @@ class Case:
         """For people."""
         return f"{self.group}/{'+'.join(self.truth) or 'none'}/{self.number}"
 
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """The part of the machine for each name of the truth."""
+        return tuple(BEHIND.get(name, name) for name in self.truth)
+
     def random(self) -> np.random.Generator:
         """Random numbers of this case alone."""
         words = [int.from_bytes(text.encode(), "big") for text in (self.group, *self.truth)]
@@ -97,7 +111,9 @@ class Case:
         count = self.count or (1e-6 if self.nuisance else 0.5e-6)
         values["counts_per_revolution"] = 0.005 / count
         parts: dict[str, dict[str, float]] = {"time_delay": {"delay": float(random.uniform(0.8e-3, 1.8e-3))}}
-        for name in self.truth:
+        if set(self.truth) & set(BEHIND):
+            values["encoder_on"] = "table"
+        for name in self.parts:
             parts[name] = sizes(PARTS[name], random, self.size)
         if self.nuisance:
             parts |= self._nuisance(random)
@@ -149,7 +165,7 @@ class Case:
 @lru_cache(maxsize=64)
 def _dirt(case: Case) -> Dirt:
     """Scaled on the axis without the truth: beside a gap, any change of the motion grows to full size. What is left is smooth."""
-    spec = case.exact().with_parts(dict.fromkeys(case.truth, False)).spec
+    spec = case.exact().with_parts(dict.fromkeys(case.parts, False)).spec
     machine = Machine(replace(spec, inner_rate=SMOOTH * case.rate))
     words = [int.from_bytes(text.encode(), "big") for text in (case.group, *case.truth)]
     random = np.random.default_rng([STREAMS[case.draws], 7, case.number, *words])
@@ -168,6 +184,11 @@ def varied(draws: Draws, group: str, each: int, **changes: Any) -> Iterator[Case
     """Every effect under other circumstances."""
     for name in EFFECTS:
         yield from (replace(Case(group, (name,), k, draws), **changes) for k in range(each))
+
+
+def further(draws: Draws, each: int = 6) -> Iterator[Case]:
+    """Laws that the other sets do not draw."""
+    return (Case("further laws", (name,), k, draws) for name in FURTHER for k in range(each))
 
 
 def several(draws: Draws, count: int, cases: int, group: str = "", **changes: Any) -> Iterator[Case]:
@@ -203,6 +224,7 @@ def sets(draws: Draws) -> dict[str, list[Case]]:
         **{name: list(varied(draws, name, 10, dirt=amount)) for amount in AMOUNTS for name in [f"imperfect {100 * amount:.2g} %"]},
         "clean dirt": list(clean_dirt(draws)),
         "outside": list(outside(draws)),
+        "further laws": list(further(draws)),
         "hard": list(varied(draws, "hard", 6, nuisance=True)),
         "two effects": list(several(draws, 2, 40)),
         "three effects": list(several(draws, 3, 40)),

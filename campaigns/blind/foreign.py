@@ -22,8 +22,7 @@ from campaigns.blind.judge import Judged
 from xy_sysid.axis.model import STANDARD
 from xy_sysid.diagnosis.diagnose import diagnose_prepared, not_enough
 from xy_sysid.diagnosis.equal_laws import equals
-from xy_sysid.greybox.axis_data import prepare_all
-from xy_sysid.hypotheses.enough_data import lacking
+from xy_sysid.hypotheses.enough_data import prepared
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import Units
 
@@ -311,8 +310,8 @@ def run(case: Foreign) -> Judged:
     """Drive, diagnose, judge: the effects of several are all to be named, and one first."""
     rate, voltage, position, units = case.record()
     begun = time.process_time()
-    lack = lacking(rate, [(voltage, position)])
-    found = not_enough(lack, units) if lack else diagnose_prepared(prepare_all(rate, [(voltage, position)], units=units))
+    ready = prepared(rate, [(voltage, position)], units=units)
+    found = not_enough(ready, units) if isinstance(ready, str) else diagnose_prepared(ready)
     seconds = time.process_time() - begun
     named = judge.names(found)
     first = bool(named) and named[0] in case.there

@@ -84,8 +84,9 @@ def run(case: Case, folder: Path | None = None) -> Judged:
     else:
         right = laws(case.truth) <= laws(named)
     first = bool(named) and (named[0] in case.truth or (right and laws(named[:1]) <= laws(case.truth)))
-    phantoms = tuple(name for name in named if not laws((name,)) <= _there(machine))
-    stray = bool(named) and not first and not (case.nuisance and laws(named[:1]) <= _there(machine))
+    there = _there(case, machine, seen.kinds)
+    phantoms = tuple(name for name in named if not laws((name,)) <= there)
+    stray = bool(named) and not first and not ((case.nuisance or seen.kinds) and laws(named[:1]) <= there)
     ratio, errors, inside = _measured(case, machine, recording.rate, u, y, found) if right and one and case.known else (None, {}, {})
     made = outcome(case, found, seconds, right=right, first=first, stray=stray, phantoms=phantoms)
     return replace(made, ratio=ratio, errors=errors, inside=inside, change=seen.change, noise=seen.noise, dirt=seen.dirt, kinds=seen.kinds)
@@ -117,9 +118,9 @@ def laws(names: tuple[str, ...]) -> set[str]:
     return {part for name in names for part in sums.get(name, (name,))}
 
 
-def _there(machine: Machine) -> set[str]:
-    """Laws of every part of the machine; whatever dry friction slides with its constant level."""
-    parts = set(machine.spec.axes[0].parts)
+def _there(case: Case, machine: Machine, dirt: tuple[str, ...]) -> set[str]:
+    """Laws of every part of the machine and of its dirt; whatever dry friction slides with its constant level."""
+    parts = (set(machine.spec.axes[0].parts) - set(case.parts)) | {*case.truth, *dirt}
     return laws(tuple(parts)) | parts | ({FRICTION[0]} if parts & set(FRICTION) else set())
 
 
@@ -127,14 +128,16 @@ def true_values(case: Case, machine: Machine) -> dict[str, float]:
     """What the hypothesis should find, by ``effect.parameter``."""
     axis, truth = machine.spec.axes[0], machine.truth("x")
     values: dict[str, float] = {}
-    for name in case.truth:
+    for name, part in zip(case.truth, case.parts, strict=True):
         if name not in STANDARD.effects:
             continue
-        own = dict(axis.parts[name])
+        own = dict(axis.parts[part])
         if "per_revolution" in own:
             own["period"] = axis.drive.lead / own.pop("per_revolution")
         if name in ("base_resonance", "screw_compliance"):
             own = {"frequency": truth["antiresonance_hz"], "split": truth["resonance_hz"] / truth["antiresonance_hz"] - 1.0}
+        if name == "load_side_resonance":
+            own = {"frequency": truth["resonance_hz"]}
         if name == "backlash":
             own = {"gap": own["gap"]}
         values |= {f"{name}.{key}": float(value) for key, value in own.items() if key in STANDARD[name].names}

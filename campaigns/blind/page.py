@@ -17,6 +17,7 @@ WORDS = {
     "imperfect 3 %": "dirt, 3 %",
     "clean dirt": "no effect, dirt of 0.2, 1 and 3 %",
     "outside": "outside the library, without dirt and with 0.2, 1 and 3 %",
+    "further laws": "laws that the other sets do not draw, one effect",
     "hard": "mild friction, a 1 um encoder and a tenth of another effect",
     "two effects": "all named",
     "three effects": "all named",

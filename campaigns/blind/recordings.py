@@ -75,6 +75,6 @@ def _simulated(case: Case) -> Recorded:
     voltage, position = recording.axis("x")
     rate = recording.sampling_rate
     exact = moved(machine, voltage)
-    gone = {name: change(exact, moved(machine.with_parts({name: False}), voltage), rate) for name in case.truth}
+    gone = {name: change(exact, moved(machine.with_parts({part: False}), voltage), rate) for name, part in zip(case.truth, case.parts, strict=True)}
     reached = case.dirt_reached
     return Recorded(rate, voltage, position, Seen(gone, change(exact, position, rate), reached, case.kinds))

@@ -270,6 +270,34 @@ def test_what_two_sets_share_is_named_and_what_they_differ_in_is_not() -> None:
     assert unsure.confidence < 0.5
 
 
+def ending(fit: GreyboxFit, value: float, low: float, high: float) -> GreyboxFit:
+    """A fit whose load comes out so, V."""
+    load = replace(fit.parameter("constant_load.load"), value=value, low=low, high=high)
+    parameters = tuple(load if item.name == load.name else item for item in fit.parameters)
+    return replace(fit, model=fit.model.with_effect("constant_load", (value,)), parameters=parameters)
+
+
+@pytest.mark.parametrize(
+    ("value", "low", "high", "half"),
+    [(-0.2, -0.25, -0.15, False), (0.2, -0.1, 0.5, True), (0.2, 0.05, 0.35, True), (-1.0, -1.1, -0.9, True), (1.0, 0.9, 1.1, True)],
+)
+def test_a_size_that_is_not_known_or_ends_at_a_bound_is_half_sure_at_most(value: float, low: float, high: float, half: bool) -> None:
+    """Whether it is so in the fit that is told, or beside what is not told; a size with a sign has two bounds. A value of 1 stands for its bound."""
+    data, alone = prepare(2000.0, *recorded("constant_load", seconds=20.0).axis("x")), diagnosed("constant_load")
+    bound = STANDARD["constant_load"].on(data.similar)[0].high
+    size = (value, low, high) if abs(value) < 1.0 else (value * bound, low * bound, high * bound)
+    told, more = ending(alone.final, *size), fit_with(data, alone.final, ["coulomb_friction"])
+    last = replace(alone, rungs=(alone.rungs[0], Rung.of(told, ("constant_load",))), rivals=(), sizes={"constant_load": 100.0}, settled=None)
+    names, sizes = ("constant_load", "coulomb_friction"), {"constant_load": 100.0, "coulomb_friction": 0.01}
+    for rungs_of_it in (
+        (*last.rungs, Rung.of(more, ("coulomb_friction",))),
+        (*alone.rungs, Rung.of(ending(more, *size), ("coulomb_friction",))),
+    ):
+        both = judged(data, replace(last, rungs=rungs_of_it, best=names, sizes=sizes), STANDARD)
+        assert both.effects == ("constant_load",) and (both.confidence <= 0.5) is half
+    assert (judged(data, last, STANDARD).confidence <= 0.5) is half
+
+
 def test_a_refused_spring_that_leaves_as_little_as_a_wave_makes_the_wave_unsure() -> None:
     """It is no spring, but neither is it surely that wave; other refused sets, and relatives, are no rivals."""
     wave, spring, stiff = (frozenset({"coulomb_friction", name}) for name in ("cogging", "return_spring", "hardening_stiffness"))
@@ -339,6 +367,19 @@ def test_a_gap_is_asked_for_early_and_once(effect: str, monkeypatch: pytest.Monk
     if effect == "backlash":
         assert len(asked) == 1
         assert tried.index(frozenset({"backlash"})) == len(tried) - 1 <= FEWEST + 1
+
+
+def test_a_gap_that_is_too_small_to_be_one_is_not_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However well the filter does with it."""
+    fitted = grown
+
+    def too_small(data: AxisData, base: GreyboxFit, gap: Effect, *others: Any) -> Any:
+        found = fitted(data, base, gap, *others)
+        return replace(found, found=replace(found.found, too_small=True))
+
+    monkeypatch.setattr(one_step, "grown", too_small)
+    found = diagnose(2000.0, *recorded("backlash", seconds=20.0).axis("x"))
+    assert "backlash" not in found.effects and "backlash" not in found.sentence
 
 
 def test_a_gap_of_little_more_than_a_count_is_no_soft_screw() -> None:

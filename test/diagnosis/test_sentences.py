@@ -10,13 +10,17 @@ import numpy as np
 import pytest
 from helpers.simulated import recorded
 
+from xy_sysid.axis.mechanics import Transmission
 from xy_sysid.axis.model import STANDARD
+from xy_sysid.cli.diagnose import _show
 from xy_sysid.cli.refine import _words, verdict
 from xy_sysid.diagnosis import words
 from xy_sysid.diagnosis.answer import Answer, Rung, Tried
+from xy_sysid.diagnosis.as_json import answer_document
 from xy_sysid.diagnosis.diagnose import judged
 from xy_sysid.diagnosis.refine import Effort, refine
 from xy_sysid.greybox.axis_data import AxisData, prepare
+from xy_sysid.greybox.free_run import fit_with
 from xy_sysid.page.document_words import candidate_rows
 from xy_sysid.story.document import document
 from xy_sysid.story.story import Story
@@ -93,3 +97,15 @@ def test_nothing_missing_is_told_with_the_floor_of_the_ladder(data: AxisData) ->
     (told,) = re.findall(r"at the noise floor \(([\d.]+) mm/s\)", found.sentence)
     assert float(told) == pytest.approx(1e3 * found.base.noise_floor, rel=5e-3)
     assert np.isfinite(found.confidence)
+
+
+def test_parameters_of_what_is_not_named_are_not_shown_as_found(data: AxisData, ladder: Answer, capsys: pytest.CaptureFixture[str]) -> None:
+    """Friction that explains a part of what is not in the library stands in the sentence, and nowhere as a part of the model."""
+    more = fit_with(data, ladder.base, ["coulomb_friction"])
+    found = replace(ladder, rungs=(*ladder.rungs, Rung.of(more, ("coulomb_friction",))), best=("coulomb_friction",), explained=0.3)
+    found = judged(data, found, STANDARD)
+    assert found.verdict == "not_in_library" and "At best coulomb_friction explains 30 %" in found.sentence
+    assert found.told is found.rungs[0]
+    _show("x", found, Transmission())
+    assert "coulomb_friction.coulomb" not in capsys.readouterr().out
+    assert answer_document(found)["error"]["held_out"] == answer_document(found)["error"]["now"] == ladder.base.held_out_error

@@ -10,7 +10,7 @@ import pytest
 from xy_sysid.axis.model import STANDARD, AxisModel
 from xy_sysid.effects import Scene
 from xy_sysid.greybox.axis_data import AxisData, prepare
-from xy_sysid.greybox.forces import braked, force_of, pushing, stood_in, taken_for, taken_over
+from xy_sysid.greybox.forces import force_of, pushing, stood_in, taken_for, taken_over
 
 RATE = 1000.0
 
@@ -110,21 +110,3 @@ def test_a_linear_spring_stands_in_for_one_that_softens_not(data: AxisData) -> N
 def test_laws_that_cannot_be_compared_begin_with_the_values_of_the_same_name(data: AxisData) -> None:
     model = AxisModel(0.1, 1e-3, 100.0).with_effect("presliding_hysteresis", (0.3, 1e-5, 0.0))
     assert dict(stood_in(data, model, "presliding_hysteresis", STANDARD["coulomb_friction"]).effects)["coulomb_friction"] == (0.3,)
-
-
-def test_a_law_that_falls_with_speed_may_stand_for_a_simple_one_with_less_drag(data: AxisData) -> None:
-    """All brake alike, at twice the drag and more, at the same inertia, and no parameter is at its bound."""
-    model = AxisModel(0.25, 1e-3, 120.0).with_effect("coulomb_friction", (0.45,))
-    found = braked(data, model, "coulomb_friction", STANDARD["stribeck_friction"])
-    assert found
-    law = STANDARD["stribeck_friction"].functions["level"]
-    for one, times in zip(found, (2.0, 4.0, 8.0), strict=False):
-        assert one.gain == pytest.approx(0.25 / times, rel=0.02)
-        assert one.gain * one.pole == pytest.approx(30.0, rel=1e-12)
-        values = dict(zip(STANDARD["stribeck_friction"].names, dict(one.effects)["stribeck_friction"], strict=True))
-        assert law(**values, v=0.015) + 0.015 / one.gain == pytest.approx(0.45 + 0.015 / 0.25, rel=0.05)
-
-
-@pytest.mark.parametrize(("name", "values", "other"), [("constant_load", (0.3,), "gravity"), ("coulomb_friction", (0.3,), "presliding_hysteresis")])
-def test_only_laws_of_dry_friction_are_braked(data: AxisData, name: str, values: tuple[float, ...], other: str) -> None:
-    assert braked(data, AxisModel(0.1, 1e-3, 100.0).with_effect(name, values), name, STANDARD[other]) == []

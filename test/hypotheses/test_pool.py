@@ -15,7 +15,7 @@ from xy_sysid.diagnosis.rungs import with_one_more
 from xy_sysid.diagnosis.sets import contains
 from xy_sysid.excitation.lockstep import drive
 from xy_sysid.greybox.axis_data import AxisData, prepare
-from xy_sysid.greybox.free_run import fit, fit_base
+from xy_sysid.greybox.free_run import GreyboxFit, fit, fit_base
 from xy_sysid.hypotheses.compare import gain, size
 from xy_sysid.hypotheses.criteria import AT_FLOOR, MOST_EFFECTS, SIZE
 from xy_sysid.hypotheses.moves import is_twice, moves
@@ -193,3 +193,32 @@ def test_no_gap_is_looked_for_where_friction_explains_most_of_the_error() -> Non
     assert found.effects == ("coulomb_friction",)
     assert found.final is not None and found.final.excess > AT_FLOOR
     assert tried and not any("backlash" in names for names in tried)
+
+
+def test_a_quick_fit_tells_how_near_a_set_comes_by_the_first_set() -> None:
+    """A set that is worse than the first, as every search has some, lets no more quick fits through."""
+    pool = Pool(data_of("coulomb_friction", seconds=5.0), STANDARD)
+    base = pool.begin(fit_base(pool.data))
+    near = pool._near()
+    worse = replace(base.fit, scores=base.fit.scores + 1e4)
+    pool.remember(frozenset({"gain_drift"}), worse, worse, leads=False)
+    assert pool._near() == near
+
+
+@pytest.mark.parametrize("refused_at_first", [True, False])
+def test_all_data_tell_whether_a_simpler_set_is_refused(refused_at_first: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A set is not kept because a quick fit of a simpler one is refused, and does not give way to one that all data refuse."""
+    data, simple, crowded = data_of("coulomb_friction"), frozenset({"coulomb_friction"}), frozenset({"coulomb_friction", "constant_load"})
+    pool = Pool(data, STANDARD, worth=SIZE)
+    pool.begin(fit_base(data))
+    rigid = pool.best.fit
+    both = with_one_more(data, STANDARD, rigid, with_one_more(data, STANDARD, rigid, rigid, "coulomb_friction"), "constant_load")
+    pool.remember(crowded, fit(data, both.model, brief=True), both)
+
+    def refusal(effects: frozenset[str], found: GreyboxFit) -> str:
+        return "coulomb_friction: refused" if effects == simple and found.brief is refused_at_first else ""
+
+    monkeypatch.setattr(pool, "_refusal", refusal)
+    assert pool.best.effects == crowded
+    list(pool.simplified())
+    assert pool.best.effects == (simple if refused_at_first else crowded)

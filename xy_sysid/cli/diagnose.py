@@ -52,15 +52,17 @@ def diagnose(
     if json:
         answers: dict[str, Any] = {name: answer_document(item) | _mechanics(item, drive) for name, item in found.items()}
         answers |= {name: {"verdict": "not_enough_data", "effect": None, "confidence": 1.0, "sentence": text} for name, text in refused.items()}
-        emit({"axes": answers, "seconds": seconds, "notes": notes_of(recordings)})
+        emit({"axes": answers, "seconds": seconds, "notes": notes_of(recordings, names)})
         return
     for name, item in found.items():
         _show(name, item, drive)
+    for text in (text for one in recordings for text in one.left_out(names)):
+        say(text)
     say_refused(refused)
 
 
 def _mechanics(item: Answer, drive: Transmission) -> dict[str, Any]:
-    return {"mechanics": mechanics_document(item.rungs[-1].parameters if item.rungs else (), item.units, drive)}
+    return {"mechanics": mechanics_document(item.told.parameters if item.told else (), item.units, drive)}
 
 
 def _show(name: str, item: Answer, drive: Transmission) -> None:
@@ -69,7 +71,7 @@ def _show(name: str, item: Answer, drive: Transmission) -> None:
     if item.where is not None and item.where.places:
         places = "; ".join(place.sentence for place in item.where.places[:3])
         say(f"  The rigid model fails: {places}.")
-    if item.rungs and item.verdict != "nothing_missing":
+    if item.told and item.verdict != "nothing_missing":
         rows = []
         for one in sorted(item.candidates, key=lambda one: (float(f"{one.rung.held_out_error:.2g}"), one.name not in item.effects)):
             part = "-" if one.rung.one_step else f"{100 * one.explained:.3g} %"  # of another error, one sample ahead
@@ -80,8 +82,8 @@ def _show(name: str, item: Answer, drive: Transmission) -> None:
                 ("effect", f"held-out error {motion(item.units.judged)[1]}", "times floor", "share of error"),
                 rows,
             )
-        parameter_table(item.rungs[-1].parameters)
-        mechanics_table(item.rungs[-1].parameters, item.units, drive)
+        parameter_table(item.told.parameters)
+        mechanics_table(item.told.parameters, item.units, drive)
     say(f"  Next experiment: {item.next_experiment}\n")
 
 

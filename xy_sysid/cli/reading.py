@@ -113,9 +113,9 @@ def read(paths: Sequence[Path], reading: Reading, quiet: bool) -> Recording:
     return joined(read_each(paths, reading, quiet))
 
 
-def notes_of(recordings: Sequence[Recording]) -> list[str]:
-    """What was noted as they were read."""
-    return [note for recording in recordings for note in recording.notes]
+def notes_of(recordings: Sequence[Recording], names: Sequence[str] = ()) -> list[str]:
+    """What was noted as they were read, and what of these axes no model is fitted to."""
+    return [note for recording in recordings for note in (*recording.notes, *recording.left_out(names))]
 
 
 def measured_responses(paths: Sequence[Path], reading: Reading, averages: float | None = None) -> dict[str, FrequencyResponse] | None:

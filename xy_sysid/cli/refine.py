@@ -14,7 +14,7 @@ from xy_sysid.cli import options as o
 from xy_sysid.cli.diagnose import Own, error_cells, parameter_table
 from xy_sysid.cli.mechanics import Gear, Kt, mechanics_document, mechanics_table
 from xy_sysid.cli.output import emit, say, say_refused, table
-from xy_sysid.cli.reading import chosen, each, named, read_each, reads, runs_of
+from xy_sysid.cli.reading import chosen, each, named, notes_of, read_each, reads, runs_of
 from xy_sysid.files.provenance import provenance
 from xy_sysid.units import bare, motion, moved
 
@@ -96,7 +96,7 @@ def refine(
             | {"mechanics": mechanics_document(item.final.parameters, recording.units, drive)}
             for name, item in found.items()
         }
-        emit({"recording": origin, "axes": answers, "refused": refused})
+        emit({"recording": origin, "axes": answers, "refused": refused, "notes": notes_of(recordings, names)})
         return
     scale, unit = motion(recording.units.judged)
     for name, item in found.items():
@@ -112,6 +112,8 @@ def refine(
         if name in alone:
             say(f"  {_alone_in_words(alone[name], recording.output_unit)}")
         say()
+    for text in (text for one in recordings for text in one.left_out(names)):
+        say(text)
     say_refused(refused)
 
 

@@ -10,12 +10,12 @@ error in bins of speed, position, amplitude and time is scaled so that its mean 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.floor import Floor, Windows, bands, encoder_noise, floor
@@ -93,11 +93,12 @@ class Comparison:
 
 @dataclass(frozen=True, slots=True)
 class Unseen:
-    """Samples of a gap-free run that no fit saw.
+    """Samples of a gap-free run that no fit saw, or of several, one after the other.
 
     voltage, position: (n,) input and output; begins: time of the first, s
     encoder: rms of the encoder's noise, in units.output, if more of the recording is known; None: from these samples
     held: windows of the velocity that no fit saw, and the floor, where a fit has cut them; None: every sample counts
+    starts: sample at which each run begins; several need ``held``
     """
 
     voltage: FloatArray
@@ -107,6 +108,11 @@ class Unseen:
     begins: float = 0.0
     encoder: float | None = None
     held: tuple[Windows, Floor] | None = None
+    starts: tuple[int, ...] = (0,)
+
+    def of_each(self, values: FloatArray, made: Callable[[FloatArray], FloatArray]) -> FloatArray:
+        """What is made of the samples (n,) of each run, one after the other."""
+        return np.concatenate([made(part) for part in np.split(values, self.starts[1:])])
 
     def windows(self, measured: FloatArray) -> tuple[Windows, Floor]:
         """Windows that are judged, and the floor there. measured: (n,) velocity."""
@@ -134,15 +140,16 @@ def compare_velocity(model: FloatArray, u: FloatArray, y: FloatArray, sampling_r
 
 
 def compare_motion(model: FloatArray, unseen: Unseen) -> Comparison:
-    """A simulated mean velocity (n - 1,) of any model against the measured output (n,)."""
+    """A simulated mean velocity (n - 1,) of any model, or (n - r,) over r runs, against the measured output (n,)."""
     unit, sampling_rate, y = unseen.units.judged, unseen.sampling_rate, unseen.position
-    if y.shape[0] < SHORTEST_RUN or model.shape[0] != y.shape[0] - 1:
+    if y.shape[0] < SHORTEST_RUN or model.shape[0] != y.shape[0] - len(unseen.starts):
         raise BadInput("number of samples", y.shape[0], f"{SHORTEST_RUN} or more", "Give a longer recording.")
     first = unseen.skipped
-    measured, predicted = np.diff(y)[first:] * sampling_rate, model[first:]
+    measured, predicted = unseen.of_each(y, np.diff)[first:] * sampling_rate, model[first:]
+    here, driven = (unseen.of_each(values, lambda part: part[:-1])[first:] for values in (y, unseen.voltage))
     error = measured - predicted
     windows, least = unseen.windows(measured)
-    counts = _inside(windows, error.size) if unseen.held is not None else slice(None)
+    counts = windows.covered(error.size) if unseen.held is not None else slice(None)
     layout = windows.layout
     accelerated = unseen.units.sensed == "acceleration"
     offset = 0.0 if accelerated else float(np.mean(error[counts]))  # a constant velocity leaves no trace in an acceleration
@@ -168,20 +175,20 @@ def compare_motion(model: FloatArray, unseen: Unseen) -> Comparison:
         places.append(_place("frequency", (0.0, float(edges[1])), "Hz", abs(offset) / allowed, text))
     if noise > 0.0 and np.isfinite(noise):
         width = max(int(ENVELOPE * sampling_rate), 1)
-        power_in = np.asarray(scipy.signal.oaconvolve(unseen.voltage[first:-1] ** 2, np.full(width, 1.0 / width), mode="same"), dtype=np.float64)
-        envelope, here = np.sqrt(np.maximum(power_in, 0.0))[counts], y[first:-1][counts]
+        power_in = np.asarray(scipy.signal.oaconvolve(driven**2, np.full(width, 1.0 / width), mode="same"), dtype=np.float64)
+        envelope, place = np.sqrt(np.maximum(power_in, 0.0))[counts], here[counts]
         off, speed = low_error[counts], low_speed[counts]
         places += _binned("speed", (np.abs(speed), unseen.units.speed), SPEED_BINS, off, noise)
         places += _direction(speed, off, noise, unit)
-        places += _binned("position", (here, unseen.units.output), POSITION_BINS, off, noise)
-        places += _periodic(here, off, noise, unseen.units.output)
+        places += _binned("position", (place, unseen.units.output), POSITION_BINS, off, noise)
+        places += _periodic(place, off, noise, unseen.units.output)
         places += _binned("amplitude", (envelope, unseen.units.input), AMPLITUDE_BINS, off, noise)
         places += _binned("time", (time[counts], "s"), TIME_BINS, off, noise)
     return Comparison(
         time=time,
         measured=measured,
         predicted=predicted,
-        position=y[first:-1],
+        position=here,
         motion=layout.rms(least.motion),
         error=whole,
         noise_floor=allowed,
@@ -195,14 +202,6 @@ def compare_motion(model: FloatArray, unseen: Unseen) -> Comparison:
             sorted((place for place in places if place.error_over_floor >= TWICE and np.isfinite(whole)), key=lambda place: -place.error_over_floor)
         ),
     )
-
-
-def _inside(windows: Windows, samples: int) -> NDArray[np.bool_]:
-    """(samples,) those in a window."""
-    inside = np.zeros(samples, dtype=np.bool_)
-    for begin in windows.begins:
-        inside[begin : begin + windows.layout.length] = True
-    return inside
 
 
 def _place(kind: PlaceKind, span: tuple[float, float], unit: str, ratio: float, sentence: str) -> Place:

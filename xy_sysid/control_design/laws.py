@@ -98,3 +98,8 @@ def along(model: AxisModel, places: FloatArray, what: str) -> FloatArray:
         "drag": lambda x: force(model, 1.0, x, of_speed=True, by_place=True) - force(model, 0.0, x, of_speed=True, by_place=True),
     }
     return np.array([kinds[what](float(x)) for x in places])
+
+
+def lost_in(language: str, effect: Effect) -> str:
+    """What is lost of an effect in a format that keeps only the mean level of dry friction."""
+    return "only its mean level at speed is kept" if effect.is_dry else f"{language} cannot express it"

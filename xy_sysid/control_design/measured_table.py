@@ -18,7 +18,7 @@ from xy_sysid.control_design.inverse import feedforward
 from xy_sysid.control_design.path import SampledPath, recorded
 from xy_sysid.control_design.tables import MOST_ROWS, Correction
 from xy_sysid.errors import BadInput
-from xy_sysid.greybox.parameters import Z95
+from xy_sysid.response.frf import Z95
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import Run
 

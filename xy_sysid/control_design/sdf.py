@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from xy_sysid.axis.model import AxisModel
-from xy_sysid.control_design.laws import along, asks, friction, largest_voltage
+from xy_sysid.control_design.laws import along, asks, friction, largest_voltage, lost_in
 from xy_sysid.effects._contract import Effect
 
 PLACES = 101  # at which a spring is asked whether it is straight
@@ -28,7 +28,7 @@ def sdf(
     stiffness, offset = (float(value) for value in np.polyfit(places, pull, 1))
     reach = float(np.max(np.abs(pull)))
     straight = reach > 0.0 and stiffness > 0.0 and float(np.max(np.abs(stiffness * places + offset - pull))) <= STRAIGHT * reach
-    lost = [(effect, _lost(model.library[effect])) for effect, _ in model.effects if not (straight and _spring(model.library[effect]))]
+    lost = [(effect, lost_in("SDF", model.library[effect])) for effect, _ in model.effects if not (straight and _spring(model.library[effect]))]
     if model.delay > 0.0:
         lost.append(("delay", "SDF has none"))
     if travel is None:
@@ -68,7 +68,3 @@ def sdf(
 def _spring(effect: Effect) -> bool:
     """Whether it is a force by position alone."""
     return effect.category == "force" and asks(effect) - {"gain", "pole"} == {"x"}
-
-
-def _lost(effect: Effect) -> str:
-    return "only its mean level at speed is kept" if effect.is_dry else "SDF cannot express it"

@@ -16,7 +16,8 @@ import scipy
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.comparison.physical_model import PhysicalModel
 from xy_sysid.errors import BadInput
-from xy_sysid.greybox.parameters import Z95, Estimate
+from xy_sysid.greybox.parameters import Estimate
+from xy_sysid.response.frf import Z95
 from xy_sysid.samples.block import FloatArray
 
 FACTOR = 2.0  # a number known to worse than this factor is said to be undetermined

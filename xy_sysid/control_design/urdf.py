@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 
 from xy_sysid.axis.model import AxisModel
-from xy_sysid.control_design.laws import friction, largest_voltage
-from xy_sysid.effects._contract import Effect
+from xy_sysid.control_design.laws import friction, largest_voltage, lost_in
 
 ENDLESS = 1e16  # m: end of a joint that has none, as URDF asks for one; SDF takes this number by default
 
@@ -16,7 +15,7 @@ def urdf(
 ) -> tuple[str, tuple[tuple[str, str], ...]]:
     """(text, what is lost by effect); travel: m or rad, None if unknown; limit: of the drive, infinite if unknown."""
     level = 0.5 * (friction(model, abs(model.gain), 1.0) + friction(model, -abs(model.gain), -1.0))
-    lost = [(effect, _lost(model.library[effect])) for effect, _ in model.effects]
+    lost = [(effect, lost_in("URDF", model.library[effect])) for effect, _ in model.effects]
     if model.delay > 0.0:
         lost.append(("delay", "URDF has none"))
     if travel is None:
@@ -45,7 +44,3 @@ def urdf(
         "</robot>",
     ]
     return "\n".join(lines) + "\n", tuple(lost)
-
-
-def _lost(effect: Effect) -> str:
-    return "only its mean level at speed is kept" if effect.is_dry else "URDF cannot express it"

@@ -13,6 +13,7 @@ import numpy as np
 
 from xy_sysid.comparison.physical_model import PhysicalModel
 from xy_sysid.comparison.where_it_fails import Comparison
+from xy_sysid.diagnosis.unmodelled import UnmodelledForce
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.greybox.parameters import Estimate, parameter_table
 from xy_sysid.hypotheses.criteria import AT_FLOOR
@@ -172,6 +173,7 @@ class Answer:
     verdict:  see Kind; confidence: 0..1; sentence: both in words; units: of input and output
     tolerance: part of the motion (rms) that is left unexplained beyond the noise
     where:    the places where the base fails; look_alikes: of the first effect; runs: that it is about
+    force:    that nobody modelled: what the last rung leaves, or the base where no effect is named
     """
 
     rungs: tuple[Rung, ...]
@@ -197,6 +199,7 @@ class Answer:
     look_alikes: tuple[LookAlike, ...] = ()
     next_experiment: str = ""
     runs: tuple[Run, ...] = ()
+    force: UnmodelledForce | None = None
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -207,6 +210,11 @@ class Answer:
     def effect(self) -> str | None:
         """The first of the effects."""
         return self.effects[0] if self.effects else None
+
+    @property
+    def told(self) -> Rung | None:
+        """The rung whose effects are named: the last, the base where none is named; None if the data do not suffice."""
+        return (self.rungs[-1] if self.effects else self.rungs[0]) if self.rungs else None
 
     @property
     def base(self) -> GreyboxFit:

@@ -14,7 +14,7 @@ from xy_sysid.greybox.parameters import Estimate
 
 def answer_document(found: Answer) -> dict[str, Any]:
     """One axis of the document that ``diagnose --json`` gives."""
-    first, last = (found.rungs[0], found.rungs[-1]) if found.rungs else (None, None)
+    first, last = found.rungs[0] if found.rungs else None, found.told
     runner_up = words.runner_up(found)
     return {
         "verdict": found.verdict,
@@ -37,8 +37,17 @@ def answer_document(found: Answer) -> dict[str, Any]:
         "explained": found.explained,
         "noise": found.noise,
         "discrepancy": found.discrepancy,
+        "unmodelled_force": _force(found),
         **stopped_and_refused(found),
     }
+
+
+def _force(found: Answer) -> dict[str, Any] | None:
+    """The force that nobody modelled, and its spectrum by bands, in the unit of the input."""
+    if found.force is None:
+        return None
+    spectrum = [{"from": low, "to": high, "rms": rms} for low, high, rms in found.force.bands]
+    return {"unit": found.units.input, "rms": found.force.rms, "input": found.force.input, "spectrum": spectrum}
 
 
 def stopped_and_refused(found: Answer) -> dict[str, Any]:

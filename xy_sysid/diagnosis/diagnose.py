@@ -14,12 +14,14 @@ from xy_sysid.diagnosis.equal_laws import likelihood
 from xy_sysid.diagnosis.first_set import settled
 from xy_sysid.diagnosis.refine import Effort, never, refine
 from xy_sysid.diagnosis.sets import contains, part_explained
+from xy_sysid.diagnosis.unmodelled import unmodelled_force
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.hypotheses.criteria import AT_FLOOR, SIZE
 from xy_sysid.hypotheses.enough_data import prepared
 from xy_sysid.hypotheses.input_noise import input_noise
+from xy_sysid.hypotheses.refusal import at_bound
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import USUAL, Units
 
@@ -63,10 +65,10 @@ def not_enough(missing: str, units: Units = USUAL) -> Answer:
 
 def judged(data: AxisData, found: Answer, library: Library) -> Answer:
     """The verdict on a search that has ended."""
-    every, with_all, (found, sure) = found.best, _confidence(found, found.best), _told(data, found)
+    every, with_all, (found, sure) = found.best, _confidence(data, found, found.final), _told(data, found)
     motion = max(data.layout.rms(data.floor.motion), 1e-300)
     left = found.discrepancy / motion
-    found, base, names = replace(found, tolerance=left), found.base, found.best
+    found, base, names = replace(found, tolerance=left, force=unmodelled_force(data, found.final)), found.base, found.best
     hides = math.sqrt(math.expm1(AT_FLOOR)) * data.layout.rms(data.floor.power) / motion  # in the noise
     noise = None
     if names and (found.explained >= 1.0 - found.explained or found.final.excess < AT_FLOOR):
@@ -83,8 +85,10 @@ def judged(data: AxisData, found: Answer, library: Library) -> Answer:
     else:
         verdict, experiment = "not_in_library", _UNKNOWN
         confidence = (1.0 - found.helps) * (1.0 - _hidden(max(left, hides), data.floor.epsilon))
+        found = replace(found, force=unmodelled_force(data, base))
         sentence = words.not_in_library(data, found)
     sentence += words.kept_out(found)
+    sentence += words.not_tried(data, found, library) if verdict != "nothing_missing" else ""
     if found.stopped:
         sentence += " The search was stopped by its budget."
         confidence *= 0.8
@@ -107,16 +111,15 @@ def _told(data: AxisData, found: Answer) -> tuple[Answer, float]:
     So a second effect is named where it explains much or is sure, and dirt that explains little and is unsure does not make the first one unsure.
     """
     if found.final.one_step:  # judged one sample ahead, as one: a rung may have brought two of them
-        return found, _confidence(found, found.best)
+        return found, _confidence(data, found, found.final)
 
     def tells(rung: Rung) -> float:
-        return _confidence(found, rung.effects) * math.log(found.base.held_out_error / max(rung.held_out_error, 1e-300))
+        return _confidence(data, found, rung.fit) * math.log(found.base.held_out_error / max(rung.held_out_error, 1e-300))
 
     most = max(found.rungs[1:], key=tells, default=None)
     if most is None or most is found.rungs[-1]:
-        return found, _confidence(found, found.best)
-    told = _down_to(data, found, found.rungs.index(most))
-    return told, _confidence(found, told.best)
+        return found, _confidence(data, found, found.final)
+    return _down_to(data, found, found.rungs.index(most)), _confidence(data, found, most.fit)
 
 
 def _down_to(data: AxisData, found: Answer, place: int) -> Answer:
@@ -134,22 +137,24 @@ def _down_to(data: AxisData, found: Answer, place: int) -> Answer:
     )
 
 
-def _confidence(found: Answer, names: tuple[str, ...]) -> float:
+def _confidence(data: AxisData, found: Answer, told: GreyboxFit) -> float:
     """How likely no other set is as good, how much larger each effect is than what is left, and how likely the name of one is that shares
-    its law with others; of what is undetermined half at most."""
-    library = found.final.model.library
+    its law with others; of what is undetermined half at most. told: the fit whose effects are named, which may have less than the last."""
+    library, names = told.model.library, tuple(name for name in found.best if name in told.model)
     rivals = (rival for rival in found.rivals if not contains(library, frozenset(rival.effects), frozenset(names)))
     doubt = max((rival.doubt for rival in rivals), default=0.0)
     size = min((found.sizes[name] for name in names if name in found.sizes), default=0.0)
     likely = math.prod(likelihood(library, name, values) for name, values in found.final.model.effects if name in names)
     sure = (1.0 - doubt) * size / (size + 1.0) * likely
-    return min(sure, 0.5) if any(_undetermined(found.final, name) for name in names) else sure
+    return min(sure, 0.5) if any(_undetermined(data, fit, name) for fit in (told, found.final) for name in names) else sure
 
 
-def _undetermined(final: GreyboxFit, name: str) -> bool:
-    """The size of an effect is not distinguished from zero, or is known to worse than a factor of two, in every recording."""
-    item = final.parameter(f"{name}.{final.model.library[name].parameters[0].name}")
-    return not any(_is_known(one.low, one.high) for one in item.recordings or (item,))
+def _undetermined(data: AxisData, fit: GreyboxFit, name: str) -> bool:
+    """The size of an effect is not distinguished from zero, is known to worse than a factor of two, in every recording, or ends at a bound."""
+    effect = fit.model.library[name]
+    size = effect.on(data.similar)[0]
+    item = fit.parameter(f"{name}.{size.name}")
+    return at_bound(size, item.value) or not any(_is_known(one.low, one.high) for one in item.recordings or (item,))
 
 
 def _is_known(low: float, high: float) -> bool:

@@ -47,6 +47,10 @@ def not_in_library(data: AxisData, found: Answer) -> str:
     beyond, motion = data.layout.rms(_beyond_noise(data, base)), max(data.layout.rms(data.floor.motion), 1e-300)
     said = f"Not in the library: no effect explains the error of the rigid model ({moved(base.held_out_error, unit)}). "
     said += f"Error above the encoder noise: {moved(beyond, unit)}, {percent(beyond / motion)} of the motion{_mostly(data, base)}."
+    if found.force is not None:
+        low, high = found.force.mostly
+        force, drive = (moved(value, data.units.input) for value in (found.force.rms, found.force.input))
+        said += f" This corresponds to an unmodelled force of {force} rms at the motor (input: {drive}), mostly between {low:.3g} and {high:.3g} Hz."
     if names and found.explained > 0.0:
         said += f" At best {listed(names)} {'explain' if len(names) > 1 else 'explains'} {percent(found.explained)} of the error's power."
     return said
@@ -59,6 +63,16 @@ def kept_out(found: Answer) -> str:
     names, several = found.kept_out.effects, len(found.kept_out.effects) > 1
     with_it = f"With {listed(names)}{'' if several else ' alone'} the error would be {moved(found.kept_out.rung.held_out_error, found.units.judged)}"
     return f" {with_it}, but {'they are' if several else 'it is'} refused: {found.kept_out.refused}."
+
+
+def not_tried(data: AxisData, found: Answer, library: Library) -> str:
+    """Effects that ask for one stretch without a gap, where there are several and something is left to explain; empty otherwise."""
+    names = [effect.name for effect in library.acting if effect.one_step is not None]
+    if len(data.starts) < 2 or not names or found.final.excess < AT_FLOOR:
+        return ""
+    return (
+        f" {listed(names)} {'was' if len(names) == 1 else 'were'} not tried: that takes one stretch without a gap, and there are {len(data.starts)}."
+    )
 
 
 def experiment(name: str, library: Library) -> str:

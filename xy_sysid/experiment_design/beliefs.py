@@ -91,8 +91,7 @@ class Evidence:
         power = self.data.layout.power(error)
         if not np.all(np.isfinite(power)):
             return math.inf
-        score = self.objective.of_power(power)
-        return 0.5 * self.objective.count * score * self.windows.begins.size
+        return self.objective.nats(self.objective.of_power(power), self.windows.begins.size)
 
     def spectrum(self, error: NDArray[np.complex128]) -> tuple[FloatArray, float, float]:
         """(bands,) expected power of an error, and the powers of the unmodelled force and motion."""

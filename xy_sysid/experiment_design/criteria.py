@@ -7,21 +7,14 @@ pairs of ``python -m campaigns.bench settle``; the tables of docs/settle.md are 
 from __future__ import annotations
 
 import math
-from typing import TypeVar
 
 from xy_sysid.effects._contract import USUAL_WITHIN
 from xy_sysid.greybox.axis_data import HELD, SEEN
-from xy_sysid.hypotheses.criteria import Criterion
+from xy_sysid.hypotheses.criteria import Criteria
 from xy_sysid.settings import AxisExcitation
 
-TABLE: list[Criterion] = []
-N = TypeVar("N", int, float)
-
-
-def _number(name: str, value: N, unit: str, because: str) -> N:
-    TABLE.append(Criterion(name, value, unit, because))
-    return value
-
+TABLE = Criteria()
+_number = TABLE.number
 
 # what is settled
 SURE = _number("sure", 0.95, "1", "probability with which sets are to be distinguished: the usual one of intervals")

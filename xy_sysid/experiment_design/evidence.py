@@ -59,7 +59,7 @@ def nats(sets: tuple[Belief, Belief], model: AxisModel, item: Recorded, rounds: 
     What each set has to leave of the data at hand counts for both.
     """
     own, rival = sets
-    least = expected_error(item, own)
+    least, count = expected_error(item, own), item.windows.begins.size
     lines = item.objective.lines > 0.0
     weight = (lines / np.sqrt(least))[item.windows.layout.band]
     centre = rival.inner(rival.model)
@@ -74,7 +74,7 @@ def nats(sets: tuple[Belief, Belief], model: AxisModel, item: Recorded, rounds: 
             break
         off = inner - centre
         score = item.objective.of_power(least + power)
-        best = min(best, _all(item, score) + 0.5 * float(off @ rival.precision @ off))
+        best = min(best, item.objective.nats(score, count) + 0.5 * float(off @ rival.precision @ off))
         if last == rounds:
             break
         columns = (slopes(item, rival, other, now) * weight).reshape(inner.size, -1).view(np.float64)
@@ -84,13 +84,8 @@ def nats(sets: tuple[Belief, Belief], model: AxisModel, item: Recorded, rounds: 
         inner = inner + np.linalg.lstsq(columns @ columns.T + rival.precision, columns @ left - rival.precision @ off)[0]
         inner = rival.scale.inner(rival.scale.outer(inner))
     drawn = own.inner(model) - own.inner(own.model)
-    truth = _all(item, item.objective.of_power(least)) + 0.5 * float(drawn @ own.precision @ drawn)
+    truth = item.objective.nats(item.objective.of_power(least), count) + 0.5 * float(drawn @ own.precision @ drawn)
     return max(best - truth, 0.0) if math.isfinite(best) else 1e6
-
-
-def _all(item: Recorded, score: float) -> float:
-    """Nats of all windows for a score in nats a line."""
-    return 0.5 * item.objective.count * score * item.windows.begins.size
 
 
 def settled(each: Sequence[Sequence[Power]], seconds: float) -> float:

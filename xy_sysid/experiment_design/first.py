@@ -28,7 +28,7 @@ from xy_sysid.experiment_design.proposals import proposals
 from xy_sysid.greybox.axis_data import EPSILON, WINDOWS
 from xy_sysid.greybox.floor import bands
 from xy_sysid.greybox.least_squares import Scale
-from xy_sysid.greybox.parameters import Z95
+from xy_sysid.response.frf import Z95
 
 CROSSES = (0.3, 10.0)  # s in which an axis crosses its travel at full voltage
 POLE = (5.0, 500.0)  # rad/s

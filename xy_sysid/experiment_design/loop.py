@@ -102,9 +102,9 @@ class Question:
     units: Units = USUAL
 
 
-def best_design(setting: Setting, beliefs: Sequence[Belief], limits: MachineLimits) -> NextChoice:
-    """The experiment of ``design``; none where none may tell."""
-    found: Design = design(setting, beliefs, limits)
+def best_design(setting: Setting, beliefs: Sequence[Belief], limits: MachineLimits, tell: Callable[[float], None] = lambda part: None) -> NextChoice:
+    """The experiment of ``design``; none where none may tell. tell: called with the part that is done."""
+    found: Design = design(setting, beliefs, limits, tell=tell)
     return NextChoice(found.best.experiment if found.best is not None and found.helps else None, found)
 
 

@@ -7,18 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 from threadpoolctl import threadpool_limits
 
 from xy_sysid.axis.model import STANDARD, Library
 from xy_sysid.diagnosis.of_run import diagnose
-from xy_sysid.experiment_design.beliefs import Belief
-from xy_sysid.experiment_design.design import design, expects
+from xy_sysid.experiment_design.design import expects
 from xy_sysid.experiment_design.experiment import Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
-from xy_sysid.experiment_design.loop import Budget, Decision, Ending, NextChoice, Question, after, decide
+from xy_sysid.experiment_design.loop import Budget, Decision, Ending, Question, after, best_design, decide
 from xy_sysid.experiment_design.of_run import NextExperiment, Tell, answered, check_enough
-from xy_sysid.experiment_design.prediction import Setting
 from xy_sysid.experiment_design.rivals import names_of, possible
 from xy_sysid.greybox.axis_data import EPSILON, prepare_all
 from xy_sysid.samples.recording import Run
@@ -73,15 +72,12 @@ def step(plan: WalkPlan, runs: Sequence[Run], before: WalkStep | None = None, te
     check_enough(found)
     rate, signals, units = runs[0].sampling_rate, [(run.voltage, run.position) for run in runs], runs[0].units
     limits = replace(plan.limits, start=float(runs[-1].position[-1]), units=units)
-
-    def choose(setting: Setting, beliefs: Sequence[Belief], among: MachineLimits) -> NextChoice:
-        made = design(setting, beliefs, among, tell=tell)
-        return NextChoice(made.best.experiment if made.best is not None and made.helps else None, made)
-
     with threadpool_limits(1, "blas"):
         sets = plan.sets or possible(prepare_all(rate, signals, plan.tolerance, units), plan.library, found)
         question = Question(sampling_rate=rate, recordings=signals, sets=sets, library=plan.library, tolerance=plan.tolerance, units=units)
-        decision = decide(question, (), limits, choose, before.decision.standing if before is not None else None, plan.budget.draws)
+        decision = decide(
+            question, (), limits, partial(best_design, tell=tell), before.decision.standing if before is not None else None, plan.budget.draws
+        )
         experiments = before.experiments + 1 if before is not None else 0
         seconds = before.seconds + before.following.seconds if before is not None and before.following is not None else 0.0
         follows = after(decision, plan.budget, experiments, seconds)

@@ -80,7 +80,7 @@ def choose(frf: FrequencyResponse, family: Structure, thorough: bool = True) -> 
     data = independent_data(frf, len(now.frequency))
     scale = max(1.0, excess(now))
     trials = {(fit.structure.numerator_order, fit.structure.denominator_order): fit for fit in tried}
-    ranked = sorted((_trial(fit, data, scale) for fit in trials.values()), key=lambda item: item.length)
+    ranked = sorted((OrderTrial.of(fit, data, scale) for fit in trials.values()), key=lambda item: item.length)
     base = "a rigid body" if rigid.structure.denominator_order > max(family.integrators, 1) else "an integrator" if family.integrators else "a lag"
     reason = f"Orders {_orders(now)}, chosen from the data: {base}{' with delay' if family.free_delay else ''} has {_times(rigid)}"
     reason += "".join(f"; {text}" for text in words)
@@ -194,10 +194,6 @@ def _misfit(fit: Fit, richer: Fit, added: tuple[Mode, ...]) -> float:
         bottom, top = min(beside, mode.frequency) / NEAR, max(beside, mode.frequency) * NEAR
         inside |= (fit.frequency >= bottom) & (fit.frequency <= top)
     return max(float(np.sum((parts - noise)[inside])), 0.0)
-
-
-def _trial(fit: Fit, data: float, scale: float) -> OrderTrial:
-    return OrderTrial(fit.structure.numerator_order, fit.structure.denominator_order, fit.cost, description_length(fit, data, scale))
 
 
 def _orders(fit: Fit) -> str:

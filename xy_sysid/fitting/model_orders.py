@@ -28,6 +28,11 @@ class OrderTrial:
     cost: float
     length: float
 
+    @staticmethod
+    def of(fit: Fit, data: float, scale: float = 1.0) -> OrderTrial:
+        """The trial of a fit; data, scale: see ``description_length``."""
+        return OrderTrial(fit.structure.numerator_order, fit.structure.denominator_order, fit.cost, description_length(fit, data, scale))
+
 
 def independent_data(frf: FrequencyResponse, lines: int) -> float:
     """Real numbers' worth of independent data in so many lines, whose errors are correlated."""
@@ -41,7 +46,7 @@ def try_orders(frf: FrequencyResponse, fit: Fit) -> tuple[OrderTrial, ...]:
     """
     asked = fit.structure
     data = independent_data(frf, len(fit.frequency))
-    found = [_trial(fit, data)]
+    found = [OrderTrial.of(fit, data)]
     excess = asked.denominator_order - asked.numerator_order
     seen = {(asked.numerator_order, asked.denominator_order)}
     for order in range(max(asked.integrators + 1, asked.denominator_order - WIDER), min(12, asked.denominator_order + WIDER) + 1):
@@ -52,7 +57,7 @@ def try_orders(frf: FrequencyResponse, fit: Fit) -> tuple[OrderTrial, ...]:
             seen.add(orders)
             trial = _fitted(frf, replace(asked, numerator_order=orders[0], denominator_order=orders[1], weighting="sigma"))
             if trial is not None:
-                found.append(_trial(trial, data))
+                found.append(OrderTrial.of(trial, data))
     return tuple(sorted(found, key=lambda item: item.length))
 
 
@@ -65,9 +70,5 @@ def _fitted(frf: FrequencyResponse, structure: Structure) -> Fit | None:
 
 
 def description_length(fit: Fit, data: float, scale: float = 1.0) -> float:
-    """nats; scale: cost over that of noise alone which no model gets below."""
+    """nats; data: independent real numbers; scale: cost over that of noise alone which no model gets below."""
     return fit.cost / scale + 0.5 * fit.structure.parameters * math.log(max(data, 2.0))
-
-
-def _trial(fit: Fit, data: float) -> OrderTrial:
-    return OrderTrial(fit.structure.numerator_order, fit.structure.denominator_order, fit.cost, description_length(fit, data))

@@ -139,9 +139,9 @@ def _diagnosis(recording: Recording, run: Run, plan: Plan) -> Row:
         "noise": found.noise,
         "discrepancy": found.discrepancy,
     }
-    if not found.rungs:  # not enough data
+    named = found.told
+    if named is None:  # not enough data
         return row | {"noise": None, "discrepancy": None, "explained": None}
-    named = found.rungs[-1] if found.effects else found.rungs[0]
     row |= _of_rung(named) | {"rigid_error": found.rungs[0].held_out_error, "tried_first": _listed(found.tried_first)}
     return row | _followed(runs, plan, found) if plan.follow else row
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 
@@ -124,12 +124,6 @@ class AxisData:
         places = self.steps if signal.size == self.velocity.size else self.runs
         return np.concatenate([signal[part.start : part.start + count] for part, count in zip(places, self.early, strict=True)])
 
-    @property
-    def moving(self) -> float:
-        """rms of the motion in held-out windows divided by that in fitted windows."""
-        held, fitted = (float(np.mean(np.abs(windows.spectrum(self.velocity)) ** 2)) for windows in (self.held, self.fitted))
-        return float(np.sqrt(held / fitted)) if fitted > 0.0 else 0.0
-
     @cached_property
     def similar(self) -> Similarity:
         """Ratio of this motion to that of the reference machine, for which the bounds of effects are given."""
@@ -152,16 +146,17 @@ class AxisData:
         way = sum(float(np.sum(np.abs(np.diff(self.position[run][::apart])))) for run in self.runs)
         return way < ONCE * (self.reach[1] - self.reach[0])
 
+    def begins(self, signal: FloatArray) -> FloatArray:
+        """(n - r,) of a signal (n,), such as the voltage: at the beginning of each sample."""
+        return np.concatenate([signal[run][:-1] for run in self.runs])
+
     def middle(self) -> FloatArray:
         """(n - r,) measured position at the middle of each sample, m."""
         return np.concatenate([0.5 * (self.position[run][1:] + self.position[run][:-1]) for run in self.runs])
 
     def held_samples(self) -> NDArray[np.bool_]:
         """(n - r,) those of ``velocity`` in a window that is held out."""
-        inside = np.zeros(self.velocity.size, dtype=np.bool_)
-        for begin in self.held.begins:
-            inside[begin : begin + self.layout.length] = True
-        return inside
+        return self.held.covered(self.velocity.size)
 
     def first_windows(self) -> Windows:
         """Every window of the first stage, fitted and held out; those held out alone where the first stage is all that there is."""
@@ -169,13 +164,6 @@ class AxisData:
             return self.held
         both = np.sort(np.concatenate((self.brief.begins, _within(self.held, self.steps, self.early).begins)))
         return Windows(self.layout, np.unique(both))
-
-    def longest(self) -> AxisData:
-        """The longest recording alone."""
-        if len(self.starts) == 1:
-            return self
-        run = max(self.runs, key=lambda part: part.stop - part.start)
-        return prepare(self.sampling_rate, self.voltage[run], self.position[run], self.floor.epsilon, self.units)
 
 
 def prepare(sampling_rate: float, voltage: FloatArray, position: FloatArray, epsilon: float = EPSILON, units: Units = USUAL) -> AxisData:
@@ -255,12 +243,6 @@ def _within(windows: Windows, steps: Sequence[slice], early: Sequence[int] | NDA
         inside = (windows.begins >= step.start) & (windows.begins + windows.layout.length <= step.start + count)
         found.append(windows.begins[inside] - step.start + offset)
     return Windows(windows.layout, np.concatenate(found))
-
-
-def loosened(data: AxisData, epsilon: float) -> AxisData:
-    """The same axis with a larger tolerance."""
-    both = Windows(data.layout, np.concatenate((data.fitted.begins, data.held.begins)))
-    return replace(data, floor=replace(floor(both, data.velocity, data.floor.encoder, epsilon), response=data.floor.response))
 
 
 def _begins(length: int, start: int, stop: int) -> NDArray[np.int64]:

@@ -99,9 +99,12 @@ class Windows:
         found = np.asarray(scipy.fft.rfft(cut)[..., : self.layout.band.size])
         return found * self.layout.amplitude if self.layout.sensed == "acceleration" else found
 
-    def before(self, samples: int) -> Windows:
-        """Those that end within the first samples."""
-        return Windows(self.layout, self.begins[self.begins + self.layout.length <= samples])
+    def covered(self, samples: int) -> NDArray[np.bool_]:
+        """(samples,) those in any of the windows."""
+        inside = np.zeros(samples, dtype=np.bool_)
+        for begin in self.begins:
+            inside[begin : begin + self.layout.length] = True
+        return inside
 
     @property
     def end(self) -> int:

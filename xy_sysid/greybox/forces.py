@@ -122,10 +122,10 @@ def _pushed_alike(data: AxisData, model: AxisModel, name: str, begun: AxisModel,
     return begun.with_effect(other.name, _least(left, np.array(dict(begun.effects)[other.name]), other.on(data.similar)))
 
 
-def _rubbing(data: AxisData, model: AxisModel, name: str, relative: Effect, drags: tuple[float, float] = (0.1, 10.0)) -> AxisModel:
+def _rubbing(data: AxisData, model: AxisModel, name: str, relative: Effect) -> AxisModel:
     """``stood_in`` of two laws of dry friction: their levels at the speeds of the measured motion, the faster the more, as their power is.
 
-    What of the old one falls or rises with the speed, the base's drag takes over, at the same inertia; drags: its bounds, times what it was.
+    What of the old one falls or rises with the speed, the base's drag takes over, at the same inertia, from a tenth to ten times what it was.
     """
     moving = data.velocity[data.velocity != 0.0]
     speeds = np.quantile(moving, np.linspace(0.0, 1.0, SPEEDS))
@@ -137,23 +137,10 @@ def _rubbing(data: AxisData, model: AxisModel, name: str, relative: Effect, drag
         return np.asarray(size * (_levels(relative, values[:-1], speeds) + (values[-1] - drag) * np.abs(speeds) - rubbed))
 
     items, begun = relative.on(data.similar), dict(of_one_name(data, model, name, relative).effects)[relative.name]
-    dragged = Parameter("drag", "V s/m", drags[0] * drag, drags[1] * drag, drag, "of the base")
+    dragged = Parameter("drag", "V s/m", 0.1 * drag, 10.0 * drag, drag, "of the base")
     *values, more = _least(left, np.array([*begun, drag]), [*items, dragged])
     slower = float(drag / more)
     return replace(model.without(name), gain=model.gain * slower, pole=model.pole / slower).with_effect(relative.name, values)
-
-
-def braked(data: AxisData, model: AxisModel, name: str, relative: Effect) -> list[AxisModel]:
-    """The model with a richer law of dry friction in the place of a simple one, and two, four and eight times the base's drag.
-
-    All brake as the model does, as well as they can without a parameter at its bound: of a friction that falls with the speed a simple
-    law makes drag that is missing.
-    """
-    if not model.library[name].category == relative.category == "friction" or not np.any(data.velocity != 0.0):
-        return []
-    found = [_rubbing(data, model, name, relative, (times, times * 1.01)) for times in (2.0, 4.0, 8.0)]
-    low, high = (np.array([getattr(item, side) for item in relative.on(data.similar)]) for side in ("low", "high"))
-    return [one for one in found if np.all((low * 1.01 < dict(one.effects)[relative.name]) & (dict(one.effects)[relative.name] < high))]
 
 
 def pushes(effect: Effect) -> bool:

@@ -17,7 +17,7 @@ from xy_sysid.axis.model import FINE, STANDARD, AxisModel, Library, undoer
 from xy_sysid.effects import Effect, Scene
 from xy_sysid.effects._contract import in_time
 from xy_sysid.errors import BadInput
-from xy_sysid.greybox.axis_data import EPSILON, AxisData, loosened, prepare, prepare_all
+from xy_sysid.greybox.axis_data import EPSILON, AxisData, prepare, prepare_all
 from xy_sysid.greybox.forces import force_of, friction_of, pushing, rubbing
 from xy_sysid.greybox.least_squares import Scale, Schedule, Solution, Target, solve
 from xy_sysid.greybox.objective import Objective
@@ -39,7 +39,6 @@ __all__ = [
     "fit_base",
     "fit_with",
     "look",
-    "loosened",
     "prepare",
     "prepare_all",
     "screened",

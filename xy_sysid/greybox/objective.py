@@ -67,6 +67,10 @@ class Objective:
         """The same of a mean power (bands,), nats a line."""
         return float(self.each(power[None, :], spectrum)[0]) / max(0.5 * self.count, 1.0)
 
+    def nats(self, score: float, windows: int) -> float:
+        """A score, nats a line, over all lines of so many half overlapping windows, of which every other one is independent."""
+        return 0.5 * self.count * score * windows
+
     def of_power(self, power: FloatArray) -> float:
         """Score of an error's power (bands,), nats a line, with the unmodelled force and motion that suit it."""
         return self.score(power, self.spectrum(power))

@@ -19,8 +19,9 @@ from xy_sysid.effects._contract import PATIENT, Beside, DryFriction, Followed, L
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.floor import count_size
 from xy_sysid.greybox.free_run import AxisData, GreyboxFit
-from xy_sysid.greybox.parameters import Z95, Estimate, unit_of
+from xy_sysid.greybox.parameters import Estimate, unit_of
 from xy_sysid.greybox.score_test import bounded
+from xy_sysid.response.frf import Z95
 
 AT_NOISE = 3.5  # held-out innovation over the encoder's noise up to which an effect explains the axis
 BETTER = 2.0  # innovation without the effect over that with it, at least
@@ -50,6 +51,8 @@ def followed(
     """As ``one_step_fit``, with the filter's own result, from which a next fit can begin."""
     if effect.one_step is None:
         raise BadInput(f"effect {effect.name}", "no one-step prediction", "an effect that has one", "Fit it by simulation.")
+    if len(data.starts) > 1:
+        raise BadInput(f"stretches for {effect.name}", len(data.starts), "one, as a filter runs through it", "Give one recording without a gap.")
     library = base.model.library
     dry, others = beside(base.model, effect)
     for name, values in new:

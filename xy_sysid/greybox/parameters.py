@@ -16,10 +16,10 @@ from xy_sysid.axis.model import AxisModel, simulator, start_of
 from xy_sysid.effects import Parameter
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.least_squares import Predictor, Scale, Solution
+from xy_sysid.response.frf import Z95
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.tables import Table
 
-Z95 = 1.959964
 BEGINS = 2000.0  # Hz: sub-steps in which a start is looked for
 
 

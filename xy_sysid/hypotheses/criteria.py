@@ -20,14 +20,20 @@ class Criterion:
     because: str
 
 
-TABLE: list[Criterion] = []
 N = TypeVar("N", int, float)
 
 
-def _number(name: str, value: N, unit: str, because: str) -> N:
-    TABLE.append(Criterion(name, value, unit, because))
-    return value
+class Criteria(list[Criterion]):
+    """A table of such numbers, which grows by one wherever a module gives itself one."""
 
+    def number(self, name: str, value: N, unit: str, because: str) -> N:
+        """The value, which stands in the table with its reason."""
+        self.append(Criterion(name, value, unit, because))
+        return value
+
+
+TABLE = Criteria()
+_number = TABLE.number
 
 PRICE = _number("price", 4.0, "nats", "cost of a parameter: half the logarithm of the number of independent lines (Schwarz 1978)")
 CHANCE = _number("chance", 0.977, "1", "least probability that a held-out gain is real: two standard errors")

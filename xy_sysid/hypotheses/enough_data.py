@@ -15,12 +15,6 @@ from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import USUAL, Units
 
 
-def lacking(sampling_rate: float, recordings: Sequence[tuple[FloatArray, FloatArray]], units: Units = USUAL) -> str:
-    """What is missing in the data, in words; empty if they suffice."""
-    found = prepared(sampling_rate, recordings, units=units)
-    return found if isinstance(found, str) else ""
-
-
 def prepared(
     sampling_rate: float, recordings: Sequence[tuple[FloatArray, FloatArray]], epsilon: float = EPSILON, units: Units = USUAL
 ) -> AxisData | str:

@@ -114,7 +114,7 @@ class OneStepTrials:
         grew = grown(pool.data, node.fit, pool.library[name], wanted)
         self.fitted[key] = grew
         result = Filtered((*self._up_to(node), *grew.rungs), bar, error_without(pool.data, grew.found))
-        if name in result.rungs[-1][1].model and result.wins:
+        if name in result.rungs[-1][1].model and result.wins and not grew.found.too_small:
             self.found = result
 
     def _up_to(self, node: Node) -> list[tuple[str, GreyboxFit]]:

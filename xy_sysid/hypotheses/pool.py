@@ -271,9 +271,8 @@ class Pool:
 
     def _near(self) -> float:
         """The score up to which a screening fit is followed by a full fit."""
-        best = self.score(self.answer)
-        rigid = max(self.score(node) for node in self.nodes.values() if node.whole)
-        return best + NEAR * (rigid - best) + PRICE
+        best, first = self.score(self.answer), self.score(self.nodes[self.kept])
+        return best + NEAR * (first - best) + PRICE
 
     def _inside(self, node: Node) -> list[Node]:
         """The sets that a set contains and that have a full fit."""
@@ -306,9 +305,10 @@ class Pool:
                 if effects not in self.nodes and not self.late():
                     yield effects
                 node = self.fitted(effects, begun)
-                if node is None or node.refused or (self.late() and not node.whole) or self._is_better(best, node):
+                if node is None or self._is_better(best, node):
                     continue
-                if not self._is_better(best, self.finished(node)):
+                self.finished(node)  # a quick fit refuses what all data may tell, and takes what they refuse
+                if node.whole and not node.refused and not self._is_better(best, node):
                     simpler = node
                     break
             if simpler is None:

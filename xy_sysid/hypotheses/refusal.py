@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from xy_sysid.axis.model import Library
-from xy_sysid.effects import Effect
+from xy_sysid.effects import Effect, Parameter
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.hypotheses.criteria import FEWEST
@@ -28,8 +28,7 @@ def refusal(data: AxisData, library: Library, found: GreyboxFit, given: frozense
         if data.passed_once and effect.is_by_place and not _repeats(data, effect, values):
             return f"{name}: each position is passed only once, so an effect of position cannot be distinguished from a drift"
         for k, (item, value) in enumerate(zip(effect.on(data.similar), values, strict=True)):
-            edge = value >= item.high * (1.0 - 1e-6) or (k == 0 and not item.positive and value <= item.low * (1.0 + 1e-6) and item.low > 0.0)
-            if k == 0 and edge:
+            if k == 0 and at_bound(item, value):
                 return f"{name}: {item.name} is at its bound"
             if k == 0 and _is_none(data, effect, found):
                 return f"{name}: {item.name} cannot be distinguished from 0"
@@ -39,6 +38,12 @@ def refusal(data: AxisData, library: Library, found: GreyboxFit, given: frozense
     if found.model.delay >= 0.99 * limit:
         return f"time_delay: {found.model.delay:.3g} s is at its bound"
     return ""
+
+
+def at_bound(item: Parameter, value: float) -> bool:
+    """A size is the largest that is looked for, of a size with a sign on either side."""
+    ends = (item.high,) if item.positive else (item.low, item.high)
+    return any(end != 0.0 and abs(value - end) <= 1e-6 * abs(end) for end in ends)
 
 
 def none_of(data: AxisData, found: GreyboxFit) -> str:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from xy_sysid.errors import BadRecording
 from xy_sysid.imports import instants
 from xy_sysid.imports.foreign_units import MOTIONS, Unit, to_si
-from xy_sysid.imports.limits import MOST_COLUMNS, fits
+from xy_sysid.imports.limits import COPY, MOST_COLUMNS, fits
 from xy_sysid.imports.reading import Reading
 from xy_sysid.imports.sheet import Column, Sheet
 from xy_sysid.imports.sheet_table import same_unit, scaled
@@ -28,7 +28,6 @@ from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import Recording
 
 Arrays = Mapping[str, NDArray[Any]]
-COPY = "Take another copy of the file."
 DAMAGED = (
     *(OSError, ValueError, EOFError, KeyError, TypeError, IndexError, NotImplementedError, SyntaxError),
     *(tokenize.TokenError, zipfile.BadZipFile, zlib.error, struct.error),

@@ -14,11 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xy_sysid.errors import BadRecording, MissingExtra
-from xy_sysid.imports.limits import fits, room
+from xy_sysid.imports.limits import COPY, fits, room
 
 CHILD = Path(__file__).with_name("guarded_child.py")
 LIBRARIES = Path(__file__).parent / "libraries"
-COPY = "Take another copy of the file."
 LONGEST = 120.0  # s for any file that fits in memory
 
 

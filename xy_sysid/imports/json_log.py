@@ -12,13 +12,12 @@ import numpy as np
 
 from xy_sysid.errors import BadRecording
 from xy_sysid.imports.arrays import rate_of
-from xy_sysid.imports.limits import MOST_COLUMNS, fits
+from xy_sysid.imports.limits import COPY, MOST_COLUMNS, fits
 from xy_sysid.imports.sheet import Column, Sheet
 
 COPIES = 8  # bytes in memory for one in the file
 DEEPEST = 24  # levels
 FEW = 32  # numbers of one vector, such as the joints of an arm
-COPY = "Take another copy of the file."
 
 
 def sheet(path: Path) -> Sheet:

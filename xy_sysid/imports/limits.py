@@ -7,6 +7,7 @@ from pathlib import Path
 
 from xy_sysid.errors import BadRecording
 
+COPY = "Take another copy of the file."  # what to do about a file that is damaged
 SHARE = 0.6  # of the machine's memory that a recording may take
 MOST_COLUMNS = 10_000  # of a table, or arrays of a file; no recording has more signals
 COPIES = 4  # times its size that reading and pairing need while they work

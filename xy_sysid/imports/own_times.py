@@ -14,13 +14,13 @@ import numpy as np
 
 from xy_sysid.errors import BadRecording
 from xy_sysid.imports.even import between
+from xy_sysid.imports.paired_streams import HOLLOW
 from xy_sysid.imports.roles import Found, Roles
 from xy_sysid.imports.sheet import Column
 from xy_sysid.samples.block import FloatArray
 
 SAME = 1e-9  # s; instants that differ by less are one
 APART = 0.1  # of the rows with a first output; where more lack an input or another output, each column has a time of its own
-HARDLY = 0.5  # of the first output's rows; an axis that has fewer numbers is left out
 
 
 def clocked(roles: Roles) -> bool:
@@ -37,7 +37,7 @@ def with_own_times(roles: Roles, time: FloatArray, notes: list[str]) -> Roles:
     there = {column.name: np.isfinite(column.values) & np.isfinite(time) for column in sides}
     first = max(roles.outputs.values(), key=lambda column: int(np.sum(there[column.name])))
     rows = there[first.name]
-    axes = [axis for axis, column in roles.outputs.items() if np.sum(there[column.name]) > HARDLY * np.sum(rows)]
+    axes = [axis for axis, column in roles.outputs.items() if np.sum(there[column.name]) > (1.0 - HOLLOW) * np.sum(rows)]
     used = [side[axis] for side in (roles.inputs, roles.outputs) for axis in axes]
     if all(np.sum(rows & ~there[column.name]) <= APART * np.sum(rows) for column in used) or any(np.sum(there[column.name]) < 2 for column in used):
         return roles

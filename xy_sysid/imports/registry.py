@@ -11,7 +11,7 @@ from xy_sysid.bags.opening import regular_file
 from xy_sysid.errors import BadRecording
 from xy_sysid.imports import guarded
 from xy_sysid.imports.leaves import sheet_of_leaves
-from xy_sysid.imports.limits import fits
+from xy_sysid.imports.limits import COPY, fits
 from xy_sysid.imports.sheet import Sheet
 
 TEXT = (".csv", ".txt", ".tsv", ".dat", ".asc", ".lvm", ".prn", ".log")
@@ -70,7 +70,7 @@ def format_of(path: Path) -> Format:
         raise BadRecording(path, f"a file of kind {path.suffix!r}, which is not a recording", f"Give {KINDS}.")
     regular_file(path)
     if path.stat().st_size == 0:
-        raise BadRecording(path, "the file is empty (0 bytes)", "Take another copy of the file.")
+        raise BadRecording(path, "the file is empty (0 bytes)", COPY)
     head = _head(path)
     return next(one for one in FORMATS if suffix in one.endings and re.match(one.begins, head))
 

@@ -45,29 +45,36 @@ class Desk:
         self._recording = load(path, **reading.load, progress=lambda part: say(WorkerNews("progress", words=f"reading {path.name}", part=part)))
         self._stories: dict[str, Any] = {}
         seconds, rate = self._recording.duration, self._recording.sampling_rate
-        told = {"axes": list(self._recording.axes), "seconds": seconds, "rate": rate, "notes": list(self._recording.notes)}
+        told = {
+            "axes": list(self._recording.axes),
+            "seconds": seconds,
+            "rate": rate,
+            "notes": [*self._recording.notes, *self._recording.left_out(self._recording.axes)],
+        }
         told["effects"] = [effect.name for effect in self._library.acting]
         say(WorkerNews("opened", content=told))
 
     def do(self, order: Order) -> None:
         """One order, as the node and the replay do theirs (``story.acts``); raises XySysidError in a sentence, or Left."""
         from xy_sysid.greybox.free_run import EPSILON
+        from xy_sysid.samples.moves import several_moves
         from xy_sysid.story.acts import Job
         from xy_sysid.story.story import added, diagnosed, removed
 
-        run = self._recording.run(order.axis)
+        runs = self._recording.stretches(order.axis)
+        several_moves(runs)
         story = None if order.act in ("begin", "reset") else self._stories.get(order.axis)
         if story is None:
-            self._perform(order, Job(act="begin", run=run, story=None, effects=(), tolerance=EPSILON))
+            self._perform(order, Job(act="begin", run=runs[0], story=None, effects=(), tolerance=EPSILON, more=runs[1:]))
             story = self._stories[order.axis]
         if order.act == "diagnose":  # the data are the same as before: the model stays what it is
-            self._keep(order, diagnosed(story, run, self._library, time.process_time))
+            self._keep(order, diagnosed(story, runs, self._library, time.process_time))
         elif order.act == "add":
-            self._keep(order, added(story, run, order.argument, self._library))
+            self._keep(order, added(story, runs, order.argument, self._library))
         elif order.act == "remove":
-            self._keep(order, removed(story, run, order.argument, self._library))
+            self._keep(order, removed(story, runs, order.argument, self._library))
         elif order.act in ("next", "auto"):
-            self._perform(order, Job(act=ACTS[order.act], run=run, story=story, effects=story.effects, tolerance=EPSILON))
+            self._perform(order, Job(act=ACTS[order.act], run=runs[0], story=story, effects=story.effects, tolerance=EPSILON, more=runs[1:]))
 
     def _perform(self, order: Order, job: Job) -> None:
         """Each step is shown as it comes."""

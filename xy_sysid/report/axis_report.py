@@ -19,9 +19,11 @@ from xy_sysid.diagnosis.refine import never
 from xy_sysid.errors import BadInput
 from xy_sysid.fitting.of_recording import judged, split
 from xy_sysid.fitting.verdicts import Validation, validate
+from xy_sysid.greybox.axis_data import SHORTEST
 from xy_sysid.report.signals import excitation, motion
 from xy_sysid.report.study import AxisStudy, study_axis
-from xy_sysid.samples.recording import Recording
+from xy_sysid.samples.moves import several_moves
+from xy_sysid.samples.recording import Recording, Run
 from xy_sysid.settings import IdentifierSettings
 from xy_sysid.story.document import document
 from xy_sysid.story.story import tell as whole_story
@@ -89,10 +91,11 @@ def axis_reports(
 
 def _report(recording: Recording, axis: str, wanted: Wanted, tell: Tell, fits: Callable[[], Any]) -> AxisReport:
     """All that can be said about one axis; what cannot is said in words."""
-    note = ""
-    run = recording.run(axis) if len(recording) else None
-    if run is not None and len(run) > round(LONGEST * run.sampling_rate):
-        note = f"The diagnosis uses the first {LONGEST:g} s of the longest stretch, of {run.seconds:.4g} s."
+    runs = recording.stretches(axis) if len(recording) else ()
+    seconds, notes = sum(run.seconds for run in runs), [text.partition(": ")[2] for text in recording.left_out((axis,))]
+    if seconds > LONGEST:
+        stretches = "the longest stretch" if len(runs) == 1 else f"{len(runs)} stretches"
+        notes.append(f"The diagnosis uses the first {LONGEST:g} s of {stretches}, of {seconds:.4g} s.")
     story, problem = None, ""
     tell(axis, STAGES[1])
     try:
@@ -101,7 +104,7 @@ def _report(recording: Recording, axis: str, wanted: Wanted, tell: Tell, fits: C
         problem = str(refusal)
     studied, verdicts = fits()
     speed = float("nan") if story is None else _speed(recording, axis)
-    return AxisReport(study=studied, verdicts=verdicts, story=story, speed=speed, problem=problem, note=note)
+    return AxisReport(study=studied, verdicts=verdicts, story=story, speed=speed, problem=problem, note="; ".join(notes))
 
 
 def _studied(recording: Recording, axis: str, settings: IdentifierSettings, period: int | None) -> tuple[AxisStudy, Validation | None]:
@@ -124,7 +127,19 @@ def _studied(recording: Recording, axis: str, settings: IdentifierSettings, peri
 def told(recording: Recording, axis: str, wanted: Wanted) -> Mapping[str, Any]:
     """The document of the whole story of an axis, of at most LONGEST. Raises BadInput for samples that cannot be judged."""
     clock = never if wanted.budget == math.inf else time.process_time
-    return document(whole_story(recording.run(axis).until(LONGEST), wanted.library, clock, wanted.budget))
+    return document(whole_story(_stretches(recording, axis), wanted.library, clock, wanted.budget))
+
+
+def _stretches(recording: Recording, axis: str) -> tuple[Run, ...]:
+    """All stretches of an axis as ``diagnose`` has them, of at most LONGEST together. Raises BadInput where they hold one move only."""
+    runs = recording.stretches(axis)
+    several_moves(runs)
+    found, left = [], LONGEST
+    for run in runs:
+        if left * run.sampling_rate >= SHORTEST:
+            found.append(run.until(left))
+            left -= run.seconds
+    return tuple(found)
 
 
 def _speed(recording: Recording, axis: str) -> float:

@@ -254,6 +254,20 @@ class Recording:
         longest = sorted(found, key=len, reverse=True)[:MOST_STRETCHES]
         return tuple(sorted(longest, key=lambda run: run.first))
 
+    def left_out(self, axes: Sequence[str]) -> tuple[str, ...]:
+        """What is in none of the ``stretches`` of these axes, a sentence for each of which something is left out."""
+        found = ((axis, self._left_out(axis)) for axis in axes if len(self))
+        return tuple(f"axis {axis}: left out {said}" for axis, said in found if said)
+
+    def _left_out(self, axis: str) -> str:
+        used = self.stretches(axis)
+        whole = [next(_size(part) for part in self.runs() if part.start <= run.first < part.stop) for run in used]
+        ends = sum(size - len(run) for size, run in zip(whole, used, strict=True)) / self.sampling_rate
+        short, rest = len(self.runs()) - len(used), (len(self) - sum(whole)) / self.sampling_rate
+        said = [f"{ends:.3g} s at the ends, where it is not driven and stands"] if ends else []
+        said += [f"{short} short {'stretch' if short == 1 else 'stretches'} between gaps, {rest:.3g} s"] if short else []
+        return " and ".join(said)
+
     def every_stretch(self, axis: str) -> tuple[Run, ...]:
         """All stretches of one axis without a gap, however short, complete as recorded. Raises BadInput if there is no such axis."""
         u, y = self.axis(axis)

@@ -25,7 +25,7 @@ class Job:
     act: ``begin`` fits the rigid model if there is no story yet, ``diagnose`` begins again with these samples and then has ``effects`` in
     the model, ``renew`` does so without asking what is missing, ``effects`` changes the effects and keeps the samples, ``add_next`` adds the
     best one, ``auto`` all that help
-    run: of the axis; story: so far, None to begin
+    run: of the axis; story: so far, None to begin; more: further stretches of the same axis
     """
 
     act: Act
@@ -33,11 +33,12 @@ class Job:
     story: Story | None
     effects: tuple[str, ...]
     tolerance: float
+    more: tuple[Run, ...] = ()
 
 
 def perform(job: Job, library: Library, clock: Callable[[], float] = never) -> Iterator[tuple[str, Story | None]]:
     """(what is being done now, None), and (what was done, the story so far) after each step. Raises BadInput for a wrong effect."""
-    run = job.run
+    run = (job.run, *job.more)
     story = None if job.act in ANEW else job.story
     if story is None:
         yield "fitting the rigid model", None

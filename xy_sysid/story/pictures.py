@@ -41,7 +41,7 @@ class Measured:
 
     frequency: (m,) Hz, log-spaced; magnitude, magnitude_low, magnitude_high: dB (m/V) with 95 % band; phase...: degrees
     coherence: (m,); trusted: (m,) bool: excited and coherent
-    time: (k,) s, middle of each bucket; velocity_low, velocity_high: (k,) m/s, least and most in it; position: (k,) m, mean
+    time: (k,) s, middle of each bucket, gaps left out; velocity_low, velocity_high: (k,) m/s, least and most in it; position: (k,) m, mean
     zoom_start: s; zoom_voltage, zoom_velocity: samples around the base's largest error
     held_out: (from, to), s, of each stretch that no fit has seen, except fits that are judged one sample ahead; those see none from ahead on
     """
@@ -129,18 +129,19 @@ def measured(data: AxisData, base: GreyboxFit) -> Measured:
         time=_means(np.arange(data.velocity.size) / data.sampling_rate),
         velocity_low=low,
         velocity_high=most,
-        position=_means(data.position[:-1]),
+        position=_means(data.begins(data.position)),
         held_out=_stretches(data),
         ahead=data.training / data.sampling_rate,
         zoom_start=start / data.sampling_rate,
-        zoom_voltage=data.voltage[start:stop].copy(),
+        zoom_voltage=data.begins(data.voltage)[start:stop].copy(),
         zoom_velocity=data.velocity[start:stop].copy(),
     )
 
 
 def pictures(data: AxisData, fitted: GreyboxFit, shown: Measured) -> Pictures:
     """The side of one fit. The error over the floor in bins has the ratio of the whole, held-out error over floor, in its mean power."""
-    position = data.position[0] + np.concatenate(([0.0], np.cumsum(fitted.simulated))) / data.sampling_rate
+    travelled = (np.concatenate(([0.0], np.cumsum(fitted.simulated[step]))) / data.sampling_rate for step in data.steps)
+    position = np.concatenate([data.position[run.start] + way for run, way in zip(data.runs, travelled, strict=True)])
     _, weight, point = _points(data)
     response = _mean_response(_response(data, position), weight, point)
     compared = _compared(data, fitted)
@@ -161,12 +162,12 @@ def pictures(data: AxisData, fitted: GreyboxFit, shown: Measured) -> Pictures:
         band_end=end,
         failing=compared.places,
         speed=_binned(speed, error, noise, SPEED_BINS),
-        place=_binned(data.position[:-1], error, noise, POSITION_BINS),
+        place=_binned(data.begins(data.position), error, noise, POSITION_BINS),
         time=_binned(time, error, noise, TIME_BINS),
         correlation=_correlation(data, fitted),
         velocity_low=low,
         velocity_high=most,
-        position=_means(position[:-1]),
+        position=_means(data.begins(position)),
         zoom_velocity=fitted.simulated[first : first + shown.zoom_velocity.size].copy(),
     )
 
@@ -185,6 +186,7 @@ def _compared(data: AxisData, fitted: GreyboxFit) -> Comparison:
         begins=first / data.sampling_rate,
         encoder=data.floor.encoder,
         held=None if fitted.one_step else (data.held, data.floor),
+        starts=(0,) if fitted.one_step else data.starts,
     )
     with contextlib.suppress(BadInput):
         found = compare_motion(fitted.simulated[first:], unseen)
@@ -222,7 +224,7 @@ def _rms(values: FloatArray) -> float:
 
 def _correlation(data: AxisData, fitted: GreyboxFit) -> ResidualCorrelation | None:
     try:
-        return residual_correlation(fitted.error, data.voltage[: fitted.error.size])
+        return residual_correlation(fitted.error, data.begins(data.voltage))
     except BadInput:
         return None
 
@@ -235,9 +237,12 @@ def _below(values: FloatArray, end: float, sampling_rate: float) -> FloatArray:
 
 
 def _response(data: AxisData, position: FloatArray) -> FrequencyResponse:
-    length = 2 ** int(np.log2(max(min(WINDOW * data.sampling_rate, data.position.size / 4.0), 16.0)))
+    longest = max(run.stop - run.start for run in data.runs)
+    length = 2 ** int(np.log2(max(min(WINDOW * data.sampling_rate, longest / 4.0), 16.0)))
     shape = WindowShape.of("hann", length, 0.5)
-    spectra = batch_spectra([(0, data.voltage, position)], shape, differenced=True)
+    firsts = np.cumsum([0, *(-(-(run.stop - run.start) // shape.hop) * shape.hop for run in data.runs)])  # each begins with a window
+    runs = [(int(first), data.voltage[run], position[run]) for first, run in zip(firsts, data.runs, strict=False)]
+    spectra = batch_spectra(runs, shape, differenced=True)
     return frequency_response(
         spectra, shape, data.sampling_rate, H1Options(differenced=True, band=(0.0, TOP * data.sampling_rate), min_coherence=COHERENT)
     )
@@ -303,12 +308,13 @@ def _means(values: FloatArray) -> FloatArray:
 
 def _zoom(data: AxisData, base: GreyboxFit) -> tuple[int, int]:
     """The samples around the largest error that is not encoder noise."""
-    width = min(int(ZOOM * data.sampling_rate), ZOOM_MOST, base.error.size)
+    width = min(int(ZOOM * data.sampling_rate), ZOOM_MOST, min(step.stop - step.start for step in data.steps))
     smooth = max(int(0.002 * data.sampling_rate), 1)
     power = scipy.signal.oaconvolve(base.error, np.full(smooth, 1.0 / smooth), mode="same") ** 2
     skip = min(int(0.5 * data.sampling_rate), power.size // 4)  # the simulation starts from rest
-    start = skip + int(np.argmax(power[skip:])) - width // 2
-    start = min(max(start, 0), base.error.size - width)
+    worst = skip + int(np.argmax(power[skip:]))
+    within = next(step for step in data.steps if worst < step.stop)  # of one recording
+    start = min(max(worst - width // 2, within.start), within.stop - width)
     return start, start + width
 
 

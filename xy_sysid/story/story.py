@@ -1,7 +1,7 @@
 """The story of one axis, from the rigid model to the noise floor: where the model fails, which effect is missing, and the error after each step.
 
-Each function takes a story and gives the next one. A story holds plain numbers and short pictures only: it can be sent to
-another process, and written as a document (``document``).
+Each function takes a story and gives the next one. ``run`` is a run of the axis, or all of its stretches. A story holds plain numbers and short
+pictures only: it can be sent to another process, and written as a document (``document``).
 """
 
 from __future__ import annotations
@@ -16,15 +16,14 @@ import numpy as np
 from xy_sysid.axis.model import STANDARD, AxisModel, Library, simulate
 from xy_sysid.diagnosis.answer import Answer, Rung
 from xy_sysid.diagnosis.diagnose import not_enough
-from xy_sysid.diagnosis.of_run import diagnose
+from xy_sysid.diagnosis.of_run import Data, diagnose, runs_together
 from xy_sysid.diagnosis.refine import Effort, never, refine, settle
 from xy_sysid.diagnosis.rungs import with_one_more
 from xy_sysid.errors import BadInput
-from xy_sysid.greybox.free_run import EPSILON, AxisData, GreyboxFit, fit, fit_base, prepare
+from xy_sysid.greybox.free_run import EPSILON, AxisData, GreyboxFit, fit, fit_base, prepare_all
 from xy_sysid.greybox.one_step import follower, one_step_fit
 from xy_sysid.hypotheses.criteria import MOST_EFFECTS
 from xy_sysid.hypotheses.enough_data import prepared
-from xy_sysid.samples.recording import Run
 from xy_sysid.settings import unknown_name
 from xy_sysid.story.pictures import Measured, Pictures, measured, pictures
 from xy_sysid.units import Units
@@ -67,21 +66,21 @@ class Story:
         return replace(self, rungs=self.rungs[:1], pictures=self.pictures[:1], note="")
 
 
-def begin(run: Run, library: Library = STANDARD, tolerance: float = EPSILON) -> Story:
+def begin(run: Data, library: Library = STANDARD, tolerance: float = EPSILON) -> Story:
     """The rigid base, fitted to gap-free samples; without steps, but with a diagnosis, if the data do not suffice."""
-    data = prepared(run.sampling_rate, [(run.voltage, run.position)], tolerance, run.units)
-    story = _none(run, tolerance)
+    runs, story = runs_together(run), _none(run, tolerance)
+    data = prepared(story.sampling_rate, [(one.voltage, one.position) for one in runs], tolerance, story.units)
     if isinstance(data, str):
-        return replace(story, diagnosis=not_enough(data, run.units))
+        return replace(story, diagnosis=not_enough(data, story.units))
     return _based(story, data, fit_base(data, library))
 
 
-def diagnosed(story: Story, run: Run, library: Library = STANDARD, clock: Callable[[], float] = never, budget: float = math.inf) -> Story:
+def diagnosed(story: Story, run: Data, library: Library = STANDARD, clock: Callable[[], float] = never, budget: float = math.inf) -> Story:
     """With the answer to: which effect is missing in the rigid base? The model stays what it is. budget, clock: see ``diagnosis.of_run``."""
     return replace(story, diagnosis=diagnose(run, library, budget, clock, tolerance=story.tolerance).plain(), note="")
 
 
-def added(story: Story, run: Run, name: str, library: Library = STANDARD) -> Story:
+def added(story: Story, run: Data, name: str, library: Library = STANDARD) -> Story:
     """With one more effect, everything refitted together, as the diagnosis did if it was its next step; a relative of the same family is replaced.
 
     Raises BadInput for a name that is unknown, in every model, or in this one.
@@ -102,7 +101,7 @@ def added(story: Story, run: Run, name: str, library: Library = STANDARD) -> Sto
     return _grown(story, data, found, (name,), () if relative is None else (relative,))
 
 
-def removed(story: Story, run: Run, name: str, library: Library = STANDARD) -> Story:
+def removed(story: Story, run: Data, name: str, library: Library = STANDARD) -> Story:
     """Without one effect, the rest refitted; raises BadInput if it is not in the model."""
     if name not in story.effects:
         raise BadInput("effect", repr(name), ", ".join(story.effects) or "none, the model is the rigid base", "Choose one that is in the model.")
@@ -110,7 +109,7 @@ def removed(story: Story, run: Run, name: str, library: Library = STANDARD) -> S
     return _grown(story, data, fit(data, _model(story.rungs[-1], library).without(name)), went=(name,))
 
 
-def next_best(story: Story, run: Run, library: Library = STANDARD) -> Story:
+def next_best(story: Story, run: Data, library: Library = STANDARD) -> Story:
     """With the effect that helps most now; with a note instead if nothing is left to explain, or nothing helps."""
     if story.now is None:
         return story
@@ -127,7 +126,7 @@ def next_best(story: Story, run: Run, library: Library = STANDARD) -> Story:
     return _grown(story, data, new[0].fit, new[0].came) if new else replace(story, note=HELPS_NO_MORE)
 
 
-def auto(story: Story, run: Run, library: Library = STANDARD) -> Story:
+def auto(story: Story, run: Data, library: Library = STANDARD) -> Story:
     """Add the next best until the floor is reached or nothing helps, then take out what is no longer needed."""
     while len(story.effects) < MOST_EFFECTS:
         before, story = len(story.rungs), next_best(story, run, library)
@@ -136,7 +135,7 @@ def auto(story: Story, run: Run, library: Library = STANDARD) -> Story:
     return pruned(story, run, library)
 
 
-def pruned(story: Story, run: Run, library: Library = STANDARD) -> Story:
+def pruned(story: Story, run: Data, library: Library = STANDARD) -> Story:
     """Without the effects that are no longer needed, and with simpler relatives that do as well; the same story if all stay."""
     if len(story.effects) < 2:
         return story
@@ -147,7 +146,7 @@ def pruned(story: Story, run: Run, library: Library = STANDARD) -> Story:
     return _grown(story, data, found, new, gone) if gone else story
 
 
-def tell(run: Run, library: Library = STANDARD, clock: Callable[[], float] = never, budget: float = math.inf) -> Story:
+def tell(run: Data, library: Library = STANDARD, clock: Callable[[], float] = never, budget: float = math.inf) -> Story:
     """The whole story of one axis: base, diagnosis, and every effect that it needs; the base is that of the diagnosis. budget, clock: as there."""
     found = diagnose(run, library, budget, clock)
     story = replace(_none(run, EPSILON), diagnosis=found.plain())
@@ -163,9 +162,11 @@ def allowed(name: str, library: Library = STANDARD) -> None:
         raise unknown_name(name, names, "effect")
 
 
-def _none(run: Run, tolerance: float) -> Story:
+def _none(run: Data, tolerance: float) -> Story:
     """A story before its first fit."""
-    return Story(axis=run.axis, sampling_rate=run.sampling_rate, seconds=run.seconds, tolerance=tolerance, units=run.units)
+    runs = runs_together(run)
+    first, seconds = runs[0], sum(one.seconds for one in runs)
+    return Story(axis=first.axis, sampling_rate=first.sampling_rate, seconds=seconds, tolerance=tolerance, units=first.units)
 
 
 def _based(story: Story, data: AxisData, base: GreyboxFit) -> Story:
@@ -173,8 +174,8 @@ def _based(story: Story, data: AxisData, base: GreyboxFit) -> Story:
     return _grown(replace(story, measured=measured(data, base)), data, base)
 
 
-def _data(story: Story, run: Run) -> AxisData:
-    return prepare(run.sampling_rate, run.voltage, run.position, story.tolerance, run.units)
+def _data(story: Story, run: Data) -> AxisData:
+    return prepare_all(story.sampling_rate, [(one.voltage, one.position) for one in runs_together(run)], story.tolerance, story.units)
 
 
 def _planned(story: Story) -> Rung | None:
@@ -205,7 +206,8 @@ def _shown(story: Story, data: AxisData, rung: Rung, found: GreyboxFit) -> Story
 
 
 def _model(rung: Rung, library: Library) -> AxisModel:
-    return AxisModel(gain=rung.gain, delay=rung.delay, pole=rung.pole, effects=rung.values, library=library)
+    own = tuple((item.name, tuple(one.value for one in item.recordings)) for item in rung.parameters if item.recordings)
+    return AxisModel(gain=rung.gain, delay=rung.delay, pole=rung.pole, effects=rung.values, library=library, per_recording=own)
 
 
 def _fit_of(story: Story, data: AxisData, library: Library, rung: Rung | None = None) -> GreyboxFit:
@@ -217,7 +219,8 @@ def _fit_of(story: Story, data: AxisData, library: Library, rung: Rung | None = 
         rigid = _fit_of(story, data, library, story.rungs[0])
         others = tuple((name, values) for name, values in rung.values if name != alone.name)
         return one_step_fit(data, replace(rigid, model=replace(rigid.model, effects=others)), alone)
-    simulated = simulate(model, data.sampling_rate, data.voltage, data.position)
+    each = (simulate(model.in_recording(k), data.sampling_rate, data.voltage[part], data.position[part]) for k, part in enumerate(data.runs))
+    simulated = np.concatenate(list(each))
     return GreyboxFit(
         model=model,
         parameters=rung.parameters,
