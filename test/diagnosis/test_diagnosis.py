@@ -18,7 +18,7 @@ from helpers import simulated
 from xy_sim.parts import PARTS
 from xy_sysid.axis.model import STANDARD, Library
 from xy_sysid.cli import run
-from xy_sysid.diagnosis import rungs
+from xy_sysid.diagnosis import of_run, rungs
 from xy_sysid.diagnosis.answer import Answer, Rung, Tried
 from xy_sysid.diagnosis.diagnose import diagnose, judged
 from xy_sysid.diagnosis.equal_laws import likelihood
@@ -412,3 +412,14 @@ def test_a_gap_beside_a_large_force_is_asked_for_with_that_force() -> None:
     assert set(found.effects) == {"backlash", "coulomb_friction", "cogging"}
     assert [rung.added for rung in found.rungs][:2] == [None, "cogging"] and found.final.excess == 0.0
     assert [one.name for one in found.candidates].count("cogging") == 1 and found.candidates[0].name == "backlash"
+
+
+@pytest.mark.parametrize("effect", ["backlash", "presliding_hysteresis"])
+def test_what_was_not_tried_leaves_doubt_in_the_names_that_it_is_taken_for(effect: str) -> None:
+    """Backlash needs one stretch without a gap: of two stretches another effect is named, with 0.5 at most, and it is said; not so at the floor."""
+    whole = recorded(effect, seconds=20.0)
+    keep = np.ones(len(whole), dtype=np.bool_)
+    keep[18_000:18_100] = False
+    found = of_run.diagnose(whole.only(keep))
+    assert ("Not tried: backlash, which needs one stretch without a gap (the data have 2)." in found.sentence) == (effect == "backlash")
+    assert found.confidence <= 0.5 if effect == "backlash" else found.effects == (effect,) and found.confidence > 0.9

@@ -70,10 +70,10 @@ def judged(data: AxisData, found: Answer, library: Library) -> Answer:
     left = found.discrepancy / motion
     found, base, names = replace(found, tolerance=left, force=unmodelled_force(data, found.final)), found.base, found.best
     hides = math.sqrt(math.expm1(AT_FLOOR)) * data.layout.rms(data.floor.power) / motion  # in the noise
-    noise = None
+    noise, untried = None, _untried(data, found, library)
     if names and (found.explained >= 1.0 - found.explained or found.final.excess < AT_FLOOR):
         verdict: Kind = "missing_effect"
-        confidence, experiment = sure, words.experiment(names[0], library)
+        confidence, experiment = min(sure, 0.5) if _could_be(untried, names, library) else sure, words.experiment(names[0], library)
         sentence = words.missing(data, found, every[len(names) :], with_all)
     elif base.excess < AT_FLOOR or (noise := input_noise(data, base)) is not None:
         verdict, names, experiment = "nothing_missing", (), "None is needed."
@@ -88,7 +88,7 @@ def judged(data: AxisData, found: Answer, library: Library) -> Answer:
         found = replace(found, force=unmodelled_force(data, base))
         sentence = words.not_in_library(data, found)
     sentence += words.kept_out(found)
-    sentence += words.not_tried(data, found, library) if verdict != "nothing_missing" else ""
+    sentence += words.not_tried(untried, len(data.starts)) if verdict != "nothing_missing" else ""
     if found.stopped:
         sentence += " The search was stopped by its budget."
         confidence *= 0.8
@@ -120,6 +120,18 @@ def _told(data: AxisData, found: Answer) -> tuple[Answer, float]:
     if most is None or most is found.rungs[-1]:
         return found, _confidence(data, found, found.final)
     return _down_to(data, found, found.rungs.index(most)), _confidence(data, found, most.fit)
+
+
+def _untried(data: AxisData, found: Answer, library: Library) -> tuple[str, ...]:
+    """Effects that need one stretch without a gap, where the data have several stretches and the error is above the noise floor."""
+    if len(data.starts) < 2 or found.final.excess < AT_FLOOR:
+        return ()
+    return tuple(effect.name for effect in library.acting if effect.one_step is not None)
+
+
+def _could_be(untried: tuple[str, ...], names: tuple[str, ...], library: Library) -> bool:
+    """An effect that was not tried is often taken for one of those that are named."""
+    return any(name in library[other].suspects for other in untried for name in names)
 
 
 def _down_to(data: AxisData, found: Answer, place: int) -> Answer:

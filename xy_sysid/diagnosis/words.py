@@ -65,14 +65,12 @@ def kept_out(found: Answer) -> str:
     return f" {with_it}, but {'they are' if several else 'it is'} refused: {found.kept_out.refused}."
 
 
-def not_tried(data: AxisData, found: Answer, library: Library) -> str:
-    """Effects that ask for one stretch without a gap, where there are several and something is left to explain; empty otherwise."""
-    names = [effect.name for effect in library.acting if effect.one_step is not None]
-    if len(data.starts) < 2 or not names or found.final.excess < AT_FLOOR:
+def not_tried(names: tuple[str, ...], stretches: int) -> str:
+    """Says that effects were not tried, as the data have several stretches; empty if all effects were tried."""
+    if not names:
         return ""
-    return (
-        f" {listed(names)} {'was' if len(names) == 1 else 'were'} not tried: that takes one stretch without a gap, and there are {len(data.starts)}."
-    )
+    need = "needs" if len(names) == 1 else "need"
+    return f" Not tried: {listed(names)}, which {need} one stretch without a gap (the data have {stretches})."
 
 
 def experiment(name: str, library: Library) -> str:
