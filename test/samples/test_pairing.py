@@ -239,7 +239,7 @@ def test_random_abuse_never_crashes_and_never_invents() -> None:
 
 @pytest.mark.parametrize("size", [1, 20, 500])
 @pytest.mark.parametrize("rate", [500.0, 1000.0, 1900.0, 1970.0, 4000.0])
-def test_a_rate_that_changes_while_the_counter_goes_on_is_read_anew(rate: float, size: int) -> None:
+def test_a_rate_that_changes_while_the_counter_goes_on_is_estimated_again(rate: float, size: int) -> None:
     """2 kHz becomes another rate without a restart: that is said, nothing of both is mixed for long, and pairing goes on at the new one.
 
     From 1 kHz to 4 kHz every stamp is so near the one before it that none of them alone tells it.
@@ -250,7 +250,7 @@ def test_a_rate_that_changes_while_the_counter_goes_on_is_read_anew(rate: float,
         machine.voltage(one)
         machine.position(one)
     assert machine.pairer.rate == pytest.approx(rate)
-    assert "read anew" in machine.pairer.said["restart"]
+    assert "the rate is estimated again" in machine.pairer.said["restart"]
     assert sum(len(part.voltage) for part in machine.samples if part.seq >= 3020) > 5000
     assert len(machine.heard()) == len(set(machine.heard()))
 
@@ -271,7 +271,7 @@ def test_jitter_stalls_and_a_clock_that_drifts_are_no_other_rate() -> None:
 
 
 def test_a_rate_that_one_stream_was_read_wrong_at_does_not_stay() -> None:
-    """The first voltages came while its source caught up with a stall: both rates are read anew after a while, and samples are paired."""
+    """The first voltages came while its source caught up with a stall: both rates are estimated again after a while, and samples are paired."""
     machine = Machine()
     for first in range(0, 40_000, 20):
         machine.position(block(first))
