@@ -75,9 +75,9 @@ def test_a_level_that_is_the_same_at_all_speeds_stays(data: AxisData) -> None:
 
 def scene(data: AxisData, model: AxisModel) -> Scene:
     """As a base sees it that explains nothing."""
-    velocity = data.begun(data.velocity)
-    position = data.begun(data.middle())
-    voltage = data.begun(data.voltage[:-1])
+    velocity = data.first_stage(data.velocity)
+    position = data.first_stage(data.middle())
+    voltage = data.first_stage(data.voltage[:-1])
     return Scene(sampling_rate=RATE, gain=model.gain, pole=model.pole, voltage=voltage, velocity=velocity, position=position, error=velocity)
 
 

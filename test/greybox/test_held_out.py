@@ -40,10 +40,10 @@ def inside(data: AxisData, begins: np.ndarray) -> np.ndarray:
 def test_windows_that_judge_share_no_sample_with_those_that_a_fit_sees(sizes: tuple[int, ...]) -> None:
     """Short, long, and several recordings; no window lies across the joint of two; the first stage sees nothing held out either."""
     data = prepare_all(2000.0, [moved(size, k) for k, size in enumerate(sizes)])
-    fitted, held, brief = (inside(data, windows.begins) for windows in (data.fitted, data.held, data.brief))
-    assert fitted.any() and held.any() and brief.any()
+    fitted, held, screening = (inside(data, windows.begins) for windows in (data.fitted, data.held, data.screening_windows))
+    assert fitted.any() and held.any() and screening.any()
     assert not (fitted & held).any()
-    assert not (brief[: data.first] & (data.begun(held.astype(float)) > 0.0)).any() and not brief[data.first :].any()
+    assert not (screening[: data.first] & (data.first_stage(held.astype(float)) > 0.0)).any() and not screening[data.first :].any()
     assert np.array_equal(data.held_samples(), held)
     for step in data.steps:
         for begin in (*data.fitted.begins, *data.held.begins):
@@ -99,5 +99,5 @@ def test_the_first_stage_is_short_where_windows_are_long(monkeypatch: pytest.Mon
 
     monkeypatch.setattr("xy_sysid.greybox.axis_data._split", half_shifted)
     data = prepare(4000.0, *moved(200_000))
-    assert data.brief.begins.size >= 2
+    assert data.screening_windows.begins.size >= 2
     assert data.first < 100_000

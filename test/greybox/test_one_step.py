@@ -116,7 +116,7 @@ def machine(*effects: str) -> tuple[AxisData, GreyboxFit]:
 def test_friction_that_differs_between_directions_is_found_beside_backlash() -> None:
     """Coulomb friction is in the filter already; a law with two levels takes its place, no load on the table."""
     data, base = machine("backlash=30e-6", "asymmetric_friction=0.3,coulomb=0.2")
-    start = fit_with(data, base, ["coulomb_friction"], brief=True)
+    start = fit_with(data, base, ["coulomb_friction"], screening=True)
     rungs = grown(data, start, EFFECTS["backlash"]).rungs
     name, last = rungs[-1]
     assert [rungs[0][0], name, len(rungs)] == ["backlash", "asymmetric_friction", 2]
@@ -129,7 +129,7 @@ def test_friction_that_differs_between_directions_is_found_beside_backlash() -> 
 def test_a_load_on_the_table_is_told_from_friction_that_differs_between_directions() -> None:
     """Across a gap the motor feels the one and not the other; both numbers are right."""
     data, base = machine("backlash=30e-6", "constant_load=0.15", "coulomb_friction=0.2")
-    start = fit_with(data, base, ["coulomb_friction"], brief=True)
+    start = fit_with(data, base, ["coulomb_friction"], screening=True)
     rungs = grown(data, start, EFFECTS["backlash"]).rungs
     assert [name for name, _ in rungs] == ["backlash", "constant_load"]
     last = rungs[-1][1]
@@ -195,7 +195,7 @@ def test_friction_that_bends_or_sticks_is_told_from_coulomb_friction_beside_a_ga
 ) -> None:
     """It takes the place of Coulomb friction in the filter, and the innovations fall; Stribeck's numbers stay vague, for sticking is smoothed."""
     data, base = machine("backlash=5e-6", effect)
-    alone = one_step_fit(data, fit_with(data, base, ["coulomb_friction"], brief=True), EFFECTS["backlash"])
+    alone = one_step_fit(data, fit_with(data, base, ["coulomb_friction"], screening=True), EFFECTS["backlash"])
     both = with_one_more(data, STANDARD, base, alone, name)
     assert name in both.model
     assert "coulomb_friction" not in both.model

@@ -19,7 +19,7 @@ from xy_sysid.hypotheses.companions import put_beside
 from xy_sysid.hypotheses.compare import gain
 from xy_sysid.hypotheses.criteria import ALMOST, AT_FLOOR, PRICE, TELLS
 from xy_sysid.hypotheses.one_step import Filtered
-from xy_sysid.hypotheses.pool import Node, Pool, alike
+from xy_sysid.hypotheses.pool import Node, Pool, comparable_fits
 
 
 def rungs_of(data: AxisData, library: Library, names: Sequence[str] = ()) -> tuple[Rung, ...]:
@@ -44,11 +44,11 @@ def with_one_more(data: AxisData, library: Library, base: GreyboxFit, now: Greyb
     if ahead is not None:
         return put_beside(data, now, ahead, effect)
     model = now.model if relative is None else now.model.without(relative)
-    begun = _added(data, now, model, effect)
+    start_models = _added(data, now, model, effect)
     if any(own not in base.model for own, _ in model.effects):
-        alone = fit(data, best_start(data, _added(data, base, base.model, effect)), brief=True)
-        begun += starts.merged(model, alone.model)
-    return fit(data, best_start(data, begun))
+        alone = fit(data, best_start(data, _added(data, base, base.model, effect)), screening=True)
+        start_models += starts.merged(model, alone.model)
+    return fit(data, best_start(data, start_models))
 
 
 def _added(data: AxisData, now: GreyboxFit, model: AxisModel, effect: Effect) -> list[AxisModel]:
@@ -92,11 +92,11 @@ def answer_of_search(pool: Pool, given: tuple[Rung, ...], filtered: Filtered | N
         if not is_the_same(library, (item.effects, item.fit), (node.effects, node.fit), AT_FLOOR)
         if not item.refused or is_taken_for(library, item.effects, node.effects)  # it is no spring, but is it a wave?
     ]
-    others.sort(key=lambda item: (-_doubt(node, item), item.brief.excess))
+    others.sort(key=lambda item: (-_doubt(node, item), item.screening.excess))
     for item in others[:1]:
-        pool.finished(item, shown=True)
+        pool.with_full_fit(item, shown=True)
     rivals = tuple(_tried(pool, base, item, _doubt(node, item)) for item in others)
-    whole = [item for item in pool.nodes.values() if item.whole and not item.refused]
+    whole = [item for item in pool.nodes.values() if item.has_full_fit and not item.refused]
     rungs = (*given, *_rungs(pool, given, ordered, final))
     found = Answer(
         rungs=rungs,
@@ -123,7 +123,7 @@ def _tried(pool: Pool, base: GreyboxFit, node: Node, doubt: float = 0.0) -> Trie
 
 def _doubt(node: Node, other: Node) -> float:
     """Probability that another set predicts better than the one that was taken, parameters at their price; at most a half, as it was not taken."""
-    found = gain(*alike(node, other))
+    found = gain(*comparable_fits(node, other))
     priced = replace(found, nats=found.nats + PRICE * (other.parameters - node.parameters))
     return min(1.0 - priced.probability, 0.5)
 
@@ -158,13 +158,13 @@ def _of_one_step(
 def _ordered(library: Library, sizes: Mapping[str, float]) -> tuple[str, ...]:
     """Names, the largest size first; of what is alike to the largest dry friction first, as every machine has it."""
     order = sorted(sizes, key=lambda name: -sizes[name])
-    alike = [name for name in order if library[name].is_dry and sizes[name] >= ALMOST * sizes[order[0]]]
-    return tuple(dict.fromkeys((*alike, *order)))
+    similar = [name for name in order if library[name].is_dry and sizes[name] >= ALMOST * sizes[order[0]]]
+    return tuple(dict.fromkeys((*similar, *order)))
 
 
 def _kept_out(pool: Pool, base: GreyboxFit, node: Node) -> Tried | None:
     """The refused set with the smallest error, if that is clearly below the error of the best set."""
-    nodes = [item for item in pool.nodes.values() if item.refused and item.whole and gain(item.fit, node.fit).is_sure]
+    nodes = [item for item in pool.nodes.values() if item.refused and item.has_full_fit and gain(item.fit, node.fit).is_sure]
     best = max(nodes, key=lambda item: gain(item.fit, node.fit).nats, default=None)
     return None if best is None else _tried(pool, base, best, 0.5)
 
@@ -202,6 +202,6 @@ def _with(pool: Pool, now: GreyboxFit, name: str, final: GreyboxFit, asked: bool
     if effects == frozenset(own for own, _ in final.model.effects):
         return final
     known = pool.nodes.get(effects)
-    if known is not None and not known.refused and (known.whole or asked):
-        return pool.finished(known, shown=True).fit
+    if known is not None and not known.refused and (known.has_full_fit or asked):
+        return pool.with_full_fit(known, shown=True).fit
     return with_one_more(pool.data, pool.library, pool.nodes[pool.kept].fit, now, name) if asked else None

@@ -64,7 +64,8 @@ class AxisData:
     voltage, position: (n,) V and m, recordings one after the other; velocity: (n - r,) mean of each sample, m/s, of r recordings
     starts: sample of ``voltage`` at which each recording begins
     fitted, held: windows of ``velocity`` for the fit, and held-out windows
-    early: samples of each recording's velocity that are in the first stage; brief: windows in these (``begun``) that a fit sees there
+    early: samples of each recording's velocity in the first stage, which ``first_stage`` returns
+    screening_windows: windows of a screening fit; they begin at a sample of ``first_stage(velocity)``
     training: samples of ``velocity`` for filters that must run without interruption
     units: the units that V and m stand for, used in sentences
     work: amount of simulation
@@ -78,7 +79,7 @@ class AxisData:
     layout: Bands
     fitted: Windows
     held: Windows
-    brief: Windows
+    screening_windows: Windows
     training: int
     early: tuple[int, ...]
     floor: Floor
@@ -119,8 +120,8 @@ class AxisData:
         """Samples of each recording's velocity in the first stage, or in the whole."""
         return self.early if early else tuple(step.stop - step.start for step in self.steps)
 
-    def begun(self, signal: FloatArray) -> FloatArray:
-        """(n - r,) -> (first,), or with r more (n,) as it is: the beginnings of all recordings."""
+    def first_stage(self, signal: FloatArray) -> FloatArray:
+        """(first,) of a signal (n - r,), or (first,) of a signal (n,): the first stage of each recording, one after the other."""
         places = self.steps if signal.size == self.velocity.size else self.runs
         return np.concatenate([signal[part.start : part.start + count] for part, count in zip(places, self.early, strict=True)])
 
@@ -162,7 +163,7 @@ class AxisData:
         """Every window of the first stage, fitted and held out; those held out alone where the first stage is all that there is."""
         if self.first >= self.velocity.size:
             return self.held
-        both = np.sort(np.concatenate((self.brief.begins, _within(self.held, self.steps, self.early).begins)))
+        both = np.sort(np.concatenate((self.screening_windows.begins, _within(self.held, self.steps, self.early).begins)))
         return Windows(self.layout, np.unique(both))
 
 
@@ -211,7 +212,7 @@ def prepare_all(
         layout=layout,
         fitted=fitted,
         held=held,
-        brief=_within(fitted, steps, early),
+        screening_windows=_within(fitted, steps, early),
         training=int(TRAINING * velocities[0].size),
         early=early,
         floor=least,

@@ -48,7 +48,7 @@ FIRST_LOOK = Schedule(1, 6, 1e-2, 1e-2)
 NEARER = Schedule(4, 6, 3e-3, 3e-3)
 FINER = Schedule(2, 8, 1e-4, 1e-3)
 LONG = Schedule(3, 6, 1e-5, 1e-4)
-COARSE, MIDDLING = 2000.0, 4000.0  # Hz: finest sub-steps of looks and first rounds (errors up to 3e-3 of the motion), and of brief fits (6e-4)
+COARSE, MIDDLING = 2000.0, 4000.0  # Hz: finest sub-steps of looks and first rounds (errors up to 3e-3 of the motion), and of screening fits (6e-4)
 TOLD = 0.01  # least part of the residual voltage that an effect explains, to be simulated before any fit: of 14 s below 10 Hz chance
 # takes half of it
 LATE = 1.0 / (4.0 * CUTOFFS[-1])  # s, of a delay with which nothing is read if it is wrong: a quarter of the shortest period that is looked at
@@ -69,7 +69,7 @@ class GreyboxFit:
     simulated:      (n - r,) velocity over all recordings, m/s; error: (n - r,) measured minus simulated
     held:           (windows, bands) power of the held-out error, m^2/s^2
     units:          of input and output; m/s above is ``units.speed``
-    brief:          a screening fit, on the data of the first stage: errors are of all its windows, and the simulation ends with them
+    is_screening:   True for a screening fit: it uses the data of the first stage; errors and simulation cover these data only
     one_step:       judged by the prediction of the next sample from all earlier ones, not by simulation; errors are those of the prediction
     """
 
@@ -87,7 +87,7 @@ class GreyboxFit:
     runs: int
     converged: bool
     held: FloatArray
-    brief: bool = False
+    is_screening: bool = False
     one_step: bool = False
     units: Units = USUAL
 
@@ -106,10 +106,10 @@ class GreyboxFit:
 
 def fit_base(data: AxisData, library: Library = STANDARD) -> GreyboxFit:
     """Gain, delay and pole: from the best of the frequency response and inverse dynamics, with and without the delay of the former."""
-    gain, delay, pole = base_start(data.sampling_rate, data.begun(data.voltage), data.begun(data.velocity))
+    gain, delay, pole = base_start(data.sampling_rate, data.first_stage(data.voltage), data.first_stage(data.velocity))
     models = [AxisModel(gain, delay, pole, library=library)]
     for late in {delay, 0.0}:
-        scene = _scene(data, AxisModel(gain, late, pole, library=library), data.begun(data.velocity), data.begun)
+        scene = _scene(data, AxisModel(gain, late, pole, library=library), data.first_stage(data.velocity), data.first_stage)
         models += [AxisModel(own, late, min(max(its, 1e-2), 1e5), library=library) for own, its in rigid_starts(scene)]
     return fit(data, best_start(data, models))
 
@@ -119,20 +119,20 @@ def fit_with(
     base: GreyboxFit,
     names: Iterable[str],
     starts: Mapping[str, tuple[float, ...]] | None = None,
-    brief: bool = False,
-    hopeless: float = np.inf,
+    screening: bool = False,
+    give_up_above: float = np.inf,
 ) -> GreyboxFit:
     """The model of ``base`` with more effects, all parameters fitted together; starts: their start values, else determined from the data.
 
     If the result is worse than ``base``, it is fitted again from ``base`` with a nearly absent new effect.
-    brief: a screening fit, which stops after its first round if its excess is then above ``hopeless``
+    screening: make a screening fit. It stops after its first round if its excess is then above ``give_up_above``, nats a line.
     """
     model = base.model
     for name in names:
         values = (starts or {}).get(name)
         model = _begun(data, base, model, name) if values is None else model.with_effect(name, bounded(model.library[name], values, data.similar))
-    found = fit(data, model, brief, hopeless)
-    if brief or fitted_score(data, found) <= fitted_score(data, base):
+    found = fit(data, model, screening, give_up_above)
+    if screening or fitted_score(data, found) <= fitted_score(data, base):
         return found
     absent = base.model
     for name, values in model.effects:
@@ -235,7 +235,7 @@ def first_excess(data: AxisData, model: AxisModel) -> float:
     """Score over the first stage's data, without a fit."""
     task = problem(data, model, True)
     run, values = task.at(COARSE), task.row
-    power = data.layout.power(data.brief.spectrum(data.begun(data.velocity) - run(values)))
+    power = data.layout.power(data.screening_windows.spectrum(data.first_stage(data.velocity) - run(values)))
     power = np.where(np.isfinite(power), power, np.inf)
     return Objective.of(data.floor).of_power(power)
 
@@ -254,13 +254,13 @@ def screened(data: AxisData, fitted: GreyboxFit, effects: Iterable[Effect], scen
     inner = scale.inner(values)
     here = run(values)
     nuisance = on_all_cores(lambda step: run(scale.outer(inner + step)) - here, 1e-4 * np.eye(values.size))
-    return screen(effects, scene, np.array(nuisance), data.brief if early else data.fitted, data.floor)
+    return screen(effects, scene, np.array(nuisance), data.screening_windows if early else data.fitted, data.floor)
 
 
 def scene_of(data: AxisData, fitted: GreyboxFit, early: bool = True) -> Scene:
     """The measured motion of the first stage, or of all data, as input to the traces of effects."""
-    model, part = fitted.model, data.begun if early else np.asarray
-    scene = _scene(data, model, fitted.error if fitted.brief else part(fitted.error), part)
+    model, part = fitted.model, data.first_stage if early else np.asarray
+    scene = _scene(data, model, fitted.error if fitted.is_screening else part(fitted.error), part)
     prompt = _scene(data, replace(model, delay=0.0), scene.error, part)
     return replace(scene, prompt=prompt) if model.delay > LATE else scene
 
@@ -280,23 +280,23 @@ def _scene(data: AxisData, model: AxisModel, error: FloatArray, part: Callable[[
     )
 
 
-def fit(data: AxisData, start: AxisModel, brief: bool = False, hopeless: float = np.inf, late: Callable[[], bool] = in_time) -> GreyboxFit:
-    """All parameters of a model, from where it is; brief, hopeless: see ``fit_with``; late: then the best so far is taken."""
+def fit(data: AxisData, start: AxisModel, screening: bool = False, give_up_above: float = np.inf, late: Callable[[], bool] = in_time) -> GreyboxFit:
+    """Fit all parameters of a model from its present values; screening, give_up_above: see ``fit_with``; late: time is up, return the best so far."""
     task = problem(data, start, True)
     rate = sub_steps(data, task, COARSE)
     run, scale = task.at(rate), task.scale
-    target = Target(data.begun(data.velocity), data.brief, data.floor)
+    target = Target(data.first_stage(data.velocity), data.screening_windows, data.floor)
     found = solve(run, target, scale, task.row, replace(FIRST_LOOK, late=late))
-    if not (late() or (brief and found.score > hopeless)):
+    if not (late() or (screening and found.score > give_up_above)):
         nearer = solve(run, target, scale, found.values, replace(NEARER, late=late), found)
         finer = sub_steps(data, problem(data, model_of(data, start, nearer.values), True), MIDDLING)
         if finer != rate:
             run = task.at(finer)
         more = solve(run, target, scale, nearer.values, replace(FINER, late=late), nearer)
         found = replace(more, runs=found.runs + nearer.runs + more.runs)
-    if not brief:
+    if not screening:
         return finish(data, model_of(data, start, found.values), found.runs, late)
-    return _result(data, start, scale, found, brief=True)
+    return _result(data, start, scale, found, screening=True)
 
 
 def finish(data: AxisData, start: AxisModel, runs: int = 0, late: Callable[[], bool] = in_time) -> GreyboxFit:
@@ -324,7 +324,7 @@ def sub_steps(data: AxisData, task: FitProblem, finest: float) -> float:
     rate = min(data.sampling_rate, finest)
     if rate == finest:
         return rate
-    windows, measured = (data.brief, data.begun(data.velocity)) if task.early else (data.fitted, data.velocity)
+    windows, measured = (data.screening_windows, data.first_stage(data.velocity)) if task.early else (data.fitted, data.velocity)
 
     def moved(rate: float) -> FloatArray:
         return task.at(rate)(task.row)
@@ -344,12 +344,12 @@ def sub_steps(data: AxisData, task: FitProblem, finest: float) -> float:
     return rate
 
 
-def _result(data: AxisData, start: AxisModel, scale: Scale, found: Solution, brief: bool = False) -> GreyboxFit:
+def _result(data: AxisData, start: AxisModel, scale: Scale, found: Solution, screening: bool = False) -> GreyboxFit:
     model = model_of(data, start, found.values)
-    task = problem(data, model, brief)
-    simulated = task.at(MIDDLING if brief else FINE)(task.row)
-    error = (data.begun(data.velocity) if brief else data.velocity) - simulated
-    fitted, judging = (data.brief, data.first_windows()) if brief else (data.fitted, data.held)
+    task = problem(data, model, screening)
+    simulated = task.at(MIDDLING if screening else FINE)(task.row)
+    error = (data.first_stage(data.velocity) if screening else data.velocity) - simulated
+    fitted, judging = (data.screening_windows, data.first_windows()) if screening else (data.fitted, data.held)
     held = data.layout.powers(judging.spectrum(error))
     objective = Objective.of(data.floor)
     expected = objective.spectrum(held.mean(axis=0))
@@ -368,7 +368,7 @@ def _result(data: AxisData, start: AxisModel, scale: Scale, found: Solution, bri
         runs=found.runs,
         converged=found.converged,
         held=held,
-        brief=brief,
+        is_screening=screening,
         units=data.units,
     )
 

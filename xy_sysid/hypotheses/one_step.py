@@ -94,8 +94,8 @@ class OneStepTrials:
             less = best.fit.model
             for name in sorted(best.effects - names):
                 less = less.without(name)
-            node = pool.fitted(names, lambda: [less])
-            found += [node] if node is not None and pool.finished(node).whole else []
+            node = pool.with_screening_fit(names, lambda: [less])
+            found += [node] if node is not None and pool.with_full_fit(node).has_full_fit else []
         return found if found and self._explains(found[0]) else list(dict.fromkeys((*found, pool.nodes[pool.kept])))
 
     def ahead(self, found: GreyboxFit) -> float:
@@ -121,4 +121,4 @@ class OneStepTrials:
         """Rungs up to a set, from the known fits."""
         names = [name for name, _ in node.fit.model.effects]
         known = [(names[n], self.pool.nodes.get(frozenset(names[: n + 1]))) for n in range(len(names))]
-        return [(name, item.fit) for name, item in known if item is not None and item.whole]
+        return [(name, item.fit) for name, item in known if item is not None and item.has_full_fit]
