@@ -28,7 +28,7 @@ from xy_sysid.effects import EFFECTS, Effect
 from xy_sysid.greybox.axis_data import AxisData, prepare
 from xy_sysid.greybox.free_run import GreyboxFit, fit_base, fit_with
 from xy_sysid.hypotheses import one_step
-from xy_sysid.hypotheses.companions import grown
+from xy_sysid.hypotheses.companions import extended
 from xy_sysid.hypotheses.criteria import AT_FLOOR, FEWEST, SIZE
 from xy_sysid.imports import save
 
@@ -352,13 +352,13 @@ def test_a_spring_beside_friction_is_not_taken_for_a_pendulum_and_bumps() -> Non
 def test_a_gap_is_asked_for_early_and_once(effect: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """One that explains the axis ends the simulations; one that does not is not fitted again beside the same effects."""
     asked: list[tuple[str, ...]] = []
-    fitted = grown
+    fitted = extended
 
     def counted(data: AxisData, base: GreyboxFit, gap: Effect, *others: Any) -> Any:
         asked.append((gap.name, str(others[0].hidden), *sorted(name for name, _ in base.model.effects)))
         return fitted(data, base, gap, *others)
 
-    monkeypatch.setattr(one_step, "grown", counted)
+    monkeypatch.setattr(one_step, "extended", counted)
     data = prepare(2000.0, *recorded(effect, seconds=20.0).axis("x"))
     tried: list[frozenset[str]] = []
     found = refine(data, trying=tried.append)
@@ -371,13 +371,13 @@ def test_a_gap_is_asked_for_early_and_once(effect: str, monkeypatch: pytest.Monk
 
 def test_a_gap_that_is_too_small_to_be_one_is_not_named(monkeypatch: pytest.MonkeyPatch) -> None:
     """However well the filter does with it."""
-    fitted = grown
+    fitted = extended
 
     def too_small(data: AxisData, base: GreyboxFit, gap: Effect, *others: Any) -> Any:
         found = fitted(data, base, gap, *others)
         return replace(found, found=replace(found.found, too_small=True))
 
-    monkeypatch.setattr(one_step, "grown", too_small)
+    monkeypatch.setattr(one_step, "extended", too_small)
     found = diagnose(2000.0, *recorded("backlash", seconds=20.0).axis("x"))
     assert "backlash" not in found.effects and "backlash" not in found.sentence
 
@@ -402,7 +402,7 @@ def test_what_a_simulation_had_taken_a_gap_for_goes() -> None:
     """A lag, here, of no size once the gap is known: it is taken out of what the filter has beside it."""
     data = prepare(2000.0, *recorded("coulomb_friction=0.03+backlash=6e-6", seconds=10.0).axis("x"))
     base = fit_with(data, fit_base(data), ["amplifier_lag"])
-    fit = grown(data, base, EFFECTS["backlash"]).rungs[-1][1]
+    fit = extended(data, base, EFFECTS["backlash"]).rungs[-1][1]
     assert "amplifier_lag" not in fit.model and {"backlash", "coulomb_friction"} <= {name for name, _ in fit.model.effects}
 
 

@@ -13,9 +13,9 @@ from xy_sysid.diagnosis.sets import contains, is_taken_for, part_explained
 from xy_sysid.effects import Effect
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit, best_start, fit, fit_base, joined, screened
-from xy_sysid.greybox.one_step import follower, one_step_fit
+from xy_sysid.greybox.one_step import one_step_effect, one_step_fit
 from xy_sysid.hypotheses import starts
-from xy_sysid.hypotheses.companions import put_beside
+from xy_sysid.hypotheses.companions import add_companion
 from xy_sysid.hypotheses.compare import gain
 from xy_sysid.hypotheses.criteria import ALMOST, AT_FLOOR, PRICE, TELLS
 from xy_sysid.hypotheses.one_step import Filtered
@@ -38,11 +38,11 @@ def with_one_more(data: AxisData, library: Library, base: GreyboxFit, now: Greyb
     """
     effect = library[name]
     relative = next((own for own, _ in now.model.effects if effect.family and library[own].family == effect.family), None)
-    ahead = follower(now.model)
+    ahead = one_step_effect(now.model)
     if effect.one_step is not None:
         return one_step_fit(data, now, effect)
     if ahead is not None:
-        return put_beside(data, now, ahead, effect)
+        return add_companion(data, now, ahead, effect)
     model = now.model if relative is None else now.model.without(relative)
     start_models = _added(data, now, model, effect)
     if any(own not in base.model for own, _ in model.effects):

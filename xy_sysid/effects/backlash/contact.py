@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from xy_sysid.effects._contract import Beside, DryFriction, Followed, OneStepTask
+from xy_sysid.effects._contract import Companions, DryFriction, FilterFit, OneStepTask
 from xy_sysid.effects.backlash.filter_source import NAMES
 from xy_sysid.effects.backlash.innovations import CLOSED, Innovations, View
 from xy_sysid.effects.backlash.starts import SECOND, searched
@@ -33,19 +33,19 @@ OWN, GAP, HERTZ = len(NAMES), NAMES.index("gap"), NAMES.index("hertz")
 class Contact:
     """Gap, masses and contact from the innovations of the first samples, judged on those after the training."""
 
-    def fit(self, task: OneStepTask) -> Followed:
+    def fit(self, task: OneStepTask) -> FilterFit:
         """See ``OneStep``."""
-        return from_usual(self._fit(to_usual(task)), task.beside.similar)
+        return from_usual(self._fit(to_usual(task)), task.companions.similar)
 
-    def _fit(self, task: OneStepTask) -> Followed:
-        fit = Innovations(task.sampling_rate, task.base, task.noise, task.beside, task.dry.laws)
+    def _fit(self, task: OneStepTask) -> FilterFit:
+        fit = Innovations(task.sampling_rate, task.base, task.noise, task.companions, task.dry.laws)
         fit.late = task.limits.late
         whole, near = WHOLE.within(task.stages[0]), SECOND.within(task.stages[0])
         best = self._begun(fit, task)
         rigid = self._rigid(fit, fit.start(task.base, RIGID, task.dry.values), near, 1e-2)
         if task.limits.bar is not None:
             looseness, innovation = self._seen(fit, best, task)
-            idle = task.begin is None and fit.scale(fit.seen(best, near)) > IDLE * fit.scale(fit.softened(SOFT).seen(rigid, near))
+            idle = task.earlier is None and fit.scale(fit.seen(best, near)) > IDLE * fit.scale(fit.softened(SOFT).seen(rigid, near))
             if fit.scale(innovation[task.stages[1] :]) * task.noise > (1.0 if idle else BEHIND) * task.limits.bar:
                 return self._told(fit, task, best, (looseness, innovation))
         best = fit.solved(best, np.arange(best.size), whole, 20, 1e-3)
@@ -71,19 +71,19 @@ class Contact:
         seen: tuple[float, FloatArray],
         spread: FloatArray | None = None,
         without: FloatArray | None = None,
-    ) -> Followed:
+    ) -> FilterFit:
         """What was found; of a fit that was given up there is no spread, and nothing without the gap: it does not matter any more."""
         looseness, innovation = seen
         values = fit.outer(best)
         errors = np.full(values.size, np.inf) if spread is None else spread
         large = values[GAP] > max(SEEN, LEFT * fit.scale(innovation[: task.stages[0]])) * task.noise
-        return Followed(
+        return FilterFit(
             base=_three(values),
             values=tuple(values[3:OWN].tolist()),
             base_spread=_three(errors),
             spread=tuple(errors[3:OWN].tolist()),
             dry=DryFriction(task.dry.laws, tuple(values[fit.friction].tolist()), tuple(errors[fit.friction].tolist())),
-            beside=(tuple(values[fit.others].tolist()), tuple(errors[fit.others].tolist())),
+            companions=(tuple(values[fit.others].tolist()), tuple(errors[fit.others].tolist())),
             innovation=innovation * task.noise,
             without=(innovation if without is None else without) * task.noise,
             noise=task.noise,
@@ -93,19 +93,19 @@ class Contact:
             given_up=spread is None,
         )
 
-    def innovation(self, sampling_rate: float, found: Followed, beside: Beside, samples: int) -> FloatArray:
+    def innovation(self, sampling_rate: float, found: FilterFit, companions: Companions, samples: int) -> FloatArray:
         """See ``OneStep``."""
-        found = from_usual(found, beside.similar, back=True)
-        fit = Innovations(sampling_rate * beside.similar.time, found.base, found.noise, usual(beside), found.dry.laws)
+        found = from_usual(found, companions.similar, back=True)
+        fit = Innovations(sampling_rate * companions.similar.time, found.base, found.noise, usual(companions), found.dry.laws)
         return fit.seen(fit.start(found.base, found.values, found.dry.values), View(samples, found.looseness))
 
     @staticmethod
     def _begun(fit: Innovations, task: OneStepTask) -> FloatArray:
         """Coordinates after the first fits: from an earlier result, or, as nothing draws a gap open that has closed, from a grid."""
-        begin = task.begin
-        if begin is None or begin.too_small:
+        earlier = task.earlier
+        if earlier is None or earlier.too_small:
             return searched(fit, task)
-        start = fit.start(begin.base, begin.values, begin.dry.values if begin.dry.names == task.dry.names else task.dry.values)
+        start = fit.start(earlier.base, earlier.values, earlier.dry.values if earlier.dry.names == task.dry.names else task.dry.values)
         return fit.solved(start, np.arange(start.size), SECOND.within(task.stages[0]), 15, 1e-2)
 
     @staticmethod

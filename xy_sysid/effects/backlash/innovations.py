@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from xy_sysid.effects._contract import Beside, Effect, Parameter, in_time
+from xy_sysid.effects._contract import Companions, Effect, Parameter, in_time
 from xy_sysid.effects._similarity import SPEED
 from xy_sysid.effects.backlash.contact_filter import filter_with
 from xy_sysid.effects.backlash.filter_source import NAMES
@@ -20,7 +20,7 @@ STIFF = 2.0 * np.pi * 90.0  # rad/s of the contact at least: flanks of steel; a 
 DRIFT = 0.3  # process noise per rms speed, 1/sqrt(s): the filter forgives this much acceleration
 SANE = 0.5  # rad/s of the pole over the sampling rate, Hz, to begin with: a base that was led astray would make the filter unstable
 SETTLED = 0.5  # s until the filter is judged
-STEP = 1e-3  # of a number's unit, for derivatives of what is beside
+STEP = 1e-3  # of a number's unit, for derivatives by the companions' parameters
 WORST = 1e6  # innovation over the noise at which it is cut off
 CLOSED = 1e-10  # m: no gap
 TAILS = 3.0  # innovations over their usual size from which they count less (Cauchy): a filter that has lost the gap for a moment
@@ -53,26 +53,28 @@ class View:
 class Innovations:
     """Over the noise, for coordinates: numbers, or their logarithms, in units.
 
-    The numbers are those of the base and the contact by ``NAMES``, the parameters of each law of dry friction, and what is beside.
+    The numbers are those of the base and the contact by ``NAMES``, the parameters of each law of dry friction, and those of the companions.
     """
 
-    def __init__(self, sampling_rate: float, base: tuple[float, float, float], noise: float, beside: Beside, laws: tuple[Effect, ...]) -> None:
-        self.fs, self.noise, self.beside, self.laws = sampling_rate, noise, beside, laws
+    def __init__(
+        self, sampling_rate: float, base: tuple[float, float, float], noise: float, companions: Companions, laws: tuple[Effect, ...]
+    ) -> None:
+        self.fs, self.noise, self.companions, self.laws = sampling_rate, noise, companions, laws
         self._ran: list[None] = []  # one for each run of the filter, whichever thread it is in
         self.filter = filter_with(laws)
         rows = [row for effect in laws for row in _rows_of(effect)]
         self.friction = slice(len(NAMES), len(NAMES) + len(rows))
-        self.others = slice(self.friction.stop, self.friction.stop + beside.start.size)
+        self.others = slice(self.friction.stop, self.friction.stop + companions.start.size)
         longest = max(20.0 / sampling_rate, 2.0 * base[1])
         low = [-np.inf, 0.0, 1e-2, 0.1 * noise, 0.02, STIFF / 2, 0.0, 0.0, 0.0, 0.0, 0.0]
         high = [np.inf, longest, 1e5, 1e-2, 0.98, max(15.0 * sampling_rate, 4.0 * STIFF), 2.0, 500.0, 0.9, 1.0, 10.0]
         unit = [0.02 * abs(base[0]), 0.1 / sampling_rate, 0.05, 0.1, 0.05, 0.1, 0.05, 2.0, 0.02, 0.1, 0.02]
-        self.log = np.array([*LOG, *(row.log for row in rows), *beside.positive], dtype=np.bool_)
-        self.unit = np.array([*unit, *(row.unit for row in rows), *np.where(beside.positive, 0.05, 0.05 * beside.unit)])
-        self.low = self.inner(np.array([*low, *(row.low for row in rows), *beside.low]))
-        self.high = self.inner(np.array([*high, *(row.high for row in rows), *beside.high]))
+        self.log = np.array([*LOG, *(row.log for row in rows), *companions.positive], dtype=np.bool_)
+        self.unit = np.array([*unit, *(row.unit for row in rows), *np.where(companions.positive, 0.05, 0.05 * companions.unit)])
+        self.low = self.inner(np.array([*low, *(row.low for row in rows), *companions.low]))
+        self.high = self.inner(np.array([*high, *(row.high for row in rows), *companions.high]))
         self.late = in_time
-        self.heeded = np.arange(3)  # numbers of the base on which what is beside depends
+        self.heeded = np.arange(3)  # numbers of the base on which the companions depend
 
     def softened(self, rate: float) -> Innovations:
         """The same, with a contact that may be as soft as that, rad/s, and a gap of nothing; runs count for both."""
@@ -84,7 +86,7 @@ class Innovations:
     def start(self, base: tuple[float, float, float], values: Sequence[float], friction: Sequence[float]) -> FloatArray:
         """Coordinates."""
         gain, delay, pole = base
-        return self.inner(np.array([gain, delay, min(pole, SANE * self.fs), *values, *friction, *self.beside.start]))
+        return self.inner(np.array([gain, delay, min(pole, SANE * self.fs), *values, *friction, *self.companions.start]))
 
     @property
     def runs(self) -> int:
@@ -210,7 +212,7 @@ class Innovations:
         return min(int(np.ceil(numbers[RATE] * np.sqrt(max(stiffer, 0.0)) / self.fs / turn)), MOST)
 
     def _undone(self, numbers: FloatArray, n: int) -> tuple[FloatArray, FloatArray, FloatArray, float]:
-        return self.beside.undo(np.concatenate((numbers[:3], numbers[self.others])), n)
+        return self.companions.undo(np.concatenate((numbers[:3], numbers[self.others])), n)
 
     def _moved(self, numbers: FloatArray, n: int) -> tuple[NDArray[np.int64], tuple[FloatArray, FloatArray, FloatArray], FloatArray]:
         """Columns, and derivatives by their numbers of voltage, position and forces, and of what passes of a sudden change."""

@@ -37,7 +37,7 @@ GAP, RATE, HERTZ = (NAMES.index(name) for name in ("gap", "rate", "hertz"))
 def searched(fit: Innovations, task: OneStepTask) -> FloatArray:
     """Coordinates near the best fit, from a grid."""
     first, second = FIRST.within(task.stages[0]), SECOND.within(task.stages[0])
-    grid = product(_gaps(task.noise, task.beside.swing), SHARES, RATES, DAMPINGS)
+    grid = product(_gaps(task.noise, task.companions.swing), SHARES, RATES, DAMPINGS)
     starts = [fit.start(task.base, (*numbers, *REST), task.dry.values) for numbers in grid]
     found = _raced(fit, _best(fit, starts, first, APART, BEST[0]), first)
     around = [found]
