@@ -23,7 +23,7 @@ from xy_sysid.diagnosis.answer import Answer, Rung, Tried
 from xy_sysid.diagnosis.diagnose import diagnose, judged
 from xy_sysid.diagnosis.equal_laws import likelihood
 from xy_sysid.diagnosis.refine import Effort, refine
-from xy_sysid.diagnosis.sets import is_taken_for
+from xy_sysid.diagnosis.sets import is_mistaken_for
 from xy_sysid.effects import EFFECTS, Effect
 from xy_sysid.greybox.axis_data import AxisData, prepare
 from xy_sysid.greybox.free_run import GreyboxFit, fit_base, fit_with
@@ -301,10 +301,10 @@ def test_a_size_that_is_not_known_or_ends_at_a_bound_is_half_sure_at_most(value:
 def test_a_refused_spring_that_leaves_as_little_as_a_wave_makes_the_wave_unsure() -> None:
     """It is no spring, but neither is it surely that wave; other refused sets, and relatives, are no rivals."""
     wave, spring, stiff = (frozenset({"coulomb_friction", name}) for name in ("cogging", "return_spring", "hardening_stiffness"))
-    assert is_taken_for(STANDARD, spring, wave)
-    assert not is_taken_for(STANDARD, wave, spring)
-    assert not is_taken_for(STANDARD, stiff, spring)
-    assert not is_taken_for(STANDARD, frozenset({"cogging"}), wave)
+    assert is_mistaken_for(STANDARD, spring, wave)
+    assert not is_mistaken_for(STANDARD, wave, spring)
+    assert not is_mistaken_for(STANDARD, stiff, spring)
+    assert not is_mistaken_for(STANDARD, frozenset({"cogging"}), wave)
     data, ladder = prepare(2000.0, *recorded("cogging", seconds=20.0).axis("x")), diagnosed("cogging")
     rival = Tried(Rung.of(ladder.final, ("return_spring",)), doubt=0.5, refused="return_spring: it would give way")
     found = judged(data, replace(ladder, rivals=(rival,)), STANDARD)

@@ -9,7 +9,7 @@ from dataclasses import replace
 from xy_sysid.axis.model import AxisModel, Library
 from xy_sysid.diagnosis.answer import Answer, Rung, Tried
 from xy_sysid.diagnosis.equal_laws import is_the_same, likely_names
-from xy_sysid.diagnosis.sets import contains, is_taken_for, part_explained
+from xy_sysid.diagnosis.sets import contains, is_mistaken_for, part_explained
 from xy_sysid.effects import Effect
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit, best_start, fit, fit_base, joined, screened
@@ -90,7 +90,7 @@ def answer_of_search(pool: Pool, given: tuple[Rung, ...], filtered: Filtered | N
         if item is not node and 0 < len(item.effects) <= len(node.effects) and not item.effects < node.effects
         if not contains(library, item.effects, node.effects)
         if not is_the_same(library, (item.effects, item.fit), (node.effects, node.fit), AT_FLOOR)
-        if not item.refused or is_taken_for(library, item.effects, node.effects)  # it is no spring, but is it a wave?
+        if not item.refused or is_mistaken_for(library, item.effects, node.effects)  # it is no spring, but is it a wave?
     ]
     others.sort(key=lambda item: (-_doubt(node, item), item.screening.excess))
     for item in others[:1]:

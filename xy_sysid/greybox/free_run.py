@@ -18,7 +18,7 @@ from xy_sysid.effects import Effect, Scene
 from xy_sysid.effects._contract import in_time
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.axis_data import EPSILON, AxisData, prepare, prepare_all
-from xy_sysid.greybox.forces import force_of, friction_of, pushing, rubbing
+from xy_sysid.greybox.forces import dry_frictions, force_of, friction_of, position_forces
 from xy_sysid.greybox.least_squares import Scale, Schedule, Solution, Target, solve
 from xy_sysid.greybox.objective import Objective
 from xy_sysid.greybox.parameters import Estimate, FitProblem, estimates, model_of, problem
@@ -48,9 +48,9 @@ FIRST_LOOK = Schedule(1, 6, 1e-2, 1e-2)
 NEARER = Schedule(4, 6, 3e-3, 3e-3)
 FINER = Schedule(2, 8, 1e-4, 1e-3)
 LONG = Schedule(3, 6, 1e-5, 1e-4)
-COARSE, MIDDLING = 2000.0, 4000.0  # Hz: finest sub-steps of looks and first rounds (errors up to 3e-3 of the motion), and of screening fits (6e-4)
-TOLD = 0.01  # least part of the residual voltage that an effect explains, to be simulated before any fit: of 14 s below 10 Hz chance
-# takes half of it
+COARSE, MEDIUM = 2000.0, 4000.0  # Hz: finest sub-steps of looks and first rounds (errors up to 3e-3 of the motion), and of screening fits (6e-4)
+LEAST_EXPLAINED = 0.01  # of the residual voltage: an effect that explains less is not simulated before a fit. In 14 s below 10 Hz chance
+# explains half of this
 LATE = 1.0 / (4.0 * CUTOFFS[-1])  # s, of a delay with which nothing is read if it is wrong: a quarter of the shortest period that is looked at
 FAITHFUL = 0.1  # of the error of a model: allowed change of its motion with finer sub-steps
 
@@ -130,7 +130,10 @@ def fit_with(
     model = base.model
     for name in names:
         values = (starts or {}).get(name)
-        model = _begun(data, base, model, name) if values is None else model.with_effect(name, bounded(model.library[name], values, data.similar))
+        if values is None:
+            model = _with_best_start(data, base, model, name)
+        else:
+            model = model.with_effect(name, bounded(model.library[name], values, data.similar))
     found = fit(data, model, screening, give_up_above)
     if screening or fitted_score(data, found) <= fitted_score(data, base):
         return found
@@ -148,22 +151,24 @@ def fitted_score(data: AxisData, fitted: GreyboxFit) -> float:
     return Objective.of(data.floor).of_power(np.where(np.isfinite(power), power, np.inf))
 
 
-def _begun(data: AxisData, base: GreyboxFit, model: AxisModel, name: str) -> AxisModel:
-    """The model with one more effect, with the best start value from trace, inverse dynamics and joint start."""
+def _with_best_start(data: AxisData, base: GreyboxFit, model: AxisModel, name: str) -> AxisModel:
+    """The model with one more effect, with the best start values from trace, inverse dynamics and joint start."""
     effect = model.library[name]
     traced = model.with_effect(name, look(data, base, [effect])[0].values)
-    return best_start(data, [traced, *other_starts(data, base, model, name)])
+    return best_start(data, [traced, *inverse_start_models(data, base, model, name)])
 
 
-def other_starts(data: AxisData, base: GreyboxFit, model: AxisModel, name: str, scene: Scene | None = None, least: float = 0.0) -> list[AxisModel]:
-    """The model with one more effect, from inverse identification, and from starts of base and effect together.
+def inverse_start_models(
+    data: AxisData, base: GreyboxFit, model: AxisModel, name: str, scene: Scene | None = None, least: float = 0.0
+) -> list[AxisModel]:
+    """Start models with one more effect: by inverse dynamics, and with joint start values of base and effect.
 
     scene: of the base and the first stage's data, if it is known; least: see ``inverse_starts``
     """
     effect, scene = model.library[name], scene or scene_of(data, base)
-    candidates = _read(data, model, effect, scene, least)
+    candidates = _from_inverse_dynamics(data, model, effect, scene, least)
     if scene.prompt is not None:
-        candidates += _read(data, replace(model, delay=0.0), effect, scene.prompt, least)
+        candidates += _from_inverse_dynamics(data, replace(model, delay=0.0), effect, scene.prompt, least)
     if effect.joint is not None:
         for gain, later, pole, values in effect.joint(scene):
             whole = replace(model, gain=gain, delay=max(base.model.delay + later, 0.0), pole=min(max(pole, 1e-2), 1e5))
@@ -171,28 +176,28 @@ def other_starts(data: AxisData, base: GreyboxFit, model: AxisModel, name: str, 
     return candidates
 
 
-def _read(data: AxisData, model: AxisModel, effect: Effect, scene: Scene, least: float) -> list[AxisModel]:
-    """The model with one more effect as inverse identification reads it from a scene that has the model's delay."""
-    name, candidates, known = effect.name, [], _apart(model)
-    beside, rubs = [own for own in pushing(known) if own != name], [own for own in rubbing(known) if own != name]
+def _from_inverse_dynamics(data: AxisData, model: AxisModel, effect: Effect, scene: Scene, least: float) -> list[AxisModel]:
+    """Start models with one more effect by inverse dynamics, from a scene with the delay of the model."""
+    name, candidates, known = effect.name, [], _friction_split(model)
+    by_position, frictions = [own for own in position_forces(known) if own != name], [own for own in dry_frictions(known) if own != name]
     amplified = [own for own, _ in known.effects if known.library[own].category == "input" and own != name]
     if amplified:
         scene = replace(scene, voltage=_amplified(data, known, amplified, data.counts(early=scene.velocity.size == data.first)))
-    forces = [force_of(data, known, own, data.counts(early=scene.velocity.size == data.first)) for own in beside]
-    forces += [friction_of(scene, known, own) for own in rubs]
-    for start in inverse_starts(effect, scene, scene.velocity.size, forces, bool(rubs), least):
+    forces = [force_of(data, known, own, data.counts(early=scene.velocity.size == data.first)) for own in by_position]
+    forces += [friction_of(scene, known, own) for own in frictions]
+    for start in inverse_starts(effect, scene, scene.velocity.size, forces, bool(frictions), least):
         whole = replace(known, gain=start.gain, pole=min(max(start.pole, 1e-2), 1e5))
-        for own, size in zip((*beside, *rubs), start.sizes, strict=True):
-            whole = whole.with_effect(own, bounded(known.library[own], _sized(known, own, size), data.similar))
+        for own, size in zip((*by_position, *frictions), start.sizes, strict=True):
+            whole = whole.with_effect(own, bounded(known.library[own], _scaled(known, own, size), data.similar))
         whole = whole if known is model else whole.joined()
         if all(own in whole for own, _ in model.effects):
             candidates.append(whole.with_effect(name, start.values))
     return candidates
 
 
-def is_read(model: AxisModel) -> bool:
-    """Starts by least squares know all that acts in a model: forces by place, friction by speed, and what the amplifier does."""
-    known = {*pushing(model), *rubbing(model), *(name for name, _ in model.effects if model.library[name].category == "input")}
+def has_inverse_starts(model: AxisModel) -> bool:
+    """Whether inverse dynamics can include every effect of a model: position forces, dry friction, and effects of category input."""
+    known = {*position_forces(model), *dry_frictions(model), *(name for name, _ in model.effects if model.library[name].category == "input")}
     return all(name in known for name, _ in model.effects)
 
 
@@ -206,16 +211,16 @@ def _amplified(data: AxisData, model: AxisModel, names: list[str], counts: Seque
     return np.concatenate(parts)
 
 
-def _apart(model: AxisModel) -> AxisModel:
-    """The model with the parts of a friction that is the sum of several in its place: each has a size of its own."""
-    whole = [own for own in rubbing(model) if model.library[own].sum_of is not None]
+def _friction_split(model: AxisModel) -> AxisModel:
+    """The model with a friction that is a sum of effects replaced by these, so that each has its own size."""
+    whole = [own for own in dry_frictions(model) if model.library[own].sum_of is not None]
     return model.apart(whole[0]) if whole else model
 
 
-def _sized(model: AxisModel, name: str, times: float) -> tuple[float, ...]:
-    """The values of an effect that pushes so many times as hard, up to three: its size, and every other level of a friction.
+def _scaled(model: AxisModel, name: str, times: float) -> tuple[float, ...]:
+    """The values of an effect whose force is multiplied by ``times``, at most by three: its size, and every other level of a friction.
 
-    What has no sign may vanish or push the other way round; the rest is not below a third.
+    A size of either sign may become 0 or negative; a positive size is multiplied by at least 0.3.
     """
     items, values = model.library[name].parameters, dict(model.effects)[name]
     levels = [k == 0 or (model.library[name].is_dry and item.unit == items[0].unit) for k, item in enumerate(items)]
@@ -289,7 +294,7 @@ def fit(data: AxisData, start: AxisModel, screening: bool = False, give_up_above
     found = solve(run, target, scale, task.row, replace(FIRST_LOOK, late=late))
     if not (late() or (screening and found.score > give_up_above)):
         nearer = solve(run, target, scale, found.values, replace(NEARER, late=late), found)
-        finer = sub_steps(data, problem(data, model_of(data, start, nearer.values), True), MIDDLING)
+        finer = sub_steps(data, problem(data, model_of(data, start, nearer.values), True), MEDIUM)
         if finer != rate:
             run = task.at(finer)
         more = solve(run, target, scale, nearer.values, replace(FINER, late=late), nearer)
@@ -347,7 +352,7 @@ def sub_steps(data: AxisData, task: FitProblem, finest: float) -> float:
 def _result(data: AxisData, start: AxisModel, scale: Scale, found: Solution, screening: bool = False) -> GreyboxFit:
     model = model_of(data, start, found.values)
     task = problem(data, model, screening)
-    simulated = task.at(MIDDLING if screening else FINE)(task.row)
+    simulated = task.at(MEDIUM if screening else FINE)(task.row)
     error = (data.first_stage(data.velocity) if screening else data.velocity) - simulated
     fitted, judging = (data.screening_windows, data.first_windows()) if screening else (data.fitted, data.held)
     held = data.layout.powers(judging.spectrum(error))

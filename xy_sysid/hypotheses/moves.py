@@ -10,7 +10,7 @@ from itertools import combinations
 from xy_sysid.axis.model import AxisModel, Library
 from xy_sysid.effects import Effect
 from xy_sysid.greybox.axis_data import AxisData
-from xy_sysid.greybox.free_run import TOLD, GreyboxFit, first_excess, is_read, other_starts, scene_of, screened
+from xy_sysid.greybox.free_run import LEAST_EXPLAINED, GreyboxFit, first_excess, has_inverse_starts, inverse_start_models, scene_of, screened
 from xy_sysid.hypotheses.criteria import ALMOST, WIDTH
 from xy_sysid.hypotheses.starts import added, swapped
 
@@ -67,7 +67,7 @@ def moves(data: AxisData, library: Library, now: GreyboxFit, screening: GreyboxF
     for effect in open_to:
         traced = traces.get(effect.name)
         if not is_twice(library, own | {effect.name}):
-            gain = predicted_gain([effect.name], other_starts(data, now, model, effect.name, scene, TOLD) if early else ())
+            gain = predicted_gain([effect.name], inverse_start_models(data, now, model, effect.name, scene, LEAST_EXPLAINED) if early else ())
             singles.append(Move(own | {effect.name}, len(effect.parameters), gain, partial(added, data, now, model, effect, traced)))
         for name in sorted(own):
             related = bool(effect.family) and effect.family == library[name].family
@@ -75,7 +75,11 @@ def moves(data: AxisData, library: Library, now: GreyboxFit, screening: GreyboxF
             if related or suspected:
                 starts = cache(partial(swapped, data, now, name, effect, traced))  # used for the predicted gain, and again for the fit
                 rest = model.without(name)
-                start_models = starts() if suspected else other_starts(data, now, rest, effect.name, scene, TOLD) if early and is_read(rest) else ()
+                start_models: Sequence[AxisModel] = ()
+                if suspected:
+                    start_models = starts()
+                elif early and has_inverse_starts(rest):
+                    start_models = inverse_start_models(data, now, rest, effect.name, scene, LEAST_EXPLAINED)
                 more = len(effect.parameters) - len(library[name].parameters)
                 swaps.append(Move(own - {name} | {effect.name}, more, predicted_gain([effect.name], start_models), starts))
     pairs = _pairs(library, now, own, gains, screen.gain, lambda names: _both(data, now, [library[name] for name in names], traces))
