@@ -85,7 +85,7 @@ def test_a_contact_that_is_stiff_and_damped_does_not_run_away_in_coarse_steps() 
     data, base = machine("backlash=20e-6")
     fit = innovations(data, base, "coulomb_friction")
     inner = fit.start((base.model.gain, base.model.delay, base.model.pole), (20e-6, 0.75, 3900.0, 1.0, 100.0, 0.4, 0.0, 0.0), (0.1,))
-    coarse, fine = (fit.size(inner, View(8000, cuts=cuts)) for cuts in (3, 24))
+    coarse, fine = (fit.rms(inner, View(8000, sub_steps=sub_steps)) for sub_steps in (3, 24))
     assert coarse == pytest.approx(fine, rel=0.02)
 
 
@@ -125,7 +125,7 @@ def test_derivatives_are_those_of_the_filter(name: str, values: tuple[float, ...
         for sign in (1.0, -1.0):
             there = inner.copy()
             there[place] += sign * 1e-3
-            moved.append(fit.seen(there, view)[1000:])
+            moved.append(fit.innovations(there, view)[1000:])
         if fit.low[place] + 1e-2 < inner[place] < fit.high[place] - 1e-2:
             difference = (moved[0] - moved[1]) / 2e-3
             seen = float(np.median(np.abs(difference)))
@@ -154,10 +154,10 @@ def filter_leaves(law: Effect, values: tuple[float, ...]) -> float:
     position = np.concatenate(([0.0], np.cumsum(velocity))) / RATE
     none = np.zeros(0)
     nothing = Companions(none, none, none, none, none.astype(np.bool_), lambda _, n: (u[:n], position[: n + 1], np.zeros((2, n)), 1.0))
-    fit = Innovations(RATE, BASE, 1e6, nothing, (law,)).softened(10.0)
+    fit = Innovations(RATE, BASE, 1e6, nothing, (law,)).with_soft_contact(10.0)
     closed = fit.start(BASE, (1e-10, 0.4, 30e3, 0.5, 0.0, 0.0, 0.0, 0.0), values)
     fit.high[NAMES.index("rate")] = closed[NAMES.index("rate")]
-    out = fit.seen(closed, View(u.size - 1, looseness=0.0, cuts=400)) * 1e6
+    out = fit.innovations(closed, View(u.size - 1, process_noise_factor=0.0, sub_steps=400)) * 1e6
     return float(np.std(np.diff(out))) * RATE / float(np.std(velocity))
 
 

@@ -170,10 +170,10 @@ def test_friction_inside_the_filter_is_the_law_of_its_effect(name: str, values: 
     u = 3.0 * lfilter([0.3], [1.0, -0.7], noise())
     velocity = simulate(AxisModel(*BASE).with_effect(name, values), RATE, u, np.zeros_like(u))
     position = np.concatenate(([0.0], np.cumsum(velocity))) / RATE
-    fit = Innovations(RATE, BASE, 1e6, beside_nothing(u, position), (EFFECTS[name],)).softened(10.0)
+    fit = Innovations(RATE, BASE, 1e6, beside_nothing(u, position), (EFFECTS[name],)).with_soft_contact(10.0)
     closed = fit.start(BASE, (1e-10, 0.4, 30e3, 0.5, 0.0, 0.0, 0.0, 0.0), values)
     fit.high[5] = closed[5]  # a contact far stiffer than a fit may have
-    out = fit.seen(closed, View(u.size - 1, looseness=0.0, cuts=800)) * 1e6
+    out = fit.innovations(closed, View(u.size - 1, process_noise_factor=0.0, sub_steps=800)) * 1e6
     bent = name == "presliding_hysteresis"
     assert float(np.std(np.diff(out))) * RATE < (0.002 if bent else 0.01) * float(np.std(velocity))
 

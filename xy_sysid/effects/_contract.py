@@ -34,7 +34,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.samples.block import FloatArray
 
 USUAL_WITHIN = 2.0  # factor by which sizes of real machines differ from the usual one: two of three are within it
-BEGUN = 0.05  # of its usual size at least, with which a fit begins what must not be 0
+LEAST_START = 0.05  # of the typical value: least start value of a parameter that must not be 0
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -150,8 +150,8 @@ class FilterFit:
     companions:   (k,) numbers of ``Companions``, and their standard errors
     innovation:   (n,) measured minus predicted position, one step ahead, m
     without:      (n,) innovations of the same filter (process noise, companions) without the effect, all else refitted, m
-    noise:        standard deviation of the encoder, m; runs: how often the filter ran
-    looseness:    process noise that the filter was given, over the usual
+    noise:        standard deviation of the encoder, m; runs: number of filter runs
+    process_noise_factor: on the process noise that the filter assumed
     too_small:    True if the effect found is so small that it is none
     given_up:     True if it ended early, because it could not come near the bar
     """
@@ -166,7 +166,7 @@ class FilterFit:
     without: FloatArray
     noise: float
     runs: int
-    looseness: float = 1.0
+    process_noise_factor: float = 1.0
     too_small: bool = False
     given_up: bool = False
 
@@ -428,7 +428,7 @@ class Effect:
     def read(self, guess: Guess, coefficients: FloatArray, similar: Similarity) -> tuple[float, ...]:
         """The values of the parameters that belong to the coefficients of a guess's columns, within their bounds.
 
-        What is an input or the effect's size is not smaller than a fit can begin with.
+        A size of the effect and a parameter in V are at least ``LEAST_START`` times their typical value.
         Raises BadInput for other than one finite number each, as an effect of one's own may give.
         """
         given = tuple(guess.read(coefficients))
@@ -436,7 +436,7 @@ class Effect:
             said, allowed = ", ".join(str(value)[:20] for value in given), f"a number for each of {', '.join(self.names)}"
             raise BadInput(f"values that {self.name} guesses", said or "nothing", allowed, "Return them in this order.")
         items = self.on(similar)
-        least = [BEGUN * abs(item.typical) if item.positive and (k == 0 or "V" in item.unit) else item.low for k, item in enumerate(items)]
+        least = [LEAST_START * abs(item.typical) if item.positive and (k == 0 or "V" in item.unit) else item.low for k, item in enumerate(items)]
         return tuple(float(min(max(value, low), item.high)) for value, low, item in zip(given, least, items, strict=True))
 
 

@@ -33,16 +33,16 @@ GAP, RATE, HERTZ = (NAMES.index(name) for name in ("gap", "rate", "hertz"))
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """What the filter is shown and told.
+    """How the filter is run.
 
-    looseness: factor on the process noise; cuts: sub-steps of a sample, at least; deaf: factor on the encoder's noise;
-    turn: rad that the closed contact may turn in a sub-step
+    samples: how many, from the first; process_noise_factor, encoder_noise_factor: factors on the noise that the filter assumes
+    sub_steps: least number in a sample; turn: largest phase of the closed contact in a sub-step, rad
     """
 
     samples: int
-    looseness: float = 1.0
-    cuts: int = 6
-    deaf: float = 1.0
+    process_noise_factor: float = 1.0
+    sub_steps: int = 6
+    encoder_noise_factor: float = 1.0
     turn: float = 0.35
 
     def within(self, samples: int) -> View:
@@ -74,10 +74,10 @@ class Innovations:
         self.low = self.inner(np.array([*low, *(row.low for row in rows), *companions.low]))
         self.high = self.inner(np.array([*high, *(row.high for row in rows), *companions.high]))
         self.late = in_time
-        self.heeded = np.arange(3)  # numbers of the base on which the companions depend
+        self.influential = np.arange(3)  # numbers of the base on which the companions depend
 
-    def softened(self, rate: float) -> Innovations:
-        """The same, with a contact that may be as soft as that, rad/s, and a gap of nothing; runs count for both."""
+    def with_soft_contact(self, rate: float) -> Innovations:
+        """The same without a gap, and with a contact that may be as soft as ``rate``, rad/s; ``runs`` counts both."""
         other = copy(self)
         other.low = self.low.copy()
         other.low[[RATE, GAP]] = np.log((rate, CLOSED)) / self.unit[[RATE, GAP]]
@@ -102,13 +102,13 @@ class Innovations:
         kept = np.clip(inner, self.low, self.high) * self.unit
         return np.asarray(np.where(self.log, np.exp(np.where(self.log, kept, 0.0)), kept))
 
-    def seen(self, inner: FloatArray, view: View) -> FloatArray:
+    def innovations(self, inner: FloatArray, view: View) -> FloatArray:
         """(samples,) innovations over the noise."""
         return self.run(self.outer(inner), view, False)[0]
 
-    def size(self, inner: FloatArray, view: View) -> float:
+    def rms(self, inner: FloatArray, view: View) -> float:
         """rms of the innovations over the noise."""
-        return float(np.sqrt(np.mean(self.seen(inner, view) ** 2)))
+        return float(np.sqrt(np.mean(self.innovations(inner, view) ** 2)))
 
     def scale(self, errors: FloatArray) -> float:
         """Their usual size, over the noise, whatever their tails are."""
@@ -134,7 +134,7 @@ class Innovations:
             whole[free] = part
             return self.run(self.outer(whole), view, True)[1][skip:, free]
 
-        size = scale or max(self.scale(self.seen(start, view)), 1e-3)
+        size = scale or max(self.scale(self.innovations(start, view)), 1e-3)
         if self.late():
             return start
         found = scipy.optimize.least_squares(
@@ -174,9 +174,9 @@ class Innovations:
         moved = np.zeros((0, n)), np.zeros((0, n + 1)), np.zeros((0, 2, n))
         passing = np.zeros(0)
         if sloped and self.others.start < self.others.stop:
-            column, moved, passing = self._moved(numbers, n)
+            column, moved, passing = self._derivatives(numbers, n)
         noise = self.noise / through
-        drift = (view.looseness * DRIFT * float(np.std(np.diff(position))) * self.fs) ** 2
+        drift = (view.process_noise_factor * DRIFT * float(np.std(np.diff(position))) * self.fs) ** 2
         out, slopes = np.empty(n), np.empty((n, numbers.size) if sloped else (0, 0))
         own = numbers[: self.friction.stop].copy()
         nudge = 1e-6 * np.maximum(np.abs(own[self.friction]), 1e-3 * np.where(self.log[self.friction], 0.0, self.unit[self.friction]) + 1e-300)
@@ -186,9 +186,9 @@ class Innovations:
             against,
             own,
             self.fs,
-            (view.deaf * noise) ** 2,
+            (view.encoder_noise_factor * noise) ** 2,
             drift,
-            max(view.cuts, self._cuts(numbers, view.turn)),
+            max(view.sub_steps, self._sub_steps(numbers, view.turn)),
             *moved,
             column,
             nudge,
@@ -205,7 +205,7 @@ class Innovations:
             slopes = np.clip(np.nan_to_num(slopes, nan=0.0), -WORST, WORST)
         return out, slopes
 
-    def _cuts(self, numbers: FloatArray, turn: float) -> int:
+    def _sub_steps(self, numbers: FloatArray, turn: float) -> int:
         """Sub-steps of a sample with which the closed contact, as stiff as it usually is, turns so far in each, rad."""
         depth = PRESSED * SPEED / numbers[RATE]
         stiffer = 1.0 + numbers[HERTZ] * (1.5 * np.sqrt(2.0 * depth / numbers[GAP]) - 1.0)
@@ -214,21 +214,22 @@ class Innovations:
     def _undone(self, numbers: FloatArray, n: int) -> tuple[FloatArray, FloatArray, FloatArray, float]:
         return self.companions.undo(np.concatenate((numbers[:3], numbers[self.others])), n)
 
-    def _moved(self, numbers: FloatArray, n: int) -> tuple[NDArray[np.int64], tuple[FloatArray, FloatArray, FloatArray], FloatArray]:
-        """Columns, and derivatives by their numbers of voltage, position and forces, and of what passes of a sudden change."""
+    def _derivatives(self, numbers: FloatArray, n: int) -> tuple[NDArray[np.int64], tuple[FloatArray, FloatArray, FloatArray], FloatArray]:
+        """Indices of the numbers that matter, the derivatives of voltage, position and forces by them, and that of the part of a sudden change
+        that the encoder shows at once."""
         here = self._undone(numbers, n)
-        column = np.array([*self.heeded, *range(self.others.start, self.others.stop)])
+        column = np.array([*self.influential, *range(self.others.start, self.others.stop)])
         steps = STEP * self.unit[column] * np.where(self.log[column], numbers[column], 1.0)
         rows = []
         for place, step in zip(column, steps, strict=True):
             moved = numbers.copy()
             moved[place] += step
             rows.append([(np.asarray(new) - old) / step for new, old in zip(self._undone(moved, n), here, strict=True)])
-        heeds = [place >= 3 or any(np.any(item) for item in row) for place, row in zip(column, rows, strict=True)]
-        self.heeded = column[[place < 3 and seen for place, seen in zip(column, heeds, strict=True)]]
-        kept = [row for row, seen in zip(rows, heeds, strict=True) if seen]
+        matters = [place >= 3 or any(np.any(item) for item in row) for place, row in zip(column, rows, strict=True)]
+        self.influential = column[[place < 3 and used for place, used in zip(column, matters, strict=True)]]
+        kept = [row for row, used in zip(rows, matters, strict=True) if used]
         voltage, position, against, through = (np.array(items) for items in zip(*kept, strict=True))
-        return column[heeds], (voltage, position, against), through
+        return column[matters], (voltage, position, against), through
 
 
 @dataclass(frozen=True, slots=True)
