@@ -20,7 +20,7 @@ from xy_sysid.hypotheses.one_step import OneStepTrials
 from xy_sysid.hypotheses.pool import Pool
 
 
-def settled(data: AxisData, library: Library, names: tuple[str, ...], effort: Effort) -> Answer | None:
+def answer_of_known_set(data: AxisData, library: Library, names: tuple[str, ...], effort: Effort) -> Answer | None:
     """The answer of a known set, or of a simpler one that does as well; None where the search has to be made.
 
     names: effects in any order; those that the library does not have make no set

@@ -18,7 +18,7 @@ from xy_sysid.hypotheses import starts
 from xy_sysid.hypotheses.companions import add_companion
 from xy_sysid.hypotheses.compare import gain
 from xy_sysid.hypotheses.criteria import ALMOST, AT_FLOOR, PRICE, TELLS
-from xy_sysid.hypotheses.one_step import Filtered
+from xy_sysid.hypotheses.one_step import OneStepResult
 from xy_sysid.hypotheses.pool import Node, Pool, comparable_fits
 
 
@@ -69,7 +69,7 @@ def answer_of_rungs(data: AxisData, rungs: tuple[Rung, ...]) -> Answer:
     )
 
 
-def answer_of_search(pool: Pool, given: tuple[Rung, ...], filtered: Filtered | None) -> Answer:
+def answer_of_search(pool: Pool, given: tuple[Rung, ...], filtered: OneStepResult | None) -> Answer:
     """The answer of the best set, or of what one-step prediction found instead. given: the base, and effects that were given."""
     data, library, node, base, kept = pool.data, pool.library, pool.answer, given[0].fit, [name for rung in given for name in rung.came]
     alone = (item for item in pool.nodes.values() if len(item.effects) == 1)
@@ -131,7 +131,7 @@ def _doubt(node: Node, other: Node) -> float:
 def _of_one_step(
     pool: Pool,
     base: Rung,
-    filtered: Filtered,
+    filtered: OneStepResult,
     tried: Sequence[Tried],
     refused: tuple[tuple[tuple[str, ...], str], ...],
 ) -> Answer:
@@ -184,7 +184,7 @@ def _rungs(pool: Pool, given: tuple[Rung, ...], names: tuple[str, ...], final: G
     now = shown = given[-1].fit
     left, together = list(names[sum(len(rung.came) for rung in given) :]), []
     while left:
-        fits = {name: found for name in left if (found := _with(pool, now, name, final, name == left[0])) is not None}
+        fits = {name: found for name in left if (found := _fit_with(pool, now, name, final, name == left[0])) is not None}
         lower = [name for name, found in fits.items() if found.held_out_error < shown.held_out_error or found is final]
         name = lower[0] if lower else left[0]
         now = fits[name]
@@ -196,7 +196,7 @@ def _rungs(pool: Pool, given: tuple[Rung, ...], names: tuple[str, ...], final: G
     return rungs
 
 
-def _with(pool: Pool, now: GreyboxFit, name: str, final: GreyboxFit, asked: bool) -> GreyboxFit | None:
+def _fit_with(pool: Pool, now: GreyboxFit, name: str, final: GreyboxFit, asked: bool) -> GreyboxFit | None:
     """The fit with one more effect, from memory if it is known; None if it is not, and is not asked for."""
     effects = frozenset(own for own, _ in now.model.effects) | {name}
     if effects == frozenset(own for own, _ in final.model.effects):

@@ -66,7 +66,7 @@ class Evidence:
         """travel: of the machine, m; None: as far as the data went."""
         self.travel = travel
         self.machine = data.similar if travel is None else replace(data.similar, length=0.5 * (travel[1] - travel[0]) / REACH)
-        self.data, self.windows = data, Windows(data.layout, np.sort(np.concatenate((data.fitted.begins, data.held.begins))))
+        self.data, self.windows = data, Windows(data.layout, np.sort(np.concatenate((data.fitted.begins, data.held_out.begins))))
         self.objective = Objective.of(data.floor)
         self.measured = self.windows.spectrum(data.velocity)
 

@@ -92,7 +92,7 @@ def gained(data: AxisData, one: GreyboxFit, other: GreyboxFit) -> Gain:
         return found
     each = other.scores - one.scores
     ends = [step.start for step in data.steps]
-    parts = [each[np.searchsorted(ends, data.held.begins, side="right") == k + 1] for k in range(len(ends))]
+    parts = [each[np.searchsorted(ends, data.held_out.begins, side="right") == k + 1] for k in range(len(ends))]
     parts = [part for part in parts if part.size]
     variance = sum(part.size * (float(np.var(part, ddof=1)) if part.size > 1 else float(part[0] ** 2)) for part in parts)
     return Gain(found.nats, math.sqrt(OVERLAP * variance), each.size / OVERLAP - len(parts) + 1)

@@ -67,7 +67,7 @@ class GreyboxFit:
     forced:         lines of a window in which the unmodelled force exceeds the floor
     force:          of the unmodelled force, V a sample (rms, white), that explains the held-out error beyond the floor
     simulated:      (n - r,) velocity over all recordings, m/s; error: (n - r,) measured minus simulated
-    held:           (windows, bands) power of the held-out error, m^2/s^2
+    held_out_powers: (windows, bands) power of the held-out error, m^2/s^2
     units:          of input and output; m/s above is ``units.speed``
     is_screening:   True for a screening fit: it uses the data of the first stage; errors and simulation cover these data only
     one_step:       judged by the prediction of the next sample from all earlier ones, not by simulation; errors are those of the prediction
@@ -86,7 +86,7 @@ class GreyboxFit:
     error: FloatArray
     runs: int
     converged: bool
-    held: FloatArray
+    held_out_powers: FloatArray
     is_screening: bool = False
     one_step: bool = False
     units: Units = USUAL
@@ -94,7 +94,7 @@ class GreyboxFit:
     @property
     def power(self) -> FloatArray:
         """(bands,) of the held-out error, m^2/s^2."""
-        return np.asarray(self.held.mean(axis=0))
+        return np.asarray(self.held_out_powers.mean(axis=0))
 
     def parameter(self, name: str) -> Estimate:
         """The parameter of this name; raises BadInput."""
@@ -354,7 +354,7 @@ def _result(data: AxisData, start: AxisModel, scale: Scale, found: Solution, scr
     task = problem(data, model, screening)
     simulated = task.at(MEDIUM if screening else FINE)(task.row)
     error = (data.first_stage(data.velocity) if screening else data.velocity) - simulated
-    fitted, judging = (data.screening_windows, data.first_windows()) if screening else (data.fitted, data.held)
+    fitted, judging = (data.screening_windows, data.first_windows()) if screening else (data.fitted, data.held_out)
     held = data.layout.powers(judging.spectrum(error))
     objective = Objective.of(data.floor)
     expected = objective.spectrum(held.mean(axis=0))
@@ -372,7 +372,7 @@ def _result(data: AxisData, start: AxisModel, scale: Scale, found: Solution, scr
         error=error,
         runs=found.runs,
         converged=found.converged,
-        held=held,
+        held_out_powers=held,
         is_screening=screening,
         units=data.units,
     )

@@ -19,7 +19,7 @@ from xy_sysid.hypotheses.refusal import refusal
 
 
 @dataclass(frozen=True, slots=True)
-class Filtered:
+class OneStepResult:
     """The result of one-step prediction, and the errors that it had to beat.
 
     rungs: names and fits, the last is the answer; bar: error one sample ahead, m/s, of the best simulation with an autoregressive error
@@ -31,8 +31,8 @@ class Filtered:
     without: float
 
     @property
-    def wins(self) -> bool:
-        """It explains as much above the noise as a named effect must, and the best set without it has an error above the floor."""
+    def is_accepted(self) -> bool:
+        """Whether it explains as much above the noise as a named effect must, and the best set without it has an error above the floor."""
         seen = min(self.bar, self.without) >= exp(0.5 * TELLS) * self.rungs[-1][1].held_out_error
         return seen and self.size >= SIZE
 
@@ -48,7 +48,7 @@ class OneStepTrials:
     """Each effect is fitted once from a set, and accepted if it beats the best simulation with an autoregressive error. found: the result."""
 
     pool: Pool
-    found: Filtered | None = None
+    found: OneStepResult | None = None
     fitted: dict[tuple[str, frozenset[str], bool], Extended] = field(default_factory=dict)
     asked: set[frozenset[str]] = field(default_factory=set)
 
@@ -113,8 +113,8 @@ class OneStepTrials:
         demand = Demand(Limits(FILTERED * bar, pool.late), pool.worth, lambda fit: refusal(pool.data, pool.library, fit), masked)
         extension = extended(pool.data, node.fit, pool.library[name], demand)
         self.fitted[key] = extension
-        result = Filtered((*self._up_to(node), *extension.rungs), bar, error_without(pool.data, extension.found))
-        if name in result.rungs[-1][1].model and result.wins and not extension.found.too_small:
+        result = OneStepResult((*self._up_to(node), *extension.rungs), bar, error_without(pool.data, extension.found))
+        if name in result.rungs[-1][1].model and result.is_accepted and not extension.found.too_small:
             self.found = result
 
     def _up_to(self, node: Node) -> list[tuple[str, GreyboxFit]]:

@@ -67,7 +67,7 @@ class Pool:
     def scale(self) -> float:
         """Nats over all held-out windows that correspond to one nat a line."""
         lines = self.data.floor.lines @ self.data.floor.excited
-        return max(0.5 * float(lines) * self.data.held.begins.size, 1.0)
+        return max(0.5 * float(lines) * self.data.held_out.begins.size, 1.0)
 
     def score(self, node: Node) -> float:
         """Score of the held-out windows in nats, with the penalty for parameters; less is better."""
@@ -259,7 +259,7 @@ class Pool:
 
     def _may_be_worth(self, node: Node, move: Move) -> bool:
         """Whether the new effect is large enough if its gain is a few times its first-order prediction."""
-        lines = max(node.fit.forced, 1.0) * self.data.held.begins.size
+        lines = max(node.fit.forced, 1.0) * self.data.held_out.begins.size
         most = OPTIMISM * 2.0 * self.scale * move.predicted_gain / lines
         return move.parameters <= 0 or most >= len(move.effects - node.effects) * math.log1p(self.worth)
 
