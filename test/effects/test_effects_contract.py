@@ -19,7 +19,7 @@ from xy_sysid.samples.block import FloatArray
 
 RATE = 2000.0
 PACKAGE = Path(__file__).parents[2] / "xy_sysid"
-RELATIONS = ("look_alikes", "suspects", "special_of", "sum_of", "rubs", "hides")  # fields in which an effect may name others
+RELATIONS = ("look_alikes", "suspects", "special_of", "sum_of", "start_friction", "masks")  # fields in which an effect may name others
 
 
 def names(text: str) -> list[str]:

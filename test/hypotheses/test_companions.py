@@ -36,7 +36,7 @@ def test_what_a_simulation_had_and_is_of_no_use_beside_a_gap_goes(data: AxisData
     assert set(dict(found.rungs[-1][1].model.effects)) == {"backlash", "coulomb_friction", "amplifier_lag"}
 
 
-@pytest.mark.parametrize("hidden", [False, True])
+@pytest.mark.parametrize("masked", [False, True])
 def test_without_what_a_gap_hides_no_filter_follows_the_motor(data: AxisData, masked: bool) -> None:
     """An encoder's count of 1 um is 0.6 mm/s one sample ahead."""
     last = followed(data, fit_base(data), 2e-3, masked).rungs[-1][1]
