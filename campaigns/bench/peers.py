@@ -63,7 +63,7 @@ def judged(data: AxisData, model: AxisModel) -> Judged:
         found = data.layout.power(windows.spectrum(error))
         return np.asarray(np.where(np.isfinite(found), found, np.inf))
 
-    return Judged(model, data.layout.rms(power(data.held)), Objective.of(data.floor).of_power(power(data.fitted)))
+    return Judged(model, data.layout.rms(power(data.held_out)), Objective.of(data.floor).of_power(power(data.fitted)))
 
 
 def made(gain: float, delay: float, pole: float, coulomb: float | None) -> AxisModel:

@@ -23,12 +23,12 @@ from xy_sysid.diagnosis.answer import Answer, Rung, Tried
 from xy_sysid.diagnosis.diagnose import diagnose, judged
 from xy_sysid.diagnosis.equal_laws import likelihood
 from xy_sysid.diagnosis.refine import Effort, refine
-from xy_sysid.diagnosis.sets import is_taken_for
+from xy_sysid.diagnosis.sets import is_mistaken_for
 from xy_sysid.effects import EFFECTS, Effect
 from xy_sysid.greybox.axis_data import AxisData, prepare
 from xy_sysid.greybox.free_run import GreyboxFit, fit_base, fit_with
 from xy_sysid.hypotheses import one_step
-from xy_sysid.hypotheses.companions import grown
+from xy_sysid.hypotheses.companions import extended
 from xy_sysid.hypotheses.criteria import AT_FLOOR, FEWEST, SIZE
 from xy_sysid.imports import save
 
@@ -301,10 +301,10 @@ def test_a_size_that_is_not_known_or_ends_at_a_bound_is_half_sure_at_most(value:
 def test_a_refused_spring_that_leaves_as_little_as_a_wave_makes_the_wave_unsure() -> None:
     """It is no spring, but neither is it surely that wave; other refused sets, and relatives, are no rivals."""
     wave, spring, stiff = (frozenset({"coulomb_friction", name}) for name in ("cogging", "return_spring", "hardening_stiffness"))
-    assert is_taken_for(STANDARD, spring, wave)
-    assert not is_taken_for(STANDARD, wave, spring)
-    assert not is_taken_for(STANDARD, stiff, spring)
-    assert not is_taken_for(STANDARD, frozenset({"cogging"}), wave)
+    assert is_mistaken_for(STANDARD, spring, wave)
+    assert not is_mistaken_for(STANDARD, wave, spring)
+    assert not is_mistaken_for(STANDARD, stiff, spring)
+    assert not is_mistaken_for(STANDARD, frozenset({"cogging"}), wave)
     data, ladder = prepare(2000.0, *recorded("cogging", seconds=20.0).axis("x")), diagnosed("cogging")
     rival = Tried(Rung.of(ladder.final, ("return_spring",)), doubt=0.5, refused="return_spring: it would give way")
     found = judged(data, replace(ladder, rivals=(rival,)), STANDARD)
@@ -352,13 +352,13 @@ def test_a_spring_beside_friction_is_not_taken_for_a_pendulum_and_bumps() -> Non
 def test_a_gap_is_asked_for_early_and_once(effect: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """One that explains the axis ends the simulations; one that does not is not fitted again beside the same effects."""
     asked: list[tuple[str, ...]] = []
-    fitted = grown
+    fitted = extended
 
     def counted(data: AxisData, base: GreyboxFit, gap: Effect, *others: Any) -> Any:
         asked.append((gap.name, str(others[0].hidden), *sorted(name for name, _ in base.model.effects)))
         return fitted(data, base, gap, *others)
 
-    monkeypatch.setattr(one_step, "grown", counted)
+    monkeypatch.setattr(one_step, "extended", counted)
     data = prepare(2000.0, *recorded(effect, seconds=20.0).axis("x"))
     tried: list[frozenset[str]] = []
     found = refine(data, trying=tried.append)
@@ -371,13 +371,13 @@ def test_a_gap_is_asked_for_early_and_once(effect: str, monkeypatch: pytest.Monk
 
 def test_a_gap_that_is_too_small_to_be_one_is_not_named(monkeypatch: pytest.MonkeyPatch) -> None:
     """However well the filter does with it."""
-    fitted = grown
+    fitted = extended
 
     def too_small(data: AxisData, base: GreyboxFit, gap: Effect, *others: Any) -> Any:
         found = fitted(data, base, gap, *others)
         return replace(found, found=replace(found.found, too_small=True))
 
-    monkeypatch.setattr(one_step, "grown", too_small)
+    monkeypatch.setattr(one_step, "extended", too_small)
     found = diagnose(2000.0, *recorded("backlash", seconds=20.0).axis("x"))
     assert "backlash" not in found.effects and "backlash" not in found.sentence
 
@@ -402,7 +402,7 @@ def test_what_a_simulation_had_taken_a_gap_for_goes() -> None:
     """A lag, here, of no size once the gap is known: it is taken out of what the filter has beside it."""
     data = prepare(2000.0, *recorded("coulomb_friction=0.03+backlash=6e-6", seconds=10.0).axis("x"))
     base = fit_with(data, fit_base(data), ["amplifier_lag"])
-    fit = grown(data, base, EFFECTS["backlash"]).rungs[-1][1]
+    fit = extended(data, base, EFFECTS["backlash"]).rungs[-1][1]
     assert "amplifier_lag" not in fit.model and {"backlash", "coulomb_friction"} <= {name for name, _ in fit.model.effects}
 
 

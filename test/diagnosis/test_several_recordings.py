@@ -78,7 +78,7 @@ def test_the_first_stage_holds_the_beginning_of_every_recording() -> None:
     assert all(0 < count < step.stop - step.start for count, step in zip(data.early, data.steps, strict=True))
     assert data.first <= FIRST
     parts = [data.velocity[step][:count] for count, step in zip(data.early, data.steps, strict=True)]
-    assert np.array_equal(data.begun(data.velocity), np.concatenate(parts))
+    assert np.array_equal(data.first_stage(data.velocity), np.concatenate(parts))
     edges = np.cumsum(data.early)
     for begin in data.first_windows().begins:
         assert np.searchsorted(edges, begin, side="right") == np.searchsorted(edges, begin + data.layout.length - 1, side="right")

@@ -15,7 +15,7 @@ from xy_sim.machine import Machine
 from xy_sysid import jit
 from xy_sysid.axis.model import STANDARD, AxisModel, Library, simulate
 from xy_sysid.effects import EFFECTS, Effect
-from xy_sysid.effects._contract import Beside, Limits
+from xy_sysid.effects._contract import Companions, Limits
 from xy_sysid.effects.backlash import contact
 from xy_sysid.effects.backlash.filter_source import NAMES
 from xy_sysid.effects.backlash.innovations import Innovations, View
@@ -23,7 +23,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.excitation.lockstep import drive
 from xy_sysid.files.effects import from_file
 from xy_sysid.greybox.free_run import AxisData, GreyboxFit, fit_base, prepare
-from xy_sysid.greybox.one_step import as_beside, error_without, followed, noise_of, one_step_fit
+from xy_sysid.greybox.one_step import as_companions, error_without, filter_fit, noise_of, one_step_fit
 from xy_sysid.greybox.whitened import whitened_rms
 from xy_sysid.settings import AxisExcitation, ExcitationSettings, build
 
@@ -76,7 +76,7 @@ def machine(*effects: str) -> tuple[AxisData, GreyboxFit]:
 def innovations(data: AxisData, base: GreyboxFit, *laws: str, others: tuple[tuple[str, tuple[float, ...]], ...] = ()) -> Innovations:
     model = base.model
     return Innovations(
-        RATE, (model.gain, model.delay, model.pole), noise_of(data), as_beside(data, STANDARD, others), tuple(EFFECTS[name] for name in laws)
+        RATE, (model.gain, model.delay, model.pole), noise_of(data), as_companions(data, STANDARD, others), tuple(EFFECTS[name] for name in laws)
     )
 
 
@@ -85,7 +85,7 @@ def test_a_contact_that_is_stiff_and_damped_does_not_run_away_in_coarse_steps() 
     data, base = machine("backlash=20e-6")
     fit = innovations(data, base, "coulomb_friction")
     inner = fit.start((base.model.gain, base.model.delay, base.model.pole), (20e-6, 0.75, 3900.0, 1.0, 100.0, 0.4, 0.0, 0.0), (0.1,))
-    coarse, fine = (fit.size(inner, View(8000, cuts=cuts)) for cuts in (3, 24))
+    coarse, fine = (fit.rms(inner, View(8000, sub_steps=sub_steps)) for sub_steps in (3, 24))
     assert coarse == pytest.approx(fine, rel=0.02)
 
 
@@ -95,9 +95,9 @@ def test_starts_that_are_tried_on_all_cores_find_the_same(monkeypatch: pytest.Mo
     found = []
     for cores in (1, 3):
         monkeypatch.setattr(jit, "cores", partial(int, cores))
-        found.append(followed(data, base, GAP, [("dead_zone", (0.05,))])[1])
+        found.append(filter_fit(data, base, GAP, [("dead_zone", (0.05,))])[1])
     one, three = found
-    assert (one.base, one.values, one.beside, one.runs) == (three.base, three.values, three.beside, three.runs)
+    assert (one.base, one.values, one.companions, one.runs) == (three.base, three.values, three.companions, three.runs)
     np.testing.assert_array_equal(one.innovation, three.innovation)
 
 
@@ -125,7 +125,7 @@ def test_derivatives_are_those_of_the_filter(name: str, values: tuple[float, ...
         for sign in (1.0, -1.0):
             there = inner.copy()
             there[place] += sign * 1e-3
-            moved.append(fit.seen(there, view)[1000:])
+            moved.append(fit.innovations(there, view)[1000:])
         if fit.low[place] + 1e-2 < inner[place] < fit.high[place] - 1e-2:
             difference = (moved[0] - moved[1]) / 2e-3
             seen = float(np.median(np.abs(difference)))
@@ -153,11 +153,11 @@ def filter_leaves(law: Effect, values: tuple[float, ...]) -> float:
     velocity = simulate(AxisModel(*BASE, library=Library([law])).with_effect(law.name, values), RATE, u, np.zeros_like(u))
     position = np.concatenate(([0.0], np.cumsum(velocity))) / RATE
     none = np.zeros(0)
-    nothing = Beside(none, none, none, none, none.astype(np.bool_), lambda _, n: (u[:n], position[: n + 1], np.zeros((2, n)), 1.0))
-    fit = Innovations(RATE, BASE, 1e6, nothing, (law,)).softened(10.0)
+    nothing = Companions(none, none, none, none, none.astype(np.bool_), lambda _, n: (u[:n], position[: n + 1], np.zeros((2, n)), 1.0))
+    fit = Innovations(RATE, BASE, 1e6, nothing, (law,)).with_soft_contact(10.0)
     closed = fit.start(BASE, (1e-10, 0.4, 30e3, 0.5, 0.0, 0.0, 0.0, 0.0), values)
     fit.high[NAMES.index("rate")] = closed[NAMES.index("rate")]
-    out = fit.seen(closed, View(u.size - 1, looseness=0.0, cuts=400)) * 1e6
+    out = fit.innovations(closed, View(u.size - 1, process_noise_factor=0.0, sub_steps=400)) * 1e6
     return float(np.std(np.diff(out))) * RATE / float(np.std(velocity))
 
 
@@ -174,11 +174,11 @@ def test_two_laws_of_bristles_at_once_are_refused() -> None:
 def test_the_filter_without_a_gap_is_always_there_to_be_beaten() -> None:
     """Where there is a gap it is far behind; where there is none it is as good, to a few hundredths."""
     data, base = machine("backlash=30e-6")
-    fit, found = followed(data, base, GAP)
+    fit, found = filter_fit(data, base, GAP)
     assert found.without.shape == found.innovation.shape
     assert error_without(data, found) > 5.0 * fit.held_out_error
     data, base = machine("coulomb_friction=0.2")
-    fit, found = followed(data, base, GAP)
+    fit, found = filter_fit(data, base, GAP)
     assert error_without(data, found) < 1.03 * fit.held_out_error
     assert fit.excess > 0.15
 
@@ -187,8 +187,8 @@ def test_a_gap_that_cannot_come_near_the_best_without_it_is_given_up_soon() -> N
     """Against a simulation that predicts down to the noise: fewer runs, and it says so; a true gap is not given up."""
     data, base = machine("coulomb_friction=0.2")
     held = np.arange(data.velocity.size) >= data.training
-    whole, its = followed(data, base, GAP)
-    early, found = followed(data, base, GAP, limits=Limits(bar=noise_of(data) * RATE))
+    whole, its = filter_fit(data, base, GAP)
+    early, found = filter_fit(data, base, GAP, limits=Limits(bar=noise_of(data) * RATE))
     assert found.given_up
     assert not early.converged
     assert whole.converged
@@ -197,7 +197,7 @@ def test_a_gap_that_cannot_come_near_the_best_without_it_is_given_up_soon() -> N
     assert error_without(data, found) < 1.2 * error_without(data, its)
     data, base = machine("backlash=30e-6")
     bar = whitened_rms(base.error, held)
-    assert not followed(data, base, GAP, limits=Limits(bar=bar))[1].given_up
+    assert not filter_fit(data, base, GAP, limits=Limits(bar=bar))[1].given_up
 
 
 @pytest.mark.parametrize(("idle", "times", "given_up"), [(0.0, 100.0, False), (0.0, 0.5, True), (0.9, 0.5, True), (0.9, 100.0, False)])
@@ -206,15 +206,15 @@ def test_what_beats_the_bar_where_nobody_fitted_goes_on_even_if_the_filter_does_
 ) -> None:
     """The bar is the error of the held-out part, and is held against that. idle: 0 is every gap; times: bar over what the gap leaves in the end."""
     data, base = machine("backlash=30e-6")
-    bar = times * followed(data, base, GAP)[0].held_out_error
+    bar = times * filter_fit(data, base, GAP)[0].held_out_error
     monkeypatch.setattr(contact, "IDLE", idle)
-    assert followed(data, base, GAP, limits=Limits(bar=bar))[1].given_up == given_up
+    assert filter_fit(data, base, GAP, limits=Limits(bar=bar))[1].given_up == given_up
 
 
 def test_what_was_given_up_says_nothing_of_its_numbers() -> None:
     """Their intervals are as wide as can be."""
     data, base = machine("backlash=30e-6")
-    fit, found = followed(data, base, GAP, limits=Limits(bar=1e-9))
+    fit, found = filter_fit(data, base, GAP, limits=Limits(bar=1e-9))
     assert found.given_up
     assert np.all(np.isinf(found.spread)) and np.all(np.isinf(found.base_spread))
     assert fit.parameter("backlash.gap").high == np.inf

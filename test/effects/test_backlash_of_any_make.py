@@ -11,7 +11,7 @@ from xy_sysid.diagnosis.diagnose import diagnose
 from xy_sysid.effects import EFFECTS
 from xy_sysid.greybox.axis_data import AxisData, prepare
 from xy_sysid.greybox.free_run import fit_base
-from xy_sysid.greybox.one_step import error_without, followed
+from xy_sysid.greybox.one_step import error_without, filter_fit
 
 GAP = EFFECTS["backlash"]
 
@@ -29,7 +29,7 @@ GAP = EFFECTS["backlash"]
 def test_the_gap_and_the_masses_come_out_right(machine: GapMachine) -> None:
     """To 10 % and 0.03, and the same filter without a gap leaves at least twice as much."""
     data = prepare(machine.fs, *driven(machine, 1))
-    fit, found = followed(data, fit_base(data), GAP)
+    fit, found = filter_fit(data, fit_base(data), GAP)
     assert fit.parameter("backlash.gap").value == pytest.approx(machine.gap * machine.count, rel=0.1)
     assert fit.parameter("backlash.share").value == pytest.approx(machine.share, abs=0.03)
     assert error_without(data, found) > 2.0 * fit.held_out_error
@@ -39,7 +39,7 @@ def test_the_contact_comes_out_right_too() -> None:
     """Of a linear one its frequency and damping, and that it does not stiffen."""
     machine = GapMachine(gap=30.0, contact=650.0, damping=0.05)
     data = prepare(machine.fs, *driven(machine, 2))
-    fit = followed(data, fit_base(data), GAP)[0]
+    fit = filter_fit(data, fit_base(data), GAP)[0]
     assert fit.parameter("backlash.rate").value == pytest.approx(2.0 * np.pi * 650.0, rel=0.05)
     assert fit.parameter("backlash.damping").value == pytest.approx(0.05, abs=0.02)
     assert fit.parameter("backlash.hertz").value < 0.1
@@ -54,7 +54,7 @@ def test_the_answer_is_the_same_in_other_units() -> None:
 
 
 def _gap(data: AxisData) -> float:
-    return followed(data, fit_base(data), GAP)[0].parameter("backlash.gap").value
+    return filter_fit(data, fit_base(data), GAP)[0].parameter("backlash.gap").value
 
 
 @pytest.mark.parametrize(("name", "gap"), [("gap_hertz_16um", 16e-6), ("gap_linear_12um", 12e-6), ("gap_linear_37um", 37e-6)])

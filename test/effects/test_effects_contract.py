@@ -19,7 +19,7 @@ from xy_sysid.samples.block import FloatArray
 
 RATE = 2000.0
 PACKAGE = Path(__file__).parents[2] / "xy_sysid"
-RELATIONS = ("look_alikes", "suspects", "special_of", "sum_of", "rubs", "hides")  # fields in which an effect may name others
+RELATIONS = ("look_alikes", "suspects", "special_of", "sum_of", "start_friction", "masks")  # fields in which an effect may name others
 
 
 def names(text: str) -> list[str]:
@@ -59,7 +59,7 @@ def test_an_effect_says_everything_about_itself(name: str) -> None:
         assert "\n" not in text
     assert effect.look_alikes
     assert set(effect.look_alikes) <= set(EFFECTS) - {name}
-    assert {*effect.suspects, *effect.hides} <= set(EFFECTS) - {name}
+    assert {*effect.suspects, *effect.masks} <= set(EFFECTS) - {name}
     assert effect.suspects or effect.simulable or effect.category == "base"  # else nothing would ever ask for it
     assert bool(effect.mode_frequency) == (effect.category == "motion")
     assert not effect.mode_frequency or dict(zip(effect.names, effect.parameters, strict=True))[effect.mode_frequency].unit == "Hz"

@@ -10,7 +10,7 @@ import pytest
 from xy_sysid.axis.model import STANDARD, AxisModel
 from xy_sysid.effects import Scene
 from xy_sysid.greybox.axis_data import AxisData, prepare
-from xy_sysid.greybox.forces import force_of, pushing, stood_in, taken_for, taken_over
+from xy_sysid.greybox.forces import force_moved_to_others, force_of, position_forces, with_equal_force, with_force_from_trace
 
 RATE = 1000.0
 
@@ -24,7 +24,7 @@ def data() -> AxisData:
 
 def test_a_spring_takes_over_a_load_by_resting_elsewhere(data: AxisData) -> None:
     both = AxisModel(0.1, 1e-3, 100.0).with_effect("return_spring", (100.0, 2e-4, 8.7)).with_effect("constant_load", (5.0,))
-    spring = taken_over(data, both.with_effect("coulomb_friction", (0.2,)), "constant_load")
+    spring = force_moved_to_others(data, both.with_effect("coulomb_friction", (0.2,)), "constant_load")
     assert dict(spring.effects)["coulomb_friction"] == (0.2,)
     stiffness, rest, softening = dict(spring.effects)["return_spring"]
     assert stiffness == pytest.approx(100.0, rel=2e-3)
@@ -37,25 +37,25 @@ def test_a_spring_takes_over_a_load_by_resting_elsewhere(data: AxisData) -> None
 
 def test_what_alone_pushes_by_place_leaves_the_others_as_they_are(data: AxisData) -> None:
     model = AxisModel(0.1, 1e-3, 100.0).with_effect("coulomb_friction", (0.2,)).with_effect("constant_load", (5.0,))
-    assert pushing(model) == ["constant_load"]
-    assert taken_over(data, model, "constant_load") == model.without("constant_load")
+    assert position_forces(model) == ["constant_load"]
+    assert force_moved_to_others(data, model, "constant_load") == model.without("constant_load")
 
 
 def test_friction_is_not_taken_over_by_a_load(data: AxisData) -> None:
     model = AxisModel(0.1, 1e-3, 100.0).with_effect("coulomb_friction", (0.2,)).with_effect("constant_load", (5.0,))
-    assert taken_over(data, model, "coulomb_friction") == model.without("coulomb_friction")
+    assert force_moved_to_others(data, model, "coulomb_friction") == model.without("coulomb_friction")
 
 
 def test_a_law_that_gives_no_number_takes_nothing_over(data: AxisData) -> None:
     model = AxisModel(0.1, 1e-3, 100.0).with_effect("hardening_stiffness", (np.nan, 0.0)).with_effect("constant_load", (5.0,))
-    assert dict(taken_over(data, model, "constant_load").effects).keys() == {"hardening_stiffness"}
+    assert dict(force_moved_to_others(data, model, "constant_load").effects).keys() == {"hardening_stiffness"}
 
 
 @pytest.mark.parametrize("gain", [0.1, -0.1])
 def test_coulomb_friction_stands_in_for_stribeck_with_the_base_taking_what_falls_with_speed(data: AxisData, gain: float) -> None:
     """Together they brake alike at every speed, and the inertia 1 / (gain pole) stays."""
     model = AxisModel(gain, 1e-3, 100.0).with_effect("stribeck_friction", (0.25, 0.02, 0.1))
-    found = stood_in(data, model, "stribeck_friction", STANDARD["coulomb_friction"])
+    found = with_equal_force(data, model, "stribeck_friction", STANDARD["coulomb_friction"])
     (level,) = dict(found.effects)["coulomb_friction"]
     assert 0.25 < level < 0.28
     assert abs(found.gain) > abs(gain) and math.copysign(1.0, found.gain) == math.copysign(1.0, gain)
@@ -68,23 +68,23 @@ def test_coulomb_friction_stands_in_for_stribeck_with_the_base_taking_what_falls
 
 def test_a_level_that_is_the_same_at_all_speeds_stays(data: AxisData) -> None:
     model = AxisModel(0.1, 1e-3, 100.0).with_effect("asymmetric_friction", (0.3, 0.0))
-    found = stood_in(data, model, "asymmetric_friction", STANDARD["coulomb_friction"])
+    found = with_equal_force(data, model, "asymmetric_friction", STANDARD["coulomb_friction"])
     assert dict(found.effects)["coulomb_friction"] == pytest.approx((0.3,), rel=1e-6)
     assert (found.gain, found.pole) == pytest.approx((0.1, 100.0), rel=1e-6)
 
 
 def scene(data: AxisData, model: AxisModel) -> Scene:
     """As a base sees it that explains nothing."""
-    velocity = data.begun(data.velocity)
-    position = data.begun(data.middle())
-    voltage = data.begun(data.voltage[:-1])
+    velocity = data.first_stage(data.velocity)
+    position = data.first_stage(data.middle())
+    voltage = data.first_stage(data.voltage[:-1])
     return Scene(sampling_rate=RATE, gain=model.gain, pole=model.pole, voltage=voltage, velocity=velocity, position=position, error=velocity)
 
 
 def test_a_spring_that_softens_is_taken_for_a_part_of_a_wave_that_pushes_alike(data: AxisData) -> None:
     """Cogging of which the travel is two thirds of a period, beside a friction that stays."""
     model = AxisModel(0.1, 1e-3, 100.0).with_effect("coulomb_friction", (0.2,)).with_effect("return_spring", (40.0, 1e-3, 6000.0))
-    found = taken_for(data, model, "return_spring", STANDARD["cogging"], scene(data, model))
+    found = with_force_from_trace(data, model, "return_spring", STANDARD["cogging"], scene(data, model))
     assert found is not None
     assert [name for name, _ in found.effects] == ["coulomb_friction", "cogging"]
     assert (found.gain, found.pole) == (0.1, 100.0)
@@ -97,16 +97,16 @@ def test_a_law_that_leaves_no_trace_on_this_motion_is_not_what_a_spring_was_take
     """A weight that swings needs half a radian of travel; and friction is no force by place."""
     model = AxisModel(0.1, 1e-3, 100.0).with_effect("return_spring", (40.0, 1e-3, 0.0))
     for other in ("gravity", "coulomb_friction"):
-        assert taken_for(data, model, "return_spring", STANDARD[other], scene(data, model)) is None
+        assert with_force_from_trace(data, model, "return_spring", STANDARD[other], scene(data, model)) is None
 
 
 def test_a_linear_spring_stands_in_for_one_that_softens_not(data: AxisData) -> None:
     model = AxisModel(0.1, 1e-3, 100.0).with_effect("return_spring", (80.0, 0.0, 0.0))
-    cubic, linear = dict(stood_in(data, model, "return_spring", STANDARD["hardening_stiffness"]).effects)["hardening_stiffness"]
+    cubic, linear = dict(with_equal_force(data, model, "return_spring", STANDARD["hardening_stiffness"]).effects)["hardening_stiffness"]
     assert linear == pytest.approx(80.0, rel=1e-3)
     assert abs(cubic) * 6e-3**2 < 0.1
 
 
 def test_laws_that_cannot_be_compared_begin_with_the_values_of_the_same_name(data: AxisData) -> None:
     model = AxisModel(0.1, 1e-3, 100.0).with_effect("presliding_hysteresis", (0.3, 1e-5, 0.0))
-    assert dict(stood_in(data, model, "presliding_hysteresis", STANDARD["coulomb_friction"]).effects)["coulomb_friction"] == (0.3,)
+    assert dict(with_equal_force(data, model, "presliding_hysteresis", STANDARD["coulomb_friction"]).effects)["coulomb_friction"] == (0.3,)

@@ -40,26 +40,26 @@ def inside(data: AxisData, begins: np.ndarray) -> np.ndarray:
 def test_windows_that_judge_share_no_sample_with_those_that_a_fit_sees(sizes: tuple[int, ...]) -> None:
     """Short, long, and several recordings; no window lies across the joint of two; the first stage sees nothing held out either."""
     data = prepare_all(2000.0, [moved(size, k) for k, size in enumerate(sizes)])
-    fitted, held, brief = (inside(data, windows.begins) for windows in (data.fitted, data.held, data.brief))
-    assert fitted.any() and held.any() and brief.any()
+    fitted, held, screening = (inside(data, windows.begins) for windows in (data.fitted, data.held_out, data.screening_windows))
+    assert fitted.any() and held.any() and screening.any()
     assert not (fitted & held).any()
-    assert not (brief[: data.first] & (data.begun(held.astype(float)) > 0.0)).any() and not brief[data.first :].any()
+    assert not (screening[: data.first] & (data.first_stage(held.astype(float)) > 0.0)).any() and not screening[data.first :].any()
     assert np.array_equal(data.held_samples(), held)
     for step in data.steps:
-        for begin in (*data.fitted.begins, *data.held.begins):
+        for begin in (*data.fitted.begins, *data.held_out.begins):
             assert not begin < step.start < begin + data.layout.length
 
 
 def test_what_is_held_out_is_spread_over_the_record() -> None:
     """Some of each quarter, so that it holds the motion that it judges."""
     data = prepare(2000.0, *moved(60_000))
-    assert all(part.any() and not part.all() for part in np.array_split(inside(data, data.held.begins), 4))
+    assert all(part.any() and not part.all() for part in np.array_split(inside(data, data.held_out.begins), 4))
 
 
 def test_of_several_recordings_each_is_held_out_in_part() -> None:
     """And each is fitted in part."""
     data = prepare_all(2000.0, [moved(60_000, 1), moved(40_000, 2)])
-    for windows in (data.fitted, data.held):
+    for windows in (data.fitted, data.held_out):
         assert all(inside(data, windows.begins)[step].any() for step in data.steps)
 
 
@@ -99,5 +99,5 @@ def test_the_first_stage_is_short_where_windows_are_long(monkeypatch: pytest.Mon
 
     monkeypatch.setattr("xy_sysid.greybox.axis_data._split", half_shifted)
     data = prepare(4000.0, *moved(200_000))
-    assert data.brief.begins.size >= 2
+    assert data.screening_windows.begins.size >= 2
     assert data.first < 100_000

@@ -13,14 +13,14 @@ from xy_sim.machine import Machine
 from xy_sysid.axis.model import STANDARD, AxisModel, simulate, undoer
 from xy_sysid.diagnosis.rungs import with_one_more
 from xy_sysid.effects import EFFECTS
-from xy_sysid.effects._contract import Beside
+from xy_sysid.effects._contract import Companions
 from xy_sysid.effects.backlash.innovations import Innovations, View
 from xy_sysid.errors import BadInput
 from xy_sysid.excitation.lockstep import drive
 from xy_sysid.greybox.axis_data import AxisData, prepare
 from xy_sysid.greybox.free_run import GreyboxFit, fit_base, fit_with
 from xy_sysid.greybox.one_step import one_step_fit
-from xy_sysid.hypotheses.companions import grown
+from xy_sysid.hypotheses.companions import extended
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.settings import AxisExcitation, ExcitationSettings, build
 
@@ -116,8 +116,8 @@ def machine(*effects: str) -> tuple[AxisData, GreyboxFit]:
 def test_friction_that_differs_between_directions_is_found_beside_backlash() -> None:
     """Coulomb friction is in the filter already; a law with two levels takes its place, no load on the table."""
     data, base = machine("backlash=30e-6", "asymmetric_friction=0.3,coulomb=0.2")
-    start = fit_with(data, base, ["coulomb_friction"], brief=True)
-    rungs = grown(data, start, EFFECTS["backlash"]).rungs
+    start = fit_with(data, base, ["coulomb_friction"], screening=True)
+    rungs = extended(data, start, EFFECTS["backlash"]).rungs
     name, last = rungs[-1]
     assert [rungs[0][0], name, len(rungs)] == ["backlash", "asymmetric_friction", 2]
     assert last.excess == 0.0
@@ -129,8 +129,8 @@ def test_friction_that_differs_between_directions_is_found_beside_backlash() -> 
 def test_a_load_on_the_table_is_told_from_friction_that_differs_between_directions() -> None:
     """Across a gap the motor feels the one and not the other; both numbers are right."""
     data, base = machine("backlash=30e-6", "constant_load=0.15", "coulomb_friction=0.2")
-    start = fit_with(data, base, ["coulomb_friction"], brief=True)
-    rungs = grown(data, start, EFFECTS["backlash"]).rungs
+    start = fit_with(data, base, ["coulomb_friction"], screening=True)
+    rungs = extended(data, start, EFFECTS["backlash"]).rungs
     assert [name for name, _ in rungs] == ["backlash", "constant_load"]
     last = rungs[-1][1]
     assert last.excess == 0.0
@@ -142,7 +142,7 @@ def test_a_load_on_the_table_is_told_from_friction_that_differs_between_directio
 def test_nothing_is_put_beside_backlash_that_stands_alone() -> None:
     """One rung."""
     data, base = machine("backlash=30e-6")
-    assert [name for name, _ in grown(data, base, EFFECTS["backlash"]).rungs] == ["backlash"]
+    assert [name for name, _ in extended(data, base, EFFECTS["backlash"]).rungs] == ["backlash"]
 
 
 def test_a_dead_zone_can_be_added_to_backlash_by_name() -> None:
@@ -170,17 +170,17 @@ def test_friction_inside_the_filter_is_the_law_of_its_effect(name: str, values: 
     u = 3.0 * lfilter([0.3], [1.0, -0.7], noise())
     velocity = simulate(AxisModel(*BASE).with_effect(name, values), RATE, u, np.zeros_like(u))
     position = np.concatenate(([0.0], np.cumsum(velocity))) / RATE
-    fit = Innovations(RATE, BASE, 1e6, beside_nothing(u, position), (EFFECTS[name],)).softened(10.0)
+    fit = Innovations(RATE, BASE, 1e6, beside_nothing(u, position), (EFFECTS[name],)).with_soft_contact(10.0)
     closed = fit.start(BASE, (1e-10, 0.4, 30e3, 0.5, 0.0, 0.0, 0.0, 0.0), values)
     fit.high[5] = closed[5]  # a contact far stiffer than a fit may have
-    out = fit.seen(closed, View(u.size - 1, looseness=0.0, cuts=800)) * 1e6
+    out = fit.innovations(closed, View(u.size - 1, process_noise_factor=0.0, sub_steps=800)) * 1e6
     bent = name == "presliding_hysteresis"
     assert float(np.std(np.diff(out))) * RATE < (0.002 if bent else 0.01) * float(np.std(velocity))
 
 
-def beside_nothing(voltage: FloatArray, position: FloatArray) -> Beside:
+def beside_nothing(voltage: FloatArray, position: FloatArray) -> Companions:
     none = np.zeros(0)
-    return Beside(none, none, none, none, none.astype(np.bool_), lambda _, n: (voltage[:n], position[: n + 1], np.zeros((2, n)), 1.0))
+    return Companions(none, none, none, none, none.astype(np.bool_), lambda _, n: (voltage[:n], position[: n + 1], np.zeros((2, n)), 1.0))
 
 
 @pytest.mark.parametrize(
@@ -195,7 +195,7 @@ def test_friction_that_bends_or_sticks_is_told_from_coulomb_friction_beside_a_ga
 ) -> None:
     """It takes the place of Coulomb friction in the filter, and the innovations fall; Stribeck's numbers stay vague, for sticking is smoothed."""
     data, base = machine("backlash=5e-6", effect)
-    alone = one_step_fit(data, fit_with(data, base, ["coulomb_friction"], brief=True), EFFECTS["backlash"])
+    alone = one_step_fit(data, fit_with(data, base, ["coulomb_friction"], screening=True), EFFECTS["backlash"])
     both = with_one_more(data, STANDARD, base, alone, name)
     assert name in both.model
     assert "coulomb_friction" not in both.model

@@ -9,7 +9,7 @@ import pytest
 from helpers.foreign import Joint, driven
 
 from xy_sysid.greybox.axis_data import prepare
-from xy_sysid.greybox.free_run import LATE, first_excess, fit_base, other_starts, scene_of
+from xy_sysid.greybox.free_run import LATE, first_excess, fit_base, inverse_start_models, scene_of
 from xy_sysid.greybox.whitened import ORDER, enough
 
 LIMITED = Joint(fs=500.0, seconds=30.0, count=2e-5, mass=0.3, drag=8.0, limit=3.0, shake=4.0, band=(0.5, 40.0))
@@ -32,8 +32,8 @@ def test_a_limit_is_read_though_the_base_has_a_delay_that_the_axis_has_not() -> 
     data = prepare(LIMITED.fs, *driven(LIMITED, 1))
     base = fit_base(data)
     late = replace(base, model=replace(base.model, delay=0.04))
-    assert not other_starts(data, late, late.model, "saturation", replace(scene_of(data, late), prompt=None))
-    read = min(other_starts(data, late, late.model, "saturation"), key=lambda start: first_excess(data, start))
+    assert not inverse_start_models(data, late, late.model, "saturation", replace(scene_of(data, late), prompt=None))
+    read = min(inverse_start_models(data, late, late.model, "saturation"), key=lambda start: first_excess(data, start))
     assert first_excess(data, read) < first_excess(data, late.model) - 1.0
     assert dict(read.effects)["saturation"][0] == pytest.approx(LIMITED.limit, rel=0.2)
 

@@ -11,7 +11,7 @@ from xy_sysid.axis.model import STANDARD
 from xy_sysid.effects._contract import Limits
 from xy_sysid.greybox.axis_data import AxisData, prepare
 from xy_sysid.greybox.free_run import GreyboxFit, fit_base
-from xy_sysid.hypotheses.companions import Grown, Wanted, grown
+from xy_sysid.hypotheses.companions import Demand, Extended, extended
 from xy_sysid.hypotheses.criteria import SIZE
 
 BAR = 5e-3  # m/s one sample ahead: more than what any filter with this gap leaves
@@ -23,9 +23,9 @@ def data() -> AxisData:
     return prepare(2000.0, *across_gap(1e-4, 0.1, 0.15, 1, lag=2e-3))
 
 
-def followed(data: AxisData, base: GreyboxFit, bar: float, hidden: bool = False) -> Grown:
+def followed(data: AxisData, base: GreyboxFit, bar: float, masked: bool = False) -> Extended:
     """Backlash and what acts with it."""
-    return grown(data, base, STANDARD["backlash"], Wanted(Limits(bar), SIZE, hidden=hidden))
+    return extended(data, base, STANDARD["backlash"], Demand(Limits(bar), SIZE, masked=masked))
 
 
 def test_what_a_simulation_had_and_is_of_no_use_beside_a_gap_goes(data: AxisData) -> None:
@@ -36,9 +36,9 @@ def test_what_a_simulation_had_and_is_of_no_use_beside_a_gap_goes(data: AxisData
     assert set(dict(found.rungs[-1][1].model.effects)) == {"backlash", "coulomb_friction", "amplifier_lag"}
 
 
-@pytest.mark.parametrize("hidden", [False, True])
-def test_without_what_a_gap_hides_no_filter_follows_the_motor(data: AxisData, hidden: bool) -> None:
+@pytest.mark.parametrize("masked", [False, True])
+def test_without_what_a_gap_hides_no_filter_follows_the_motor(data: AxisData, masked: bool) -> None:
     """An encoder's count of 1 um is 0.6 mm/s one sample ahead."""
-    last = followed(data, fit_base(data), 2e-3, hidden).rungs[-1][1]
-    assert ("amplifier_lag" in last.model) is hidden
-    assert (last.held_out_error < 1e-3) is hidden
+    last = followed(data, fit_base(data), 2e-3, masked).rungs[-1][1]
+    assert ("amplifier_lag" in last.model) is masked
+    assert (last.held_out_error < 1e-3) is masked

@@ -110,7 +110,7 @@ def test_a_fit_never_ends_worse_than_it_starts(data: AxisData, effects: tuple[tu
         model = AxisModel(gain, 1e-3, pole, effects)
         task = problem(data, model, True)
         run = task.at(2000.0)
-        target = Target(data.begun(data.velocity), data.brief, data.floor)
+        target = Target(data.first_stage(data.velocity), data.screening_windows, data.floor)
         _, before = target.spectrum(target.measured - target.windows.spectrum(run(task.row)))
         assert solve(run, target, task.scale, task.row, schedule).score <= before
 

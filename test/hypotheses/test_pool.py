@@ -31,7 +31,7 @@ def data_of(effect: str, seconds: float = 20.0) -> AxisData:
 def searched(data: AxisData, most: int = MOST_EFFECTS) -> tuple[Pool, list[frozenset[str]]]:
     """The pool after a search, and the sets that were said to be tried."""
     pool = Pool(data, STANDARD, worth=SIZE, most=most)
-    pool.begin(fit_base(data))
+    pool.add_first(fit_base(data))
     return pool, [*pool.search(), *pool.simplified()]
 
 
@@ -83,7 +83,7 @@ def test_every_set_has_what_is_given() -> None:
     data = data_of("coulomb_friction+cogging")
     pool = Pool(data, STANDARD, frozenset({"cogging"}), SIZE)
     base = fit_base(data)
-    pool.begin(with_one_more(data, STANDARD, base, base, "cogging"))
+    pool.add_first(with_one_more(data, STANDARD, base, base, "cogging"))
     assert all("cogging" in effects for effects in [*pool.search(), *pool.simplified()])
     assert pool.best.effects == {"cogging", "coulomb_friction"}
 
@@ -93,11 +93,11 @@ def test_what_is_of_no_use_is_left_out_again() -> None:
     data = data_of("coulomb_friction")
     pool, _ = searched(data)
     crowded = frozenset({"coulomb_friction", "constant_load"})
-    node = pool.fitted(crowded, lambda: [pool.best.fit.model.with_effect("constant_load", (0.001,))])
+    node = pool.with_screening_fit(crowded, lambda: [pool.best.fit.model.with_effect("constant_load", (0.001,))])
     assert node is not None
-    pool.finished(node)
-    pool.nodes[frozenset({"coulomb_friction"})].leads = False
-    pool.nodes[crowded].leads = True
+    pool.with_full_fit(node)
+    pool.nodes[frozenset({"coulomb_friction"})].is_better = False
+    pool.nodes[crowded].is_better = True
     assert pool.best.effects == crowded
     list(pool.simplified())
     assert pool.best.effects == {"coulomb_friction"}
@@ -147,22 +147,24 @@ def test_the_better_of_two_fits_gains_and_a_fit_gains_nothing_over_itself(both: 
 def test_a_quick_fit_never_takes_the_place_of_one_on_all_data() -> None:
     """A better quick fit of a known set is fitted on all data, too; when the time is up, what was known stays, and goes on leading."""
     pool, effects = Pool(data_of("coulomb_friction", seconds=5.0), STANDARD), frozenset({"coulomb_friction"})
-    base = pool.begin(fit_base(pool.data))
+    base = pool.add_first(fit_base(pool.data))
     whole = with_one_more(pool.data, STANDARD, base.fit, base.fit, "coulomb_friction")
-    quick = fit(pool.data, whole.model, brief=True)
+    quick = fit(pool.data, whole.model, screening=True)
     known = pool.remember(effects, replace(quick, excess=quick.excess + 1.0), whole)
     pool.late = lambda: True
-    assert pool.remember(effects, quick, quick, leads=False) is known
+    assert pool.remember(effects, quick, quick, is_better=False) is known
     pool.late = lambda: False
-    assert pool.remember(effects, quick, quick, leads=False).whole and pool.nodes[effects].whole and pool.best is pool.nodes[effects]
+    assert (
+        pool.remember(effects, quick, quick, is_better=False).has_full_fit and pool.nodes[effects].has_full_fit and pool.best is pool.nodes[effects]
+    )
 
 
 def test_the_first_set_stays_as_it_was_given() -> None:
     """Answers are shown beside its error, so no other fit takes its place."""
     pool = Pool(data_of("coulomb_friction", seconds=5.0), STANDARD)
-    begun = pool.begin(fit_base(pool.data))
-    begun.fit = replace(begun.fit, model=replace(begun.fit.model, gain=2.0 * begun.fit.model.gain))  # of which a refit would be better
-    assert pool.fitted(frozenset(), lambda: [begun.brief.model]) is begun and pool.nodes[frozenset()] is begun
+    first = pool.add_first(fit_base(pool.data))
+    first.fit = replace(first.fit, model=replace(first.fit.model, gain=2.0 * first.fit.model.gain))  # of which a refit would be better
+    assert pool.with_screening_fit(frozenset(), lambda: [first.screening.model]) is first and pool.nodes[frozenset()] is first
 
 
 def test_what_pulls_back_with_the_sine_of_an_angle_is_a_weight_and_no_wave() -> None:
@@ -172,7 +174,7 @@ def test_what_pulls_back_with_the_sine_of_an_angle_is_a_weight_and_no_wave() -> 
     made = drive(machine, ExcitationSettings(lockstep=True, speed=0.0, rate=1000.0, block=50, unit="rad", axes={"x": axis}), 30.0)
     data = prepare(1000.0, *made.axis("x"), units=Units("V", "rad"))
     pool = Pool(data, STANDARD)
-    base = pool.begin(fit_base(data)).fit
+    base = pool.add_first(fit_base(data)).fit
     weight = with_one_more(data, STANDARD, base, base, "gravity").model
     amplitude, phase = dict(weight.effects)["gravity"]
     wave = fit(data, weight.without("gravity").with_effect("cogging", (amplitude, 6.2, phase)))
@@ -198,11 +200,11 @@ def test_no_gap_is_looked_for_where_friction_explains_most_of_the_error() -> Non
 def test_a_quick_fit_tells_how_near_a_set_comes_by_the_first_set() -> None:
     """A set that is worse than the first, as every search has some, lets no more quick fits through."""
     pool = Pool(data_of("coulomb_friction", seconds=5.0), STANDARD)
-    base = pool.begin(fit_base(pool.data))
-    near = pool._near()
+    base = pool.add_first(fit_base(pool.data))
+    near = pool._full_fit_limit()
     worse = replace(base.fit, scores=base.fit.scores + 1e4)
-    pool.remember(frozenset({"gain_drift"}), worse, worse, leads=False)
-    assert pool._near() == near
+    pool.remember(frozenset({"gain_drift"}), worse, worse, is_better=False)
+    assert pool._full_fit_limit() == near
 
 
 @pytest.mark.parametrize("refused_at_first", [True, False])
@@ -210,13 +212,13 @@ def test_all_data_tell_whether_a_simpler_set_is_refused(refused_at_first: bool, 
     """A set is not kept because a quick fit of a simpler one is refused, and does not give way to one that all data refuse."""
     data, simple, crowded = data_of("coulomb_friction"), frozenset({"coulomb_friction"}), frozenset({"coulomb_friction", "constant_load"})
     pool = Pool(data, STANDARD, worth=SIZE)
-    pool.begin(fit_base(data))
+    pool.add_first(fit_base(data))
     rigid = pool.best.fit
     both = with_one_more(data, STANDARD, rigid, with_one_more(data, STANDARD, rigid, rigid, "coulomb_friction"), "constant_load")
-    pool.remember(crowded, fit(data, both.model, brief=True), both)
+    pool.remember(crowded, fit(data, both.model, screening=True), both)
 
     def refusal(effects: frozenset[str], found: GreyboxFit) -> str:
-        return "coulomb_friction: refused" if effects == simple and found.brief is refused_at_first else ""
+        return "coulomb_friction: refused" if effects == simple and found.is_screening is refused_at_first else ""
 
     monkeypatch.setattr(pool, "_refusal", refusal)
     assert pool.best.effects == crowded

@@ -12,7 +12,7 @@ from xy_sysid.axis.model import AxisModel
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.hypotheses.companions import size_ahead
 from xy_sysid.hypotheses.criteria import SIZE, TELLS
-from xy_sysid.hypotheses.one_step import Filtered
+from xy_sysid.hypotheses.one_step import OneStepResult
 
 NOISE = 1e-3  # m/s
 
@@ -34,7 +34,7 @@ def ahead(error: float) -> GreyboxFit:
         error=nothing,
         runs=1,
         converged=True,
-        held=np.empty((0, 0)),
+        held_out_powers=np.empty((0, 0)),
     )
     return replace(fit, one_step=True)
 
@@ -49,13 +49,13 @@ def test_what_is_gone_counts_over_what_is_left_beyond_the_noise() -> None:
 def test_a_gap_wins_by_what_it_explains_beyond_the_noise(bar: float, without: float) -> None:
     """Against the better of the two that know no gap; what is named must explain so much, here as in a simulation."""
     last = (1.0 + (1.9**2 - 1.0) / (1.0 + SIZE)) ** 0.5
-    assert Filtered((("backlash", ahead(0.99 * last * NOISE)),), bar * NOISE, without * NOISE).wins
-    assert not Filtered((("backlash", ahead(1.01 * last * NOISE)),), bar * NOISE, without * NOISE).wins
+    assert OneStepResult((("backlash", ahead(0.99 * last * NOISE)),), bar * NOISE, without * NOISE).is_accepted
+    assert not OneStepResult((("backlash", ahead(1.01 * last * NOISE)),), bar * NOISE, without * NOISE).is_accepted
 
 
 def test_a_gap_does_not_win_by_what_nobody_can_tell() -> None:
     """At the noise the least gain is many times what is left beyond it."""
     best = ahead(1.0001 * NOISE)
-    little = Filtered((("backlash", best),), 9.0 * NOISE, 1.02 * best.held_out_error)
-    assert little.size > SIZE and not little.wins
-    assert replace(little, without=1.01 * exp(0.5 * TELLS) * best.held_out_error).wins
+    little = OneStepResult((("backlash", best),), 9.0 * NOISE, 1.02 * best.held_out_error)
+    assert little.size > SIZE and not little.is_accepted
+    assert replace(little, without=1.01 * exp(0.5 * TELLS) * best.held_out_error).is_accepted

@@ -287,7 +287,7 @@ def test_silence_is_said(world: World) -> None:
     """Without any stream the node says what it does not hear."""
     statuses = world.statuses()
     world.start(IDENTIFIER, QUICK)
-    assert world.until(lambda: "no voltage and no position heard" in newest(statuses, "streams").get("message", ""), 30.0)
+    assert world.until(lambda: "no voltage and no position received" in newest(statuses, "streams").get("message", ""), 30.0)
 
 
 def test_a_recorder_killed_in_the_middle_leaves_a_readable_bag(world: World, tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from xy_sysid.comparison.where_it_fails import Comparison, compare_velocity
 from xy_sysid.diagnosis import words
 from xy_sysid.diagnosis.answer import Answer, Kind, Rung
 from xy_sysid.diagnosis.equal_laws import likelihood
-from xy_sysid.diagnosis.first_set import settled
+from xy_sysid.diagnosis.first_set import answer_of_known_set
 from xy_sysid.diagnosis.refine import Effort, never, refine
 from xy_sysid.diagnosis.sets import contains, part_explained
 from xy_sysid.diagnosis.unmodelled import unmodelled_force
@@ -51,7 +51,7 @@ def diagnose_prepared(
     """Diagnose one axis from data that suffice. first: effects that are tried before all others (see ``first_set``)."""
     effort = Effort(budget=budget, clock=clock, size=SIZE)
     begun = effort.now()
-    found = settled(data, library, first, effort)
+    found = answer_of_known_set(data, library, first, effort)
     if found is None:
         found = refine(data, library, effort=replace(effort, budget=budget + begun - effort.now()))
     return judged(data, found, library)
@@ -65,11 +65,11 @@ def not_enough(missing: str, units: Units = USUAL) -> Answer:
 
 def judged(data: AxisData, found: Answer, library: Library) -> Answer:
     """The verdict on a search that has ended."""
-    every, with_all, (found, sure) = found.best, _confidence(data, found, found.final), _told(data, found)
+    every, with_all, (found, sure) = found.best, _confidence(data, found, found.final), _named(data, found)
     motion = max(data.layout.rms(data.floor.motion), 1e-300)
     left = found.discrepancy / motion
     found, base, names = replace(found, tolerance=left, force=unmodelled_force(data, found.final)), found.base, found.best
-    hides = math.sqrt(math.expm1(AT_FLOOR)) * data.layout.rms(data.floor.power) / motion  # in the noise
+    hidden_part = math.sqrt(math.expm1(AT_FLOOR)) * data.layout.rms(data.floor.power) / motion  # in the noise
     noise, untried = None, _untried(data, found, library)
     if names and (found.explained >= 1.0 - found.explained or found.final.excess < AT_FLOOR):
         verdict: Kind = "missing_effect"
@@ -79,12 +79,12 @@ def judged(data: AxisData, found: Answer, library: Library) -> Answer:
         verdict, names, experiment = "nothing_missing", (), "None is needed."
         found, trust = replace(found, explained=0.0, kept_out=None), 1.0 - max(base.excess, 0.0)
         if noise is not None:
-            trust, hides = 1.0 - found.helps, max(left, hides)
-        confidence = trust * (1.0 - _hidden(hides, data.floor.epsilon))
-        sentence = words.nothing_missing(data, base, noise, hides)
+            trust, hidden_part = 1.0 - found.helps, max(left, hidden_part)
+        confidence = trust * (1.0 - _part_hidden(hidden_part, data.floor.epsilon))
+        sentence = words.nothing_missing(data, base, noise, hidden_part)
     else:
         verdict, experiment = "not_in_library", _UNKNOWN
-        confidence = (1.0 - found.helps) * (1.0 - _hidden(max(left, hides), data.floor.epsilon))
+        confidence = (1.0 - found.helps) * (1.0 - _part_hidden(max(left, hidden_part), data.floor.epsilon))
         found = replace(found, force=unmodelled_force(data, base))
         sentence = words.not_in_library(data, found)
     sentence += words.kept_out(found)
@@ -104,22 +104,22 @@ def judged(data: AxisData, found: Answer, library: Library) -> Answer:
     return replace(found, look_alikes=words.look_alikes(found, library))
 
 
-def _told(data: AxisData, found: Answer) -> tuple[Answer, float]:
-    """The rungs down to that whose names tell most, and the confidence in all of these: the logarithm by which the held-out error falls, times
-    that confidence.
+def _named(data: AxisData, found: Answer) -> tuple[Answer, float]:
+    """The answer up to the rung that is most worth naming, and the confidence in its effects.
 
-    So a second effect is named where it explains much or is sure, and dirt that explains little and is unsure does not make the first one unsure.
+    The measure is the logarithm of the fall of the held-out error, times the confidence. So a second effect is named if it explains much or is sure.
+    An effect that explains little and is unsure does not make the first one unsure.
     """
     if found.final.one_step:  # judged one sample ahead, as one: a rung may have brought two of them
         return found, _confidence(data, found, found.final)
 
-    def tells(rung: Rung) -> float:
+    def worth_naming(rung: Rung) -> float:
         return _confidence(data, found, rung.fit) * math.log(found.base.held_out_error / max(rung.held_out_error, 1e-300))
 
-    most = max(found.rungs[1:], key=tells, default=None)
+    most = max(found.rungs[1:], key=worth_naming, default=None)
     if most is None or most is found.rungs[-1]:
         return found, _confidence(data, found, found.final)
-    return _down_to(data, found, found.rungs.index(most)), _confidence(data, found, most.fit)
+    return _cut_after(data, found, found.rungs.index(most)), _confidence(data, found, most.fit)
 
 
 def _untried(data: AxisData, found: Answer, library: Library) -> tuple[str, ...]:
@@ -134,8 +134,8 @@ def _could_be(untried: tuple[str, ...], names: tuple[str, ...], library: Library
     return any(name in library[other].suspects for other in untried for name in names)
 
 
-def _down_to(data: AxisData, found: Answer, place: int) -> Answer:
-    """The answer without what came after one of its rungs."""
+def _cut_after(data: AxisData, found: Answer, place: int) -> Answer:
+    """The answer without the rungs after one of them."""
     fit = found.rungs[place].fit
     names = tuple(name for name in found.best if name in fit.model)
     return replace(
@@ -149,16 +149,16 @@ def _down_to(data: AxisData, found: Answer, place: int) -> Answer:
     )
 
 
-def _confidence(data: AxisData, found: Answer, told: GreyboxFit) -> float:
+def _confidence(data: AxisData, found: Answer, named: GreyboxFit) -> float:
     """How likely no other set is as good, how much larger each effect is than what is left, and how likely the name of one is that shares
-    its law with others; of what is undetermined half at most. told: the fit whose effects are named, which may have less than the last."""
-    library, names = told.model.library, tuple(name for name in found.best if name in told.model)
+    its law with others; of what is undetermined half at most. named: the fit whose effects are named, which may have less than the last."""
+    library, names = named.model.library, tuple(name for name in found.best if name in named.model)
     rivals = (rival for rival in found.rivals if not contains(library, frozenset(rival.effects), frozenset(names)))
     doubt = max((rival.doubt for rival in rivals), default=0.0)
     size = min((found.sizes[name] for name in names if name in found.sizes), default=0.0)
     likely = math.prod(likelihood(library, name, values) for name, values in found.final.model.effects if name in names)
     sure = (1.0 - doubt) * size / (size + 1.0) * likely
-    return min(sure, 0.5) if any(_undetermined(data, fit, name) for fit in (told, found.final) for name in names) else sure
+    return min(sure, 0.5) if any(_undetermined(data, fit, name) for fit in (named, found.final) for name in names) else sure
 
 
 def _undetermined(data: AxisData, fit: GreyboxFit, name: str) -> bool:
@@ -175,7 +175,7 @@ def _is_known(low: float, high: float) -> bool:
     return low * high > 0.0 and math.isfinite(far) and far <= 4.0 * near
 
 
-def _hidden(left: float, trusted: float) -> float:
+def _part_hidden(left: float, trusted: float) -> float:
     """Part of all sizes that what is left could hide, on a logarithmic scale from what laws are trusted to up to the whole motion.
 
     left, trusted: parts of the motion. Prior of Jeffreys 1946: the order of magnitude of a size is unknown.

@@ -20,7 +20,7 @@ from xy_sysid.hypotheses.one_step import OneStepTrials
 from xy_sysid.hypotheses.pool import Pool
 
 
-def settled(data: AxisData, library: Library, names: tuple[str, ...], effort: Effort) -> Answer | None:
+def answer_of_known_set(data: AxisData, library: Library, names: tuple[str, ...], effort: Effort) -> Answer | None:
     """The answer of a known set, or of a simpler one that does as well; None where the search has to be made.
 
     names: effects in any order; those that the library does not have make no set
@@ -35,7 +35,7 @@ def settled(data: AxisData, library: Library, names: tuple[str, ...], effort: Ef
 
     base = rungs_of(data, library)
     pool = Pool(data, library, worth=effort.size, most=effort.most, late=late)
-    pool.begin(base[0].fit)
+    pool.add_first(base[0].fit)
     trials = OneStepTrials(pool)
     _fitted(pool, tuple(name for name in names if library[name].one_step is None))
     for _ in pool.simplified():
@@ -53,11 +53,11 @@ def _fitted(pool: Pool, names: tuple[str, ...]) -> None:
     """Fit effects to the first stage's data, one after another, each from the best of its starts; then all of them to all data."""
     data, now = pool.data, pool.nodes[pool.kept]
     for name in names:
-        effect, model = pool.library[name], now.brief.model
-        traced = screened(data, now.brief, [effect]).traces[0].values
-        start = best_start(data, starts.added(data, now.brief, model, effect, traced))
-        brief = fit(data, start, brief=True, late=pool.late)
-        now = pool.remember(now.effects | {name}, brief, brief, leads=False)
+        effect, model = pool.library[name], now.screening.model
+        traced = screened(data, now.screening, [effect]).traces[0].values
+        start = best_start(data, starts.added(data, now.screening, model, effect, traced))
+        screening = fit(data, start, screening=True, late=pool.late)
+        now = pool.remember(now.effects | {name}, screening, screening, is_better=False)
     if names:
-        now = pool.finished(now)
-        now.leads = now.whole and not now.refused
+        now = pool.with_full_fit(now)
+        now.is_better = now.has_full_fit and not now.refused

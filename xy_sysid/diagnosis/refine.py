@@ -66,7 +66,7 @@ def refine(
         return effort.now() > until or (effort.budget == math.inf and data.work.done > enough)
 
     pool = Pool(data, library, frozenset(kept), worth=effort.size, most=effort.most, late=late)
-    pool.begin(rungs[-1].fit)
+    pool.add_first(rungs[-1].fit)
     trials = OneStepTrials(pool)
     _search(pool, None if kept else trials, trying)
     return answer_of_search(pool, rungs, trials.found)
@@ -96,7 +96,7 @@ def settle(data: AxisData, now: GreyboxFit) -> GreyboxFit:
     if now.one_step:
         return now
     pool = Pool(data, now.model.library)
-    pool.begin(now)
+    pool.add_first(now)
     for _ in pool.simplified():
         pass
     return joined(data, pool.best.fit)

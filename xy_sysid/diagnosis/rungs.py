@@ -9,17 +9,17 @@ from dataclasses import replace
 from xy_sysid.axis.model import AxisModel, Library
 from xy_sysid.diagnosis.answer import Answer, Rung, Tried
 from xy_sysid.diagnosis.equal_laws import is_the_same, likely_names
-from xy_sysid.diagnosis.sets import contains, is_taken_for, part_explained
+from xy_sysid.diagnosis.sets import contains, is_mistaken_for, part_explained
 from xy_sysid.effects import Effect
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit, best_start, fit, fit_base, joined, screened
-from xy_sysid.greybox.one_step import follower, one_step_fit
+from xy_sysid.greybox.one_step import one_step_effect, one_step_fit
 from xy_sysid.hypotheses import starts
-from xy_sysid.hypotheses.companions import put_beside
+from xy_sysid.hypotheses.companions import add_companion
 from xy_sysid.hypotheses.compare import gain
 from xy_sysid.hypotheses.criteria import ALMOST, AT_FLOOR, PRICE, TELLS
-from xy_sysid.hypotheses.one_step import Filtered
-from xy_sysid.hypotheses.pool import Node, Pool, alike
+from xy_sysid.hypotheses.one_step import OneStepResult
+from xy_sysid.hypotheses.pool import Node, Pool, comparable_fits
 
 
 def rungs_of(data: AxisData, library: Library, names: Sequence[str] = ()) -> tuple[Rung, ...]:
@@ -38,17 +38,17 @@ def with_one_more(data: AxisData, library: Library, base: GreyboxFit, now: Greyb
     """
     effect = library[name]
     relative = next((own for own, _ in now.model.effects if effect.family and library[own].family == effect.family), None)
-    ahead = follower(now.model)
+    ahead = one_step_effect(now.model)
     if effect.one_step is not None:
         return one_step_fit(data, now, effect)
     if ahead is not None:
-        return put_beside(data, now, ahead, effect)
+        return add_companion(data, now, ahead, effect)
     model = now.model if relative is None else now.model.without(relative)
-    begun = _added(data, now, model, effect)
+    start_models = _added(data, now, model, effect)
     if any(own not in base.model for own, _ in model.effects):
-        alone = fit(data, best_start(data, _added(data, base, base.model, effect)), brief=True)
-        begun += starts.merged(model, alone.model)
-    return fit(data, best_start(data, begun))
+        alone = fit(data, best_start(data, _added(data, base, base.model, effect)), screening=True)
+        start_models += starts.merged(model, alone.model)
+    return fit(data, best_start(data, start_models))
 
 
 def _added(data: AxisData, now: GreyboxFit, model: AxisModel, effect: Effect) -> list[AxisModel]:
@@ -69,7 +69,7 @@ def answer_of_rungs(data: AxisData, rungs: tuple[Rung, ...]) -> Answer:
     )
 
 
-def answer_of_search(pool: Pool, given: tuple[Rung, ...], filtered: Filtered | None) -> Answer:
+def answer_of_search(pool: Pool, given: tuple[Rung, ...], filtered: OneStepResult | None) -> Answer:
     """The answer of the best set, or of what one-step prediction found instead. given: the base, and effects that were given."""
     data, library, node, base, kept = pool.data, pool.library, pool.answer, given[0].fit, [name for rung in given for name in rung.came]
     alone = (item for item in pool.nodes.values() if len(item.effects) == 1)
@@ -90,13 +90,13 @@ def answer_of_search(pool: Pool, given: tuple[Rung, ...], filtered: Filtered | N
         if item is not node and 0 < len(item.effects) <= len(node.effects) and not item.effects < node.effects
         if not contains(library, item.effects, node.effects)
         if not is_the_same(library, (item.effects, item.fit), (node.effects, node.fit), AT_FLOOR)
-        if not item.refused or is_taken_for(library, item.effects, node.effects)  # it is no spring, but is it a wave?
+        if not item.refused or is_mistaken_for(library, item.effects, node.effects)  # it is no spring, but is it a wave?
     ]
-    others.sort(key=lambda item: (-_doubt(node, item), item.brief.excess))
+    others.sort(key=lambda item: (-_doubt(node, item), item.screening.excess))
     for item in others[:1]:
-        pool.finished(item, shown=True)
+        pool.with_full_fit(item, shown=True)
     rivals = tuple(_tried(pool, base, item, _doubt(node, item)) for item in others)
-    whole = [item for item in pool.nodes.values() if item.whole and not item.refused]
+    whole = [item for item in pool.nodes.values() if item.has_full_fit and not item.refused]
     rungs = (*given, *_rungs(pool, given, ordered, final))
     found = Answer(
         rungs=rungs,
@@ -123,7 +123,7 @@ def _tried(pool: Pool, base: GreyboxFit, node: Node, doubt: float = 0.0) -> Trie
 
 def _doubt(node: Node, other: Node) -> float:
     """Probability that another set predicts better than the one that was taken, parameters at their price; at most a half, as it was not taken."""
-    found = gain(*alike(node, other))
+    found = gain(*comparable_fits(node, other))
     priced = replace(found, nats=found.nats + PRICE * (other.parameters - node.parameters))
     return min(1.0 - priced.probability, 0.5)
 
@@ -131,7 +131,7 @@ def _doubt(node: Node, other: Node) -> float:
 def _of_one_step(
     pool: Pool,
     base: Rung,
-    filtered: Filtered,
+    filtered: OneStepResult,
     tried: Sequence[Tried],
     refused: tuple[tuple[tuple[str, ...], str], ...],
 ) -> Answer:
@@ -158,13 +158,13 @@ def _of_one_step(
 def _ordered(library: Library, sizes: Mapping[str, float]) -> tuple[str, ...]:
     """Names, the largest size first; of what is alike to the largest dry friction first, as every machine has it."""
     order = sorted(sizes, key=lambda name: -sizes[name])
-    alike = [name for name in order if library[name].is_dry and sizes[name] >= ALMOST * sizes[order[0]]]
-    return tuple(dict.fromkeys((*alike, *order)))
+    similar = [name for name in order if library[name].is_dry and sizes[name] >= ALMOST * sizes[order[0]]]
+    return tuple(dict.fromkeys((*similar, *order)))
 
 
 def _kept_out(pool: Pool, base: GreyboxFit, node: Node) -> Tried | None:
     """The refused set with the smallest error, if that is clearly below the error of the best set."""
-    nodes = [item for item in pool.nodes.values() if item.refused and item.whole and gain(item.fit, node.fit).is_sure]
+    nodes = [item for item in pool.nodes.values() if item.refused and item.has_full_fit and gain(item.fit, node.fit).is_sure]
     best = max(nodes, key=lambda item: gain(item.fit, node.fit).nats, default=None)
     return None if best is None else _tried(pool, base, best, 0.5)
 
@@ -184,7 +184,7 @@ def _rungs(pool: Pool, given: tuple[Rung, ...], names: tuple[str, ...], final: G
     now = shown = given[-1].fit
     left, together = list(names[sum(len(rung.came) for rung in given) :]), []
     while left:
-        fits = {name: found for name in left if (found := _with(pool, now, name, final, name == left[0])) is not None}
+        fits = {name: found for name in left if (found := _fit_with(pool, now, name, final, name == left[0])) is not None}
         lower = [name for name, found in fits.items() if found.held_out_error < shown.held_out_error or found is final]
         name = lower[0] if lower else left[0]
         now = fits[name]
@@ -196,12 +196,12 @@ def _rungs(pool: Pool, given: tuple[Rung, ...], names: tuple[str, ...], final: G
     return rungs
 
 
-def _with(pool: Pool, now: GreyboxFit, name: str, final: GreyboxFit, asked: bool) -> GreyboxFit | None:
+def _fit_with(pool: Pool, now: GreyboxFit, name: str, final: GreyboxFit, asked: bool) -> GreyboxFit | None:
     """The fit with one more effect, from memory if it is known; None if it is not, and is not asked for."""
     effects = frozenset(own for own, _ in now.model.effects) | {name}
     if effects == frozenset(own for own, _ in final.model.effects):
         return final
     known = pool.nodes.get(effects)
-    if known is not None and not known.refused and (known.whole or asked):
-        return pool.finished(known, shown=True).fit
+    if known is not None and not known.refused and (known.has_full_fit or asked):
+        return pool.with_full_fit(known, shown=True).fit
     return with_one_more(pool.data, pool.library, pool.nodes[pool.kept].fit, now, name) if asked else None

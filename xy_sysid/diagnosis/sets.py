@@ -16,8 +16,8 @@ def part_explained(data: AxisData, base: GreyboxFit, final: GreyboxFit) -> float
     return min(max(1.0 - max(after, 0.0) / before, 0.0), 1.0) if before > 0.0 else 0.0
 
 
-def is_taken_for(library: Library, names: frozenset[str], others: frozenset[str]) -> bool:
-    """A set differs from another only in an effect whose trace is a reason to try what stands there in the other, which is no relative."""
+def is_mistaken_for(library: Library, names: frozenset[str], others: frozenset[str]) -> bool:
+    """Whether two sets differ in one effect each, and the trace of the first is a reason to suspect the second, of another family."""
     here, there = names - others, others - names
     if not len(here) == len(there) == 1:
         return False

@@ -34,7 +34,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.samples.block import FloatArray
 
 USUAL_WITHIN = 2.0  # factor by which sizes of real machines differ from the usual one: two of three are within it
-BEGUN = 0.05  # of its usual size at least, with which a fit begins what must not be 0
+LEAST_START = 0.05  # of the typical value: least start value of a parameter that must not be 0
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -43,10 +43,10 @@ Law = Callable[..., Any]
 
 
 @dataclass(frozen=True, slots=True)
-class Beside:
-    """What acts beside an effect that one-step prediction judges, and how to take it out of a recording.
+class Companions:
+    """Companions of an effect that one-step prediction judges: effects that act together with it and can be removed from the recording.
 
-    start, low, high, unit: (k,) of its numbers, SI (unit: size of 1); positive: (k,) fitted as a logarithm
+    start, low, high, unit: (k,) start values, bounds and scale of their parameters, SI; positive: (k,) True if fitted as a logarithm
     undo: gain, delay, pole and the k numbers, and n -> voltage (n,), V; position (n + 1,), m; forces against the drive (2, n), V, at the
           motor and on the table;
           how much of a sudden change of that position the encoder shows at once
@@ -65,7 +65,7 @@ class Beside:
 
 @dataclass(frozen=True, slots=True)
 class DryFriction:
-    """Dry friction beside an effect that one-step prediction judges.
+    """Dry friction together with an effect that one-step prediction judges.
 
     laws: effects of category friction or bristle, which act together as in the simulation; values: their parameters, SI, one law
     after another; spread: standard errors of these, if known
@@ -114,43 +114,44 @@ PATIENT = Limits()
 
 @dataclass(frozen=True, slots=True)
 class OneStepTask:
-    """What one-step prediction is to fit an effect to.
+    """Input of a fit by one-step prediction.
 
-    base: gain, delay, pole to begin with; noise: of the encoder, m; stages: samples of the first stage, of training, of all
-    beside, dry: what acts beside it; begin: an earlier result without what is new beside
+    base: start values of gain, delay, pole; noise: of the encoder, m; stages: samples of the first stage, of training, of all
+    companions, dry: effects and dry friction that act together with it
+    earlier: an earlier result to start from, without the newest companion
     """
 
     sampling_rate: float
     base: tuple[float, float, float]
     noise: float
     stages: tuple[int, int, int]
-    beside: Beside
+    companions: Companions
     dry: DryFriction
-    begin: Followed | None = None
+    earlier: FilterFit | None = None
     limits: Limits = PATIENT
 
 
 class OneStep(Protocol):
-    """Fits base and effect together by one-step prediction, beside any laws of dry friction."""
+    """Fits base and effect together by one-step prediction, with any laws of dry friction."""
 
-    def fit(self, task: OneStepTask) -> Followed:
+    def fit(self, task: OneStepTask) -> FilterFit:
         """The numbers that make the innovations least."""
 
-    def innovation(self, sampling_rate: float, found: Followed, beside: Beside, samples: int) -> FloatArray:
-        """(samples,) measured minus predicted position over the noise, with the numbers of an earlier result; ``beside.start`` is beside."""
+    def innovation(self, sampling_rate: float, found: FilterFit, companions: Companions, samples: int) -> FloatArray:
+        """(samples,) innovations divided by the noise, with the parameters of an earlier result and the companions at ``companions.start``."""
 
 
 @dataclass(frozen=True, slots=True)
-class Followed:
-    """What one-step prediction found.
+class FilterFit:
+    """Result of a fit by one-step prediction, with the filter that predicts.
 
     base, values: gain, delay, pole, and the effect's parameters, SI; base_spread, spread: their standard errors
-    dry:          friction that came out beside it
-    beside:       (k,) numbers of ``Beside``, and their standard errors
+    dry:          dry friction, fitted together with it
+    companions:   (k,) numbers of ``Companions``, and their standard errors
     innovation:   (n,) measured minus predicted position, one step ahead, m
-    without:      (n,) the same of the same filter (process noise, what is beside) with the effect taken out and all else refitted, m
-    noise:        standard deviation of the encoder, m; runs: how often the filter ran
-    looseness:    process noise that the filter was given, over the usual
+    without:      (n,) innovations of the same filter (process noise, companions) without the effect, all else refitted, m
+    noise:        standard deviation of the encoder, m; runs: number of filter runs
+    process_noise_factor: on the process noise that the filter assumed
     too_small:    True if the effect found is so small that it is none
     given_up:     True if it ended early, because it could not come near the bar
     """
@@ -160,12 +161,12 @@ class Followed:
     base_spread: tuple[float, float, float]
     spread: tuple[float, ...]
     dry: DryFriction
-    beside: tuple[tuple[float, ...], tuple[float, ...]]
+    companions: tuple[tuple[float, ...], tuple[float, ...]]
     innovation: FloatArray
     without: FloatArray
     noise: float
     runs: int
-    looseness: float = 1.0
+    process_noise_factor: float = 1.0
     too_small: bool = False
     given_up: bool = False
 
@@ -279,8 +280,8 @@ class Effect:
     straight:    True for a force proportional to speed, with one factor for each direction: it needs no sub-steps
     angular:     True for a law of an angle: it replaces another law only if the position is in rad
     on_table:    True for a force that acts on the table: inside a backlash gap it does not reach the motor
-    rubs:        for ``one_step``: the dry friction of its start model, if no other is given
-    hides:       for ``one_step``: names of effects that leave no trace where it acts, and are always tried together with it
+    start_friction: for ``one_step``: the dry friction of its start model, if no other is given
+    masks:       for ``one_step``: names of effects whose trace it masks, so they are always tried together with it
     suspects:    names of effects whose trace in an error is a reason to try this one as well, because its own trace is weak
     mode_frequency: of a resonance: which parameter is its frequency, Hz; a mode that the data do not excite cannot be named
     """
@@ -309,8 +310,8 @@ class Effect:
     straight: bool = False
     angular: bool = False
     on_table: bool = False
-    rubs: str = ""
-    hides: tuple[str, ...] = ()
+    start_friction: str = ""
+    masks: tuple[str, ...] = ()
     suspects: tuple[str, ...] = ()
     mode_frequency: str = ""
 
@@ -427,7 +428,7 @@ class Effect:
     def read(self, guess: Guess, coefficients: FloatArray, similar: Similarity) -> tuple[float, ...]:
         """The values of the parameters that belong to the coefficients of a guess's columns, within their bounds.
 
-        What is an input or the effect's size is not smaller than a fit can begin with.
+        A size of the effect and a parameter in V are at least ``LEAST_START`` times their typical value.
         Raises BadInput for other than one finite number each, as an effect of one's own may give.
         """
         given = tuple(guess.read(coefficients))
@@ -435,7 +436,7 @@ class Effect:
             said, allowed = ", ".join(str(value)[:20] for value in given), f"a number for each of {', '.join(self.names)}"
             raise BadInput(f"values that {self.name} guesses", said or "nothing", allowed, "Return them in this order.")
         items = self.on(similar)
-        least = [BEGUN * abs(item.typical) if item.positive and (k == 0 or "V" in item.unit) else item.low for k, item in enumerate(items)]
+        least = [LEAST_START * abs(item.typical) if item.positive and (k == 0 or "V" in item.unit) else item.low for k, item in enumerate(items)]
         return tuple(float(min(max(value, low), item.high)) for value, low, item in zip(given, least, items, strict=True))
 
 

@@ -22,7 +22,7 @@ from xy_sysid.effects._similarity import Similarity
 from xy_sysid.experiment_design.criteria import ALLOWED, FACTOR, LEAST_SEEN, REACH, STEPS, TRIES
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.floor import Windows
-from xy_sysid.greybox.free_run import MIDDLING, GreyboxFit
+from xy_sysid.greybox.free_run import MEDIUM, GreyboxFit
 from xy_sysid.greybox.least_squares import STEP, Scale
 from xy_sysid.greybox.objective import Objective
 from xy_sysid.greybox.parameters import problem, unit_of
@@ -66,7 +66,7 @@ class Evidence:
         """travel: of the machine, m; None: as far as the data went."""
         self.travel = travel
         self.machine = data.similar if travel is None else replace(data.similar, length=0.5 * (travel[1] - travel[0]) / REACH)
-        self.data, self.windows = data, Windows(data.layout, np.sort(np.concatenate((data.fitted.begins, data.held.begins))))
+        self.data, self.windows = data, Windows(data.layout, np.sort(np.concatenate((data.fitted.begins, data.held_out.begins))))
         self.objective = Objective.of(data.floor)
         self.measured = self.windows.spectrum(data.velocity)
 
@@ -83,7 +83,7 @@ class Evidence:
     def error(self, model: AxisModel) -> NDArray[np.complex128]:
         """(windows, lines) of a model."""
         task = problem(self.data, model, False)
-        return np.asarray(self.measured - self.windows.spectrum(task.at(MIDDLING)(task.row)))
+        return np.asarray(self.measured - self.windows.spectrum(task.at(MEDIUM)(task.row)))
 
     def nats(self, model: AxisModel, error: NDArray[np.complex128] | None = None) -> float:
         """Above an error that is the floor alone; infinite for a model that runs away."""

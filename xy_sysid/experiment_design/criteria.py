@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from xy_sysid.effects._contract import USUAL_WITHIN
-from xy_sysid.greybox.axis_data import HELD, SEEN
+from xy_sysid.greybox.axis_data import FITTED_BLOCK, HELD_OUT_BLOCK
 from xy_sysid.hypotheses.criteria import Criteria
 from xy_sysid.settings import AxisExcitation
 
@@ -19,8 +19,8 @@ _number = TABLE.number
 # what is settled
 SURE = _number("sure", 0.95, "1", "probability with which sets are to be distinguished: the usual one of intervals")
 ODDS = math.log(SURE / (1.0 - SURE))  # nats: likelihood ratio at which one of two is that probable (Wald 1945)
-JUDGED = HELD / (SEEN + HELD)  # part of a record that judges
-FITTED = SEEN / (SEEN + HELD)  # part of a record that a fit sees
+JUDGED = HELD_OUT_BLOCK / (FITTED_BLOCK + HELD_OUT_BLOCK)  # part of a record that judges
+FITTED = FITTED_BLOCK / (FITTED_BLOCK + HELD_OUT_BLOCK)  # part of a record that a fit sees
 NO_EVIDENCE = _number("no evidence", 1.0, "nats", "expected likelihood ratio below this by the whole budget: the sets are the same on this machine")
 MINIMUM = _number("minimum", 2.0, "s", "less motion than this in the budget is worth no experiment: one block")
 

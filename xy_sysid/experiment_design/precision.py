@@ -24,7 +24,7 @@ from xy_sysid.experiment_design.prediction import Recorded, Setting, expected_er
 from xy_sysid.experiment_design.proposals import neighbours, proposals
 from xy_sysid.greybox.axis_data import AxisData, prepare_all
 from xy_sysid.greybox.free_run import GreyboxFit, finish
-from xy_sysid.greybox.least_squares import of_the_law
+from xy_sysid.greybox.least_squares import model_error_covariance
 from xy_sysid.greybox.parameters import Estimate
 from xy_sysid.response.frf import Z95
 from xy_sysid.samples.block import FloatArray
@@ -50,7 +50,7 @@ def information(belief: Belief, model: AxisModel, item: Recorded) -> Information
     change = slopes(item, belief, model, predicted(item, model)) * weight
     columns = change.reshape(change.shape[0], -1).view(np.float64)
     normal = columns @ columns.T
-    law = of_the_law(change, item.trusted * item.velocity * weight, layout, _inverse(normal + belief.precision))
+    law = model_error_covariance(change, item.trusted * item.velocity * weight, layout, _inverse(normal + belief.precision))
     return Information(normal / item.seconds, law)
 
 

@@ -12,7 +12,7 @@ from xy_sysid.axis.model import AxisModel, simulator
 from xy_sysid.experiment_design.beliefs import Belief, with_row
 from xy_sysid.experiment_design.criteria import BLOCK, COARSE, CYCLES, LOOKED
 from xy_sysid.experiment_design.experiment import RAMP, Experiment
-from xy_sysid.greybox.axis_data import HELD, ROOM, SEEN, WINDOWS, AxisData
+from xy_sysid.greybox.axis_data import FITTED_BLOCK, HELD_OUT_BLOCK, ROOM, WINDOWS, AxisData
 from xy_sysid.greybox.floor import Bands, Windows, bands, floor
 from xy_sysid.greybox.least_squares import STEP
 from xy_sysid.greybox.objective import Objective
@@ -61,7 +61,7 @@ class Setting:
         while True:
             every = (*self.recorded, seconds)
             window = bands(rate, int(min(sum(every) / WINDOWS, max(every) / ROOM) * rate)).length / rate
-            if seconds - self.ramp >= CYCLES * (SEEN + HELD) * window:
+            if seconds - self.ramp >= CYCLES * (FITTED_BLOCK + HELD_OUT_BLOCK) * window:
                 return seconds
             seconds += BLOCK
 

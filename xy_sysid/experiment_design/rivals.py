@@ -13,7 +13,7 @@ from xy_sysid.diagnosis.answer import Answer
 from xy_sysid.diagnosis.equal_laws import equals
 from xy_sysid.diagnosis.rungs import rungs_of
 from xy_sysid.diagnosis.sets import contains
-from xy_sysid.effects._contract import BEGUN
+from xy_sysid.effects._contract import LEAST_START
 from xy_sysid.errors import BadInput
 from xy_sysid.experiment_design.beliefs import Belief, Evidence, believed, hidden
 from xy_sysid.experiment_design.criteria import ALLOWED, DRAWS
@@ -92,7 +92,7 @@ def gained(data: AxisData, one: GreyboxFit, other: GreyboxFit) -> Gain:
         return found
     each = other.scores - one.scores
     ends = [step.start for step in data.steps]
-    parts = [each[np.searchsorted(ends, data.held.begins, side="right") == k + 1] for k in range(len(ends))]
+    parts = [each[np.searchsorted(ends, data.held_out.begins, side="right") == k + 1] for k in range(len(ends))]
     parts = [part for part in parts if part.size]
     variance = sum(part.size * (float(np.var(part, ddof=1)) if part.size > 1 else float(part[0] ** 2)) for part in parts)
     return Gain(found.nats, math.sqrt(OVERLAP * variance), each.size / OVERLAP - len(parts) + 1)
@@ -171,7 +171,7 @@ def _is_gone(data: AxisData, found: GreyboxFit, name: str) -> bool:
     """The fit made an effect so small that the model is as good as without it."""
     effect = found.model.library[name]
     pairs = zip(effect.on(data.similar), dict(found.model.effects)[name], strict=True)
-    return any(item.positive and (k == 0 or "V" in item.unit) and value < BEGUN * abs(item.typical) for k, (item, value) in enumerate(pairs))
+    return any(item.positive and (k == 0 or "V" in item.unit) and value < LEAST_START * abs(item.typical) for k, (item, value) in enumerate(pairs))
 
 
 def _gives_way(library: Library, name: str, other: str) -> bool:

@@ -27,14 +27,14 @@ from xy_sysid.units import USUAL, Units
 FIRST = 28_000  # samples of the first stage of a fit, of all recordings together
 TRAINING = 2.0 / 3.0  # of the record, for what must run through from the start (one-step prediction)
 EPSILON = 1e-3  # part of the motion to which laws and their integration are trusted
-FEWEST_BRIEF = 2  # windows that a fit sees in the first stage
-LIKE = 0.1  # of the whole power in each excited band that the first stage must hold
+FEWEST_SCREENING_WINDOWS = 2  # least number of windows of a screening fit
+EXCITED_PART = 0.1  # least power of the first stage in each excited band, compared with that of all data
 FEWEST = 256  # samples of all recordings
 SHORTEST = 16  # samples of each
 WINDOWS, ROOM = 14.0, 4.0  # window lengths that all recordings together, and the longest, must hold at least; else they are made shorter
-SEEN, HELD = 3.0, 1.5  # window lengths of a block that a fit sees, and of one that is held out
-LOOK = 0.05  # s between two looks at the way that was gone: noise adds nothing to it
-ONCE = 1.2  # times the travel, which a way must be at least for places to be passed again
+FITTED_BLOCK, HELD_OUT_BLOCK = 3.0, 1.5  # window lengths of a block that is fitted, and of one that is held out
+PATH_STEP = 0.05  # s between the positions that are summed to a path, so that noise does not lengthen it
+PASSED_AGAIN = 1.2  # times the travel: a shorter path passes each position only once
 SHIFTS = 4  # places tried for the blocks that are held out
 
 
@@ -63,8 +63,9 @@ class AxisData:
 
     voltage, position: (n,) V and m, recordings one after the other; velocity: (n - r,) mean of each sample, m/s, of r recordings
     starts: sample of ``voltage`` at which each recording begins
-    fitted, held: windows of ``velocity`` for the fit, and held-out windows
-    early: samples of each recording's velocity that are in the first stage; brief: windows in these (``begun``) that a fit sees there
+    fitted, held_out: windows of ``velocity`` for the fit, and held-out windows
+    early: samples of each recording's velocity in the first stage, which ``first_stage`` returns
+    screening_windows: windows of a screening fit; they begin at a sample of ``first_stage(velocity)``
     training: samples of ``velocity`` for filters that must run without interruption
     units: the units that V and m stand for, used in sentences
     work: amount of simulation
@@ -77,8 +78,8 @@ class AxisData:
     starts: tuple[int, ...]
     layout: Bands
     fitted: Windows
-    held: Windows
-    brief: Windows
+    held_out: Windows
+    screening_windows: Windows
     training: int
     early: tuple[int, ...]
     floor: Floor
@@ -119,8 +120,8 @@ class AxisData:
         """Samples of each recording's velocity in the first stage, or in the whole."""
         return self.early if early else tuple(step.stop - step.start for step in self.steps)
 
-    def begun(self, signal: FloatArray) -> FloatArray:
-        """(n - r,) -> (first,), or with r more (n,) as it is: the beginnings of all recordings."""
+    def first_stage(self, signal: FloatArray) -> FloatArray:
+        """(first,) of a signal (n - r,), or (first,) of a signal (n,): the first stage of each recording, one after the other."""
         places = self.steps if signal.size == self.velocity.size else self.runs
         return np.concatenate([signal[part.start : part.start + count] for part, count in zip(places, self.early, strict=True)])
 
@@ -142,9 +143,9 @@ class AxisData:
     @cached_property
     def passed_once(self) -> bool:
         """Each position is passed only once, so an effect of position cannot be distinguished from a drift."""
-        apart = max(int(LOOK * self.sampling_rate), 1)
+        apart = max(int(PATH_STEP * self.sampling_rate), 1)
         way = sum(float(np.sum(np.abs(np.diff(self.position[run][::apart])))) for run in self.runs)
-        return way < ONCE * (self.reach[1] - self.reach[0])
+        return way < PASSED_AGAIN * (self.reach[1] - self.reach[0])
 
     def begins(self, signal: FloatArray) -> FloatArray:
         """(n - r,) of a signal (n,), such as the voltage: at the beginning of each sample."""
@@ -156,13 +157,13 @@ class AxisData:
 
     def held_samples(self) -> NDArray[np.bool_]:
         """(n - r,) those of ``velocity`` in a window that is held out."""
-        return self.held.covered(self.velocity.size)
+        return self.held_out.covered(self.velocity.size)
 
     def first_windows(self) -> Windows:
         """Every window of the first stage, fitted and held out; those held out alone where the first stage is all that there is."""
         if self.first >= self.velocity.size:
-            return self.held
-        both = np.sort(np.concatenate((self.brief.begins, _within(self.held, self.steps, self.early).begins)))
+            return self.held_out
+        both = np.sort(np.concatenate((self.screening_windows.begins, _within(self.held_out, self.steps, self.early).begins)))
         return Windows(self.layout, np.unique(both))
 
 
@@ -210,8 +211,8 @@ def prepare_all(
         starts=starts,
         layout=layout,
         fitted=fitted,
-        held=held,
-        brief=_within(fitted, steps, early),
+        held_out=held,
+        screening_windows=_within(fitted, steps, early),
         training=int(TRAINING * velocities[0].size),
         early=early,
         floor=least,
@@ -223,13 +224,13 @@ def _early(whole: Windows, fitted: Windows, velocity: FloatArray, least: Floor, 
     """Samples of each recording in the first stage: as many as it takes that what the whole excites is excited there (a sweep takes its time),
     and that a fit sees two windows."""
     sizes = np.array([step.stop - step.start for step in steps])
-    each = FIRST if len(steps) == 1 else max(FIRST // len(steps), int(SEEN * whole.layout.length))
+    each = FIRST if len(steps) == 1 else max(FIRST // len(steps), int(FITTED_BLOCK * whole.layout.length))
     powers = whole.layout.powers(whole.spectrum(velocity))[:, least.excited]
     ends = whole.begins + whole.layout.length
     while each < sizes.max():
-        seen = powers[np.any([(step.start <= whole.begins) & (ends <= step.start + each) for step in steps], axis=0)]
-        enough = _within(fitted, steps, np.minimum(sizes, each)).begins.size >= FEWEST_BRIEF
-        if enough and seen.shape[0] and np.all(seen.mean(axis=0) > LIKE * powers.mean(axis=0)):
+        covered = powers[np.any([(step.start <= whole.begins) & (ends <= step.start + each) for step in steps], axis=0)]
+        enough = _within(fitted, steps, np.minimum(sizes, each)).begins.size >= FEWEST_SCREENING_WINDOWS
+        if enough and covered.shape[0] and np.all(covered.mean(axis=0) > EXCITED_PART * powers.mean(axis=0)):
             break
         each *= 2
     return tuple(int(size) for size in np.minimum(sizes, each))
@@ -268,12 +269,12 @@ def _split(layout: Bands, spans: Sequence[tuple[int, int]], velocity: FloatArray
 
 def _blocks(length: int, start: int, stop: int, shift: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """First samples of the windows within blocks that are fitted, and within those that are held out."""
-    seen, held = int(SEEN * length), int(HELD * length)
+    fit_length, held_length = int(FITTED_BLOCK * length), int(HELD_OUT_BLOCK * length)
     fitted: list[NDArray[np.int64]] = []
     out: list[NDArray[np.int64]] = []
-    at, fits = start - shift * (seen + held) // SHIFTS, True
+    at, fits = start - shift * (fit_length + held_length) // SHIFTS, True
     while at < stop:
-        end = at + (seen if fits else held)
+        end = at + (fit_length if fits else held_length)
         low, high = max(at, start), min(end, stop)
         if high - low >= length:
             (fitted if fits else out).append(_begins(length, low, high))

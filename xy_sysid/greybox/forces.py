@@ -1,4 +1,4 @@
-"""Forces of the effects of a model on the measured motion, and models in which other effects take over the force of one.
+"""Forces of the effects of a model on the measured motion, and models in which the force of one effect is moved to others.
 
 Nothing is simulated: position, time and speed are measured, and these laws depend on nothing else.
 """
@@ -22,9 +22,9 @@ SMOOTH = 300.0  # Hz, below which a speed is seen
 SPEEDS = 100  # at which levels of dry friction are compared
 
 
-def pushing(model: AxisModel) -> list[str]:
-    """Effects whose force depends on position and time alone."""
-    return [name for name, _ in model.effects if pushes(model.library[name])]
+def position_forces(model: AxisModel) -> list[str]:
+    """Names of the effects whose force depends on position and time alone."""
+    return [name for name, _ in model.effects if is_position_force(model.library[name])]
 
 
 def force_of(data: AxisData, model: AxisModel, name: str, counts: Sequence[int]) -> FloatArray:
@@ -37,8 +37,8 @@ def force_of(data: AxisData, model: AxisModel, name: str, counts: Sequence[int])
     return np.concatenate(parts)
 
 
-def rubbing(model: AxisModel) -> list[str]:
-    """Effects whose friction depends on speed alone."""
+def dry_frictions(model: AxisModel) -> list[str]:
+    """Names of the effects of dry friction that depend on speed alone."""
     return [name for name, _ in model.effects if model.library[name].category == "friction"]
 
 
@@ -50,14 +50,14 @@ def friction_of(scene: Scene, model: AxisModel, name: str) -> FloatArray:
     return np.asarray(np.copysign(1.0, model.gain) * scene.direction() * level)
 
 
-def taken_over(data: AxisData, model: AxisModel, name: str) -> AxisModel:
+def force_moved_to_others(data: AxisData, model: AxisModel, name: str) -> AxisModel:
     """The model without an effect; the other forces of position and time are adapted to replace its force as well as possible.
 
     For example, a spring with a load is a spring with another rest position. Without other forces, or if a law is not finite, nothing is adapted.
     """
-    others = [own for own in pushing(model) if own != name]
+    others = [own for own in position_forces(model) if own != name]
     less = model.without(name)
-    if not others or name not in pushing(model):
+    if not others or name not in position_forces(model):
         return less
     counts = data.counts(early=True)
     wanted = np.sum([force_of(data, model, own, counts) for own in (*others, name)], axis=0)
@@ -77,73 +77,74 @@ def taken_over(data: AxisData, model: AxisModel, name: str) -> AxisModel:
     return moved(_least(left, np.concatenate([dict(model.effects)[own] for own in others]), items))
 
 
-def of_one_name(data: AxisData, model: AxisModel, name: str, relative: Effect) -> AxisModel:
+def with_shared_values(data: AxisData, model: AxisModel, name: str, relative: Effect) -> AxisModel:
     """The model with a relative in the place of an effect: parameters of the same name keep their value, others get typical values."""
     own = dict(zip(model.library[name].names, dict(model.effects)[name], strict=True))
-    begun = ((own.get(item.name, item.typical), item) for item in relative.on(data.similar))
-    return model.without(name).with_effect(relative.name, [min(max(value, item.low), item.high) for value, item in begun])
+    pairs = ((own.get(item.name, item.typical), item) for item in relative.on(data.similar))
+    return model.without(name).with_effect(relative.name, [min(max(value, item.low), item.high) for value, item in pairs])
 
 
-def stood_in(data: AxisData, model: AxisModel, name: str, relative: Effect) -> AxisModel:
+def with_equal_force(data: AxisData, model: AxisModel, name: str, relative: Effect) -> AxisModel:
     """The model with a relative in the place of an effect, with a force as similar as possible.
 
-    As ``of_one_name`` where the laws are neither forces by place nor dry friction.
+    As ``with_shared_values`` if the laws are neither position forces nor dry friction.
     """
-    effect, begun = model.library[name], of_one_name(data, model, name, relative)
+    effect, start = model.library[name], with_shared_values(data, model, name, relative)
     if effect.category == relative.category == "friction" and np.any(data.velocity != 0.0):
-        return _rubbing(data, model, name, relative)
-    return _pushed_alike(data, model, name, begun, relative) if pushes(effect) and pushes(relative) else begun
+        return _matched_to_friction(data, model, name, relative)
+    return _matched_to_force(data, model, name, start, relative) if is_position_force(effect) and is_position_force(relative) else start
 
 
-def taken_for(data: AxisData, model: AxisModel, name: str, other: Effect, scene: Scene) -> AxisModel | None:
-    """The model with another law in the place of an effect that pushes much the same; begun from that one of its traces on the scene which
-    comes nearest to it. None where the law leaves no trace on this motion, or neither is a force by place.
+def with_force_from_trace(data: AxisData, model: AxisModel, name: str, other: Effect, scene: Scene) -> AxisModel | None:
+    """The model with another law in the place of an effect, with a force as similar as possible; start values are those of the most similar trace.
+
+    None if the law leaves no trace on this motion, or if one of the two is not a position force.
 
     scene: of the first stage
     """
-    traces = other.guessed(scene) if pushes(model.library[name]) and pushes(other) else []
+    traces = other.guessed(scene) if is_position_force(model.library[name]) and is_position_force(other) else []
     if not traces:
         return None
     wanted = force_of(data, model, name, data.counts(early=True))
     fits = [np.asarray(np.linalg.lstsq(trace.columns.T, wanted, rcond=None)[0], dtype=np.float64) for trace in traces]
     least = min(range(len(traces)), key=lambda k: float(np.sum((wanted - fits[k] @ traces[k].columns) ** 2)))
-    begun = model.without(name).with_effect(other.name, other.read(traces[least], fits[least], data.similar))
-    return _pushed_alike(data, model, name, begun, other)
+    start = model.without(name).with_effect(other.name, other.read(traces[least], fits[least], data.similar))
+    return _matched_to_force(data, model, name, start, other)
 
 
-def _pushed_alike(data: AxisData, model: AxisModel, name: str, begun: AxisModel, other: Effect) -> AxisModel:
-    """The model that is begun, with the other law's parameters such that it pushes as the effect does in the first model."""
+def _matched_to_force(data: AxisData, model: AxisModel, name: str, start: AxisModel, other: Effect) -> AxisModel:
+    """The start model with the parameters of the other law fitted to the force of the effect in the first model."""
     counts = data.counts(early=True)
     wanted = force_of(data, model, name, counts)
 
     def left(values: FloatArray) -> FloatArray:
-        return np.asarray(force_of(data, begun.with_effect(other.name, values), other.name, counts) - wanted)
+        return np.asarray(force_of(data, start.with_effect(other.name, values), other.name, counts) - wanted)
 
-    return begun.with_effect(other.name, _least(left, np.array(dict(begun.effects)[other.name]), other.on(data.similar)))
+    return start.with_effect(other.name, _least(left, np.array(dict(start.effects)[other.name]), other.on(data.similar)))
 
 
-def _rubbing(data: AxisData, model: AxisModel, name: str, relative: Effect) -> AxisModel:
-    """``stood_in`` of two laws of dry friction: their levels at the speeds of the measured motion, the faster the more, as their power is.
+def _matched_to_friction(data: AxisData, model: AxisModel, name: str, relative: Effect) -> AxisModel:
+    """``with_equal_force`` for two laws of dry friction: their levels are matched at the measured speeds, weighted by speed, as power is.
 
-    What of the old one falls or rises with the speed, the base's drag takes over, at the same inertia, from a tenth to ten times what it was.
+    The drag of the base may change from a tenth to ten times its value, at the same inertia, to match the part that depends on speed.
     """
     moving = data.velocity[data.velocity != 0.0]
     speeds = np.quantile(moving, np.linspace(0.0, 1.0, SPEEDS))
     size = np.abs(speeds) / float(np.max(np.abs(speeds)))
     drag = 1.0 / abs(model.gain)  # V s/m
-    rubbed = _levels(model.library[name], np.array(dict(model.effects)[name]), speeds)
+    friction = _levels(model.library[name], np.array(dict(model.effects)[name]), speeds)
 
     def left(values: FloatArray) -> FloatArray:
-        return np.asarray(size * (_levels(relative, values[:-1], speeds) + (values[-1] - drag) * np.abs(speeds) - rubbed))
+        return np.asarray(size * (_levels(relative, values[:-1], speeds) + (values[-1] - drag) * np.abs(speeds) - friction))
 
-    items, begun = relative.on(data.similar), dict(of_one_name(data, model, name, relative).effects)[relative.name]
+    items, start = relative.on(data.similar), dict(with_shared_values(data, model, name, relative).effects)[relative.name]
     dragged = Parameter("drag", "V s/m", 0.1 * drag, 10.0 * drag, drag, "of the base")
-    *values, more = _least(left, np.array([*begun, drag]), [*items, dragged])
+    *values, more = _least(left, np.array([*start, drag]), [*items, dragged])
     slower = float(drag / more)
     return replace(model.without(name), gain=model.gain * slower, pole=model.pole / slower).with_effect(relative.name, values)
 
 
-def pushes(effect: Effect) -> bool:
+def is_position_force(effect: Effect) -> bool:
     """Whether the force depends on position and time alone."""
     return effect.category == "force" and undoable(effect)
 
@@ -156,12 +157,12 @@ def _levels(effect: Effect, values: FloatArray, speeds: FloatArray) -> FloatArra
     return np.array([law(**{word: row[word] for word in asked}) for row in rows])
 
 
-def _least(left: Callable[[FloatArray], FloatArray], begun: FloatArray, items: Sequence[Parameter]) -> FloatArray:
+def _least(left: Callable[[FloatArray], FloatArray], start: FloatArray, items: Sequence[Parameter]) -> FloatArray:
     """The values within the bounds with the smallest error; the start values within the bounds, if the error is not finite."""
     from scipy.optimize import least_squares  # here, as it takes a while to import, and few ask
 
     low, high = np.array([item.low for item in items]), np.array([item.high for item in items])
-    inside = np.clip(begun, low, high)
+    inside = np.clip(start, low, high)
     if not np.isfinite(left(inside)).all():
         return inside
     return np.asarray(least_squares(left, inside, bounds=(low, high), x_scale="jac", max_nfev=LOOKS).x)

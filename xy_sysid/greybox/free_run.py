@@ -18,7 +18,7 @@ from xy_sysid.effects import Effect, Scene
 from xy_sysid.effects._contract import in_time
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.axis_data import EPSILON, AxisData, prepare, prepare_all
-from xy_sysid.greybox.forces import force_of, friction_of, pushing, rubbing
+from xy_sysid.greybox.forces import dry_frictions, force_of, friction_of, position_forces
 from xy_sysid.greybox.least_squares import Scale, Schedule, Solution, Target, solve
 from xy_sysid.greybox.objective import Objective
 from xy_sysid.greybox.parameters import Estimate, FitProblem, estimates, model_of, problem
@@ -48,9 +48,9 @@ FIRST_LOOK = Schedule(1, 6, 1e-2, 1e-2)
 NEARER = Schedule(4, 6, 3e-3, 3e-3)
 FINER = Schedule(2, 8, 1e-4, 1e-3)
 LONG = Schedule(3, 6, 1e-5, 1e-4)
-COARSE, MIDDLING = 2000.0, 4000.0  # Hz: finest sub-steps of looks and first rounds (errors up to 3e-3 of the motion), and of brief fits (6e-4)
-TOLD = 0.01  # least part of the residual voltage that an effect explains, to be simulated before any fit: of 14 s below 10 Hz chance
-# takes half of it
+COARSE, MEDIUM = 2000.0, 4000.0  # Hz: finest sub-steps of looks and first rounds (errors up to 3e-3 of the motion), and of screening fits (6e-4)
+LEAST_EXPLAINED = 0.01  # of the residual voltage: an effect that explains less is not simulated before a fit. In 14 s below 10 Hz chance
+# explains half of this
 LATE = 1.0 / (4.0 * CUTOFFS[-1])  # s, of a delay with which nothing is read if it is wrong: a quarter of the shortest period that is looked at
 FAITHFUL = 0.1  # of the error of a model: allowed change of its motion with finer sub-steps
 
@@ -67,9 +67,9 @@ class GreyboxFit:
     forced:         lines of a window in which the unmodelled force exceeds the floor
     force:          of the unmodelled force, V a sample (rms, white), that explains the held-out error beyond the floor
     simulated:      (n - r,) velocity over all recordings, m/s; error: (n - r,) measured minus simulated
-    held:           (windows, bands) power of the held-out error, m^2/s^2
+    held_out_powers: (windows, bands) power of the held-out error, m^2/s^2
     units:          of input and output; m/s above is ``units.speed``
-    brief:          a screening fit, on the data of the first stage: errors are of all its windows, and the simulation ends with them
+    is_screening:   True for a screening fit: it uses the data of the first stage; errors and simulation cover these data only
     one_step:       judged by the prediction of the next sample from all earlier ones, not by simulation; errors are those of the prediction
     """
 
@@ -86,15 +86,15 @@ class GreyboxFit:
     error: FloatArray
     runs: int
     converged: bool
-    held: FloatArray
-    brief: bool = False
+    held_out_powers: FloatArray
+    is_screening: bool = False
     one_step: bool = False
     units: Units = USUAL
 
     @property
     def power(self) -> FloatArray:
         """(bands,) of the held-out error, m^2/s^2."""
-        return np.asarray(self.held.mean(axis=0))
+        return np.asarray(self.held_out_powers.mean(axis=0))
 
     def parameter(self, name: str) -> Estimate:
         """The parameter of this name; raises BadInput."""
@@ -106,10 +106,10 @@ class GreyboxFit:
 
 def fit_base(data: AxisData, library: Library = STANDARD) -> GreyboxFit:
     """Gain, delay and pole: from the best of the frequency response and inverse dynamics, with and without the delay of the former."""
-    gain, delay, pole = base_start(data.sampling_rate, data.begun(data.voltage), data.begun(data.velocity))
+    gain, delay, pole = base_start(data.sampling_rate, data.first_stage(data.voltage), data.first_stage(data.velocity))
     models = [AxisModel(gain, delay, pole, library=library)]
     for late in {delay, 0.0}:
-        scene = _scene(data, AxisModel(gain, late, pole, library=library), data.begun(data.velocity), data.begun)
+        scene = _scene(data, AxisModel(gain, late, pole, library=library), data.first_stage(data.velocity), data.first_stage)
         models += [AxisModel(own, late, min(max(its, 1e-2), 1e5), library=library) for own, its in rigid_starts(scene)]
     return fit(data, best_start(data, models))
 
@@ -119,20 +119,23 @@ def fit_with(
     base: GreyboxFit,
     names: Iterable[str],
     starts: Mapping[str, tuple[float, ...]] | None = None,
-    brief: bool = False,
-    hopeless: float = np.inf,
+    screening: bool = False,
+    give_up_above: float = np.inf,
 ) -> GreyboxFit:
     """The model of ``base`` with more effects, all parameters fitted together; starts: their start values, else determined from the data.
 
     If the result is worse than ``base``, it is fitted again from ``base`` with a nearly absent new effect.
-    brief: a screening fit, which stops after its first round if its excess is then above ``hopeless``
+    screening: make a screening fit. It stops after its first round if its excess is then above ``give_up_above``, nats a line.
     """
     model = base.model
     for name in names:
         values = (starts or {}).get(name)
-        model = _begun(data, base, model, name) if values is None else model.with_effect(name, bounded(model.library[name], values, data.similar))
-    found = fit(data, model, brief, hopeless)
-    if brief or fitted_score(data, found) <= fitted_score(data, base):
+        if values is None:
+            model = _with_best_start(data, base, model, name)
+        else:
+            model = model.with_effect(name, bounded(model.library[name], values, data.similar))
+    found = fit(data, model, screening, give_up_above)
+    if screening or fitted_score(data, found) <= fitted_score(data, base):
         return found
     absent = base.model
     for name, values in model.effects:
@@ -148,22 +151,24 @@ def fitted_score(data: AxisData, fitted: GreyboxFit) -> float:
     return Objective.of(data.floor).of_power(np.where(np.isfinite(power), power, np.inf))
 
 
-def _begun(data: AxisData, base: GreyboxFit, model: AxisModel, name: str) -> AxisModel:
-    """The model with one more effect, with the best start value from trace, inverse dynamics and joint start."""
+def _with_best_start(data: AxisData, base: GreyboxFit, model: AxisModel, name: str) -> AxisModel:
+    """The model with one more effect, with the best start values from trace, inverse dynamics and joint start."""
     effect = model.library[name]
     traced = model.with_effect(name, look(data, base, [effect])[0].values)
-    return best_start(data, [traced, *other_starts(data, base, model, name)])
+    return best_start(data, [traced, *inverse_start_models(data, base, model, name)])
 
 
-def other_starts(data: AxisData, base: GreyboxFit, model: AxisModel, name: str, scene: Scene | None = None, least: float = 0.0) -> list[AxisModel]:
-    """The model with one more effect, from inverse identification, and from starts of base and effect together.
+def inverse_start_models(
+    data: AxisData, base: GreyboxFit, model: AxisModel, name: str, scene: Scene | None = None, least: float = 0.0
+) -> list[AxisModel]:
+    """Start models with one more effect: by inverse dynamics, and with joint start values of base and effect.
 
     scene: of the base and the first stage's data, if it is known; least: see ``inverse_starts``
     """
     effect, scene = model.library[name], scene or scene_of(data, base)
-    candidates = _read(data, model, effect, scene, least)
+    candidates = _from_inverse_dynamics(data, model, effect, scene, least)
     if scene.prompt is not None:
-        candidates += _read(data, replace(model, delay=0.0), effect, scene.prompt, least)
+        candidates += _from_inverse_dynamics(data, replace(model, delay=0.0), effect, scene.prompt, least)
     if effect.joint is not None:
         for gain, later, pole, values in effect.joint(scene):
             whole = replace(model, gain=gain, delay=max(base.model.delay + later, 0.0), pole=min(max(pole, 1e-2), 1e5))
@@ -171,28 +176,28 @@ def other_starts(data: AxisData, base: GreyboxFit, model: AxisModel, name: str, 
     return candidates
 
 
-def _read(data: AxisData, model: AxisModel, effect: Effect, scene: Scene, least: float) -> list[AxisModel]:
-    """The model with one more effect as inverse identification reads it from a scene that has the model's delay."""
-    name, candidates, known = effect.name, [], _apart(model)
-    beside, rubs = [own for own in pushing(known) if own != name], [own for own in rubbing(known) if own != name]
+def _from_inverse_dynamics(data: AxisData, model: AxisModel, effect: Effect, scene: Scene, least: float) -> list[AxisModel]:
+    """Start models with one more effect by inverse dynamics, from a scene with the delay of the model."""
+    name, candidates, known = effect.name, [], _friction_split(model)
+    by_position, frictions = [own for own in position_forces(known) if own != name], [own for own in dry_frictions(known) if own != name]
     amplified = [own for own, _ in known.effects if known.library[own].category == "input" and own != name]
     if amplified:
         scene = replace(scene, voltage=_amplified(data, known, amplified, data.counts(early=scene.velocity.size == data.first)))
-    forces = [force_of(data, known, own, data.counts(early=scene.velocity.size == data.first)) for own in beside]
-    forces += [friction_of(scene, known, own) for own in rubs]
-    for start in inverse_starts(effect, scene, scene.velocity.size, forces, bool(rubs), least):
+    forces = [force_of(data, known, own, data.counts(early=scene.velocity.size == data.first)) for own in by_position]
+    forces += [friction_of(scene, known, own) for own in frictions]
+    for start in inverse_starts(effect, scene, scene.velocity.size, forces, bool(frictions), least):
         whole = replace(known, gain=start.gain, pole=min(max(start.pole, 1e-2), 1e5))
-        for own, size in zip((*beside, *rubs), start.sizes, strict=True):
-            whole = whole.with_effect(own, bounded(known.library[own], _sized(known, own, size), data.similar))
+        for own, size in zip((*by_position, *frictions), start.sizes, strict=True):
+            whole = whole.with_effect(own, bounded(known.library[own], _scaled(known, own, size), data.similar))
         whole = whole if known is model else whole.joined()
         if all(own in whole for own, _ in model.effects):
             candidates.append(whole.with_effect(name, start.values))
     return candidates
 
 
-def is_read(model: AxisModel) -> bool:
-    """Starts by least squares know all that acts in a model: forces by place, friction by speed, and what the amplifier does."""
-    known = {*pushing(model), *rubbing(model), *(name for name, _ in model.effects if model.library[name].category == "input")}
+def has_inverse_starts(model: AxisModel) -> bool:
+    """Whether inverse dynamics can include every effect of a model: position forces, dry friction, and effects of category input."""
+    known = {*position_forces(model), *dry_frictions(model), *(name for name, _ in model.effects if model.library[name].category == "input")}
     return all(name in known for name, _ in model.effects)
 
 
@@ -206,16 +211,16 @@ def _amplified(data: AxisData, model: AxisModel, names: list[str], counts: Seque
     return np.concatenate(parts)
 
 
-def _apart(model: AxisModel) -> AxisModel:
-    """The model with the parts of a friction that is the sum of several in its place: each has a size of its own."""
-    whole = [own for own in rubbing(model) if model.library[own].sum_of is not None]
+def _friction_split(model: AxisModel) -> AxisModel:
+    """The model with a friction that is a sum of effects replaced by these, so that each has its own size."""
+    whole = [own for own in dry_frictions(model) if model.library[own].sum_of is not None]
     return model.apart(whole[0]) if whole else model
 
 
-def _sized(model: AxisModel, name: str, times: float) -> tuple[float, ...]:
-    """The values of an effect that pushes so many times as hard, up to three: its size, and every other level of a friction.
+def _scaled(model: AxisModel, name: str, times: float) -> tuple[float, ...]:
+    """The values of an effect whose force is multiplied by ``times``, at most by three: its size, and every other level of a friction.
 
-    What has no sign may vanish or push the other way round; the rest is not below a third.
+    A size of either sign may become 0 or negative; a positive size is multiplied by at least 0.3.
     """
     items, values = model.library[name].parameters, dict(model.effects)[name]
     levels = [k == 0 or (model.library[name].is_dry and item.unit == items[0].unit) for k, item in enumerate(items)]
@@ -235,7 +240,7 @@ def first_excess(data: AxisData, model: AxisModel) -> float:
     """Score over the first stage's data, without a fit."""
     task = problem(data, model, True)
     run, values = task.at(COARSE), task.row
-    power = data.layout.power(data.brief.spectrum(data.begun(data.velocity) - run(values)))
+    power = data.layout.power(data.screening_windows.spectrum(data.first_stage(data.velocity) - run(values)))
     power = np.where(np.isfinite(power), power, np.inf)
     return Objective.of(data.floor).of_power(power)
 
@@ -254,13 +259,13 @@ def screened(data: AxisData, fitted: GreyboxFit, effects: Iterable[Effect], scen
     inner = scale.inner(values)
     here = run(values)
     nuisance = on_all_cores(lambda step: run(scale.outer(inner + step)) - here, 1e-4 * np.eye(values.size))
-    return screen(effects, scene, np.array(nuisance), data.brief if early else data.fitted, data.floor)
+    return screen(effects, scene, np.array(nuisance), data.screening_windows if early else data.fitted, data.floor)
 
 
 def scene_of(data: AxisData, fitted: GreyboxFit, early: bool = True) -> Scene:
     """The measured motion of the first stage, or of all data, as input to the traces of effects."""
-    model, part = fitted.model, data.begun if early else np.asarray
-    scene = _scene(data, model, fitted.error if fitted.brief else part(fitted.error), part)
+    model, part = fitted.model, data.first_stage if early else np.asarray
+    scene = _scene(data, model, fitted.error if fitted.is_screening else part(fitted.error), part)
     prompt = _scene(data, replace(model, delay=0.0), scene.error, part)
     return replace(scene, prompt=prompt) if model.delay > LATE else scene
 
@@ -280,23 +285,23 @@ def _scene(data: AxisData, model: AxisModel, error: FloatArray, part: Callable[[
     )
 
 
-def fit(data: AxisData, start: AxisModel, brief: bool = False, hopeless: float = np.inf, late: Callable[[], bool] = in_time) -> GreyboxFit:
-    """All parameters of a model, from where it is; brief, hopeless: see ``fit_with``; late: then the best so far is taken."""
+def fit(data: AxisData, start: AxisModel, screening: bool = False, give_up_above: float = np.inf, late: Callable[[], bool] = in_time) -> GreyboxFit:
+    """Fit all parameters of a model from its present values; screening, give_up_above: see ``fit_with``; late: time is up, return the best so far."""
     task = problem(data, start, True)
     rate = sub_steps(data, task, COARSE)
     run, scale = task.at(rate), task.scale
-    target = Target(data.begun(data.velocity), data.brief, data.floor)
+    target = Target(data.first_stage(data.velocity), data.screening_windows, data.floor)
     found = solve(run, target, scale, task.row, replace(FIRST_LOOK, late=late))
-    if not (late() or (brief and found.score > hopeless)):
+    if not (late() or (screening and found.score > give_up_above)):
         nearer = solve(run, target, scale, found.values, replace(NEARER, late=late), found)
-        finer = sub_steps(data, problem(data, model_of(data, start, nearer.values), True), MIDDLING)
+        finer = sub_steps(data, problem(data, model_of(data, start, nearer.values), True), MEDIUM)
         if finer != rate:
             run = task.at(finer)
         more = solve(run, target, scale, nearer.values, replace(FINER, late=late), nearer)
         found = replace(more, runs=found.runs + nearer.runs + more.runs)
-    if not brief:
+    if not screening:
         return finish(data, model_of(data, start, found.values), found.runs, late)
-    return _result(data, start, scale, found, brief=True)
+    return _result(data, start, scale, found, screening=True)
 
 
 def finish(data: AxisData, start: AxisModel, runs: int = 0, late: Callable[[], bool] = in_time) -> GreyboxFit:
@@ -324,7 +329,7 @@ def sub_steps(data: AxisData, task: FitProblem, finest: float) -> float:
     rate = min(data.sampling_rate, finest)
     if rate == finest:
         return rate
-    windows, measured = (data.brief, data.begun(data.velocity)) if task.early else (data.fitted, data.velocity)
+    windows, measured = (data.screening_windows, data.first_stage(data.velocity)) if task.early else (data.fitted, data.velocity)
 
     def moved(rate: float) -> FloatArray:
         return task.at(rate)(task.row)
@@ -344,12 +349,12 @@ def sub_steps(data: AxisData, task: FitProblem, finest: float) -> float:
     return rate
 
 
-def _result(data: AxisData, start: AxisModel, scale: Scale, found: Solution, brief: bool = False) -> GreyboxFit:
+def _result(data: AxisData, start: AxisModel, scale: Scale, found: Solution, screening: bool = False) -> GreyboxFit:
     model = model_of(data, start, found.values)
-    task = problem(data, model, brief)
-    simulated = task.at(MIDDLING if brief else FINE)(task.row)
-    error = (data.begun(data.velocity) if brief else data.velocity) - simulated
-    fitted, judging = (data.brief, data.first_windows()) if brief else (data.fitted, data.held)
+    task = problem(data, model, screening)
+    simulated = task.at(MEDIUM if screening else FINE)(task.row)
+    error = (data.first_stage(data.velocity) if screening else data.velocity) - simulated
+    fitted, judging = (data.screening_windows, data.first_windows()) if screening else (data.fitted, data.held_out)
     held = data.layout.powers(judging.spectrum(error))
     objective = Objective.of(data.floor)
     expected = objective.spectrum(held.mean(axis=0))
@@ -367,8 +372,8 @@ def _result(data: AxisData, start: AxisModel, scale: Scale, found: Solution, bri
         error=error,
         runs=found.runs,
         converged=found.converged,
-        held=held,
-        brief=brief,
+        held_out_powers=held,
+        is_screening=screening,
         units=data.units,
     )
 

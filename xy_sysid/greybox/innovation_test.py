@@ -13,10 +13,10 @@ import scipy
 
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.effects import Effect, Scene
-from xy_sysid.effects._contract import Beside, Followed
+from xy_sysid.effects._contract import Companions, FilterFit
 from xy_sysid.effects._scene import Guess
 from xy_sysid.greybox.free_run import AxisData
-from xy_sysid.greybox.one_step import as_beside, beside
+from xy_sysid.greybox.one_step import as_companions, companions
 from xy_sysid.greybox.score_test import Projected, Trace, best_trace
 from xy_sysid.greybox.start_rigid import mean_velocity_filter
 from xy_sysid.samples.block import FloatArray
@@ -24,25 +24,27 @@ from xy_sysid.samples.block import FloatArray
 SMALL = 0.02  # of the rms voltage or velocity: how much of a trace is put in to see what it does
 
 
-def traces(data: AxisData, model: AxisModel, effect: Effect, found: Followed, effects: Iterable[Effect]) -> list[Trace]:
+def traces(data: AxisData, model: AxisModel, effect: Effect, found: FilterFit, effects: Iterable[Effect]) -> list[Trace]:
     """The part of the innovations' power that each additional effect would explain, to first order, best first, with start values."""
     assert effect.one_step is not None
     library, fs, n = model.library, data.sampling_rate, data.first
-    names = [name for name, _ in beside(model, effect)[1]]
+    names = [name for name, _ in companions(model, effect)[1]]
     pairs = (
-        zip(names, np.split(np.array(found.beside[0]), np.cumsum([len(library[name].names) for name in names])[:-1]), strict=True) if names else ()
+        zip(names, np.split(np.array(found.companions[0]), np.cumsum([len(library[name].names) for name in names])[:-1]), strict=True)
+        if names
+        else ()
     )
-    own = as_beside(data, library, [(name, tuple(values)) for name, values in pairs])
-    numbers = np.array([*found.base, *found.beside[0]])
+    own = as_companions(data, library, [(name, tuple(values)) for name, values in pairs])
+    numbers = np.array([*found.base, *found.companions[0]])
     voltage, position, against, through = own.undo(numbers, n)
     still = np.zeros(0)
 
-    def seen(by: Beside, what: Followed = found) -> FloatArray:
+    def seen(by: Companions, what: FilterFit = found) -> FloatArray:
         assert effect.one_step is not None
         return effect.one_step.innovation(fs, what, by, n)
 
-    def recording(u: FloatArray, y: FloatArray, f: FloatArray) -> Beside:
-        return Beside(
+    def recording(u: FloatArray, y: FloatArray, f: FloatArray) -> Companions:
+        return Companions(
             start=still,
             low=still,
             high=still,
@@ -95,7 +97,7 @@ def _moved(numbers: FloatArray) -> list[FloatArray]:
     return found
 
 
-def _missing_velocity(data: AxisData, found: Followed, innovation: FloatArray) -> FloatArray:
+def _missing_velocity(data: AxisData, found: FilterFit, innovation: FloatArray) -> FloatArray:
     """(n,) m/s: what the forces that the innovations tell of would do to the base. Right but for its size and a short delay."""
     gain, _, pole = found.base
     b, a = mean_velocity_filter(gain, pole, data.sampling_rate)

@@ -118,8 +118,8 @@ class Solution:
             beyond = layout.lines * np.maximum(layout.power(self.error) - least.noise, 0.0)
             share = np.nan_to_num(beyond / tolerance(layout, self.error, least), nan=1.0, posinf=1.0)
         repeats = 1.0 + (windows.begins.size - 1) * share
-        known = _that_repeats(whitened, np.sqrt(repeats)[layout.band], noise)
-        return known + of_the_law(whitened, least.epsilon * self.target.measured * self.weight, layout, noise)
+        known = _with_repeated_error(whitened, np.sqrt(repeats)[layout.band], noise)
+        return known + model_error_covariance(whitened, least.epsilon * self.target.measured * self.weight, layout, noise)
 
 
 def solve(
@@ -184,10 +184,10 @@ def solve(
             found, runs = left(trial), runs + 1
             new = _cost(found * weight)
             if np.isfinite(new) and new < cost:
-                fall, gone = (cost - new) / cost, trial - inner
-                hoped = -float(2.0 * slope @ gone + gone @ normal @ gone)
-                if abs((cost - new) - hoped) < TRUSTED * hoped:
-                    change, exact = _updated(change, gone, diagonal, found - error), False
+                fall, taken = (cost - new) / cost, trial - inner
+                expected_decrease = -float(2.0 * slope @ taken + taken @ normal @ taken)
+                if abs((cost - new) - expected_decrease) < TRUSTED * expected_decrease:
+                    change, exact = _updated(change, taken, diagonal, found - error), False
                 else:
                     change, exact = slopes(trial, found), True
                 inner, error, cost, fresh = trial, found, new, False
@@ -244,13 +244,13 @@ def _weight(target: Target, expected: FloatArray) -> FloatArray:
     return np.asarray((counts / np.sqrt(expected))[target.windows.layout.band])
 
 
-def _updated(change: NDArray[np.complex128], gone: FloatArray, size: FloatArray, moved: NDArray[np.complex128]) -> NDArray[np.complex128]:
+def _updated(change: NDArray[np.complex128], taken: FloatArray, size: FloatArray, moved: NDArray[np.complex128]) -> NDArray[np.complex128]:
     """Derivatives (k, windows, lines) that agree with the step just taken, else as they were (Broyden 1965, eq. 4.5).
 
-    gone: (k,) step; size: (k,) its weights; moved: change of the error that it made
+    taken: (k,) step; size: (k,) its weights; moved: change of the error that it made
     """
-    missing = moved - np.tensordot(gone, change, 1)
-    return np.asarray(change + np.multiply.outer(size * gone / float(size @ gone**2), missing))
+    missing = moved - np.tensordot(taken, change, 1)
+    return np.asarray(change + np.multiply.outer(size * taken / float(size @ taken**2), missing))
 
 
 def _covariance(normal: FloatArray) -> FloatArray:
@@ -265,7 +265,7 @@ def _covariance(normal: FloatArray) -> FloatArray:
     return covariance
 
 
-def _that_repeats(change: NDArray[np.complex128], times: FloatArray, noise: FloatArray) -> FloatArray:
+def _with_repeated_error(change: NDArray[np.complex128], times: FloatArray, noise: FloatArray) -> FloatArray:
     """(k, k) covariance where what is left in a band beyond the encoder's noise is one mistake, as harmful as one of its size can be.
 
     Noise averages out over lines and windows, such a mistake does not. change: (k, windows, lines), whitened; times: (lines,) square root
@@ -281,7 +281,7 @@ def _that_repeats(change: NDArray[np.complex128], times: FloatArray, noise: Floa
     return found
 
 
-def of_the_law(change: NDArray[np.complex128], motion: NDArray[np.complex128], layout: Bands, noise: FloatArray) -> FloatArray:
+def model_error_covariance(change: NDArray[np.complex128], motion: NDArray[np.complex128], layout: Bands, noise: FloatArray) -> FloatArray:
     """(k, k) what laws and integration that are not exact add to the covariance, however long the record.
 
     In each band the model's motion may be off by one common complex factor. change: (k, windows, lines), whitened; motion: (windows, lines),

@@ -15,7 +15,7 @@ import numpy as np
 from xy_sysid.axis.loop_source import undoable
 from xy_sysid.axis.model import AxisModel, Library, undoer
 from xy_sysid.effects import Effect
-from xy_sysid.effects._contract import PATIENT, Beside, DryFriction, Followed, Limits, OneStepTask, arguments
+from xy_sysid.effects._contract import PATIENT, Companions, DryFriction, FilterFit, Limits, OneStepTask, arguments
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.floor import count_size
 from xy_sysid.greybox.free_run import AxisData, GreyboxFit
@@ -26,7 +26,7 @@ from xy_sysid.response.frf import Z95
 AT_NOISE = 3.5  # held-out innovation over the encoder's noise up to which an effect explains the axis
 BETTER = 2.0  # innovation without the effect over that with it, at least
 CLEAN = 1.6  # innovation over the noise up to which next to nothing else is left in it,
-LITTLE_BETTER = 1.03  # and what is enough there in the place of BETTER: a gap of one encoder count makes 1.04 to 1.07
+BETTER_AT_NOISE = 1.03  # replaces BETTER there: a gap of one encoder count makes 1.04 to 1.07
 TELLING = 0.005  # dry friction over the rms voltage from which it is named
 
 FILTER_WORK = 2.0  # samples times sub-steps simulated in the time that the filter takes for one sample
@@ -35,41 +35,41 @@ Others = Sequence[tuple[str, tuple[float, ...]]]
 
 
 def one_step_fit(
-    data: AxisData, base: GreyboxFit, effect: Effect, new: Others = (), begin: Followed | None = None, limits: Limits = PATIENT
+    data: AxisData, base: GreyboxFit, effect: Effect, new: Others = (), earlier: FilterFit | None = None, limits: Limits = PATIENT
 ) -> GreyboxFit:
     """Fit an effect together with those of ``base`` by one-step prediction; excess is 0 if that explains the axis.
 
-    new: additional effects, with start values; begin: an earlier result without them; limits: see ``Limits``, bar in m/s.
+    new: additional effects, with start values; earlier: an earlier result without them; limits: see ``Limits``, bar in m/s.
     Raises BadInput if it cannot.
     """
-    return followed(data, base, effect, new, begin, limits)[0]
+    return filter_fit(data, base, effect, new, earlier, limits)[0]
 
 
-def followed(
-    data: AxisData, base: GreyboxFit, effect: Effect, new: Others = (), begin: Followed | None = None, limits: Limits = PATIENT
-) -> tuple[GreyboxFit, Followed]:
-    """As ``one_step_fit``, with the filter's own result, from which a next fit can begin."""
+def filter_fit(
+    data: AxisData, base: GreyboxFit, effect: Effect, new: Others = (), earlier: FilterFit | None = None, limits: Limits = PATIENT
+) -> tuple[GreyboxFit, FilterFit]:
+    """As ``one_step_fit``, and the result of the filter, which a next fit can use as ``earlier``."""
     if effect.one_step is None:
         raise BadInput(f"effect {effect.name}", "no one-step prediction", "an effect that has one", "Fit it by simulation.")
     if len(data.starts) > 1:
         raise BadInput(f"stretches for {effect.name}", len(data.starts), "one, as a filter runs through it", "Give one recording without a gap.")
     library = base.model.library
-    dry, others = beside(base.model, effect)
+    dry, others = companions(base.model, effect)
     for name, values in new:
         if library[name].is_dry:
             dry = _with_law(dry, library[name], values, effect)
         else:
             others += ((name, values),)
-    first = data.training if any(_ages(library[name]) for name, _ in others) else data.first
+    first = data.training if any(_depends_on_time(library[name]) for name, _ in others) else data.first
     found = effect.one_step.fit(
         OneStepTask(
             sampling_rate=data.sampling_rate,
             base=(base.model.gain, base.model.delay, base.model.pole),
             noise=noise_of(data),
             stages=(first, data.training, data.position.size - 1),
-            beside=as_beside(data, library, others),
+            companions=as_companions(data, library, others),
             dry=dry,
-            begin=begin,
+            earlier=earlier,
             limits=replace(limits, bar=None if limits.bar is None else limits.bar / data.sampling_rate),
         )
     )
@@ -79,33 +79,42 @@ def followed(
 
 def _with_law(dry: DryFriction, law: Effect, values: tuple[float, ...], effect: Effect) -> DryFriction:
     """Add a law of dry friction, in the place of its relatives and of the default friction of the effect."""
-    kept = [(own, its) for own, its, _ in dry.rows() if own.name not in (law.name, effect.rubs) and not (law.family and own.family == law.family)]
+    kept = [
+        (own, its)
+        for own, its, _ in dry.rows()
+        if own.name not in (law.name, effect.start_friction) and not (law.family and own.family == law.family)
+    ]
     return DryFriction((*(own for own, _ in kept), law), (*(value for _, its in kept for value in its), *values))
 
 
-def _ages(effect: Effect) -> bool:
-    """True if the law knows the time: the first stage is too short to see it."""
+def _depends_on_time(effect: Effect) -> bool:
+    """Whether the law depends on time; the first stage is too short for such a law."""
     return any("t" in arguments(function) for function in effect.functions.values())
 
 
-def beside(model: AxisModel, effect: Effect) -> tuple[DryFriction, tuple[tuple[str, tuple[float, ...]], ...]]:
-    """Dry friction of a model and its effects that can be taken out of a recording; raises BadInput for others."""
-    rubbing, others = [], []
+def companions(model: AxisModel, effect: Effect) -> tuple[DryFriction, tuple[tuple[str, tuple[float, ...]], ...]]:
+    """Dry friction of a model, and its other effects that can be removed from a recording: the companions of ``effect``.
+
+    Raises BadInput if the model has an effect that is neither.
+    """
+    dry_friction, others = [], []
     for name, values in model.effects:
         own = model.library[name]
         if own.is_dry:
-            rubbing.append((own, values))
+            dry_friction.append((own, values))
         elif undoable(own):
             others.append((name, values))
         elif name != effect.name:
-            raise BadInput("effects", f"{effect.name} with {name}", f"{effect.name} with dry friction, or what does not heed speed", "Leave it out.")
-    if not rubbing and effect.rubs in model.library.effects:
-        first = model.library[effect.rubs]
-        rubbing = [(first, tuple(item.low for item in first.parameters))]
-    return DryFriction(tuple(own for own, _ in rubbing), tuple(value for _, values in rubbing for value in values)), tuple(others)
+            raise BadInput(
+                "effects", f"{effect.name} with {name}", f"{effect.name} with dry friction, or effects that do not depend on speed", "Leave it out."
+            )
+    if not dry_friction and effect.start_friction in model.library.effects:
+        first = model.library[effect.start_friction]
+        dry_friction = [(first, tuple(item.low for item in first.parameters))]
+    return DryFriction(tuple(own for own, _ in dry_friction), tuple(value for _, values in dry_friction for value in values)), tuple(others)
 
 
-def follower(model: AxisModel) -> Effect | None:
+def one_step_effect(model: AxisModel) -> Effect | None:
     """The effect of a model that only one-step prediction can judge, if there is one."""
     return next((model.library[name] for name, _ in model.effects if model.library[name].one_step is not None), None)
 
@@ -116,11 +125,11 @@ def noise_of(data: AxisData) -> float:
     return min(data.encoder, max(count / np.sqrt(12.0), 1e-12)) if count > 0.0 else data.encoder
 
 
-def as_beside(data: AxisData, library: Library, others: Others) -> Beside:
-    """Effects with start values, ready to be fitted and taken out of the recording."""
+def as_companions(data: AxisData, library: Library, others: Others) -> Companions:
+    """Companions from effects with start values, ready to be fitted and removed from the recording."""
     names = [name for name, _ in others]
     items = [item for name in names for item in library[name].on(data.similar)]
-    return Beside(
+    return Companions(
         start=np.array([value for name, values in others for value in bounded(library[name], values, data.similar)]),
         low=np.array([item.low for item in items]),
         high=np.array([item.high for item in items]),
@@ -132,19 +141,19 @@ def as_beside(data: AxisData, library: Library, others: Others) -> Beside:
     )
 
 
-def _result(data: AxisData, library: Library, effect: Effect, names: Sequence[str], found: Followed) -> GreyboxFit:
+def _result(data: AxisData, library: Library, effect: Effect, names: Sequence[str], found: FilterFit) -> GreyboxFit:
     error = found.innovation * data.sampling_rate
     settled = min(int(0.5 * data.sampling_rate), data.training // 4)
     held = float(np.sqrt(np.mean(error[data.training :] ** 2)))
     noise_floor = found.noise * data.sampling_rate
     worse = held if found.too_small else error_without(data, found)
-    told = held < CLEAN * noise_floor and worse > LITTLE_BETTER * held
-    far = max(held / (AT_NOISE * noise_floor), 0.0 if told else BETTER * held / worse)
+    explains_all = held < CLEAN * noise_floor and worse > BETTER_AT_NOISE * held
+    far = max(held / (AT_NOISE * noise_floor), 0.0 if explains_all else BETTER * held / worse)
     rows: list[tuple[str, tuple[float, ...], tuple[float, ...]]] = [(effect.name, bounded(effect, found.values, data.similar), found.spread)]
     for law, its, errors in found.dry.rows():
         if its[0] > TELLING * float(np.std(data.voltage)) and its[0] > 5.0 * errors[0]:
             rows.append((law.name, bounded(law, its, data.similar), errors))
-    values, spread = iter(found.beside[0]), iter(found.beside[1])
+    values, spread = iter(found.companions[0]), iter(found.companions[1])
     rows += [(name, tuple(next(values) for _ in library[name].names), tuple(next(spread) for _ in library[name].names)) for name in names]
     gain, delay, pole = found.base
     model = AxisModel(gain, max(delay, 0.0), pole, library=library)
@@ -165,19 +174,19 @@ def _result(data: AxisData, library: Library, effect: Effect, names: Sequence[st
         held_out_error=held,
         noise_floor=noise_floor,
         excess=max(0.0, 2.0 * float(np.log(far))),
-        scores=np.zeros(data.held.begins.size),
+        scores=np.zeros(data.held_out.begins.size),
         forced=1.0,
         force=0.0,
         simulated=data.velocity - error,
         error=error,
         runs=found.runs,
         converged=not found.given_up,
-        held=data.layout.powers(data.held.spectrum(error)),
+        held_out_powers=data.layout.powers(data.held_out.spectrum(error)),
         one_step=True,
         units=data.units,
     )
 
 
-def error_without(data: AxisData, found: Followed) -> float:
+def error_without(data: AxisData, found: FilterFit) -> float:
     """Held-out error one step ahead, m/s, of the same filter without the effect, all else refitted: what the effect must beat."""
     return float(np.sqrt(np.mean(found.without[data.training :] ** 2))) * data.sampling_rate

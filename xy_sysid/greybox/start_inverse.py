@@ -40,11 +40,11 @@ class InverseStart:
 
 
 def inverse_starts(
-    effect: Effect, scene: Scene, samples: int, forces: Sequence[FloatArray] = (), rubs: bool = False, least: float = 0.0
+    effect: Effect, scene: Scene, samples: int, forces: Sequence[FloatArray] = (), with_friction: bool = False, least: float = 0.0
 ) -> list[InverseStart]:
     """One for each low-pass at most, from the first samples.
 
-    forces: (n,) V each, of what the model has already, whose sizes are free; rubs: dry friction is among them
+    forces: (n,) V each, of what the model has already, whose sizes are free; with_friction: dry friction is among them
     least: part of what is left of the voltage that the effect must take away
     """
     if effect.guesses is None or effect.is_behind:
@@ -58,23 +58,23 @@ def inverse_starts(
     for cutoff in cutoffs(scene.sampling_rate):
         slow, acceleration, velocity, voltage = _motion(scene, samples, cutoff)
         rows = slow.inside()
-        if effect.is_dry or rubs:
+        if effect.is_dry or with_friction:
             moving = scipy.ndimage.minimum_filter1d(np.abs(velocity), 2 * int(0.5 * slow.rate / cutoff) + 1) > REST * float(np.std(velocity))
             rows = rows & moving if float(np.mean(moving)) > FEW else rows
-        beside = [slow(force) for force in seen_forces]
-        known = np.array([acceleration, velocity, *beside])[:, rows]
+        others = [slow(force) for force in seen_forces]
+        known = np.array([acceleration, velocity, *others])[:, rows]
         best, kept = (1.0 - least) * _least(known, voltage[rows])[1] / (float(voltage[rows] @ voltage[rows]) + 1e-300), None
         for guess, columns in zip(guesses, seen_columns, strict=True):
             acting = slow(columns)
             target = voltage - acting[0] if guess.whole else voltage
             free = acting[:0] if guess.whole else acting
-            coefficients, left = _least(np.concatenate((known, free[:, rows])), target[rows])
-            left /= float(target[rows] @ target[rows]) + 1e-300
-            if left < best and coefficients[0] * coefficients[1] > 0.0:
-                inertia, drag, *sizes = (float(value) for value in coefficients[: 2 + len(beside)])
+            coefficients, residual = _least(np.concatenate((known, free[:, rows])), target[rows])
+            residual /= float(target[rows] @ target[rows]) + 1e-300
+            if residual < best and coefficients[0] * coefficients[1] > 0.0:
+                inertia, drag, *sizes = (float(value) for value in coefficients[: 2 + len(others)])
                 part = 1.0 / (drag * scene.gain) if effect.is_of_the_drag else 1.0  # its columns are in volts of the base's drag
-                own = np.ones(len(acting)) if guess.whole else coefficients[2 + len(beside) :] * part
-                best, kept = left, InverseStart(1.0 / drag, drag / inertia, effect.read(guess, own, scene.similar), tuple(sizes))
+                own = np.ones(len(acting)) if guess.whole else coefficients[2 + len(others) :] * part
+                best, kept = residual, InverseStart(1.0 / drag, drag / inertia, effect.read(guess, own, scene.similar), tuple(sizes))
         if kept is not None:
             found.append(kept)
     return found
@@ -144,5 +144,5 @@ def _least(rows: FloatArray, target: FloatArray) -> tuple[FloatArray, float]:
     size = np.linalg.norm(rows, axis=1) + 1e-300
     unit = rows / size[:, None]
     coefficients = np.linalg.lstsq(unit @ unit.T, unit @ target, rcond=1e-12)[0]
-    left = target - coefficients @ unit
-    return np.asarray(coefficients / size), float(left @ left)
+    residual = target - coefficients @ unit
+    return np.asarray(coefficients / size), float(residual @ residual)

@@ -28,16 +28,16 @@ def prepared(
         data = prepare_all(sampling_rate, recordings, epsilon, units)
     except BadInput as problem:
         return str(problem)
-    if data.held is data.fitted:
+    if data.held_out is data.fitted:
         seconds = voltage.size / sampling_rate
         return f"{seconds:.3g} s without a gap are too few windows to fit some and judge by others; record longer, better 60 s."
     followed, least = _coherence(sampling_rate, voltage, position)
     if followed < least:
         return f"the output does not follow the input (coherence {followed:.2g} at best, {least:.2g} is the least); check which signals these are."
-    moving = [_moving(data, begins) for begins in (data.fitted.begins, data.held.begins)]
+    moving = [_moving(data, begins) for begins in (data.fitted.begins, data.held_out.begins)]
     if moving[0] < 2 * FEWEST or moving[1] < FEWEST:
-        seconds, every = data.layout.length / sampling_rate, data.fitted.begins.size + data.held.begins.size
-        goes = sum(_moving(data, begins, about_mean=False) for begins in (data.fitted.begins, data.held.begins))
+        seconds, every = data.layout.length / sampling_rate, data.fitted.begins.size + data.held_out.begins.size
+        goes = sum(_moving(data, begins, about_mean=False) for begins in (data.fitted.begins, data.held_out.begins))
         what = "stands most of the time: it moves" if goes <= sum(moving) else "keeps its speed most of the time: it changes"
         return (
             f"the axis {what} in {sum(moving)} of {every} windows of {seconds:.2g} s; "
@@ -61,7 +61,7 @@ def _one_after_the_other(recordings: Sequence[tuple[FloatArray, FloatArray]]) ->
 
 def _moving(data: AxisData, begins: np.ndarray, about_mean: bool = True) -> int:
     """Number of windows with motion, compared with the tenth with the strongest motion; about_mean: only changes of speed count."""
-    every = np.concatenate((data.fitted.begins, data.held.begins))
+    every = np.concatenate((data.fitted.begins, data.held_out.begins))
     length = data.layout.length
 
     def sizes(starts: np.ndarray) -> FloatArray:

@@ -25,7 +25,7 @@ def input_noise(data: AxisData, fit: GreyboxFit) -> float | None:
     lines = Objective.of(data.floor).lines
     used = lines > 0.0
     power, floor = fit.power[used], data.floor.power[used]
-    response, shape = _response(data, fit)[used], lines[used] * data.held.begins.size / OVERLAP
+    response, shape = _response(data, fit)[used], lines[used] * data.held_out.begins.size / OVERLAP
     if fit.one_step or int(used.sum()) < FEWEST or not np.all(np.isfinite(power)) or not np.all(response > 0.0):
         return None
 

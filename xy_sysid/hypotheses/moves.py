@@ -10,7 +10,7 @@ from itertools import combinations
 from xy_sysid.axis.model import AxisModel, Library
 from xy_sysid.effects import Effect
 from xy_sysid.greybox.axis_data import AxisData
-from xy_sysid.greybox.free_run import TOLD, GreyboxFit, first_excess, is_read, other_starts, scene_of, screened
+from xy_sysid.greybox.free_run import LEAST_EXPLAINED, GreyboxFit, first_excess, has_inverse_starts, inverse_start_models, scene_of, screened
 from xy_sysid.hypotheses.criteria import ALMOST, WIDTH
 from xy_sysid.hypotheses.starts import added, swapped
 
@@ -19,13 +19,14 @@ from xy_sysid.hypotheses.starts import added, swapped
 class Move:
     """A change of one set of effects to another.
 
-    effects: the new set; parameters: number of added ones; promised: predicted gain, nats a line, to first order or of the best start, the larger
+    effects: the new set; parameters: number of added ones
+    predicted_gain: nats a line, to first order or of the best start model without a fit, whichever is larger
     starts: models with start values
     """
 
     effects: frozenset[str]
     parameters: int
-    promised: float
+    predicted_gain: float
     starts: Callable[[], Sequence[AxisModel]]
 
 
@@ -42,12 +43,12 @@ def is_twice(library: Library, names: Iterable[str]) -> bool:
     return len(families) > len(set(families)) or any(whole is not None and own & set(whole.parts) for whole in sums)
 
 
-def moves(data: AxisData, library: Library, now: GreyboxFit, brief: GreyboxFit, early: bool = True) -> list[Move]:
+def moves(data: AxisData, library: Library, now: GreyboxFit, screening: GreyboxFit, early: bool = True) -> list[Move]:
     """Effects to add, alone or in pairs, and effects that may replace a relative or a look-alike.
 
     The best of each kind.
 
-    brief: the screening fit of the same set; early: use the data of the first stage, else all
+    screening: the screening fit of the same set; early: use the data of the first stage, else all
     """
     model, own = now.model, frozenset(name for name, _ in now.model.effects)
     open_to = [e for e in library.acting if e.simulable and e.name not in own and (e.repeats or not (data.passed_once and e.is_by_place))]
@@ -55,30 +56,34 @@ def moves(data: AxisData, library: Library, now: GreyboxFit, brief: GreyboxFit, 
     screen = screened(data, now, open_to, scene)
     traces = {trace.effect: trace.values for trace in screen.traces}
     gains = {name: screen.gain([name]) for name in screen.rows}
-    here = first_excess(data, brief.model) if early else 0.0
+    here = first_excess(data, screening.model) if early else 0.0
 
-    def promised(names: Iterable[str], begun: Sequence[AxisModel] = ()) -> float:
+    def predicted_gain(names: Iterable[str], start_models: Sequence[AxisModel] = ()) -> float:
         """To first order, or from the start models without a fit, whichever is larger."""
         first = screen.gain(names) if all(name in screen.rows for name in names) else 0.0
-        return max(first, *(here - first_excess(data, start) for start in begun if early), 0.0)
+        return max(first, *(here - first_excess(data, start) for start in start_models if early), 0.0)
 
     singles, swaps = [], []
     for effect in open_to:
         traced = traces.get(effect.name)
         if not is_twice(library, own | {effect.name}):
-            gain = promised([effect.name], other_starts(data, now, model, effect.name, scene, TOLD) if early else ())
+            gain = predicted_gain([effect.name], inverse_start_models(data, now, model, effect.name, scene, LEAST_EXPLAINED) if early else ())
             singles.append(Move(own | {effect.name}, len(effect.parameters), gain, partial(added, data, now, model, effect, traced)))
         for name in sorted(own):
             related = bool(effect.family) and effect.family == library[name].family
             suspected = name in effect.suspects and (data.units.output == "rad" or not effect.angular)
             if related or suspected:
-                starts = cache(partial(swapped, data, now, name, effect, traced))  # asked for their promise, and again to be fitted
+                starts = cache(partial(swapped, data, now, name, effect, traced))  # used for the predicted gain, and again for the fit
                 rest = model.without(name)
-                begun = starts() if suspected else other_starts(data, now, rest, effect.name, scene, TOLD) if early and is_read(rest) else ()
+                start_models: Sequence[AxisModel] = ()
+                if suspected:
+                    start_models = starts()
+                elif early and has_inverse_starts(rest):
+                    start_models = inverse_start_models(data, now, rest, effect.name, scene, LEAST_EXPLAINED)
                 more = len(effect.parameters) - len(library[name].parameters)
-                swaps.append(Move(own - {name} | {effect.name}, more, promised([effect.name], begun), starts))
+                swaps.append(Move(own - {name} | {effect.name}, more, predicted_gain([effect.name], start_models), starts))
     pairs = _pairs(library, now, own, gains, screen.gain, lambda names: _both(data, now, [library[name] for name in names], traces))
-    best = [sorted(kind, key=lambda move: -move.promised)[:WIDTH] for kind in (swaps, pairs)]
+    best = [sorted(kind, key=lambda move: -move.predicted_gain)[:WIDTH] for kind in (swaps, pairs)]
     return [*singles, *(move for kind in best for move in kind)]
 
 

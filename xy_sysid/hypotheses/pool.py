@@ -23,28 +23,28 @@ from xy_sysid.hypotheses.refusal import refusal
 
 @dataclass(eq=False)
 class Node:
-    """One set that was fitted.
+    """One candidate: a set of effects with its fits.
 
-    brief, fit: screening fit and full fit (the screening fit again if no full fit was made); refused: why the fit does not count, or empty
-    large: its gain over the best set that it contains is large enough; leads: and above chance
-    promised: gain of the move to it, nats a line
+    screening, fit: screening fit and full fit (the screening fit again if no full fit was made); refused: why the fit does not count, or empty
+    is_large: its gain over the best set that it contains is large enough; is_better: and larger than chance
+    predicted_gain: predicted before the fit, nats a line
     moves: possible moves from it; None until asked for
     """
 
     effects: frozenset[str]
     parameters: int
-    brief: GreyboxFit
+    screening: GreyboxFit
     fit: GreyboxFit
     refused: str = ""
-    large: bool = True
-    leads: bool = True
-    promised: float = 0.0
+    is_large: bool = True
+    is_better: bool = True
+    predicted_gain: float = 0.0
     moves: list[Move] | None = None
 
     @property
-    def whole(self) -> bool:
-        """Fitted on all data."""
-        return not self.fit.brief
+    def has_full_fit(self) -> bool:
+        """Whether a full fit was made, on all windows that are not held out."""
+        return not self.fit.is_screening
 
 
 @dataclass
@@ -67,18 +67,18 @@ class Pool:
     def scale(self) -> float:
         """Nats over all held-out windows that correspond to one nat a line."""
         lines = self.data.floor.lines @ self.data.floor.excited
-        return max(0.5 * float(lines) * self.data.held.begins.size, 1.0)
+        return max(0.5 * float(lines) * self.data.held_out.begins.size, 1.0)
 
     def score(self, node: Node) -> float:
         """Score of the held-out windows in nats, with the penalty for parameters; less is better."""
-        if not node.whole:
+        if not node.has_full_fit:
             return inf
         return float(np.sum(node.fit.scores)) + PRICE * node.parameters
 
     @property
     def best(self) -> Node:
         """The set with the least score, among those whose effects are large enough."""
-        return min((node for node in self.nodes.values() if node.leads and not node.refused and node.whole), key=self.score)
+        return min((node for node in self.nodes.values() if node.is_better and not node.refused and node.has_full_fit), key=self.score)
 
     @property
     def answer(self) -> Node:
@@ -87,31 +87,44 @@ class Pool:
         Among equally good sets with as many effects, the one with dry friction, because every machine has friction.
         """
         first = self.nodes[self.kept]
-        better = [node for node in self.nodes.values() if node.leads and not node.refused and node.whole and self._lowers(node)]
+        better = [
+            node for node in self.nodes.values() if node.is_better and not node.refused and node.has_full_fit and self._lowers_held_out_error(node)
+        ]
         if self.best is first or not better:
             return first
         best = min(better, key=self.score)
         same = (node for node in better if len(node.effects) == len(best.effects) and self.score(node) < self.score(best) + PRICE)
         return min(same, key=lambda node: (-sum(self.library[name].is_dry for name in node.effects), self.score(node)))
 
-    def _lowers(self, node: Node) -> bool:
-        """Its held-out error is below that of every set that it contains."""
-        return all(node.fit.held_out_error < less.fit.held_out_error for less in self._inside(node))
+    def _lowers_held_out_error(self, node: Node) -> bool:
+        """Whether its held-out error is below that of every set that it contains."""
+        return all(node.fit.held_out_error < less.fit.held_out_error for less in self._subsets(node))
 
-    def begin(self, start: GreyboxFit) -> Node:
-        """The first set, from which the search begins."""
-        brief = fit(self.data, start.model, brief=True, late=self.late)
-        return self.remember(frozenset(name for name, _ in start.model.effects), brief, start)
+    def add_first(self, start: GreyboxFit) -> Node:
+        """Add the set from which the search starts; start: its full fit. Returns its node with a screening fit as well."""
+        screening = fit(self.data, start.model, screening=True, late=self.late)
+        return self.remember(frozenset(name for name, _ in start.model.effects), screening, start)
 
-    def remember(self, effects: frozenset[str], brief: GreyboxFit, found: GreyboxFit, leads: bool = True, promised: float = 0.0) -> Node:
+    def remember(
+        self, effects: frozenset[str], screening: GreyboxFit, found: GreyboxFit, is_better: bool = True, predicted_gain: float = 0.0
+    ) -> Node:
         """Store a set with its fit; it replaces a worse fit of the same set. Only another full fit replaces a full fit."""
         parameters, known = count(self.library, effects - self.kept), self.nodes.get(effects)
-        leads = leads or (known is not None and known.leads)
-        node = Node(effects, parameters, brief, found, refused=self._refusal(effects, found), large=leads, leads=leads, promised=promised)
-        lower = known is None or brief.excess < known.brief.excess - PRICE / self.scale
-        if known is not None and not node.whole and not (lower and (not known.whole or self.finished(node).whole)):
+        is_better = is_better or (known is not None and known.is_better)
+        node = Node(
+            effects,
+            parameters,
+            screening,
+            found,
+            refused=self._refusal(effects, found),
+            is_large=is_better,
+            is_better=is_better,
+            predicted_gain=predicted_gain,
+        )
+        lower = known is None or screening.excess < known.screening.excess - PRICE / self.scale
+        if known is not None and not node.has_full_fit and not (lower and (not known.has_full_fit or self.with_full_fit(node).has_full_fit)):
             return known
-        if known is not None and known.whole and node.whole and self.score(known) <= self.score(node) and not known.refused:
+        if known is not None and known.has_full_fit and node.has_full_fit and self.score(known) <= self.score(node) and not known.refused:
             return known
         self.nodes[effects] = node
         return node
@@ -122,7 +135,7 @@ class Pool:
     def search(self) -> Iterator[frozenset[str]]:
         """Try moves until none predicts a better set; yields each set before it is fitted."""
         if self.nodes[self.kept].moves is None:
-            yield from self._alone_first()
+            yield from self._try_single_effects()
         while not self.late():
             best = self.best
             if best.fit.excess < AT_FLOOR:
@@ -139,21 +152,21 @@ class Pool:
             yield move[1].effects
             self._try(*move)
 
-    def _alone_first(self) -> Iterator[frozenset[str]]:
+    def _try_single_effects(self) -> Iterator[frozenset[str]]:
         """Try each effect alone before two are combined, the most promising first; yields as ``search``.
 
         Predicted gains are unreliable if the first model is far from the data.
         """
         first = self.nodes[self.kept]
         first.moves = self._moves(first)
-        for move in sorted(first.moves, key=lambda move: -move.promised):
+        for move in sorted(first.moves, key=lambda move: -move.predicted_gain):
             if self.late() or self.best.fit.excess < AT_FLOOR:
                 return
-            if len(move.effects - self.kept) == 1 and self.scale * move.promised > PRICE * move.parameters:
+            if len(move.effects - self.kept) == 1 and self.scale * move.predicted_gain > PRICE * move.parameters:
                 yield move.effects
                 self._try(first, move)
-        alone = [node for node in self.nodes.values() if node is not first and node.large and node.whole and not node.refused]
-        for node in sorted(alone, key=self.score):  # what is best alone need not be in the best pair
+        alone = [node for node in self.nodes.values() if node is not first and node.is_large and node.has_full_fit and not node.refused]
+        for node in sorted(alone, key=self.score):  # the best single effect need not be in the best pair
             node.moves = self._moves(node)
             chosen = self._next([node])
             if chosen is not None and not self.late():
@@ -176,11 +189,11 @@ class Pool:
     @property
     def _likeliest(self) -> Node:
         """The set with the lowest score of those whose gain is large enough, even if it may be chance. One more effect may make it sure."""
-        return min((node for node in self.nodes.values() if node.large and node.whole and not node.refused), key=self.score)
+        return min((node for node in self.nodes.values() if node.is_large and node.has_full_fit and not node.refused), key=self.score)
 
     def _best_refused(self) -> Node | None:
         """The best of the refused sets, if its score is better than that of all others."""
-        refused = [node for node in self.nodes.values() if node.refused and node.whole and self.score(node) < self.score(self.best)]
+        refused = [node for node in self.nodes.values() if node.refused and node.has_full_fit and self.score(node) < self.score(self.best)]
         return min(refused, key=self.score, default=None)
 
     def _without_refused(self, node: Node) -> list[Move]:
@@ -189,15 +202,15 @@ class Pool:
         if name not in node.effects - self.kept:
             return []
         less = node.effects - {name}
-        begun = partial(starts.dropped, self.data, node.fit, name, self._alone(less))
-        return [move for move in [Move(less, -count(self.library, [name]), 0.0, begun)] if self._is_open(node, move)]
+        start_models = partial(starts.dropped, self.data, node.fit, name, self._single_effects(less))
+        return [move for move in [Move(less, -count(self.library, [name]), 0.0, start_models)] if self._is_open(node, move)]
 
-    def _alone(self, effects: frozenset[str]) -> list[AxisModel]:
+    def _single_effects(self, effects: frozenset[str]) -> list[AxisModel]:
         """Models with single effects of a set, if they are known."""
         return [self.nodes[one].fit.model for other in sorted(effects) if (one := self.kept | {other}) in self.nodes]
 
     def _moves(self, node: Node, early: bool = True) -> list[Move]:
-        found = moves(self.data, self.library, node.fit, node.brief, early)
+        found = moves(self.data, self.library, node.fit, node.screening, early)
         allowed = (move for move in found if self.kept <= move.effects and len(move.effects - self.kept) <= self.most)
         return [move for move in allowed if self._is_open(node, move)]
 
@@ -205,11 +218,13 @@ class Pool:
         """A set that is not known, not even by other names of its effects; or one whose fit failed from one start, and that has another start: in the
         place of a law, or without one."""
         laws = self._laws(move.effects)
-        if any(node.whole and not node.refused and self._laws(effects) == laws for effects, node in self.nodes.items()):
+        if any(node.has_full_fit and not node.refused and self._laws(effects) == laws for effects, node in self.nodes.items()):
             return False
         known = self.nodes.get(move.effects)
         return known is None or (
-            (not known.whole or known.refused != "") and len(move.effects) <= len(parent.effects) and (parent.effects, move.effects) not in self.tried
+            (not known.has_full_fit or known.refused != "")
+            and len(move.effects) <= len(parent.effects)
+            and (parent.effects, move.effects) not in self.tried
         )
 
     def _laws(self, effects: frozenset[str]) -> frozenset[str]:
@@ -227,67 +242,69 @@ class Pool:
         Two effects at once only if no other move from their set predicts that: one after the other costs less, and shows which of them helps.
         Sets that raise the held-out error are continued last.
         """
-        least, hopeful = self.score(self.answer) - PRICE, []
+        least, options = self.score(self.answer) - PRICE, []
         for node in nodes or self.nodes.values():
-            own = [(self._hoped(node, move), move) for move in node.moves or () if self._is_open(node, move) and self._may_be_worth(node, move)]
-            own = [(hoped, move) for hoped, move in own if hoped < least]
-            lowers = bool(own) and self._lowers(node)
+            own = [
+                (self._predicted_score(node, move), move) for move in node.moves or () if self._is_open(node, move) and self._may_be_worth(node, move)
+            ]
+            own = [(predicted, move) for predicted, move in own if predicted < least]
+            lowers = bool(own) and self._lowers_held_out_error(node)
             single = [item for item in own if len(item[1].effects - node.effects) < 2]
-            hopeful += [(not lowers, hoped, node, move) for hoped, move in single or own]
-        return min(hopeful, key=lambda item: item[:2])[2:] if hopeful else None
+            options += [(not lowers, predicted, node, move) for predicted, move in single or own]
+        return min(options, key=lambda item: item[:2])[2:] if options else None
 
-    def _hoped(self, node: Node, move: Move) -> float:
+    def _predicted_score(self, node: Node, move: Move) -> float:
         """The predicted score of a move, nats."""
-        return self.score(node) - self.scale * move.promised + PRICE * move.parameters
+        return self.score(node) - self.scale * move.predicted_gain + PRICE * move.parameters
 
     def _may_be_worth(self, node: Node, move: Move) -> bool:
-        """The new effect may be large enough, if its gain is a few times its first-order prediction."""
-        lines = max(node.fit.forced, 1.0) * self.data.held.begins.size
-        most = OPTIMISM * 2.0 * self.scale * move.promised / lines
+        """Whether the new effect is large enough if its gain is a few times its first-order prediction."""
+        lines = max(node.fit.forced, 1.0) * self.data.held_out.begins.size
+        most = OPTIMISM * 2.0 * self.scale * move.predicted_gain / lines
         return move.parameters <= 0 or most >= len(move.effects - node.effects) * math.log1p(self.worth)
 
     def _try(self, parent: Node, move: Move) -> Node | None:
         """Fit the set of a move; a full fit only if it is near the best."""
         self.tried.add((parent.effects, move.effects))
-        begun = [*move.starts()]
+        start_models = [*move.starts()]
         new = move.effects - parent.effects
         alone = self.nodes.get(new | self.kept)
         if move.effects > parent.effects > self.kept and alone is not None:
-            begun += starts.merged(parent.fit.model, alone.fit.model)
-        limit = parent.brief.excess + (self._near() - self.score(parent) - PRICE * move.parameters) / self.scale
-        brief = fit(self.data, best_start(self.data, begun), brief=True, hopeless=limit + HOPELESS, late=self.late)
-        if not np.isfinite(brief.excess):
+            start_models += starts.merged(parent.fit.model, alone.fit.model)
+        limit = parent.screening.excess + (self._full_fit_limit() - self.score(parent) - PRICE * move.parameters) / self.scale
+        screening = fit(self.data, best_start(self.data, start_models), screening=True, give_up_above=limit + HOPELESS, late=self.late)
+        if not np.isfinite(screening.excess):
             parent.moves = [item for item in parent.moves or () if item is not move]
             return None
-        found = brief
-        if brief.excess < limit:
-            found = finish(self.data, brief.model, brief.runs, self.late)
-        node = self.remember(move.effects, brief, found, promised=move.promised)
-        inside = self._inside(node)
-        simpler = min(inside, key=self.score, default=None)
-        node.large = node.whole and (simpler is None or self._is_large(node, simpler))
-        node.leads = node.whole and (simpler is None or self._is_better(node, simpler))
+        found = screening
+        if screening.excess < limit:
+            found = finish(self.data, screening.model, screening.runs, self.late)
+        node = self.remember(move.effects, screening, found, predicted_gain=move.predicted_gain)
+        subsets = self._subsets(node)
+        simpler = min(subsets, key=self.score, default=None)
+        node.is_large = node.has_full_fit and (simpler is None or self._is_large(node, simpler))
+        node.is_better = node.has_full_fit and (simpler is None or self._is_better(node, simpler))
         return node
 
-    def _near(self) -> float:
+    def _full_fit_limit(self) -> float:
         """The score up to which a screening fit is followed by a full fit."""
         best, first = self.score(self.answer), self.score(self.nodes[self.kept])
         return best + NEAR * (first - best) + PRICE
 
-    def _inside(self, node: Node) -> list[Node]:
-        """The sets that a set contains and that have a full fit."""
-        return [item for item in self.nodes.values() if item.effects < node.effects and item.whole and not item.refused]
+    def _subsets(self, node: Node) -> list[Node]:
+        """The smaller sets within a set that have a full fit and are not refused."""
+        return [item for item in self.nodes.values() if item.effects < node.effects and item.has_full_fit and not item.refused]
 
     def _is_better(self, node: Node, simpler: Node) -> bool:
         """Better than a simpler set by more than chance, and by the least size of its effects."""
-        return self._is_large(node, simpler) and gain(*alike(node, simpler)).is_sure
+        return self._is_large(node, simpler) and gain(*comparable_fits(node, simpler)).is_sure
 
     def _is_large(self, node: Node, simpler: Node) -> bool:
         """Better than a simpler set including the penalty for parameters, and by the least size of its effects.
 
         A richer law in the place of a simpler one must have the size WORTH. Compared with a set at the floor nothing more is needed.
         """
-        one, other = alike(node, simpler)
+        one, other = comparable_fits(node, simpler)
         if other.excess < AT_FLOOR:
             return False
         new = len(node.effects) - len(simpler.effects)
@@ -301,20 +318,20 @@ class Pool:
         """
         while True:
             best, simpler = self.best, None
-            for effects, begun in self._simpler(best):
+            for effects, start_models in self._simpler(best):
                 if effects not in self.nodes and not self.late():
                     yield effects
-                node = self.fitted(effects, begun)
+                node = self.with_screening_fit(effects, start_models)
                 if node is None or self._is_better(best, node):
                     continue
-                self.finished(node)  # a quick fit refuses what all data may tell, and takes what they refuse
-                if node.whole and not node.refused and not self._is_better(best, node):
+                self.with_full_fit(node)  # a full fit may change whether the set is refused
+                if node.has_full_fit and not node.refused and not self._is_better(best, node):
                     simpler = node
                     break
             if simpler is None:
                 return
-            best.large = best.leads = False
-            simpler.large = simpler.leads = True
+            best.is_large = best.is_better = False
+            simpler.is_large = simpler.is_better = True
 
     def _simpler(self, best: Node) -> Iterator[tuple[frozenset[str], Callable[[], Sequence[AxisModel]]]]:
         """Sets without an effect, or with a simpler relative in its place, and their start values."""
@@ -323,31 +340,31 @@ class Pool:
             if name in self.kept:
                 continue
             effect = library[name]
-            alone = self._alone(best.effects - {name})
+            alone = self._single_effects(best.effects - {name})
             for relative in sorted(library.acting, key=lambda item: len(item.parameters)):
                 fits = relative.simulable and relative.name not in best.effects and (data.units.output == "rad" or not relative.angular)
                 if fits and relative.is_special_case(effect):
                     yield best.effects - {name} | {relative.name}, partial(starts.swapped, data, best.fit, name, relative, None)
             yield best.effects - {name}, partial(starts.dropped, data, best.fit, name, alone)
 
-    def fitted(self, effects: frozenset[str], begun: Callable[[], Sequence[AxisModel]]) -> Node | None:
-        """A screening fit of a set; a known set is fitted again if a start value is already better than its fit.
+    def with_screening_fit(self, effects: frozenset[str], start_models: Callable[[], Sequence[AxisModel]]) -> Node | None:
+        """The node of a set, with a screening fit; a known set is fitted again if a start model is already better than its fit.
 
         The first set stays as given, because every answer is compared with its error.
         """
         known = self.nodes.get(effects)
         if self.late() or (known is not None and effects == self.kept):
             return known
-        start = best_start(self.data, list(begun()))
+        start = best_start(self.data, list(start_models()))
         if known is not None and first_excess(self.data, known.fit.model) <= first_excess(self.data, start) + PRICE / self.scale:
             return known
-        brief = fit(self.data, start, brief=True, late=self.late)
-        return self.remember(effects, brief, brief, leads=False) if np.isfinite(brief.excess) else known
+        screening = fit(self.data, start, screening=True, late=self.late)
+        return self.remember(effects, screening, screening, is_better=False) if np.isfinite(screening.excess) else known
 
-    def finished(self, node: Node, shown: bool = False) -> Node:
-        """The same node with a full fit, unless the time is up; a set that is shown with others is always fitted."""
-        if not node.whole and (shown or not self.late()):
-            node.fit = finish(self.data, node.brief.model, node.brief.runs, in_time if shown else self.late)
+    def with_full_fit(self, node: Node, shown: bool = False) -> Node:
+        """The same node with a full fit, unless time is up. shown: the answer shows this set, so it is fitted in any case."""
+        if not node.has_full_fit and (shown or not self.late()):
+            node.fit = finish(self.data, node.screening.model, node.screening.runs, in_time if shown else self.late)
             node.refused = self._refusal(node.effects, node.fit)
         return node
 
@@ -356,10 +373,10 @@ class Pool:
 
         Both compare the set with the best set that has the same effects except this one.
         """
-        fewer = [alike(node, item) for item in self.nodes.values() if item.effects <= node.effects - {name}]
+        fewer = [comparable_fits(node, item) for item in self.nodes.values() if item.effects <= node.effects - {name}]
         return max(min(size(*pair) for pair in fewer), 0.0), max(min(force_explained(*pair) for pair in fewer), 0.0)
 
 
-def alike(one: Node, other: Node) -> tuple[GreyboxFit, GreyboxFit]:
+def comparable_fits(one: Node, other: Node) -> tuple[GreyboxFit, GreyboxFit]:
     """Fits of two sets to the same data: full fits if both sets have one, else screening fits."""
-    return (one.fit, other.fit) if one.whole and other.whole else (one.brief, other.brief)
+    return (one.fit, other.fit) if one.has_full_fit and other.has_full_fit else (one.screening, other.screening)

@@ -55,7 +55,7 @@ def none_of(data: AxisData, found: GreyboxFit) -> str:
 def _is_none(data: AxisData, effect: Effect, found: GreyboxFit) -> bool:
     size = effect.on(data.similar)[0]
     known = found.parameter(f"{effect.name}.{size.name}")
-    return size.positive and not found.brief and math.isfinite(known.high) and known.low <= size.low * (1.0 + 1e-6)
+    return size.positive and not found.is_screening and math.isfinite(known.high) and known.low <= size.low * (1.0 + 1e-6)
 
 
 def _repeats(data: AxisData, effect: Effect, values: Sequence[float]) -> bool:

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.effects import Effect, Scene
 from xy_sysid.greybox.axis_data import AxisData
-from xy_sysid.greybox.forces import of_one_name, stood_in, taken_for, taken_over
-from xy_sysid.greybox.free_run import GreyboxFit, is_read, other_starts, scene_of
+from xy_sysid.greybox.forces import force_moved_to_others, with_equal_force, with_force_from_trace, with_shared_values
+from xy_sysid.greybox.free_run import GreyboxFit, has_inverse_starts, inverse_start_models, scene_of
 from xy_sysid.greybox.score_test import bounded
 
 
@@ -16,31 +16,31 @@ def added(
     data: AxisData, now: GreyboxFit, model: AxisModel, effect: Effect, traced: Sequence[float] | None, scene: Scene | None = None
 ) -> list[AxisModel]:
     """Start models with one more effect: from its trace, by inverse dynamics, and from base and effect together."""
-    begun = [] if traced is None else [model.with_effect(effect.name, bounded(effect, traced, data.similar))]
-    return [*begun, *other_starts(data, now, model, effect.name, scene)]
+    start_models = [] if traced is None else [model.with_effect(effect.name, bounded(effect, traced, data.similar))]
+    return [*start_models, *inverse_start_models(data, now, model, effect.name, scene)]
 
 
 def swapped(data: AxisData, now: GreyboxFit, name: str, other: Effect, traced: Sequence[float] | None) -> list[AxisModel]:
     """Start models with one effect replaced: with equal values of parameters of the same name, with an equal force, and by inverse dynamics."""
     model = now.model
-    begun = [make(data, model, name, other) for make in (of_one_name, stood_in)]
+    start_models = [make(data, model, name, other) for make in (with_shared_values, with_equal_force)]
     rest = model.without(name)
     if traced is not None:
         old = dict(zip(model.library[name].names, dict(model.effects)[name], strict=True))
         values = tuple(old.get(key, value) for key, value in zip(other.names, traced, strict=True))
-        begun.append(rest.with_effect(other.name, bounded(other, values, data.similar)))
-    if is_read(rest):
-        begun += other_starts(data, now, rest, other.name)
-    alike = taken_for(data, model, name, other, scene_of(data, now))
-    return [*begun, *([alike] if alike is not None else [])]
+        start_models.append(rest.with_effect(other.name, bounded(other, values, data.similar)))
+    if has_inverse_starts(rest):
+        start_models += inverse_start_models(data, now, rest, other.name)
+    from_trace = with_force_from_trace(data, model, name, other, scene_of(data, now))
+    return [*start_models, *([from_trace] if from_trace is not None else [])]
 
 
 def dropped(data: AxisData, now: GreyboxFit, name: str, alone: Sequence[AxisModel]) -> list[AxisModel]:
     """Start models without an effect: unchanged, with its force moved to the others, by inverse dynamics, and with the others' values alone."""
     less, scene = now.model.without(name), scene_of(data, now)
-    begun = [less.with_effect(other, values) for model in alone for other, values in model.effects if other in less]
-    read = [start for other, _ in less.effects for start in other_starts(data, now, less.without(other), other, scene)]
-    return [less, taken_over(data, now.model, name), *begun, *read]
+    start_models = [less.with_effect(other, values) for model in alone for other, values in model.effects if other in less]
+    read = [start for other, _ in less.effects for start in inverse_start_models(data, now, less.without(other), other, scene)]
+    return [less, force_moved_to_others(data, now.model, name), *start_models, *read]
 
 
 def merged(now: AxisModel, other: AxisModel) -> list[AxisModel]:

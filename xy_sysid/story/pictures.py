@@ -185,7 +185,7 @@ def _compared(data: AxisData, fitted: GreyboxFit) -> Comparison:
         units=data.units,
         begins=first / data.sampling_rate,
         encoder=data.floor.encoder,
-        held=None if fitted.one_step else (data.held, data.floor),
+        held=None if fitted.one_step else (data.held_out, data.floor),
         starts=(0,) if fitted.one_step else data.starts,
     )
     with contextlib.suppress(BadInput):

@@ -21,7 +21,7 @@ from xy_sysid.diagnosis.refine import Effort, never, refine, settle
 from xy_sysid.diagnosis.rungs import with_one_more
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.free_run import EPSILON, AxisData, GreyboxFit, fit, fit_base, prepare_all
-from xy_sysid.greybox.one_step import follower, one_step_fit
+from xy_sysid.greybox.one_step import one_step_effect, one_step_fit
 from xy_sysid.hypotheses.criteria import MOST_EFFECTS
 from xy_sysid.hypotheses.enough_data import prepared
 from xy_sysid.settings import unknown_name
@@ -214,7 +214,7 @@ def _fit_of(story: Story, data: AxisData, library: Library, rung: Rung | None = 
     """The fit of a rung again, of the newest without one: by one simulation, or as it was made where free simulation cannot judge it."""
     rung = rung or story.rungs[-1]
     model = _model(rung, library)
-    alone = follower(model)
+    alone = one_step_effect(model)
     if alone is not None:
         rigid = _fit_of(story, data, library, story.rungs[0])
         others = tuple((name, values) for name, values in rung.values if name != alone.name)
@@ -228,13 +228,13 @@ def _fit_of(story: Story, data: AxisData, library: Library, rung: Rung | None = 
         held_out_error=rung.held_out_error,
         noise_floor=rung.noise_floor,
         excess=rung.excess,
-        scores=np.zeros(data.held.begins.size),
+        scores=np.zeros(data.held_out.begins.size),
         forced=0.0,
         force=0.0,
         simulated=simulated,
         error=data.velocity - simulated,
         runs=0,
         converged=True,
-        held=data.layout.powers(data.held.spectrum(data.velocity - simulated)),
+        held_out_powers=data.layout.powers(data.held_out.spectrum(data.velocity - simulated)),
         units=data.units,
     )

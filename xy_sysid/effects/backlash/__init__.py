@@ -3,7 +3,7 @@
 contact:         its fit by one-step prediction, in stages
 innovations:     what the filter leaves, as a function of numbers that a solver moves
 starts:          where a fit begins
-contact_filter:  the compiled filter for the laws of friction that act beside
+contact_filter:  the compiled filter for the laws of dry friction that act with it
 filter_source:   its text, written from these laws
 filter_template: the frame of that
 filter_parts:    force of the contact, and the covariance's next step
@@ -89,7 +89,7 @@ EFFECT = Effect(
     order=100,
     simulable=False,
     one_step=Contact(),
-    rubs="coulomb_friction",
-    hides=("amplifier_lag",),
+    start_friction="coulomb_friction",
+    masks=("amplifier_lag",),
     suspects=("screw_compliance", "amplifier_lag", "presliding_hysteresis"),
 )

@@ -11,18 +11,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from xy_sysid.effects._contract import Beside, DryFriction, Followed, OneStepTask
+from xy_sysid.effects._contract import Companions, DryFriction, FilterFit, OneStepTask
 from xy_sysid.effects.backlash.filter_source import NAMES
 from xy_sysid.effects.backlash.innovations import CLOSED, Innovations, View
-from xy_sysid.effects.backlash.starts import SECOND, searched
+from xy_sysid.effects.backlash.starts import SECOND, best_of_grids
 from xy_sysid.effects.backlash.usual_machine import from_usual, to_usual, usual
 from xy_sysid.samples.block import FloatArray
 
 RIGID = (CLOSED, 0.4, 1500.0, 0.1, 0.0, 0.03, 0.0, 0.0)  # no gap
 SOFT = 10.0  # rad/s of the spring at least that may take the place of the gap
 SEEN, LEFT = 2.5, 1.5  # encoder noises, and innovations, that a gap must have to be one
-WHOLE = View(samples=1_000_000, looseness=0.5, cuts=4)
-FORGIVING = (1.0, 0.3, 0.1, 0.03)  # process noise that the filter may have in the end, over the usual: what predicts best of the training
+WHOLE = View(samples=1_000_000, process_noise_factor=0.5, sub_steps=4)
+PROCESS_NOISE_FACTORS = (1.0, 0.3, 0.1, 0.03)  # factors on the process noise to choose from: the one that predicts the first stage best
 BEHIND = 1.5  # held-out innovation over the bar after the first fits, at which it is given up. Development draws, and machines of another make:
 # true gaps 0.1 to 1.1; where there is none 1.2 to 18
 IDLE = 0.9  # innovation with a gap over that without it, after the first fits, from which it does nothing, and must be at the bar. The same
@@ -33,94 +33,95 @@ OWN, GAP, HERTZ = len(NAMES), NAMES.index("gap"), NAMES.index("hertz")
 class Contact:
     """Gap, masses and contact from the innovations of the first samples, judged on those after the training."""
 
-    def fit(self, task: OneStepTask) -> Followed:
+    def fit(self, task: OneStepTask) -> FilterFit:
         """See ``OneStep``."""
-        return from_usual(self._fit(to_usual(task)), task.beside.similar)
+        return from_usual(self._fit(to_usual(task)), task.companions.similar)
 
-    def _fit(self, task: OneStepTask) -> Followed:
-        fit = Innovations(task.sampling_rate, task.base, task.noise, task.beside, task.dry.laws)
+    def _fit(self, task: OneStepTask) -> FilterFit:
+        fit = Innovations(task.sampling_rate, task.base, task.noise, task.companions, task.dry.laws)
         fit.late = task.limits.late
         whole, near = WHOLE.within(task.stages[0]), SECOND.within(task.stages[0])
-        best = self._begun(fit, task)
-        rigid = self._rigid(fit, fit.start(task.base, RIGID, task.dry.values), near, 1e-2)
+        best = self._first_fit(fit, task)
+        rigid = self._fit_without_gap(fit, fit.start(task.base, RIGID, task.dry.values), near, 1e-2)
         if task.limits.bar is not None:
-            looseness, innovation = self._seen(fit, best, task)
-            idle = task.begin is None and fit.scale(fit.seen(best, near)) > IDLE * fit.scale(fit.softened(SOFT).seen(rigid, near))
+            process_noise_factor, innovation = self._predicted(fit, best, task)
+            without_gap = fit.with_soft_contact(SOFT).innovations(rigid, near)
+            idle = task.earlier is None and fit.scale(fit.innovations(best, near)) > IDLE * fit.scale(without_gap)
             if fit.scale(innovation[task.stages[1] :]) * task.noise > (1.0 if idle else BEHIND) * task.limits.bar:
-                return self._told(fit, task, best, (looseness, innovation))
+                return self._result(fit, task, best, (process_noise_factor, innovation))
         best = fit.solved(best, np.arange(best.size), whole, 20, 1e-3)
-        calm = replace(whole, looseness=self._seen(fit, best, task)[0])
+        calm = replace(whole, process_noise_factor=self._predicted(fit, best, task)[0])
         best = fit.solved(best, np.arange(best.size), calm, 10, 1e-3)
-        rigid = self._rigid(fit, self._closed(fit, rigid, best, near), whole, 1e-3)
-        without = self._seen(fit.softened(SOFT), rigid, task)[1]
-        return self._told(fit, task, best, self._seen(fit, best, task), fit.spread(best, whole), without)
+        rigid = self._fit_without_gap(fit, self._start_without_gap(fit, rigid, best, near), whole, 1e-3)
+        without = self._predicted(fit.with_soft_contact(SOFT), rigid, task)[1]
+        return self._result(fit, task, best, self._predicted(fit, best, task), fit.spread(best, whole), without)
 
     @staticmethod
-    def _seen(fit: Innovations, inner: FloatArray, task: OneStepTask) -> tuple[float, FloatArray]:
-        """The process noise with which the filter predicts the first stage best, over the usual, and all innovations with it."""
+    def _predicted(fit: Innovations, inner: FloatArray, task: OneStepTask) -> tuple[float, FloatArray]:
+        """The factor on the process noise with which the filter predicts the first stage best, and all innovations with it."""
         first, training, n = task.stages
-        sizes = {looseness: _rms(fit.seen(inner, View(min(first, training), looseness))) for looseness in FORGIVING}
-        looseness = min(FORGIVING, key=lambda item: sizes[item])
-        return looseness, fit.seen(inner, View(n, looseness))
+        sizes = {factor: _rms(fit.innovations(inner, View(min(first, training), factor))) for factor in PROCESS_NOISE_FACTORS}
+        best = min(PROCESS_NOISE_FACTORS, key=lambda factor: sizes[factor])
+        return best, fit.innovations(inner, View(n, best))
 
     @staticmethod
-    def _told(
+    def _result(
         fit: Innovations,
         task: OneStepTask,
         best: FloatArray,
-        seen: tuple[float, FloatArray],
+        predicted: tuple[float, FloatArray],
         spread: FloatArray | None = None,
         without: FloatArray | None = None,
-    ) -> Followed:
-        """What was found; of a fit that was given up there is no spread, and nothing without the gap: it does not matter any more."""
-        looseness, innovation = seen
+    ) -> FilterFit:
+        """The result as a ``FilterFit``; a fit that was given up has no standard errors and no innovations without the gap."""
+        process_noise_factor, innovation = predicted
         values = fit.outer(best)
         errors = np.full(values.size, np.inf) if spread is None else spread
         large = values[GAP] > max(SEEN, LEFT * fit.scale(innovation[: task.stages[0]])) * task.noise
-        return Followed(
+        return FilterFit(
             base=_three(values),
             values=tuple(values[3:OWN].tolist()),
             base_spread=_three(errors),
             spread=tuple(errors[3:OWN].tolist()),
             dry=DryFriction(task.dry.laws, tuple(values[fit.friction].tolist()), tuple(errors[fit.friction].tolist())),
-            beside=(tuple(values[fit.others].tolist()), tuple(errors[fit.others].tolist())),
+            companions=(tuple(values[fit.others].tolist()), tuple(errors[fit.others].tolist())),
             innovation=innovation * task.noise,
             without=(innovation if without is None else without) * task.noise,
             noise=task.noise,
             runs=fit.runs,
-            looseness=looseness,
+            process_noise_factor=process_noise_factor,
             too_small=not large,
             given_up=spread is None,
         )
 
-    def innovation(self, sampling_rate: float, found: Followed, beside: Beside, samples: int) -> FloatArray:
+    def innovation(self, sampling_rate: float, found: FilterFit, companions: Companions, samples: int) -> FloatArray:
         """See ``OneStep``."""
-        found = from_usual(found, beside.similar, back=True)
-        fit = Innovations(sampling_rate * beside.similar.time, found.base, found.noise, usual(beside), found.dry.laws)
-        return fit.seen(fit.start(found.base, found.values, found.dry.values), View(samples, found.looseness))
+        found = from_usual(found, companions.similar, back=True)
+        fit = Innovations(sampling_rate * companions.similar.time, found.base, found.noise, usual(companions), found.dry.laws)
+        return fit.innovations(fit.start(found.base, found.values, found.dry.values), View(samples, found.process_noise_factor))
 
     @staticmethod
-    def _begun(fit: Innovations, task: OneStepTask) -> FloatArray:
-        """Coordinates after the first fits: from an earlier result, or, as nothing draws a gap open that has closed, from a grid."""
-        begin = task.begin
-        if begin is None or begin.too_small:
-            return searched(fit, task)
-        start = fit.start(begin.base, begin.values, begin.dry.values if begin.dry.names == task.dry.names else task.dry.values)
+    def _first_fit(fit: Innovations, task: OneStepTask) -> FloatArray:
+        """Coordinates after the first fit: from an earlier result, or from a grid, because a fit cannot open a gap that has closed."""
+        earlier = task.earlier
+        if earlier is None or earlier.too_small:
+            return best_of_grids(fit, task)
+        start = fit.start(earlier.base, earlier.values, earlier.dry.values if earlier.dry.names == task.dry.names else task.dry.values)
         return fit.solved(start, np.arange(start.size), SECOND.within(task.stages[0]), 15, 1e-2)
 
     @staticmethod
-    def _closed(fit: Innovations, rigid: FloatArray, best: FloatArray, view: View) -> FloatArray:
-        """Where the filter without a gap goes on from: the better of its own first fit, and of what was found with the gap closed."""
+    def _start_without_gap(fit: Innovations, rigid: FloatArray, best: FloatArray, view: View) -> FloatArray:
+        """Start of the fit without a gap: the better of its own first fit, and of the fit with a gap after the gap is closed."""
         rigid[fit.others] = best[fit.others]
         closed = best.copy()
         closed[[GAP, HERTZ]] = rigid[[GAP, HERTZ]]
-        soft = fit.softened(SOFT)
-        return min(rigid, closed, key=lambda start: soft.size(start, view))
+        soft = fit.with_soft_contact(SOFT)
+        return min(rigid, closed, key=lambda start: soft.rms(start, view))
 
     @staticmethod
-    def _rigid(fit: Innovations, start: FloatArray, view: View, enough: float) -> FloatArray:
-        """Without a gap, by the same filter; any spring will do then."""
-        return fit.softened(SOFT).solved(start, np.delete(np.arange(start.size), [GAP, HERTZ]), view, 15, enough)
+    def _fit_without_gap(fit: Innovations, start: FloatArray, view: View, enough: float) -> FloatArray:
+        """Fit of the same filter without a gap; the contact may be soft."""
+        return fit.with_soft_contact(SOFT).solved(start, np.delete(np.arange(start.size), [GAP, HERTZ]), view, 15, enough)
 
 
 def _rms(signal: FloatArray) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from xy_sysid.effects._contract import Beside, Effect, Parameter, in_time
+from xy_sysid.effects._contract import Companions, Effect, Parameter, in_time
 from xy_sysid.effects._similarity import SPEED
 from xy_sysid.effects.backlash.contact_filter import filter_with
 from xy_sysid.effects.backlash.filter_source import NAMES
@@ -20,7 +20,7 @@ STIFF = 2.0 * np.pi * 90.0  # rad/s of the contact at least: flanks of steel; a 
 DRIFT = 0.3  # process noise per rms speed, 1/sqrt(s): the filter forgives this much acceleration
 SANE = 0.5  # rad/s of the pole over the sampling rate, Hz, to begin with: a base that was led astray would make the filter unstable
 SETTLED = 0.5  # s until the filter is judged
-STEP = 1e-3  # of a number's unit, for derivatives of what is beside
+STEP = 1e-3  # of a number's unit, for derivatives by the companions' parameters
 WORST = 1e6  # innovation over the noise at which it is cut off
 CLOSED = 1e-10  # m: no gap
 TAILS = 3.0  # innovations over their usual size from which they count less (Cauchy): a filter that has lost the gap for a moment
@@ -33,16 +33,16 @@ GAP, RATE, HERTZ = (NAMES.index(name) for name in ("gap", "rate", "hertz"))
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """What the filter is shown and told.
+    """How the filter is run.
 
-    looseness: factor on the process noise; cuts: sub-steps of a sample, at least; deaf: factor on the encoder's noise;
-    turn: rad that the closed contact may turn in a sub-step
+    samples: how many, from the first; process_noise_factor, encoder_noise_factor: factors on the noise that the filter assumes
+    sub_steps: least number in a sample; turn: largest phase of the closed contact in a sub-step, rad
     """
 
     samples: int
-    looseness: float = 1.0
-    cuts: int = 6
-    deaf: float = 1.0
+    process_noise_factor: float = 1.0
+    sub_steps: int = 6
+    encoder_noise_factor: float = 1.0
     turn: float = 0.35
 
     def within(self, samples: int) -> View:
@@ -53,29 +53,31 @@ class View:
 class Innovations:
     """Over the noise, for coordinates: numbers, or their logarithms, in units.
 
-    The numbers are those of the base and the contact by ``NAMES``, the parameters of each law of dry friction, and what is beside.
+    The numbers are those of the base and the contact by ``NAMES``, the parameters of each law of dry friction, and those of the companions.
     """
 
-    def __init__(self, sampling_rate: float, base: tuple[float, float, float], noise: float, beside: Beside, laws: tuple[Effect, ...]) -> None:
-        self.fs, self.noise, self.beside, self.laws = sampling_rate, noise, beside, laws
+    def __init__(
+        self, sampling_rate: float, base: tuple[float, float, float], noise: float, companions: Companions, laws: tuple[Effect, ...]
+    ) -> None:
+        self.fs, self.noise, self.companions, self.laws = sampling_rate, noise, companions, laws
         self._ran: list[None] = []  # one for each run of the filter, whichever thread it is in
         self.filter = filter_with(laws)
         rows = [row for effect in laws for row in _rows_of(effect)]
         self.friction = slice(len(NAMES), len(NAMES) + len(rows))
-        self.others = slice(self.friction.stop, self.friction.stop + beside.start.size)
+        self.others = slice(self.friction.stop, self.friction.stop + companions.start.size)
         longest = max(20.0 / sampling_rate, 2.0 * base[1])
         low = [-np.inf, 0.0, 1e-2, 0.1 * noise, 0.02, STIFF / 2, 0.0, 0.0, 0.0, 0.0, 0.0]
         high = [np.inf, longest, 1e5, 1e-2, 0.98, max(15.0 * sampling_rate, 4.0 * STIFF), 2.0, 500.0, 0.9, 1.0, 10.0]
         unit = [0.02 * abs(base[0]), 0.1 / sampling_rate, 0.05, 0.1, 0.05, 0.1, 0.05, 2.0, 0.02, 0.1, 0.02]
-        self.log = np.array([*LOG, *(row.log for row in rows), *beside.positive], dtype=np.bool_)
-        self.unit = np.array([*unit, *(row.unit for row in rows), *np.where(beside.positive, 0.05, 0.05 * beside.unit)])
-        self.low = self.inner(np.array([*low, *(row.low for row in rows), *beside.low]))
-        self.high = self.inner(np.array([*high, *(row.high for row in rows), *beside.high]))
+        self.log = np.array([*LOG, *(row.log for row in rows), *companions.positive], dtype=np.bool_)
+        self.unit = np.array([*unit, *(row.unit for row in rows), *np.where(companions.positive, 0.05, 0.05 * companions.unit)])
+        self.low = self.inner(np.array([*low, *(row.low for row in rows), *companions.low]))
+        self.high = self.inner(np.array([*high, *(row.high for row in rows), *companions.high]))
         self.late = in_time
-        self.heeded = np.arange(3)  # numbers of the base on which what is beside depends
+        self.influential = np.arange(3)  # numbers of the base on which the companions depend
 
-    def softened(self, rate: float) -> Innovations:
-        """The same, with a contact that may be as soft as that, rad/s, and a gap of nothing; runs count for both."""
+    def with_soft_contact(self, rate: float) -> Innovations:
+        """The same without a gap, and with a contact that may be as soft as ``rate``, rad/s; ``runs`` counts both."""
         other = copy(self)
         other.low = self.low.copy()
         other.low[[RATE, GAP]] = np.log((rate, CLOSED)) / self.unit[[RATE, GAP]]
@@ -84,7 +86,7 @@ class Innovations:
     def start(self, base: tuple[float, float, float], values: Sequence[float], friction: Sequence[float]) -> FloatArray:
         """Coordinates."""
         gain, delay, pole = base
-        return self.inner(np.array([gain, delay, min(pole, SANE * self.fs), *values, *friction, *self.beside.start]))
+        return self.inner(np.array([gain, delay, min(pole, SANE * self.fs), *values, *friction, *self.companions.start]))
 
     @property
     def runs(self) -> int:
@@ -100,13 +102,13 @@ class Innovations:
         kept = np.clip(inner, self.low, self.high) * self.unit
         return np.asarray(np.where(self.log, np.exp(np.where(self.log, kept, 0.0)), kept))
 
-    def seen(self, inner: FloatArray, view: View) -> FloatArray:
+    def innovations(self, inner: FloatArray, view: View) -> FloatArray:
         """(samples,) innovations over the noise."""
         return self.run(self.outer(inner), view, False)[0]
 
-    def size(self, inner: FloatArray, view: View) -> float:
+    def rms(self, inner: FloatArray, view: View) -> float:
         """rms of the innovations over the noise."""
-        return float(np.sqrt(np.mean(self.seen(inner, view) ** 2)))
+        return float(np.sqrt(np.mean(self.innovations(inner, view) ** 2)))
 
     def scale(self, errors: FloatArray) -> float:
         """Their usual size, over the noise, whatever their tails are."""
@@ -132,7 +134,7 @@ class Innovations:
             whole[free] = part
             return self.run(self.outer(whole), view, True)[1][skip:, free]
 
-        size = scale or max(self.scale(self.seen(start, view)), 1e-3)
+        size = scale or max(self.scale(self.innovations(start, view)), 1e-3)
         if self.late():
             return start
         found = scipy.optimize.least_squares(
@@ -172,9 +174,9 @@ class Innovations:
         moved = np.zeros((0, n)), np.zeros((0, n + 1)), np.zeros((0, 2, n))
         passing = np.zeros(0)
         if sloped and self.others.start < self.others.stop:
-            column, moved, passing = self._moved(numbers, n)
+            column, moved, passing = self._derivatives(numbers, n)
         noise = self.noise / through
-        drift = (view.looseness * DRIFT * float(np.std(np.diff(position))) * self.fs) ** 2
+        drift = (view.process_noise_factor * DRIFT * float(np.std(np.diff(position))) * self.fs) ** 2
         out, slopes = np.empty(n), np.empty((n, numbers.size) if sloped else (0, 0))
         own = numbers[: self.friction.stop].copy()
         nudge = 1e-6 * np.maximum(np.abs(own[self.friction]), 1e-3 * np.where(self.log[self.friction], 0.0, self.unit[self.friction]) + 1e-300)
@@ -184,9 +186,9 @@ class Innovations:
             against,
             own,
             self.fs,
-            (view.deaf * noise) ** 2,
+            (view.encoder_noise_factor * noise) ** 2,
             drift,
-            max(view.cuts, self._cuts(numbers, view.turn)),
+            max(view.sub_steps, self._sub_steps(numbers, view.turn)),
             *moved,
             column,
             nudge,
@@ -203,30 +205,31 @@ class Innovations:
             slopes = np.clip(np.nan_to_num(slopes, nan=0.0), -WORST, WORST)
         return out, slopes
 
-    def _cuts(self, numbers: FloatArray, turn: float) -> int:
+    def _sub_steps(self, numbers: FloatArray, turn: float) -> int:
         """Sub-steps of a sample with which the closed contact, as stiff as it usually is, turns so far in each, rad."""
         depth = PRESSED * SPEED / numbers[RATE]
         stiffer = 1.0 + numbers[HERTZ] * (1.5 * np.sqrt(2.0 * depth / numbers[GAP]) - 1.0)
         return min(int(np.ceil(numbers[RATE] * np.sqrt(max(stiffer, 0.0)) / self.fs / turn)), MOST)
 
     def _undone(self, numbers: FloatArray, n: int) -> tuple[FloatArray, FloatArray, FloatArray, float]:
-        return self.beside.undo(np.concatenate((numbers[:3], numbers[self.others])), n)
+        return self.companions.undo(np.concatenate((numbers[:3], numbers[self.others])), n)
 
-    def _moved(self, numbers: FloatArray, n: int) -> tuple[NDArray[np.int64], tuple[FloatArray, FloatArray, FloatArray], FloatArray]:
-        """Columns, and derivatives by their numbers of voltage, position and forces, and of what passes of a sudden change."""
+    def _derivatives(self, numbers: FloatArray, n: int) -> tuple[NDArray[np.int64], tuple[FloatArray, FloatArray, FloatArray], FloatArray]:
+        """Indices of the numbers that matter, the derivatives of voltage, position and forces by them, and that of the part of a sudden change
+        that the encoder shows at once."""
         here = self._undone(numbers, n)
-        column = np.array([*self.heeded, *range(self.others.start, self.others.stop)])
+        column = np.array([*self.influential, *range(self.others.start, self.others.stop)])
         steps = STEP * self.unit[column] * np.where(self.log[column], numbers[column], 1.0)
         rows = []
         for place, step in zip(column, steps, strict=True):
             moved = numbers.copy()
             moved[place] += step
             rows.append([(np.asarray(new) - old) / step for new, old in zip(self._undone(moved, n), here, strict=True)])
-        heeds = [place >= 3 or any(np.any(item) for item in row) for place, row in zip(column, rows, strict=True)]
-        self.heeded = column[[place < 3 and seen for place, seen in zip(column, heeds, strict=True)]]
-        kept = [row for row, seen in zip(rows, heeds, strict=True) if seen]
+        matters = [place >= 3 or any(np.any(item) for item in row) for place, row in zip(column, rows, strict=True)]
+        self.influential = column[[place < 3 and used for place, used in zip(column, matters, strict=True)]]
+        kept = [row for row, used in zip(rows, matters, strict=True) if used]
         voltage, position, against, through = (np.array(items) for items in zip(*kept, strict=True))
-        return column[heeds], (voltage, position, against), through
+        return column[matters], (voltage, position, against), through
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,8 +17,8 @@ from xy_sysid.effects.backlash.innovations import Innovations, View
 from xy_sysid.jit import on_all_cores
 from xy_sysid.samples.block import FloatArray
 
-FIRST = View(samples=4000, looseness=5.0, cuts=4, turn=0.7)
-SECOND = View(samples=8000, looseness=1.2, cuts=4, turn=0.35)
+FIRST = View(samples=4000, process_noise_factor=5.0, sub_steps=4, turn=0.7)
+SECOND = View(samples=8000, process_noise_factor=1.2, sub_steps=4, turn=0.35)
 GAPS = (10.0, 0.5, 2.0)  # from so many encoder noises up to so much of the way between two reversals, each so much wider
 WIDEST = 12  # gaps at most
 SHARES = (0.3, 0.4, 0.5, 0.6, 0.7, 0.8)
@@ -28,29 +28,29 @@ REST = (0.0, 0.1, 0.3, 0.0)  # loss, guide, hertz, rub
 AROUND = ((0.75, 0.87, 1.0, 1.15, 1.32, 1.6), (0.7, 1.0, 1.6, 2.5), (0.0, 1.0))  # gap and rate over what was found; hertz
 APART = {"gap": 0.6, "share": 0.15, "rate": 0.8}  # starts that differ by less, in logarithms but for the share, find the same
 NEAR = {"gap": 0.2, "rate": 0.6, "hertz": 0.7}
-BEST = (5, 4)  # starts that are followed, of the first and of the second grid
-RACE = ((6, 2), (20, 1))  # steps that each start goes, and how many go on
+BEST = (5, 4)  # start values that are fitted, of the first and of the second grid
+ROUNDS = ((6, 2), (20, 1))  # solver steps of each start value, and how many start values are kept
 ENOUGH = 3e-3  # relative fall of the cost in a step, below which it ends
 GAP, RATE, HERTZ = (NAMES.index(name) for name in ("gap", "rate", "hertz"))
 
 
-def searched(fit: Innovations, task: OneStepTask) -> FloatArray:
-    """Coordinates near the best fit, from a grid."""
+def best_of_grids(fit: Innovations, task: OneStepTask) -> FloatArray:
+    """Coordinates near the best fit: the best of a grid, then the best of a second grid around it."""
     first, second = FIRST.within(task.stages[0]), SECOND.within(task.stages[0])
-    grid = product(_gaps(task.noise, task.beside.swing), SHARES, RATES, DAMPINGS)
+    grid = product(_gaps(task.noise, task.companions.swing), SHARES, RATES, DAMPINGS)
     starts = [fit.start(task.base, (*numbers, *REST), task.dry.values) for numbers in grid]
-    found = _raced(fit, _best(fit, starts, first, APART, BEST[0]), first)
+    found = _best_after_rounds(fit, _best(fit, starts, first, APART, BEST[0]), first)
     around = [found]
     for wider, stiffer, hertz in product(*AROUND):
         numbers = fit.outer(found)
         numbers[GAP], numbers[RATE], numbers[HERTZ] = numbers[GAP] * wider, numbers[RATE] * stiffer, hertz
         around.append(fit.inner(numbers))
-    return _raced(fit, [found, *_best(fit, around, second, NEAR, BEST[1])], second)
+    return _best_after_rounds(fit, [found, *_best(fit, around, second, NEAR, BEST[1])], second)
 
 
 def _best(fit: Innovations, starts: list[FloatArray], view: View, apart: dict[str, float], most: int) -> list[FloatArray]:
     """Those that cost least, each unlike the others, best first."""
-    errors = on_all_cores(lambda start: fit.seen(start, view), starts)
+    errors = on_all_cores(lambda start: fit.innovations(start, view), starts)
     scale = min(fit.scale(error) for error in errors)
     costs = [fit.cost(error, scale) for error in errors]
     places, widths = [NAMES.index(name) for name in apart], np.array(list(apart.values()))
@@ -64,13 +64,13 @@ def _best(fit: Innovations, starts: list[FloatArray], view: View, apart: dict[st
     return found
 
 
-def _raced(fit: Innovations, starts: list[FloatArray], view: View) -> FloatArray:
-    """The best of some starts: each goes a few steps, the better ones more."""
-    scale = min(fit.scale(fit.seen(start, view)) for start in starts)
+def _best_after_rounds(fit: Innovations, starts: list[FloatArray], view: View) -> FloatArray:
+    """The best of some start values after a few solver steps; in each round fewer are kept and get more steps."""
+    scale = min(fit.scale(fit.innovations(start, view)) for start in starts)
     every = np.arange(starts[0].size)
-    for steps, left in RACE:
+    for steps, left in ROUNDS:
         moved = on_all_cores(partial(fit.solved, free=every, view=view, most=steps, enough=ENOUGH, scale=scale), starts)
-        starts = sorted(moved, key=lambda start: fit.cost(fit.seen(start, view), scale))[:left]
+        starts = sorted(moved, key=lambda start: fit.cost(fit.innovations(start, view), scale))[:left]
     return starts[0]
 
 

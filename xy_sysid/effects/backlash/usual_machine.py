@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from xy_sysid.effects._contract import Beside, DryFriction, Followed, OneStepTask
+from xy_sysid.effects._contract import Companions, DryFriction, FilterFit, OneStepTask
 from xy_sysid.effects._similarity import Similarity
 from xy_sysid.samples.block import FloatArray
 
@@ -15,33 +15,33 @@ CONTACT = ("m", "", "rad/s", "", "s/m", "", "", "V")  # gap, share, rate, dampin
 
 def to_usual(task: OneStepTask) -> OneStepTask:
     """The same task there."""
-    similar, bar = task.beside.similar, task.limits.bar
+    similar, bar = task.companions.similar, task.limits.bar
     return replace(
         task,
         sampling_rate=task.sampling_rate * similar.time,
         base=_triple(_scaled(task.base, BASE, similar, True)),
         noise=task.noise / similar.length,
-        beside=usual(task.beside),
+        companions=usual(task.companions),
         dry=_dry(task.dry, similar, True),
-        begin=None if task.begin is None else from_usual(task.begin, similar, back=True),
+        earlier=None if task.earlier is None else from_usual(task.earlier, similar, back=True),
         limits=task.limits if bar is None else replace(task.limits, bar=bar / similar.length),
     )
 
 
-def usual(beside: Beside) -> Beside:
-    """What acts beside it there; its own numbers stay as they are."""
-    similar = beside.similar
+def usual(companions: Companions) -> Companions:
+    """The companions on the reference machine; their own parameters stay as they are."""
+    similar = companions.similar
 
     def undo(numbers: FloatArray, n: int) -> tuple[FloatArray, FloatArray, FloatArray, float]:
         own = numbers.copy()
         own[:3] = _scaled(numbers[:3], BASE, similar, False)
-        voltage, position, against, through = beside.undo(own, n)
+        voltage, position, against, through = companions.undo(own, n)
         return voltage / similar.voltage, position / similar.length, against / similar.voltage, through
 
-    return replace(beside, undo=undo, similar=Similarity(), swing=beside.swing / similar.length)
+    return replace(companions, undo=undo, similar=Similarity(), swing=companions.swing / similar.length)
 
 
-def from_usual(found: Followed, similar: Similarity, back: bool = False) -> Followed:
+def from_usual(found: FilterFit, similar: Similarity, back: bool = False) -> FilterFit:
     """A result there as one here; back: one here as it would be there."""
     length = 1.0 / similar.length if back else similar.length
     return replace(
