@@ -355,7 +355,7 @@ def test_a_gap_is_asked_for_early_and_once(effect: str, monkeypatch: pytest.Monk
     fitted = extended
 
     def counted(data: AxisData, base: GreyboxFit, gap: Effect, *others: Any) -> Any:
-        asked.append((gap.name, str(others[0].hidden), *sorted(name for name, _ in base.model.effects)))
+        asked.append((gap.name, str(others[0].masked), *sorted(name for name, _ in base.model.effects)))
         return fitted(data, base, gap, *others)
 
     monkeypatch.setattr(one_step, "extended", counted)
