@@ -25,8 +25,8 @@ class ResidualCorrelation:
     """Correlations of a residual.
 
     lag:    (m,) samples, from 0; autocorrelation: (m,), 1 at lag 0; white: bound of 95 % of it for a white residual
-    shift:  (2 m - 1,) samples by which the residual comes after the input (below 0: before it, which only feedback can cause)
     shift:  (2 m - 1,) samples of the residual's delay relative to the input (negative: only feedback can cause it)
+    cross:  (2 m - 1,) correlation of input and residual, -1..1; unrelated: bound of 95 % of it for unrelated signals
     """
 
     lag: FloatArray
